@@ -1,0 +1,272 @@
+"""Addresses name devices and carry their settings: ``scheme:target?key=value&key=value``.
+
+``parse_address`` splits them, ``Options`` hands out the settings with their types and bounds and
+refuses what nobody asked for, ``Registry`` finds who opens a scheme. Devices of other packages
+register through the entry point groups ``phasedic.cameras`` and ``phasedic.load_cells``, whose
+entries are openers named after their scheme.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from typing import TYPE_CHECKING, Generic, TypeVar, overload
+from urllib.parse import unquote
+
+from acquire.errors import ConfigError
+from acquire.events import EventSink, ignore_event
+
+if TYPE_CHECKING:
+    from acquire.camera import Camera
+    from acquire.load_cell import LoadCell
+
+# A glob may hold a question mark too: settings are the last one followed by key=value pairs.
+_SETTINGS = re.compile(r"\?((?:[A-Za-z_]\w*=[^&?]*)(?:&[A-Za-z_]\w*=[^&?]*)*)$")
+_SCHEME = re.compile(r"^([A-Za-z][\w+.-]+):")
+
+TRUE_WORDS, FALSE_WORDS = ("1", "yes", "true", "on"), ("0", "no", "false", "off")
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """An address taken apart.
+
+    Attributes
+    ----------
+    text : str
+        As it was given.
+    scheme : str
+        "" for a bare path such as ``/dev/video0``.
+    target : str
+        What stands between the scheme and the settings.
+    settings : tuple of (key, value)
+    """
+
+    text: str
+    scheme: str
+    target: str
+    settings: tuple[tuple[str, str], ...]
+
+
+def parse_address(text: str) -> Address:
+    """Take an address apart.
+
+    Raises
+    ------
+    ConfigError
+        An empty address, or a key given twice.
+    """
+    if not text.strip():
+        raise ConfigError("an address is empty; give for example sim:, /dev/video0 or files:shots/*.tif")
+    found = _SETTINGS.search(text)
+    body = text[: found.start()] if found else text
+    pairs = [pair.partition("=") for pair in found[1].split("&")] if found else []
+    settings = tuple((key, unquote(value)) for key, _, value in pairs)
+    if len({key for key, _ in settings}) < len(settings):
+        raise ConfigError(f"{text}: a setting is given twice; give each once")
+    scheme = _SCHEME.match(body)
+    if not scheme:
+        return Address(text, "", body, settings)
+    return Address(text, scheme[1].lower(), body[scheme.end() :], settings)
+
+
+class Options:
+    """The settings of an address, taken one by one with their types and bounds.
+
+    After the last one ``done()`` refuses what is left and lists what was asked for.
+    """
+
+    def __init__(self, address: Address) -> None:
+        self.address = address
+        self._left = dict(address.settings)
+        self._known: list[str] = []
+
+    @overload
+    def text(self, key: str, default: str) -> str: ...
+    @overload
+    def text(self, key: str, default: None = None) -> str | None: ...
+    def text(self, key: str, default: str | None = None) -> str | None:
+        """The setting as it stands, or ``default``."""
+        self._known.append(key)
+        return self._left.pop(key, default)
+
+    def choice(self, key: str, allowed: tuple[str, ...], default: str) -> str:
+        """One of ``allowed``."""
+        value = self.text(key, default)
+        if value not in allowed:
+            raise self._wrong(key, value, "one of " + ", ".join(allowed))
+        return value
+
+    @overload
+    def number(self, key: str, default: float, *, minimum: float = ..., maximum: float = ...) -> float: ...
+    @overload
+    def number(
+        self, key: str, default: None = None, *, minimum: float = ..., maximum: float = ...
+    ) -> float | None: ...
+    def number(
+        self,
+        key: str,
+        default: float | None = None,
+        *,
+        minimum: float = float("-inf"),
+        maximum: float = float("inf"),
+    ) -> float | None:
+        """A finite number within bounds, or ``default`` where it is not given."""
+        value = self.text(key)
+        if value is None:
+            return default
+        try:
+            number = float(value)
+        except ValueError:
+            number = float("nan")
+        if not minimum <= number <= maximum or number in (float("inf"), float("-inf")):
+            raise self._wrong(key, value, f"a number{_bounds(minimum, maximum)}")
+        return number
+
+    @overload
+    def integer(self, key: str, default: int, *, minimum: int = ..., maximum: int = ...) -> int: ...
+    @overload
+    def integer(
+        self, key: str, default: None = None, *, minimum: int = ..., maximum: int = ...
+    ) -> int | None: ...
+    def integer(
+        self,
+        key: str,
+        default: int | None = None,
+        *,
+        minimum: float = float("-inf"),
+        maximum: float = float("inf"),
+    ) -> int | None:
+        """A whole number within bounds, or ``default`` where it is not given."""
+        value = self.text(key)
+        if value is None:
+            return default
+        try:
+            number: int | None = int(value)
+        except ValueError:
+            number = None
+        if number is None or not minimum <= number <= maximum:
+            raise self._wrong(key, value, f"a whole number{_bounds(minimum, maximum)}")
+        return number
+
+    def flag(self, key: str, default: bool = False) -> bool:
+        """Yes or no."""
+        value = self.text(key)
+        if value is None:
+            return default
+        if value.lower() not in TRUE_WORDS + FALSE_WORDS:
+            raise self._wrong(key, value, "yes or no")
+        return value.lower() in TRUE_WORDS
+
+    def rest(self) -> dict[str, str]:
+        """All settings not taken yet, for a scheme with keys of its own choosing."""
+        left, self._left = self._left, {}
+        return left
+
+    def done(self) -> None:
+        """Refuse what is left.
+
+        Raises
+        ------
+        ConfigError
+            Names the unknown key and lists the known ones.
+        """
+        if self._left:
+            known = ", ".join(self._known) or "none"
+            raise ConfigError(
+                f"{self.address.text}: unknown setting {next(iter(self._left))!r}; known: {known}"
+            )
+
+    def _wrong(self, key: str, value: object, allowed: str) -> ConfigError:
+        return ConfigError(f"{self.address.text}: {key}={value} is not possible; allowed: {allowed}")
+
+
+def _bounds(low: float, high: float) -> str:
+    if low == float("-inf") and high == float("inf"):
+        return ""
+    if high == float("inf"):
+        return f" from {low:g}"
+    return f" from {low:g} to {high:g}"
+
+
+Device = TypeVar("Device")
+Opener = Callable[[Address, EventSink], Device]
+
+
+class Registry(Generic[Device]):
+    """Which function opens which scheme.
+
+    Parameters
+    ----------
+    what : str
+        "camera" or "load cell", for messages.
+    group : str
+        Entry point group through which other packages add schemes.
+    builtin : mapping of scheme to "module:function"
+        Imported when first used, so that asking for help stays fast.
+    fallback : str or None
+        "module:function" that takes every scheme nobody else knows (a pyserial URL).
+    """
+
+    def __init__(self, what: str, group: str, builtin: dict[str, str], fallback: str | None = None) -> None:
+        self._what, self._group, self._fallback = what, group, fallback
+        self._openers: dict[str, str | Opener[Device]] = dict(builtin)
+
+    def register(self, scheme: str, opener: Opener[Device]) -> None:
+        """Add or replace a scheme."""
+        self._openers[scheme] = opener
+
+    def schemes(self) -> list[str]:
+        """All known schemes, those of other packages included."""
+        return sorted({*self._openers, *(entry.name for entry in entry_points(group=self._group))})
+
+    def open(self, text: str, on_event: EventSink = ignore_event) -> Device:
+        """Open what ``text`` names; see ``Camera`` and ``LoadCell`` for what is raised."""
+        address = parse_address(text)
+        return self._find(address)(address, on_event)
+
+    def _find(self, address: Address) -> Opener[Device]:
+        opener = self._openers.get(address.scheme)
+        if opener is None:
+            for entry in entry_points(group=self._group, name=address.scheme):
+                opener = entry.load()
+        if opener is None:
+            opener = self._fallback
+        if opener is None:
+            known = ", ".join(f"{scheme}:" if scheme else "/dev/..." for scheme in self.schemes())
+            raise ConfigError(
+                f"{address.text}: no {self._what} has the scheme {address.scheme}:; known: {known}"
+            )
+        return _load(opener) if isinstance(opener, str) else opener
+
+
+def _load(path: str) -> Callable[..., Device]:
+    module, _, name = path.partition(":")
+    found: Callable[..., Device] = getattr(importlib.import_module(module), name)
+    return found
+
+
+CAMERAS: Registry[Camera] = Registry(
+    "camera",
+    "phasedic.cameras",
+    {
+        "": "acquire.v4l2:open_v4l2",
+        "opencv": "acquire.opencv_camera:open_opencv",
+        "video": "acquire.video_file:open_video",
+        "files": "acquire.image_files:open_files",
+        "session": "acquire.session_devices:open_session_camera",
+    },
+)
+LOAD_CELLS: Registry[LoadCell] = Registry(
+    "load cell",
+    "phasedic.load_cells",
+    {
+        "": "acquire.serial_cell:open_serial",
+        "none": "acquire.no_load_cell:open_none",
+        "session": "acquire.session_devices:open_session_load",
+    },
+    fallback="acquire.serial_cell:open_serial",
+)

@@ -1,0 +1,149 @@
+"""The compiled pass over the frames of a burst: sum, temporal differences and clipped pixels at once.
+
+Imported only when the first burst is taken, since numba costs a second.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import njit, types
+from numpy.typing import NDArray
+
+GROUP = 8  # frames folded in one pass; a burst of at most so many never stores its sum
+BLOCK = 4096  # pixels that stay in the first-level cache while the frames go by
+
+
+def scratch(dtype: Any) -> tuple[NDArray[Any], NDArray[Any]]:
+    """A block of sums and one of maxima for frames of this type; narrow types fill vectors best."""
+    return np.empty(BLOCK, np.uint16 if np.dtype(dtype).itemsize == 1 else np.uint32), np.empty(BLOCK, dtype)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def fold(
+    frames: tuple[NDArray[Any], ...],
+    k: int,
+    previous: NDArray[Any],
+    sums: NDArray[Any],
+    tops: NDArray[Any],
+    total: NDArray[np.uint32],
+    mean: NDArray[np.float32],
+    clipped: NDArray[np.bool_],
+    saturation: int,
+    first: bool,
+    n: int,
+) -> Any:
+    """Add k frames to a burst; finish it when n > 0.
+
+    Parameters
+    ----------
+    frames : GROUP arrays (P,) uint8 | uint16, GL
+        The first k count; the rest fill up the tuple.
+    previous : (P,) of the same type, GL
+        The frame before them (not looked at when ``first``).
+    sums, tops : (BLOCK,)
+        Room to work in, from ``scratch``.
+    total : (P,) uint32, GL
+        Sum so far; untouched when ``first`` and ``n > 0``.
+    mean : (P,) float32, GL
+        Written when ``n > 0``: the sum divided by n, correctly rounded.
+    clipped : (P,) bool
+        Set where a frame reaches ``saturation``.
+
+    Returns
+    -------
+    int, GL^2
+        Sum of the squared differences between successive frames, exact.
+    """
+    squares = np.uint64(0)
+    for start in range(0, previous.size, BLOCK):
+        stop = min(start + BLOCK, previous.size)
+        part, top = sums[: stop - start], tops[: stop - start]
+        for i in range(k):
+            image = frames[i][start:stop]
+            _add(image, part, top, i == 0)
+            if i > 0:
+                squares += _squares(image, frames[i - 1][start:stop])
+            elif not first:
+                squares += _squares(image, previous[start:stop])
+        _mark(top, clipped[start:stop], saturation, first)
+        if n > 0:
+            _divide(part, total[start:stop], mean[start:stop], first, n)
+        else:
+            _keep(part, total[start:stop], first)
+    return squares
+
+
+# One plain loop for each step: the compiler vectorises these, but not their union.
+@njit(cache=True, nogil=True, error_model="numpy")
+def _add(image: NDArray[Any], part: NDArray[Any], top: NDArray[Any], begin: bool) -> None:
+    if begin:
+        for j in range(image.size):
+            part[j] = image[j]
+        for j in range(image.size):
+            top[j] = image[j]
+    else:
+        for j in range(image.size):
+            part[j] += image[j]
+        for j in range(image.size):
+            top[j] = max(top[j], image[j])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _squares(image: NDArray[Any], before: NDArray[Any]) -> Any:
+    if image.itemsize == 1:
+        return _squares_8(image, before)
+    return _squares_16(image, before)
+
+
+# BLOCK * 255^2 fits into 32 bits, so 8-bit frames need no wider lanes.
+@njit(cache=True, nogil=True, error_model="numpy", locals={"total": types.int32, "d": types.int32})
+def _squares_8(image: NDArray[Any], before: NDArray[Any]) -> Any:
+    total = np.int32(0)
+    for j in range(image.size):
+        d = np.int32(image[j]) - np.int32(before[j])
+        total += d * d
+    return np.uint64(total)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _squares_16(image: NDArray[Any], before: NDArray[Any]) -> Any:
+    total = np.uint64(0)
+    for j in range(image.size):
+        d = np.int32(image[j]) - np.int32(before[j])
+        total += np.uint64(np.uint32(d * d))
+    return total
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _mark(top: NDArray[Any], flags: NDArray[np.bool_], saturation: int, first: bool) -> None:
+    limit = top.dtype.type(saturation)
+    if first:
+        for j in range(top.size):
+            flags[j] = top[j] >= limit
+    else:
+        for j in range(top.size):
+            flags[j] |= top[j] >= limit
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _divide(
+    part: NDArray[Any], total: NDArray[np.uint32], mean: NDArray[np.float32], first: bool, n: int
+) -> None:
+    if first:  # so small a sum is exact in float32, and so its quotient correctly rounded
+        for j in range(part.size):
+            mean[j] = np.float32(part[j]) / np.float32(n)
+    else:
+        for j in range(part.size):
+            mean[j] = np.float32(np.float64(total[j] + part[j]) / np.float64(n))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _keep(part: NDArray[Any], total: NDArray[np.uint32], first: bool) -> None:
+    if first:
+        for j in range(part.size):
+            total[j] = part[j]
+    else:
+        for j in range(part.size):
+            total[j] += part[j]

@@ -1,0 +1,32 @@
+"""Errors a person can act on.
+
+Each message names the device or file, says what happened and what to do next.
+Whatever is not one of these is a defect of ours and reaches main with its
+traceback in the log.
+"""
+
+from __future__ import annotations
+
+
+class PhasedicError(Exception):
+    """Base of all errors a person can act on; ``exit_code`` is what the process ends with."""
+
+    exit_code = 1
+
+
+class ConfigError(PhasedicError):
+    """Usage or configuration: an unknown key, an impossible value, a malformed address."""
+
+    exit_code = 2
+
+
+class DeviceError(PhasedicError):
+    """A camera or load cell that cannot be opened, or is gone for good."""
+
+    exit_code = 3
+
+
+class DataError(PhasedicError):
+    """A file or its content: missing, truncated, foreign, or not what it says."""
+
+    exit_code = 4

@@ -1,0 +1,71 @@
+"""What happens during a test, as data: device faults, losses, commands, measurements.
+
+An event is shown on the screen, logged, drawn in the view and stored in the session;
+a replay takes the commands and the list of measured bursts from there.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Any, Literal
+
+Level = Literal["info", "warning", "error"]
+
+
+class EventKind(StrEnum):
+    """The kinds of events; the values are what stands in files."""
+
+    START = "start"  # the test begins; data: configuration summary
+    STOP = "stop"  # the test ends; data: reason
+    REFERENCE = "reference"  # data: first, last, n (frame indices), force_N, shift_px
+    MEASURED = "measured"  # data: first, last, n (frame indices of the burst)
+    NEW_REFERENCE = "new-reference"  # command
+    TARE = "tare"  # command; data: offset_N
+    PAUSE = "pause"  # command
+    RESUME = "resume"  # command
+    NOTE = "note"  # the operator's own words
+    LOST = "lost"  # data: count, where
+    DEVICE = "device"  # a fault or recovery of a camera or load cell
+    RECORDER = "recorder"  # disk space, write errors, counted gaps
+    MEASUREMENT = "measurement"  # a trouble or remark of the measuring path
+    VIEW = "view"  # a trouble of the view or another output
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One thing that happened.
+
+    Attributes
+    ----------
+    t : float, s
+        ``time.monotonic()``.
+    kind : EventKind
+    source : str
+        Who says so: an address, "recorder", "operator", ...
+    text : str
+        One sentence for a person.
+    level : "info" | "warning" | "error"
+    data : mapping of str to JSON value
+    """
+
+    t: float
+    kind: EventKind
+    source: str
+    text: str
+    level: Level = "info"
+    data: Mapping[str, Any] = field(default_factory=dict)
+
+
+EventSink = Callable[[Event], None]
+
+
+def ignore_event(event: Event) -> None:
+    """The sink of those who do not listen."""
+
+
+def device_event(sink: EventSink, source: str, text: str, level: Level = "warning", **data: Any) -> None:
+    """Tell ``sink`` about a device, stamped now."""
+    sink(Event(time.monotonic(), EventKind.DEVICE, source, text, level, data))

@@ -1,0 +1,84 @@
+"""Fixed-pattern noise taken out of a burst, on request: dark and flat frames.
+
+Dirt, dust and unequal pixels stand still while the specimen moves, which pulls displacements
+toward zero and does not average out. Pure: arrays in, arrays out; how dark and flat are taken
+(lens covered; an evenly lit white sheet, out of focus) tells docs/cameras.md.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import DataError
+from acquire.frame import Burst, frozen
+
+LEAST_SHARE = 0.05  # of the median of the flat: below it a pixel sees next to nothing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FlatField:
+    """Offset and gain of each pixel.
+
+    Attributes
+    ----------
+    dark : (H, W) float32, GL
+        What a pixel gives without light.
+    gain : (H, W) float32
+        What its light is multiplied with; the median is 1.
+    useless : (H, W) bool
+        Pixels with next to no signal in the flat: left as they are, and marked as clipped.
+    """
+
+    dark: NDArray[np.float32]
+    gain: NDArray[np.float32]
+    useless: NDArray[np.bool_]
+
+    @classmethod
+    def from_images(cls, dark: NDArray[Any] | None, flat: NDArray[Any] | None) -> Self:
+        """From averaged pictures, (H, W), GL; either may be missing.
+
+        Raises
+        ------
+        DataError
+            Neither is given, they differ in size, or the flat is no brighter than the dark.
+        """
+        given = [image for image in (dark, flat) if image is not None]
+        if not given or given[0].shape != given[-1].shape:
+            raise DataError(
+                "a correction needs a dark or a flat picture, or both of one size; take them anew"
+            )
+        offset = np.zeros(given[0].shape, np.float32) if dark is None else dark.astype(np.float32)
+        if flat is None:
+            return cls(offset, np.ones_like(offset), np.zeros(offset.shape, np.bool_))
+        light = flat.astype(np.float32) - offset
+        middle = np.float32(np.median(light))
+        if not middle > 0:
+            raise DataError(
+                "the flat picture is no brighter than the dark one; were they mistaken for each other?"
+            )
+        useless = light < LEAST_SHARE * middle
+        return cls(offset, np.where(useless, np.float32(1), middle / np.where(useless, 1, light)), useless)
+
+    def apply(self, burst: Burst) -> Burst:
+        """The burst with dark and flat taken into account; its noise stays that of a raw frame.
+
+        Raises
+        ------
+        DataError
+            The burst is of another size.
+        """
+        if burst.mean.shape != self.dark.shape:
+            raise DataError(
+                f"the correction is for {_size(self.dark)} pictures, the camera gives {_size(burst.mean)}; "
+                "take dark and flat with this camera setting"
+            )
+        mean = (burst.mean - self.dark) * self.gain
+        return replace(burst, mean=frozen(mean), clipped=frozen(burst.clipped | self.useless))
+
+
+def _size(image: NDArray[Any]) -> str:
+    return f"{image.shape[1]}x{image.shape[0]}"

@@ -1,0 +1,141 @@
+"""What a camera gives: frames, bursts of frames, and a description of the camera.
+
+Times are ``time.monotonic()`` seconds, stamped at the device; grey levels (GL)
+are as the sensor counted them, not scaled to the container.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Clock = Literal["device", "host", "nominal"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """One picture, with its time and what was lost before it.
+
+    Attributes
+    ----------
+    image : (H, W) uint8 or uint16, GL
+        Read-only, and its own memory: never a view of a driver's buffer.
+    index : int
+        Sequence number of the source. Strictly increasing within one run, also across a
+        reconnection; a step of more than one is a gap.
+    t : float, s
+        Mid-exposure where exposure and the meaning of the stamp are known, else ``raw_t``.
+    clock : "device" | "host" | "nominal"
+        Who stamped: the driver, this program after the read, or nobody (a given rate).
+    lost_before : int
+        Frames known to be lost between the frame handed out before and this one.
+    bits : int
+        Significant bits of a sample; saturation is at ``2**bits - 1``.
+    raw_t : float, s
+        The stamp as it came.
+    damaged : bool
+        The device said that the content is not whole (recorded, never measured).
+    """
+
+    image: NDArray[Any]
+    index: int
+    t: float
+    clock: Clock
+    lost_before: int
+    bits: int
+    raw_t: float
+    damaged: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Burst:
+    """The mean of n consecutive frames and what their scatter tells.
+
+    Attributes
+    ----------
+    mean : (H, W) float32, GL
+    n : int
+        Frames averaged.
+    noise : float, GL
+        Temporal standard deviation of ONE frame, from successive differences; NaN when n = 1.
+    clipped : (H, W) bool
+        Pixels that were at saturation in any of the frames.
+    bits : int
+    t : float, s
+        Mean of the times of its frames.
+    duration : float, s
+        Time of the last frame minus that of the first.
+    first_index, last_index : int
+        Sequence numbers of the first and last frame averaged.
+    lost : int
+        Frames lost or damaged since the end of the burst before, and left out of this one.
+    clock : "device" | "host" | "nominal"
+    motion_px : float, px
+        Largest motion of any part of the picture during the burst, estimated; NaN when unknown.
+        Above 0.05 px the mean is smeared.
+    """
+
+    mean: NDArray[np.float32]
+    n: int
+    noise: float
+    clipped: NDArray[np.bool_]
+    bits: int
+    t: float
+    duration: float
+    first_index: int
+    last_index: int
+    lost: int
+    clock: Clock
+    motion_px: float = math.nan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CameraInfo:
+    """What is known of a camera once it is open.
+
+    Attributes
+    ----------
+    address : str
+        The address it was opened with.
+    name : str
+        Identity of the device or file, in words.
+    width, height : int, px
+    bits : int
+        Significant bits of a sample.
+    live : bool
+        True: frames come whether or not they are fetched, and are lost when they are not.
+        False: the source waits for its reader (files, a session, the simulator in lock step).
+    clock : "device" | "host" | "nominal"
+    fps : float or None, 1/s
+    exposure_s : float or None, s
+    pixel_format : str
+        As the driver names it, or the file format.
+    controls : mapping of str to JSON value
+        All settings in force, as read back.
+    warnings : tuple of str
+        What a person should know before trusting the picture.
+    """
+
+    address: str
+    name: str
+    width: int
+    height: int
+    bits: int
+    live: bool
+    clock: Clock
+    fps: float | None = None
+    exposure_s: float | None = None
+    pixel_format: str = ""
+    controls: Mapping[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+
+
+def frozen(image: NDArray[Any]) -> NDArray[Any]:
+    """The same array, made read-only (``Frame.image`` and ``Burst.mean`` are)."""
+    image.flags.writeable = False
+    return image

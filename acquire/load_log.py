@@ -1,0 +1,112 @@
+"""The load against time: filled by one thread while others ask for the force at an instant.
+
+Interpolates, and refuses to where it would invent: outside the log, across a gap, beside an
+overload. Lines that gave no reading at all (garbage, flag ERROR), and readings that waited somewhere
+so that nobody knows of when they are (flag STALE), leave no mark of their own: they are neither a
+force at a known time nor a hole, and the gap rule decides.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from bisect import bisect_left, bisect_right
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.load_sample import LoadFlag, LoadSample
+
+
+class LoadLog:
+    """All samples so far; every method may be called from any thread.
+
+    Parameters
+    ----------
+    max_gap_s : float, s
+        Between samples further apart than this the force is not known.
+    """
+
+    def __init__(self, max_gap_s: float = 0.25) -> None:
+        self._max_gap_s = max_gap_s
+        self._t: list[float] = []
+        self._force: list[float] = []
+        self._latest: LoadSample | None = None
+        self._count = 0
+        self._closed = False
+        self._lock = threading.Lock()
+
+    def append(self, sample: LoadSample) -> None:
+        """Add a sample; a time before the last one counts as the last one's."""
+        with self._lock:
+            self._latest = sample
+            self._count += 1
+            no_reading = LoadFlag.ERROR in sample.flags and math.isnan(sample.force)
+            if no_reading or LoadFlag.STALE in sample.flags:
+                return
+            self._t.append(max(sample.t, self._t[-1]) if self._t else sample.t)
+            self._force.append(sample.force)
+
+    def close(self) -> None:
+        """No more samples will come."""
+        with self._lock:
+            self._closed = True
+
+    def covers(self, t: float) -> bool:
+        """Whether waiting longer cannot change ``force_at(t)``."""
+        with self._lock:
+            return self._closed or bool(self._t and self._t[-1] >= t)
+
+    def force_at(self, t: float) -> float:
+        """The force at an instant, N.
+
+        Parameters
+        ----------
+        t : float, s
+            Monotonic.
+
+        Returns
+        -------
+        float, N
+            Linear between the samples before and after; NaN before the first and after the
+            last sample, across a gap longer than ``max_gap_s`` and beside a NaN sample.
+        """
+        with self._lock:
+            after = bisect_left(self._t, t)
+            if after == len(self._t):
+                return math.nan
+            if self._t[after] == t:
+                return self._force[after]
+            if after == 0:
+                return math.nan
+            return self._between(after - 1, after, t)
+
+    def _between(self, before: int, after: int, t: float) -> float:
+        gap = self._t[after] - self._t[before]
+        if gap > self._max_gap_s:
+            return math.nan
+        part = (t - self._t[before]) / gap
+        return self._force[before] + part * (self._force[after] - self._force[before])
+
+    def mean(self, t0: float, t1: float) -> tuple[float, int]:
+        """The mean force of the samples with t0 <= t <= t1, N, and their number.
+
+        NaN where there is none, or where one of them is NaN (an overload is not averaged away).
+        """
+        with self._lock:
+            chosen = self._force[bisect_left(self._t, t0) : bisect_right(self._t, t1)]
+        return (math.fsum(chosen) / len(chosen) if chosen else math.nan), len(chosen)
+
+    @property
+    def latest(self) -> LoadSample | None:
+        """The newest sample, whatever it says."""
+        return self._latest
+
+    def __len__(self) -> int:
+        """Samples appended, lines without a reading included."""
+        return self._count
+
+    def arrays(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Times (N,) in monotonic s and forces (N,) in N, as they are interpolated."""
+        with self._lock:
+            return np.array(self._t, float), np.array(self._force, float)

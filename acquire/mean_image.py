@@ -1,0 +1,56 @@
+"""Means of many frames as 32-bit TIFF files: what dark and flat frames are kept in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import ConfigError, DataError
+
+Image = NDArray[np.float32]
+
+
+def save_mean(mean: Image, path: Path) -> None:
+    """Write a mean as a 32-bit TIFF.
+
+    Raises
+    ------
+    ConfigError
+        The file exists, or is no TIFF by its name.
+    DataError
+        It cannot be written.
+    """
+    import cv2
+
+    if path.suffix.lower() not in (".tif", ".tiff"):
+        raise ConfigError(f"{path}: dark and flat frames are kept as TIFF; choose a name that ends in .tif")
+    if path.exists():
+        raise ConfigError(f"{path} exists, and nothing is overwritten; choose another name")
+    try:
+        written = cv2.imwrite(str(path), mean)
+    except cv2.error:
+        written = False
+    if not written:
+        raise DataError(f"{path}: cannot be written; look at the folder and the disk")
+
+
+def load_mean(path: str | None) -> Image | None:
+    """Read what ``save_mean`` wrote, or any grey TIFF; None for no path.
+
+    Raises
+    ------
+    DataError
+        Missing or not a grey picture.
+    """
+    import cv2
+
+    if path is None:
+        return None
+    if not Path(path).is_file():
+        raise DataError(f"{path}: there is no such dark or flat frame; take one with phasedic average")
+    image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
+    if image is None or image.ndim != 2 or not np.isfinite(image).all():
+        raise DataError(f"{path}: is not a grey TIFF; take the frame anew with phasedic average")
+    return np.asarray(image, np.float32)

@@ -1,0 +1,24 @@
+"""OpenCV, imported when it is first needed, with limits that must be set before that."""
+
+from __future__ import annotations
+
+import os
+from functools import cache
+from typing import Any
+
+# No damaged header may ask for gigabytes: 268 million pixels are more than any camera has.
+_LIMITS = {
+    "OPENCV_IO_MAX_IMAGE_PIXELS": str(2**28),
+    "OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT": "1",  # s; unless told otherwise a stalled camera blocks for ten
+}
+
+
+@cache
+def load_cv2() -> Any:
+    """The module ``cv2``, quiet: what goes wrong is told by our own errors."""
+    for key, value in _LIMITS.items():
+        os.environ.setdefault(key, value)
+    import cv2
+
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    return cv2

@@ -1,0 +1,182 @@
+"""``ascii``: the free text of HX711 sketches, Arduino, ESP, OpenScale and whatever prints a number.
+
+``12.3``, ``Reading: 12.3 kg``, ``12345,0.512,kg,8388607,21.5,`` (milliseconds, value, unit, raw,
+temperature). A line is an optional label that ends in ``:`` or ``=``, then numbers and units separated
+by commas, semicolons, tabs or spaces. The value is the number in ``column``, else the only number
+beside ``millis``, else the only number followed by a unit; a line that leaves a choice gives no value
+(``12,5 kg`` is one where ``decimal=comma`` is not said).
+
+What cannot be detected: there is no check digit, so a digit lost or changed within a line, or two
+lines run together into one number, reads as another value; ``capacity=`` and ``max_step=`` flag the
+gross ones.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from acquire.addresses import Options
+from acquire.errors import ConfigError
+from acquire.line_buffer import Line
+from acquire.load_sample import LoadFlag
+from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.line_parser import LineParser, bad, number
+from acquire.protocols.units import is_unit
+
+SATURATED = {8388607.0: LoadFlag.OVERLOAD, -8388608.0: LoadFlag.UNDERLOAD}  # of a 24-bit converter
+
+WIDTH_STAYS = 100  # lines in a row
+
+_LABEL = re.compile(r"[A-Za-z][\w .()\[\]/-]{0,60}[:=]", re.ASCII)
+_FIELD = re.compile(r"([-+]? *[0-9.,]+(?:[eE][-+]?[0-9]+)?)?([A-Za-z]*)")
+_SPACED_SIGN = re.compile(r"([-+]) +(?=[0-9.])")
+_POINT_SPLIT = re.compile(r" *[,;\t] *| +")
+_COMMA_SPLIT = re.compile(r" *[;\t] *| +")
+
+
+@dataclass(frozen=True, slots=True)
+class AsciiSettings:
+    """What the address says of the lines; columns count from 1.
+
+    Attributes
+    ----------
+    column : int or None
+        Field of the value.
+    millis : int or None
+        Field of the device's own milliseconds.
+    decimal_comma : bool
+    """
+
+    column: int | None = None
+    millis: int | None = None
+    decimal_comma: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class _Field:
+    value: float  # NaN: none
+    unit: str | None
+    digits: str
+
+    @property
+    def numeric(self) -> bool:
+        return not math.isnan(self.value)
+
+
+class AsciiParser(LineParser):
+    """See the module."""
+
+    def __init__(self, settings: AsciiSettings | None = None) -> None:
+        super().__init__()
+        self._settings = settings or AsciiSettings()
+        self._width, self._other_width, self._others = 0, 0, 0
+
+    def parse(self, line: Line) -> Reading | None:
+        """The reading of a line."""
+        fields = self._fields(line.data)
+        chosen = self._choose(fields) if fields and self._usual(len(fields)) else None
+        if fields is None or chosen is None:
+            return bad(line)
+        unit = fields[chosen].unit or _unit_alone(fields[chosen + 1 : chosen + 2])
+        saturated = _saturation(fields[chosen:])
+        return Reading(
+            value=math.nan if saturated else fields[chosen].value,
+            unit=unit,
+            raw=line.data,
+            start=line.start,
+            flags=saturated,
+            device_ms=None if self._settings.millis is None else fields[self._settings.millis - 1].value,
+        )
+
+    def _fields(self, data: bytes) -> list[_Field] | None:
+        """The fields of a line; None where one is neither a number nor a unit."""
+        text = data.decode("ascii", "replace").strip(" \t")
+        label = _LABEL.match(text)
+        text = _SPACED_SIGN.sub(r"\1", text[label.end() if label else 0 :].strip(" \t"))
+        split = _COMMA_SPLIT if self._settings.decimal_comma else _POINT_SPLIT
+        words = split.split(text)
+        while words and not words[-1]:
+            words.pop()
+        fields = [self._field(word) for word in words]
+        whole = [field for field in fields if field is not None]
+        return whole if len(whole) == len(fields) else None
+
+    def _usual(self, width: int) -> bool:
+        """Whether a line has as many fields as the lines before: a decimal comma makes one more.
+
+        Only where columns are said; a new width that stays is taken over.
+        """
+        if self._settings.column is None or width == self._width or not self._width:
+            self._width, self._others = width, 0
+            return True
+        self._others = self._others + 1 if width == self._other_width else 1
+        self._other_width = width
+        if self._others > WIDTH_STAYS:
+            self._width, self._others = width, 0
+        return width == self._width
+
+    def _field(self, word: str) -> _Field | None:
+        found = _FIELD.fullmatch(word)
+        if not found or not word:
+            return None
+        value = number(found[1], self._settings.decimal_comma) if found[1] else math.nan
+        if (found[1] and math.isnan(value)) or (found[2] and not is_unit(found[2])):
+            return None
+        return _Field(value, found[2] or None, found[1] or "")
+
+    def _choose(self, fields: list[_Field]) -> int | None:
+        """Where the value stands; None where the line does not tell."""
+        millis, column = self._settings.millis, self._settings.column
+        if millis is not None and not _numeric_at(fields, millis):
+            return None
+        if column is not None:
+            return column - 1 if _numeric_at(fields, column) else None
+        numeric = [i for i, field in enumerate(fields) if field.numeric and i + 1 != millis]
+        if len(numeric) != 1:
+            numeric = [i for i in numeric if fields[i].unit or _unit_alone(fields[i + 1 : i + 2])]
+            numeric = [i for i in numeric if i in (0, millis) or not _may_be_one(fields[i - 1], fields[i])]
+        return numeric[0] if len(numeric) == 1 else None
+
+
+def _numeric_at(fields: list[_Field], column: int) -> bool:
+    return column <= len(fields) and fields[column - 1].numeric
+
+
+def _may_be_one(before: _Field, after: _Field) -> bool:
+    """Whether two neighbours may be one number: 12,5 or 1,234.5."""
+    if after.digits[:1] in ("+", "-"):
+        return False
+    whole, point, _ = after.digits.partition(".")
+    return before.numeric and "." not in before.digits and (not point or len(whole) == 3)
+
+
+def _unit_alone(after: list[_Field]) -> str | None:
+    return after[0].unit if after and not after[0].numeric else None
+
+
+def _saturation(fields: list[_Field]) -> LoadFlag:
+    return next((SATURATED[f.value] for f in fields if f.value in SATURATED), LoadFlag.NONE)
+
+
+def make_parser(options: Options) -> Parser:
+    """Takes ``column``, ``millis`` and ``decimal`` out of the address."""
+    settings = AsciiSettings(
+        column=options.integer("column", minimum=1, maximum=64),
+        millis=options.integer("millis", minimum=1, maximum=64),
+        decimal_comma=options.choice("decimal", ("point", "comma"), "point") == "comma",
+    )
+    if settings.column is not None and settings.column == settings.millis:
+        raise ConfigError(f"{options.address.text}: column and millis must differ")
+    return AsciiParser(settings)
+
+
+PROTOCOL = Protocol(
+    name="ascii",
+    summary="free text lines: [milliseconds,] value [unit] ... (HX711, Arduino, ESP, OpenScale)",
+    make_parser=make_parser,
+    baud=9600,
+    flags_overload=False,
+    undetected="no check digit: a lost or changed digit reads as another value",
+)

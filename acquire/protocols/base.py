@@ -1,0 +1,119 @@
+"""What a protocol is: a description, a parser, and the bytes of its commands."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Literal
+
+from acquire.addresses import Options
+from acquire.load_sample import LoadFlag
+
+Mode = Literal["listen", "stream", "poll"]
+Parity = Literal["N", "E", "O"]
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One message of a device, as it stood on the line.
+
+    Attributes
+    ----------
+    value : float
+        In ``unit``, with the sign of the line; NaN where there is no valid value.
+    unit : str or None
+        None where the line names none.
+    stable : bool or None
+        None where the line does not say.
+    flags : LoadFlag
+    raw : bytes
+        Without the line end.
+    start : int
+        Number of the first byte of the message, counted from the first byte ever fed.
+    device_ms : float or None, ms
+    """
+
+    value: float
+    unit: str | None
+    raw: bytes
+    start: int
+    stable: bool | None = None
+    flags: LoadFlag = LoadFlag.NONE
+    device_ms: float | None = None
+
+
+class Parser(ABC):
+    """Turns bytes, in any chunking, into readings. Never raises, whatever the bytes.
+
+    Only complete messages that match the whole grammar give values; a complete message that
+    does not is a reading with flag ERROR and value NaN, so that its bytes are kept.
+
+    Attributes
+    ----------
+    commands : mapping of str to bytes
+        Added to those of the protocol, where they depend on settings.
+    """
+
+    commands: Mapping[str, bytes] = MappingProxyType({})
+
+    @abstractmethod
+    def feed(self, data: bytes) -> list[Reading]:
+        """Take the next bytes; the readings that they complete."""
+
+    def silence(self) -> list[Reading]:
+        """Told that nothing came for a while: where no byte ends a message, silence does."""
+        return []
+
+    @abstractmethod
+    def restart(self) -> None:
+        """The connection was interrupted: what is half received will never be completed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Protocol:
+    """A protocol's description.
+
+    Attributes
+    ----------
+    name, summary : str
+    make_parser : callable taking Options
+        Takes its own settings out of the address; may raise ConfigError.
+    baud, bytesize, parity : line settings where the address says none
+    mode : "listen" | "stream" | "poll"
+        Listen: the device sends by itself. Stream: it does after the command ``start``.
+        Poll: each reading is asked for with ``poll``.
+    sign : int
+        With which tension is positive.
+    unit_on_line : bool
+        False: the user must say the unit.
+    flags_overload : bool
+        False: an overload shows only as a value beyond the capacity.
+    commands : mapping of str to bytes
+        "poll", "single", "start", "stop", "tare", "zero", "identify" as far as the device has them.
+    rates : mapping of 1/s to bytes
+        Commands that start a stream at these rates, where the device lets choose.
+    undetected : str
+        What damage of a line this protocol cannot show, for the documentation and the log.
+    max_rate : float, 1/s
+        Of polling, where the address says none.
+    silence_s : float, s
+        After which a message without an end is over.
+    """
+
+    name: str
+    summary: str
+    make_parser: Callable[[Options], Parser]
+    baud: int = 9600
+    bytesize: int = 8
+    parity: Parity = "N"
+    mode: Mode = "listen"
+    sign: int = 1
+    unit_on_line: bool = True
+    flags_overload: bool = True
+    commands: Mapping[str, bytes] = field(default_factory=dict)
+    undetected: str = ""
+    max_rate: float = 10.0
+    rates: Mapping[float, bytes] = field(default_factory=dict)
+    silence_s: float = 0.1

@@ -1,0 +1,93 @@
+"""``hbm-aed``: HBM AD103, AD104, AED, WE2107.
+
+Eight characters of counts, optionally with address and status: ``xxxxxxxx,aa,sss``. In the output format
+``COF9`` the status tells overflow and standstill; without it neither shows. The counts become a force by
+``nominal=`` (what the factory scale of 1 000 000 counts stands for, in ``unit``), or by
+``decimals=`` where the device's NOV scale gives units times a power of ten.
+
+What cannot be detected: no check digit; without status (``COF3``) no overflow (say ``capacity=``).
+"""
+
+from __future__ import annotations
+
+import re
+
+from acquire.addresses import Options
+from acquire.errors import ConfigError
+from acquire.line_buffer import Line
+from acquire.load_sample import LoadFlag
+from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.line_parser import LineParser, bad, number
+
+NOMINAL_COUNTS = 1_000_000
+OVERFLOW, STANDSTILL = 0b0111, 0b1000
+
+_LINE = re.compile(rb"([-+ ][ 0-9]{6}[0-9]|[0-9]{8})(?:,([0-9]{2}))?(?:,([0-9]{3}))?")
+_TARE = b"TAR;"
+
+
+class HbmAedParser(LineParser):
+    """See the module.
+
+    Parameters
+    ----------
+    per_count : float
+        Value of one count.
+    """
+
+    def __init__(self, per_count: float = 1.0) -> None:
+        super().__init__()
+        self._per_count = per_count
+
+    def parse(self, line: Line) -> Reading | None:
+        """The reading of a line."""
+        if line.data == b"0":  # a setting was taken
+            return None
+        found = _LINE.fullmatch(line.data)
+        counts = number(found[1].decode()) if found else float("nan")
+        if not found or counts != counts:
+            return bad(line)
+        if found[3] is None:
+            return Reading(counts * self._per_count, None, line.data, line.start)
+        return self._with_status(line, counts, int(found[3]))
+
+    def _with_status(self, line: Line, counts: float, status: int) -> Reading:
+        if status & OVERFLOW:
+            return bad(line, LoadFlag.OVERLOAD if counts >= 0 else LoadFlag.UNDERLOAD)
+        stable = bool(status & STANDSTILL)
+        flags = LoadFlag.NONE if stable else LoadFlag.UNSTABLE
+        return Reading(counts * self._per_count, None, line.data, line.start, stable, flags)
+
+
+def make_parser(options: Options) -> Parser:
+    """Takes ``nominal`` and ``decimals`` out of the address."""
+    nominal = options.number("nominal", minimum=1e-12)
+    decimals = options.integer("decimals", minimum=0, maximum=8)
+    if nominal is not None and decimals is not None:
+        raise ConfigError(f"{options.address.text}: give nominal or decimals, not both")
+    if nominal is not None:
+        return HbmAedParser(nominal / NOMINAL_COUNTS)
+    return HbmAedParser(10.0 ** -(decimals or 0))
+
+
+PROTOCOL = Protocol(
+    name="hbm-aed",
+    summary="HBM AD103/104, AED, WE2107",
+    make_parser=make_parser,
+    bytesize=8,
+    parity="E",
+    mode="stream",
+    unit_on_line=False,
+    commands={
+        "poll": b"MSV?;",
+        "single": b"MSV?;",
+        "start": b"MSV?0;",
+        "stop": b"STP;",
+        "tare": _TARE,
+        "identify": b"IDN?;",
+    },
+    rates={
+        rate: b"ICR%d;MSV?0;" % icr for icr, rate in enumerate((100.0, 50.0, 25.0, 12.0, 6.0, 3.0, 2.0, 1.0))
+    },
+    undetected="no check digit; without the status of COF9 no overflow: say capacity=",
+)

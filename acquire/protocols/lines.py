@@ -1,0 +1,205 @@
+"""``lines``: one regular expression for every other device that sends lines.
+
+``pattern=`` is matched against the whole line and names its parts: ``(?P<value>...)``, and where they
+exist ``unit``, ``sign``, ``flag`` and ``ms``. Words that stand for a state instead of a value:
+``overload=H|OL|--``, ``underload=L``, ``error=Err``, ``unstable=?``: a line that contains
+a word of the first three (as a whole word) has no value; one that contains an unstable word, or whose
+``flag`` is one, is unstable. ``preset=`` loads these from ``line_presets.toml`` or a file of your own.
+
+What cannot be detected: whatever the pattern lets pass. A pattern that backtracks without end makes the
+reading slow; lines are at most 256 bytes.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from acquire.addresses import Options
+from acquire.errors import ConfigError
+from acquire.line_buffer import Line, LineBuffer
+from acquire.load_sample import LoadFlag
+from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.line_parser import LineParser, bad, number
+
+STATES = {"overload": LoadFlag.OVERLOAD, "underload": LoadFlag.UNDERLOAD, "error": LoadFlag.ERROR}
+ENDS = {"line": b"\r\n", "cr": b"\r", "lf": b"\n", "etx": b"\x03"}
+COMMANDS = ("poll", "start", "stop", "tare", "zero")
+PRESETS = Path(__file__).with_name("line_presets.toml")
+KEYS = ("pattern", *STATES, "unstable", "net", "ends", "scale", "decimal", "unit", *COMMANDS)
+
+
+@dataclass(frozen=True, slots=True)
+class LineRules:
+    """What the address or a preset says of the lines.
+
+    Attributes
+    ----------
+    pattern : compiled regular expression of bytes
+    states : tuple of (word, flag)
+        Words that take the place of a value.
+    unstable, net : tuple of bytes
+        Words that go with a value.
+    scale : float
+        The number on the line is multiplied with it.
+    decimal_comma : bool
+    unit : str or None
+        Where the line names none.
+    """
+
+    pattern: re.Pattern[bytes]
+    states: tuple[tuple[bytes, LoadFlag], ...] = ()
+    unstable: tuple[bytes, ...] = ()
+    net: tuple[bytes, ...] = ()
+    scale: float = 1.0
+    decimal_comma: bool = False
+    unit: str | None = None
+
+
+class RuledParser(LineParser):
+    """See the module."""
+
+    def __init__(
+        self, rules: LineRules, ends: bytes = b"\r\n", commands: Mapping[str, bytes] | None = None
+    ) -> None:
+        super().__init__(LineBuffer(ends=ends))
+        self._rules = rules
+        self.commands = dict(commands or {})
+
+    def parse(self, line: Line) -> Reading | None:
+        """The reading of a line."""
+        words = re.findall(rb"[^\s,;:]+", line.data)
+        for word, flag in self._rules.states:
+            if word in words or line.data.strip() == word:
+                return bad(line, flag)
+        found = self._rules.pattern.fullmatch(line.data)
+        return self._value(line, found, words) if found else bad(line)
+
+    def _value(self, line: Line, found: re.Match[bytes], words: list[bytes]) -> Reading:
+        parts = {k: v.decode("ascii", "replace") for k, v in found.groupdict().items() if v is not None}
+        state = dict(self._rules.states).get(found.groupdict().get("flag") or b"")
+        if state is not None:
+            return bad(line, state)
+        value = number(parts.get("sign", "").strip() + parts.get("value", ""), self._rules.decimal_comma)
+        if math.isnan(value):
+            return bad(line)
+        marks = {*words, found.groupdict().get("flag") or b""}
+        unstable = not marks.isdisjoint(self._rules.unstable)
+        flags = LoadFlag.UNSTABLE if unstable else LoadFlag.NONE
+        flags |= LoadFlag.NONE if marks.isdisjoint(self._rules.net) else LoadFlag.NET
+        stable = (not unstable) if self._rules.unstable else None
+        ms = number(parts.get("ms", ""))
+        return Reading(
+            value * self._rules.scale,
+            parts.get("unit") or self._rules.unit,
+            line.data,
+            line.start,
+            stable,
+            flags,
+            None if math.isnan(ms) else ms,
+        )
+
+
+def make_parser(options: Options) -> Parser:
+    """Takes ``preset`` and the keys of a preset out of the address."""
+    preset = options.text("preset")
+    said: dict[str, Any] = load_preset(preset) if preset else {}
+    for key in KEYS:
+        if key == "unit":  # also a setting of every serial address, taken there
+            continue
+        given = options.text(key)
+        if given is not None:
+            said[key] = given
+    try:
+        return parser_from(said)
+    except ConfigError as error:
+        raise ConfigError(f"{options.address.text}: {error}") from error
+
+
+def load_preset(name: str) -> dict[str, Any]:
+    """A preset of ours by its name, or a TOML file with the same keys.
+
+    Raises
+    ------
+    ConfigError
+    """
+    known = tomllib.loads(PRESETS.read_text(encoding="utf-8"))
+    if name in known:
+        return dict(known[name])
+    if not name.endswith(".toml"):
+        raise ConfigError(
+            f"no preset is called {name!r}; there are: {', '.join(known)}, or give a .toml file"
+        )
+    try:
+        said = tomllib.loads(Path(name).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ConfigError(f"preset {name}: {error}") from error
+    unknown = set(said) - set(KEYS)
+    if unknown:
+        raise ConfigError(f"preset {name}: unknown key {min(unknown)!r}; known: {', '.join(KEYS)}")
+    return said
+
+
+def parser_from(said: Mapping[str, Any]) -> RuledParser:
+    """A parser from the keys of a preset.
+
+    Raises
+    ------
+    ConfigError
+        No pattern, an impossible one, or one without a value.
+    """
+    if "pattern" not in said:
+        raise ConfigError("protocol=lines needs pattern= or preset=")
+    ends = ENDS.get(str(said.get("ends", "line")))
+    if ends is None:
+        raise ConfigError(f"ends={said['ends']} is not possible; allowed: {', '.join(ENDS)}")
+    rules = LineRules(
+        pattern=_pattern(str(said["pattern"])),
+        states=tuple((word, flag) for key, flag in STATES.items() for word in _words(said, key)),
+        unstable=_words(said, "unstable"),
+        net=_words(said, "net"),
+        scale=_scale(said.get("scale", 1.0)),
+        decimal_comma=str(said.get("decimal", "point")) == "comma",
+        unit=said.get("unit"),
+    )
+    commands = {key: _bytes(said[key]) for key in COMMANDS if key in said}
+    return RuledParser(rules, ends, commands)
+
+
+def _pattern(text: str) -> re.Pattern[bytes]:
+    try:
+        pattern = re.compile(text.encode())
+    except re.error as error:
+        raise ConfigError(f"pattern={text} is no regular expression: {error}") from error
+    if "value" not in pattern.groupindex:
+        raise ConfigError(f"pattern={text} names no value; write (?P<value>...) around the number")
+    return pattern
+
+
+def _words(said: Mapping[str, Any], key: str) -> tuple[bytes, ...]:
+    return tuple(word.encode() for word in str(said.get(key, "")).split("|") if word)
+
+
+def _scale(value: Any) -> float:
+    scale = number(str(value))
+    if math.isnan(scale) or scale == 0:
+        raise ConfigError(f"scale={value} is not possible; allowed: a number other than zero")
+    return scale
+
+
+def _bytes(text: Any) -> bytes:
+    r"""A command as it is written in a preset: ``\r`` and ``\n`` mean the bytes."""
+    return str(text).replace("\\r", "\r").replace("\\n", "\n").encode("ascii", "replace")
+
+
+PROTOCOL = Protocol(
+    name="lines",
+    summary="any other lines, by a regular expression or a preset",
+    make_parser=make_parser,
+    undetected="whatever the pattern lets pass",
+)

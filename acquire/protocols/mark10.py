@@ -1,0 +1,59 @@
+"""``mark10``: Mark-10 gauges, series 4, 5, 7 and BG.
+
+``-18.78 lbF``, ``4.285 N``, or the number alone (``NUM`` setting). ``*10`` illegal, ``*11`` not applicable,
+``*12`` invalid, ``*22`` too large. These gauges show tension as negative, so the sign is -1 by default.
+
+What cannot be detected: an overload has no mark on the line (say ``capacity=``); no check digit.
+"""
+
+from __future__ import annotations
+
+import re
+
+from acquire.addresses import Options
+from acquire.line_buffer import Line
+from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.line_parser import LineParser, bad, number
+
+_LINE = re.compile(rb" *([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?: *(lbF|ozF|kgF|gF|kN|mN|N))? *", re.IGNORECASE)
+
+RATES = (2, 5, 10, 25, 50, 125, 250)
+
+
+class Mark10Parser(LineParser):
+    """See the module."""
+
+    def parse(self, line: Line) -> Reading | None:
+        """The reading of a line."""
+        found = _LINE.fullmatch(line.data)
+        if not found:
+            return bad(line)
+        unit = found[2].decode() if found[2] else None
+        return Reading(number(found[1].decode()), unit, line.data, line.start)
+
+
+def make_parser(options: Options) -> Parser:
+    """No settings of its own."""
+    return Mark10Parser()
+
+
+PROTOCOL = Protocol(
+    name="mark10",
+    summary="Mark-10 series 4/5/7, BG",
+    make_parser=make_parser,
+    baud=9600,
+    mode="stream",
+    sign=-1,
+    flags_overload=False,
+    commands={
+        "poll": b"?C\r",
+        "single": b"?C\r",
+        "start": b"AOUT10\r",
+        "stop": b"AOUT0\r",
+        "tare": b"Z\r",
+        "zero": b"Z\r",
+        "identify": b"LIST\r",
+    },
+    rates={float(rate): b"AOUT%d\r" % rate for rate in RATES},
+    undetected="an overload has no mark on the line: say capacity=; no check digit",
+)

@@ -1,0 +1,176 @@
+"""The register map of a Modbus transmitter: read from TOML, checked, nothing hard-coded."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from acquire.errors import ConfigError
+from acquire.load_sample import LoadFlag
+
+PROFILES = Path(__file__).with_name("modbus_profiles.toml")
+TYPES = {"i16": 1, "u16": 1, "i32": 2, "u32": 2, "f32": 2}  # registers of each
+ORDERS = ("big", "little")
+FLAGS = {
+    "overload": LoadFlag.OVERLOAD,
+    "underload": LoadFlag.UNDERLOAD,
+    "unstable": LoadFlag.UNSTABLE,
+    "error": LoadFlag.ERROR,
+    "net": LoadFlag.NET,
+}
+LONGEST = 32  # registers of one query that every known transmitter answers
+
+
+@dataclass(frozen=True, slots=True)
+class FlagBit:
+    """Where a flag stands: it is raised when ``register & mask`` is (set) or is not (not set) zero-free."""
+
+    flag: LoadFlag
+    register: int
+    mask: int
+    when_set: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """A register map.
+
+    Attributes
+    ----------
+    slave, function : int
+    register : int
+        First register of the value.
+    kind, order : str
+        Type of the value, and which of its two registers comes first ("big": the high one).
+    sign_bit : FlagBit or None
+        For transmitters that give magnitude and sign apart.
+    flags : tuple of FlagBit
+    commands : mapping of name to (register, value)
+    """
+
+    slave: int
+    function: int
+    register: int
+    kind: str
+    order: str
+    sign_bit: FlagBit | None
+    flags: tuple[FlagBit, ...]
+    commands: Mapping[str, tuple[int, int]]
+
+    @property
+    def first(self) -> int:
+        """First register of the query."""
+        return min([self.register, *(bit.register for bit in self._bits())])
+
+    @property
+    def count(self) -> int:
+        """Registers of the query."""
+        last = max([self.register + TYPES[self.kind], *(bit.register + 1 for bit in self._bits())])
+        return last - self.first
+
+    def _bits(self) -> tuple[FlagBit, ...]:
+        return self.flags if self.sign_bit is None else (*self.flags, self.sign_bit)
+
+
+def load_profile(name: str) -> Profile:
+    """A profile of ours by its name, or a TOML file of the user's.
+
+    Raises
+    ------
+    ConfigError
+        Unknown name, unreadable file, or a key that is missing, unknown or impossible.
+    """
+    known = tomllib.loads(PROFILES.read_text(encoding="utf-8"))
+    if name in known:
+        return profile_from(known[name], name)
+    if not name.endswith(".toml"):
+        raise ConfigError(
+            f"no profile is called {name!r}; there are: {', '.join(known)}, or give a .toml file"
+        )
+    try:
+        said = tomllib.loads(Path(name).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ConfigError(f"profile {name}: {error}") from error
+    return profile_from(said, name)
+
+
+def profile_from(said: Mapping[str, Any], name: str) -> Profile:
+    """A profile from its keys.
+
+    Raises
+    ------
+    ConfigError
+    """
+    try:
+        _known_keys(said, ("slave", "function", "value", "sign", "flags", "commands"), "")
+        value = said["value"]
+        _known_keys(value, ("register", "type", "order"), "value.")
+        flags = said.get("flags", {})
+        _known_keys(flags, tuple(FLAGS), "flags.")
+        profile = Profile(
+            slave=_whole(said.get("slave", 1), 1, 247, "slave"),
+            function=_whole(said.get("function", 3), 3, 4, "function"),
+            register=_whole(value["register"], 0, 65534, "value.register"),
+            kind=_one_of(value.get("type", "i32"), tuple(TYPES), "value.type"),
+            order=_one_of(value.get("order", "big"), ORDERS, "value.order"),
+            sign_bit=_bit(said["sign"], LoadFlag.NONE, "sign") if "sign" in said else None,
+            flags=tuple(_bit(bit, FLAGS[flag], f"flags.{flag}") for flag, bit in flags.items()),
+            commands={key: _command(command, key) for key, command in said.get("commands", {}).items()},
+        )
+    except KeyError as error:
+        raise ConfigError(f"profile {name}: the key {error} is missing") from error
+    except (TypeError, AttributeError) as error:
+        raise ConfigError(f"profile {name}: a table is expected where a plain value stands") from error
+    except ConfigError as error:
+        raise ConfigError(f"profile {name}: {error}") from error
+    if profile.count > LONGEST:
+        raise ConfigError(
+            f"profile {name}: registers span {profile.count}; one query reads at most {LONGEST}"
+        )
+    return profile
+
+
+def _bit(said: Mapping[str, Any], flag: LoadFlag, where: str) -> FlagBit:
+    _known_keys(said, ("register", "mask", "set"), f"{where}.")
+    when_set = said.get("set", True)
+    if not isinstance(when_set, bool):
+        raise ConfigError(f"{where}.set must be true or false")
+    return FlagBit(
+        flag,
+        _whole(said["register"], 0, 65535, f"{where}.register"),
+        _whole(said["mask"], 1, 65535, f"{where}.mask"),
+        when_set,
+    )
+
+
+def _command(said: Mapping[str, Any], name: str) -> tuple[int, int]:
+    _known_keys(said, ("register", "value"), f"commands.{name}.")
+    if name not in ("tare", "zero"):
+        raise ConfigError(f"commands.{name}: there are tare and zero")
+    return (
+        _whole(said["register"], 0, 65535, f"commands.{name}.register"),
+        _whole(said["value"], 0, 65535, f"commands.{name}.value"),
+    )
+
+
+def _known_keys(said: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
+    unknown = set(said.keys()) - set(known)
+    if unknown:
+        raise ConfigError(f"unknown key {where}{min(unknown)}; known: {', '.join(known)}")
+
+
+def _whole(value: Any, low: int, high: int, where: str) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise ConfigError(
+            f"{where} = {value!r} is not possible; allowed: a whole number from {low} to {high}"
+        )
+    return value
+
+
+def _one_of(value: Any, allowed: tuple[str, ...], where: str) -> str:
+    if value not in allowed:
+        raise ConfigError(f"{where} = {value!r} is not possible; allowed: {', '.join(allowed)}")
+    return str(value)

@@ -1,0 +1,68 @@
+"""Units of force, and of mass read as force, to newtons."""
+
+from __future__ import annotations
+
+from acquire.errors import ConfigError
+
+G0 = 9.80665  # m/s^2, standard gravity
+
+FORCES = {
+    "n": 1.0,
+    "mn": 1e-3,  # millinewton, unless written MN, which no load cell of a bench sends
+    "dan": 10.0,
+    "kn": 1e3,
+    "kgf": G0,
+    "kp": G0,
+    "gf": G0 * 1e-3,
+    "lbf": 4.4482216153,
+    "ozf": 4.4482216153 / 16,
+    "klbf": 4448.2216153,
+}
+MASSES = {  # kg
+    "kg": 1.0,
+    "g": 1e-3,
+    "mg": 1e-6,
+    "t": 1e3,
+    "lb": 0.45359237,
+    "lbs": 0.45359237,
+    "oz": 0.45359237 / 16,
+}
+UNITS = (*FORCES, *MASSES)
+
+
+def is_unit(text: str) -> bool:
+    """Whether ``text`` names a unit of force or mass."""
+    return text.lower() in UNITS
+
+
+def is_mass(text: str) -> bool:
+    """Whether ``text`` names a unit of mass, which is no force until somebody says so."""
+    return text.lower() in MASSES
+
+
+def newtons_per(unit: str, mass_reads_force: bool = False) -> float:
+    """What one of ``unit`` is in newtons.
+
+    Parameters
+    ----------
+    unit : str
+        Upper or lower case.
+    mass_reads_force : bool
+        Take a mass as the weight it has under standard gravity, 9.80665 m/s^2.
+
+    Raises
+    ------
+    ConfigError
+        An unknown unit, or a mass without leave.
+    """
+    name = unit.lower()
+    if name in FORCES:
+        return FORCES[name]
+    if name not in MASSES:
+        raise ConfigError(f"unit {unit!r} is not known; known: {', '.join(UNITS)}")
+    if not mass_reads_force:
+        raise ConfigError(
+            f"{unit} is a unit of mass; say mass_reads_force=yes if the display shows the force as a mass"
+            f" (1 {unit} is then {MASSES[name] * G0:g} N)"
+        )
+    return MASSES[name] * G0

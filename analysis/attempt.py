@@ -1,0 +1,326 @@
+"""The measuring of one image: iterate, judge, rescue, and put everything on the grid.
+
+The other half of ``PhaseKernel``, which holds what does not change from frame to frame.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.prepared import clipped_share
+from analysis.renewal import UNSHARED
+from analysis.settings import NoiseModel
+from analysis.splines import prefilter_taps, tap_table
+from analysis.strain_field import Status, StrainField
+from analysis.validity import CLIPPED_SHARE, judge
+from analysis.windows import profile
+
+if TYPE_CHECKING:
+    from analysis.phase_kernel import PhaseKernel
+
+Floats = NDArray[np.float64]
+
+RESCUE_ROUNDS = 40
+MOTION_UPDATE = 0.4
+"""How much of a new step enters the motion that predicts the next one."""
+SEARCH_SHARE = 0.3
+"""Share of lost ZOIs from which on the whole picture is searched again."""
+
+
+class Attempt:
+    """The measuring of one image: parameters and verdict of every active ZOI, as they come."""
+
+    def __init__(self, kernel: PhaseKernel, image: NDArray[np.float32], noise: NoiseModel | None) -> None:
+        from analysis.warp import coefficients
+
+        self.kernel = kernel
+        self.image = image
+        self.noise = noise
+        self.ready = kernel._prepared
+        degree = kernel.settings.interpolant
+        offset = np.float32(self.ready.pattern.mean)
+        self.coefficients = coefficients(image, offset, prefilter_taps(degree)).ravel()
+        count = len(self.ready.origins)
+        self.p = np.full((count, kernel._modes), np.nan)
+        self.left = np.full(count, np.nan)
+        self.nuisance = np.full((count, 2), np.nan)
+        self.iterations = np.zeros(count, np.uint8)
+        self.status = self.ready.status.copy()
+        self.tolerance, self.trust = self._tolerance()
+        self._plain = self.p
+
+    def _current_std(self) -> float:
+        if self.noise is None:
+            return self.kernel.reference_noise
+        return float(np.sqrt(self.noise.variance(self.ready.pattern.mean)))
+
+    def _tolerance(self) -> tuple[Floats, Floats]:
+        """Error that may be left in displacement and gradients, (A, 2), and uncertainty of u and v, (A,)."""
+        settings, unit = self.kernel.settings, self.kernel._unit_sigma
+        current = self._current_std()
+        share = settings.tolerance_sigma * np.hypot(current, self.kernel.reference_noise)
+        floor = np.array([settings.tolerance_px, settings.tolerance_strain])
+        return np.maximum(share * unit[:, :2], floor), current * unit[:, 2]
+
+    def run(self, guess: Floats) -> None:
+        """Measure every ZOI that has a pattern and a guess; the others are LOST."""
+        # Without its gradients a guess is right for ZOIs beside a discontinuity.
+        self._plain = guess * (np.arange(guess.shape[1]) % (guess.shape[1] // 2) == 0)
+        known = np.isfinite(guess).all(axis=1)
+        able = self.ready.status == Status.OK
+        self.status[able & ~known] = Status.LOST
+        self._track(np.flatnonzero(able & known), guess)
+
+    def _track(self, which: NDArray[np.intp], guess: Floats) -> None:
+        """Iterate the ZOIs ``which`` from their guesses and keep what comes out."""
+        if len(which) == 0:
+            return
+        from analysis.gauss_newton import CONVERGED, LEFT_IMAGE
+
+        if self.kernel._sensors is None:
+            values, left, nuisance, state, iterations = self._iterate(which, guess[which])
+        else:
+            values, left, nuisance, state, iterations = self._iterate_phases(which, guess[which])
+        ready = self.ready
+        gain = nuisance[:, 0]
+        self.p[which], self.left[which], self.nuisance[which] = values, left, nuisance
+        self.iterations[which] = iterations
+        self.status[which] = judge(
+            state == CONVERGED,
+            state == LEFT_IMAGE,
+            left / ready.freedom[which],
+            self._expected(which, gain),
+            ready.signal[which],
+            gain,
+            ready.freedom[which] * self.kernel._sharpness,
+            self.noise is not None and self.kernel._noise is not None,
+        )
+
+    def _iterate_phases(
+        self, which: NDArray[np.intp], guess: Floats
+    ) -> tuple[Floats, Floats, Floats, Any, Any]:
+        """The same by phases alone; one step of the spectral fit tells gain and residual."""
+        from analysis.quadrature import iterate
+
+        sensors, settings = self.kernel._sensors, self.kernel.settings
+        assert sensors is not None
+        values, state, iterations = iterate(
+            sensors.weights[which], self.ready, self.ready.origins[which], self.kernel.grid.size, self.coefficients,
+            guess, self.tolerance[which], settings, self.kernel._over,
+        )  # fmt: skip
+        _, left, nuisance, _, _ = self._iterate(which, values, max_iterations=1)
+        return values, left, nuisance, state, iterations
+
+    def _iterate(
+        self, which: NDArray[np.intp], guess: Floats, max_iterations: int | None = None
+    ) -> tuple[Floats, Floats, Floats, Any, Any]:
+        from analysis.gauss_newton import track
+        from analysis.sensitivity import parameter_scale, power_rows
+        from analysis.warp import LANES
+
+        ready, kernel, settings = self.ready, self.kernel, self.kernel.settings
+        size, count = kernel.grid.size, len(which)
+        height, width = ready.shape
+        every = count == len(ready.origins)
+        values = guess.copy()
+        left, nuisance = np.full(count, np.nan), np.full((count, 2), np.nan)
+        state, iterations = np.zeros(count, np.uint8), np.zeros(count, np.uint8)
+        rows = power_rows(profile(settings.window, size), settings.order)
+        track(
+            self.coefficients, width, height, ready.fx, ready.fy, ready.f, ready.raw,
+            ready.origins if every else ready.origins[which], size, settings.order,
+            np.pad(rows, ((0, 0), (0, LANES))).astype(np.float32),
+            ready.inverse if every else ready.inverse[which], parameter_scale(settings.order, size),
+            self.tolerance[which], self.trust[which], tap_table(settings.interpolant),
+            kernel._over, max_iterations or settings.max_iterations,
+            values, left, nuisance, state, iterations,
+        )  # fmt: skip
+        return values, left, nuisance, state, iterations
+
+    def _expected(self, which: NDArray[np.intp], gain: Floats) -> Floats:
+        """Variance a pixel that noise alone leaves in the difference of the images, GL^2."""
+        reference, current = self._variances(which, gain)
+        return np.asarray(np.minimum(gain**2, 25.0) * reference + current)
+
+    def _variances(self, which: NDArray[np.intp], gain: Floats) -> tuple[Floats, Floats]:
+        level = self.ready.level[which]
+        model = self.kernel._noise
+        reference = np.full(len(which), self.kernel.reference_noise**2)
+        if model is not None:
+            reference = model.variance(level)
+        current = reference if self.noise is None else self.noise.variance(level * np.maximum(gain, 0))
+        return reference, np.asarray(current)
+
+    def rescue(self, before: Floats | None) -> None:
+        """Try lost ZOIs again: without extrapolation, from neighbours, and by a search."""
+        if not self._lost().any():
+            return
+        self._retry(self._plain if before is None else before)
+        self._from_neighbours()
+        able = np.count_nonzero(self.ready.status == Status.OK)
+        if before is not None and np.count_nonzero(self._lost()) > SEARCH_SHARE * able:
+            self._retry(self.kernel._searched(self.image))
+            self._from_neighbours()
+
+    def _lost(self) -> NDArray[np.bool_]:
+        failed = np.isin(self.status, (Status.LOST, Status.NOT_CONVERGED, Status.POOR_MATCH, Status.OUTSIDE))
+        return np.asarray(failed & (self.ready.status == Status.OK))
+
+    def _retry(self, guess: Floats) -> None:
+        """Track lost ZOIs from another guess; a worse outcome does not replace a better one."""
+        which = np.flatnonzero(self._lost() & np.isfinite(guess).all(axis=1))
+        kept = [a[which].copy() for a in (self.p, self.left, self.nuisance, self.iterations, self.status)]
+        self._track(which, guess)
+        worse = self.status[which] != Status.OK
+        for array, old in zip(
+            (self.p, self.left, self.nuisance, self.iterations, self.status), kept, strict=True
+        ):
+            array[which[worse]] = old[worse]
+
+    def _from_neighbours(self) -> None:
+        """Let good ZOIs lend their shape to lost neighbours, round by round."""
+        tried = np.zeros(self.kernel.grid.shape, np.uint8)
+        for _ in range(RESCUE_ROUNDS):
+            guess, lenders = self._lent()
+            fresh = np.isfinite(guess[:, 0]) & self._lost() & (lenders > tried.ravel()[self.kernel._index])
+            if not fresh.any():
+                return
+            tried.ravel()[self.kernel._index] = lenders
+            self._retry(np.where(fresh[:, None], guess, np.nan))
+
+    def _lent(self) -> tuple[Floats, NDArray[np.uint8]]:
+        """For each ZOI the mean of what its good neighbours predict there, and their number."""
+        kernel, grid = self.kernel, self.kernel.grid
+        rows, columns = grid.shape
+        half = kernel._modes // 2
+        good = self.status == Status.OK
+        shape = np.zeros((6, rows * columns))
+        affine = [0, 1, 2, half, half + 1, half + 2]
+        shape[:, kernel._index[good]] = kernel._total(self.p)[good][:, affine].T
+        valid = np.zeros(rows * columns)
+        valid[kernel._index[good]] = 1
+        total, number = np.zeros((6, rows, columns)), np.zeros((rows, columns))
+        padded = np.pad(shape.reshape(6, rows, columns), ((0, 0), (1, 1), (1, 1)))
+        there = np.pad(valid.reshape(rows, columns), 1)
+        for dy in (-1, 0, 1):
+            for dx in (-1, 0, 1):
+                part = padded[:, 1 + dy : 1 + dy + rows, 1 + dx : 1 + dx + columns].copy()
+                for r in (0, 3):
+                    part[r] -= grid.step * (dx * part[r + 1] + dy * part[r + 2])
+                weight = there[1 + dy : 1 + dy + rows, 1 + dx : 1 + dx + columns]
+                total += part * weight
+                number += weight
+        with np.errstate(invalid="ignore"):
+            mean = np.where(number > 0, total / np.maximum(number, 1), np.nan)
+        guess = np.zeros((len(kernel._index), kernel._modes))
+        guess[:, affine] = mean.reshape(6, -1)[:, kernel._index].T
+        return kernel._local(guess), number.ravel()[kernel._index].astype(np.uint8)
+
+    def field(
+        self, before: Floats | None, carried: Floats | None, clipped: NDArray[np.bool_] | None
+    ) -> StrainField:
+        """Put everything on the grid."""
+        if clipped is not None:
+            self._reject_clipped(clipped)
+        kernel = self.kernel
+        ok = self.status == Status.OK
+        reference, current = self._noise_parts(ok)
+        covariance_reference, covariance = self._covariances(ok, reference, current)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            residual = self.left / self.ready.freedom / (self.nuisance[:, 0] ** 2 * reference + current)
+        noise = float(np.sqrt(np.median(current[ok]))) if ok.any() else float("nan")
+        values = np.where(ok[:, None], kernel._total(self.p), np.nan)
+        motion = None if before is None else self._motion(values - before, carried)
+        status = np.full(len(kernel.grid.active.ravel()), Status.NOT_MEASURED, np.uint8)
+        status[kernel._index] = self.status
+        return StrainField(
+            grid=kernel.grid,
+            parameters=self._spread(values),
+            covariance=covariance,
+            covariance_reference=covariance_reference,
+            residual=self._spread(residual[:, None].astype(np.float32))[0],
+            status=status.reshape(kernel.grid.shape),
+            iterations=self._spread(self.iterations[:, None], 0)[0],
+            gain=self._spread(self.nuisance[:, :1].astype(np.float32))[0],
+            noise=noise,
+            window=kernel.settings.window,
+            motion=None if motion is None else self._spread(motion),
+        )
+
+    @staticmethod
+    def _motion(change: Floats, carried: Floats | None) -> Floats:
+        """Motion a frame for the next prediction: part of the news, so that less noise is carried on."""
+        return change if carried is None else carried + MOTION_UPDATE * (change - carried)
+
+    def _spread(self, values: NDArray[Any], empty: float = np.nan) -> NDArray[Any]:
+        """(A, K) onto the grid: (K, R, C)."""
+        rows, columns = self.kernel.grid.shape
+        if len(self.kernel._index) == rows * columns:
+            return np.ascontiguousarray(values.T).reshape(-1, rows, columns)
+        out = np.full((values.shape[1], rows * columns), empty, values.dtype)
+        out[:, self.kernel._index] = values.T
+        return out.reshape(-1, rows, columns)
+
+    def _reject_clipped(self, clipped: NDArray[np.bool_]) -> None:
+        good = np.flatnonzero(self.status == Status.OK)
+        half = self.kernel._modes // 2
+        shift = np.rint(self.p[good][:, [half, 0]]).astype(np.int64)
+        line = profile(self.kernel.settings.window, self.kernel.grid.size)
+        share = clipped_share(clipped, self.ready.origins[good] + shift, line)
+        self.status[good[share > CLIPPED_SHARE]] = Status.CLIPPED
+
+    def _noise_parts(self, ok: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+        """Variances a pixel of the two images at each ZOI, (A,), GL^2; what is not given, from the residual."""
+        reference, current = self._variances(np.arange(len(ok)), self.nuisance[:, 0])
+        if self.noise is not None or not ok.any():
+            return reference, current
+        pooled = float(np.median((self.left / self.ready.freedom)[ok]))
+        if self.kernel._noise is None:  # shared equally
+            return np.full(len(ok), pooled / 2), np.full(len(ok), pooled / 2)
+        rest = max(pooled - float(np.median(reference)), pooled / 4)
+        return reference, np.full(len(ok), rest)
+
+    def _covariances(
+        self, ok: NDArray[np.bool_], reference: Floats, current: Floats
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Covariance that the reference causes, and the whole, (21, R, C), NaN where there is no value."""
+        kernel, model = self.kernel, self.kernel._noise
+        own = 1 / np.maximum(self.nuisance[:, 0], 0.1) ** 2
+        grows = any(m is not None and m.slope > 0 for m in (model, self.noise))
+        if kernel._placement is None and not (grows and self.ready.covariance_level is not None):
+            # The unit covariances lie ready on the grid: two products and no copying about.
+            first = np.where(ok, reference, np.nan).astype(np.float32)
+            whole = np.where(ok, reference + current * own, np.nan).astype(np.float32)
+            unit = kernel._unit
+            return unit * self._spread(first[:, None]), unit * self._spread(whole[:, None])
+        from_reference, from_current = self._level_covariances(reference, current, own)
+        placement = kernel._placement
+        if placement is not None:
+            from_current = placement.spread(self.p, from_current)
+            # The noise of a renewed picture enters twice with opposite sign and nearly cancels.
+            renewed = np.float32(UNSHARED) * placement.spread(self.p, from_reference)
+            from_reference = placement.carried(self.p) + renewed
+        invalid = np.where(ok, np.float32(0), np.float32(np.nan))[:, None]
+        return (
+            self._spread(from_reference + invalid),
+            self._spread(from_reference + from_current + invalid),
+        )
+
+    def _level_covariances(
+        self, reference: Floats, current: Floats, own: Floats
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """The two parts (A, 21) with noise that grows with the grey level inside each ZOI."""
+        ready, model = self.ready, self.kernel._noise
+        unit, slope = ready.covariance, ready.covariance_level
+        gain, offset = self.nuisance[:, 0], self.nuisance[:, 1]
+        first = reference[:, None] * unit
+        second = (current * own)[:, None] * unit
+        if slope is not None and model is not None and model.slope > 0:
+            first = model.floor * unit + model.slope * slope
+        if slope is not None and self.noise is not None and self.noise.slope > 0:
+            constant = self.noise.floor + self.noise.slope * (offset + (1 - gain) * ready.pattern.mean)
+            second = own[:, None] * (constant[:, None] * unit + (self.noise.slope * gain)[:, None] * slope)
+        return first.astype(np.float32), second.astype(np.float32)

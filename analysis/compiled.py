@@ -1,0 +1,44 @@
+"""How the inner loops are compiled: once per machine, kept in numba's cache, announced.
+
+numba keeps compiled code beside this package where that folder can be written, else in the
+user's cache folder; NUMBA_CACHE_DIR overrides both. Importing this module imports numba, so the
+rest of the package does that only when a kernel is made.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from typing import Any
+
+import numba
+
+log = logging.getLogger("analysis")
+
+# Sums may be reordered for the vector unit, but NaN and infinity keep their meaning.
+FAST = {"contract", "reassoc", "nsz", "arcp", "afn"}
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """A helper that becomes part of the loops that call it."""
+    return numba.njit(function, error_model="numpy", fastmath=FAST, inline="always")
+
+
+def helper(function: Callable[..., Any]) -> Any:
+    """A function called from compiled loops; small or inlined by the compiler as it sees fit."""
+    return numba.njit(function, error_model="numpy", fastmath=FAST, cache=True, nogil=True)
+
+
+def parallel(function: Callable[..., Any]) -> Any:
+    """A loop over ZOIs or rows, shared among the threads; each item is done by one of them."""
+    return numba.njit(function, error_model="numpy", fastmath=FAST, cache=True, nogil=True, parallel=True)
+
+
+def is_cached(function: Any) -> bool:
+    """Whether a dispatcher has compiled code in this process or on disk."""
+    if function.signatures:
+        return True
+    try:
+        return bool(function._cache._cache_file._load_index())
+    except (AttributeError, OSError):  # numba's own affair: only the announcement depends on it
+        return False

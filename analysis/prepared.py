@@ -1,0 +1,160 @@
+"""A reference made ready: filtered pattern, normal matrices and which ZOIs can be measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.settings import KernelSettings, NoiseModel
+from analysis.spectrum import Pattern, filtered_pattern
+from analysis.strain_field import Status
+from analysis.validity import CLIPPED_SHARE, has_pattern
+from analysis.windows import profile
+
+TAIL_ROWS, TAIL = 3, 64
+"""Rows and samples appended to flat images, since loops read whole blocks and vectors."""
+
+
+class PatternError(ValueError):
+    """The reference has no pattern that could be followed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prepared:
+    """Everything of a reference that does not change from frame to frame; A active ZOIs.
+
+    Attributes
+    ----------
+    shape : (H, W)
+    pattern : Pattern
+    fx, fy, f, raw : flat float32
+        Gradients and level of the filtered reference, and the reference less its mean.
+    origins : (A, 2) int64
+        First row and column of each ZOI.
+    inverse : (A, P, P) float32
+    covariance, covariance_level : (A, 21) float32
+        For noise of variance 1 GL^2, and of variance 1 GL^2 a grey level.
+    freedom, weight : (A,) and float
+        Effective number of pixels less what the fit takes; sum of the weights.
+    signal : (A,) float64, GL^2
+        Variance of the filtered pattern.
+    level : (A,) float64, GL
+        Mean grey level.
+    status : (A,) uint8
+        OK, NO_PATTERN or CLIPPED.
+    """
+
+    shape: tuple[int, int]
+    pattern: Pattern
+    fx: NDArray[np.float32]
+    fy: NDArray[np.float32]
+    f: NDArray[np.float32]
+    raw: NDArray[np.float32]
+    origins: NDArray[np.int64]
+    inverse: NDArray[np.float32]
+    covariance: NDArray[np.float32]
+    covariance_level: NDArray[np.float32] | None
+    freedom: NDArray[np.float64]
+    weight: float
+    signal: NDArray[np.float64]
+    level: NDArray[np.float64]
+    status: NDArray[np.uint8]
+
+
+def prepare_reference(
+    image: NDArray[np.float32],
+    origins: NDArray[np.int64],
+    size: int,
+    settings: KernelSettings,
+    noise: NoiseModel | None,
+    clipped: NDArray[np.bool_] | None = None,
+) -> Prepared:
+    """Filter the reference and compute the normal matrix of each ZOI.
+
+    Parameters
+    ----------
+    image : (H, W) float32, GL
+    origins : (A, 2) int64, first row and column of each ZOI
+    noise : NoiseModel or None
+        Of this image; None: taken from its spectrum.
+    clipped : (H, W) bool, optional
+        Saturated pixels.
+    """
+    from analysis.sensitivity import columns, parameter_scale, power_rows, prepare
+
+    mean = float(image.mean(dtype=np.float64))
+    std = None if noise is None else float(np.sqrt(noise.variance(mean)))
+    pattern = filtered_pattern(image, std, settings.interpolant)
+    line = profile(settings.window, size)
+    table, units = columns(settings.order), parameter_scale(settings.order, size)
+    half = len(units) // 2
+    affine = units[[0, 1, 2, half, half + 1, half + 2]]
+    count = len(origins)
+    inverse = np.empty((count, len(table), len(table)), np.float32)
+    covariance = np.empty((count, 21), np.float32)
+    signal_dependent = noise is not None and noise.slope > 0
+    level_image = (
+        np.maximum(pattern.level + np.float32(mean), 0).ravel()
+        if signal_dependent
+        else np.empty(0, np.float32)
+    )
+    covariance_level = np.empty((count if signal_dependent else 0, 21), np.float32)
+    freedom, energy = np.empty(count, np.float32), np.empty((count, 4), np.float32)
+    prepare(
+        pattern.grad_x.ravel(), pattern.grad_y.ravel(), pattern.level.ravel(), level_image,
+        image.shape[1], origins, size,
+        power_rows(line, settings.order).astype(np.float32),
+        power_rows(line**2, settings.order).astype(np.float32),
+        table, affine, inverse, covariance, covariance_level, freedom, energy,
+    )  # fmt: skip
+    variances = covariance[:, [0, 15]].astype(np.float64)  # of u and of v among the 21 pairs
+    good = has_pattern(
+        energy[:, :2].astype(np.float64), variances, pattern.noise, pattern.noise**2 * pattern.left_gradient
+    )
+    status = np.where(good, Status.OK, Status.NO_PATTERN).astype(np.uint8)
+    if clipped is not None and clipped.any():
+        status[clipped_share(clipped, origins, line) > CLIPPED_SHARE] = Status.CLIPPED
+    return Prepared(
+        shape=(image.shape[0], image.shape[1]),
+        pattern=pattern,
+        fx=_flat(pattern.grad_x),
+        fy=_flat(pattern.grad_y),
+        f=_flat(pattern.level),
+        raw=_flat(image - np.float32(mean)),
+        origins=origins,
+        inverse=inverse,
+        covariance=covariance,
+        covariance_level=covariance_level if signal_dependent else None,
+        freedom=np.maximum(freedom.astype(np.float64), 1e-3),
+        weight=float(line.sum() ** 2),
+        signal=np.maximum(energy[:, 2].astype(np.float64), 0),
+        level=energy[:, 3].astype(np.float64) + mean,
+        status=status,
+    )
+
+
+def clipped_share(
+    clipped: NDArray[np.bool_], first: NDArray[Any], line: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Share of the window weight of each ZOI on marked pixels, (A,).
+
+    ``first`` (A, 2) are first rows and columns; ZOIs are moved into the image where they stick out.
+    """
+    import cv2
+
+    size = len(line)
+    weight = (line / line.sum()).astype(np.float32)
+    # Anchored so that the sum for the ZOI that starts at a pixel stands at that pixel.
+    share = cv2.sepFilter2D(
+        clipped.astype(np.float32), -1, weight, weight, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT
+    )
+    rows = np.clip(first[:, 0], 0, clipped.shape[0] - size)
+    columns = np.clip(first[:, 1], 0, clipped.shape[1] - size)
+    return np.asarray(share[rows, columns], np.float64)
+
+
+def _flat(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    return np.concatenate([image.ravel(), np.zeros(TAIL_ROWS * image.shape[1] + TAIL, np.float32)])

@@ -1,0 +1,71 @@
+"""B-splines: weights of the taps, the prefilter as a short filter, gradients on whole pixels.
+
+Only tables and filters on whole images are here; the warp itself is in ``warp.py``.
+Source: M. Unser, A. Aldroubi, M. Eden, B-spline signal processing, IEEE Trans. Signal Process.
+41 (1993) 821-848, doi:10.1109/78.193220.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import comb, factorial
+
+import numpy as np
+from numpy.typing import NDArray
+
+TAPS = 6
+PREFILTER_REACH = 15
+"""Taps to each side; the quintic prefilter has fallen to 3e-6 there."""
+PAD = 8
+"""Pixels of mirrored surroundings that the coefficients of an image are given."""
+
+
+def basis(degree: int, x: NDArray[np.floating]) -> NDArray[np.float64]:
+    """The centred B-spline of odd ``degree`` at x."""
+    total = np.zeros_like(x)
+    for k in range(degree + 2):
+        power = np.maximum(x + (degree + 1) / 2 - k, 0) ** degree
+        total += (-1) ** k * comb(degree + 1, k) * power / factorial(degree)
+    return total
+
+
+@lru_cache(maxsize=8)
+def tap_table(degree: int) -> NDArray[np.float32]:
+    """Polynomials of the six tap weights in tau = t - 1/2, t in [0, 1) behind the third tap, (18,).
+
+    The weights of a pair of taps at equal distance are E(tau^2) -+ tau O(tau^2); per pair, from
+    the outside in: E0, O0, E2, O2, E4, O4. Lower degrees leave the outer pairs zero.
+    """
+    tau = np.linspace(-0.5, 0.5, 2 * TAPS - 1)
+    table = np.zeros((3, TAPS))
+    for pair in range(3):
+        right = 3 - pair
+        if right <= (degree + 1) // 2:
+            weights = basis(degree, tau + 0.5 - right)
+            table[pair] = np.polynomial.polynomial.polyfit(tau, weights, TAPS - 1)
+    return np.asarray(table.ravel(), np.float32)
+
+
+@lru_cache(maxsize=8)
+def prefilter_taps(degree: int) -> NDArray[np.float32]:
+    """One side of the inverse of the sampled B-spline, (16,), centre first."""
+    length = 256
+    samples = basis(degree, np.arange(-3.0, 4.0))
+    omega = 2 * np.pi * np.arange(length) / length
+    response = samples @ np.cos(np.outer(np.arange(-3, 4), omega))
+    impulse = np.fft.ifft(1 / response).real[: PREFILTER_REACH + 1]
+    return np.asarray(impulse / (impulse[0] + 2 * impulse[1:].sum()), np.float32)
+
+
+def gradient_filter(degree: int, length: int) -> NDArray[np.complex128]:
+    """Frequency response over ``length`` FFT bins of the spline derivative on whole pixels.
+
+    The derivative of the interpolating spline of the given degree: d/dx beta^n over beta^n.
+    """
+    offsets: NDArray[np.float64] = np.arange(-3.0, 4.0)
+    values = basis(degree, offsets)
+    step = 1e-4
+    slopes = np.asarray(basis(degree, offsets + step) - basis(degree, offsets - step)) / (2 * step)
+    omega = 2 * np.pi * np.fft.fftfreq(length)
+    wave = np.exp(-1j * np.outer(offsets, omega))
+    return np.asarray((slopes @ wave) / (values @ wave))

@@ -1,0 +1,427 @@
+"""The result of one measurement: displacement, gradients, their uncertainty and a status, per ZOI.
+
+Strains, rotation and principal values are derived here from the displacement gradient
+(docs/method.md); nothing is smoothed. x points right and y down on the screen, so a positive
+``omega`` is clockwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import lru_cache
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.windows import Window, overlap
+from analysis.zoi_grid import ZoiGrid
+
+Floats = NDArray[np.float64]
+Measure = Literal["small", "green", "hencky"]
+
+U, DU_DX, DU_DY, V, DV_DX, DV_DY = range(6)
+_PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]
+PAIR_INDEX = {pair: k for k, pair in enumerate(_PAIRS)} | {(j, i): k for k, (i, j) in enumerate(_PAIRS)}
+"""Where the covariance of parameters i and j stands among the 21 of ``StrainField.covariance``."""
+
+# Each named value as a linear combination of u, du_dx, du_dy, v, dv_dx, dv_dy.
+_COMBINATIONS: Mapping[str, Mapping[int, float]] = {
+    "u": {U: 1.0},
+    "v": {V: 1.0},
+    "du_dx": {DU_DX: 1.0},
+    "du_dy": {DU_DY: 1.0},
+    "dv_dx": {DV_DX: 1.0},
+    "dv_dy": {DV_DY: 1.0},
+    "exx": {DU_DX: 1.0},
+    "eyy": {DV_DY: 1.0},
+    "exy": {DU_DY: 0.5, DV_DX: 0.5},
+    "gamma_xy": {DU_DY: 1.0, DV_DX: 1.0},
+    "omega": {DU_DY: -0.5, DV_DX: 0.5},
+}
+VALUES = tuple(_COMBINATIONS)
+"""Names that ``mean`` and ``sigma`` know."""
+
+
+class Status(IntEnum):
+    """What became of a ZOI; the numbers are what stands in files."""
+
+    OK = 0
+    NOT_MEASURED = 1
+    NO_PATTERN = 2
+    CLIPPED = 3
+    OUTSIDE = 4
+    LOST = 5
+    NOT_CONVERGED = 6
+    POOR_MATCH = 7
+
+    @property
+    def text(self) -> str:
+        """The status in words for a person."""
+        return _TEXTS[self]
+
+
+_TEXTS = {
+    Status.OK: "measured",
+    Status.NOT_MEASURED: "not asked for (outside the mask or switched off)",
+    Status.NO_PATTERN: "too little pattern to measure on",
+    Status.CLIPPED: "saturated pixels: reduce exposure or light",
+    Status.OUTSIDE: "moved out of the picture",
+    Status.LOST: "the pattern was not found again",
+    Status.NOT_CONVERGED: "the iteration did not settle",
+    Status.POOR_MATCH: "the picture does not fit the reference here (crack, edge, glare or blur)",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StrainField:
+    """One measured field on the grid of the reference; NaN where the status is not OK.
+
+    Attributes
+    ----------
+    grid : ZoiGrid
+    parameters : (6, R, C) or (12, R, C) float64
+        u, du_dx, du_dy (and, order 2, the coefficients of x^2, xy, y^2), then the same of v; at
+        the centres of the ZOIs, px and px per px.
+    covariance : (21, R, C) float32
+        Of the six affine values, pairs (i, j >= i) in order; includes the reference's part.
+    covariance_reference : (21, R, C) float32
+        The part of it that the noise of the reference causes, common to all frames.
+    residual : (R, C) float32
+        Variance of what the fit leaves over the variance expected from the noise; about 1.
+    status : (R, C) uint8, see Status
+    iterations : (R, C) uint8
+    gain : (R, C) float32
+        Contrast of the deformed image over that of the reference.
+    noise : float, GL
+        Standard deviation of the deformed image that the uncertainty was computed with.
+    window : str
+        The least-squares weight, which says how far neighbouring values are correlated.
+    motion : (6 or 12, R, C) float64, optional
+        Change of the parameters since the field that was the start; the next prediction.
+    """
+
+    grid: ZoiGrid
+    parameters: Floats
+    covariance: NDArray[np.float32]
+    covariance_reference: NDArray[np.float32]
+    residual: NDArray[np.float32]
+    status: NDArray[np.uint8]
+    iterations: NDArray[np.uint8]
+    gain: NDArray[np.float32]
+    noise: float = float("nan")
+    window: Window = "gaussian"
+    motion: Floats | None = None
+    _cache: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        for name in ("parameters", "covariance", "covariance_reference", "residual", "status",
+                     "iterations", "gain", "motion"):  # fmt: skip
+            array = getattr(self, name)
+            if array is not None:
+                array.flags.writeable = False
+
+    @classmethod
+    def from_values(
+        cls,
+        grid: ZoiGrid,
+        values: Mapping[str, ArrayLike],
+        sigmas: Mapping[str, ArrayLike] | float = 0.0,
+        status: ArrayLike | None = None,
+        residual: ArrayLike = 1.0,
+    ) -> StrainField:
+        """A field from plain arrays, as they are read from a file or imposed by a test.
+
+        Parameters
+        ----------
+        grid : ZoiGrid
+        values : mapping of "u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy" to (R, C); 0 where missing
+        sigmas : mapping of the same names to (R, C), or one number for all
+        status : (R, C), optional
+            OK where the grid is active and NOT_MEASURED elsewhere, if not given.
+        residual : (R, C)
+        """
+        names = ("u", "du_dx", "du_dy", "v", "dv_dx", "dv_dy")
+        parameters = np.stack([_filled(values.get(n, 0.0), grid) for n in names])
+        covariance = np.zeros((21, *grid.shape), np.float32)
+        for i, name in enumerate(names):
+            sigma = sigmas.get(name, 0.0) if isinstance(sigmas, Mapping) else sigmas
+            covariance[PAIR_INDEX[i, i]] = _filled(sigma, grid) ** 2
+        if status is None:
+            status = np.where(grid.active, Status.OK, Status.NOT_MEASURED)
+        states = np.array(status, np.uint8)
+        parameters[:, states != Status.OK] = np.nan
+        covariance[:, states != Status.OK] = np.nan
+        return cls(
+            grid, parameters, covariance, np.zeros_like(covariance),
+            _filled(residual, grid).astype(np.float32), states,
+            np.zeros(grid.shape, np.uint8), np.ones(grid.shape, np.float32),
+        )  # fmt: skip
+
+    @property
+    def _half(self) -> int:
+        return len(self.parameters) // 2
+
+    @property
+    def u(self) -> Floats:
+        """Displacement along x (right), (R, C), px."""
+        return np.asarray(self.parameters[0])
+
+    @property
+    def du_dx(self) -> Floats:
+        return np.asarray(self.parameters[1])
+
+    @property
+    def du_dy(self) -> Floats:
+        return np.asarray(self.parameters[2])
+
+    @property
+    def v(self) -> Floats:
+        """Displacement along y (down), (R, C), px."""
+        return np.asarray(self.parameters[self._half])
+
+    @property
+    def dv_dx(self) -> Floats:
+        return np.asarray(self.parameters[self._half + 1])
+
+    @property
+    def dv_dy(self) -> Floats:
+        return np.asarray(self.parameters[self._half + 2])
+
+    @property
+    def exx(self) -> Floats:
+        """Small strain along x, (R, C)."""
+        return self.du_dx
+
+    @property
+    def eyy(self) -> Floats:
+        """Small strain along y, (R, C)."""
+        return self.dv_dy
+
+    @property
+    def exy(self) -> Floats:
+        """Small shear strain, tensor component, (R, C)."""
+        return self.value("exy")
+
+    @property
+    def gamma_xy(self) -> Floats:
+        """Engineering shear, 2 exy, (R, C)."""
+        return self.value("gamma_xy")
+
+    @property
+    def omega(self) -> Floats:
+        """Small rotation (dv_dx - du_dy)/2, (R, C), rad, positive clockwise on the screen."""
+        return self.value("omega")
+
+    @property
+    def sigma_u(self) -> Floats:
+        """Standard uncertainty of u, (R, C), px."""
+        return self.sigma("u")
+
+    @property
+    def sigma_v(self) -> Floats:
+        return self.sigma("v")
+
+    @property
+    def sigma_du_dx(self) -> Floats:
+        return self.sigma("du_dx")
+
+    @property
+    def sigma_du_dy(self) -> Floats:
+        return self.sigma("du_dy")
+
+    @property
+    def sigma_dv_dx(self) -> Floats:
+        return self.sigma("dv_dx")
+
+    @property
+    def sigma_dv_dy(self) -> Floats:
+        return self.sigma("dv_dy")
+
+    @property
+    def sigma_exx(self) -> Floats:
+        return self.sigma("exx")
+
+    @property
+    def sigma_eyy(self) -> Floats:
+        return self.sigma("eyy")
+
+    @property
+    def sigma_exy(self) -> Floats:
+        return self.sigma("exy")
+
+    @property
+    def sigma_gamma_xy(self) -> Floats:
+        return self.sigma("gamma_xy")
+
+    @property
+    def sigma_omega(self) -> Floats:
+        return self.sigma("omega")
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """ZOIs with a valid value, (R, C)."""
+        return np.asarray(self.status == Status.OK)
+
+    @property
+    def n_valid(self) -> int:
+        """Number of ZOIs with a valid value."""
+        return int(np.count_nonzero(self.ok))
+
+    def value(self, name: str) -> Floats:
+        """A value by its name (see ``VALUES``), (R, C).
+
+        Raises
+        ------
+        ValueError
+            Unknown name.
+        """
+        half = self._half
+        terms = combination(name).items()
+        return np.asarray(sum(c * self.parameters[i % 3 + half * (i // 3)] for i, c in terms))
+
+    def sigma(self, name: str, part: Literal["all", "reference", "current"] = "all") -> Floats:
+        """Standard uncertainty of a value, (R, C), in its unit.
+
+        ``part`` separates what the noise of the reference causes, which is common to all
+        frames measured against it, from what the noise of the deformed image causes.
+        """
+        key = f"{part} {name}"
+        if key not in self._cache:
+            self._cache[key] = np.sqrt(np.maximum(self._variance(name, part), 0))
+        return np.asarray(self._cache[key])
+
+    def _variance(self, name: str, part: str) -> Floats:
+        if part == "current":
+            return self._variance(name, "all") - self._variance(name, "reference")
+        covariance = self.covariance_reference if part == "reference" else self.covariance
+        terms = combination(name)
+        return np.asarray(
+            sum(
+                a * b * covariance[PAIR_INDEX[i, j]].astype(np.float64)
+                for i, a in terms.items()
+                for j, b in terms.items()
+            )
+        )
+
+    def mean(self, name: str, where: ArrayLike | None = None) -> tuple[float, float]:
+        """Mean of a value over the valid ZOIs and the standard uncertainty of that mean.
+
+        Overlapping ZOIs see the same noise; their correlation, known from the window, is
+        taken into account. (NaN, NaN) where no ZOI is valid.
+
+        Parameters
+        ----------
+        name : str
+            One of ``VALUES``.
+        where : (R, C) bool, optional
+            Only these ZOIs, a gauge.
+        """
+        chosen = self.ok if where is None else self.ok & np.asarray(where, bool)
+        count = int(np.count_nonzero(chosen))
+        if count == 0:
+            return float("nan"), float("nan")
+        value = float(self.value(name)[chosen].mean())
+        # A ZOI without predicted noise (sigma NaN) leaves the mean without a sigma, not without a value.
+        variance = _variance_of_sum(np.where(chosen, self.sigma(name), 0.0), name, self.grid, self.window)
+        return value, float(np.sqrt(max(variance, 0.0)) / count)
+
+    def strain(self, measure: Measure = "small") -> StrainTensor:
+        """The strain tensor of a measure: "small", "green" (Green-Lagrange) or "hencky".
+
+        Raises
+        ------
+        ValueError
+            Unknown measure.
+        """
+        if measure == "small":
+            return StrainTensor(measure, self.exx, self.eyy, self.exy)
+        if measure not in ("green", "hencky"):
+            raise ValueError(f"unknown strain measure {measure!r}; known: small, green, hencky")
+        cxx = (1 + self.du_dx) ** 2 + self.dv_dx**2
+        cyy = self.du_dy**2 + (1 + self.dv_dy) ** 2
+        cxy = (1 + self.du_dx) * self.du_dy + self.dv_dx * (1 + self.dv_dy)
+        if measure == "green":
+            return StrainTensor(measure, (cxx - 1) / 2, (cyy - 1) / 2, cxy / 2)
+        return _half_logarithm(cxx, cyy, cxy)
+
+    @property
+    def rotation(self) -> Floats:
+        """Finite rotation by polar decomposition of F = I + grad u, (R, C), rad."""
+        return np.asarray(np.arctan2(self.dv_dx - self.du_dy, 2 + self.du_dx + self.dv_dy))
+
+    @property
+    def principal(self) -> tuple[Floats, Floats, Floats]:
+        """Largest and smallest principal small strain and the angle of the first to x (rad)."""
+        return self.strain("small").principal
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StrainTensor:
+    """Components of a strain tensor on the grid, each (R, C), dimensionless; exy is the tensor one."""
+
+    measure: Measure
+    exx: Floats
+    eyy: Floats
+    exy: Floats
+
+    @property
+    def principal(self) -> tuple[Floats, Floats, Floats]:
+        """Largest and smallest principal strain and the angle of the first to x, (R, C) each, rad."""
+        middle = (self.exx + self.eyy) / 2
+        radius = np.hypot((self.exx - self.eyy) / 2, self.exy)
+        angle = 0.5 * np.arctan2(2 * self.exy, self.exx - self.eyy)
+        return middle + radius, middle - radius, angle
+
+
+def combination(name: str) -> Mapping[int, float]:
+    """A named value as {parameter index: factor}.
+
+    Raises
+    ------
+    ValueError
+        Unknown name; the message lists the known ones.
+    """
+    if name not in _COMBINATIONS:
+        raise ValueError(f"unknown value {name!r}; known: {', '.join(VALUES)}")
+    return _COMBINATIONS[name]
+
+
+def _filled(values: ArrayLike, grid: ZoiGrid) -> Floats:
+    return np.array(np.broadcast_to(np.asarray(values, np.float64), grid.shape))
+
+
+def _half_logarithm(cxx: Floats, cyy: Floats, cxy: Floats) -> StrainTensor:
+    """ln(C)/2 of symmetric 2x2 matrices, through their eigenvalues."""
+    first, second, angle = StrainTensor("small", cxx, cyy, cxy).principal
+    with np.errstate(invalid="ignore", divide="ignore"):
+        h1, h2 = np.log(first) / 2, np.log(second) / 2
+    cos, sin = np.cos(angle), np.sin(angle)
+    return StrainTensor("hencky", h1 * cos**2 + h2 * sin**2, h1 * sin**2 + h2 * cos**2, (h1 - h2) * cos * sin)
+
+
+def _variance_of_sum(sigma: Floats, name: str, grid: ZoiGrid, window: Window) -> float:
+    """Variance of the sum of one value over all ZOIs: sum of sigma_i sigma_j rho(lag_ij).
+
+    rho is a product of one correlation along x and one along y for each parameter; the two
+    parts of exy and omega are equally strong and uncorrelated for a pattern without direction.
+    """
+    terms = combination(name)
+    total = 0.0
+    for parameter in terms:
+        along_y, along_x = _correlations(grid.shape, window, grid.size, grid.step, parameter % 3)
+        total += float(np.sum(sigma * (along_y @ sigma @ along_x))) / len(terms)
+    return total
+
+
+@lru_cache(maxsize=64)
+def _correlations(
+    shape: tuple[int, int], window: Window, size: int, step: int, kind: int
+) -> tuple[Floats, Floats]:
+    """Correlation matrices (R, R) and (C, C) of a displacement (0), an x (1) or a y gradient (2)."""
+    along = [int(kind == 2), int(kind == 1)]
+    rho = [overlap(window, size, step, n, moment) for n, moment in zip(shape, along, strict=True)]
+    lags = [np.abs(np.subtract.outer(np.arange(n), np.arange(n))) for n in shape]
+    return rho[0][lags[0]], rho[1][lags[1]]

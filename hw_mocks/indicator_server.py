@@ -1,0 +1,104 @@
+"""A simulated indicator on a pseudo-terminal: a thread that samples, talks and answers."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable
+
+from hw_mocks.faults import FaultPlan
+from hw_mocks.indicator import Indicator
+from hw_mocks.indicator_output import IndicatorOutput, Sensing
+from hw_mocks.pty_port import PtyPort
+
+log = logging.getLogger(__name__)
+POLL_S = 0.05
+SPLIT_S = 0.03
+PATIENCE_S = 0.2  # for a backlog that does not fit into the line's buffer at once
+
+
+class IndicatorServer:
+    """Runs an indicator until ``close``.
+
+    Samples are taken on whole milliseconds of the device's clock, as firmware does, so that the
+    time a line carries is exactly that of its force.
+
+    Parameters
+    ----------
+    indicator : Indicator
+    sensing : Sensing
+    seed : int
+    faults : FaultPlan
+    clock : callable giving monotonic seconds
+
+    Attributes
+    ----------
+    path : str
+        What to open as the serial port.
+    """
+
+    def __init__(
+        self,
+        indicator: Indicator,
+        sensing: Sensing,
+        *,
+        seed: int = 0,
+        faults: FaultPlan | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._clock, self._boot = clock, clock()
+        self._output = IndicatorOutput(indicator, sensing, self._boot, seed, faults)
+        self._port = PtyPort()
+        self.path = self._port.path
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="sim-indicator", daemon=True)
+        self._thread.start()
+
+    def __enter__(self) -> IndicatorServer:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    @property
+    def lost_bytes(self) -> int:
+        """Bytes that found the line's buffer full."""
+        return self._port.lost_bytes
+
+    def close(self) -> None:
+        """End the thread and remove the port; may be called again."""
+        self._stopped.set()
+        self._thread.join()
+        self._port.close()
+
+    def _work(self) -> None:
+        try:
+            ideal = 0.0  # s since the boot, before rounding to milliseconds
+            while not self._stopped.is_set():
+                t = self._boot + round(ideal * 1e3) / 1e3
+                self._listen_until(t)
+                self._plug(t)
+                self._send(t)
+                ideal += self._output.interval(t)
+        except Exception:
+            log.exception("the simulated indicator failed")
+
+    def _listen_until(self, t: float) -> None:
+        while not self._stopped.is_set() and (left := t - self._clock()) > 0:
+            if not self._port.plugged:
+                self._stopped.wait(min(left, POLL_S))
+            elif data := self._port.read(min(left, POLL_S)):
+                self._port.write(self._output.answers(data, self._clock()))
+
+    def _plug(self, t: float) -> None:
+        if self._output.unplugged(t):
+            self._port.unplug()
+        else:
+            self._port.plug()
+
+    def _send(self, t: float) -> None:
+        for i, chunk in enumerate(self._output.sample(t)):
+            if i:
+                self._stopped.wait(SPLIT_S)
+            self._port.write(chunk, PATIENCE_S if len(chunk) > 1000 else 0.0)

@@ -1,0 +1,341 @@
+"""The simulated camera: ``sim:hole?fps=60&bits=12``.
+
+It looks at a ``VirtualSpecimen`` through an analytic renderer and a noisy sensor, and behaves like
+a driver: frames come at their own pace from a thread of its own into a finite ring of buffers;
+when nobody takes them they are dropped and the sequence numbers show it; so do frames that the
+renderer cannot finish in time. ``lockstep=yes`` waits for its reader instead, on nominal time.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.addresses import Address, Options
+from acquire.errors import DeviceError
+from acquire.events import EventSink, device_event
+from acquire.frame import CameraInfo, Clock, Frame, frozen
+from hw_mocks.faults import CAMERA_FAULTS, FaultPlan, parse_faults
+from hw_mocks.frame_plan import Planned, plan_frames
+from hw_mocks.scene import Scene
+from hw_mocks.sensor import BITS, Exposer, Sensor
+from hw_mocks.specimen import VirtualSpecimen, take_specimen
+
+log = logging.getLogger(__name__)
+POLL_S = 0.1
+FORMATS = {8: "GREY", 10: "Y10", 12: "Y12", 16: "Y16"}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimCameraSettings:
+    """How the camera looks and runs.
+
+    Attributes
+    ----------
+    sensor : Sensor
+    fps : float, 1/s
+    exposure_s : float, s
+    radius_px : float, px
+        Of the speckles.
+    contrast : float
+        Standard deviation of the pattern, part of full scale.
+    seed : int
+    buffers : int
+        Of the ring.
+    offset_s : float, s
+        Nominal time of the start (lock step).
+    faults : FaultPlan
+    """
+
+    sensor: Sensor
+    fps: float = 60.0
+    exposure_s: float = 0.002
+    radius_px: float = 2.0
+    contrast: float = 0.18
+    seed: int = 0
+    buffers: int = 4
+    offset_s: float = 0.0
+    faults: FaultPlan = field(default_factory=FaultPlan)
+
+
+class Ring:
+    """A few buffers between the sensor and whoever reads; full, it takes nothing."""
+
+    def __init__(self, size: int) -> None:
+        self._size = size
+        self._frames: deque[Frame] = deque()
+        self._change = threading.Condition()
+        self._closed = False
+
+    def put(self, frame: Frame) -> bool:
+        """Store a frame; False: no buffer is free."""
+        with self._change:
+            if len(self._frames) >= self._size:
+                return False
+            self._frames.append(frame)
+            self._change.notify()
+            return True
+
+    def close(self) -> None:
+        """No more frames will come."""
+        with self._change:
+            self._closed = True
+            self._change.notify_all()
+
+    def get(self, timeout: float) -> tuple[Frame | None, bool]:
+        """The oldest frame or None, and whether more may come."""
+        with self._change:
+            if not self._frames and not self._closed:
+                self._change.wait(timeout)
+            frame = self._frames.popleft() if self._frames else None
+            return frame, frame is not None or not self._closed
+
+
+class SimCamera:
+    """See the module; fulfils ``acquire.camera.Camera``.
+
+    Parameters
+    ----------
+    specimen : VirtualSpecimen
+        ``specimen.nominal`` chooses lock step.
+    settings : SimCameraSettings
+    address : str
+        For messages.
+    on_event : callable
+    clock : callable giving monotonic seconds
+    sleep : callable taking seconds, optional
+        By default a wait that ``stop`` interrupts.
+
+    Attributes
+    ----------
+    dropped : int
+        Frames lost so far because no buffer was free or the renderer was late.
+    """
+
+    def __init__(
+        self,
+        specimen: VirtualSpecimen,
+        settings: SimCameraSettings,
+        address: str,
+        on_event: EventSink,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], object] | None = None,
+    ) -> None:
+        self.specimen, self._settings, self._on_event = specimen, settings, on_event
+        self._clock, self._stopped = clock, threading.Event()
+        self._sleep = sleep or self._stopped.wait
+        self._scene = Scene(specimen, settings.radius_px, settings.contrast, settings.seed)
+        self._exposer = Exposer(settings.sensor, (specimen.height, specimen.width), settings.seed + 1)
+        self._plan = plan_frames(specimen.duration_s, settings.fps, settings.faults)
+        self._ring = Ring(settings.buffers)
+        self._thread: threading.Thread | None = None
+        self._error: Exception | None = None
+        self._last_index, self._trouble = -1, ""
+        self.dropped = 0
+        self.info = self._describe(address)
+        specimen.clock.claimed = True
+        # Compiles what is not compiled yet, before time counts; the noise to come stays as it is.
+        Exposer(settings.sensor, (specimen.height, specimen.width), 0).expose(self._scene.render(0.0))
+
+    def _describe(self, address: str) -> CameraInfo:
+        settings, sensor, specimen = self._settings, self._settings.sensor, self.specimen
+        clock: Clock = "nominal" if specimen.nominal else "device"
+        controls: dict[str, Any] = {
+            "bits": sensor.bits,
+            "full_well_e": sensor.full_well_e if np.isfinite(sensor.full_well_e) else None,
+            "read_noise_e": sensor.read_e,
+            "noise_mid_grey_GL": sensor.noise(),
+            "fixed_pattern": sensor.fixed_pattern,
+            "brightness": sensor.brightness,
+            "speckle_radius_px": settings.radius_px,
+            "contrast": settings.contrast,
+            "seed": settings.seed,
+            "buffers": settings.buffers,
+        }
+        return CameraInfo(
+            address=address,
+            name=f"simulated camera, {specimen.kind} specimen",
+            width=specimen.width,
+            height=specimen.height,
+            bits=sensor.bits,
+            live=not specimen.nominal,
+            clock=clock,
+            fps=settings.fps,
+            exposure_s=settings.exposure_s,
+            pixel_format=FORMATS[sensor.bits],
+            controls=controls,
+            warnings=("simulated: no camera and no specimen",),
+        )
+
+    @property
+    def scene(self) -> Scene:
+        """What it looks at, for the truth."""
+        return self._scene
+
+    def __enter__(self) -> Self:
+        if self._thread is None and not self._stopped.is_set():
+            self.specimen.clock.begin(self._settings.offset_s if self.specimen.nominal else self._clock())
+            if not self.specimen.nominal:
+                self._thread = threading.Thread(target=self._work, name="sim-camera", daemon=True)
+                self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[Frame]:
+        source = self._in_lock_step() if self.specimen.nominal else self._from_ring()
+        for frame in source:
+            if self._stopped.is_set():
+                return
+            yield frame
+
+    def stop(self) -> None:
+        """End the iteration; may be called from any thread."""
+        self._stopped.set()
+        self._ring.close()
+
+    def close(self) -> None:
+        """Stop, and wait for the thread."""
+        self.stop()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _start(self) -> float:
+        return self.specimen.clock.start or 0.0
+
+    def _from_ring(self) -> Iterator[Frame]:
+        more = self._thread is not None
+        while more and not self._stopped.is_set():
+            frame, more = self._ring.get(POLL_S)
+            if frame is not None:
+                yield self._numbered(frame)
+        if self._error is not None:
+            raise self._error
+
+    def _in_lock_step(self) -> Iterator[Frame]:
+        for planned in self._plan:
+            if self._delivers(planned):
+                yield self._numbered(self._shoot(planned))
+        if self._error is not None:
+            raise self._error
+
+    def _numbered(self, frame: Frame) -> Frame:
+        """The frame, knowing what was lost before it."""
+        lost, self._last_index = frame.index - self._last_index - 1, frame.index
+        if not lost:
+            return frame
+        image, damaged = frame.image, frame.damaged
+        return Frame(image, frame.index, frame.t, frame.clock, lost, frame.bits, frame.raw_t, damaged)
+
+    def _work(self) -> None:
+        """The thread: each frame at its time into the ring."""
+        try:
+            for planned in self._plan:
+                if self._stopped.is_set():
+                    break
+                self._serve(planned)
+        except Exception as error:
+            log.exception("the simulated camera failed")
+            self._error = error
+        finally:
+            self._ring.close()
+
+    def _serve(self, planned: Planned) -> None:
+        """One frame period; the picture is made before its time and stored when it is due.
+
+        A lag shorter than the ring costs nothing, as with a camera that fills its buffers by itself.
+        """
+        due = self._start() + planned.t + self._settings.exposure_s / 2
+        late = self._clock() - due > (self._settings.buffers - 1) / self._settings.fps
+        frame = None if late or planned.fate not in ("good", "damaged") else self._shoot(planned)
+        if (left := due - self._clock()) > 0:
+            self._sleep(left)
+        if self._delivers(planned) and (frame is None or not self._ring.put(frame)):
+            self.dropped += 1
+
+    def _delivers(self, planned: Planned) -> bool:
+        """Whether this frame comes; tells of trouble that begins or ends here."""
+        trouble = planned.fate if planned.fate in ("stalled", "disconnected") else ""
+        source = self.info.address
+        if planned.fate == "gone":
+            text = "the camera was disconnected and does not come back; plug it in and start again"
+            self._error = DeviceError(f"{source}: {text}")
+        elif trouble and trouble != self._trouble:
+            device_event(self._on_event, source, f"the camera is {trouble}; waiting for it", "error")
+        elif self._trouble and not trouble:
+            device_event(self._on_event, source, f"the camera was {self._trouble} and is back", "info")
+        self._trouble = trouble
+        return planned.fate in ("good", "damaged")
+
+    def _shoot(self, planned: Planned) -> Frame:
+        image = self._exposer.expose(self._scene.render(planned.t))
+        damaged = planned.fate == "damaged"
+        if damaged:
+            image = _half(image)
+        t = self._start() + planned.t
+        raw = t if self.specimen.nominal else t + self._settings.exposure_s / 2
+        return Frame(image, planned.index, t, self.info.clock, 0, self.info.bits, raw, damaged)
+
+
+def _half(image: NDArray[Any]) -> NDArray[Any]:
+    """The upper half; the rest never came."""
+    torn = image.copy()
+    torn[image.shape[0] // 2 :] = 0
+    return frozen(torn)
+
+
+def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpecimen) -> SimCamera:
+    """Open ``sim:KIND?key=value...`` on a specimen made by ``specimen_from`` of the same address.
+
+    Keys, beside those of the specimen (width, height, seconds, hold, end, max_strain, E_GPa, nu,
+    yield_MPa, section_mm2, px_per_mm, axis, hole, cell, overstrain, drift_x, drift_y,
+    rotation_deg, lockstep): fps, bits, noise (% of full scale at mid-grey), fpn (%), brightness,
+    exposure_us, radius (px), contrast (%), seed, buffers, offset (s), faults.
+
+    Raises
+    ------
+    ConfigError
+        Unknown key or fault, or an impossible value.
+    """
+    options = Options(address)
+    take_specimen(options)
+    settings = _take_camera(options)
+    options.done()
+    return SimCamera(specimen, settings, address.text, on_event)
+
+
+def _take_camera(options: Options) -> SimCameraSettings:
+    fps = options.number("fps", 60.0, minimum=0.1, maximum=10_000)
+    return SimCameraSettings(
+        sensor=_take_sensor(options),
+        fps=fps,
+        exposure_s=options.number("exposure_us", min(2000.0, 5e5 / fps), minimum=0, maximum=1e6 / fps) * 1e-6,
+        radius_px=options.number("radius", 2.0, minimum=0.7, maximum=64),
+        contrast=options.number("contrast", 18.0, minimum=1, maximum=20) / 100,
+        seed=options.integer("seed", 0, minimum=0),
+        buffers=options.integer("buffers", 4, minimum=1, maximum=1000),
+        offset_s=options.number("offset", 0.0, minimum=0),
+        faults=parse_faults(options.text("faults", ""), CAMERA_FAULTS, options.address.text),
+    )
+
+
+def _take_sensor(options: Options) -> Sensor:
+    return Sensor.with_noise(
+        int(options.choice("bits", tuple(map(str, BITS)), "12")),
+        options.number("noise", 0.5, minimum=0, maximum=20) / 100,
+        fixed_pattern=options.number("fpn", 0.0, minimum=0, maximum=20) / 100,
+        brightness=options.number("brightness", 1.0, minimum=0.01, maximum=10),
+    )

@@ -1,0 +1,278 @@
+"""The simulated load cell: ``sim:?rate=80&noise_N=1``.
+
+A simulated indicator feels the specimen and talks on a pseudo-terminal; what reads it is the
+product's own serial load cell, opened on the other end. On nominal time (lock step) there is no
+line: samples are computed for the whole test.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Self, cast
+
+import numpy as np
+
+from acquire.addresses import Address, Options
+from acquire.errors import ConfigError
+from acquire.events import Event, EventKind, EventSink
+from acquire.load_cell import LoadCell, open_load_cell
+from acquire.load_sample import LoadCellInfo, LoadSample
+from hw_mocks.ascii_indicator import AsciiIndicator, Style
+from hw_mocks.faults import SERIAL_FAULTS, FaultPlan, parse_faults
+from hw_mocks.indicator import Indicator
+from hw_mocks.indicator_output import Sensing
+from hw_mocks.indicator_server import IndicatorServer
+from hw_mocks.sim_indicators import INDICATORS, HbmAedIndicator
+from hw_mocks.specimen import SPECIMEN_KEYS, VirtualSpecimen, take_specimen
+
+log = logging.getLogger(__name__)
+STYLES: tuple[Style, ...] = ("millis", "plain", "label", "openscale")
+# Settings of the product's serial reader that make sense here too.
+PASSED_ON = ("sign", "capacity", "max_step", "timeout", "wait", "tare", "mode", "decimal")
+TIMED = {"millis": "1", "column": "2"}
+WARNING = "simulated: no load cell and no specimen"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SimLoadSettings:
+    """How the simulated cell measures.
+
+    Attributes
+    ----------
+    protocol : str
+    style : str
+        Of the lines of ``ascii``.
+    rate : float, 1/s
+    noise_N, resolution_N, capacity_N : float, N
+    seed : int
+    faults : FaultPlan
+    passed_on : mapping of str to str
+        Settings for the serial reader.
+    """
+
+    protocol: str = "ascii"
+    style: Style = "millis"
+    rate: float = 80.0
+    noise_N: float = 1.0
+    resolution_N: float = 0.1
+    capacity_N: float = 10_000.0
+    seed: int = 0
+    faults: FaultPlan = field(default_factory=FaultPlan)
+    passed_on: dict[str, str] = field(default_factory=dict)
+
+
+class SimLoadCell:
+    """The product's serial load cell on a simulated indicator; fulfils ``LoadCell``.
+
+    Parameters
+    ----------
+    specimen : VirtualSpecimen
+    settings : SimLoadSettings
+    address : str
+    on_event : callable
+
+    Attributes
+    ----------
+    noise_N : float, N
+        Standard deviation of one reading, rounding included: what the device adds to the truth.
+    """
+
+    def __init__(
+        self, specimen: VirtualSpecimen, settings: SimLoadSettings, address: str, on_event: EventSink
+    ) -> None:
+        self._specimen, self._address = specimen, address
+        self.noise_N = float(np.hypot(settings.noise_N, settings.resolution_N / np.sqrt(12)))
+        sensing = Sensing(
+            lambda t: float(specimen.force(specimen.elapsed(t))),
+            specimen.elapsed,
+            settings.rate,
+            settings.noise_N,
+            settings.capacity_N,
+        )
+        indicator, port_settings = _indicator(settings)
+        self._server = IndicatorServer(indicator, sensing, seed=settings.seed, faults=settings.faults)
+        query = "&".join(f"{key}={value}" for key, value in {**port_settings, **settings.passed_on}.items())
+        try:
+            self._cell = open_load_cell(f"{self._server.path}?{query}", _renamed(on_event, address))
+        except BaseException:
+            self._server.close()
+            raise
+        self.info = _described(self._cell.info, address, settings, self.noise_N)
+
+    def __enter__(self) -> Self:
+        if not self._specimen.clock.claimed:
+            self._specimen.clock.begin(time.monotonic())
+        self._cell.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[LoadSample]:
+        return iter(self._cell)
+
+    def tare(self) -> None:
+        """As the product's serial load cell does it."""
+        self._cell.tare()
+
+    def stop(self) -> None:
+        """End the iteration; from any thread."""
+        self._cell.stop()
+
+    def close(self) -> None:
+        """Close the port and the indicator behind it."""
+        self._cell.close()
+        self._server.close()
+
+
+class NominalLoadCell:
+    """The load on nominal time, for lock step: as many samples as the test has, at once.
+
+    Parameters and attributes as ``SimLoadCell``.
+    """
+
+    def __init__(
+        self, specimen: VirtualSpecimen, settings: SimLoadSettings, address: str, on_event: EventSink
+    ) -> None:
+        self._specimen, self._settings, self._on_event = specimen, settings, on_event
+        self.noise_N = float(np.hypot(settings.noise_N, settings.resolution_N / np.sqrt(12)))
+        self._rng = np.random.default_rng(settings.seed)
+        self._next, self._stopped, self._offset, self._last = 0, False, 0.0, 0.0
+        info = LoadCellInfo(address, "simulated load cell on nominal time", "none", "nominal")
+        self.info = _described(info, address, settings, self.noise_N)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def __iter__(self) -> Iterator[LoadSample]:
+        while not self._stopped and self._next / self._settings.rate <= self._specimen.duration_s + 1e-9:
+            t = self._next / self._settings.rate
+            self._next += 1
+            yield self._sample(t)
+
+    def _sample(self, t: float) -> LoadSample:
+        s = self._settings
+        force = float(self._specimen.force(t)) + s.noise_N * float(self._rng.standard_normal())
+        self._last = round(force / s.resolution_N) * s.resolution_N
+        text = f"{self._last - self._offset:.6g} N"
+        start = self._specimen.clock.start or 0.0
+        return LoadSample(start + t, self._last - self._offset, "N", raw=text.encode())
+
+    def tare(self) -> None:
+        """Make the last sample zero."""
+        self._offset = self._last
+        text, data = f"tared: {self._offset:.6g} N is zero now", {"offset_N": self._offset}
+        self._on_event(Event(time.monotonic(), EventKind.TARE, self.info.address, text, "info", data))
+
+    def stop(self) -> None:
+        """End the iteration; from any thread."""
+        self._stopped = True
+
+    def close(self) -> None:
+        """Nothing is open."""
+        self.stop()
+
+
+def _indicator(settings: SimLoadSettings) -> tuple[Indicator, dict[str, str]]:
+    """The indicator, and what the serial reader must know of it."""
+    name, step = settings.protocol, settings.resolution_N
+    if name == "ascii":
+        indicator: Indicator = AsciiIndicator(step, style=settings.style)
+    elif name == "hbm-aed":
+        indicator = HbmAedIndicator(step, nominal_N=settings.capacity_N)
+    else:
+        indicator = INDICATORS[name](step)
+    baud, bytesize, parity = indicator.line
+    port = {"protocol": name, "baud": f"{baud}", "bytesize": f"{bytesize}", "parity": parity}
+    if name == "ascii":
+        return indicator, port | (TIMED if settings.style in ("millis", "openscale") else {})
+    more = {
+        "sauter": {"unit": "N"},
+        "hbm-aed": {"unit": "N", "nominal": f"{settings.capacity_N:g}"},
+        "modbus": {"unit": "N", "profile": "laumas-tlb", "scale": f"{step:g}"},
+    }
+    return indicator, port | more.get(name, {})
+
+
+def _described(info: LoadCellInfo, address: str, settings: SimLoadSettings, noise_N: float) -> LoadCellInfo:
+    more = {
+        **info.settings,
+        "rate": settings.rate,
+        "noise_N": noise_N,
+        "resolution_N": settings.resolution_N,
+        "simulated_capacity_N": settings.capacity_N,
+        "seed": settings.seed,
+    }
+    name = f"simulated load cell ({info.name})"
+    warnings = (WARNING, *info.warnings)
+    return dataclasses.replace(info, address=address, name=name, settings=more, warnings=warnings)
+
+
+def _renamed(on_event: EventSink, address: str) -> Callable[[Event], None]:
+    return lambda event: on_event(dataclasses.replace(event, source=address))
+
+
+def open_sim_load(address: Address, on_event: EventSink, specimen: VirtualSpecimen) -> LoadCell:
+    """Open ``sim:?key=value...`` on the specimen of the test.
+
+    Keys: rate, noise_N, resolution_N, range_N, protocol (all of ``INDICATORS``), line (of ascii: millis, plain, label,
+    openscale), seed, faults, lockstep, and of the serial reader sign, capacity, max_step, timeout,
+    wait, tare, mode, decimal. Those of the specimen belong to the camera's address where
+    the camera is simulated too.
+
+    Raises
+    ------
+    ConfigError
+        Unknown key or fault, an impossible value, or a specimen that is not the camera's.
+    """
+    options = Options(address)
+    _refuse_another_specimen(address, specimen)
+    take_specimen(options)
+    settings = _take_load(options)
+    options.done()
+    kind = NominalLoadCell if specimen.nominal else SimLoadCell
+    return kind(specimen, settings, address.text, on_event)
+
+
+def _take_load(options: Options) -> SimLoadSettings:
+    passed_on = {key: value for key in PASSED_ON if (value := options.text(key)) is not None}
+    protocol = options.choice("protocol", tuple(INDICATORS), "ascii")
+    rate = options.number("rate", minimum=0.1, maximum=1000)
+    if rate is not None and protocol != "ascii":
+        passed_on["rate"] = f"{rate:g}"  # the reader asks or commands at this rate
+    return SimLoadSettings(
+        protocol=protocol,
+        style=cast("Style", options.choice("line", STYLES, "millis")),
+        rate=80.0 if rate is None else rate,
+        noise_N=options.number("noise_N", 1.0, minimum=0),
+        resolution_N=options.number("resolution_N", 0.1, minimum=1e-6),
+        capacity_N=options.number("range_N", 10_000.0, minimum=1e-3),
+        seed=options.integer("seed", 0, minimum=0),
+        faults=parse_faults(options.text("faults", ""), SERIAL_FAULTS, options.address.text),
+        passed_on=passed_on,
+    )
+
+
+def _refuse_another_specimen(address: Address, specimen: VirtualSpecimen) -> None:
+    """The camera's specimen is the only one: what the load's address says of it must agree."""
+    if not specimen.clock.claimed:
+        return
+    given = [key for key, _ in address.settings if key in SPECIMEN_KEYS and key != "lockstep"]
+    if given:
+        raise ConfigError(f"{address.text}: {given[0]} belongs to the camera's sim: address, say it there")
+    if address.target not in ("", specimen.kind):
+        raise ConfigError(f"{address.text}: the camera's specimen is {specimen.kind}; say sim: alone here")
+    if Options(address).flag("lockstep", specimen.nominal) != specimen.nominal:
+        raise ConfigError(f"{address.text}: camera and load must both be in lock step or neither")

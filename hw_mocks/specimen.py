@@ -1,0 +1,240 @@
+"""One virtual specimen behind both devices: what the camera sees and what the load cell feels.
+
+Every quantity is a pure function of the time since the start of the test (the programme holds,
+pulls to yield, pulls on, holds). It is the truth that measurements are compared with:
+``specimen.at(t)`` has the displacement and its gradient, ``force(t)`` the load. The strain is the
+displacement gradient (engineering strain along the load), about the middle of the image.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from acquire.addresses import Address, Options
+from acquire.errors import ConfigError
+from hw_mocks.deformation import Gradient, Motion
+from hw_mocks.material import Material
+from hw_mocks.programme import Programme, TestClock
+from hw_mocks.strain_modes import Axis, Kind, StrainModes
+
+Array = NDArray[np.float64]
+KINDS: tuple[Kind, ...] = ("uniform", "hole", "woven")
+SPECIMEN_KEYS = frozenset(
+    {
+        "width",
+        "height",
+        "E_GPa",
+        "nu",
+        "yield_MPa",
+        "seconds",
+        "hold",
+        "end",
+        "max_strain",
+        "axis",
+        "section_mm2",
+        "px_per_mm",
+        "hole",
+        "cell",
+        "overstrain",
+        "drift_x",
+        "drift_y",
+        "rotation_deg",
+        "lockstep",
+    }
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VirtualSpecimen:
+    """A tensile specimen and its test.
+
+    Attributes
+    ----------
+    kind : "uniform" | "hole" | "woven"
+        See ``hw_mocks.strain_modes``.
+    width, height : int, px
+        The field of view.
+    material : Material
+    programme : Programme
+    axis : "y" | "x"
+        Direction of the load in the image.
+    area_m2 : float, m^2
+        Cross-section (gross, for the hole).
+    px_per_m : float, px/m
+        Scale of the image.
+    hole_radius_px, cell_px : float, px
+        Of the hole, and period of the weave.
+    overstrain : float
+        Of the weave: highest local strain over the mean, less 1.
+    drift_px : (float, float), px
+        Rigid displacement along x and y reached at the end of the ramp.
+    rotation_rad : float, rad
+        Rigid rotation reached there, clockwise on the screen.
+    nominal : bool
+        The test runs on nominal time from 0 (lock step) instead of the machine's clock.
+    clock : TestClock
+        When the test began; the one thing here that changes.
+    """
+
+    kind: Kind = "uniform"
+    width: int = 640
+    height: int = 512
+    material: Material = field(default_factory=Material)
+    programme: Programme = field(default_factory=Programme)
+    axis: Axis = "y"
+    area_m2: float = 40e-6
+    px_per_m: float = 20e3
+    hole_radius_px: float = 60.0
+    cell_px: float = 96.0
+    overstrain: float = 0.6
+    drift_px: tuple[float, float] = (0.0, 0.0)
+    rotation_rad: float = 0.0
+    nominal: bool = False
+    clock: TestClock = field(default_factory=TestClock)
+
+    @property
+    def E(self) -> float:
+        """Young's modulus, Pa."""
+        return self.material.E
+
+    @property
+    def nu(self) -> float:
+        """Elastic Poisson's ratio."""
+        return self.material.nu
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the test, s."""
+        return self.programme.duration_s
+
+    @property
+    def yield_s(self) -> float:
+        """Time since the start at which plastic flow begins, s; infinite where it never does."""
+        p, wanted = self.programme, self.material.yield_strain
+        if wanted > p.max_strain:
+            return math.inf
+        strains = (0.0, p.knee_strain, p.max_strain)
+        return float(np.interp(wanted, strains, (p.hold_s, p.knee_s, p.hold_s + p.ramp_s)))
+
+    @property
+    def modes(self) -> StrainModes:
+        """The strain field per unit of mean strain."""
+        middle = ((self.width - 1) / 2, (self.height - 1) / 2)
+        return StrainModes(self.kind, self.axis, *middle, self.hole_radius_px, self.cell_px, self.overstrain)
+
+    def elapsed(self, now: float) -> float:
+        """Seconds since the start at ``now`` on the clock of whoever began the test."""
+        return self.clock.elapsed(now)
+
+    def axial_strain(self, t: ArrayLike) -> Array:
+        """Mean strain along the load, ``t`` seconds since the start (for the hole: remote)."""
+        return self.programme.strain(t)
+
+    def transverse_strain(self, t: ArrayLike) -> Array:
+        """Mean strain across the load (for the hole: remote)."""
+        return self.material.transverse(self.axial_strain(t))
+
+    def stress(self, t: ArrayLike) -> Array:
+        """Mean stress, Pa (for the hole: gross and remote)."""
+        return self.material.stress(self.axial_strain(t))
+
+    def force(self, t: ArrayLike) -> Array:
+        """Load on the specimen, N, tension positive."""
+        return np.asarray(self.area_m2 * self.stress(t))
+
+    def at(self, t: float) -> Motion:
+        """The deformation ``t`` seconds since the start."""
+        progress = float(self.programme.progress(t))
+        shift = (progress * self.drift_px[0], progress * self.drift_px[1])
+        axial, transverse = float(self.axial_strain(t)), float(self.transverse_strain(t))
+        return Motion(self.modes, axial, transverse, progress * self.rotation_rad, shift)
+
+    def displacement(self, x: ArrayLike, y: ArrayLike, t: float) -> tuple[Array, Array]:
+        """Where reference pixels (x, y) have gone: (u, v) in px."""
+        return self.at(t).displacement(x, y)
+
+    def gradient(self, x: ArrayLike, y: ArrayLike, t: float) -> Gradient:
+        """(du_dx, du_dy, dv_dx, dv_dy) at reference pixels (x, y)."""
+        return self.at(t).gradient(x, y)
+
+    def mask(self) -> NDArray[np.bool_]:
+        """(H, W) bool: where there is material in the reference image.
+
+        Outside of it the displacement means nothing (it is continued smoothly into the hole).
+        """
+        if self.kind != "hole":
+            return np.ones((self.height, self.width), bool)
+        y, x = np.mgrid[: self.height, : self.width]
+        modes = self.modes
+        return np.asarray(np.hypot(x - modes.x0, y - modes.y0) > self.hole_radius_px)
+
+
+def specimen_from(address: Address) -> VirtualSpecimen:
+    """The specimen that a ``sim:`` address describes.
+
+    Keys for devices are left to ``open_sim_camera`` and ``open_sim_load``, which refuse what
+    nobody knows.
+
+    Raises
+    ------
+    ConfigError
+        An unknown kind or an impossible value.
+    """
+    return take_specimen(Options(address))
+
+
+def take_specimen(options: Options) -> VirtualSpecimen:
+    """Take the keys of the specimen out of an address's settings; raises as ``specimen_from``."""
+    kind = _kind(options.address)
+    material = _take_material(options)
+    return VirtualSpecimen(
+        kind=kind,
+        width=options.integer("width", 640, minimum=32, maximum=8192),
+        height=options.integer("height", 512, minimum=32, maximum=8192),
+        material=material,
+        programme=_take_programme(options, material),
+        axis="x" if options.choice("axis", ("y", "x"), "y") == "x" else "y",
+        area_m2=options.number("section_mm2", 40.0, minimum=1e-3) * 1e-6,
+        px_per_m=options.number("px_per_mm", 20.0, minimum=1e-3) * 1e3,
+        hole_radius_px=options.number("hole", 60.0, minimum=4),
+        cell_px=options.number("cell", 96.0, minimum=8),
+        overstrain=options.number("overstrain", 0.6, minimum=0, maximum=0.95),
+        drift_px=(options.number("drift_x", 0.0), options.number("drift_y", 0.0)),
+        rotation_rad=math.radians(options.number("rotation_deg", 0.0, minimum=-45, maximum=45)),
+        nominal=options.flag("lockstep"),
+    )
+
+
+def _kind(address: Address) -> Kind:
+    wanted = address.target or "uniform"
+    for kind in KINDS:
+        if kind == wanted:
+            return kind
+    raise ConfigError(f"{address.text}: there is no simulated specimen {wanted!r}; known: {', '.join(KINDS)}")
+
+
+def _take_material(options: Options) -> Material:
+    return Material(
+        E=options.number("E_GPa", 70.0, minimum=1e-3) * 1e9,
+        nu=options.number("nu", 0.33, minimum=0, maximum=0.5),
+        yield_stress=options.number("yield_MPa", 140.0, minimum=1e-3) * 1e6,
+    )
+
+
+def _take_programme(options: Options, material: Material) -> Programme:
+    seconds = options.number("seconds", 20.0, minimum=0.1)
+    # A short test keeps its parts in proportion unless they are given.
+    hold = options.number("hold", min(2.0, 0.1 * seconds), minimum=0)
+    end = options.number("end", min(1.0, 0.05 * seconds), minimum=0)
+    top = options.number("max_strain", 8e-3, minimum=0, maximum=0.5)
+    if hold + end >= seconds:
+        raise ConfigError(
+            f"{options.address.text}: hold and end leave no time to pull; give seconds above {hold + end:g}"
+        )
+    plastic = top > material.yield_strain
+    knee_strain, knee = (material.yield_strain, 0.6) if plastic else (top / 2, 0.5)
+    return Programme(hold, seconds - hold - end, end, knee_strain, top, knee)

@@ -1,0 +1,135 @@
+"""The two channels between threads: a one-place mailbox and a byte-bounded buffer.
+
+Both count what they could not pass on; nothing is dropped silently.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from typing import Generic, TypeVar
+
+Item = TypeVar("Item")
+
+
+class Mailbox(Generic[Item]):
+    """One place, newest wins: the measuring path never waits for old bursts.
+
+    With ``waits=True`` ``put`` waits until the place is free, so that nothing is skipped: for
+    sources that wait for their reader.
+
+    Attributes
+    ----------
+    skipped : list of Item
+        What was replaced before anybody took it, until ``take_skipped`` fetches it.
+    """
+
+    def __init__(self, *, waits: bool = False) -> None:
+        self._waits = waits
+        self._items: deque[Item] = deque()
+        self._skipped: list[Item] = []
+        self._change = threading.Condition()
+        self._closed = False
+
+    def put(self, item: Item) -> None:
+        """Place ``item``; what lay there untaken is counted as skipped. Ignored after ``close``."""
+        with self._change:
+            while self._waits and self._items and not self._closed:
+                self._change.wait()
+            if self._closed:
+                self._skipped.append(item)
+                return
+            while self._items:
+                self._skipped.append(self._items.popleft())
+            self._items.append(item)
+            self._change.notify_all()
+
+    def get(self, timeout_s: float | None = None) -> Item | None:
+        """Take what is there, waiting up to ``timeout_s``; None where nothing came or all is over."""
+        with self._change:
+            self._change.wait_for(lambda: self._items or self._closed, timeout_s)
+            item = self._items.popleft() if self._items else None
+            self._change.notify_all()
+            return item
+
+    def take_skipped(self) -> list[Item]:
+        """What was skipped since the last call."""
+        with self._change:
+            skipped, self._skipped = self._skipped, []
+            return skipped
+
+    def close(self) -> None:
+        """No more items; what lies there can still be taken."""
+        with self._change:
+            self._closed = True
+            self._change.notify_all()
+
+    @property
+    def finished(self) -> bool:
+        """Closed and empty."""
+        with self._change:
+            return self._closed and not self._items
+
+
+class ByteBuffer(Generic[Item]):
+    """A queue bounded in bytes; a put beyond the bound is refused and counted by the caller.
+
+    Parameters
+    ----------
+    limit : int, bytes
+    waits : bool
+        Wait for room instead of refusing (sources that wait for their reader).
+    """
+
+    def __init__(self, limit: int, *, waits: bool = False) -> None:
+        self._limit, self._waits = limit, waits
+        self._items: deque[tuple[Item, int]] = deque()
+        self._bytes = 0
+        self._change = threading.Condition()
+        self._closed = False
+
+    def put(self, item: Item, size: int, *, always: bool = False) -> bool:
+        """Queue ``item`` of ``size`` bytes; False where there is no room, or after ``close``.
+
+        An empty buffer takes anything; ``always`` is for small things that must not be lost.
+        """
+        with self._change:
+            if self._waits and not always:
+                self._change.wait_for(lambda: self._fits(size) or self._closed)
+            if self._closed or not (always or self._fits(size)):
+                return False
+            self._items.append((item, size))
+            self._bytes += size
+            self._change.notify_all()
+            return True
+
+    def _fits(self, size: int) -> bool:
+        return not self._items or self._bytes + size <= self._limit
+
+    def get(self, timeout_s: float | None = None) -> Item | None:
+        """The oldest item; None after ``timeout_s``, or when closed and empty."""
+        with self._change:
+            self._change.wait_for(lambda: self._items or self._closed, timeout_s)
+            if not self._items:
+                return None
+            item, size = self._items.popleft()
+            self._bytes -= size
+            self._change.notify_all()
+            return item
+
+    def close(self) -> None:
+        """No more items; what is queued can still be taken."""
+        with self._change:
+            self._closed = True
+            self._change.notify_all()
+
+    @property
+    def finished(self) -> bool:
+        """Closed and empty."""
+        with self._change:
+            return self._closed and not self._items
+
+    @property
+    def waiting_bytes(self) -> int:
+        """Bytes queued now."""
+        return self._bytes

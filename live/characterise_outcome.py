@@ -1,0 +1,226 @@
+"""What an experiment of ``phasedic characterise`` hands back, and how it is kept.
+
+An ``Outcome`` is text, tables and verdicts; it goes through JSON unchanged, so that a run that was
+interrupted takes up what it has. Figures and CSV files lie beside it.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import json
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from acquire.errors import ConfigError, DataError
+
+FORMAT = 1
+EQUAL_WITHIN = 0.1
+DPI = 80
+Word = Literal["better", "equal", "worse"]
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Rows under headings that carry their units; ``name`` is that of its CSV file."""
+
+    name: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[Any, ...], ...]
+
+    def csv(self) -> str:
+        """As CSV, numbers in full."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(self.columns)
+        writer.writerows(self.rows)
+        return text.getvalue()
+
+    def markdown(self) -> str:
+        """As a Markdown table, numbers to three digits."""
+        lines = ["| " + " | ".join(self.columns) + " |", "|" + " --- |" * len(self.columns)]
+        lines += ["| " + " | ".join(shown(value) for value in row) + " |" for row in self.rows]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """Where ours stands in one respect.
+
+    Attributes
+    ----------
+    subject : str
+        What was compared, with both figures.
+    against : str
+        "the paper", "the paper's estimator", "the limit", the name of a peer ...
+    word : "better" | "equal" | "worse"
+    """
+
+    subject: str
+    against: str
+    word: Word
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The result of one experiment.
+
+    Attributes
+    ----------
+    name, title : str
+    text : str
+        Markdown under the title; may hold ``![...](figure.png)``.
+    tables : tuple of Table
+    figures : tuple of str
+        File names beside the page.
+    verdicts : tuple of Verdict
+    seconds : float, s
+        Time it took.
+    """
+
+    name: str
+    title: str
+    text: str
+    tables: tuple[Table, ...] = ()
+    figures: tuple[str, ...] = ()
+    verdicts: tuple[Verdict, ...] = ()
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Bench:
+    """What an experiment is given.
+
+    Attributes
+    ----------
+    folder : Path
+        Where its figures go.
+    quick : bool
+        Fewer ZOIs and cases.
+    data : Path or None
+        Folder of real image sets.
+    tick : callable
+        Told the share done so far, 0 to 1.
+    """
+
+    folder: Path
+    quick: bool = False
+    data: Path | None = None
+    tick: Callable[[float], None] = field(default=lambda share: None)
+
+    def steps(self, items: Iterable[Any]) -> Iterable[Any]:
+        """The items one by one, ticking after each."""
+        everything = list(items)
+        for number, item in enumerate(everything):
+            yield item
+            self.tick((number + 1) / len(everything))
+
+
+def shown(value: Any) -> str:
+    """A value for a reader: three digits, powers of ten where they are needed."""
+    if not isinstance(value, float):
+        return str(value)
+    if math.isnan(value):
+        return "-"
+    if value == 0:
+        return "0"
+    if 1e-3 <= abs(value) < 1e4:
+        digits = max(0, 2 - math.floor(math.log10(abs(value))))
+        return f"{value:.{digits}f}"
+    return f"{value:.2e}"
+
+
+def compared(ours: float, theirs: float) -> Word:
+    """The verdict for two figures of which the smaller is the better."""
+    if ours < theirs * (1 - EQUAL_WITHIN):
+        return "better"
+    return "equal" if ours <= theirs * (1 + EQUAL_WITHIN) else "worse"
+
+
+def verdict(what: str, unit: str, ours: float, theirs: float, against: str) -> Verdict:
+    """A verdict whose text carries both figures."""
+    subject = f"{what}: {shown(float(ours))} against {shown(float(theirs))} {unit}".rstrip()
+    return Verdict(subject, against, compared(ours, theirs))
+
+
+def figure(width: float = 9.0, height: float = 3.6) -> Any:
+    """An empty figure (inches) that needs no display.
+
+    Raises
+    ------
+    ConfigError
+        matplotlib is missing.
+    """
+    try:
+        from matplotlib.figure import Figure
+    except ImportError:
+        raise ConfigError(
+            "figures need matplotlib, which is not installed: pip install phasedic[plots]"
+        ) from None
+    return Figure(figsize=(width, height), layout="constrained")
+
+
+def save_figure(bench: Bench, name: str, drawn: Any) -> str:
+    """Write a figure beside the page; returns its file name."""
+    drawn.savefig(bench.folder / name, dpi=DPI, metadata={"Software": None})
+    return name
+
+
+def colour_map(axes: Any, values: Any, title: str, unit: str, limits: Sequence[float] | None = None) -> Any:
+    """A map with its colour bar, symmetric about its middle unless limits are given."""
+    import numpy as np
+
+    low, high = limits if limits is not None else np.nanpercentile(values, [1, 99])
+    picture = axes.imshow(values, cmap="RdBu_r", vmin=low, vmax=high, interpolation="nearest")
+    axes.set_title(title, fontsize=9)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    axes.figure.colorbar(picture, ax=axes, shrink=0.8, label=unit)
+    return picture
+
+
+def write_outcome(outcome: Outcome, folder: Path, key: str) -> None:
+    """Keep an outcome: JSON for taking up again, CSV for others. The JSON appears whole or not at all."""
+    for table in outcome.tables:
+        (folder / f"{table.name}.csv").write_text(table.csv(), encoding="utf-8")
+    document = {"format": FORMAT, "key": key, "outcome": dataclasses.asdict(outcome)}
+    new = folder / f".{outcome.name}.json.new"
+    new.write_text(json.dumps(document, indent=1), encoding="utf-8")
+    new.replace(folder / f"{outcome.name}.json")
+
+
+def read_outcome(name: str, folder: Path, key: str) -> Outcome | None:
+    """What an earlier run with the same key left; None where there is nothing that serves.
+
+    Raises
+    ------
+    DataError
+        The file cannot be read as what it should be.
+    """
+    path = folder / f"{name}.json"
+    if not path.exists():
+        return None
+    try:
+        document = json.loads(path.read_text(encoding="utf-8"))
+        if document["format"] != FORMAT or document["key"] != key:
+            return None
+        outcome = _from_dict(document["outcome"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise DataError(f"{path} is not a result of phasedic characterise ({error}); delete it") from error
+    return outcome if all((folder / each).exists() for each in outcome.figures) else None
+
+
+def _from_dict(values: dict[str, Any]) -> Outcome:
+    tables = tuple(
+        Table(t["name"], tuple(t["columns"]), tuple(tuple(row) for row in t["rows"]))
+        for t in values["tables"]
+    )
+    verdicts = tuple(Verdict(**v) for v in values["verdicts"])
+    return Outcome(
+        values["name"], values["title"], values["text"], tables,
+        tuple(values["figures"]), verdicts, float(values["seconds"]),
+    )  # fmt: skip

@@ -1,0 +1,76 @@
+"""The command line: ``phasedic run | demo | replay | devices ...``; messages and exit codes."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import importlib
+import logging
+import os
+import sys
+from collections.abc import Callable, Sequence
+
+from acquire.errors import PhasedicError
+from live.arguments import make_parser
+
+Command = Callable[[argparse.Namespace], int]
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Entry point; returns the exit code."""
+    arguments = make_parser().parse_args(argv)
+    _set_up_logging(arguments)
+    code = _outcome(arguments)
+    _let_go_of_lost_streams()
+    return code
+
+
+def _let_go_of_lost_streams() -> None:
+    """A terminal or pipe that has gone must not turn the exit code into Python's 120."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except (OSError, ValueError):
+            with contextlib.suppress(OSError, ValueError):
+                os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+
+
+def _set_up_logging(arguments: argparse.Namespace) -> None:
+    verbose = getattr(arguments, "verbose", False)
+    logging.basicConfig(
+        level=logging.DEBUG if verbose else logging.WARNING,
+        format="%(levelname)s %(message)s"
+        if not verbose
+        else "%(asctime)s %(levelname)s %(name)s: %(message)s",
+        stream=sys.stderr,
+    )
+    for name in ("acquire", "analysis", "live", "hw_mocks"):
+        logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.INFO)
+
+
+def _command(start: str) -> Command:
+    """The function that ``start`` names as module:function."""
+    module, _, name = start.partition(":")
+    command: Command = getattr(importlib.import_module(module), name)
+    return command
+
+
+def _outcome(arguments: argparse.Namespace) -> int:
+    """Run the command; what it raises becomes a message and an exit code."""
+    try:
+        return _command(arguments.start)(arguments)
+    except PhasedicError as error:
+        print(f"phasedic: {error}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("phasedic: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        return 0
+    except Exception:
+        logging.getLogger("live").exception("a defect of phasedic; please report it with this traceback")
+        return 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

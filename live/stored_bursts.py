@@ -1,0 +1,143 @@
+"""The bursts of a recorded session, whatever it holds: all frames, every K-th frame, or bursts."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from acquire.burst import BurstAccumulator, average_bursts, burst_of
+from acquire.errors import ConfigError, DataError
+from acquire.frame import Burst, Frame
+from acquire.session import Session
+
+DEFAULT_BURST = 4  # of a session whose configuration says nothing
+
+
+class Store(Protocol):
+    """What a replay asks of a session."""
+
+    def burst(self, told: Mapping[str, Any]) -> Burst:
+        """The burst that an event tells of (first, last, n); DataError where it was not recorded whole."""
+        ...
+
+    def first_burst(self, n: int) -> tuple[Burst, int]:
+        """The first n frames, and the sequence number of the last; DataError where there are none."""
+        ...
+
+    def bursts_after(
+        self, last: int, n: int | None, shorten_above_px: float | None = None
+    ) -> Iterator[Burst]:
+        """All bursts of n frames after sequence number ``last``; None: as they were recorded."""
+        ...
+
+
+def open_store(session: Session, path: Path) -> Store:
+    """How to find the bursts of ``session``; raises DataError where it holds no pictures."""
+    if session.mode.kind == "bursts":
+        return _Bursts(session, path)
+    if len(session) == 0:
+        raise DataError(f"{path}: the session holds no frames; there is nothing to replay")
+    return _Frames(session, path) if session.mode.every == 1 else _EveryKth(session, path)
+
+
+class _Frames:
+    """All frames were recorded."""
+
+    def __init__(self, session: Session, path: Path) -> None:
+        self._session, self._path = session, path
+        self._indices = [int(i) for i in session.indices]
+
+    def burst(self, told: Mapping[str, Any]) -> Burst:
+        first, last, n = int(told["first"]), int(told["last"]), int(told["n"])
+        frames = [frame for frame in self._between(first, last) if not frame.damaged]
+        if len(frames) != n:
+            raise DataError(
+                f"{self._path}: of the burst of frames {first} to {last} only {len(frames)} of {n} are"
+                " recorded; replay without --as-measured measures what is there"
+            )
+        return burst_of(frames)
+
+    def first_burst(self, n: int) -> tuple[Burst, int]:
+        for burst in average_bursts(self._session.frames(), n):
+            return burst, burst.last_index
+        raise DataError(
+            f"{self._path}: fewer than {n} frames without a gap; give a smaller --reference-burst"
+        )
+
+    def bursts_after(
+        self, last: int, n: int | None, shorten_above_px: float | None = None
+    ) -> Iterator[Burst]:
+        frames = self._between(last + 1, self._indices[-1])
+        accumulator = BurstAccumulator(n or DEFAULT_BURST, shorten_above_px=shorten_above_px)
+        return (burst for burst in map(accumulator.add, frames) if burst is not None)
+
+    def _between(self, first: int, last: int) -> Iterator[Frame]:
+        start, stop = bisect_left(self._indices, first), bisect_right(self._indices, last)
+        return self._session.frames(start, stop)
+
+
+class _EveryKth(_Frames):
+    """Only every K-th frame was recorded: what is left is taken as a slower camera."""
+
+    def burst(self, told: Mapping[str, Any]) -> Burst:
+        """What was recorded of a burst; where that is nothing, the recorded frame next to it."""
+        frames = [f for f in self._between(int(told["first"]), int(told["last"])) if not f.damaged]
+        return burst_of(frames or [next(self._between(int(told["first"]), self._indices[-1]))])
+
+    def first_burst(self, n: int) -> tuple[Burst, int]:
+        for burst in average_bursts(self._between(self._indices[0], self._indices[-1]), n):
+            return burst, self._indices[burst.last_index]
+        raise DataError(f"{self._path}: fewer than {n} frames; give a smaller --reference-burst")
+
+    def bursts_after(
+        self, last: int, n: int | None, shorten_above_px: float | None = None
+    ) -> Iterator[Burst]:
+        if n is not None and n > 1:
+            raise ConfigError(
+                f"{self._path} holds only one frame in {self._session.mode.every}, {n} of them are no burst;"
+                " give --burst 1"
+            )
+        return average_bursts(self._between(last + 1, self._indices[-1]), 1)
+
+    def _between(self, first: int, last: int) -> Iterator[Frame]:
+        start, stop = bisect_left(self._indices, first), bisect_right(self._indices, last)
+        for number in range(start, stop):
+            yield replace(self._session.frame(number), index=number, lost_before=0)
+
+
+class _Bursts:
+    """Bursts were recorded in place of frames."""
+
+    def __init__(self, session: Session, path: Path) -> None:
+        self._session, self._path = session, path
+        self._numbers = {
+            (burst.first_index, burst.last_index): number for number, burst in enumerate(session.bursts())
+        }
+        if not self._numbers:
+            raise DataError(f"{path}: the session holds no bursts; there is nothing to replay")
+
+    def burst(self, told: Mapping[str, Any]) -> Burst:
+        number = self._numbers.get((int(told["first"]), int(told["last"])))
+        if number is None:
+            raise DataError(
+                f"{self._path}: the burst of frames {told['first']} to {told['last']} was not recorded;"
+                " replay without --as-measured measures what is there"
+            )
+        return self._session.burst(number)
+
+    def first_burst(self, n: int) -> tuple[Burst, int]:
+        raise ConfigError(f"{self._path} holds bursts, not frames; --reference-burst cannot be changed")
+
+    def bursts_after(
+        self, last: int, n: int | None, shorten_above_px: float | None = None
+    ) -> Iterator[Burst]:
+        for burst in self._session.bursts():
+            if burst.first_index > last:
+                if n is not None and burst.n != n:
+                    raise ConfigError(
+                        f"{self._path} holds bursts of {burst.n} frames; give --burst {burst.n}"
+                    )
+                yield burst

@@ -1,0 +1,140 @@
+"""What holds for every parser, whatever the bytes and however they are cut."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import random
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquire.load_sample import LoadFlag
+from acquire.protocols import Reading
+from tests.acquire.protocols.conversation import ALL, any_parser, parser, read_line
+
+SEEDS = [
+    b"12.5 N\r\n",
+    b"S S     100.00 g\r\n",
+    b"ST,GS,+0001.234kg\r\n",
+    b"-18.78 lbF\r\n",
+    b"1021.15",
+    b"+0500000,31,008\r\n",
+    bytes([1, 3, 6, 0, 0, 0, 5, 0, 2]),
+    b"\x00\xff\r\r\n",
+]
+babble = st.one_of(
+    st.binary(max_size=400),
+    st.lists(st.one_of(st.sampled_from(SEEDS), st.binary(max_size=12)), max_size=30).map(b"".join),
+)
+
+
+def chunks(data: bytes, seed: int) -> list[bytes]:
+    """``data`` cut at random places."""
+    rng = random.Random(seed)
+    cuts = sorted({0, len(data), *(rng.randrange(len(data) + 1) for _ in range(rng.randrange(8)))})
+    return [data[a:b] for a, b in itertools.pairwise(cuts)]
+
+
+def same(a: Reading, b: Reading) -> bool:
+    values = a.value == b.value or (math.isnan(a.value) and math.isnan(b.value))
+    return values and (a.raw, a.start, a.flags, a.unit) == (b.raw, b.start, b.flags, b.unit)
+
+
+@pytest.mark.parametrize("name", ALL)
+@given(data=babble, seed=st.integers(0, 1000))
+def test_chunking_changes_nothing(name: str, data: bytes, seed: int) -> None:
+    whole, cut = any_parser(name), any_parser(name)
+    at_once = whole.feed(data) + whole.silence()
+    in_pieces = [reading for piece in chunks(data, seed) for reading in cut.feed(piece)] + cut.silence()
+    assert len(at_once) == len(in_pieces)
+    assert all(same(a, b) for a, b in zip(at_once, in_pieces, strict=True))
+
+
+@pytest.mark.parametrize("name", ALL)
+@given(data=babble)
+def test_every_reading_is_a_number_or_says_why_not(name: str, data: bytes) -> None:
+    made = any_parser(name)
+    because = LoadFlag.ERROR | LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD
+    for reading in made.feed(data) + made.silence():
+        assert math.isfinite(reading.value) != bool(reading.flags & because)
+        assert data[reading.start : reading.start + len(reading.raw)] == reading.raw
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_a_megabyte_without_an_end_is_held_in_a_few_hundred_bytes(name: str) -> None:
+    made = any_parser(name)
+    readings = made.feed(b"\r\n")
+    for _ in range(1000):
+        readings += made.feed(b"1" * 1000)
+    assert sum(len(reading.raw) for reading in readings) <= 512
+
+
+def test_the_first_partial_line_gives_no_value() -> None:
+    made = parser("ascii")
+    assert [r.value for r in made.feed(b"3.5 N\r\n12.5 N\r\n")] == [12.5]
+
+
+def test_a_line_with_more_columns_than_the_others_gives_no_value() -> None:
+    made = parser("ascii", "millis=1&column=2")
+    made.feed(b"\r\n")
+    values = [r.value for r in made.feed(b"10,12.5,N\r\n20,12,5,N\r\n30,12.5,N\r\n")]
+    assert values == pytest.approx([12.5, math.nan, 12.5], nan_ok=True)
+
+
+def test_more_columns_that_stay_are_taken_over() -> None:
+    made = parser("ascii", "column=2")
+    made.feed(b"\r\n1,2\r\n")
+    values = [r.value for r in made.feed(b"1,3,4\r\n" * 150)]
+    assert math.isnan(values[99]) and values[-1] == 3.0
+
+
+def test_after_a_restart_the_line_begun_is_gone() -> None:
+    made = parser("ascii")
+    made.feed(b"\r\n12")
+    made.restart()
+    assert [r.value for r in made.feed(b"5 N\r\n7 N\r\n")] == [7.0]
+
+
+@pytest.mark.parametrize("end", [b"\r", b"\n", b"\r\n", b"\n\r"])
+def test_every_line_end(end: bytes) -> None:
+    made = parser("ascii")
+    made.feed(end)
+    assert [r.value for r in made.feed(b"1 N" + end + b"2 N" + end)] == [1.0, 2.0]
+
+
+decimals = st.decimals(min_value=-9999, max_value=9999, places=3, allow_nan=False, allow_infinity=False)
+
+
+def _aed(x: float) -> bytes:
+    return f"ST,GS,{x:+09.3f}kg".encode()
+
+
+RENDERERS: list[tuple[str, Callable[[float], bytes], str]] = [
+    ("ascii", lambda x: f"{x:.3f} N".encode(), ""),
+    ("ascii", lambda x: f"99,{x:.3f},N,1234,21.5,".encode(), "millis=1"),
+    ("mt-sics", lambda x: f"S D {x:10.3f} kg".encode(), ""),
+    ("aed-standard", _aed, ""),
+    ("mark10", lambda x: f"{x:.3f} N".encode(), ""),
+    ("hbm-aed", lambda x: f"{round(x * 1000):+08d}".encode(), "decimals=3"),
+    ("lines", lambda x: f"{x:10.3f} kg".encode(), "preset=ohaus"),
+]
+
+
+@pytest.mark.parametrize(("name", "render", "settings"), RENDERERS, ids=[f"{r[0]} {r[2]}" for r in RENDERERS])
+@given(value=decimals)
+def test_what_is_rendered_is_read(
+    name: str, render: Callable[[float], bytes], settings: str, value: float
+) -> None:
+    reading = read_line(name, render(float(value)), settings)
+    assert reading is not None
+    assert reading.value == pytest.approx(float(value), abs=1e-9)
+
+
+@given(st.decimals(min_value=-999, max_value=999, places=2, allow_nan=False, allow_infinity=False))
+def test_what_sauter_answers_is_read(value: float) -> None:
+    made = parser("sauter")
+    made.feed(f"{0 if value < 0 else 1}{abs(value):06.2f}".encode())
+    assert made.silence()[0].value == pytest.approx(float(value))

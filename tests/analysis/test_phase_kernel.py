@@ -1,0 +1,151 @@
+"""The kernel as its users see it: truth, uncertainty, independence of ZOIs, refusals."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+import pytest
+
+from analysis import KernelSettings, NoiseModel, PatternError, PhaseKernel, Roi, Status, ZoiGrid
+from tests.analysis.speckle import SHAPE, picture
+
+GRID = ZoiGrid.cover(Roi(8, 8, 224, 184), size=32, step=16)
+FIELDS = ("u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy", "sigma_u", "sigma_exx", "residual")
+
+
+def true_displacement(grid: ZoiGrid, u=0.0, v=0.0, du_dx=0.0, du_dy=0.0, dv_dx=0.0, dv_dy=0.0):
+    x, y = np.meshgrid(grid.x - (SHAPE[1] - 1) / 2, grid.y - (SHAPE[0] - 1) / 2)
+    return u + du_dx * x + du_dy * y, v + dv_dx * x + dv_dy * y
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32, np.float64])
+def test_any_kind_of_grey_image(dtype: type) -> None:
+    bits = 8 if dtype is np.uint8 else 12
+    kernel = PhaseKernel(picture(bits=bits).astype(dtype), GRID)
+    field = kernel.measure(picture(bits=bits, u=0.3, v=-0.2).astype(dtype))
+    assert field.ok.all()
+    assert abs(np.mean(field.u) - 0.3) < 1e-3 and abs(np.mean(field.v) + 0.2) < 1e-3
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize(
+    "motion",
+    [
+        {"u": 0.37, "v": -0.21},
+        {"u": 11.4, "v": -7.3},
+        {"du_dx": 0.004, "dv_dy": -0.0012, "u": 0.1},
+        {"du_dy": 0.006, "dv_dx": 0.006},
+        {"du_dy": -0.0175, "dv_dx": 0.0175},
+    ],
+)
+def test_imposed_motion_is_found_from_scratch(motion: dict, order: int) -> None:
+    kernel = PhaseKernel(picture(), GRID, KernelSettings(order=order))
+    field = kernel.measure(picture(**motion))
+    ok = field.ok
+    assert ok.mean() > 0.7
+    u, v = true_displacement(GRID, **motion)
+    assert np.max(np.abs(field.u - u)[ok]) < 3e-3
+    assert np.max(np.abs(field.v - v)[ok]) < 3e-3
+    for name in ("du_dx", "du_dy", "dv_dx", "dv_dy"):
+        assert np.abs(np.mean(getattr(field, name)[ok]) - motion.get(name, 0.0)) < 2e-5
+    assert np.isnan(field.u[~ok]).all() and (field.status[~ok] == Status.OUTSIDE).all()
+
+
+def test_values_do_not_depend_on_threads_or_other_zois() -> None:
+    reference, deformed = picture(0.01, 1), picture(0.01, 2, u=0.3, du_dx=0.002)
+    few = GRID.subset(every=3)
+    whole = PhaseKernel(reference, GRID, noise=41.0).measure(deformed, noise=41.0)
+    part = PhaseKernel(reference, few, noise=41.0).measure(deformed, noise=41.0)
+    threads = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        alone = PhaseKernel(reference, GRID, noise=41.0).measure(deformed, noise=41.0)
+    finally:
+        numba.set_num_threads(threads)
+    for name in FIELDS:
+        assert np.array_equal(getattr(whole, name), getattr(alone, name), equal_nan=True)
+        assert np.array_equal(getattr(whole, name)[few.active], getattr(part, name)[few.active])
+
+
+def test_a_start_gives_the_same_values_as_a_search() -> None:
+    kernel = PhaseKernel(picture(), GRID)
+    first = kernel.measure(picture(u=0.3))
+    second = kernel.measure(picture(u=0.5), start=first)
+    third = kernel.measure(picture(u=0.7), start=second)
+    fresh = kernel.measure(picture(u=0.7))
+    assert third.ok.all()
+    assert np.max(np.abs(third.u - fresh.u)) < 3e-4
+    assert third.iterations.mean() < fresh.iterations.mean()
+
+
+def test_predicted_uncertainty_is_the_scatter_and_noise_is_recognised() -> None:
+    noise = 0.02
+    kernel = PhaseKernel(picture(noise, 1), GRID, noise=noise * 4095)
+    fields = [kernel.measure(picture(noise, s, u=0.3), noise=noise * 4095) for s in range(2, 12)]
+    values = np.stack([f.u for f in fields])
+    current = np.sqrt(np.mean(values.var(axis=0, ddof=1)))
+    assert current == pytest.approx(np.sqrt(np.mean(fields[0].sigma("u", "current") ** 2)), rel=0.1)
+    whole = np.sqrt(np.mean((values - 0.3) ** 2))
+    assert whole == pytest.approx(np.mean(fields[0].sigma_u), rel=0.15)
+    unknown = PhaseKernel(picture(noise, 1), GRID).measure(picture(noise, 2, u=0.3))
+    assert np.mean(unknown.sigma_u) == pytest.approx(np.mean(fields[0].sigma_u), rel=0.1)
+    assert np.median(fields[0].residual) == pytest.approx(1, abs=0.15)
+
+
+def test_noise_model_scales_with_the_burst() -> None:
+    one = NoiseModel(gain=0.2, read=2.0)
+    kernel = PhaseKernel(picture(), GRID, noise=one)
+    single = kernel.measure(picture(u=0.2), noise=one)
+    burst = kernel.measure(picture(u=0.2), noise=one.averaged(16))
+    ratio = single.sigma("u", "current") / burst.sigma("u", "current")
+    assert np.allclose(ratio, 4, rtol=1e-3)
+    assert np.allclose(single.sigma("u", "reference"), burst.sigma("u", "reference"))
+
+
+def test_brightness_and_contrast_do_not_matter() -> None:
+    reference = picture()
+    deformed = picture(u=0.3).astype(np.float32) * 0.7 + 300
+    field = PhaseKernel(reference, GRID).measure(deformed)
+    assert np.nanmax(np.abs(field.u - 0.3)) < 2e-3
+    assert np.nanmean(field.gain) == pytest.approx(0.7, abs=0.01)
+
+
+def test_a_featureless_reference_is_refused_and_a_blank_frame_gives_no_numbers() -> None:
+    noise = np.random.default_rng(0).normal(0, 3, SHAPE)
+    for blank in (np.full(SHAPE, 100, np.uint8), (100 + noise).astype(np.uint8)):
+        with pytest.raises(PatternError):
+            PhaseKernel(blank, GRID)
+    field = PhaseKernel(picture(), GRID).measure((1000 + noise).astype(np.uint16))
+    assert field.n_valid == 0 and np.isnan(field.u).all()
+    assert np.isnan(field.mean("exx")).all()
+
+
+def test_clipped_zois_are_named() -> None:
+    mask = np.zeros(SHAPE, bool)
+    mask[:60, :60] = True
+    reference = picture()
+    field = PhaseKernel(reference, GRID, clipped=mask).measure(reference)
+    assert field.status[0, 0] == Status.CLIPPED and field.status[-1, -1] == Status.OK
+    field = PhaseKernel(reference, GRID).measure(reference, clipped=mask)
+    assert field.status[0, 0] == Status.CLIPPED and field.status[-1, -1] == Status.OK
+
+
+def test_wrong_input_is_refused_with_a_sentence() -> None:
+    with pytest.raises(ValueError, match="leaves the image"):
+        PhaseKernel(picture()[:100], GRID)
+    kernel = PhaseKernel(picture(), GRID)
+    with pytest.raises(ValueError, match="has 240 x 100 px"):
+        kernel.measure(picture()[:100])
+    with pytest.raises(ValueError, match="grey picture"):
+        kernel.measure(np.zeros((*SHAPE, 3), np.uint8))
+    with pytest.raises(ValueError, match="no ZOI"):
+        PhaseKernel(picture(), GRID.subset(active=np.zeros(GRID.shape, bool)))
+    with pytest.raises(ValueError, match="window"):
+        KernelSettings(window="round")  # type: ignore[arg-type]
+
+
+def test_inactive_zois_are_not_measured() -> None:
+    few = GRID.subset(every=2)
+    field = PhaseKernel(picture(), few).measure(picture(u=0.2))
+    assert np.array_equal(field.status == Status.NOT_MEASURED, ~few.active)
+    assert np.isnan(field.u[~few.active]).all() and np.isfinite(field.u[few.active]).all()

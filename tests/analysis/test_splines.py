@@ -1,0 +1,70 @@
+"""Tables of the B-splines, the prefilter and the warp, against scipy and against known functions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from analysis.gauss_newton import compose, displacement, warp_zois
+from analysis.splines import PAD, basis, prefilter_taps, tap_table
+from analysis.warp import coefficients
+
+RNG = np.random.default_rng(0)
+IMAGE = ndimage.gaussian_filter(RNG.normal(0, 1, (70, 90)), 1.0).astype(np.float32) * 100
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+def test_tap_weights_are_the_spline(degree: int) -> None:
+    table = tap_table(degree).reshape(3, 6).astype(float)
+    for fraction in (0.0, 0.3, 0.77):
+        tau = fraction - 0.5
+        powers = tau ** np.arange(6)
+        signs = (-1.0) ** np.arange(6)
+        right, left = table @ powers, table @ (powers * signs)
+        found = [*left, *right[::-1]]
+        expected = basis(degree, fraction - np.arange(-2.0, 4.0))
+        assert np.allclose(found, expected, atol=1e-6)
+        assert np.sum(found) == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize("degree", [3, 5])
+def test_prefilter_is_that_of_scipy(degree: int) -> None:
+    found = coefficients(IMAGE, np.float32(0), prefilter_taps(degree))
+    expected = ndimage.spline_filter(IMAGE.astype(float), degree, mode="mirror")
+    assert np.max(np.abs(found[PAD:-PAD, PAD:-PAD] - expected)) < 1e-3 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(
+    "motion", [(0.3, 0, 0, -0.6, 0, 0), (1.2, 0.01, -0.09, -2.4, 0.09, -0.02), (0, 0, 0, 0, 0, 0)]
+)
+@pytest.mark.parametrize("size", [16, 21])
+def test_warp_is_the_interpolated_image(motion: tuple, size: int) -> None:
+    origin = np.array([[24, 30]])
+    out = np.empty((1, size, size), np.float32)
+    flat = coefficients(IMAGE, np.float32(0), prefilter_taps(5)).ravel()
+    warp_zois(flat, IMAGE.shape[1], origin, size, np.array([motion], float), tap_table(5), out)
+    x = np.arange(size) - (size - 1) / 2
+    u = motion[0] + motion[1] * x + motion[2] * x[:, None]
+    v = motion[3] + motion[4] * x + motion[5] * x[:, None]
+    rows = 24 + np.arange(size)[:, None] + v
+    columns = 30 + np.arange(size) + u
+    expected = ndimage.map_coordinates(IMAGE.astype(float), [rows, columns], order=5, mode="mirror")
+    assert np.max(np.abs(out[0] - expected)) < 1e-3 * np.abs(IMAGE).max()
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_composition_undoes_the_step(order: int) -> None:
+    modes = 6 if order == 1 else 12
+    p, step = (RNG.normal(0, 0.01, modes) for _ in range(2))
+    if order == 2:  # exact to second order in place: keep the quadratic parts small
+        p[[3, 4, 5, 9, 10, 11]] *= 1e-3
+        step[[3, 4, 5, 9, 10, 11]] *= 1e-3
+    x, y = 3.0, -2.0
+    composed = p.copy()
+    compose(composed, order, step)
+    du, dv = displacement(step, order, x, y)
+    u, v = displacement(p, order, x, y)
+    cu, cv = displacement(composed, order, x + du, y + dv)
+    assert x + du + cu == pytest.approx(x + u, abs=1e-9 if order == 1 else 2e-5)
+    assert y + dv + cv == pytest.approx(y + v, abs=1e-9 if order == 1 else 2e-5)

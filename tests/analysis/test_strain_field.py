@@ -1,0 +1,73 @@
+"""Strain measures, principal values, and the uncertainty of means over overlapping ZOIs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis import PhaseKernel, Roi, Status, StrainField, ZoiGrid
+from tests.analysis.speckle import picture
+
+GRID = ZoiGrid.cover(Roi(0, 0, 64, 64), 32, 16)
+
+
+def uniform(**values: float) -> StrainField:
+    return StrainField.from_values(GRID, values, sigmas=1e-3)
+
+
+def test_small_strain_is_the_symmetric_part() -> None:
+    field = uniform(du_dx=0.01, du_dy=0.004, dv_dx=0.002, dv_dy=-0.003)
+    assert np.allclose(field.exx, 0.01) and np.allclose(field.eyy, -0.003)
+    assert np.allclose(field.exy, 0.003) and np.allclose(field.gamma_xy, 0.006)
+    assert np.allclose(field.omega, -0.001)
+
+
+@pytest.mark.parametrize("measure", ["green", "hencky"])
+def test_finite_measures_do_not_see_a_rotation(measure: str) -> None:
+    c, s = np.cos(0.4), np.sin(0.4)
+    field = uniform(du_dx=c - 1, du_dy=-s, dv_dx=s, dv_dy=c - 1)
+    strain = field.strain(measure)  # type: ignore[arg-type]
+    assert np.allclose([strain.exx, strain.eyy, strain.exy], 0, atol=1e-12)
+    assert np.allclose(field.rotation, 0.4)
+
+
+def test_known_values_of_the_measures() -> None:
+    field = uniform(du_dx=0.1)
+    assert np.allclose(field.strain("green").exx, 0.105)
+    assert np.allclose(field.strain("hencky").exx, np.log(1.1))
+    first, second, angle = field.principal
+    assert np.allclose(first, 0.1) and np.allclose(second, 0) and np.allclose(angle, 0)
+    with pytest.raises(ValueError, match="unknown strain measure"):
+        field.strain("engineering")  # type: ignore[arg-type]
+
+
+def test_mean_leaves_out_rejected_zois() -> None:
+    status = np.zeros(GRID.shape, int)
+    status[0, 0] = Status.LOST
+    values = np.full(GRID.shape, 0.01)
+    values[0, 0] = 5.0
+    field = StrainField.from_values(GRID, {"du_dx": values}, 1e-3, status)
+    assert field.mean("exx")[0] == pytest.approx(0.01)
+    assert field.n_valid == GRID.active.size - 1
+    assert np.isnan(field.exx[0, 0])
+
+
+@pytest.mark.parametrize("name", ["u", "exx", "eyy", "exy", "omega"])
+@pytest.mark.parametrize("step", [8, 40])
+def test_sigma_of_a_mean_is_its_scatter(name: str, step: int) -> None:
+    grid = ZoiGrid.cover(Roi(4, 4, 232, 192), 32, step)
+    kernel = PhaseKernel(picture(), grid, noise=0.5)
+    fields = [kernel.measure(picture(0.03, s), noise=0.03 * 4095) for s in range(24)]
+    means = np.array([f.mean(name)[0] for f in fields])
+    predicted = fields[0].mean(name)[1]
+    assert np.sqrt(np.mean(means**2)) == pytest.approx(predicted, rel=0.45)
+    assert np.std([f.value(name) for f in fields]) == pytest.approx(np.mean(fields[0].sigma(name)), rel=0.1)
+
+
+def test_statuses_have_words() -> None:
+    assert all(s.text for s in Status)
+
+
+def test_arrays_are_read_only() -> None:
+    with pytest.raises(ValueError, match="read-only"):
+        uniform(u=1.0).u[0, 0] = 3

@@ -1,0 +1,275 @@
+"""``make bench``: throughput of the kernel beside other engines on the same pictures, in one run.
+
+1024 x 1024 px, 8 bit, 1 % noise, r = 2 px. Tracking: 0.23 px and 1e-4 strain a frame; every figure includes the
+prefilter of the frame, sigma, residual and status. ``--json`` prints one JSON object instead.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import lru_cache
+from typing import Any
+
+import numba
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid, warm_up
+from tests.accuracy.truth import Speckle, affine, digitise
+from tests.bench import machine
+from tests.bench.peers import missing, peers
+
+SHAPE = (1024, 1024)
+NOISE = 0.01
+FRAMES = 6
+STEP = {"u": 0.2, "v": -0.11, "du_dx": 1e-4, "dv_dy": -3e-5, "du_dy": 2e-5}
+FLOP_A_PIXEL = 190
+"""Of one iteration: two sets of six weights (46), 36 taps and 6 rows (84), moments (60)."""
+
+
+@lru_cache(maxsize=2)
+def sequence(rotation: float = 0.0) -> list[NDArray[np.uint8]]:
+    """Reference and frames; ``rotation`` in degrees is there from the first frame on."""
+    rng = np.random.default_rng(1)
+    pattern = Speckle(2.0, 3)
+    frames = [digitise(pattern.at(*affine(SHAPE)), 8, NOISE, rng)]
+    a = np.deg2rad(rotation)
+    for i in range(1, FRAMES + 1):
+        m = {k: i * v for k, v in STEP.items()}
+        m["du_dx"] += np.cos(a) - 1
+        m["dv_dy"] += np.cos(a) - 1
+        m["du_dy"] -= np.sin(a)
+        m["dv_dx"] = np.sin(a)
+        frames.append(digitise(pattern.at(*affine(SHAPE, **m)), 8, NOISE, rng))
+    return frames
+
+
+@dataclass
+class Report:
+    """Lines for people and the same values for machines."""
+
+    quiet: bool
+    values: dict[str, Any] = field(default_factory=dict)
+
+    def add(self, section: str, row: dict[str, Any]) -> None:
+        rows = self.values.setdefault(section, [])
+        if not self.quiet:
+            if not rows:
+                print(f"\n## {section}\n\n| " + " | ".join(row) + " |\n|" + "---|" * len(row))
+            print("| " + " | ".join(_shown(v) for v in row.values()) + " |", flush=True)
+        rows.append(row)
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float):
+        return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.4g}"
+    return f"{value:,}" if isinstance(value, int) else str(value)
+
+
+def zois(size: int, step: int = 8, margin: int = 8, every: int = 1) -> ZoiGrid:
+    side = SHAPE[0] - 2 * margin
+    return ZoiGrid.cover(Roi(margin, margin, side, side), size, step).subset(every=every)
+
+
+SIGMA = float(np.hypot(NOISE * 255, 0.29))
+
+
+def track(kernel: PhaseKernel, frames: list[NDArray]) -> tuple[float, StrainField, StrainField]:
+    """Shortest time a frame once the sequence runs, its field, and the one before."""
+    before = kernel.measure(frames[1], noise=SIGMA)
+    now = kernel.measure(frames[2], start=before, noise=SIGMA)
+    shortest = np.inf
+    for frame in frames[3:]:
+        for _ in range(3):  # the same frame again: the shortest counts
+            begin = time.perf_counter()
+            later = kernel.measure(frame, start=now, noise=SIGMA)
+            shortest = min(shortest, time.perf_counter() - begin)
+        before, now = now, later
+    return shortest, now, before
+
+
+def unsettled(size: int, frames: list[NDArray], found: StrainField, before: StrainField) -> float:
+    """Share of ZOIs further than max(0.001 px, 5 um/m, 0.05 sigma) from the fully iterated answer, %."""
+    exact = KernelSettings(tolerance_px=1e-7, tolerance_strain=1e-9, tolerance_sigma=0, max_iterations=30)
+    full = PhaseKernel(frames[0], found.grid, exact, SIGMA).measure(frames[-1], start=before, noise=SIGMA)
+    beyond = np.zeros(found.grid.shape, bool)
+    for name in ("u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy"):
+        floor = 1e-3 if name in ("u", "v") else 5e-6
+        limit = np.maximum(floor, 0.05 * full.sigma(name))
+        beyond |= np.abs(found.value(name) - full.value(name)) > limit
+    return float(100 * beyond[found.ok].mean())
+
+
+def throughput(report: Report) -> None:
+    frames, turned = sequence(), sequence(5.0)
+    peak, flow = machine.arithmetic(), machine.bandwidth()
+    report.values["arithmetic_flop_s"], report.values["bandwidth_B_s"] = peak, flow
+    most = numba.get_num_threads()
+    for size, order, threads, images in (
+        (32, 1, most, frames), (32, 1, 1, frames), (32, 1, most, turned), (32, 2, most, frames),
+        (57, 1, most, frames), (64, 1, most, frames), (64, 1, 1, frames), (64, 1, most, turned),
+    ):  # fmt: skip
+        grid = zois(size, margin=64 if images is turned else 8)
+        numba.set_num_threads(threads)
+        kernel = PhaseKernel(images[0], grid, KernelSettings(order=order), SIGMA)
+        seconds, now, before = track(kernel, images)
+        numba.set_num_threads(most)
+        work = grid.n_active * float(now.iterations.mean()) * size**2 * FLOP_A_PIXEL
+        report.add("Tracking a sequence", {
+            "ZOI": size, "order": order, "threads": threads, "rotation deg": 5 if images is turned else 0,
+            "ZOIs": grid.n_active, "ZOI/s": grid.n_active / seconds, "iterations": float(now.iterations.mean()),
+            "valid %": 100 * now.n_valid / grid.n_active,
+            "not settled %": unsettled(size, images, now, before) if order == 1 else "",
+            "share of memory bandwidth %": 100 * (20 * SHAPE[0] * SHAPE[1] + 700 * grid.n_active) / seconds / flow,
+            "share of multiply-add peak %": 100 * work / seconds / (peak * threads / most),
+            "error of mean u px": float(np.nanmean(now.u) - _true_u(now.grid, images is turned)),
+        })  # fmt: skip
+
+
+def _true_u(grid: ZoiGrid, turned: bool) -> float:
+    a = np.deg2rad(5.0) if turned else 0.0
+    x, y = grid.x.mean() - (SHAPE[1] - 1) / 2, grid.y.mean() - (SHAPE[0] - 1) / 2
+    gradient = (FRAMES * STEP["du_dx"] + np.cos(a) - 1, FRAMES * STEP["du_dy"] - np.sin(a))
+    return float(FRAMES * STEP["u"] + gradient[0] * x + gradient[1] * y)
+
+
+def counts(report: Report) -> None:
+    frames = sequence()
+    for step, every in ((8, 12), (8, 4), (8, 1), (4, 1), (3, 1)):
+        grid = zois(32, step, every=every)
+        kernel = PhaseKernel(frames[0], grid, None, SIGMA)
+        seconds, _, _ = track(kernel, frames)
+        report.add("Cost against the number of ZOIs (32 px)", {
+            "ZOIs": grid.n_active, "ms a frame": 1e3 * seconds, "us a ZOI": 1e6 * seconds / grid.n_active,
+        })  # fmt: skip
+
+
+def first_frame(report: Report) -> None:
+    frames = sequence()
+    for size, order in ((32, 1), (64, 1), (32, 2)):
+        grid = zois(size)
+        settings = KernelSettings(order=order)
+        prepare = machine.best(lambda g=grid, s=settings: PhaseKernel(frames[0], g, s, SIGMA), repeats=3)
+        kernel = PhaseKernel(frames[0], grid, settings, SIGMA)
+        scratch = machine.best(lambda k=kernel: k.measure(frames[3], noise=SIGMA), repeats=3)
+        ready = kernel._prepared
+        own = sum(
+            a.nbytes for a in (ready.inverse, ready.covariance, ready.freedom, ready.signal, ready.level)
+        )
+        shared = sum(a.nbytes for a in (ready.fx, ready.fy, ready.f, ready.raw))
+        report.add("Reference and first frame", {
+            "ZOI": size, "order": order, "prepare ZOI/s": grid.n_active / prepare,
+            "first frame with search ZOI/s": grid.n_active / scratch, "bytes a ZOI": own / grid.n_active,
+            "bytes a ZOI with its share of the images": (own + shared) / grid.n_active,
+        })  # fmt: skip
+
+
+def other_engines(report: Report) -> None:
+    frames = sequence()
+    for size, note in ((32, ""), (57, "equal l_10% (130 px) to the 33 px engines")):
+        grid = zois(size, margin=32)
+        kernel = PhaseKernel(frames[0], grid, None, SIGMA)
+        seconds, now, _ = track(kernel, frames)
+        _engine(report, f"phasedic, ZOI {size}", note, seconds, grid, now.u)
+    grid = zois(33, margin=32)
+    points = np.stack(np.meshgrid(grid.x, grid.y), axis=-1).reshape(-1, 2)
+    for peer in peers(frames[0], frames[-1], points):
+        seconds = machine.best(peer.run, repeats=3)
+        u = peer.run()[:, 0].astype(float).reshape(grid.shape)
+        _engine(report, peer.name, "", seconds, grid, u)
+    if missing():
+        report.values["not installed"] = missing()
+        if not report.quiet:
+            print(f"\nNot installed here, so not run: {', '.join(missing())}.")
+
+
+def _engine(report: Report, name: str, note: str, seconds: float, grid: ZoiGrid, u: NDArray) -> None:
+    x, y = np.meshgrid(grid.x - (SHAPE[1] - 1) / 2, grid.y - (SHAPE[0] - 1) / 2)
+    error = u - FRAMES * (STEP["u"] + STEP["du_dx"] * x + STEP["du_dy"] * y)
+    report.add("Beside other engines, same pair, same points", {
+        "engine": name, "points/s": grid.n_active / seconds, "mean error px": float(np.nanmean(error)),
+        "scatter px": float(np.nanstd(error)), "note": note,
+    })  # fmt: skip
+
+
+def scaling(report: Report) -> None:
+    most = numba.get_num_threads()
+    if most < 2:
+        return
+    frames = sequence()
+    rates: dict[str, list[float]] = {"memory stream": [], "multiply-add": [], "ZOI 32": [], "ZOI 64": []}
+    for threads in (1, 2):
+        numba.set_num_threads(threads)
+        rates["memory stream"].append(machine.bandwidth())
+        rates["multiply-add"].append(machine.arithmetic())
+        for size in (32, 64):
+            grid = zois(size)
+            seconds, _, _ = track(PhaseKernel(frames[0], grid, None, SIGMA), frames)
+            rates[f"ZOI {size}"].append(grid.n_active / seconds)
+    numba.set_num_threads(most)
+    for name, (one, two) in rates.items():
+        report.add("Two threads over one", {"loop": name, "one": one, "two": two, "ratio": two / one})
+
+
+def bursts(report: Report) -> None:
+    from acquire.burst import burst_of
+    from acquire.frame import Frame
+
+    rng = np.random.default_rng(0)
+    images = [rng.integers(0, 256, (1024, 1280), dtype=np.uint8) for _ in range(8)]
+    frames = [Frame(im, i, i / 60, "nominal", 0, 8, i / 60) for i, im in enumerate(images)]
+    report.add("Burst averaging, 8 x 1280x1024 uint8", {"ms a burst": 1e3 * machine.best(burst_of, frames)})
+
+
+def start_up(report: Report) -> None:
+    code = (
+        "import time; t = time.perf_counter()\n"
+        "import numpy as np, analysis\n"
+        "a = time.perf_counter()\n"
+        "from analysis import PhaseKernel, Roi, ZoiGrid\n"
+        "y, x = np.mgrid[:256, :256]\n"
+        "im = (100 + 40 * np.sin(1.3 * x + 0.2 * y) * np.cos(0.9 * y - 0.35 * x)).astype(np.uint8)\n"
+        "PhaseKernel(im, ZoiGrid.cover(Roi(0, 0, 256, 256), 32, 16)).measure(im)\n"
+        "print(a - t, time.perf_counter() - t)"
+    )
+    out = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    report.add(
+        "Start-up, once compiled",
+        {"import s": float(out[0]), "import and first measurement s": float(out[1])},
+    )
+    begin = time.perf_counter()
+    subprocess.run([sys.executable, "-m", "live.cli", "--help"], capture_output=True, check=False)
+    report.add("Command line", {"phasedic --help s": time.perf_counter() - begin})
+
+
+SECTIONS = (throughput, counts, first_frame, other_engines, scaling, bursts, start_up)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(prog="python -m tests.bench", description=__doc__)
+    parser.add_argument("--json", action="store_true", help="one JSON object instead of tables")
+    parser.add_argument("--only", nargs="+", default=[], choices=[s.__name__ for s in SECTIONS])
+    options = parser.parse_args()
+    warm_up()
+    report = Report(quiet=options.json)
+    report.values["machine"] = machine.describe()
+    report.values["date"] = f"{datetime.now(UTC):%Y-%m-%d}"
+    if not options.json:
+        print(f"{report.values['machine']}; {report.values['date']}")
+    for section in SECTIONS:
+        if not options.only or section.__name__ in options.only:
+            section(report)
+    if options.json:
+        print(json.dumps(report.values, indent=1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,214 @@
+"""Every camera keeps the contract of ``acquire.camera.Camera``: one suite over all of them."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from itertools import islice, pairwise
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from acquire.addresses import parse_address
+from acquire.camera import Camera, open_camera
+from acquire.errors import ConfigError, DataError, DeviceError, PhasedicError
+from acquire.events import ignore_event
+from acquire.frame import Frame
+from acquire.opencv_camera import OpenCVCamera, OpenCVSettings
+from acquire.v4l2 import V4L2Camera
+from acquire.v4l2_setup import V4L2Settings
+from tests.acquire import session_fixtures
+from tests.acquire.fake_v4l2 import FakeCamera, FakeKernel
+from tests.contracts.entry_points import install_example
+
+Opener = Callable[[Path, pytest.MonkeyPatch], Camera]
+
+
+def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Camera:
+    for k in range(6):
+        cv2.imwrite(str(tmp_path / f"{k}.png"), np.full((12, 16), 9 * k, np.uint8))
+    return open_camera(f"files:{tmp_path}/*.png?fps=5")
+
+
+def video(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Camera:
+    writer = cv2.VideoWriter(str(tmp_path / "a.avi"), cv2.VideoWriter.fourcc(*"FFV1"), 25, (32, 24))
+    for k in range(6):
+        writer.write(np.full((24, 32, 3), 9 * k, np.uint8))
+    writer.release()
+    return open_camera(f"video:{tmp_path}/a.avi")
+
+
+class Webcam:
+    """A ``cv2.VideoCapture`` that never ends."""
+
+    count = 0
+
+    def isOpened(self) -> bool:
+        return True
+
+    def read(self) -> tuple[bool, Any]:
+        self.count += 1
+        time.sleep(0.002)  # as a driver does; unpaced, it would keep a core busy
+        return True, np.full((12, 16, 3), self.count % 256, np.uint8)
+
+    def get(self, prop: int) -> float:
+        return 0.0
+
+    def set(self, prop: int, value: float) -> bool:
+        return True
+
+    def release(self) -> None: ...
+
+
+def opencv(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Camera:
+    return OpenCVCamera("opencv:0", Webcam, OpenCVSettings(), ignore_event)
+
+
+def v4l2(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Camera:
+    kernel = FakeKernel(FakeCamera())
+    return V4L2Camera("/dev/video0", "/dev/video0", V4L2Settings(), ignore_event, kernel, kernel.pause)
+
+
+def session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Camera:
+    with session_fixtures.writer(tmp_path / "run.h5") as writer:
+        for k in range(6):
+            writer.write_frame(session_fixtures.frame(k))
+    return open_camera(f"session:{tmp_path}/run.h5")
+
+
+def _sim(settings: str) -> Camera:
+    from hw_mocks.sim_camera import open_sim_camera
+    from hw_mocks.specimen import specimen_from
+
+    address = parse_address(f"sim:uniform?width=64&height=48&seconds=2&fps=50&{settings}")
+    return open_sim_camera(address, ignore_event, specimen_from(address))
+
+
+def sim(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Camera:
+    return _sim("bits=12")
+
+
+def sim_in_lock_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Camera:
+    return _sim("lockstep=yes")
+
+
+def somebody_elses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Camera:
+    install_example(tmp_path, monkeypatch)
+    (tmp_path / "a.bin").write_bytes(bytes(range(192)) * 6)
+    return open_camera(f"raw:{tmp_path}/a.bin?width=16&height=12")
+
+
+OPENERS = [files, video, opencv, v4l2, session, sim, sim_in_lock_step, somebody_elses]
+
+
+@pytest.fixture(params=OPENERS, ids=lambda opener: opener.__name__.replace("_", "-"))
+def camera(
+    request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[Camera]:
+    opened = request.param(tmp_path, monkeypatch)
+    yield opened
+    opened.close()
+
+
+def take(camera: Camera, count: int) -> list[Frame]:
+    with camera:
+        return list(islice(camera, count))
+
+
+def test_it_is_a_camera(camera: Camera) -> None:
+    assert isinstance(camera, Camera)
+
+
+def test_info_is_complete_before_the_stream(camera: Camera) -> None:
+    info = camera.info
+    assert info.address
+    assert info.name
+    assert min(info.width, info.height, info.bits) > 0
+    assert info.bits <= 16
+    assert info.clock in ("device", "host", "nominal")
+    assert isinstance(info.live, bool)
+    assert info.fps is None or info.fps > 0
+    assert all(isinstance(text, str) for text in info.warnings)
+
+
+def test_frames_are_what_info_promised(camera: Camera) -> None:
+    info = camera.info
+    frames = take(camera, 4)
+    assert len(frames) == 4
+    for frame in frames:
+        assert frame.image.shape == (info.height, info.width)
+        assert frame.image.dtype == (np.uint8 if info.bits <= 8 else np.uint16)
+        assert (frame.bits, frame.clock) == (info.bits, info.clock)
+        assert int(frame.image.max()) < 2**frame.bits
+
+
+def test_numbers_increase_times_do_not_run_back_and_gaps_agree(camera: Camera) -> None:
+    frames = take(camera, 5)
+    for earlier, later in pairwise(frames):
+        assert later.index > earlier.index
+        assert later.t >= earlier.t
+        assert later.lost_before == later.index - earlier.index - 1
+    assert frames[0].lost_before >= 0
+
+
+def test_each_frame_has_read_only_memory_of_its_own(camera: Camera) -> None:
+    frames = take(camera, 4)
+    kept = [frame.image.copy() for frame in frames]
+    for k, frame in enumerate(frames):
+        assert not frame.image.flags.writeable
+        assert all(not np.shares_memory(frame.image, other.image) for other in frames[:k])
+        assert np.array_equal(frame.image, kept[k])
+    with pytest.raises(ValueError, match="read-only"):
+        frames[0].image[0, 0] = 1
+
+
+def test_stop_from_another_thread_ends_the_iteration(camera: Camera) -> None:
+    with camera:
+        stream = iter(camera)
+        next(stream)
+        stopper = threading.Thread(target=camera.stop)
+        stopper.start()
+        stopper.join()
+        assert len(list(islice(stream, 3))) <= 1  # the one that was on its way
+
+
+def test_stop_before_the_iteration(camera: Camera) -> None:
+    with camera:
+        camera.stop()
+        assert len(list(islice(camera, 3))) <= 1
+
+
+def test_closing_twice_and_without_having_entered(camera: Camera) -> None:
+    camera.close()
+    camera.close()
+    camera.stop()
+
+
+def test_leaving_closes_also_after_an_error(camera: Camera) -> None:
+    with pytest.raises(ZeroDivisionError), camera:
+        next(iter(camera))
+        raise ZeroDivisionError
+    camera.close()
+
+
+@pytest.mark.parametrize(
+    ("address", "kind"),
+    [
+        ("files:{}/nothing/*.tif", DataError),
+        ("video:{}/nothing.mp4", DataError),
+        ("session:{}/nothing.h5", DataError),
+        ("opencv:front", ConfigError),
+        ("/dev/video97", DeviceError),
+        ("nobody:knows", ConfigError),
+        ("files:{}?unknown=1", PhasedicError),
+    ],
+)
+def test_what_cannot_be_opened_is_named(tmp_path: Path, address: str, kind: type[PhasedicError]) -> None:
+    text = address.format(tmp_path)
+    with pytest.raises(kind) as caught:
+        open_camera(text)
+    assert text.partition(":")[2].partition("?")[0].partition("/*")[0] in str(caught.value)

@@ -1,0 +1,112 @@
+"""What an indicator puts on the line, fault by fault; no port and no clock."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hw_mocks.ascii_indicator import AsciiIndicator
+from hw_mocks.faults import SERIAL_FAULTS, parse_faults
+from hw_mocks.indicator import Shown
+from hw_mocks.indicator_output import IndicatorOutput, Sensing
+
+RATE = 10.0
+
+
+def lines(
+    faults: str = "", seconds: float = 1.0, style: str = "millis", noise: float = 0.0
+) -> list[list[bytes]]:
+    """The chunks of each sample; the force is 100 N a second, the test begins with the indicator."""
+    sensing = Sensing(lambda t: 100 * t, lambda t: t, RATE, noise)
+    plan = parse_faults(faults, SERIAL_FAULTS, "test")
+    output = IndicatorOutput(AsciiIndicator(style=style), sensing, boot=0.0, faults=plan)
+    t, found = 0.0, []
+    while t < seconds - 1e-9:
+        found.append(output.sample(t))
+        t += output.interval(t)
+    return found
+
+
+def flat(faults: str = "", seconds: float = 1.0, style: str = "millis") -> bytes:
+    return b"".join(chunk for sample in lines(faults, seconds, style) for chunk in sample)
+
+
+def test_one_line_a_sample() -> None:
+    assert lines()[:3] == [[b"0,0.0,N\r\n"], [b"100,10.0,N\r\n"], [b"200,20.0,N\r\n"]]
+
+
+@pytest.mark.parametrize(
+    ("style", "line"),
+    [
+        ("millis", b"1234,-0.5,N\r\n"),
+        ("plain", b"-0.5 N\r\n"),
+        ("label", b"Reading: -0.5 N\r\n"),
+        ("openscale", b"1234,-0.5,N,-411,21.5,\r\n"),
+    ],
+)
+def test_styles(style: str, line: bytes) -> None:
+    assert AsciiIndicator(style=style).render(Shown(-0.514, 1234.4)) == line
+
+
+def test_saturation_is_the_converters_end_value() -> None:
+    assert AsciiIndicator().render(Shown(1e9, 7, status="overload")) == b"7,8388607,N\r\n"
+    assert b",-8388608," in AsciiIndicator(style="openscale").render(Shown(-1e9, 7, status="underload"))
+
+
+def test_noise_is_as_stated() -> None:
+    values = [float(sample[0].split(b",")[1]) for sample in lines(seconds=90, noise=2.0)]
+    assert np.std(np.array(values) - 10 * np.arange(len(values))) == pytest.approx(2.0, rel=0.1)
+
+
+def test_silence_sends_nothing_and_late_sends_all_at_once() -> None:
+    assert [len(s) for s in lines("silence@0.3*0.3")] == [1, 1, 1, 0, 0, 0, 1, 1, 1, 1]
+    late = lines("late@0.3*0.3")
+    assert [len(s) for s in late] == [1, 1, 1, 0, 0, 0, 1, 1, 1, 1]
+    assert late[6] == [b"300,30.0,N\r\n400,40.0,N\r\n500,50.0,N\r\n600,60.0,N\r\n"]
+
+
+def test_single_line_faults() -> None:
+    assert lines("partial@0.3")[3] == [b".0,N\r\n"]
+    assert lines("duplicate@0.3")[3] == [b"300,30.0,N\r\n" * 2]
+    assert lines("split@0.3")[3] == [b"300,30", b".0,N\r\n"]
+    assert lines("split@0.3*2")[4] == [b"400,40", b".0,N\r\n"]
+
+
+def test_foreign_bytes_come_before_the_line() -> None:
+    assert lines("nul@0.3*4")[3] == [bytes(4) + b"300,30.0,N\r\n"]
+    garbage = lines("garbage@0.3*40")[3][0]
+    assert len(garbage) == 40 + 12 and garbage.endswith(b"300,30.0,N\r\n")
+
+
+def test_writing_faults() -> None:
+    assert lines("comma@0.3*0.1")[3:5] == [[b"300,30,0,N\r\n"], [b"400,40.0,N\r\n"]]
+    assert lines("cr@0.3*0.1")[3:5] == [[b"300,30.0,N\r"], [b"400,40.0,N\r\n"]]
+    assert lines("unit@0.3*0.1")[3:5] == [[b"300,0.0300,kN\r\n"], [b"400,40.0,N\r\n"]]
+    assert lines("overload@0.3*0.1")[3] == [b"300,8388607,N\r\n"]
+
+
+def test_clock_faults() -> None:
+    assert lines("jump@0.3*60")[3] == [b"60300,30.0,N\r\n"]
+    assert lines("reset@0.3")[3] == [AsciiIndicator.banner + b"0,30.0,N\r\n"]
+    assert lines("reset@0.3")[4] == [b"100,40.0,N\r\n"]
+
+
+def test_backlog_is_old_lines_at_once() -> None:
+    chunk = lines("backlog@0.5*0.3")[5][0]
+    assert chunk.split(b"\r\n")[:4] == [b"200,20.0,N", b"300,30.0,N", b"400,40.0,N", b"500,50.0,N"]
+
+
+def test_rate_falls_short() -> None:
+    assert len(lines("rate@1*0.5", seconds=3.0)) == pytest.approx(10 + 10, abs=1)
+
+
+def test_unplugged_while_it_lasts() -> None:
+    plan = parse_faults("unplug@1*2", SERIAL_FAULTS, "test")
+    output = IndicatorOutput(AsciiIndicator(), Sensing(lambda t: 0.0, lambda t: t), 0.0, faults=plan)
+    assert [output.unplugged(t) for t in (0.9, 1.0, 2.9, 3.0)] == [False, True, True, False]
+
+
+def test_beyond_capacity_is_overload() -> None:
+    sensing = Sensing(lambda t: t, lambda t: t, noise_N=0.0, capacity_N=100.0)
+    output = IndicatorOutput(AsciiIndicator(), sensing, 0.0)
+    assert [output.shown(t).status for t in (-101, 99, 101)] == ["underload", "ok", "overload"]

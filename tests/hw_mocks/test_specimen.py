@@ -1,0 +1,168 @@
+"""The specimen: material, programme, strain fields."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from acquire.addresses import parse_address
+from acquire.errors import ConfigError
+from hw_mocks.deformation import Affine, Deformation, Motion, Wave
+from hw_mocks.material import Material
+from hw_mocks.programme import Programme, TestClock
+from hw_mocks.specimen import VirtualSpecimen, specimen_from
+
+DEFORMATIONS: dict[str, Deformation] = {
+    "affine": Affine(0.3, -0.2, 0.01, 0.02, -0.03, 0.04, 100, 50),
+    "rotation": Affine.rotation(0.4, 100, 50),
+    "wave": Wave(0.5, 64),
+    **{
+        f"{kind} along {axis}": VirtualSpecimen(kind, axis=axis, rotation_rad=0.1, drift_px=(3, -2)).at(17.0)
+        for kind in ("uniform", "hole", "woven")
+        for axis in ("x", "y")
+    },
+}
+
+
+@pytest.mark.parametrize("deformation", DEFORMATIONS.values(), ids=DEFORMATIONS.keys())
+def test_gradient_is_that_of_the_displacement(deformation: Deformation) -> None:
+    rng = np.random.default_rng(0)
+    x, y, h = rng.uniform(0, 640, 400), rng.uniform(0, 512, 400), 1e-4
+    far_x, far_y = deformation.displacement(x + h, y), deformation.displacement(x, y + h)
+    near_x, near_y = deformation.displacement(x - h, y), deformation.displacement(x, y - h)
+    differences = [
+        (far - near) / (2 * h)
+        for far, near in (
+            (far_x[0], near_x[0]),
+            (far_y[0], near_y[0]),
+            (far_x[1], near_x[1]),
+            (far_y[1], near_y[1]),
+        )
+    ]
+    for difference, gradient in zip(differences, deformation.gradient(x, y), strict=True):
+        np.testing.assert_allclose(difference, gradient, rtol=0, atol=2e-9)
+
+
+def test_rotation_turns_x_towards_y() -> None:
+    u, v = Affine.rotation(math.pi / 2).displacement(1.0, 0.0)
+    assert (float(u), float(v)) == pytest.approx((-1.0, 1.0))
+
+
+def test_uniform_field_has_the_mean_strains() -> None:
+    specimen = VirtualSpecimen()
+    du_dx, du_dy, dv_dx, dv_dy = specimen.gradient(*np.mgrid[0:640:50, 0:512:50], t=15.0)
+    np.testing.assert_allclose(dv_dy, specimen.axial_strain(15.0))
+    np.testing.assert_allclose(du_dx, specimen.transverse_strain(15.0))
+    assert not du_dy.any() and not dv_dx.any()
+
+
+def test_hole_has_kirschs_concentration() -> None:
+    specimen = VirtualSpecimen("hole")
+    motion, modes = specimen.at(10.0), specimen.modes
+    beside = motion.gradient(modes.x0 + modes.hole_radius, modes.y0)
+    above = motion.gradient(modes.x0, modes.y0 + modes.hole_radius)
+    assert beside[3] / motion.axial == pytest.approx(3)
+    assert above[0] / motion.axial == pytest.approx(-1)
+    far = motion.gradient(modes.x0 + 1e5, modes.y0 + 1e5)
+    assert far[3] / motion.axial == pytest.approx(1, abs=1e-5)
+    assert far[0] / motion.axial == pytest.approx(-specimen.nu, abs=1e-5)
+
+
+def test_hole_edge_carries_no_traction() -> None:
+    specimen = VirtualSpecimen("hole")
+    angle = np.linspace(0, 2 * math.pi, 37)
+    nx, ny, modes = np.cos(angle), np.sin(angle), specimen.modes
+    x, y = modes.x0 + modes.hole_radius * nx, modes.y0 + modes.hole_radius * ny
+    du_dx, du_dy, dv_dx, dv_dy = specimen.gradient(x, y, 10.0)
+    nu = specimen.nu
+    sx, sy = du_dx + nu * dv_dy, dv_dy + nu * du_dx
+    sxy = (1 - nu) / 2 * (du_dy + dv_dx)
+    scale = float(specimen.axial_strain(10.0))
+    np.testing.assert_allclose((sx * nx + sxy * ny) / scale, 0, atol=1e-9)
+    np.testing.assert_allclose((sxy * nx + sy * ny) / scale, 0, atol=1e-9)
+
+
+def test_mask_is_the_hole() -> None:
+    mask = VirtualSpecimen("hole", hole_radius_px=40).mask()
+    assert mask.shape == (512, 640)
+    assert np.count_nonzero(~mask) == pytest.approx(math.pi * 40**2, rel=0.01)
+    assert VirtualSpecimen("woven").mask().all()
+
+
+def test_woven_mean_over_a_cell_is_the_mean_strain() -> None:
+    specimen = VirtualSpecimen("woven", cell_px=96)
+    y, x = np.mgrid[96:192, 192:288]
+    du_dx, _, _, dv_dy = specimen.gradient(x, y, 12.0)
+    assert dv_dy.mean() == pytest.approx(float(specimen.axial_strain(12.0)), rel=1e-12)
+    assert du_dx.mean() == pytest.approx(float(specimen.transverse_strain(12.0)), rel=1e-12)
+    assert dv_dy.max() / dv_dy.mean() == pytest.approx(1.6, abs=0.01)
+
+
+def test_material_is_elastic_up_to_yield() -> None:
+    material = Material()
+    strain = np.linspace(0, material.yield_strain, 20)
+    np.testing.assert_allclose(material.stress(strain), material.E * strain)
+    np.testing.assert_allclose(material.transverse(strain), -material.nu * strain)
+
+
+def test_material_beyond_yield_is_on_its_flow_curve() -> None:
+    material = Material()
+    strain = np.linspace(material.yield_strain, 0.1, 50)
+    plastic = material.plastic_strain(strain)
+    flow = (
+        material.yield_stress
+        + material.voce * (1 - np.exp(-material.voce_rate * plastic))
+        + material.hardening * plastic
+    )
+    np.testing.assert_allclose(material.stress(strain), flow, rtol=1e-12)
+    np.testing.assert_allclose(
+        material.transverse(strain), -material.nu * flow / material.E - plastic / 2, rtol=1e-12
+    )
+
+
+def test_programme_holds_pulls_and_holds() -> None:
+    p = Programme(hold_s=2, ramp_s=10, end_s=1, knee_strain=2e-3, max_strain=8e-3, knee=0.6)
+    assert p.duration_s == 13
+    np.testing.assert_allclose(
+        p.strain([-1, 0, 2, 5, 8, 10, 12, 13]), [0, 0, 0, 1e-3, 2e-3, 5e-3, 8e-3, 8e-3]
+    )
+
+
+def test_default_test_is_twenty_seconds_and_yields_at_six_tenths_of_the_ramp() -> None:
+    specimen = specimen_from(parse_address("sim:"))
+    p = specimen.programme
+    assert specimen.duration_s == pytest.approx(20)
+    assert (specimen.yield_s - p.hold_s) / p.ramp_s == pytest.approx(0.6)
+    assert float(specimen.force(specimen.yield_s)) == pytest.approx(140e6 * 40e-6)
+
+
+def test_drift_and_rotation_are_reached_at_the_end_of_the_ramp() -> None:
+    specimen = VirtualSpecimen(drift_px=(2.0, -1.0), rotation_rad=0.02)
+    x0, y0 = specimen.modes.x0, specimen.modes.y0
+    u, v = specimen.displacement(x0, y0, specimen.duration_s)
+    assert (float(u), float(v)) == pytest.approx((2.0, -1.0))
+    assert specimen.at(1.0) == Motion(specimen.modes, 0.0, 0.0)
+    assert specimen.at(20.0).angle == 0.02
+
+
+def test_clock_begins_once() -> None:
+    clock = TestClock()
+    assert clock.start is None and clock.elapsed(7.0) == 0
+    assert clock.begin(5.0) == 5 and clock.begin(6.0) == 5
+    assert clock.elapsed(7.0) == 2
+
+
+@pytest.mark.parametrize(
+    ("address", "word"),
+    [
+        ("sim:cracked", "uniform, hole, woven"),
+        ("sim:?width=10", "width=10"),
+        ("sim:?seconds=2&hold=2", "seconds above"),
+        ("sim:?nu=0.7", "nu=0.7"),
+    ],
+)
+def test_bad_address_says_what_is_allowed(address: str, word: str) -> None:
+    with pytest.raises(ConfigError, match=word):
+        specimen_from(parse_address(address))

@@ -1,0 +1,103 @@
+"""Bad input: a clear message and its exit code, no traceback, nothing lost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+
+from live.cli import main
+
+
+def speckle(seed: int = 1, shape: tuple[int, int] = (96, 128)) -> np.ndarray:
+    noise = np.random.default_rng(seed).normal(size=shape).astype(np.float32)
+    smooth = cv2.GaussianBlur(noise, (0, 0), 2.0)
+    return np.clip(128 + 40 * smooth / smooth.std(), 0, 255).astype(np.uint8)
+
+
+@pytest.fixture
+def shots(tmp_path: Path) -> Path:
+    folder = tmp_path / "shots"
+    folder.mkdir()
+    for i in range(3):
+        cv2.imwrite(str(folder / f"a_{i}.png"), speckle())
+    return folder
+
+
+def refused(
+    capsys: pytest.CaptureFixture[str], code: int, says: str, *arguments: str, out: Path | None = None
+) -> None:
+    extra = ["--out", str(out)] if out else []
+    assert main([*arguments, *extra, "--no-view", "--no-rrd"]) == code
+    error = capsys.readouterr().err
+    assert says in error
+    assert "Traceback" not in error
+
+
+@pytest.mark.parametrize(
+    ("code", "says", "arguments"),
+    [
+        (2, "no camera is given", ["run"]),
+        (3, "/dev/video77", ["run", "--camera", "/dev/video77"]),
+        (2, "firewire", ["run", "--camera", "firewire:0"]),
+        (2, "unknown setting 'fsp'", ["run", "--camera", "sim:uniform?fsp=3"]),
+        (2, "burst", ["run", "--camera", "sim:", "--burst", "0"]),
+        (2, "leaves the picture", ["run", "--camera", "sim:?lockstep=yes", "--roi", "600,0,100,100"]),
+        (2, "x,y,width,height", ["run", "--camera", "sim:", "--config", "NO", "--section", "3"]),
+        (2, "no such configuration file", ["run", "--camera", "sim:", "--config", "nowhere.toml"]),
+        (3, "/dev/ttyUSB77", ["run", "--camera", "sim:?lockstep=yes", "--load", "/dev/ttyUSB77"]),
+        (4, "nowhere", ["replay", "files:nowhere/*.tif"]),
+        (4, "no such file", ["replay", "nowhere.h5"]),
+    ],
+)
+def test_arguments(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, code: int, says: str, arguments: list[str]
+) -> None:
+    if "--section" in arguments:
+        says = "give width,thickness"
+    refused(capsys, code, says, *arguments, out=tmp_path / "out")
+    assert not (tmp_path / "out" / "session.h5").exists()
+
+
+def test_pictures_of_different_sizes(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
+    cv2.imwrite(str(shots / "a_3.png"), speckle(shape=(90, 128)))
+    refused(capsys, 4, "a_3.png", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")
+
+
+def test_a_truncated_picture(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
+    whole = (shots / "a_1.png").read_bytes()
+    (shots / "a_1.png").write_bytes(whole[: len(whole) // 2])
+    refused(capsys, 4, "a_1.png", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")
+
+
+def test_a_zoi_larger_than_the_roi(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
+    source = f"files:{shots}/*.png"
+    refused(capsys, 2, "ZOI", "replay", source, "--roi", "0,0,40,40", "--zoi", "64", out=tmp_path / "out")
+
+
+def test_a_featureless_reference(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
+    cv2.imwrite(str(shots / "a_0.png"), np.full((96, 128), 128, np.uint8))
+    refused(capsys, 4, "pattern", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")
+
+
+def test_a_mask_of_another_size(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
+    mask = tmp_path / "mask.png"
+    cv2.imwrite(str(mask), np.full((10, 10), 255, np.uint8))
+    source = f"files:{shots}/*.png"
+    refused(capsys, 4, "mask.png", "replay", source, "--mask", str(mask), "--zoi", "32", out=tmp_path / "out")
+
+
+def test_foreign_and_truncated_sessions(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    foreign = tmp_path / "foreign.h5"
+    with h5py.File(foreign, "w") as file:
+        file["x"] = np.arange(3)
+    refused(capsys, 4, "foreign.h5", "replay", str(foreign), out=tmp_path / "out1")
+    cut = tmp_path / "cut.h5"
+    cut.write_bytes(foreign.read_bytes()[:700])
+    refused(capsys, 4, "cut.h5", "replay", str(cut), out=tmp_path / "out2")
+    text = tmp_path / "text.h5"
+    text.write_text("this is no HDF5 file")
+    refused(capsys, 4, "text.h5", "replay", str(text), out=tmp_path / "out3")

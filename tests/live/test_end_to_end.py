@@ -1,0 +1,286 @@
+"""From camera and load cell to strain, and back again from the recording."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from acquire.events import EventKind
+from acquire.session import Session
+from live import run_live
+from live.cli import main
+from live.config import load_config
+from live.measurement import Measurement
+from live.rig import Rig
+from live.run_live import LiveRun, Outcome
+from live.status import Screen
+
+SIM = "sim:woven?lockstep=yes&seconds=3&fps=15&width=224&height=192&bits=12"
+SMALL = {
+    "measure.zoi": 48,
+    "measure.step": 24,
+    "measure.burst": 3,
+    "measure.reference_burst": 4,
+    "view.enabled": False,
+    "view.rrd": False,
+}
+MAPS = ("u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy", "exx", "eyy", "exy", "sigma_exx", "residual", "status")
+
+
+def live_run(folder: Path, camera: str = SIM, **more: Any) -> LiveRun:
+    overrides = {"camera.address": camera, "load.address": "sim:", "output.dir": str(folder), **SMALL, **more}
+    return LiveRun(load_config(None, overrides), Screen(quiet=True))
+
+
+def strains(folder: Path) -> dict[str, np.ndarray]:
+    with h5py.File(folder / "strain.h5") as file:
+        group = file["entry/strain"]
+        return {name: group[name][()] for name in (*MAPS, "time_s", "force_N")}
+
+
+def assert_bit_equal(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> None:
+    for name, values in a.items():
+        np.testing.assert_array_equal(values, b[name], err_msg=name)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome]:
+    folder = tmp_path_factory.mktemp("live") / "run"
+    return folder, live_run(folder).run()
+
+
+def test_the_strain_is_that_of_the_specimen(recorded: tuple[Path, Outcome]) -> None:
+    _, outcome = recorded
+    specimen = outcome.rig.specimen
+    assert specimen is not None
+    last = outcome.outputs.history.instants[-1]
+    true = float(specimen.axial_strain(specimen.elapsed(last.t)))
+    assert last.n_valid == last.n_zoi > 10
+    # The ZOIs do not cover a whole number of cells, so the mean is near the mean strain, not at it.
+    assert last.eyy == pytest.approx(true, rel=0.25)
+    assert true > 1e-3
+
+
+def test_everything_is_accounted_for(recorded: tuple[Path, Outcome]) -> None:
+    folder, outcome = recorded
+    ledger = outcome.ledger
+    assert outcome.exit_code == 0
+    assert ledger.adds_up
+    assert ledger.recorded == ledger.grabbed == 46
+    assert (ledger.reference, ledger.skipped, ledger.lost) == (4, 0, 0)
+    with Session.open(folder / "session.h5") as session:
+        assert len(session) == 46
+        assert session.ledger is not None
+        assert session.ledger["measured"] == ledger.measured
+        kinds = [event.kind for event in session.events()]
+        assert kinds.count(EventKind.MEASURED) == 14
+        assert kinds.count(EventKind.REFERENCE) == 1
+        assert session.config["measure"]["zoi"] == 48
+
+
+def test_the_csv_has_a_row_a_measurement(recorded: tuple[Path, Outcome]) -> None:
+    folder, outcome = recorded
+    with (folder / "strain.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    assert len(rows) == 14
+    assert list(rows[0])[:11] == (
+        [
+            "frame",
+            "time_s",
+            "force_N",
+            "exx",
+            "eyy",
+            "exy",
+            "sigma_exx",
+            "sigma_eyy",
+            "sigma_exy",
+            "n_valid",
+            "n_zoi",
+        ]
+    )
+    assert float(rows[-1]["eyy"]) == pytest.approx(outcome.outputs.history.instants[-1].eyy, rel=1e-5)
+
+
+def test_replay_as_measured_is_bit_equal(recorded: tuple[Path, Outcome], tmp_path: Path) -> None:
+    folder, _ = recorded
+    out = tmp_path / "again"
+    arguments = [
+        "replay",
+        str(folder / "session.h5"),
+        "--as-measured",
+        "--out",
+        str(out),
+        "--no-view",
+        "--no-rrd",
+    ]
+    assert main(arguments) == 0
+    assert_bit_equal(strains(folder), strains(out))
+
+
+def test_plain_replay_measures_every_burst_with_other_zois(
+    recorded: tuple[Path, Outcome], tmp_path: Path
+) -> None:
+    folder, _ = recorded
+    session = str(folder / "session.h5")
+    same, other = tmp_path / "same", tmp_path / "other"
+    assert main(["replay", session, "--out", str(same), "--no-view", "--no-rrd"]) == 0
+    assert_bit_equal(strains(folder), strains(same))  # in lock step nothing was skipped
+    more = ["--zoi", "32", "--step", "8", "--from", "1", "--to", "2.5", "--burst", "1"]
+    assert main(["replay", session, "--out", str(other), "--no-view", "--no-rrd", *more]) == 0
+    times = strains(other)["time_s"]
+    assert len(times) == 23  # 15 fps
+    assert times.min() >= 1
+    assert times.max() <= 2.5
+
+
+def test_replay_with_forced_skips_is_bit_equal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A camera that does not wait, and a measurement that is too slow for it."""
+    folder = tmp_path / "run"
+    live = live_run(folder)
+    open_rig = run_live.open_rig
+
+    def hasty(*arguments: Any, **named: Any) -> Rig:
+        rig = open_rig(*arguments, **named)
+        monkeypatch.setattr(rig.camera, "info", replace(rig.camera.info, live=True))
+        return rig
+
+    def slow(m: Measurement) -> None:
+        assert live.grabber is not None
+        if m.number < 2:
+            live.grabber.join()  # the camera has given everything before this one is done
+
+    monkeypatch.setattr(run_live, "open_rig", hasty)
+    live.watch(slow)
+    outcome = live.run()
+    assert outcome.ledger.skipped > 0
+    assert outcome.ledger.adds_up
+    out = tmp_path / "again"
+    session = str(folder / "session.h5")
+    assert main(["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]) == 0
+    assert_bit_equal(strains(folder), strains(out))
+
+
+def test_a_new_reference_is_composed_and_replayed(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    live = live_run(folder)
+
+    def ask(m: Measurement) -> None:
+        if m.number == 5:
+            live.command(EventKind.NEW_REFERENCE)
+
+    live.watch(ask)
+    outcome = live.run()
+    assert outcome.ledger.adds_up
+    assert outcome.ledger.reference == 8
+    specimen = outcome.rig.specimen
+    assert specimen is not None
+    last = outcome.outputs.history.instants[-1]
+    assert last.eyy == pytest.approx(float(specimen.axial_strain(specimen.elapsed(last.t))), rel=0.25)
+    out = tmp_path / "again"
+    session = str(folder / "session.h5")
+    assert main(["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]) == 0
+    assert_bit_equal(strains(folder), strains(out))
+
+
+@pytest.mark.parametrize(
+    "how",
+    [
+        {"record.mode": "bursts"},
+        {"camera.crop": (16, 8, 160, 152)},
+        {"record.mode": "bursts", "camera.crop": (16, 8, 160, 152)},
+        {"measure.shorten_bursts": True, "measure.burst": 6},
+    ],
+)
+def test_what_is_recorded_in_part_replays_bit_equal(tmp_path: Path, how: dict[str, Any]) -> None:
+    folder, out = tmp_path / "run", tmp_path / "again"
+    outcome = live_run(folder, **how).run()
+    assert outcome.ledger.adds_up
+    session = str(folder / "session.h5")
+    for extra in ([], ["--as-measured"]):
+        assert (
+            main(["replay", session, *extra, "--out", str(out / str(len(extra))), "--no-view", "--no-rrd"])
+            == 0
+        )
+        assert_bit_equal(strains(folder), strains(out / str(len(extra))))
+
+
+def test_dark_and_flat_frames_take_the_fixed_pattern_out(tmp_path: Path) -> None:
+    """A fixed pattern pulls displacement towards zero; corrected, a moved folder still replays bit-equal."""
+    camera = "sim:uniform?lockstep=yes&seconds=2&fps=15&width=224&height=192&bits=12&fpn=6&drift_x=0.5"
+    flat = tmp_path / "flat.tif"
+    even = camera.replace("drift_x=0.5", "contrast=1&radius=64&max_strain=0")
+    assert main(["average", "--camera", even, "--frames", "16", "--out", str(flat)]) == 0
+    errors = []
+    for name, more in (("raw", {}), ("corrected", {"camera.flat": str(flat)})):
+        outcome = live_run(tmp_path / name, camera, **more).run()
+        specimen = outcome.rig.specimen
+        assert specimen is not None
+        last = specimen.displacement(np.array([112.0]), np.array([96.0]), specimen.elapsed(1.9))[0][0]
+        errors.append(abs(float(np.nanmedian(strains(tmp_path / name)["u"][-1])) - last))
+    assert errors[1] < 0.5 * errors[0]
+    (tmp_path / "corrected").rename(tmp_path / "moved")
+    session, out = str(tmp_path / "moved" / "session.h5"), tmp_path / "again"
+    assert main(["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]) == 0
+    assert_bit_equal(strains(tmp_path / "moved"), strains(out))
+
+
+def test_a_rotated_recording_is_one_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder, out = tmp_path / "run", tmp_path / "again"
+    live = live_run(folder)
+    object.__setattr__(live.config.record, "rotate_MB", 1.0)  # smaller than the configuration allows
+    assert live.run().exit_code == 0
+    assert len(list(folder.glob("session*.h5"))) > 2
+    session = str(folder / "session.001.h5")
+    assert main(["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]) == 0
+    assert_bit_equal(strains(folder), strains(out))
+
+
+def test_every_third_frame_is_a_slower_camera(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder, out = tmp_path / "run", tmp_path / "again"
+    outcome = live_run(folder, **{"record.mode": "every=3"}).run()
+    ledger = outcome.ledger
+    assert (ledger.recorded, ledger.thinned) == (16, 30)
+    assert ledger.adds_up
+    assert not ledger.loss
+    session = str(folder / "session.h5")
+    assert main(["replay", session, "--out", str(out), "--no-view", "--no-rrd"]) == 0
+    assert len(strains(out)["time_s"]) == 14
+    bad = ["replay", session, "--burst", "3", "--out", str(tmp_path / "x"), "--no-view", "--no-rrd"]
+    assert main(bad) == 2
+    assert "holds only one frame in 3" in capsys.readouterr().err
+
+
+def test_nothing_is_overwritten(recorded: tuple[Path, Outcome], capsys: pytest.CaptureFixture[str]) -> None:
+    folder, _ = recorded
+    before = (folder / "session.h5").stat().st_mtime_ns
+    assert (
+        main(["run", "--camera", SIM, "--load", "none:", "--out", str(folder), "--no-view", "--no-rrd"]) == 2
+    )
+    assert "nothing is overwritten" in capsys.readouterr().err
+    assert (folder / "session.h5").stat().st_mtime_ns == before
+
+
+def test_without_recording_and_load(tmp_path: Path) -> None:
+    live = live_run(tmp_path / "run", **{"load.address": "none:", "record.enabled": False})
+    outcome = live.run()
+    assert outcome.exit_code == 0
+    assert not (tmp_path / "run" / "session.h5").exists()
+    assert np.isnan(strains(tmp_path / "run")["force_N"]).all()
+
+
+def test_stopping_from_outside_closes_everything(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    live = live_run(folder)
+    live.watch(lambda m: live.stop("interrupted") if m.number == 3 else None)
+    outcome = live.run()
+    assert outcome.exit_code == 130
+    assert outcome.ledger.adds_up
+    with Session.open(folder / "session.h5") as session:
+        assert session.ledger is not None
+        assert len(session) == outcome.ledger.recorded
