@@ -160,10 +160,14 @@ class Pace:
     ----------
     pause_s : float, s
         After a longer pause any two messages of one read are late.
+    window_s : float, s
+        Over which the pace is averaged.
+    known_s : float, s
+        Until messages came for so long their pace is unknown, and any two of one read are late.
     """
 
-    def __init__(self, pause_s: float = 0.1, window_s: float = 2.0) -> None:
-        self._pause_s, self._window_s = pause_s, window_s
+    def __init__(self, pause_s: float = 0.1, window_s: float = 2.0, known_s: float = 0.2) -> None:
+        self._pause_s, self._window_s, self._known_s = pause_s, window_s, known_s
         self._reads: deque[tuple[float, int]] = deque()
         self._last = math.nan
 
@@ -172,16 +176,16 @@ class Pace:
         pause, self._last = now - self._last, now
         rate = self._rate(now)
         self._reads.append((now, count))
-        if count < 2 or math.isnan(pause):
+        if count < 2:
             return False
-        return pause > self._pause_s or (not math.isnan(rate) and count > 3 + 2 * rate * pause)
+        return not (pause <= self._pause_s and count <= 3 + 2 * rate * pause)  # so that NaN is late
 
     def _rate(self, now: float) -> float:
         """Messages a second so far; NaN where too little is known."""
         while self._reads and self._reads[0][0] < now - self._window_s:
             self._reads.popleft()
         span = now - self._reads[0][0] if self._reads else 0.0
-        return sum(count for _, count in self._reads) / span if span > self._window_s / 4 else math.nan
+        return sum(count for _, count in self._reads) / span if span > self._known_s else math.nan
 
     def restart(self) -> None:
         """The connection was interrupted."""

@@ -95,14 +95,21 @@ def test_a_device_that_lost_time_is_tied_anew_in_the_end() -> None:
 
 def test_pace() -> None:
     pace = Pace()
-    assert not pace.late(5, 0.0)
-    assert not any(pace.late(1, 0.0125 * k) for k in range(1, 200))
+    assert not any(pace.late(1, 0.0125 * k) for k in range(200))
     assert pace.late(2, 2.5 + 0.2)  # after a pause
-    pace.restart()
-    assert not pace.late(100, 10.0)
 
 
-def test_a_fast_stream_in_large_reads_is_not_late() -> None:
+@pytest.mark.parametrize("known_for", [0, 1, 10, 20, 200])
+def test_a_backlog_is_late_however_early_it_comes(known_for: int) -> None:
     pace = Pace()
-    assert not any(pace.late(16, 0.016 * k) for k in range(300))
+    assert not any(pace.late(1, 0.0125 * k) for k in range(known_for))
+    assert pace.late(160, 0.0125 * known_for)
+    pace.restart()
+    assert pace.late(2, 0.0125 * (known_for + 1))
+
+
+def test_a_fast_stream_in_large_reads_is_not_late_once_its_pace_is_known() -> None:
+    pace = Pace()
+    late = [pace.late(16, 0.016 * k) for k in range(300)]
+    assert not any(late[15:])
     assert pace.late(400, 0.016 * 300)

@@ -32,6 +32,9 @@ def headless_viewer(size: str = "1600x900") -> Iterator[Any]:
     with subprocess.Popen([*command, "--hide-welcome-screen"], stderr=subprocess.DEVNULL) as process:
         try:
             yield _connected(process, f"rerun+http://127.0.0.1:{port}/proxy")
+        except ConnectionError as error:
+            # It may answer for a moment and end only when it cannot find a graphics device.
+            raise ViewerGone(_why_gone(process)) from error
         finally:
             process.terminate()
 
@@ -47,7 +50,13 @@ def _connected(process: subprocess.Popen[bytes], address: str, timeout_s: float 
             return client
         except Exception:
             time.sleep(0.3)
-    raise ViewerGone(f"no headless viewer here (ended with {process.poll()}); see the packages in {__file__}")
+    raise ViewerGone(_why_gone(process))
+
+
+def _why_gone(process: subprocess.Popen[bytes]) -> str:
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        process.wait(5.0)
+    return f"no headless viewer here (ended with {process.poll()}); see the packages in {__file__}"
 
 
 def screenshot(
