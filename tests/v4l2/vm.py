@@ -161,10 +161,12 @@ def guest_kernel() -> GuestKernel:
         raise NoMachine("there is no apt-get to fetch a kernel with; this needs Debian or Ubuntu")
     found = _kernel_package()
     print(f"vm: fetching {found} (about 70 MB, once) ...", flush=True)
-    shutil.rmtree(CACHE, ignore_errors=True)
-    root.mkdir(parents=True)
-    run("apt-get", "download", "-qq", found, "busybox-static", cwd=CACHE)
-    for package in CACHE.glob("*.deb"):
+    packages = CACHE / "packages"
+    for old in (root, packages):  # of an interrupted fetch; compiled loops lie beside them
+        shutil.rmtree(old, ignore_errors=True)
+        old.mkdir(parents=True)
+    run("apt-get", "download", "-qq", found, "busybox-static", cwd=packages)
+    for package in packages.glob("*.deb"):
         run("dpkg-deb", "-x", package, root)
         package.unlink()
     kernel = GuestKernel(root, next((root / "lib/modules").iterdir()).name)
