@@ -98,12 +98,12 @@ class Run:
             return []
         return [line for line in tables[0].read_text().splitlines() if line[:1].isdigit()]
 
-    def until_rows(self, count: int, seconds: float = 120) -> None:
+    def until_rows(self, count: int, seconds: float = 400) -> None:
         """Wait until so many instants more are measured."""
         wanted = len(self.rows()) + count
         self.until(lambda: len(self.rows()) >= wanted, seconds)
 
-    def until(self, condition: object, seconds: float = 60) -> None:
+    def until(self, condition: object, seconds: float = 240) -> None:
         """Wait for something while the run goes on."""
 
         def met() -> bool:
