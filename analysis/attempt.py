@@ -5,29 +5,54 @@ The other half of ``PhaseKernel``, which holds what does not change from frame t
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.prediction import Motion
 from analysis.prepared import clipped_share
 from analysis.renewal import UNSHARED
 from analysis.settings import NoiseModel
 from analysis.splines import prefilter_taps, tap_table
 from analysis.strain_field import Status, StrainField
-from analysis.validity import CLIPPED_SHARE, judge
+from analysis.validity import CLIPPED_SHARE, bends, judge
 from analysis.windows import profile
 
 if TYPE_CHECKING:
     from analysis.phase_kernel import PhaseKernel
 
 Floats = NDArray[np.float64]
+Places = NDArray[np.intp] | slice
+"""Which of the active ZOIs."""
 
 RESCUE_ROUNDS = 40
-MOTION_UPDATE = 0.4
-"""How much of a new step enters the motion that predicts the next one."""
 SEARCH_SHARE = 0.3
 """Share of lost ZOIs from which on the whole picture is searched again."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outcome:
+    """What the iteration says of B ZOIs.
+
+    Attributes
+    ----------
+    values : (B, modes)
+    left, bending : (B,)
+        Weighted sum of squares that the fit leaves, GL^2; what it leaves of a displacement that
+        bends or jumps inside the ZOI, px^2 (``shapes.bent``).
+    nuisance : (B, 2)
+        Gain, and offset in GL.
+    state, iterations : (B,) uint8
+    """
+
+    values: Floats
+    left: Floats
+    bending: Floats
+    nuisance: Floats
+    state: NDArray[np.uint8]
+    iterations: NDArray[np.uint8]
 
 
 class Attempt:
@@ -50,7 +75,7 @@ class Attempt:
         self.iterations = np.zeros(count, np.uint8)
         self.status = self.ready.status.copy()
         self.tolerance, self.trust = self._tolerance()
-        self._plain = self.p
+        self._guess = self.p
 
     def _current_std(self) -> float:
         if self.noise is None:
@@ -67,9 +92,8 @@ class Attempt:
 
     def run(self, guess: Floats) -> None:
         """Measure every ZOI that has a pattern and a guess; the others are LOST."""
-        # Without its gradients a guess is right for ZOIs beside a discontinuity.
-        self._plain = guess * (np.arange(guess.shape[1]) % (guess.shape[1] // 2) == 0)
-        known = np.isfinite(guess).all(axis=1)
+        self._guess = guess
+        known = np.isfinite(guess @ np.ones(guess.shape[1]))
         able = self.ready.status == Status.OK
         self.status[able & ~known] = Status.LOST
         self._track(np.flatnonzero(able & known), guess)
@@ -78,30 +102,31 @@ class Attempt:
         """Iterate the ZOIs ``which`` from their guesses and keep what comes out."""
         if len(which) == 0:
             return
+        places: Places = which if len(which) < len(guess) else np.s_[:]  # as a rule all: no copies
         from analysis.gauss_newton import CONVERGED, LEFT_IMAGE
 
-        if self.kernel._sensors is None:
-            values, left, nuisance, state, iterations = self._iterate(which, guess[which])
-        else:
-            values, left, nuisance, state, iterations = self._iterate_phases(which, guess[which])
-        ready = self.ready
-        gain = nuisance[:, 0]
-        self.p[which], self.left[which], self.nuisance[which] = values, left, nuisance
-        self.iterations[which] = iterations
-        self.status[which] = judge(
-            state == CONVERGED,
-            state == LEFT_IMAGE,
-            left / ready.freedom[which],
-            self._expected(which, gain),
-            ready.signal[which],
+        iterate = self._iterate if self.kernel._sensors is None else self._iterate_phases
+        found = iterate(places, guess[places])
+        ready, kernel = self.ready, self.kernel
+        self.p[places], self.left[places], self.nuisance[places] = found.values, found.left, found.nuisance
+        self.iterations[places] = found.iterations
+        gain = found.nuisance[:, 0]
+        left, expected = found.left / ready.freedom[places], self._expected(places, gain)
+        status = judge(
+            found.state == CONVERGED,
+            found.state == LEFT_IMAGE,
+            left,
+            expected,
+            ready.signal[places],
             gain,
-            ready.freedom[which] * self.kernel._sharpness,
-            self.noise is not None and self.kernel._noise is not None,
+            ready.freedom[places] * kernel._sharpness,
+            self.noise is not None and kernel._noise is not None,
         )
+        noise = kernel._share_variance[places] * np.maximum(expected, left)[:, None]
+        status[(status == Status.OK) & bends(found.bending, noise, ready.shapes.noise)] = Status.UNEVEN
+        self.status[places] = status
 
-    def _iterate_phases(
-        self, which: NDArray[np.intp], guess: Floats
-    ) -> tuple[Floats, Floats, Floats, Any, Any]:
+    def _iterate_phases(self, which: Places, guess: Floats) -> Outcome:
         """The same by phases alone; one step of the spectral fit tells gain and residual."""
         from analysis.quadrature import iterate
 
@@ -111,44 +136,44 @@ class Attempt:
             sensors.weights[which], self.ready, self.ready.origins[which], self.kernel.grid.size, self.coefficients,
             guess, self.tolerance[which], settings, self.kernel._over,
         )  # fmt: skip
-        _, left, nuisance, _, _ = self._iterate(which, values, max_iterations=1)
-        return values, left, nuisance, state, iterations
+        judged = self._iterate(which, values, max_iterations=1)
+        return replace(judged, values=values, state=state, iterations=iterations)
 
-    def _iterate(
-        self, which: NDArray[np.intp], guess: Floats, max_iterations: int | None = None
-    ) -> tuple[Floats, Floats, Floats, Any, Any]:
+    def _iterate(self, which: Places, guess: Floats, max_iterations: int | None = None) -> Outcome:
         from analysis.gauss_newton import track
         from analysis.sensitivity import parameter_scale, power_rows
         from analysis.warp import LANES
 
         ready, kernel, settings = self.ready, self.kernel, self.kernel.settings
-        size, count = kernel.grid.size, len(which)
+        size, count = kernel.grid.size, len(guess)
         height, width = ready.shape
-        every = count == len(ready.origins)
-        values = guess.copy()
-        left, nuisance = np.full(count, np.nan), np.full((count, 2), np.nan)
-        state, iterations = np.zeros(count, np.uint8), np.zeros(count, np.uint8)
+        out = Outcome(
+            guess.copy(), np.full(count, np.nan), np.full(count, np.nan), np.full((count, 2), np.nan),
+            np.zeros(count, np.uint8), np.zeros(count, np.uint8),
+        )  # fmt: skip
         rows = power_rows(profile(settings.window, size), settings.order)
+        shapes = ready.shapes
         track(
             self.coefficients, width, height, ready.fx, ready.fy, ready.f, ready.raw,
-            ready.origins if every else ready.origins[which], size, settings.order,
-            np.pad(rows, ((0, 0), (0, LANES))).astype(np.float32),
-            ready.inverse if every else ready.inverse[which], parameter_scale(settings.order, size),
+            ready.origins[which], size, settings.order,
+            np.pad(rows, ((0, 0), (0, LANES))).astype(np.float32), shapes.rows, shapes.blocks, shapes.mix[1, 1],
+            ready.inverse[which], ready.cross[which],
+            ready.weight * ready.energy[which], parameter_scale(settings.order, size),
             self.tolerance[which], self.trust[which], tap_table(settings.interpolant),
             kernel._over, max_iterations or settings.max_iterations,
-            values, left, nuisance, state, iterations,
+            out.values, out.left, out.bending, out.nuisance, out.state, out.iterations,
         )  # fmt: skip
-        return values, left, nuisance, state, iterations
+        return out
 
-    def _expected(self, which: NDArray[np.intp], gain: Floats) -> Floats:
+    def _expected(self, which: Places, gain: Floats) -> Floats:
         """Variance a pixel that noise alone leaves in the difference of the images, GL^2."""
         reference, current = self._variances(which, gain)
         return np.asarray(np.minimum(gain**2, 25.0) * reference + current)
 
-    def _variances(self, which: NDArray[np.intp], gain: Floats) -> tuple[Floats, Floats]:
+    def _variances(self, which: Places, gain: Floats) -> tuple[Floats, Floats]:
         level = self.ready.level[which]
         model = self.kernel._noise
-        reference = np.full(len(which), self.kernel.reference_noise**2)
+        reference = np.full(len(gain), self.kernel.reference_noise**2)
         if model is not None:
             reference = model.variance(level)
         current = reference if self.noise is None else self.noise.variance(level * np.maximum(gain, 0))
@@ -158,7 +183,9 @@ class Attempt:
         """Try lost ZOIs again: without extrapolation, from neighbours, and by a search."""
         if not self._lost().any():
             return
-        self._retry(self._plain if before is None else before)
+        # Without its gradients a guess is right for ZOIs beside a discontinuity.
+        displacements = np.arange(self.kernel._modes) % (self.kernel._modes // 2) == 0
+        self._retry(self._guess * displacements if before is None else before)
         self._from_neighbours()
         able = np.count_nonzero(self.ready.status == Status.OK)
         if before is not None and np.count_nonzero(self._lost()) > SEARCH_SHARE * able:
@@ -219,9 +246,7 @@ class Attempt:
         guess[:, affine] = mean.reshape(6, -1)[:, kernel._index].T
         return kernel._local(guess), number.ravel()[kernel._index].astype(np.uint8)
 
-    def field(
-        self, before: Floats | None, carried: Floats | None, clipped: NDArray[np.bool_] | None
-    ) -> StrainField:
+    def field(self, before: Floats | None, carried: Motion, clipped: NDArray[np.bool_] | None) -> StrainField:
         """Put everything on the grid."""
         if clipped is not None:
             self._reject_clipped(clipped)
@@ -233,7 +258,6 @@ class Attempt:
             residual = self.left / self.ready.freedom / (self.nuisance[:, 0] ** 2 * reference + current)
         noise = float(np.sqrt(np.median(current[ok]))) if ok.any() else float("nan")
         values = np.where(ok[:, None], kernel._total(self.p), np.nan)
-        motion = None if before is None else self._motion(values - before, carried)
         status = np.full(len(kernel.grid.active.ravel()), Status.NOT_MEASURED, np.uint8)
         status[kernel._index] = self.status
         return StrainField(
@@ -247,13 +271,10 @@ class Attempt:
             gain=self._spread(self.nuisance[:, :1].astype(np.float32))[0],
             noise=noise,
             window=kernel.settings.window,
-            motion=None if motion is None else self._spread(motion),
+            motion=None
+            if before is None
+            else carried.after(values, before + carried.ahead, self.trust, kernel.grid.size / 6),
         )
-
-    @staticmethod
-    def _motion(change: Floats, carried: Floats | None) -> Floats:
-        """Motion a frame for the next prediction: part of the news, so that less noise is carried on."""
-        return change if carried is None else carried + MOTION_UPDATE * (change - carried)
 
     def _spread(self, values: NDArray[Any], empty: float = np.nan) -> NDArray[Any]:
         """(A, K) onto the grid: (K, R, C)."""
@@ -274,7 +295,7 @@ class Attempt:
 
     def _noise_parts(self, ok: NDArray[np.bool_]) -> tuple[Floats, Floats]:
         """Variances a pixel of the two images at each ZOI, (A,), GL^2; what is not given, from the residual."""
-        reference, current = self._variances(np.arange(len(ok)), self.nuisance[:, 0])
+        reference, current = self._variances(np.s_[:], self.nuisance[:, 0])
         if self.noise is not None or not ok.any():
             return reference, current
         pooled = float(np.median((self.left / self.ready.freedom)[ok]))

@@ -12,6 +12,7 @@ import numpy as np
 from numba import prange
 
 from analysis.compiled import helper, inlined, parallel
+from analysis.shapes import BLOCK, N_SHAPES, add_shares, bent
 from analysis.splines import PAD
 from analysis.warp import LANES, inside, warp_row
 
@@ -25,8 +26,6 @@ LEFT_BY_MISFIT = 0.003
 """The same without noise (measured: up to 0.002)."""
 LEFT_BY_LENGTH = 0.03
 """The same per px of the step, the next order of the expansion (measured: 0.004-0.03)."""
-BLOCK = 4
-"""Rows whose moments are summed in one loop, so that sums across a vector are rare."""
 LONGEST_STEP = 3.0
 """Pixels; a longer step at the edge of the ZOI is shortened to this."""
 
@@ -34,9 +33,11 @@ LONGEST_STEP = 3.0
 @inlined
 def _moments_of_rows(
     fx: Any, fy: Any, f: Any, raw: Any, at: Any, width: Any, size: int, g: Any, line: Any,
-    along_x: Any, w: Any, e: Any,
+    along_x: Any, bends: Any, w: Any, e: Any,
 ) -> Any:  # fmt: skip
-    """Sums over four rows of w d {f_x, f_y, f, 1} {1, xi, eta} and of w d^2, d = g - raw.
+    """Sums over four rows of w d {f_x, f_y, f, 1} {1, xi, eta}, w d {f_x, f_y} {P2, P3}, and w d^2.
+
+    The difference is d = g - raw, P2 and P3 are polynomials in xi (``shapes``).
 
     ``at`` is the flat index of the first pixel, ``line`` the distance of rows in ``g``; ``w``
     and ``e`` are the window along y of the four rows and the window times eta.
@@ -55,6 +56,10 @@ def _moments_of_rows(
     d0 = f4(0)
     d1 = f4(0)
     d2 = f4(0)
+    a3 = f4(0)
+    a4 = f4(0)
+    b3 = f4(0)
+    b4 = f4(0)
     energy = f4(0)
     i1 = at + width
     i2 = i1 + width
@@ -81,10 +86,14 @@ def _moments_of_rows(
         t = wp * fx[at + k] + wq * fx[i1 + k] + wr * fx[i2 + k] + ws * fx[i3 + k]
         a0 += x0 * t
         a1 += x1 * t
+        a3 += bends[0, k] * t
+        a4 += bends[1, k] * t
         a2 += x0 * (ep * fx[at + k] + eq * fx[i1 + k] + er * fx[i2 + k] + es * fx[i3 + k])
         t = wp * fy[at + k] + wq * fy[i1 + k] + wr * fy[i2 + k] + ws * fy[i3 + k]
         b0 += x0 * t
         b1 += x1 * t
+        b3 += bends[0, k] * t
+        b4 += bends[1, k] * t
         b2 += x0 * (ep * fy[at + k] + eq * fy[i1 + k] + er * fy[i2 + k] + es * fy[i3 + k])
         t = wp * f[at + k] + wq * f[i1 + k] + wr * f[i2 + k] + ws * f[i3 + k]
         c0 += x0 * t
@@ -94,7 +103,7 @@ def _moments_of_rows(
         d0 += x0 * t
         d1 += x1 * t
         d2 += x0 * (ep + eq + er + es)
-    return a0, a1, a2, b0, b1, b2, c0, c1, c2, d0, d1, d2, energy
+    return a0, a1, a2, b0, b1, b2, c0, c1, c2, d0, d1, d2, energy, a3, a4, b3, b4
 
 
 @helper
@@ -224,14 +233,15 @@ def warp_zoi_row(
 @helper
 def _moments(
     c: Any, width: int, fx: Any, fy: Any, f: Any, raw: Any, top: int, first: int, size: int, order: int,
-    along_x: Any, q: Any, ramp: Any, table: Any, g: Any, m: Any,
+    along_x: Any, bends: Any, blocks: Any, slope: Any, q: Any, ramp: Any, table: Any, g: Any, m: Any, shares: Any,
 ) -> Any:  # fmt: skip
-    """Warp one ZOI and write J' w d to ``m``; returns d' w d."""
+    """Warp one ZOI and write J' w d to ``m`` and the sums with the shapes to ``shares``; returns d' w d."""
     stride = width + 2 * PAD
     reach = (size - 1) / 2
     rounded = (size + LANES - 1) // LANES * LANES
     line = size + LANES
     m[:] = 0
+    shares[:] = 0
     energy = 0.0
     for y in range(0, size, BLOCK):
         for j in range(min(BLOCK, size - y)):
@@ -244,10 +254,14 @@ def _moments(
         w = (along_x[0, y], along_x[0, y + 1], along_x[0, y + 2], along_x[0, y + 3])
         e = (along_x[1, y], along_x[1, y + 1], along_x[1, y + 2], along_x[1, y + 3])
         s = _moments_of_rows(
-            fx, fy, f, raw, at, np.uintp(width), rounded, g, np.uintp(line), along_x, w, e
+            fx, fy, f, raw, at, np.uintp(width), rounded, g, np.uintp(line), along_x, bends, w, e
         )  # fmt: skip
         _add_rows(order, m, s)
         energy += s[12]
+        n = y // BLOCK
+        p = (blocks[0, n], blocks[1, n], blocks[2, n], blocks[3, n])
+        add_shares(shares, 0, (s[0], s[1], s[13], s[14]), p, slope)
+        add_shares(shares, N_SHAPES, (s[3], s[4], s[15], s[16]), p, slope)
         if order == 2:
             h = (along_x[2, y], along_x[2, y + 1], along_x[2, y + 2], along_x[2, y + 3])
             t = _second_moments_of_rows(
@@ -275,8 +289,9 @@ def _solve(inverse: Any, m: Any, step: Any, energy: Any) -> Any:
 @parallel
 def track(
     c: Any, width: int, height: int, fx: Any, fy: Any, f: Any, raw: Any, origins: Any, size: int,
-    order: int, along_x: Any, inverse: Any, units: Any, tolerance: Any, trust: Any, table: Any, over: Any,
-    max_iterations: int, p: Any, left: Any, nuisance: Any, state: Any, iterations: Any,
+    order: int, along_x: Any, bends: Any, blocks: Any, slope: Any, inverse: Any, cross: Any, squares: Any,
+    units: Any, tolerance: Any, trust: Any, table: Any, over: Any,
+    max_iterations: int, p: Any, left: Any, bending: Any, nuisance: Any, state: Any, iterations: Any,
 ) -> None:  # fmt: skip
     """Measure all ZOIs.
 
@@ -289,13 +304,18 @@ def track(
     origins : (A, 2) int64, first row and column of each ZOI
     along_x : (2 order + 1, size + LANES) float32
         Window times powers of xi; zero beyond ``size``.
+    bends, blocks, slope : see ``shapes.Shapes``: rows, blocks and mix[1, 1]
     inverse : (A, P, P) float32
+    cross : (A, 10, P) float32
+    squares : (A, 2) float64
+        Sums of w f_x^2 and w f_y^2.
     tolerance : (A, 2) float64
         Error that may be left in u and v (px) and in the gradients.
     trust : (A,) float64, px
         Predicted uncertainty of u and v from the noise of the deformed image.
     p : (A, 6 or 12) float64, px units, start values in, result out
     left : (A,) float64, out: weighted sum of squared differences after the fit, GL^2
+    bending : (A,) float64, out: what the fit leaves of a displacement that bends or jumps, px^2 (``shapes.bent``)
     nuisance : (A, 2) float64, out: gain, and offset in GL
     state, iterations : (A,) uint8, out
     """
@@ -310,6 +330,7 @@ def track(
         ramp = np.arange(size + LANES).astype(np.float32)
         m = np.empty(count)
         step = np.empty(count)
+        shares = np.empty(2 * N_SHAPES)
         for z in range(chunk * 32, min(chunk * 32 + 32, len(origins))):
             top, first = origins[z]
             q = p[z]
@@ -319,13 +340,15 @@ def track(
                     state[z] = LEFT_IMAGE
                     break
                 energy = _moments(
-                    c, width, fx, fy, f, raw, top, first, size, order, along_x, q, ramp, table, g, m
+                    c, width, fx, fy, f, raw, top, first, size, order, along_x, bends, blocks, slope,
+                    q, ramp, table, g, m, shares,
                 )  # fmt: skip
                 left[z] = _solve(inverse[z], m, step, energy)
                 gain = 1 + step[modes]
                 nuisance[z, 0] = gain
                 nuisance[z, 1] = step[modes + 3]
                 gain = min(max(gain, GAIN_RANGE[0]), GAIN_RANGE[1])
+                bending[z] = bent(shares, cross[z], step, squares[z, 0], squares[z, 1]) / gain**2
                 longest = 0.0
                 for i in range(modes):
                     longest = max(longest, abs(step[i]) / gain)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.attempt import Attempt
+from analysis.prediction import Motion
 from analysis.prepared import PatternError, Prepared, prepare_reference
 from analysis.quadrature import Sensors, make_sensors
 from analysis.renewal import Placement, place, taken
@@ -112,6 +113,9 @@ class PhaseKernel:
         self._unit = unit.reshape(21, rows, columns)
         variance = np.maximum(self._prepared.covariance[:, [0, 15, 6, 11, 18, 20]].astype(np.float64), 0)
         sigma = np.sqrt(variance)
+        # Of u and v if nothing else were sought, for a noise of 1 GL.
+        pixels = self._prepared.weight * self._sharpness
+        self._share_variance = 1 / np.maximum(pixels * self._prepared.energy, 1e-12)
         # Smallest of u and v, smallest of the gradients, largest of u and v.
         self._unit_sigma = np.stack([sigma[:, :2].min(1), sigma[:, 2:].min(1), sigma[:, :2].max(1)], axis=1)
 
@@ -225,20 +229,18 @@ class PhaseKernel:
             raise ValueError(f"the start has {start.grid.shape} ZOIs, this kernel {self.grid.shape}")
         return taken(start.parameters, self._index, self._modes)
 
-    def _carried_motion(self, start: StrainField | None) -> Floats | None:
-        """Motion a frame of the field before, (A, modes); 0 where it is not known."""
-        if start is None or start.motion is None:
-            return None
-        motion = taken(start.motion, self._index, self._modes)
-        return np.where(np.isfinite(motion), motion, 0)
+    def _carried_motion(self, start: StrainField | None) -> Motion:
+        """What the field before says of this one."""
+        motion = None if start is None else start.motion
+        if motion is not None and motion.fits(self._index, self._modes):
+            return motion
+        return Motion.none(self._index, self._modes)
 
-    def _first_guess(
-        self, image: NDArray[np.float32], before: Floats | None, carried: Floats | None
-    ) -> Floats:
+    def _first_guess(self, image: NDArray[np.float32], before: Floats | None, carried: Motion) -> Floats:
         """Start of the iteration, (A, modes): the field before carried on, or a search."""
         if before is None:
             return self._searched(image)
-        return self._local(before.copy() if carried is None else before + carried)
+        return self._local(before + carried.ahead)
 
     def _local(self, total: Floats) -> Floats:
         """Parameters against this reference from those against the original one."""

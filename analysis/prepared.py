@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,9 @@ from analysis.spectrum import Pattern, filtered_pattern
 from analysis.strain_field import Status
 from analysis.validity import CLIPPED_SHARE, has_pattern
 from analysis.windows import profile
+
+if TYPE_CHECKING:
+    from analysis.shapes import Shapes
 
 TAIL_ROWS, TAIL = 3, 64
 """Rows and samples appended to flat images, since loops read whole blocks and vectors."""
@@ -35,6 +38,11 @@ class Prepared:
     origins : (A, 2) int64
         First row and column of each ZOI.
     inverse : (A, P, P) float32
+    cross : (A, 10, P) float32
+        Of the shapes that the fit cannot follow with the columns of J (``shapes.cross_moments``).
+    shapes : Shapes
+    energy : (A, 2) float64, (GL/px)^2
+        Mean of f_x^2 and f_y^2 under the window.
     covariance, covariance_level : (A, 21) float32
         For noise of variance 1 GL^2, and of variance 1 GL^2 a grey level.
     freedom, weight : (A,) and float
@@ -55,6 +63,9 @@ class Prepared:
     raw: NDArray[np.float32]
     origins: NDArray[np.int64]
     inverse: NDArray[np.float32]
+    cross: NDArray[np.float32]
+    shapes: Shapes
+    energy: NDArray[np.float64]
     covariance: NDArray[np.float32]
     covariance_level: NDArray[np.float32] | None
     freedom: NDArray[np.float64]
@@ -84,6 +95,8 @@ def prepare_reference(
         Saturated pixels.
     """
     from analysis.sensitivity import columns, parameter_scale, power_rows, prepare
+    from analysis.shapes import N_SHAPES, shapes_of
+    from analysis.warp import LANES
 
     mean = float(image.mean(dtype=np.float64))
     std = None if noise is None else float(np.sqrt(noise.variance(mean)))
@@ -94,6 +107,9 @@ def prepare_reference(
     affine = units[[0, 1, 2, half, half + 1, half + 2]]
     count = len(origins)
     inverse = np.empty((count, len(table), len(table)), np.float32)
+    cross = np.empty((count, 2 * N_SHAPES, len(table)), np.float32)
+    shapes = shapes_of(line, LANES)
+    fx, fy, f = _flat(pattern.grad_x), _flat(pattern.grad_y), _flat(pattern.level)
     covariance = np.empty((count, 21), np.float32)
     signal_dependent = noise is not None and noise.slope > 0
     level_image = (
@@ -104,11 +120,11 @@ def prepare_reference(
     covariance_level = np.empty((count if signal_dependent else 0, 21), np.float32)
     freedom, energy = np.empty(count, np.float32), np.empty((count, 4), np.float32)
     prepare(
-        pattern.grad_x.ravel(), pattern.grad_y.ravel(), pattern.level.ravel(), level_image,
-        image.shape[1], origins, size,
+        fx, fy, f, level_image, image.shape[1], origins, size,
         power_rows(line, settings.order).astype(np.float32),
         power_rows(line**2, settings.order).astype(np.float32),
-        table, affine, inverse, covariance, covariance_level, freedom, energy,
+        shapes.powers, shapes.blocks, shapes.mix,
+        table, affine, inverse, covariance, covariance_level, cross, freedom, energy,
     )  # fmt: skip
     variances = covariance[:, [0, 15]].astype(np.float64)  # of u and of v among the 21 pairs
     good = has_pattern(
@@ -120,12 +136,15 @@ def prepare_reference(
     return Prepared(
         shape=(image.shape[0], image.shape[1]),
         pattern=pattern,
-        fx=_flat(pattern.grad_x),
-        fy=_flat(pattern.grad_y),
-        f=_flat(pattern.level),
+        fx=fx,
+        fy=fy,
+        f=f,
         raw=_flat(image - np.float32(mean)),
         origins=origins,
         inverse=inverse,
+        cross=cross,
+        shapes=shapes,
+        energy=energy[:, :2].astype(np.float64),
         covariance=covariance,
         covariance_level=covariance_level if signal_dependent else None,
         freedom=np.maximum(freedom.astype(np.float64), 1e-3),

@@ -17,6 +17,8 @@ from numba import prange
 from numpy.typing import NDArray
 
 from analysis.compiled import helper, inlined, parallel
+from analysis.shapes import N_POWERS, cross_moments
+from analysis.warp import LANES
 
 f4 = np.float32
 
@@ -202,26 +204,32 @@ def _sandwich(inverse: Any, middle: Any, affine: Any, units: Any, out: Any) -> N
 @parallel
 def prepare(
     fx: Any, fy: Any, f: Any, level: Any, width: int, origins: Any, size: int, along_x: Any, square_x: Any,
-    table: Any, units: Any, inverse: Any, covariance: Any, covariance_level: Any, freedom: Any, energy: Any,
+    powers: Any, blocks: Any, mix: Any, table: Any, units: Any,
+    inverse: Any, covariance: Any, covariance_level: Any, cross: Any, freedom: Any, energy: Any,
 ) -> None:  # fmt: skip
     """Normal matrices of all ZOIs.
 
     Parameters
     ----------
-    fx, fy, f : flat (H * W) float32
-        Gradient (GL/px) and level of the filtered reference, ``width`` pixels a row.
+    fx, fy, f : flat float32
+        Gradient (GL/px) and level of the filtered reference, ``width`` pixels a row, some samples
+        longer than the image.
     level : flat float32, or empty
         Grey level for a noise that grows with it; empty: not wanted.
     origins : (A, 2) int64
         First row and column of each ZOI.
     along_x, square_x : (2 order + 1, size) float32
         Window and squared window times powers of xi (the window is the same along y).
+    powers, blocks, mix
+        See ``shapes.Shapes``.
     table : (P, 3), units : (6,)
     inverse : (A, P, P) float32, written
         Zero where there is no pattern.
     covariance, covariance_level : (A, 21) float32, written
         Of the six affine parameters, px units, for noise of variance 1 GL^2 and for noise of
         variance ``level``.
+    cross : (A, 10, P) float32, written
+        Of the shapes that the fit cannot follow with the columns of J (``shapes.cross_moments``).
     freedom : (A,) float32, written
         Sum of the weights less what the fit takes: expected weighted residual per GL^2 of noise.
     energy : (A, 4) float32, written
@@ -229,8 +237,9 @@ def prepare(
     """
     count = len(table)
     affine = np.array([0, 1, 2, (count - 6) // 2, (count - 6) // 2 + 1, (count - 6) // 2 + 2])
-    powers = along_x.shape[0]
-    one = np.ones(size, np.float32)
+    n_powers = along_x.shape[0]
+    one = np.ones(size + LANES, np.float32)
+    rounded = (size + LANES - 1) // LANES * LANES
     chunks = (len(origins) + 31) // 32
     for chunk in prange(chunks):
         scratch = np.ones((5, size), np.float32)
@@ -238,8 +247,9 @@ def prepare(
         middle = np.empty((count, count))
         inv = np.empty((count, count))
         low = np.empty((count, count))
-        moments = np.empty((2, N_PRODUCTS, powers, powers))
-        of_level = np.empty((2, N_PRODUCTS, powers, powers))
+        moments = np.empty((2, N_PRODUCTS, n_powers, n_powers))
+        of_level = np.empty((2, N_PRODUCTS, n_powers, n_powers))
+        shaped = np.empty((7, 3, 4, N_POWERS))
         for z in range(chunk * 32, min(chunk * 32 + 32, len(origins))):
             moments[:] = 0
             of_level[:] = 0
@@ -256,10 +266,15 @@ def prepare(
             energy[z, 2] = moments[0, 5, 0, 0] / total - (moments[0, 9, 0, 0] / total) ** 2
             if not _invert(normal, low, inv):
                 inverse[z] = 0
+                cross[z] = 0
                 covariance[z] = 0
                 freedom[z] = 0
                 continue
             inverse[z] = inv
+            cross_moments(
+                fx, fy, f, one, np.uintp(origins[z, 0] * width + origins[z, 1]), np.uintp(width), rounded,
+                1 if count == 12 else 2, powers, blocks, mix, table, shaped, cross[z],
+            )  # fmt: skip
             _assemble(moments[1], table, middle)
             _sandwich(inv, middle, affine, units, covariance[z])
             taken = 0.0

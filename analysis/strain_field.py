@@ -16,6 +16,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.prediction import Motion
 from analysis.windows import Window, overlap
 from analysis.zoi_grid import ZoiGrid
 
@@ -56,6 +57,7 @@ class Status(IntEnum):
     LOST = 5
     NOT_CONVERGED = 6
     POOR_MATCH = 7
+    UNEVEN = 8
 
     @property
     def text(self) -> str:
@@ -72,6 +74,7 @@ _TEXTS = {
     Status.LOST: "the pattern was not found again",
     Status.NOT_CONVERGED: "the iteration did not settle",
     Status.POOR_MATCH: "the picture does not fit the reference here (crack, edge, glare or blur)",
+    Status.UNEVEN: "the displacement jumps or bends inside the ZOI (crack, edge, steep strain): take smaller ZOIs",
 }
 
 
@@ -99,8 +102,8 @@ class StrainField:
         Standard deviation of the deformed image that the uncertainty was computed with.
     window : str
         The least-squares weight, which says how far neighbouring values are correlated.
-    motion : (6 or 12, R, C) float64, optional
-        Change of the parameters since the field that was the start; the next prediction.
+    motion : Motion, optional
+        For the start in the next frame.
     """
 
     grid: ZoiGrid
@@ -113,12 +116,12 @@ class StrainField:
     gain: NDArray[np.float32]
     noise: float = float("nan")
     window: Window = "gaussian"
-    motion: Floats | None = None
+    motion: Motion | None = None
     _cache: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("parameters", "covariance", "covariance_reference", "residual", "status",
-                     "iterations", "gain", "motion"):  # fmt: skip
+                     "iterations", "gain"):  # fmt: skip
             array = getattr(self, name)
             if array is not None:
                 array.flags.writeable = False

@@ -22,6 +22,10 @@ MODEL_SHARE = 0.002
 """... plus this share of the variance of the pattern, for what no noise explains."""
 LOST_SHARE = 0.5
 """A fit that leaves more than this share of the pattern's variance has found something else."""
+BENDING_CHANCE = 5.0
+"""Standard deviations by which the square of a bending displacement must exceed its noise ..."""
+BENDING_PX = 0.05
+"""... beyond the square of this, px: what the displacement at the centre may be wrong by."""
 LEAST_GAIN, MOST_GAIN = 0.2, 5.0
 PATTERN_OVER_NOISE = 3.0
 """Gradient energy of a ZOI over that of filtered noise alone; less is no pattern."""
@@ -88,3 +92,20 @@ def judge(
     status[~(left <= allowed + LOST_SHARE * pattern)] = Status.LOST
     status[outside] = Status.OUTSIDE
     return status
+
+
+def bends(bending: Floats, unit: Floats, noise: Floats) -> NDArray[np.bool_]:
+    """Whether the displacement in each ZOI bends or jumps so much that its centre is wrong, (A,).
+
+    Parameters
+    ----------
+    bending : (A,), px^2
+        See ``shapes.bent``.
+    unit : (A, 2), px^2
+        Variance of u and of v from the noise, of a ZOI without anything else to find.
+    noise : (2,)
+        ``shapes.Shapes.noise``.
+    """
+    mean = unit.sum(axis=1) * noise[0]
+    spread = np.sqrt(2 * noise[1] * (unit**2).sum(axis=1))
+    return np.asarray(~(bending <= mean + BENDING_CHANCE * spread + BENDING_PX**2))
