@@ -17,7 +17,7 @@ from analysis.renewal import UNSHARED
 from analysis.settings import NoiseModel
 from analysis.splines import prefilter_taps, tap_table
 from analysis.strain_field import Status, StrainField
-from analysis.validity import CLIPPED_SHARE, bends, judge
+from analysis.validity import CLIPPED_SHARE, bends, judge, stretch_of
 from analysis.windows import profile
 
 if TYPE_CHECKING:
@@ -123,7 +123,10 @@ class Attempt:
             self.noise is not None and kernel._noise is not None,
         )
         noise = kernel._share_variance[places] * np.maximum(expected, left)[:, None]
-        status[(status == Status.OK) & bends(found.bending, noise, ready.shapes.noise)] = Status.UNEVEN
+        uneven = bends(
+            found.bending, noise, ready.shapes.noise, stretch_of(found.values, kernel.grid.size / 6)
+        )
+        status[(status == Status.OK) & uneven] = Status.UNEVEN
         self.status[places] = status
 
     def _iterate_phases(self, which: Places, guess: Floats) -> Outcome:

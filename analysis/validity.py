@@ -25,7 +25,9 @@ LOST_SHARE = 0.5
 BENDING_CHANCE = 5.0
 """Standard deviations by which the square of a bending displacement must exceed its noise ..."""
 BENDING_PX = 0.05
-"""... beyond the square of this, px: what the displacement at the centre may be wrong by."""
+"""... beyond the squares of this, px: what the displacement at the centre may be wrong by ..."""
+BENDING_SHARE = 0.15
+"""... and of this share of the displacement that the strain makes in the ZOI, which a crack exceeds."""
 LEAST_GAIN, MOST_GAIN = 0.2, 5.0
 PATTERN_OVER_NOISE = 3.0
 """Gradient energy of a ZOI over that of filtered noise alone; less is no pattern."""
@@ -94,8 +96,8 @@ def judge(
     return status
 
 
-def bends(bending: Floats, unit: Floats, noise: Floats) -> NDArray[np.bool_]:
-    """Whether the displacement in each ZOI bends or jumps so much that its centre is wrong, (A,).
+def bends(bending: Floats, unit: Floats, noise: Floats, stretch: Floats) -> NDArray[np.bool_]:
+    """Whether the displacement in each ZOI jumps, or bends so much that its centre is wrong, (A,).
 
     Parameters
     ----------
@@ -105,7 +107,22 @@ def bends(bending: Floats, unit: Floats, noise: Floats) -> NDArray[np.bool_]:
         Variance of u and of v from the noise, of a ZOI without anything else to find.
     noise : (2,)
         ``shapes.Shapes.noise``.
+    stretch : (A,), px
+        Displacement that the strain makes over the width of the window (``stretch_of``). Where a
+        specimen necks the strain is steep, but small beside itself; across a crack it is not.
     """
     mean = unit.sum(axis=1) * noise[0]
     spread = np.sqrt(2 * noise[1] * (unit**2).sum(axis=1))
-    return np.asarray(~(bending <= mean + BENDING_CHANCE * spread + BENDING_PX**2))
+    allowed = BENDING_PX**2 + (BENDING_SHARE * stretch) ** 2
+    return np.asarray(~(bending <= mean + BENDING_CHANCE * spread + allowed))
+
+
+def stretch_of(parameters: Floats, lever: float) -> Floats:
+    """Magnitude of the Green-Lagrange strain times ``lever`` px, (A,); (A, 6 or 12) as the kernel has them."""
+    half = parameters.shape[1] // 2
+    du_dx, du_dy = parameters[:, 1], parameters[:, 2]
+    dv_dx, dv_dy = parameters[:, half + 1], parameters[:, half + 2]
+    xx = du_dx + (du_dx**2 + dv_dx**2) / 2
+    yy = dv_dy + (du_dy**2 + dv_dy**2) / 2
+    xy = (du_dy + dv_dx + du_dx * du_dy + dv_dx * dv_dy) / 2
+    return np.asarray(lever * np.sqrt(xx**2 + yy**2 + 2 * xy**2))

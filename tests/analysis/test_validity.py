@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.strain_field import Status
-from analysis.validity import bends, has_pattern, judge
+from analysis.validity import bends, has_pattern, judge, stretch_of
 from tests.accuracy import rejection
 
 
@@ -34,8 +34,15 @@ def test_verdicts() -> None:
 def test_bending_beyond_its_noise_and_the_limit() -> None:
     unit, noise = np.array([[1e-4, 1e-4], [1e-4, 1e-4], [1e-8, 1e-8], [1e-8, 1e-8]]), np.array([1.5, 0.5])
     found = np.array([0.002, 0.02, 0.048**2, 0.052**2])
-    assert bends(found, unit, noise).tolist() == [False, True, False, True]
-    assert bends(np.array([np.nan]), unit[:1], noise).tolist() == [True]
+    assert bends(found, unit, noise, np.zeros(4)).tolist() == [False, True, False, True]
+    assert bends(np.array([np.nan]), unit[:1], noise, np.zeros(1)).tolist() == [True]
+    assert bends(found, unit, noise, np.full(4, 1.0)).tolist() == [False] * 4
+
+
+def test_the_stretch_of_a_strain_is_free_of_rotation() -> None:
+    c, s, stretched = np.cos(0.5), np.sin(0.5), 1.1
+    turned = np.array([[3.0, stretched * c - 1, -s, -2.0, stretched * s, c - 1]])
+    assert stretch_of(turned, 5.0) == pytest.approx(5.0 * (stretched**2 - 1) / 2)
 
 
 def test_a_zoi_of_noise_has_no_pattern() -> None:
