@@ -1,15 +1,18 @@
 """Other people's DIC programs, where they are installed: pyvale and SUN-DIC, on pictures in memory.
 
 Both are called as their own examples call them, with a subset of 33 px every 8 px; they write files,
-which go to a temporary folder. Neither is a dependency: ``installed`` says which are there.
+which go to a temporary folder. Neither is a dependency: ``installed`` says which are there. ``pyvale`` and
+``sun_dic`` give the map of u alone, ``pyvale_points`` and ``sun_dic_points`` where each value lies as well.
 """
 
 from __future__ import annotations
 
 import contextlib
 import io
+import os
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -23,8 +26,43 @@ SUBSET, STEP, RIM = 33, 8, 32
 """px; the pictures are measured but for a rim."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Points:
+    """Centres of a program's subsets and the displacement there.
+
+    Attributes
+    ----------
+    x, y : (R, C) float64, px
+        Column and row in the reference picture.
+    u : (R, C) float64, px
+        NaN where the program found nothing.
+    """
+
+    x: Floats
+    y: Floats
+    u: Floats
+
+
 def pyvale(reference: Any, deformed: Any) -> Floats:
     """Map of u, px, NaN where not found: pyvale, affine, B-spline, its own defaults (filter included)."""
+    return _inner(pyvale_points(reference, deformed).u)
+
+
+def pyvale_points(reference: Any, deformed: Any, cores: int | None = None) -> Points:
+    """pyvale, affine, B-spline, its own defaults (filter included).
+
+    Parameters
+    ----------
+    reference, deformed : (H, W) uint8 | uint16, grey levels
+        No subset reaches into the outer ``RIM`` px of the reference.
+    cores : int, optional
+        Its threads; by default it takes what it likes.
+
+    Raises
+    ------
+    ImportError
+        Where it is not installed; besides, whatever pyvale raises.
+    """
     mask = np.zeros(reference.shape, bool)
     mask[RIM:-RIM, RIM:-RIM] = True
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
@@ -33,17 +71,38 @@ def pyvale(reference: Any, deformed: Any) -> Floats:
         dic.calculate_2d(
             reference, deformed[None], mask,
             seed=[reference.shape[1] // 2, reference.shape[0] // 2],
-            subset_size=SUBSET, subset_step=STEP, max_displacement=8,
+            subset_size=SUBSET, subset_step=STEP, max_displacement=8, num_threads=cores,
             output_basepath=folder, print_level=0,
         )  # fmt: skip
         found = dic.import_2d(
             data=Path(folder) / "dic_results_*", delimiter=",", layout="matrix", print_level=0
         )
-    return _inner(np.squeeze(np.asarray(found.u_px, float)))
+    x, y, u = (np.squeeze(np.asarray(a, float)) for a in (found.ss_x, found.ss_y, found.u_px))
+    return Points(x, y, u)
 
 
 def sun_dic(reference: Any, deformed: Any) -> Floats:
     """Map of u, px, NaN where not found: SUN-DIC, affine, its defaults with splines of order 5, one process."""
+    return _inner(sun_dic_points(reference, deformed).u)
+
+
+def sun_dic_points(reference: Any, deformed: Any, rim: int = RIM, cores: int = 1) -> Points:
+    """SUN-DIC, affine, its defaults with splines of order 5.
+
+    Parameters
+    ----------
+    reference, deformed : (H, W) uint8 | uint16, grey levels
+    rim : int, px
+        No centre of a subset lies in the outer ``rim`` px of the reference.
+    cores : int
+        Processes. With more than one it starts Ray (which takes some seconds and leaves its log in the folder
+        of temporary files), and each process is held to one thread: left alone, each starts a thread a core.
+
+    Raises
+    ------
+    ImportError
+        Where it is not installed; besides, whatever SUN-DIC and Ray raise.
+    """
     import cv2
     import sundic.post_process as results
     import sundic.settings as options
@@ -58,11 +117,30 @@ def sun_dic(reference: Any, deformed: Any) -> Floats:
         settings.ImageFolder = str(images)
         settings.SubsetSize = settings.SubSetSize = SUBSET
         settings.StepSize, settings.InterpolationOrder = STEP, 5
+        settings.CPUCount = cores
         height, width = reference.shape
-        settings.ROI = [RIM, RIM, width - 2 * RIM, height - 2 * RIM]
-        program.planarDICLocal(settings, str(Path(folder) / "results.sdic"))
+        settings.ROI = [rim, rim, width - 2 * rim, height - 2 * rim]
+        with _worker_environment() if cores > 1 else contextlib.nullcontext():
+            program.planarDICLocal(settings, str(Path(folder) / "results.sdic"))
         values, rows, columns = results.getDisplacements(str(Path(folder) / "results.sdic"), 0)
-    return _inner(values[:, 3].reshape(rows, columns, order="F"))
+    x, y, u = (values[:, c].reshape(rows, columns, order="F") for c in (0, 1, 3))
+    return Points(x, y, u)
+
+
+@contextlib.contextmanager
+def _worker_environment() -> Iterator[None]:
+    """What Ray's processes inherit while it starts: one Numba thread each, and nothing reported to its makers."""
+    wanted = {"NUMBA_NUM_THREADS": "1", "RAY_USAGE_STATS_ENABLED": "0"}
+    before = {name: os.environ.get(name) for name in wanted}
+    os.environ.update(wanted)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def _inner(u: Floats) -> Floats:

@@ -1,24 +1,52 @@
-"""Other engines on the same pair: speed and, beside it, how wrong they are."""
+"""Other engines on the same pair: speed and, beside it, how wrong they are.
+
+OpenCV's engines always; pyvale and SUN-DIC where they are installed, through ``live.characterise_others``.
+"""
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import cv2
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis import ZoiGrid
+from live import characterise_others as others
+from live.characterise_others import Points
+
 Flow = Callable[[], NDArray[np.floating]]
+HOW_TO_ADD = """The extra `peers` adds them: about 3 GB, and builds of OpenCV that overwrite ours, so best in an
+environment of its own: `python3 -m venv ../peers && ../peers/bin/pip install --editable '.[test,peers]' &&
+../peers/bin/python -m tests.bench`. (`.venv/bin/pip install --editable '.[peers]'`, then `make bench`, runs too.)
+Should `import cv2` fail afterwards, `pip install --force-reinstall --no-deps opencv-contrib-python-headless` in that
+environment puts it right."""
 
 
 @dataclass(frozen=True)
 class Peer:
-    """A name and a function that gives the displacement (u, v) at the points, (N, 2)."""
+    """An engine on one pair.
+
+    Attributes
+    ----------
+    name : str
+    run : callable
+        One whole call of it; the points it found and u there, px.
+    note : str
+        What the call includes.
+    repeats : int
+        Timed calls, after one that is not.
+    optional : bool
+        Somebody else's program, which may fail without ending the bench.
+    """
 
     name: str
-    run: Flow
+    run: Callable[[], Points]
+    note: str = ""
+    repeats: int = 3
+    optional: bool = False
 
 
 def pyramidal_lucas_kanade(reference: NDArray, deformed: NDArray, points: NDArray, window: int = 33) -> Flow:
@@ -46,12 +74,51 @@ def dis_flow(reference: NDArray, deformed: NDArray, points: NDArray) -> Flow:
     return run
 
 
-def peers(reference: NDArray, deformed: NDArray, points: NDArray) -> Iterator[Peer]:
-    """OpenCV's engines; 8-bit images, points (N, 2) as (x, y)."""
-    yield Peer("OpenCV PyrLK, 33 px, 3 levels", pyramidal_lucas_kanade(reference, deformed, points))
-    yield Peer("OpenCV DIS (dense)", dis_flow(reference, deformed, points))
+def peers(reference: NDArray, deformed: NDArray, grid: ZoiGrid) -> Iterator[Peer]:
+    """OpenCV's engines, then the programs that are installed; 8-bit images (H, W)."""
+    x, y = np.meshgrid(grid.x, grid.y)
+    points = np.stack([x, y], axis=-1).reshape(-1, 2)
+
+    def at_points(flow: Flow) -> Callable[[], Points]:
+        return lambda: Points(x, y, flow()[:, 0].astype(float).reshape(grid.shape))
+
+    yield Peer(
+        "OpenCV PyrLK, 33 px, 3 levels", at_points(pyramidal_lucas_kanade(reference, deformed, points))
+    )
+    yield Peer("OpenCV DIS (dense)", at_points(dis_flow(reference, deformed, points)))
+    yield from programs(reference, deformed)
+
+
+def programs(reference: NDArray, deformed: NDArray) -> Iterator[Peer]:
+    """pyvale and SUN-DIC as their users call them, on all cores, where they can be imported.
+
+    pyvale keeps its subsets out of the rim, SUN-DIC their centres: with half a subset more both have the
+    same points.
+    """
+    here = others.installed()
+    cores = numba.get_num_threads()
+    name = "pyvale, 33 px"
+    if name in here:
+        yield Peer(
+            name,
+            lambda: others.pyvale_points(reference, deformed, cores),
+            f"a whole call, reference and search included: {cores} threads, results written and read",
+            repeats=2,
+            optional=True,
+        )
+    name = "SUN-DIC, 33 px"
+    if name in here:
+        yield Peer(
+            name,
+            lambda: others.sun_dic_points(reference, deformed, others.RIM + others.SUBSET // 2, cores),
+            f"a whole call, reference and search included: images written, Ray started for {cores} processes, "
+            "results written and read",
+            repeats=2,
+            optional=True,
+        )
 
 
 def missing() -> list[str]:
     """Optional peers that are not installed here."""
-    return [name for name in ("pyvale", "sundic") if importlib.util.find_spec(name) is None]
+    here = others.installed()
+    return [name.partition(",")[0] for name in others.PROGRAMS if name not in here]
