@@ -123,9 +123,9 @@ class Attempt:
             self.noise is not None and kernel._noise is not None,
         )
         noise = kernel._share_variance[places] * np.maximum(expected, left)[:, None]
-        uneven = bends(
-            found.bending, noise, ready.shapes.noise, stretch_of(found.values, kernel.grid.size / 6)
-        )
+        stretch = stretch_of(found.values, kernel.grid.size / 6)
+        limit = kernel.settings.bending_px
+        uneven = bends(found.bending, noise, ready.shapes.noise, stretch, limit)
         status[(status == Status.OK) & uneven] = Status.UNEVEN
         self.status[places] = status
 

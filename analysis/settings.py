@@ -36,6 +36,9 @@ class KernelSettings:
         ... and that of each gradient below this ...
     tolerance_sigma : float
         ... or below this share of the value's own standard uncertainty, where that is more.
+    bending_px : float, px
+        A ZOI is UNEVEN whose displacement bends or jumps by more than this beside what noise and a
+        steady strain explain; inf accepts all, for a smooth field that the ZOIs are meant to average.
 
     Raises
     ------
@@ -51,6 +54,7 @@ class KernelSettings:
     tolerance_px: float = 5e-5
     tolerance_strain: float = 1e-6
     tolerance_sigma: float = 0.05
+    bending_px: float = 0.05
 
     def __post_init__(self) -> None:
         _one_of("window", self.window, WINDOWS)
@@ -61,7 +65,7 @@ class KernelSettings:
             raise ValueError('estimator "phase" has order 1 only')
         if self.max_iterations < 1:
             raise ValueError(f"max_iterations must be at least 1, got {self.max_iterations}")
-        for name in ("tolerance_px", "tolerance_strain", "tolerance_sigma"):
+        for name in ("tolerance_px", "tolerance_strain", "tolerance_sigma", "bending_px"):
             if not getattr(self, name) >= 0:
                 raise ValueError(f"{name} must not be negative, got {getattr(self, name)}")
 

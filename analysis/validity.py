@@ -24,10 +24,9 @@ LOST_SHARE = 0.5
 """A fit that leaves more than this share of the pattern's variance has found something else."""
 BENDING_CHANCE = 5.0
 """Standard deviations by which the square of a bending displacement must exceed its noise ..."""
-BENDING_PX = 0.05
-"""... beyond the squares of this, px: what the displacement at the centre may be wrong by ..."""
 BENDING_SHARE = 0.15
-"""... and of this share of the displacement that the strain makes in the ZOI, which a crack exceeds."""
+"""... beyond the squares of a limit in px and of this share of the displacement that the strain makes in
+the ZOI, which a crack exceeds."""
 LEAST_GAIN, MOST_GAIN = 0.2, 5.0
 PATTERN_OVER_NOISE = 3.0
 """Gradient energy of a ZOI over that of filtered noise alone; less is no pattern."""
@@ -96,7 +95,7 @@ def judge(
     return status
 
 
-def bends(bending: Floats, unit: Floats, noise: Floats, stretch: Floats) -> NDArray[np.bool_]:
+def bends(bending: Floats, unit: Floats, noise: Floats, stretch: Floats, limit: float) -> NDArray[np.bool_]:
     """Whether the displacement in each ZOI jumps, or bends so much that its centre is wrong, (A,).
 
     Parameters
@@ -110,10 +109,12 @@ def bends(bending: Floats, unit: Floats, noise: Floats, stretch: Floats) -> NDAr
     stretch : (A,), px
         Displacement that the strain makes over the width of the window (``stretch_of``). Where a
         specimen necks the strain is steep, but small beside itself; across a crack it is not.
+    limit : float, px
+        What the displacement at the centre may be wrong by.
     """
     mean = unit.sum(axis=1) * noise[0]
     spread = np.sqrt(2 * noise[1] * (unit**2).sum(axis=1))
-    allowed = BENDING_PX**2 + (BENDING_SHARE * stretch) ** 2
+    allowed = limit**2 + (BENDING_SHARE * stretch) ** 2
     return np.asarray(~(bending <= mean + BENDING_CHANCE * spread + allowed))
 
 

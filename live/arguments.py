@@ -42,6 +42,12 @@ def _add_measure(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--estimator", help="spectral (default) or phase")
     group.add_argument("--order", type=int, help="shape of a ZOI: 1 affine (default), 2 quadratic")
     group.add_argument(
+        "--bending",
+        type=float,
+        metavar="PX",
+        help="refuse ZOIs with jumps or bends beyond (default 0.05; inf: none)",
+    )
+    group.add_argument(
         "--noise", type=float, metavar="GL", help="noise of one frame, where no burst tells it"
     )
     _add_output(parser)
@@ -152,7 +158,11 @@ def _add_map(commands: Any) -> None:
     )
     one.add_argument("--low-pass", type=float, default=0.0, metavar="PX", help="Gaussian filter, for show")
     one.add_argument(
-        "--deconvolve", type=int, default=0, metavar="STEPS", help="take blur off, for show (order 1)"
+        "--deconvolve",
+        type=int,
+        default=0,
+        metavar="STEPS",
+        help="take the blur of the ZOI off, for show (order 1): 3 or 7 steps; the title says what they do",
     )
     one.set_defaults(start="live.maps:command")
 
@@ -240,6 +250,7 @@ _KEYS = {
     "window": "measure.window",
     "estimator": "measure.estimator",
     "order": "measure.order",
+    "bending": "measure.bending_px",
     "noise": "measure.noise_GL",
     "record": "record.mode",
     "axis": "specimen.axis",

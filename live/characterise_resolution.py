@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.pattern import resolution_length
-from analysis.settings import KernelSettings
+from analysis.settings import Estimator, KernelSettings
 from analysis.zoi_grid import Roi, ZoiGrid
 from hw_mocks.deformation import Affine, Wave
 from live.characterise_outcome import Bench, Outcome, Table, Verdict, figure, save_figure, verdict
@@ -57,7 +57,9 @@ def measured(estimator: str, pair: tuple[Any, Any], grid: ZoiGrid, noise: float 
     """The field of one of the estimators; noise in GL."""
     if estimator == "paper":
         return papers(pair, grid)
-    return ours(pair, grid, noise, KernelSettings(estimator="phase" if estimator == "phase" else "spectral"))
+    # How much of a wave is lost is the question, so a ZOI that loses much is not refused.
+    kind: Estimator = "phase" if estimator == "phase" else "spectral"
+    return ours(pair, grid, noise, KernelSettings(estimator=kind, bending_px=math.inf))
 
 
 def error_maps(who: Iterable[str], size: int, count: int, step: int, seed: int) -> dict[str, Any]:

@@ -130,6 +130,11 @@ class MeasureConfig:
     )
     estimator: str = _key(_choice("spectral", "phase"), "spectral", "spectral, or phase alone")
     order: int = _key(_integer(1, 3), 1, "order of the shape of a ZOI: 1 is affine")
+    bending_px: float = _key(
+        _number(0, math.inf),
+        0.05,
+        "a ZOI in which the displacement jumps or bends by more is UNEVEN; inf never",
+    )
     noise_GL: float | None = _key(
         _number(0, 65535), None, "noise of one frame in grey levels, where no burst tells it", optional=True
     )

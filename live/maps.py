@@ -8,6 +8,7 @@ Needs matplotlib (``pip install phasedic[plots]``).
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,8 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
-from analysis.deconvolution import deconvolved
+from analysis.deconvolution import deconvolved, effect
 from analysis.strain_field import Status
+from analysis.zoi_grid import ZoiGrid
 from live.colours import diverging_table, unit_for
 from live.display_filter import for_display
 from live.results_reader import Strain
@@ -47,7 +49,7 @@ class Picture:
     low_pass_px : float, px
         Sigma of a Gaussian filter; 0 for none.
     deconvolution : int
-        Steps of Van Cittert's iteration that takes off part of the window's blur; 0 for none.
+        Steps that take off the window's blur (``analysis.deconvolution``); 0 for none.
     """
 
     field: str
@@ -58,10 +60,13 @@ class Picture:
     low_pass_px: float = 0.0
     deconvolution: int = 0
 
-    @property
-    def treatment(self) -> str:
+    def treatment(self, grid: ZoiGrid) -> str:
         """What was done to the map before it was drawn, in words; "" for nothing."""
-        words = [f"deconvolved, {self.deconvolution} steps"] * (self.deconvolution > 0)
+        words = []
+        if self.deconvolution:
+            done = effect(grid, self.deconvolution)
+            noise = done.noise if self.field in DISPLACEMENTS else done.noise_gradient
+            words = [f"deconvolved, {self.deconvolution} steps: l_10% {done.l10:.0f} px, noise x {noise:.2f}"]
         words += [f"median {self.median} x {self.median}"] * (self.median > 1)
         words += [f"low-pass {self.low_pass_px:g} px"] * (self.low_pass_px > 0)
         return ", ".join(words)
@@ -129,26 +134,35 @@ def draw(strain: Strain, picture: Picture, background: NDArray[Any] | None) -> A
         _draw_values(figure, axes, values, extent, picture)
     time = strain.time_s[picture.row]
     title = picture.title or f"{picture.field}, {time:.2f} s, ZOI {strain.grid.size} px"
-    axes.set_title(f"{title}\n({picture.treatment})" if picture.treatment else title, fontsize=10)
+    treatment = picture.treatment(strain.grid)
+    axes.set_title(f"{title}\n({treatment})" if treatment else title, fontsize=10)
     return figure
 
 
 def _treated(strain: Strain, picture: Picture) -> NDArray[np.float64]:
     """The map as it is to be drawn; stored values stay as they are."""
     values = np.array(strain.maps(picture.field, picture.row), np.float64)
-    if picture.field == "status" and picture.treatment:
+    treated = picture.deconvolution or picture.median > 1 or picture.low_pass_px > 0
+    if picture.field == "status" and treated:
         raise ConfigError("a map of statuses is neither filtered nor deconvolved")
-    measure = strain.config.get("measure", {})
-    if picture.deconvolution and measure.get("order", 1) != 1:
-        raise ConfigError("only maps of order 1 can be deconvolved")
-    try:
-        if picture.deconvolution:
-            values = deconvolved(
-                values, strain.grid, picture.deconvolution, measure.get("window", "gaussian")
-            )
-    except ValueError as error:
-        raise ConfigError(str(error)) from None
+    if picture.deconvolution:
+        _check_blur(strain.config.get("measure", {}), picture.field)
+        try:
+            values = deconvolved(values, strain.grid, picture.deconvolution)
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
     return for_display(values, strain.grid.step, picture.low_pass_px, picture.median)
+
+
+def _check_blur(measure: Mapping[str, Any], field: str) -> None:
+    """Raises ConfigError unless the map is one whose blur is known."""
+    if field.startswith(("sigma", "residual")):
+        raise ConfigError(f"{field} has no blur to take off; deconvolve a displacement or a strain")
+    for key, value in (("order", 1), ("window", "gaussian"), ("estimator", "spectral")):
+        if measure.get(key, value) != value:
+            raise ConfigError(
+                f"only maps measured with {key} = {value} can be deconvolved, not with {measure[key]}"
+            )
 
 
 def _draw_values(figure: Any, axes: Any, values: NDArray[Any], extent: Any, picture: Picture) -> None:

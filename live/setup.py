@@ -138,7 +138,12 @@ def kernel_settings(config: Config) -> KernelSettings:
 
     m = config.measure
     try:
-        return KernelSettings(window=cast(Any, m.window), estimator=cast(Any, m.estimator), order=m.order)
+        return KernelSettings(
+            window=cast(Any, m.window),
+            estimator=cast(Any, m.estimator),
+            order=m.order,
+            bending_px=m.bending_px,
+        )
     except ValueError as error:
         raise usable(error, "measure") from None
 

@@ -17,9 +17,11 @@ from pathlib import Path
 import numpy as np
 
 from analysis import KernelSettings, NoiseModel, PhaseKernel
+from analysis.deconvolution import effect
+from analysis.windows import profile
 from tests.accuracy import rejection
 from tests.accuracy.limit import NAMES, gaussian, l10, noise_limit
-from tests.accuracy.real import star, star_deconvolved, wave
+from tests.accuracy.real import star, star_field, wave
 from tests.accuracy.runs import SHAPE, errors, grid, level, measure
 from tests.accuracy.truth import Speckle, digitise, field, pixels
 
@@ -254,34 +256,44 @@ def _data() -> Path:
 def star_image(quick: bool) -> Lines:
     """DIC Challenge 2.0 Star, noisy (pictures: SEM/iDICs)
 
-    Standard deviation of v where periods exceed 200 px; product in px^2 (best peer 0.44).
+    Standard deviation of v where periods exceed 200 px; product in px^2 (best peer 0.44). l_10% is read from all
+    points up to 1.4 periods from the middle row (of the row alone it is known to 2.5 % at order 1), with its standard
+    error. Theory: the transform of the weight; for deconvolved maps, of the window and the filter. ZOIs in which
+    half a pixel bends too much to be believed (UNEVEN) are kept here, since their error is what is asked for.
     """
     yield from _table(
-        "estimator", "window", "ZOI", "order", "l_10% px", "std px", "predicted px", "l_10% x std px^2"
+        "estimator",
+        "window",
+        "ZOI",
+        "order",
+        "l_10% px",
+        "theory px",
+        "std px",
+        "predicted px",
+        "l_10% x std px^2",
     )
-    found = star(_data(), 33, _settings("phase"), every=20)
-    yield _row(
-        "phase", "gaussian", 33, 1, f"{found.l10:.1f}", f"{found.scatter:.5f}", f"{found.predicted:.5f}",
-        f"{found.l10 * found.scatter:.3f}",
-    )  # fmt: skip
-    for window, size, order in (
-        ("gaussian", 57, 1),
-        ("uniform", 33, 1),
-        ("uniform", 33, 2),
-        ("tukey", 37, 2),
-        ("tukey", 41, 2),
+    for estimator, window, size, order, treatments in (
+        ("phase", "gaussian", 33, 1, (0,)),
+        ("spectral", "gaussian", 57, 1, (0,)),
+        ("spectral", "uniform", 33, 1, (0,)),
+        ("spectral", "uniform", 33, 2, (0,)),
+        ("spectral", "tukey", 37, 2, (0,)),
+        ("spectral", "tukey", 41, 2, (0,)),
+        ("spectral", "gaussian", 37, 1, (0, 3, 7)),
+        ("spectral", "gaussian", 31, 1, (0, 7)),
     ):
-        found = star(_data(), size, KernelSettings(window=window, order=order))  # type: ignore[arg-type]
-        yield _row(
-            "spectral", window, size, order, f"{found.l10:.1f}", f"{found.scatter:.5f}", f"{found.predicted:.5f}",
-            f"{found.l10 * found.scatter:.3f}",
-        )  # fmt: skip
-    for steps in (2, 6):
-        found = star_deconvolved(_data(), 37, steps)
-        yield _row(
-            f"spectral, map deconvolved, {steps} steps", "gaussian", 37, 1, f"{found.l10:.1f}",
-            f"{found.scatter:.5f} (u)", "", f"{found.l10 * found.scatter:.3f}",
-        )  # fmt: skip
+        settings = KernelSettings(estimator=estimator, window=window, order=order)  # type: ignore[arg-type]
+        coarse = quick or estimator == "phase"
+        measured = star_field(_data(), size, settings, step=5 if len(treatments) > 1 else 15 if coarse else 6)
+        for steps in treatments:
+            found = star(measured, steps)
+            theory = effect(measured.grid, steps).l10 if steps else l10(profile(settings.window, size))
+            yield _row(
+                f"{estimator}, map deconvolved, {steps} steps" if steps else estimator, window, size, order,
+                f"{found.l10:.1f} +- {found.l10_error:.1f}",
+                f"{theory:.1f}" if (estimator, order) == ("spectral", 1) else "",
+                f"{found.scatter:.5f}", f"{found.predicted:.5f}", f"{found.l10 * found.scatter:.3f}",
+            )  # fmt: skip
 
 
 def sample14(quick: bool) -> Lines:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import cv2
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
-from analysis.deconvolution import deconvolved
+from analysis.deconvolution import deconvolved, effect
 
 STAR, SAMPLE14 = "star_dic_challenge_2", "dic_challenge_1_sample14"
 
@@ -22,72 +22,80 @@ def read(path: Path) -> NDArray:
     return image if image.ndim == 2 else image[..., 0]
 
 
+BAND = 1.38
+"""How far from the middle of the Star its response is read, periods: there the wave is tilted by less than
+0.1 rad, and its length differs by less than 0.5 % from that on the middle row, which is taken into account."""
+NEAR = (0.8, 1.6)
+"""Periods over l_10% between which the response is fitted to read l_10%."""
+LONG = 200.0
+
+
 @dataclass(frozen=True)
 class StarResult:
-    """l_10% in px, standard deviation of v (px) where periods exceed 200 px, and that predicted."""
+    """l_10% in px and its standard error, standard deviation of v (px) at long periods, and that predicted."""
 
     l10: float
+    l10_error: float
     scatter: float
     predicted: float
 
 
-def star(folder: Path, size: int, settings: KernelSettings, every: int = 10) -> StarResult:
+def star_field(folder: Path, size: int, settings: KernelSettings, step: int = 6) -> StrainField:
+    """The whole Star measured; v = 0.5 cos(2 pi (y - 250)/period(x)) px, the period 10 .. 300 px."""
     reference, deformed = (read(folder / STAR / f"DIC_Challenge_Star_Noise_{n}.tiff") for n in ("Ref", "Def"))
     height, width = reference.shape
-    grid = ZoiGrid.cover(Roi(0, 0, width, height), size, 1)
-    period = 10 + 290 * grid.x / (width - 1)
-    line = np.zeros(grid.shape, bool)
-    row = int(np.argmin(np.abs(grid.y - 250)))
-    line[row] = True
-    v = PhaseKernel(reference, grid.subset(active=line), settings).measure(deformed).v[row]
-    area = np.zeros(grid.shape, bool)
-    area[::every, ::every] = True
-    area[:, period <= 200] = False
-    field = PhaseKernel(reference, grid.subset(active=area), settings).measure(deformed)
-    truth = 0.5 * np.cos(2 * np.pi * (grid.y[:, None] - 250) / period)
-    # Attenuation at long periods is not noise: take off what the measured response explains.
-    error = field.v - truth * _response(period, v)
-    return StarResult(_l10(period, v), float(np.nanstd(error)), float(np.sqrt(np.nanmean(field.sigma_v**2))))
+    grid = ZoiGrid.cover(Roi(0, 0, width, height), size, step)
+    # Where half a pixel bends within a ZOI it would be UNEVEN, since it is wrong: here by how much is the question.
+    return PhaseKernel(reference, grid, replace(settings, bending_px=np.inf)).measure(deformed)
 
 
-def star_deconvolved(folder: Path, size: int, steps: int) -> StarResult:
-    """The map of the default kernel (step 3), with the window's blur partly taken off."""
-    reference, deformed = (read(folder / STAR / f"DIC_Challenge_Star_Noise_{n}.tiff") for n in ("Ref", "Def"))
-    height, width = reference.shape
-    grid = ZoiGrid.cover(Roi(0, 0, width, height), size, 3)
-    period = 10 + 290 * grid.x / (width - 1)
-    field = PhaseKernel(reference, grid).measure(deformed)
-    # Five rows about the middle: v has fallen by less than 1 % there at the periods that count.
-    row = int(np.argmin(np.abs(grid.y - 250)))
-    v = _line(deconvolved(field.v, grid, steps)[row - 2 : row + 3])
-    truth = np.cos(2 * np.pi * np.subtract.outer(grid.y[row - 2 : row + 3], [250.0]) / period).mean(axis=0)
-    scatter = float(np.nanstd(deconvolved(field.u, grid, steps)[:, period > 200]))
-    return StarResult(_l10(period, v / truth), scatter, float("nan"))
+def star(field: StrainField, steps: int = 0) -> StarResult:
+    """Resolution and noise of v, of the map deconvolved in ``steps`` steps where that is not 0."""
+    grid = field.grid
+    v = deconvolved(field.v, grid, steps) if steps else np.asarray(field.v, np.float64)
+    period = np.broadcast_to(10 + 290 * grid.x / 3999, grid.shape)
+    away = np.broadcast_to(grid.y[:, None] - 250, grid.shape)
+    truth = 0.5 * np.cos(2 * np.pi * away / period)
+    # The wave is tilted away from the middle row, since the period grows along x.
+    length = period / np.hypot(1, away * (290 / 3999) / period)
+    inside = np.isfinite(v) & (np.abs(away) <= BAND * period)
+    l10, error = _l10(length[inside], truth[inside], v[inside])
+    area = np.isfinite(v) & (period > LONG)
+    # Attenuation at long periods is not noise: take off what a smooth response explains.
+    loss = _loss(LONG / period[area], truth[area], v[area], (2, 4))
+    rest = v[area] - truth[area] * (1 - sum(c * (LONG / period[area]) ** n for n, c in loss.items()))
+    predicted = np.sqrt(np.mean(field.sigma_v[area] ** 2)) * (effect(grid, steps).noise if steps else 1)
+    return StarResult(l10, error, float(rest.std()), float(predicted))
 
 
-def _fit(period: NDArray, v: NDArray) -> tuple[NDArray, float]:
-    """Coefficients of 1 - v/0.5 in powers of 1/period^2 around the period that has lost 10 %."""
-    limit = 150.0
-    for _ in range(8):
-        near = np.isfinite(v) & (period > 0.75 * limit) & (period < 2.2 * limit)
-        # An even transfer function, as a short series in the wave number.
-        basis = np.stack([period**-2.0, period**-4.0, period**-6.0], axis=1)
-        c = np.linalg.lstsq(basis[near], 1 - v[near] / 0.5, rcond=None)[0]
-        fine = np.linspace(0.5 * limit, 2 * limit, 4000)
-        loss = c[0] * fine**-2 + c[1] * fine**-4 + c[2] * fine**-6
-        above = np.flatnonzero(loss > 0.1)
-        limit = float(fine[above[-1]]) if len(above) else 0.6 * limit
-    return c, limit
+def _l10(length: NDArray, truth: NDArray, v: NDArray, blocks: int = 10) -> tuple[float, float]:
+    """The wave length of which 10 % are lost, and its standard error (jackknife over blocks of wave lengths)."""
+    l10 = _crossing(length, truth, v)
+    near = (length > NEAR[0] * l10) & (length < NEAR[1] * l10)
+    edges = np.quantile(length[near], np.linspace(0, 1, blocks + 1))
+    block = np.searchsorted(edges, length[near])
+    one_less = [_crossing(length[near][keep], truth[near][keep], v[near][keep], l10)
+                for keep in (block != b for b in range(1, blocks + 1))]  # fmt: skip
+    return l10, float(np.sqrt((blocks - 1) * np.var(one_less)))
 
 
-def _l10(period: NDArray, v: NDArray) -> float:
-    return _fit(period, v)[1]
+def _crossing(length: NDArray, truth: NDArray, v: NDArray, start: float = 150.0) -> float:
+    """From ``start`` down to shorter waves, until the loss fitted around one is 10 % there."""
+    fine = np.linspace(*NEAR, 4001)
+    for _ in range(40):
+        near = (length > NEAR[0] * start) & (length < NEAR[1] * start)
+        loss = _loss(start / length[near], truth[near], v[near], (2, 4, 6))
+        above = np.flatnonzero(sum(c * fine**-n for n, c in loss.items()) > 0.1)
+        before, start = start, start * (float(fine[above[-1]]) if len(above) else NEAR[0])
+        if abs(start - before) < 1e-4 * start:
+            break
+    return start
 
 
-def _response(period: NDArray, v: NDArray) -> NDArray:
-    c, limit = _fit(period, v)
-    p = np.maximum(period, limit)
-    return 1 - (c[0] * p**-2 + c[1] * p**-4 + c[2] * p**-6)
+def _loss(wave_number: NDArray, truth: NDArray, v: NDArray, powers: tuple[int, ...]) -> dict[int, float]:
+    """Coefficients of what v has lost of the truth: an even transfer function, a short series."""
+    basis = np.stack([truth * wave_number**n for n in powers], axis=1)
+    return dict(zip(powers, np.linalg.lstsq(basis, truth - v, rcond=None)[0].tolist(), strict=True))
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,9 @@ def test_sigma_of_a_mean_is_its_scatter(name: str, step: int) -> None:
     means = np.array([f.mean(name)[0] for f in fields])
     predicted = fields[0].mean(name)[1]
     assert np.sqrt(np.mean(means**2)) == pytest.approx(predicted, rel=0.45)
-    assert np.nanstd([f.value(name) for f in fields]) == pytest.approx(np.nanmean(fields[0].sigma(name)), rel=0.1)
+    assert np.nanstd([f.value(name) for f in fields]) == pytest.approx(
+        np.nanmean(fields[0].sigma(name)), rel=0.1
+    )
 
 
 def test_statuses_have_words() -> None:

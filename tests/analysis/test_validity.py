@@ -34,9 +34,10 @@ def test_verdicts() -> None:
 def test_bending_beyond_its_noise_and_the_limit() -> None:
     unit, noise = np.array([[1e-4, 1e-4], [1e-4, 1e-4], [1e-8, 1e-8], [1e-8, 1e-8]]), np.array([1.5, 0.5])
     found = np.array([0.002, 0.02, 0.048**2, 0.052**2])
-    assert bends(found, unit, noise, np.zeros(4)).tolist() == [False, True, False, True]
-    assert bends(np.array([np.nan]), unit[:1], noise, np.zeros(1)).tolist() == [True]
-    assert bends(found, unit, noise, np.full(4, 1.0)).tolist() == [False] * 4
+    assert bends(found, unit, noise, np.zeros(4), 0.05).tolist() == [False, True, False, True]
+    assert bends(np.array([np.nan]), unit[:1], noise, np.zeros(1), 0.05).tolist() == [True]
+    assert bends(found, unit, noise, np.full(4, 1.0), 0.05).tolist() == [False] * 4
+    assert bends(found, unit, noise, np.zeros(4), np.inf).tolist() == [False] * 4
 
 
 def test_the_stretch_of_a_strain_is_free_of_rotation() -> None:

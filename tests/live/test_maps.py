@@ -8,10 +8,13 @@ import cv2
 import numpy as np
 import pytest
 
+from acquire.errors import ConfigError
+from analysis import Roi, ZoiGrid
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
-from live.maps import Picture
+from live.maps import Picture, draw
+from live.results_reader import Strain
 
 
 @pytest.fixture(scope="module")
@@ -46,9 +49,21 @@ def test_a_picture_comes_out(results: Path, tmp_path: Path, more: list[str]) -> 
 
 
 def test_what_was_done_is_named() -> None:
-    assert Picture("eyy").treatment == ""
-    named = Picture("eyy", median=3, low_pass_px=9, deconvolution=2).treatment
-    assert named == "deconvolved, 2 steps, median 3 x 3, low-pass 9 px"
+    grid = ZoiGrid.cover(Roi(0, 0, 192, 160), 48, 8)
+    assert Picture("eyy").treatment(grid) == ""
+    named = Picture("eyy", median=3, low_pass_px=9, deconvolution=3).treatment(grid)
+    assert named == "deconvolved, 3 steps: l_10% 62 px, noise x 0.86, median 3 x 3, low-pass 9 px"
+    assert Picture("u", deconvolution=3).treatment(grid) == "deconvolved, 3 steps: l_10% 62 px, noise x 1.05"
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("order", 2), ("window", "uniform"), ("estimator", "phase")], ids=str
+)
+def test_only_a_known_blur_is_taken_off(results: Path, key: str, value: object) -> None:
+    with Strain.open(results / "out" / "strain.h5") as strain:
+        strain.config.setdefault("measure", {})[key] = value
+        with pytest.raises(ConfigError, match=f"only maps measured with {key} = .* can be deconvolved"):
+            draw(strain, Picture("eyy", deconvolution=3), None)
 
 
 @pytest.mark.parametrize(
@@ -58,6 +73,7 @@ def test_what_was_done_is_named() -> None:
         (["--row", "7"], 4, "no row 7"),
         (["--field", "status", "--median", "3"], 2, "neither filtered nor deconvolved"),
         (["--deconvolve", "-1"], 2, "must not be negative"),
+        (["--field", "sigma_eyy", "--deconvolve", "3"], 2, "has no blur"),
     ],
 )
 def test_refusals(
