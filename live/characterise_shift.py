@@ -193,8 +193,9 @@ def _text(
     return f"""ZOI 32x32, 12 bit, speckle radius {RADIUS:g} px, shifts of u from -0.5 to 0.5 px in 10 equal steps,
 {pairs} pairs a shift; the spectral kernel sees each of them with {draws} noises. The paper samples a pattern
 drawn 10 times oversampled; here it is rendered analytically at the shifted place. It says neither whether 31 GL is a
-standard deviation or a range (both are shown) nor which mean of the bias it prints (three are shown). Ours is the default
-kernel with the same 32 px; its Gaussian weight (sigma 5.3 px) resolves finer (l_10% 73 px) than the paper's bi-triangular window (about 100 px), so a
+standard deviation or a range (both are shown) nor which mean of the bias it prints (three are shown). Ours is the
+default kernel with the same 32 px; its Gaussian weight (sigma 5.3 px) resolves finer (l_10% 73 px) than the paper's
+bi-triangular window (about 100 px), so a
 {SAME_LENGTH} px ZOI of the same l_10% stands beside it. Phase alone is the same kernel with
 `estimator="phase"`; its noise is lower because its weight is wider (see the section on spatial resolution).
 
