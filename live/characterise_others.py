@@ -120,11 +120,24 @@ def sun_dic_points(reference: Any, deformed: Any, rim: int = RIM, cores: int = 1
         settings.CPUCount = cores
         height, width = reference.shape
         settings.ROI = [rim, rim, width - 2 * rim, height - 2 * rim]
-        with _worker_environment() if cores > 1 else contextlib.nullcontext():
+        with _worker_environment() if cores > 1 else _one_thread():
             program.planarDICLocal(settings, str(Path(folder) / "results.sdic"))
         values, rows, columns = results.getDisplacements(str(Path(folder) / "results.sdic"), 0)
     x, y, u = (values[:, c].reshape(rows, columns, order="F") for c in (0, 1, 3))
     return Points(x, y, u)
+
+
+@contextlib.contextmanager
+def _one_thread() -> Iterator[None]:
+    """Loops of Numba on one thread: its parallel loops over one subset at a time cost more than they save."""
+    import numba
+
+    before = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
 
 
 @contextlib.contextmanager
