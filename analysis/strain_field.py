@@ -269,6 +269,14 @@ class StrainField:
         return np.asarray(self.status == Status.OK)
 
     @property
+    def refused(self) -> dict[Status, int]:
+        """How many ZOIs have no value for each reason, the commonest first; those not asked for are left out."""
+        found, counts = np.unique(self.status, return_counts=True)
+        tally = {Status(int(s)): int(n) for s, n in zip(found, counts, strict=True)}
+        asked = {s: n for s, n in tally.items() if s not in (Status.OK, Status.NOT_MEASURED)}
+        return dict(sorted(asked.items(), key=lambda item: -item[1]))
+
+    @property
     def n_valid(self) -> int:
         """Number of ZOIs with a valid value."""
         return int(np.count_nonzero(self.ok))

@@ -31,7 +31,7 @@ class StatusCard:
     def _lines(self, history: History, ledger: Ledger) -> list[str]:
         i = history.instants[-1]
         lines = [
-            f"**{i.n_valid} of {i.n_zoi}** ZOIs valid",
+            f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
             f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, mean **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
         ]
         figures = evaluate(history, self._loads, self._specimen)

@@ -16,7 +16,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """Means over the valid ZOIs at one time; strains dimensionless, force in N."""
+    """Means over the valid ZOIs at one time; strains dimensionless, force in N.
+
+    ``refused`` says why ZOIs have no value ("3 UNEVEN, 1 LOST"), empty where all have one.
+    """
 
     t: float
     force: float
@@ -30,6 +33,7 @@ class Instant:
     zoi_sigma: float
     n_valid: int
     n_zoi: int
+    refused: str
     noise_GL: float
     measure_s: float
 
@@ -54,6 +58,7 @@ def instant_of(measurement: Measurement) -> Instant:
         zoi_sigma=float(np.median(field.sigma_eyy[valid])) if values.size else math.nan,
         n_valid=int(valid.sum()),
         n_zoi=int(field.grid.active.sum()),
+        refused=", ".join(f"{n} {status.name}" for status, n in field.refused.items()),
         noise_GL=measurement.burst.noise,
         measure_s=measurement.measure_s,
     )

@@ -64,8 +64,9 @@ def summary_lines(history: History, loads: LoadLog, specimen: SpecimenConfig) ->
         return ["no ZOI could be measured; see the events above"]
     last = valid[-1]
     largest = max(valid, key=lambda instant: abs(instant.largest)).largest
+    refused = f" ({last.refused})" if last.refused else ""
     lines = [
-        f"measured {len(history.instants)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last",
+        f"measured {len(history.instants)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
         f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} um/m;"
         f" largest of any ZOI {largest * 1e6:+.0f} um/m",
         noise_line(history),

@@ -73,3 +73,11 @@ def test_statuses_have_words() -> None:
 def test_arrays_are_read_only() -> None:
     with pytest.raises(ValueError, match="read-only"):
         uniform(u=1.0).u[0, 0] = 3
+
+
+def test_the_refused_are_told_by_their_reasons() -> None:
+    grid = ZoiGrid.cover(Roi(0, 0, 128, 32), 32, 32)
+    status = [[Status.LOST, Status.OK, Status.LOST, Status.UNEVEN]]
+    field = StrainField.from_values(grid, {}, status=status)
+    assert field.refused == {Status.LOST: 2, Status.UNEVEN: 1}
+    assert list(field.refused) == [Status.LOST, Status.UNEVEN]
