@@ -7,17 +7,13 @@ rest of the package does that only when a kernel is made.
 
 from __future__ import annotations
 
-import functools
 import logging
-import threading
 from collections.abc import Callable
 from typing import Any
 
 import numba
 
 log = logging.getLogger("analysis")
-
-_TURN = threading.Lock()
 
 # Sums may be reordered for the vector unit, but NaN and infinity keep their meaning.
 FAST = {"contract", "reassoc", "nsz", "arcp", "afn"}
@@ -34,25 +30,12 @@ def helper(function: Callable[..., Any]) -> Any:
 
 
 def parallel(function: Callable[..., Any]) -> Any:
-    """A loop over ZOIs or rows, shared among the threads; each item is done by one of them.
-
-    Callers in several threads take turns: one loop keeps all cores busy, and where numba finds
-    neither OpenMP nor TBB (macOS, a bare Debian) it ends the whole program if two run at once.
-    """
-    compiled = numba.njit(function, error_model="numpy", fastmath=FAST, cache=True, nogil=True, parallel=True)
-
-    @functools.wraps(function)
-    def one_at_a_time(*arguments: Any) -> Any:
-        with _TURN:
-            return compiled(*arguments)
-
-    one_at_a_time.compiled = compiled  # type: ignore[attr-defined]
-    return one_at_a_time
+    """A loop over ZOIs or rows, shared among the threads; each item is done by one of them."""
+    return numba.njit(function, error_model="numpy", fastmath=FAST, cache=True, nogil=True, parallel=True)
 
 
 def is_cached(function: Any) -> bool:
-    """Whether a loop has compiled code in this process or on disk."""
-    function = getattr(function, "compiled", function)
+    """Whether a dispatcher has compiled code in this process or on disk."""
     if function.signatures:
         return True
     try:
