@@ -35,6 +35,9 @@ Gaussian ZOI gave 270 um/m, many times the predicted uncertainty."""
 class PhaseKernel:
     """Measures displacement and strain of every ZOI of a grid against one reference.
 
+    For one thread at a time, whatever the number of kernels: their loops use all cores, and where
+    numba finds neither OpenMP nor TBB it ends a program in which two of them run at once.
+
     Parameters
     ----------
     reference : (H, W) uint8, uint16 or float32, GL
