@@ -13,7 +13,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any, Self
 
@@ -33,6 +33,12 @@ from hw_mocks.specimen import VirtualSpecimen, take_specimen
 log = logging.getLogger(__name__)
 POLL_S = 0.1
 FORMATS = {8: "GREY", 10: "Y10", 12: "Y12", 16: "Y16"}
+
+
+AUTO_FPS = (30.0, 25.0, 20.0, 15.0, 10.0, 5.0)
+"""What fps=auto chooses from."""
+RENDER_SHARE = 0.4
+"""Of one core that rendering may take then."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -302,8 +308,9 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
 
     Keys, beside those of the specimen (width, height, seconds, hold, end, max_strain, E_GPa, nu,
     yield_MPa, section_mm2, px_per_mm, axis, hole, cell, overstrain, drift_x, drift_y,
-    rotation_deg, lockstep): fps, bits, noise (% of full scale at mid-grey), fpn (%), brightness,
-    exposure_us, radius (px), contrast (%), seed, buffers, offset (s), faults.
+    rotation_deg, lockstep): fps (a number, or auto: what this machine renders with ease), bits, noise
+    (% of full scale at mid-grey), fpn (%), brightness, exposure_us, radius (px), contrast (%), seed,
+    buffers, offset (s), faults.
 
     Raises
     ------
@@ -314,11 +321,35 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
     take_specimen(options)
     settings = _take_camera(options)
     options.done()
+    if _automatic(options) and not specimen.nominal:
+        settings = replace(settings, fps=affordable_fps(specimen, settings))
     return SimCamera(specimen, settings, address.text, on_event)
 
 
+def affordable_fps(specimen: VirtualSpecimen, settings: SimCameraSettings) -> float:
+    """The highest rate of ``AUTO_FPS`` at which rendering leaves most of the machine to the measurement."""
+    scene = Scene(specimen, settings.radius_px, settings.contrast, settings.seed)
+    exposer = Exposer(settings.sensor, (specimen.height, specimen.width), 0)
+    exposer.expose(scene.render(0.0))  # compiles
+    taken = []
+    for t in np.linspace(0, specimen.duration_s, 6):
+        begin = time.perf_counter()
+        exposer.expose(scene.render(float(t)))
+        taken.append(time.perf_counter() - begin)
+    most = RENDER_SHARE / float(np.median(taken))
+    return next((fps for fps in AUTO_FPS if fps <= most), AUTO_FPS[-1])
+
+
+def _automatic(options: Options) -> bool:
+    return ("fps", "auto") in options.address.settings
+
+
 def _take_camera(options: Options) -> SimCameraSettings:
-    fps = options.number("fps", 60.0, minimum=0.1, maximum=10_000)
+    if _automatic(options):
+        fps = AUTO_FPS[0]
+        options.text("fps")
+    else:
+        fps = options.number("fps", 60.0, minimum=0.1, maximum=10_000)
     return SimCameraSettings(
         sensor=_take_sensor(options),
         fps=fps,

@@ -121,7 +121,9 @@ def _add_demo(commands: Any) -> None:
     demo = commands.add_parser("demo", help="the same on a simulated tensile test, compared with its truth")
     demo.add_argument("--specimen", default="woven", help="woven (default), uniform or hole")
     demo.add_argument(
-        "--fps", type=float, default=30.0, help="frame rate of the simulated camera (default 30)"
+        "--fps",
+        type=float,
+        help="frame rate of the simulated camera (default: what this machine renders, at most 30)",
     )
     demo.add_argument("--seconds", type=float, metavar="S", help="end after this time")
     _add_measure(demo)

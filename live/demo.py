@@ -57,9 +57,10 @@ def _config_file(arguments: argparse.Namespace) -> Any:
 def _defaults(arguments: argparse.Namespace) -> dict[str, Any]:
     section = WIDTH_MM * THICKNESS_MM
     seconds = f"&seconds={arguments.seconds:g}" if arguments.seconds else ""
+    fps = "auto" if arguments.fps is None else f"{arguments.fps:g}"
     return {
         "camera.address": (
-            f"sim:{arguments.specimen}?bits=12&fps={arguments.fps:g}&buffers=32&section_mm2={section:g}{seconds}"
+            f"sim:{arguments.specimen}?bits=12&fps={fps}&buffers=64&section_mm2={section:g}{seconds}"
         ),
         "load.address": "sim:",
         "specimen.width_mm": WIDTH_MM,

@@ -13,6 +13,7 @@ from acquire.camera import Camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event, ignore_event
 from acquire.frame import Frame
+from hw_mocks.scene import Scene
 from hw_mocks.sensor import Sensor
 from hw_mocks.sim_camera import Ring, SimCamera, SimCameraSettings, open_sim_camera
 from hw_mocks.specimen import specimen_from
@@ -231,3 +232,20 @@ def test_camera_gone_for_good_is_an_error_after_its_last_frame() -> None:
 def test_bad_settings_are_refused(settings: str, word: str) -> None:
     with pytest.raises(ConfigError, match=word):
         opened(settings)
+
+
+@pytest.mark.parametrize(("render_s", "fps"), [(0.002, 30.0), (0.019, 20.0), (0.1, 5.0)])
+def test_automatic_rate_is_what_this_machine_renders(
+    render_s: float, fps: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [0.0]
+
+    def rendered(self: Scene, t: float) -> np.ndarray:
+        now[0] += render_s
+        return np.full((48, 64), 0.5, np.float32)
+
+    monkeypatch.setattr("hw_mocks.sim_camera.time.perf_counter", lambda: now[0])
+    monkeypatch.setattr(Scene, "render", rendered)
+    address = parse_address("sim:uniform?width=64&height=48&fps=auto")
+    with open_sim_camera(address, lambda event: None, specimen_from(address)) as camera:
+        assert camera.info.fps == fps
