@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 WIDTH_MM, THICKNESS_MM = 20.0, 2.0
 RELATIVE = 0.003  # of the strain, beside three times the predicted uncertainty
+LEAST_WITHIN = 0.97  # 99 % are to be expected; of 150 values, chance takes one in a few runs below that
 
 
 def demo(arguments: argparse.Namespace) -> int:
@@ -72,9 +73,9 @@ def _defaults(arguments: argparse.Namespace) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Instance:
-    """What is kept of a measurement for the comparison."""
+    """What is kept of a measurement for the comparison; ``times`` (n,) are those of its frames, s."""
 
-    t: float
+    times: Array
     valid: NDArray[np.bool_]
     mean: tuple[float, float, float]
     sigma: tuple[float, float, float]
@@ -90,7 +91,8 @@ class Kept:
         """Keep means, sigmas and which ZOIs they are over."""
         pairs = [m.field.mean(name) for name in ("exx", "eyy", "exy")]
         (xx, s_xx), (yy, s_yy), (xy, s_xy) = pairs
-        self.measurements.append(Instance(m.t, np.isfinite(m.field.exx), (xx, yy, xy), (s_xx, s_yy, s_xy)))
+        times = m.t + np.linspace(-0.5, 0.5, m.burst.n) * m.burst.duration
+        self.measurements.append(Instance(times, np.isfinite(m.field.exx), (xx, yy, xy), (s_xx, s_yy, s_xy)))
 
 
 class ZoiTruth:
@@ -136,6 +138,14 @@ class ZoiTruth:
         return np.asarray(chosen @ weights)
 
 
+def middle_of(specimen: VirtualSpecimen, times: Array) -> float:
+    """When the strain was that of the mean of the frames: not in the middle where the ramp begins in a burst."""
+    strain = specimen.axial_strain(times)
+    if not strain[-1] > strain[0]:
+        return float(times.mean())
+    return float(np.interp(strain.mean(), strain, times))
+
+
 def compare(outcome: Outcome, kept: Kept, config: Config, say: Callable[[str], None]) -> bool:
     """Print what was measured against the truth; whether the elastic part agrees."""
     specimen = outcome.rig.specimen
@@ -144,11 +154,12 @@ def compare(outcome: Outcome, kept: Kept, config: Config, say: Callable[[str], N
     truth = ZoiTruth(specimen, outcome.grid, (crop[0], crop[1]))
     ratios, errors = [], []
     for m in kept.measurements:
-        elapsed = specimen.elapsed(m.t)
+        times = np.array([specimen.elapsed(t) for t in m.times])
+        elapsed = middle_of(specimen, times)
         true = np.array([e[m.valid].mean() if m.valid.any() else math.nan for e in truth.strains(elapsed)])
         error, sigma = np.array(m.mean) - true, np.array(m.sigma)
-        if elapsed <= specimen.yield_s:
-            ratios.append([np.max(np.abs(error) / (RELATIVE * np.abs(true) + k * sigma)) for k in (3, 5)])
+        if times[-1] <= specimen.yield_s:
+            ratios.append([np.abs(error) / (RELATIVE * np.abs(true) + k * sigma) for k in (3, 5)])
             errors.append(error)
     say("")
     say("against the simulated truth (elastic part; exx, eyy, exy):")
@@ -161,17 +172,18 @@ def compare(outcome: Outcome, kept: Kept, config: Config, say: Callable[[str], N
 
 
 def _say_strain(ratios: Array, errors: Array, say: Callable[[str], None]) -> bool:
-    """``ratios`` (N, 2): the largest error of the three, in units of 0.3 % + 3 sigma and + 5 sigma."""
+    """``ratios`` (N, 2, 3): the error of each of the three in units of 0.3 % + 3 sigma, and of 0.3 % + 5 sigma."""
     if not ratios.size:
         say("  no instant of the elastic part was measured")
         return False
-    share, rms = float(np.mean(ratios[:, 0] <= 1)), np.sqrt(np.mean(errors**2, axis=0)) * 1e6
+    within, rms = ratios[:, 0] <= 1, np.sqrt(np.mean(errors**2, axis=0)) * 1e6
     beyond = int(np.sum(~(ratios[:, 1] <= 1)))
     say(f"  mean strain: error {rms[0]:.2f}, {rms[1]:.2f}, {rms[2]:.2f} um/m rms in {len(ratios)} instants")
     say(
-        f"  {share:.1%} of the instants within {RELATIVE:.1%} of the strain + 3 sigma, {beyond} beyond 5 sigma"
+        f"  {within.mean():.1%} of these {within.size} values within {RELATIVE:.1%} of the strain + 3 sigma,"
+        f" {beyond} beyond 5 sigma"
     )
-    return share >= 0.99 and beyond == 0
+    return float(within.mean()) >= LEAST_WITHIN and beyond == 0
 
 
 def _say_force(outcome: Outcome, specimen: VirtualSpecimen, say: Callable[[str], None]) -> None:
