@@ -111,12 +111,8 @@ def prepare_reference(
     shapes = shapes_of(line, LANES)
     fx, fy, f = _flat(pattern.grad_x), _flat(pattern.grad_y), _flat(pattern.level)
     covariance = np.empty((count, 21), np.float32)
-    signal_dependent = noise is not None and noise.slope > 0
-    level_image = (
-        np.maximum(pattern.level + np.float32(mean), 0).ravel()
-        if signal_dependent
-        else np.empty(0, np.float32)
-    )
+    level_image = _level_image(pattern, mean, noise)
+    signal_dependent = level_image.size > 0
     covariance_level = np.empty((count if signal_dependent else 0, 21), np.float32)
     freedom, energy = np.empty(count, np.float32), np.empty((count, 4), np.float32)
     prepare(
@@ -126,11 +122,7 @@ def prepare_reference(
         shapes.powers, shapes.blocks, shapes.mix,
         table, affine, inverse, covariance, covariance_level, cross, freedom, energy,
     )  # fmt: skip
-    variances = covariance[:, [0, 15]].astype(np.float64)  # of u and of v among the 21 pairs
-    good = has_pattern(
-        energy[:, :2].astype(np.float64), variances, pattern.noise, pattern.noise**2 * pattern.left_gradient
-    )
-    status = np.where(good, Status.OK, Status.NO_PATTERN).astype(np.uint8)
+    status = _measurable(pattern, covariance, energy)
     if clipped is not None and clipped.any():
         status[clipped_share(clipped, origins, line) > CLIPPED_SHARE] = Status.CLIPPED
     return Prepared(
@@ -153,6 +145,24 @@ def prepare_reference(
         level=energy[:, 3].astype(np.float64) + mean,
         status=status,
     )
+
+
+def _measurable(
+    pattern: Pattern, covariance: NDArray[np.float32], energy: NDArray[np.float32]
+) -> NDArray[np.uint8]:
+    """OK or NO_PATTERN for each ZOI, (A,)."""
+    variances = covariance[:, [0, 15]].astype(np.float64)  # of u and of v among the 21 pairs
+    good = has_pattern(
+        energy[:, :2].astype(np.float64), variances, pattern.noise, pattern.noise**2 * pattern.left_gradient
+    )
+    return np.where(good, Status.OK, Status.NO_PATTERN).astype(np.uint8)
+
+
+def _level_image(pattern: Pattern, mean: float, noise: NoiseModel | None) -> NDArray[np.float32]:
+    """Grey levels for a noise that grows with them, flat; empty where it does not."""
+    if noise is None or noise.slope <= 0:
+        return np.empty(0, np.float32)
+    return np.asarray(np.maximum(pattern.level + np.float32(mean), 0).ravel(), np.float32)
 
 
 def clipped_share(
