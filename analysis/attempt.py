@@ -67,7 +67,7 @@ class Attempt:
         self.ready = kernel._prepared
         degree = kernel.settings.interpolant
         offset = np.float32(self.ready.pattern.mean)
-        self.coefficients = coefficients(image, offset, prefilter_taps(degree)).ravel()
+        self.coefficients = coefficients(image, offset, prefilter_taps(degree))
         count = len(self.ready.origins)
         self.p = np.full((count, kernel._modes), np.nan)
         self.left = np.full(count, np.nan)
@@ -144,8 +144,7 @@ class Attempt:
 
     def _iterate(self, which: Places, guess: Floats, max_iterations: int | None = None) -> Outcome:
         from analysis.gauss_newton import track
-        from analysis.sensitivity import parameter_scale, power_rows
-        from analysis.warp import LANES
+        from analysis.sensitivity import parameter_scale
 
         ready, kernel, settings = self.ready, self.kernel, self.kernel.settings
         size, count = kernel.grid.size, len(guess)
@@ -154,12 +153,9 @@ class Attempt:
             guess.copy(), np.full(count, np.nan), np.full(count, np.nan), np.full((count, 2), np.nan),
             np.zeros(count, np.uint8), np.zeros(count, np.uint8),
         )  # fmt: skip
-        rows = power_rows(profile(settings.window, size), settings.order)
-        shapes = ready.shapes
         track(
-            self.coefficients, width, height, ready.fx, ready.fy, ready.f, ready.raw,
-            ready.origins[which], size, settings.order,
-            np.pad(rows, ((0, 0), (0, LANES))).astype(np.float32), shapes.rows, shapes.blocks, shapes.mix[1, 1],
+            self.coefficients, width, height, ready.images.ravel(), ready.images[0].size, ready.images.shape[2],
+            ready.origins[which], size, settings.order, ready.shapes.rows, ready.shapes.mix,
             ready.inverse[which], ready.cross[which],
             ready.weight * ready.energy[which], parameter_scale(settings.order, size),
             self.tolerance[which], self.trust[which], tap_table(settings.interpolant),

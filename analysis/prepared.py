@@ -17,8 +17,8 @@ from analysis.windows import profile
 if TYPE_CHECKING:
     from analysis.shapes import Shapes
 
-TAIL_ROWS, TAIL = 3, 64
-"""Rows and samples appended to flat images, since loops read whole blocks and vectors."""
+LINE = 16
+"""Samples of a cache line."""
 
 
 class PatternError(ValueError):
@@ -33,8 +33,9 @@ class Prepared:
     ----------
     shape : (H, W)
     pattern : Pattern
-    fx, fy, f, raw : flat float32
-        Gradients and level of the filtered reference, and the reference less its mean.
+    images : (4, H + 1, pitch) float32
+        Gradients and level of the filtered reference, f_x, f_y, f, and the reference less its mean; zero
+        beyond H rows of W, since loops read whole vectors.
     origins : (A, 2) int64
         First row and column of each ZOI.
     inverse : (A, P, P) float32
@@ -57,10 +58,7 @@ class Prepared:
 
     shape: tuple[int, int]
     pattern: Pattern
-    fx: NDArray[np.float32]
-    fy: NDArray[np.float32]
-    f: NDArray[np.float32]
-    raw: NDArray[np.float32]
+    images: NDArray[np.float32]
     origins: NDArray[np.int64]
     inverse: NDArray[np.float32]
     cross: NDArray[np.float32]
@@ -94,9 +92,9 @@ def prepare_reference(
     clipped : (H, W) bool, optional
         Saturated pixels.
     """
-    from analysis.sensitivity import columns, parameter_scale, power_rows, prepare
+    from analysis.sensitivity import columns, parameter_scale, prepare, square_rows
     from analysis.shapes import N_SHAPES, shapes_of
-    from analysis.warp import LANES
+    from analysis.vectors import whole
 
     mean = float(image.mean(dtype=np.float64))
     std = None if noise is None else float(np.sqrt(noise.variance(mean)))
@@ -108,18 +106,16 @@ def prepare_reference(
     count = len(origins)
     inverse = np.empty((count, len(table), len(table)), np.float32)
     cross = np.empty((count, 2 * N_SHAPES, len(table)), np.float32)
-    shapes = shapes_of(line, LANES)
-    fx, fy, f = _flat(pattern.grad_x), _flat(pattern.grad_y), _flat(pattern.level)
+    shapes = shapes_of(line, whole(size))
+    images = _padded(pattern.grad_x, pattern.grad_y, pattern.level, image - np.float32(mean))
     covariance = np.empty((count, 21), np.float32)
-    level_image = _level_image(pattern, mean, noise)
-    signal_dependent = level_image.size > 0
+    by_level = _by_level(images, pattern, mean, noise)
+    signal_dependent = by_level.size > 0
     covariance_level = np.empty((count if signal_dependent else 0, 21), np.float32)
     freedom, energy = np.empty(count, np.float32), np.empty((count, 4), np.float32)
     prepare(
-        fx, fy, f, level_image, image.shape[1], origins, size,
-        power_rows(line, settings.order).astype(np.float32),
-        power_rows(line**2, settings.order).astype(np.float32),
-        shapes.powers, shapes.blocks, shapes.mix,
+        images.ravel(), by_level.ravel(), images[0].size, images.shape[2], origins, size,
+        shapes.powers, square_rows(line, whole(size)), shapes.mix,
         table, affine, inverse, covariance, covariance_level, cross, freedom, energy,
     )  # fmt: skip
     status = _measurable(pattern, covariance, energy)
@@ -128,10 +124,7 @@ def prepare_reference(
     return Prepared(
         shape=(image.shape[0], image.shape[1]),
         pattern=pattern,
-        fx=fx,
-        fy=fy,
-        f=f,
-        raw=_flat(image - np.float32(mean)),
+        images=images,
         origins=origins,
         inverse=inverse,
         cross=cross,
@@ -158,11 +151,18 @@ def _measurable(
     return np.where(good, Status.OK, Status.NO_PATTERN).astype(np.uint8)
 
 
-def _level_image(pattern: Pattern, mean: float, noise: NoiseModel | None) -> NDArray[np.float32]:
-    """Grey levels for a noise that grows with them, flat; empty where it does not."""
+def _by_level(
+    images: NDArray[np.float32], pattern: Pattern, mean: float, noise: NoiseModel | None
+) -> NDArray[np.float32]:
+    """f_x, f_y, f times the grey level and the level itself, for a noise that grows with it; else empty."""
     if noise is None or noise.slope <= 0:
         return np.empty(0, np.float32)
-    return np.asarray(np.maximum(pattern.level + np.float32(mean), 0).ravel(), np.float32)
+    level = np.maximum(pattern.level + np.float32(mean), 0)
+    height, width = level.shape
+    out = np.zeros_like(images)
+    out[:3, :height, :width] = images[:3, :height, :width] * level
+    out[3, :height, :width] = level
+    return out
 
 
 def clipped_share(
@@ -185,5 +185,15 @@ def clipped_share(
     return np.asarray(share[rows, columns], np.float64)
 
 
-def _flat(image: NDArray[np.float32]) -> NDArray[np.float32]:
-    return np.concatenate([image.ravel(), np.zeros(TAIL_ROWS * image.shape[1] + TAIL, np.float32)])
+def _padded(*images: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Images of one size with zeros behind each row and below each image, (K, H + 1, pitch).
+
+    A row takes an odd number of cache lines: with an even one, and worst with a power of two, the
+    rows of a ZOI compete for the same places in the cache.
+    """
+    height, width = images[0].shape
+    lines = width // LINE + 1
+    out = np.zeros((len(images), height + 1, LINE * (lines + 1 - lines % 2)), np.float32)
+    for to, image in zip(out, images, strict=True):
+        to[:height, :width] = image
+    return out

@@ -123,17 +123,16 @@ def _zois(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Filtered level (B, n, n) and its derivatives along the six modes (B, 6, n, n) of some ZOIs."""
     x = (np.arange(size) - (size - 1) / 2).astype(np.float32)
-    at = zoi_index(ready.shape[1], origins, size)
-    level, fx, fy = ready.f[at], ready.fx[at], ready.fy[at]
+    fx, fy, level = (zois_of(image, origins, size) for image in ready.images[:3])
     modes = [g * b for g in (fx, fy) for b in (np.float32(1), x, x[:, None])]
     return level, np.stack(modes, axis=1)
 
 
-def zoi_index(width: int, origins: NDArray[np.int64], size: int) -> NDArray[np.int64]:
-    """Flat pixel indices of ZOIs, (B, n, n)."""
+def zois_of(image: NDArray[np.float32], origins: NDArray[np.int64], size: int) -> NDArray[np.float32]:
+    """Cut ZOIs out of an image, (B, n, n)."""
     pixel = np.arange(size)
-    inside = pixel[:, None] * width + pixel
-    return np.asarray((origins[:, 0] * width + origins[:, 1])[:, None, None] + inside)
+    rows, columns = origins[:, :1] + pixel, origins[:, 1:] + pixel
+    return np.asarray(image[rows[:, :, None], columns[:, None, :]])
 
 
 def _sensors_of(
@@ -210,7 +209,7 @@ def iterate(
             warped = np.empty((len(z), size, size), np.float32)
             part = p[z]
             warp_zois(coefficients, width, origins[z], size, part, tap_table(settings.interpolant), warped)
-            step = step_of(sensors[z], warped - ready.raw[zoi_index(width, origins[z], size)])
+            step = step_of(sensors[z], warped - zois_of(ready.images[3], origins[z], size))
             step *= np.minimum(1, LONGEST_STEP / np.maximum(np.abs(step[:, [0, 3]]).max(axis=1), 1e-9))[
                 :, None
             ]

@@ -16,15 +16,10 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from analysis.compiled import helper, inlined, parallel
-from analysis.shapes import N_POWERS, cross_moments
-from analysis.warp import LANES
+from analysis.compiled import helper, parallel
+from analysis.moments import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, product_moments
+from analysis.shapes import cross_moments
 
-f4 = np.float32
-
-# Products of the channels f_x, f_y, f, 1, in the order the moments are kept in.
-PRODUCT = np.array([[0, 1, 3, 7], [1, 2, 4, 8], [3, 4, 5, 9], [7, 8, 9, 6]])
-N_PRODUCTS = 10
 RIDGE = 1e-7
 """Added to the unit diagonal of the scaled normal matrix."""
 
@@ -45,91 +40,12 @@ def parameter_scale(order: int, size: int) -> NDArray[np.float64]:
     return np.array(one + one)
 
 
-def power_rows(line: NDArray[np.float64], order: int) -> NDArray[np.float64]:
-    """line * xi^k for k = 0 .. 2*order, (2 order + 1, size); xi from -1 to 1 over the ZOI."""
+def square_rows(line: NDArray[np.float64], length: int) -> NDArray[np.float32]:
+    """line^2 * xi^k for k = 0 .. 4, (5, length), zero beyond the ZOI; xi from -1 to 1 over it."""
     size = len(line)
     xi = (np.arange(size) - (size - 1) / 2) / (size / 2)
-    return np.stack([line * xi**k for k in range(2 * order + 1)])
-
-
-@inlined
-def _dot6(a: Any, i: Any, b: Any, j: Any, size: int, w: Any, q: Any, r: int) -> Any:
-    """Sums over one row of a b times rows r, r+1, r+2 of w and of q."""
-    w0 = f4(0)
-    w1 = f4(0)
-    w2 = f4(0)
-    q0 = f4(0)
-    q1 = f4(0)
-    q2 = f4(0)
-    for n in range(size):
-        k = np.uintp(n)
-        t = a[i + k] * b[j + k]
-        w0 += t * w[r, k]
-        w1 += t * w[r + 1, k]
-        w2 += t * w[r + 2, k]
-        q0 += t * q[r, k]
-        q1 += t * q[r + 1, k]
-        q2 += t * q[r + 2, k]
-    return w0, w1, w2, q0, q1, q2
-
-
-@helper
-def _add_product(
-    a: Any, i: Any, b: Any, j: Any, size: int, y: int, w: Any, q: Any, under_w: Any, under_q: Any
-) -> None:
-    """Add one row of the product a b: under_w[l, k] += eta^l xi^k w a b, likewise under q."""
-    powers = len(w)
-    for r in range(0, powers - 1, 2):
-        w0, w1, w2, q0, q1, q2 = _dot6(a, i, b, j, size, w, q, r)
-        for k in range(powers):
-            under_w[k, r] += w0 * w[k, y]
-            under_w[k, r + 1] += w1 * w[k, y]
-            under_q[k, r] += q0 * q[k, y]
-            under_q[k, r + 1] += q1 * q[k, y]
-            if r + 3 == powers:
-                under_w[k, r + 2] += w2 * w[k, y]
-                under_q[k, r + 2] += q2 * q[k, y]
-
-
-@helper
-def _add_row(fx: Any, fy: Any, f: Any, one: Any, at: Any, size: int, y: int, w: Any, q: Any, m: Any) -> None:
-    """Add one row of a ZOI to all moments; ``one`` stands for the channel 1."""
-    o = np.uintp(0)
-    _add_product(fx, at, fx, at, size, y, w, q, m[0, 0], m[1, 0])
-    _add_product(fx, at, fy, at, size, y, w, q, m[0, 1], m[1, 1])
-    _add_product(fy, at, fy, at, size, y, w, q, m[0, 2], m[1, 2])
-    _add_product(fx, at, f, at, size, y, w, q, m[0, 3], m[1, 3])
-    _add_product(fy, at, f, at, size, y, w, q, m[0, 4], m[1, 4])
-    _add_product(f, at, f, at, size, y, w, q, m[0, 5], m[1, 5])
-    _add_product(one, o, one, o, size, y, w, q, m[0, 6], m[1, 6])
-    _add_product(one, o, fx, at, size, y, w, q, m[0, 7], m[1, 7])
-    _add_product(one, o, fy, at, size, y, w, q, m[0, 8], m[1, 8])
-    _add_product(one, o, f, at, size, y, w, q, m[0, 9], m[1, 9])
-
-
-@helper
-def _add_row_of_level(
-    fx: Any, fy: Any, f: Any, level: Any, at: Any, size: int, y: int, q: Any, scratch: Any, m: Any
-) -> None:
-    """Add one row of a ZOI to the moments under q times the grey level."""
-    o = np.uintp(0)
-    for n in range(size):
-        k = np.uintp(n)
-        scratch[0, k] = level[at + k]
-        scratch[1, k] = level[at + k] * fx[at + k]
-        scratch[2, k] = level[at + k] * fy[at + k]
-        scratch[3, k] = level[at + k] * f[at + k]
-    unused = m[1]
-    _add_product(scratch[1], o, fx, at, size, y, q, q, m[0, 0], unused[0])
-    _add_product(scratch[1], o, fy, at, size, y, q, q, m[0, 1], unused[0])
-    _add_product(scratch[2], o, fy, at, size, y, q, q, m[0, 2], unused[0])
-    _add_product(scratch[1], o, f, at, size, y, q, q, m[0, 3], unused[0])
-    _add_product(scratch[2], o, f, at, size, y, q, q, m[0, 4], unused[0])
-    _add_product(scratch[3], o, f, at, size, y, q, q, m[0, 5], unused[0])
-    _add_product(scratch[0], o, scratch[4], o, size, y, q, q, m[0, 6], unused[0])
-    _add_product(scratch[1], o, scratch[4], o, size, y, q, q, m[0, 7], unused[0])
-    _add_product(scratch[2], o, scratch[4], o, size, y, q, q, m[0, 8], unused[0])
-    _add_product(scratch[3], o, scratch[4], o, size, y, q, q, m[0, 9], unused[0])
+    rows = np.stack([line**2 * xi**k for k in range(SQUARE_ROWS)])
+    return np.pad(rows, ((0, 0), (0, length - size))).astype(np.float32)
 
 
 @helper
@@ -203,25 +119,23 @@ def _sandwich(inverse: Any, middle: Any, affine: Any, units: Any, out: Any) -> N
 
 @parallel
 def prepare(
-    fx: Any, fy: Any, f: Any, level: Any, width: int, origins: Any, size: int, along_x: Any, square_x: Any,
-    powers: Any, blocks: Any, mix: Any, table: Any, units: Any,
+    images: Any, by_level: Any, samples: int, pitch: int, origins: Any, size: int, powers: Any, squares: Any,
+    mix: Any, table: Any, units: Any,
     inverse: Any, covariance: Any, covariance_level: Any, cross: Any, freedom: Any, energy: Any,
 ) -> None:  # fmt: skip
     """Normal matrices of all ZOIs.
 
     Parameters
     ----------
-    fx, fy, f : flat float32
-        Gradient (GL/px) and level of the filtered reference, ``width`` pixels a row, some samples
-        longer than the image.
-    level : flat float32, or empty
-        Grey level for a noise that grows with it; empty: not wanted.
+    images : flat float32
+        f_x, f_y (GL/px) and f of the filtered reference, ``samples`` values each, ``pitch`` a row.
+    by_level : flat float32, or empty
+        The same times the grey level, then the level, for a noise that grows with it; empty: not wanted.
     origins : (A, 2) int64
         First row and column of each ZOI.
-    along_x, square_x : (2 order + 1, size) float32
+    powers, squares : (6, line) and (5, line) float32
         Window and squared window times powers of xi (the window is the same along y).
-    powers, blocks, mix
-        See ``shapes.Shapes``.
+    mix : see ``shapes.Shapes``
     table : (P, 3), units : (6,)
     inverse : (A, P, P) float32, written
         Zero where there is no pattern.
@@ -236,34 +150,31 @@ def prepare(
         Over the window: mean of f_x^2 and f_y^2, (GL/px)^2, variance (GL^2) and mean (GL) of f.
     """
     count = len(table)
+    order = 1 if count == 12 else 2
     affine = np.array([0, 1, 2, (count - 6) // 2, (count - 6) // 2 + 1, (count - 6) // 2 + 2])
-    n_powers = along_x.shape[0]
-    one = np.ones(size + LANES, np.float32)
-    rounded = (size + LANES - 1) // LANES * LANES
+    down, end, o = np.uintp(pitch), np.uintp(3 * samples), np.uintp(0)
+    one = np.ones(powers.shape[1], np.float32)
     chunks = (len(origins) + 31) // 32
     for chunk in prange(chunks):
-        scratch = np.ones((5, size), np.float32)
+        columns = np.empty((PRODUCT_ROWS + SQUARE_ROWS, powers.shape[1]), np.float32)
         normal = np.empty((count, count))
         middle = np.empty((count, count))
         inv = np.empty((count, count))
         low = np.empty((count, count))
-        moments = np.empty((2, N_PRODUCTS, n_powers, n_powers))
-        of_level = np.empty((2, N_PRODUCTS, n_powers, n_powers))
-        shaped = np.empty((7, 3, 4, N_POWERS))
+        of_w = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
+        of_q = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
         for z in range(chunk * 32, min(chunk * 32 + 32, len(origins))):
-            moments[:] = 0
-            of_level[:] = 0
-            for y in range(size):
-                at = np.uintp((origins[z, 0] + y) * width + origins[z, 1])
-                _add_row(fx, fy, f, one, at, size, y, along_x, square_x, moments)
-                if level.size:
-                    _add_row_of_level(fx, fy, f, level, at, size, y, square_x, scratch, of_level)
-            _assemble(moments[0], table, normal)
-            total = moments[0, 6, 0, 0]
-            energy[z, 0] = moments[0, 0, 0, 0] / total
-            energy[z, 1] = moments[0, 2, 0, 0] / total
-            energy[z, 3] = moments[0, 9, 0, 0] / total
-            energy[z, 2] = moments[0, 5, 0, 0] / total - (moments[0, 9, 0, 0] / total) ** 2
+            at = np.uintp(origins[z, 0] * pitch + origins[z, 1])
+            product_moments(
+                images, images, one, o, o, one, np.uintp(samples), at, down, size,
+                powers, squares, order, columns, of_w, of_q,
+            )  # fmt: skip
+            _assemble(of_w, table, normal)
+            total = of_w[6, 0, 0]
+            energy[z, 0] = of_w[0, 0, 0] / total
+            energy[z, 1] = of_w[2, 0, 0] / total
+            energy[z, 3] = of_w[9, 0, 0] / total
+            energy[z, 2] = of_w[5, 0, 0] / total - (of_w[9, 0, 0] / total) ** 2
             if not _invert(normal, low, inv):
                 inverse[z] = 0
                 cross[z] = 0
@@ -271,17 +182,24 @@ def prepare(
                 freedom[z] = 0
                 continue
             inverse[z] = inv
-            cross_moments(
-                fx, fy, f, one, np.uintp(origins[z, 0] * width + origins[z, 1]), np.uintp(width), rounded,
-                1 if count == 12 else 2, powers, blocks, mix, table, shaped, cross[z],
-            )  # fmt: skip
-            _assemble(moments[1], table, middle)
+            cross_moments(of_w, table, mix, cross[z])
+            _assemble(of_q, table, middle)
             _sandwich(inv, middle, affine, units, covariance[z])
-            taken = 0.0
-            for i in range(count):
-                for j in range(count):
-                    taken += inv[i, j] * middle[j, i]
-            freedom[z] = total - taken
-            if level.size:
-                _assemble(of_level[0], table, middle)
+            freedom[z] = total - _taken(inv, middle)
+            if by_level.size:
+                product_moments(
+                    by_level, images, by_level, end + at, down, one, np.uintp(samples), at, down, size,
+                    powers, squares, order, columns, of_w, of_q,
+                )  # fmt: skip
+                _assemble(of_q, table, middle)
                 _sandwich(inv, middle, affine, units, covariance_level[z])
+
+
+@helper
+def _taken(inverse: Any, middle: Any) -> Any:
+    """Trace of inverse @ middle, both symmetric."""
+    out = 0.0
+    for i in range(len(inverse)):
+        for j in range(len(inverse)):
+            out += inverse[i, j] * middle[i, j]
+    return out

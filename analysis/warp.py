@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 
 from analysis.compiled import helper, inlined, parallel
 from analysis.splines import PAD, PREFILTER_REACH
+from analysis.vectors import LANES, load, spread, store
 
 f4 = np.float32
+ROWS = 16
+"""Rows that are warped and summed before the next: few enough for the first-level cache."""
 _one, _two, _three, _four, _five = (np.uintp(i) for i in range(1, 6))
-LANES = 8
-"""Rows are warped in multiples of this; what is written too much is overwritten or never read."""
 
 
 @helper
@@ -37,55 +38,78 @@ def _mirror(i: int, n: int) -> int:
 def coefficients(image: NDArray[np.float32], offset: Any, taps: NDArray[np.float32]) -> Any:
     """Spline coefficients of ``image - offset``, mirrored PAD pixels beyond each edge.
 
-    Returns (H + 2 PAD, W + 2 PAD) float32. ``taps`` is one side of the symmetric prefilter.
+    Returns flat float32: (H + 2 PAD) rows of W + 2 PAD, and a vector more than that. ``taps`` is one
+    side of the symmetric prefilter.
     """
     height, width = image.shape
     reach = PREFILTER_REACH
-    along_x = np.empty((height, width), np.float32)
-    out = np.empty((height + 2 * PAD, width + 2 * PAD), np.float32)
+    across = (width + LANES - 1) // LANES * LANES
+    stride = width + 2 * PAD
+    along_x = np.empty((height, across), np.float32)
+    out = np.zeros((height + 2 * PAD) * stride + LANES, np.float32)
     for y in prange(height):
-        line = np.empty(width + 2 * reach, np.float32)
+        line = np.zeros(across + 2 * reach + LANES, np.float32)
         for x in range(width):
             line[x + reach] = image[y, x] - offset
         for x in range(reach):
             line[x] = image[y, _mirror(x - reach, width)] - offset
             line[width + reach + x] = image[y, _mirror(width + x, width)] - offset
-        _filter_line(line, taps, along_x[y])
+        _filter_along(line, taps, along_x[y])
     for y in prange(height):
-        total = out[y + PAD, PAD : PAD + width]
-        centre = along_x[y]
-        for x in range(width):
-            total[x] = taps[0] * centre[x]
-        for k in range(1, reach + 1):
-            _add_pair(total, taps[k], along_x[_mirror(y - k, height)], along_x[_mirror(y + k, height)])
+        rows = np.empty(2 * reach + 1, np.intp)
+        for k in range(2 * reach + 1):
+            rows[k] = _mirror(y + k - reach, height) * across
+        line = np.empty(across, np.float32)
+        _filter_across(along_x, rows, taps, line)
+        row = out[(y + PAD) * stride : (y + PAD + 1) * stride]
+        row[PAD : PAD + width] = line[:width]
         for x in range(PAD):
-            out[y + PAD, x] = out[y + PAD, PAD + _mirror(x - PAD, width)]
-            out[y + PAD, PAD + width + x] = out[y + PAD, PAD + _mirror(width + x, width)]
+            row[x] = line[_mirror(x - PAD, width)]
+            row[PAD + width + x] = line[_mirror(width + x, width)]
     for y in range(PAD):
-        out[y] = out[PAD + _mirror(y - PAD, height)]
-        out[PAD + height + y] = out[PAD + _mirror(height + y, height)]
+        for to, source in ((y, _mirror(y - PAD, height)), (PAD + height + y, _mirror(height + y, height))):
+            source += PAD
+            out[to * stride : (to + 1) * stride] = out[source * stride : (source + 1) * stride]
     return out
 
 
 @helper
-def _filter_line(line: Any, taps: Any, out: Any) -> None:
-    for x in range(out.size):
-        c = np.uintp(x + PREFILTER_REACH)
-        total = taps[0] * line[c]
+def _filter_along(line: Any, taps: Any, out: Any) -> None:
+    """Symmetric filter along a line that begins ``PREFILTER_REACH`` samples before ``out``."""
+    for n in range(0, out.size, LANES):
+        c = np.uintp(n + PREFILTER_REACH)
+        value = spread(taps[0]) * load(line, c)
         for k in range(1, PREFILTER_REACH + 1):
-            total += taps[k] * (line[c - np.uintp(k)] + line[c + np.uintp(k)])
-        out[x] = total
+            d = np.uintp(k)
+            value += spread(taps[k]) * (load(line, c - d) + load(line, c + d))
+        store(out, np.uintp(n), value)
 
 
 @helper
-def _add_pair(total: Any, factor: Any, above: Any, below: Any) -> None:
-    for x in range(total.size):
-        total[x] += factor * (above[x] + below[x])
+def _filter_across(rows: Any, starts: Any, taps: Any, out: Any) -> None:
+    """The same across rows of which the flat indices are given."""
+    reach = PREFILTER_REACH
+    for n in range(0, out.size, LANES):
+        value = spread(taps[0]) * load(rows, np.uintp(starts[reach] + n))
+        for k in range(1, reach + 1):
+            pair = load(rows, np.uintp(starts[reach - k] + n)) + load(rows, np.uintp(starts[reach + k] + n))
+            value += spread(taps[k]) * pair
+        store(out, np.uintp(n), value)
+
+
+@inlined
+def _spread_table(t: Any) -> Any:
+    """The 18 numbers of ``splines.tap_table`` as vectors."""
+    return (
+        spread(t[0]), spread(t[1]), spread(t[2]), spread(t[3]), spread(t[4]), spread(t[5]),
+        spread(t[6]), spread(t[7]), spread(t[8]), spread(t[9]), spread(t[10]), spread(t[11]),
+        spread(t[12]), spread(t[13]), spread(t[14]), spread(t[15]), spread(t[16]), spread(t[17]),
+    )  # fmt: skip
 
 
 @inlined
 def _weights(tau: Any, t: Any) -> Any:
-    """The six tap weights at tau = fraction - 1/2, from ``splines.tap_table``."""
+    """The six tap weights at tau = fraction - 1/2; ``t`` is the spread table."""
     s = tau * tau
     e0 = t[0] + s * (t[2] + s * t[4])
     o0 = tau * (t[1] + s * (t[3] + s * t[5]))
@@ -97,39 +121,23 @@ def _weights(tau: Any, t: Any) -> Any:
 
 
 @inlined
-def _taps(c: Any, i: Any, a0: Any, a1: Any, a2: Any, a3: Any, a4: Any, a5: Any) -> Any:
-    left = a0 * c[i] + a1 * c[i + _one] + a2 * c[i + _two]
-    return left + a3 * c[i + _three] + a4 * c[i + _four] + a5 * c[i + _five]
+def _taps(c: Any, i: Any, a: Any) -> Any:
+    left = a[0] * load(c, i) + a[1] * load(c, i + _one) + a[2] * load(c, i + _two)
+    return left + (a[3] * load(c, i + _three) + a[4] * load(c, i + _four) + a[5] * load(c, i + _five))
 
 
 @inlined
-def _warp_piece(
-    c: Any, stride: Any, first: Any, count: int, ramp: Any,
-    x0: Any, x1: Any, x2: Any, y0: Any, y1: Any, y2: Any, table: Any, out: Any, at: Any,
-) -> None:  # fmt: skip
-    """``count`` pixels whose third tap advances by exactly one column each.
-
-    tau_x = x0 + x1 k + x2 k^2 for pixel k, tau_y likewise; ``first`` is the flat index of the
-    first of the 36 taps of pixel 0. Unsigned indices, since signed ones keep LLVM from vectors.
-    """
-    r0 = first
-    r1 = r0 + stride
-    r2 = r1 + stride
-    r3 = r2 + stride
-    r4 = r3 + stride
-    r5 = r4 + stride
-    for n in range(count):
-        k = np.uintp(n)
-        t = ramp[k]
-        a0, a1, a2, a3, a4, a5 = _weights(x0 + t * (x1 + t * x2), table)
-        b0, b1, b2, b3, b4, b5 = _weights(y0 + t * (y1 + t * y2), table)
-        total = b0 * _taps(c, r0 + k, a0, a1, a2, a3, a4, a5)
-        total += b1 * _taps(c, r1 + k, a0, a1, a2, a3, a4, a5)
-        total += b2 * _taps(c, r2 + k, a0, a1, a2, a3, a4, a5)
-        total += b3 * _taps(c, r3 + k, a0, a1, a2, a3, a4, a5)
-        total += b4 * _taps(c, r4 + k, a0, a1, a2, a3, a4, a5)
-        total += b5 * _taps(c, r5 + k, a0, a1, a2, a3, a4, a5)
-        out[at + k] = total
+def _pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: Any) -> Any:
+    """A vector of pixels; ``first`` is the flat index of the first of the 36 taps of its first pixel."""
+    a = _weights(tau_x, t)
+    b = _weights(tau_y, t)
+    upper = b[0] * _taps(c, first, a)
+    lower = b[5] * _taps(c, first + _five * stride, a)
+    upper += b[1] * _taps(c, first + stride, a)
+    lower += b[4] * _taps(c, first + _four * stride, a)
+    upper += b[2] * _taps(c, first + _two * stride, a)
+    lower += b[3] * _taps(c, first + _three * stride, a)
+    return upper + lower
 
 
 @inlined
@@ -159,40 +167,20 @@ def _piece_length(fx: Any, x1: Any, x2: Any, fy: Any, y1: Any, y2: Any, left: in
     return left
 
 
-@inlined
-def warp_row(
-    c: Any, stride: int, size: int, ramp: Any,
-    x: Any, x1: Any, x2: Any, y: Any, y1: Any, y2: Any, table: Any, out: Any, at: int,
-) -> None:  # fmt: skip
-    """The image along X = x + x1 k + x2 k^2, Y = y + y1 k + y2 k^2, k = 0 .. size-1.
-
-    ``c`` is flat, X and Y count from its own first sample; the caller has made sure that all
-    positions lie inside. ``out`` is written from ``at`` on and has room for LANES more than ``size``.
-    """
-    ix = math.floor(x)
-    iy = math.floor(y)
-    fx = x - ix
-    fy = y - iy
-    drift = x1 - 1.0
-    last = size - 1
-    if x2 == 0.0 and y2 == 0.0 and 0.0 <= fx + last * drift < 1.0 and 0.0 <= fy + last * y1 < 1.0:
-        count = (size + LANES - 1) // LANES * LANES
-        _warp_piece(
-            c, np.uintp(stride), np.uintp((iy - 2) * stride + ix - 2), count, ramp,
-            f4(fx - 0.5), f4(drift), f4(0), f4(fy - 0.5), f4(y1), f4(0), table, out, np.uintp(at),
-        )  # fmt: skip
-        return
-    _warp_in_pieces(c, stride, size, ramp, x, x1, x2, y, y1, y2, table, out, at)
-
-
 @helper
-def _warp_in_pieces(
-    c: Any, stride: int, size: int, ramp: Any,
-    x: Any, x1: Any, x2: Any, y: Any, y1: Any, y2: Any, table: Any, out: Any, at: int,
-) -> None:  # fmt: skip
-    """``warp_row`` where an integer part changes inside the row."""
+def _cut_row(
+    stride: int, size: int, x: Any, x1: Any, x2: Any, y: Any, y1: Any, y2: Any, at: int,
+    n: int, where: Any, how: Any,
+) -> int:  # fmt: skip
+    """Append the pieces of a row to the list of ``n`` and return their new number.
+
+    The row runs along X = x + x1 k + x2 k^2, Y = y + y1 k + y2 k^2, k = 0 .. size-1, and is written
+    from ``at`` on.
+    """
     k = 0
     drift = x1 - 1.0
+    last = size - 1
+    straight = x2 == 0.0 and y2 == 0.0
     while k < size:
         xk = x + k * (x1 + k * x2)
         yk = y + k * (y1 + k * y2)
@@ -202,13 +190,159 @@ def _warp_in_pieces(
         fy = yk - iy
         sx = drift + 2.0 * k * x2
         sy = y1 + 2.0 * k * y2
-        length = _piece_length(fx, sx, x2, fy, sy, y2, size - k)
-        count = (length + LANES - 1) // LANES * LANES
-        _warp_piece(
-            c, np.uintp(stride), np.uintp((iy - 2) * stride + ix - 2), count, ramp,
-            f4(fx - 0.5), f4(sx), f4(x2), f4(fy - 0.5), f4(sy), f4(y2), table, out, np.uintp(at + k),
-        )  # fmt: skip
+        length = size - k
+        if not (straight and 0.0 <= fx + last * drift < 1.0 and 0.0 <= fy + last * y1 < 1.0):
+            length = _piece_length(fx, sx, x2, fy, sy, y2, length)
+        where[n, 0] = (iy - 2) * stride + ix - 2
+        where[n, 1] = at + k
+        where[n, 2] = length
+        how[n, 0] = fx - 0.5
+        how[n, 1] = sx
+        how[n, 2] = fy - 0.5
+        how[n, 3] = sy
+        n += 1
         k += length
+    return n
+
+
+@helper
+def _warp_pieces(c: Any, stride: Any, n: int, where: Any, how: Any, ramp: Any, table: Any, out: Any) -> None:
+    """Warp ``n`` pieces: tau_x = how[0] + how[1] k, tau_y = how[2] + how[3] k."""
+    t = _spread_table(table)
+    for piece in range(n):
+        first = np.uintp(where[piece, 0])
+        at = np.uintp(where[piece, 1])
+        x0 = spread(how[piece, 0])
+        x1 = spread(how[piece, 1])
+        y0 = spread(how[piece, 2])
+        y1 = spread(how[piece, 3])
+        for done in range(0, where[piece, 2], LANES):
+            k = np.uintp(done)
+            r = load(ramp, k)
+            store(out, at + k, _pixels(c, stride, first + k, x0 + r * x1, y0 + r * y1, t))
+
+
+@helper
+def _warp_bent_pieces(
+    c: Any, stride: Any, n: int, where: Any, how: Any, x2: Any, y2: Any, ramp: Any, table: Any, out: Any
+) -> None:
+    """The same with tau_x = how[0] + how[1] k + x2 k^2, tau_y likewise."""
+    t = _spread_table(table)
+    for piece in range(n):
+        first = np.uintp(where[piece, 0])
+        at = np.uintp(where[piece, 1])
+        for done in range(0, where[piece, 2], LANES):
+            k = np.uintp(done)
+            r = load(ramp, k)
+            tau_x = spread(how[piece, 0]) + r * (spread(how[piece, 1]) + r * spread(x2))
+            tau_y = spread(how[piece, 2]) + r * (spread(how[piece, 3]) + r * spread(y2))
+            store(out, at + k, _pixels(c, stride, first + k, tau_x, tau_y, t))
+
+
+@helper
+def new_plan(size: int) -> Any:
+    """Room for ``plan_rows`` (starts, taus) and for ``warp_cut_rows`` (where, how)."""
+    return (
+        np.empty(size, np.int64), np.empty((2, size), np.float32),
+        np.empty((ROWS * size, 3), np.int64), np.empty((ROWS * size, 4), np.float32),
+    )  # fmt: skip
+
+
+@inlined
+def plan_rows(p: Any, x: Any, y: Any, size: int, stride: int, starts: Any, taus: Any) -> bool:
+    """Where each row of a ZOI of order 1 begins in ``c``; False if not every row is in one piece.
+
+    All rows are reckoned ahead, since the processor cannot look beyond the row that it computes.
+
+    Parameters
+    ----------
+    x, y : position of the first pixel, px from the first sample of ``c``
+    starts : (>= size,) int64, written: index of the first of the 36 taps of the first pixel
+    taus : (2, >= size) float32, written: fractions less 1/2
+    """
+    last = size - 1
+    end_x = last * p[1]
+    end_y = last * p[4]
+    inside_x = inside_y = True
+    for row in range(size):
+        xr = x + row * p[2]
+        yr = y + row * (1 + p[5])
+        ix = math.floor(xr)
+        iy = math.floor(yr)
+        fx = xr - ix
+        fy = yr - iy
+        inside_x &= (fx + end_x >= 0.0) & (fx + end_x < 1.0)
+        inside_y &= (fy + end_y >= 0.0) & (fy + end_y < 1.0)
+        starts[row] = (iy - 2) * stride + ix - 2
+        taus[0, row] = fx - 0.5
+        taus[1, row] = fy - 0.5
+    return inside_x and inside_y
+
+
+@inlined
+def warp_rows(
+    c: Any, stride: Any, x1: Any, y1: Any, first: int, count: int, size: int, starts: Any, taus: Any,
+    ramp: Any, table: Any, out: Any, line: Any,
+) -> None:  # fmt: skip
+    """Rows ``first`` .. of a planned ZOI, ``line`` apart in ``out``; x1 and y1 are the slopes of the fractions."""
+    t = _spread_table(table)
+    sx = spread(x1)
+    sy = spread(y1)
+    at = np.uintp(0)
+    for row in range(first, first + count):
+        start = np.uintp(starts[row])
+        x0 = spread(taus[0, row])
+        y0 = spread(taus[1, row])
+        for n in range(0, size, LANES):
+            k = np.uintp(n)
+            r = load(ramp, k)
+            store(out, at + k, _pixels(c, stride, start + k, x0 + r * sx, y0 + r * sy, t))
+        at += line
+
+
+@helper
+def warp_cut_rows(
+    c: Any, stride: int, p: Any, order: int, x: Any, y: Any, first: int, count: int, size: int,
+    where: Any, how: Any, ramp: Any, table: Any, out: Any, line: int,
+) -> None:  # fmt: skip
+    """The same for any motion of order 1 or 2: rows are cut where an integer part changes.
+
+    Parameters
+    ----------
+    x, y : first column and row of the ZOI, px from the first sample of ``c``
+    where, how : (>= count * size, 3) int64 and (.., 4) float32, for use here
+    out : flat float32
+        Written in whole vectors of which each may begin at any pixel: what is written too much is
+        overwritten or never read.
+    """
+    reach = (size - 1) / 2
+    n = 0
+    x2 = y2 = 0.0
+    x1, y1 = 1 + p[1], p[4]
+    if order == 2:
+        x2, y2 = p[3], p[9]
+    for row in range(first, first + count):
+        eta = row - reach
+        u, v = displacement(p, order, -reach, eta)
+        if order == 2:
+            x1 = 1 + p[1] + p[4] * eta - 2 * p[3] * reach
+            y1 = p[7] + p[10] * eta - 2 * p[9] * reach
+        at = (row - first) * line
+        n = _cut_row(stride, size, x + u, x1, x2, y + row + v, y1, y2, at, n, where, how)
+    if order == 1:
+        _warp_pieces(c, np.uintp(stride), n, where, how, ramp, table, out)
+    else:
+        _warp_bent_pieces(c, np.uintp(stride), n, where, how, f4(x2), f4(y2), ramp, table, out)
+
+
+@helper
+def displacement(p: Any, order: int, x: Any, y: Any) -> Any:
+    """(u, v) in px at (x, y) px from the centre."""
+    if order == 1:
+        return p[0] + p[1] * x + p[2] * y, p[3] + p[4] * x + p[5] * y
+    u = p[0] + p[1] * x + p[2] * y + p[3] * x * x + p[4] * x * y + p[5] * y * y
+    v = p[6] + p[7] * x + p[8] * y + p[9] * x * x + p[10] * x * y + p[11] * y * y
+    return u, v
 
 
 @helper

@@ -172,7 +172,7 @@ def first_frame(report: Report) -> None:
                 ready.energy,
             )
         )
-        shared = sum(a.nbytes for a in (ready.fx, ready.fy, ready.f, ready.raw))
+        shared = ready.images.nbytes
         report.add("Reference and first frame", {
             "ZOI": size, "order": order, "prepare ZOI/s": grid.n_active / prepare,
             "first frame with search ZOI/s": grid.n_active / scratch, "bytes a ZOI": own / grid.n_active,
