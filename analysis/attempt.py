@@ -74,21 +74,13 @@ class Attempt:
         self.nuisance = np.full((count, 2), np.nan)
         self.iterations = np.zeros(count, np.uint8)
         self.status = self.ready.status.copy()
-        self.tolerance, self.trust = self._tolerance()
+        self.tolerance, self.trust = kernel._tolerance(self._current_std())
         self._guess = self.p
 
     def _current_std(self) -> float:
         if self.noise is None:
             return self.kernel.reference_noise
         return float(np.sqrt(self.noise.variance(self.ready.pattern.mean)))
-
-    def _tolerance(self) -> tuple[Floats, Floats]:
-        """Error that may be left in displacement and gradients, (A, 2), and uncertainty of u and v, (A,)."""
-        settings, unit = self.kernel.settings, self.kernel._unit_sigma
-        current = self._current_std()
-        share = settings.tolerance_sigma * np.hypot(current, self.kernel.reference_noise)
-        floor = np.array([settings.tolerance_px, settings.tolerance_strain])
-        return np.maximum(share * unit[:, :2], floor), current * unit[:, 2]
 
     def run(self, guess: Floats) -> None:
         """Measure every ZOI that has a pattern and a guess; the others are LOST."""
@@ -108,8 +100,12 @@ class Attempt:
         iterate = self._iterate if self.kernel._sensors is None else self._iterate_phases
         found = iterate(places, guess[places])
         ready, kernel = self.ready, self.kernel
-        self.p[places], self.left[places], self.nuisance[places] = found.values, found.left, found.nuisance
-        self.iterations[places] = found.iterations
+        if len(which) == len(self.p):
+            self.p, self.left, self.nuisance = found.values, found.left, found.nuisance
+            self.iterations = found.iterations
+        else:
+            self.p[which], self.left[which], self.nuisance[which] = found.values, found.left, found.nuisance
+            self.iterations[which] = found.iterations
         gain = found.nuisance[:, 0]
         left, expected = found.left / ready.freedom[places], self._expected(places, gain)
         status = judge(
@@ -123,10 +119,13 @@ class Attempt:
             self.noise is not None and kernel._noise is not None,
         )
         noise = kernel._share_variance[places] * np.maximum(expected, left)[:, None]
-        stretch = stretch_of(found.values, kernel.grid.size / 6)
         limit = kernel.settings.bending_px
-        uneven = bends(found.bending, noise, ready.shapes.noise, stretch, limit)
-        status[(status == Status.OK) & uneven] = Status.UNEVEN
+        # Few bend by more than the limit; only of those does it matter how much strain explains.
+        suspect = bends(found.bending, noise, ready.shapes.noise, 0.0, limit)
+        which = np.flatnonzero((status == Status.OK) & suspect)
+        stretch = stretch_of(found.values[which], kernel.grid.size / 6)
+        uneven = bends(found.bending[which], noise[which], ready.shapes.noise, stretch, limit)
+        status[which[uneven]] = Status.UNEVEN
         self.status[places] = status
 
     def _iterate_phases(self, which: Places, guess: Floats) -> Outcome:
@@ -256,7 +255,9 @@ class Attempt:
         with np.errstate(invalid="ignore", divide="ignore"):
             residual = self.left / self.ready.freedom / (self.nuisance[:, 0] ** 2 * reference + current)
         noise = float(np.sqrt(np.median(current[ok]))) if ok.any() else float("nan")
-        values = np.where(ok[:, None], kernel._total(self.p), np.nan)
+        values = kernel._total(self.p)
+        if not ok.all():
+            values = np.where(ok[:, None], values, np.nan)
         status = np.full(len(kernel.grid.active.ravel()), Status.NOT_MEASURED, np.uint8)
         status[kernel._index] = self.status
         return StrainField(
@@ -276,10 +277,10 @@ class Attempt:
         )
 
     def _spread(self, values: NDArray[Any], empty: float = np.nan) -> NDArray[Any]:
-        """(A, K) onto the grid: (K, R, C)."""
+        """(A, K) onto the grid: (K, R, C); where all ZOIs are active, the same memory."""
         rows, columns = self.kernel.grid.shape
         if len(self.kernel._index) == rows * columns:
-            return np.ascontiguousarray(values.T).reshape(-1, rows, columns)
+            return values.T.reshape(-1, rows, columns)
         out = np.full((values.shape[1], rows * columns), empty, values.dtype)
         out[:, self.kernel._index] = values.T
         return out.reshape(-1, rows, columns)

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -26,12 +28,34 @@ def inlined(function: Callable[..., Any]) -> Any:
 
 def helper(function: Callable[..., Any]) -> Any:
     """A function called from compiled loops; small or inlined by the compiler as it sees fit."""
-    return numba.njit(function, error_model="numpy", fastmath=FAST, cache=True, nogil=True)
+    return _stamped(numba.njit(function, error_model="numpy", fastmath=FAST, cache=True, nogil=True))
 
 
 def parallel(function: Callable[..., Any]) -> Any:
     """A loop over ZOIs or rows, shared among the threads; each item is done by one of them."""
-    return numba.njit(function, error_model="numpy", fastmath=FAST, cache=True, nogil=True, parallel=True)
+    options = {"error_model": "numpy", "fastmath": FAST, "cache": True, "nogil": True, "parallel": True}
+    return _stamped(numba.njit(function, **options))
+
+
+def _stamped(dispatcher: Any) -> Any:
+    """The same, compiled anew when any of the compiled modules has changed.
+
+    numba itself looks only at the file of the function, and would run the old code of its helpers.
+    """
+    try:
+        dispatcher._cache._cache_file._source_stamp = _stamp()
+    except AttributeError:  # numba's own affair: an installed package changes all its files at once
+        log.debug("the stamp of numba's cache could not be set")
+    return dispatcher
+
+
+@lru_cache(maxsize=1)
+def _stamp() -> tuple[tuple[str, float, int], ...]:
+    """Name, time and size of every module of this package with compiled code."""
+    modules = (
+        m for m in sorted(Path(__file__).parent.glob("*.py")) if "analysis.compiled" in m.read_text("utf-8")
+    )
+    return tuple((m.name, m.stat().st_mtime, m.stat().st_size) for m in (*modules, Path(__file__)))
 
 
 def is_cached(function: Any) -> bool:

@@ -11,7 +11,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from analysis.compiled import helper
+from numba import prange
+
+from analysis.compiled import parallel
 
 LEAST_ALPHA, LEAST_BETA = 0.4, 0.1
 """Parts of the news (measured less predicted) that enter position and motion after many frames."""
@@ -22,7 +24,7 @@ NEWS = 4.0
 AGE_MOVED, OLDEST = 3, 20
 
 
-@helper
+@parallel
 def advance(
     values: Any,
     guess: Any,
@@ -37,7 +39,7 @@ def advance(
     """See ``prediction.Motion.after``; the last three (A, modes), (A, modes) and (A,) are written."""
     modes = values.shape[1]
     half = modes // 2
-    for z in range(len(values)):
+    for z in prange(len(values)):
         reach, known = 0.0, True
         for i in range(modes):
             news = abs(values[z, i] - guess[z, i])
@@ -46,8 +48,9 @@ def advance(
             if k < 3:
                 reach = max(reach, news * (1.0 if k == 0 else lever))
         if not known:
-            new_change[z] = 0
-            ahead[z] = 0
+            for i in range(modes):
+                new_change[z, i] = 0.0
+                ahead[z, i] = 0.0
             new_age[z] = 1
             continue
         n = min(age[z] + 1, OLDEST)

@@ -94,6 +94,7 @@ def _moments(
 ) -> Any:  # fmt: skip
     """Warp one ZOI and write J' w d to ``m`` and the sums with the shapes to ``bent_by``; returns d' w d."""
     starts, taus, where, how = plan
+    half = 3 if order == 1 else 6
     stride = width + 2 * PAD
     line = rows.shape[1]
     reach = (size - 1) / 2
@@ -118,29 +119,27 @@ def _moments(
             images, np.uintp(samples), at, np.uintp(pitch), g, np.uintp(line), y, count, rows, columns
         )  # fmt: skip
     energy = difference_moments(columns, rows, line, sums)
-    for component in range(2):
-        s = sums[component]
-        n = component * (3 if order == 1 else 6)
-        m[n], m[n + 1], m[n + 2] = s[0, 0], s[0, 1] / mix[1, 1], s[1, 0] / mix[1, 1]
-        if order == 2:
-            m[n + 3] = (s[0, 2] - mix[2, 0] * s[0, 0]) / mix[2, 2]
-            m[n + 4] = s[1, 1] / mix[1, 1] ** 2
-            m[n + 5] = (s[2, 0] - mix[2, 0] * s[0, 0]) / mix[2, 2]
-        shares(s, bent_by, component * N_SHAPES)
-        n = len(m) - 6 + 3 * component
-        s = sums[2 + component]
-        m[n], m[n + 1], m[n + 2] = s[0, 0], s[0, 1] / mix[1, 1], s[1, 0] / mix[1, 1]
+    x, xx = mix[1, 1], mix[2, 2]
+    for k in range(CHANNELS):
+        n = k * half if k < 2 else len(m) - 12 + 3 * k
+        m[n], m[n + 1], m[n + 2] = sums[k, 0, 0], sums[k, 0, 1] / x, sums[k, 1, 0] / x
+        if k < 2:
+            shares(sums, k, bent_by)
+        if k < 2 and order == 2:
+            m[n + 3] = (sums[k, 0, 2] - mix[2, 0] * sums[k, 0, 0]) / xx
+            m[n + 4] = sums[k, 1, 1] / x**2
+            m[n + 5] = (sums[k, 2, 0] - mix[2, 0] * sums[k, 0, 0]) / xx
     return energy
 
 
 @inlined
-def _solve(inverse: Any, m: Any, step: Any, energy: Any) -> Any:
-    """Parameters of one linear fit and the weighted sum of squares it leaves."""
+def _solve(inverse: Any, z: int, m: Any, step: Any, energy: Any) -> Any:
+    """Parameters of one linear fit, of ZOI ``z``, and the weighted sum of squares it leaves."""
     left = energy
     for i in range(len(m)):
         total = 0.0
         for j in range(len(m)):
-            total += inverse[i, j] * m[j]
+            total += inverse[z, i, j] * m[j]
         step[i] = total
         left -= total * m[i]
     return left
@@ -206,12 +205,12 @@ def track(
                     c, width, images, samples, pitch, top, first, size, order, rows, mix,
                     q, ramp, table, plan, g, columns, sums, m, bent_by,
                 )  # fmt: skip
-                left[z] = _solve(inverse[z], m, step, energy)
+                left[z] = _solve(inverse, z, m, step, energy)
                 gain = 1 + step[modes]
                 nuisance[z, 0] = gain
                 nuisance[z, 1] = step[modes + 3]
                 gain = min(max(gain, GAIN_RANGE[0]), GAIN_RANGE[1])
-                bending[z] = bent(bent_by, cross[z], step, squares[z, 0], squares[z, 1]) / gain**2
+                bending[z] = bent(bent_by, cross, z, step, squares[z, 0], squares[z, 1]) / gain**2
                 longest = 0.0
                 for i in range(modes):
                     longest = max(longest, abs(step[i]) / gain)
@@ -223,13 +222,13 @@ def track(
                     step[i] *= units[i] / gain * brake
                 compose(q, order, step)
                 iterations[z] = iteration + 1
-                if brake == 1.0 and _settled(step, half, lever, tolerance[z], trust[z]):
+                if brake == 1.0 and _settled(step, half, lever, tolerance[z, 0], tolerance[z, 1], trust[z]):
                     state[z] = CONVERGED
                     break
 
 
 @helper
-def _settled(step: Any, half: int, lever: Any, tolerance: Any, trust: Any) -> Any:
+def _settled(step: Any, half: int, lever: Any, length_left: Any, slope_left: Any, trust: Any) -> Any:
     """Whether the error that this step has left is below the tolerances of u, v and the gradients."""
     move = max(abs(step[0]), abs(step[half]))
     turn = 0.0
@@ -237,7 +236,7 @@ def _settled(step: Any, half: int, lever: Any, tolerance: Any, trust: Any) -> An
         turn = max(turn, abs(step[i]), abs(step[half + i]))
     length = max(move, turn * lever)
     left = length * (LEFT_BY_MISFIT + LEFT_BY_NOISE * trust + LEFT_BY_LENGTH * length)
-    return left <= tolerance[0] and left <= tolerance[1] * lever
+    return left <= length_left and left <= slope_left * lever
 
 
 @parallel

@@ -121,6 +121,19 @@ class PhaseKernel:
         self._share_variance = 1 / np.maximum(pixels * self._prepared.energy, 1e-12)
         # Smallest of u and v, smallest of the gradients, largest of u and v.
         self._unit_sigma = np.stack([sigma[:, :2].min(1), sigma[:, 2:].min(1), sigma[:, :2].max(1)], axis=1)
+        self._tolerated: tuple[float, Floats, Floats] = np.nan, np.empty((0, 2)), np.empty(0)
+
+    def _tolerance(self, current: float) -> tuple[Floats, Floats]:
+        """Error that may be left in displacement and gradients, (A, 2), and uncertainty of u and v, (A,).
+
+        ``current`` is the noise of the deformed image, GL; as a rule that of the frame before.
+        """
+        if current != self._tolerated[0]:
+            share = self.settings.tolerance_sigma * np.hypot(current, self.reference_noise)
+            floor = np.array([self.settings.tolerance_px, self.settings.tolerance_strain])
+            allowed = np.maximum(share * self._unit_sigma[:, :2], floor)
+            self._tolerated = current, allowed, current * self._unit_sigma[:, 2]
+        return self._tolerated[1:]
 
     def _check_pattern(self) -> None:
         status = self._prepared.status

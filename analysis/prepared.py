@@ -10,15 +10,13 @@ from numpy.typing import NDArray
 
 from analysis.settings import KernelSettings, NoiseModel
 from analysis.spectrum import Pattern, filtered_pattern
+from analysis.splines import LINE
 from analysis.strain_field import Status
 from analysis.validity import CLIPPED_SHARE, has_pattern
 from analysis.windows import profile
 
 if TYPE_CHECKING:
     from analysis.shapes import Shapes
-
-LINE = 16
-"""Samples of a cache line."""
 
 
 class PatternError(ValueError):

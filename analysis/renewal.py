@@ -129,8 +129,13 @@ def place(field: StrainField, index: NDArray[np.intp], modes: int, shape: tuple[
 
 
 def taken(values: Floats, index: NDArray[np.intp], modes: int) -> Floats:
-    """(6 or 12, R, C) as (A, modes); modes that are not there are zero, those not wanted dropped."""
+    """(6 or 12, R, C) as (A, modes); modes that are not there are zero, those not wanted dropped.
+
+    Where nothing is to be left out this is the same memory.
+    """
     half, own = modes // 2, len(values) // 2
+    if len(values) == modes and len(index) == values[0].size:
+        return values.reshape(modes, -1).T
     out = np.zeros((len(index), modes))
     flat = values.reshape(2, own, -1)[:, :, index]
     keep = min(half, own)

@@ -115,7 +115,10 @@ class NoiseModel:
 
     def variance(self, level: NDArray[np.floating] | float) -> NDArray[np.float64]:
         """Variance of the average of n frames at a grey level, GL^2."""
-        return self.floor + self.slope * np.maximum(np.asarray(level, np.float64), 0)
+        above = np.asarray(level, np.float64)
+        if self.slope == 0:
+            return np.full(above.shape, self.floor)
+        return np.asarray(self.floor + self.slope * np.maximum(above, 0))
 
     def averaged(self, n: int) -> NoiseModel:
         """The same camera with n frames averaged."""

@@ -103,18 +103,19 @@ def _combine(m: Any, px: int, py: int, mix: Any, out: Any) -> None:
 
 
 @inlined
-def shares(s: Any, out: Any, at: int) -> None:
-    """The five shapes of one component, written to out[at:at + 5]; s[j, i] are the sums of w d f_x P_i(x) P_j(y)."""
-    out[at] = _SQRT_HALF * (s[0, 2] + s[2, 0])
-    out[at + 1] = s[0, 3]
-    out[at + 2] = s[1, 2]
-    out[at + 3] = s[2, 1]
-    out[at + 4] = s[3, 0]
+def shares(s: Any, component: int, out: Any) -> None:
+    """The five shapes of a component, from the sums s[component, j, i] of w d f_x P_i(x) P_j(y), written to ``out``."""
+    at = component * N_SHAPES
+    out[at] = _SQRT_HALF * (s[component, 0, 2] + s[component, 2, 0])
+    out[at + 1] = s[component, 0, 3]
+    out[at + 2] = s[component, 1, 2]
+    out[at + 3] = s[component, 2, 1]
+    out[at + 4] = s[component, 3, 0]
 
 
 @inlined
-def bent(s: Any, cross: Any, step: Any, unit_x: Any, unit_y: Any) -> Any:
-    """Sum of the squared shares, px^2, of what is left of the difference after a linear fit.
+def bent(s: Any, cross: Any, z: int, step: Any, unit_x: Any, unit_y: Any) -> Any:
+    """Sum of the squared shares, px^2, of what is left of the difference after a linear fit of ZOI ``z``.
 
     ``s`` (10,) are the sums with the whole difference, ``step`` (P,) is the fit, ``unit_x`` and ``unit_y`` the
     sums of w f_x^2 and w f_y^2.
@@ -123,7 +124,7 @@ def bent(s: Any, cross: Any, step: Any, unit_x: Any, unit_y: Any) -> Any:
     for i in range(2 * N_SHAPES):
         share = s[i]
         for j in range(len(step)):
-            share -= cross[i, j] * step[j]
+            share -= cross[z, i, j] * step[j]
         share /= unit_x if i < N_SHAPES else unit_y
         total += share * share
     return total

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 TAPS = 6
 PREFILTER_REACH = 15
 """Taps to each side; the quintic prefilter has fallen to 3e-6 there."""
+LINE = 16
+"""Samples of a cache line."""
 PAD = 8
 """Pixels of mirrored surroundings that the coefficients of an image are given."""
 

@@ -95,7 +95,9 @@ def judge(
     return status
 
 
-def bends(bending: Floats, unit: Floats, noise: Floats, stretch: Floats, limit: float) -> NDArray[np.bool_]:
+def bends(
+    bending: Floats, unit: Floats, noise: Floats, stretch: Floats | float, limit: float
+) -> NDArray[np.bool_]:
     """Whether the displacement in each ZOI jumps, or bends so much that its centre is wrong, (A,).
 
     Parameters
@@ -106,14 +108,14 @@ def bends(bending: Floats, unit: Floats, noise: Floats, stretch: Floats, limit: 
         Variance of u and of v from the noise, of a ZOI without anything else to find.
     noise : (2,)
         ``shapes.Shapes.noise``.
-    stretch : (A,), px
+    stretch : (A,) or float, px
         Displacement that the strain makes over the width of the window (``stretch_of``). Where a
         specimen necks the strain is steep, but small beside itself; across a crack it is not.
     limit : float, px
         What the displacement at the centre may be wrong by.
     """
-    mean = unit.sum(axis=1) * noise[0]
-    spread = np.sqrt(2 * noise[1] * (unit**2).sum(axis=1))
+    mean = (unit[:, 0] + unit[:, 1]) * noise[0]
+    spread = np.sqrt(2 * noise[1] * (unit[:, 0] ** 2 + unit[:, 1] ** 2))
     allowed = limit**2 + (BENDING_SHARE * stretch) ** 2
     return np.asarray(~(bending <= mean + BENDING_CHANCE * spread + allowed))
 

@@ -28,6 +28,7 @@ _FLOAT = ir.FloatType()
 _VECTOR = ir.VectorType(_FLOAT, LANES)
 _INT = ir.IntType(32)
 _ALIGNMENT = 4
+_POINTER = 64
 """Bytes: a vector may start at any sample."""
 
 
@@ -91,6 +92,50 @@ def load(_typing: Any, array: Any, index: Any) -> Any:
 
 
 @intrinsic
+def address(_typing: Any, array: Any, index: Any) -> Any:
+    """Where the flat ``index`` (uintp) of a float32 array lies in memory, for ``load_from``."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = _address(context, builder, signature.args[0], *arguments)
+        return _opaque(builder, builder.ptrtoint(place, ir.IntType(_POINTER)))
+
+    return types.uintp(array, types.uintp), generate
+
+
+@intrinsic
+def further(_typing: Any, place: Any, samples: Any) -> Any:
+    """An address so many float32 (uintp) behind another."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        bytes_on = builder.mul(arguments[1], ir.Constant(arguments[1].type, _ALIGNMENT))
+        return _opaque(builder, builder.add(arguments[0], bytes_on))
+
+    return types.uintp(types.uintp, types.uintp), generate
+
+
+def _opaque(builder: Any, value: Any) -> Any:
+    """The same integer, of which the compiler forgets how it was made.
+
+    Else it would add row and column anew in every load, and loads with an index register count twice
+    where instructions are issued.
+    """
+    return builder.asm(ir.FunctionType(value.type, [value.type]), "", "=r,0", [value], False)
+
+
+@intrinsic
+def load_from(_typing: Any, place: Any, samples: Any) -> Any:
+    """LANES samples so many float32 (a constant) behind an address."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        bytes_on = builder.mul(arguments[1], ir.Constant(arguments[1].type, _ALIGNMENT))
+        return builder.load(
+            builder.inttoptr(builder.add(arguments[0], bytes_on), _VECTOR.as_pointer()), align=_ALIGNMENT
+        )
+
+    return vector(types.uintp, types.uintp), generate
+
+
+@intrinsic
 def store(_typing: Any, array: Any, index: Any, value: Any) -> Any:
     """Write a vector to a float32 array from the flat ``index`` (uintp) on."""
 
@@ -112,6 +157,18 @@ def spread(_typing: Any, value: Any) -> Any:
         return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(_INT, LANES), [0] * LANES))
 
     return vector(types.float32), generate
+
+
+@intrinsic
+def fused(_typing: Any, a: Any, b: Any, c: Any) -> Any:
+    """a b + c in one instruction where the processor has it; a product used twice is not fused by itself."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        kind = ir.FunctionType(_VECTOR, [_VECTOR] * 3)
+        add = cgutils.get_or_insert_function(builder.module, kind, f"llvm.fmuladd.v{LANES}f32")
+        return builder.call(add, arguments, fastmath=_FLAGS)
+
+    return vector(vector, vector, vector), generate
 
 
 @intrinsic

@@ -15,13 +15,18 @@ from numba import prange
 from numpy.typing import NDArray
 
 from analysis.compiled import helper, inlined, parallel
-from analysis.splines import PAD, PREFILTER_REACH
-from analysis.vectors import LANES, load, spread, store
+from analysis.splines import LINE, PAD, PREFILTER_REACH
+from analysis.vectors import LANES, address, further, fused, load, load_from, spread, store
 
 f4 = np.float32
+GROUP = 4 * LANES
+"""Samples that are filtered at a time: one sum after the other would wait for each product."""
+BAND, STRIP = 32, 2 * GROUP
+"""Rows and columns that are filtered along y at a time, so that a row is read once from afar, not 31 times."""
 ROWS = 16
 """Rows that are warped and summed before the next: few enough for the first-level cache."""
-_one, _two, _three, _four, _five = (np.uintp(i) for i in range(1, 6))
+_lanes = np.uintp(LANES)
+_zero, _one, _two, _three, _four, _five = (np.uintp(i) for i in range(6))
 
 
 @helper
@@ -43,29 +48,36 @@ def coefficients(image: NDArray[np.float32], offset: Any, taps: NDArray[np.float
     """
     height, width = image.shape
     reach = PREFILTER_REACH
-    across = (width + LANES - 1) // LANES * LANES
+    across = (width + GROUP - 1) // GROUP * GROUP
     stride = width + 2 * PAD
-    along_x = np.empty((height, across), np.float32)
-    out = np.zeros((height + 2 * PAD) * stride + LANES, np.float32)
+    pitch = across + LINE  # an odd number of cache lines, or the rows would displace each other
+    along_x = np.empty((height, pitch), np.float32)
+    out = np.empty((height + 2 * PAD) * stride + LANES, np.float32)
+    out[out.size - LANES :] = 0
     for y in prange(height):
-        line = np.zeros(across + 2 * reach + LANES, np.float32)
+        line = np.zeros(across + 2 * reach, np.float32)
         for x in range(width):
             line[x + reach] = image[y, x] - offset
         for x in range(reach):
             line[x] = image[y, _mirror(x - reach, width)] - offset
             line[width + reach + x] = image[y, _mirror(width + x, width)] - offset
-        _filter_along(line, taps, along_x[y])
-    for y in prange(height):
-        rows = np.empty(2 * reach + 1, np.intp)
-        for k in range(2 * reach + 1):
-            rows[k] = _mirror(y + k - reach, height) * across
-        line = np.empty(across, np.float32)
-        _filter_across(along_x, rows, taps, line)
-        row = out[(y + PAD) * stride : (y + PAD + 1) * stride]
-        row[PAD : PAD + width] = line[:width]
-        for x in range(PAD):
-            row[x] = line[_mirror(x - PAD, width)]
-            row[PAD + width + x] = line[_mirror(width + x, width)]
+        _filter_along(line, taps, along_x[y, :across])
+    starts = np.empty(height + 2 * reach, np.intp)
+    for y in range(-reach, height + reach):
+        starts[y + reach] = _mirror(y, height) * pitch
+    for block in prange((height + BAND - 1) // BAND):
+        line = np.empty((BAND, across), np.float32)
+        first = block * BAND
+        count = min(BAND, height - first)
+        for x in range(0, across, STRIP):
+            for y in range(count):
+                _filter_across(along_x, starts[first + y :], x, min(x + STRIP, across), taps, line[y])
+        for y in range(count):
+            row = out[(first + y + PAD) * stride : (first + y + PAD + 1) * stride]
+            row[PAD : PAD + width] = line[y, :width]
+            for x in range(PAD):
+                row[x] = line[y, _mirror(x - PAD, width)]
+                row[PAD + width + x] = line[y, _mirror(width + x, width)]
     for y in range(PAD):
         for to, source in ((y, _mirror(y - PAD, height)), (PAD + height + y, _mirror(height + y, height))):
             source += PAD
@@ -76,54 +88,76 @@ def coefficients(image: NDArray[np.float32], offset: Any, taps: NDArray[np.float
 @helper
 def _filter_along(line: Any, taps: Any, out: Any) -> None:
     """Symmetric filter along a line that begins ``PREFILTER_REACH`` samples before ``out``."""
-    for n in range(0, out.size, LANES):
-        c = np.uintp(n + PREFILTER_REACH)
-        value = spread(taps[0]) * load(line, c)
+    for n in range(0, out.size, GROUP):
+        i = np.uintp(n + PREFILTER_REACH)
+        tap = spread(taps[0])
+        v0 = tap * load(line, i)
+        v1 = tap * load(line, i + _lanes)
+        v2 = tap * load(line, i + _two * _lanes)
+        v3 = tap * load(line, i + _three * _lanes)
         for k in range(1, PREFILTER_REACH + 1):
-            d = np.uintp(k)
-            value += spread(taps[k]) * (load(line, c - d) + load(line, c + d))
-        store(out, np.uintp(n), value)
+            tap = spread(taps[k])
+            p = i - np.uintp(k)
+            q = i + np.uintp(k)
+            v0 += tap * (load(line, p) + load(line, q))
+            v1 += tap * (load(line, p + _lanes) + load(line, q + _lanes))
+            v2 += tap * (load(line, p + _two * _lanes) + load(line, q + _two * _lanes))
+            v3 += tap * (load(line, p + _three * _lanes) + load(line, q + _three * _lanes))
+        _store_group(out, np.uintp(n), v0, v1, v2, v3)
 
 
 @helper
-def _filter_across(rows: Any, starts: Any, taps: Any, out: Any) -> None:
-    """The same across rows of which the flat indices are given."""
+def _filter_across(rows: Any, starts: Any, first: int, last: int, taps: Any, out: Any) -> None:
+    """The same across rows of which the flat indices are given, for the columns ``first`` .. ``last``."""
     reach = PREFILTER_REACH
-    for n in range(0, out.size, LANES):
-        value = spread(taps[0]) * load(rows, np.uintp(starts[reach] + n))
+    for n in range(first, last, GROUP):
+        i = np.uintp(starts[reach] + n)
+        tap = spread(taps[0])
+        v0 = tap * load(rows, i)
+        v1 = tap * load(rows, i + _lanes)
+        v2 = tap * load(rows, i + _two * _lanes)
+        v3 = tap * load(rows, i + _three * _lanes)
         for k in range(1, reach + 1):
-            pair = load(rows, np.uintp(starts[reach - k] + n)) + load(rows, np.uintp(starts[reach + k] + n))
-            value += spread(taps[k]) * pair
-        store(out, np.uintp(n), value)
+            tap = spread(taps[k])
+            p = np.uintp(starts[reach - k] + n)
+            q = np.uintp(starts[reach + k] + n)
+            v0 += tap * (load(rows, p) + load(rows, q))
+            v1 += tap * (load(rows, p + _lanes) + load(rows, q + _lanes))
+            v2 += tap * (load(rows, p + _two * _lanes) + load(rows, q + _two * _lanes))
+            v3 += tap * (load(rows, p + _three * _lanes) + load(rows, q + _three * _lanes))
+        _store_group(out, np.uintp(n), v0, v1, v2, v3)
 
 
 @inlined
-def _spread_table(t: Any) -> Any:
-    """The 18 numbers of ``splines.tap_table`` as vectors."""
-    return (
-        spread(t[0]), spread(t[1]), spread(t[2]), spread(t[3]), spread(t[4]), spread(t[5]),
-        spread(t[6]), spread(t[7]), spread(t[8]), spread(t[9]), spread(t[10]), spread(t[11]),
-        spread(t[12]), spread(t[13]), spread(t[14]), spread(t[15]), spread(t[16]), spread(t[17]),
-    )  # fmt: skip
+def _store_group(out: Any, n: Any, v0: Any, v1: Any, v2: Any, v3: Any) -> None:
+    store(out, n, v0)
+    store(out, n + _lanes, v1)
+    store(out, n + _two * _lanes, v2)
+    store(out, n + _three * _lanes, v3)
 
 
 @inlined
 def _weights(tau: Any, t: Any) -> Any:
     """The six tap weights at tau = fraction - 1/2; ``t`` is the spread table."""
     s = tau * tau
-    e0 = t[0] + s * (t[2] + s * t[4])
-    o0 = tau * (t[1] + s * (t[3] + s * t[5]))
-    e1 = t[6] + s * (t[8] + s * t[10])
-    o1 = tau * (t[7] + s * (t[9] + s * t[11]))
-    e2 = t[12] + s * (t[14] + s * t[16])
-    o2 = tau * (t[13] + s * (t[15] + s * t[17]))
-    return e0 - o0, e1 - o1, e2 - o2, e2 + o2, e1 + o1, e0 + o0
+    zero = spread(f4(0))
+    e0 = spread(t[0]) + s * (spread(t[2]) + s * spread(t[4]))
+    o0 = spread(t[1]) + s * (spread(t[3]) + s * spread(t[5]))
+    e1 = spread(t[6]) + s * (spread(t[8]) + s * spread(t[10]))
+    o1 = spread(t[7]) + s * (spread(t[9]) + s * spread(t[11]))
+    e2 = spread(t[12]) + s * (spread(t[14]) + s * spread(t[16]))
+    o2 = spread(t[13]) + s * (spread(t[15]) + s * spread(t[17]))
+    other = zero - tau
+    return (
+        fused(other, o0, e0), fused(other, o1, e1), fused(other, o2, e2),
+        fused(tau, o2, e2), fused(tau, o1, e1), fused(tau, o0, e0),
+    )  # fmt: skip
 
 
 @inlined
-def _taps(c: Any, i: Any, a: Any) -> Any:
-    left = a[0] * load(c, i) + a[1] * load(c, i + _one) + a[2] * load(c, i + _two)
-    return left + (a[3] * load(c, i + _three) + a[4] * load(c, i + _four) + a[5] * load(c, i + _five))
+def _taps(r: Any, a: Any) -> Any:
+    left = a[0] * load_from(r, _zero) + a[1] * load_from(r, _one) + a[2] * load_from(r, _two)
+    return left + (a[3] * load_from(r, _three) + a[4] * load_from(r, _four) + a[5] * load_from(r, _five))
 
 
 @inlined
@@ -131,13 +165,18 @@ def _pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: Any) -> 
     """A vector of pixels; ``first`` is the flat index of the first of the 36 taps of its first pixel."""
     a = _weights(tau_x, t)
     b = _weights(tau_y, t)
-    upper = b[0] * _taps(c, first, a)
-    lower = b[5] * _taps(c, first + _five * stride, a)
-    upper += b[1] * _taps(c, first + stride, a)
-    lower += b[4] * _taps(c, first + _four * stride, a)
-    upper += b[2] * _taps(c, first + _two * stride, a)
-    lower += b[3] * _taps(c, first + _three * stride, a)
-    return upper + lower
+    row = address(c, first)
+    value = b[0] * _taps(row, a)
+    row = further(row, stride)
+    value += b[1] * _taps(row, a)
+    row = further(row, stride)
+    value += b[2] * _taps(row, a)
+    row = further(row, stride)
+    value += b[3] * _taps(row, a)
+    row = further(row, stride)
+    value += b[4] * _taps(row, a)
+    row = further(row, stride)
+    return value + b[5] * _taps(row, a)
 
 
 @inlined
@@ -208,7 +247,7 @@ def _cut_row(
 @helper
 def _warp_pieces(c: Any, stride: Any, n: int, where: Any, how: Any, ramp: Any, table: Any, out: Any) -> None:
     """Warp ``n`` pieces: tau_x = how[0] + how[1] k, tau_y = how[2] + how[3] k."""
-    t = _spread_table(table)
+    t = table
     for piece in range(n):
         first = np.uintp(where[piece, 0])
         at = np.uintp(where[piece, 1])
@@ -227,7 +266,7 @@ def _warp_bent_pieces(
     c: Any, stride: Any, n: int, where: Any, how: Any, x2: Any, y2: Any, ramp: Any, table: Any, out: Any
 ) -> None:
     """The same with tau_x = how[0] + how[1] k + x2 k^2, tau_y likewise."""
-    t = _spread_table(table)
+    t = table
     for piece in range(n):
         first = np.uintp(where[piece, 0])
         at = np.uintp(where[piece, 1])
@@ -285,7 +324,7 @@ def warp_rows(
     ramp: Any, table: Any, out: Any, line: Any,
 ) -> None:  # fmt: skip
     """Rows ``first`` .. of a planned ZOI, ``line`` apart in ``out``; x1 and y1 are the slopes of the fractions."""
-    t = _spread_table(table)
+    t = table
     sx = spread(x1)
     sy = spread(y1)
     at = np.uintp(0)
