@@ -179,66 +179,72 @@ def _pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: Any) -> 
     return value + b[5] * _taps(row, a)
 
 
-@inlined
-def _steps_until(offset: Any, slope: Any, limit: int) -> Any:
-    """How many pixels until ``offset + slope k`` leaves [0, 1); at least 1, at most ``limit``."""
-    if slope > 0:
-        room = (1.0 - offset) / slope
-    elif slope < 0:
-        room = -offset / slope
-    else:
-        return limit
-    if room >= limit:
-        return limit
-    return max(1, math.ceil(room))
-
-
-@helper
-def _piece_length(fx: Any, x1: Any, x2: Any, fy: Any, y1: Any, y2: Any, left: int) -> Any:
-    """Pixels until one of the two integer parts changes along a row (drift beyond one a pixel)."""
-    if x2 == 0.0 and y2 == 0.0:
-        return min(_steps_until(fx, x1, left), _steps_until(fy, y1, left))
-    for k in range(1, left):
-        x = fx + k * (x1 + k * x2)
-        y = fy + k * (y1 + k * y2)
-        if x < 0.0 or x >= 1.0 or y < 0.0 or y >= 1.0:
-            return k
-    return left
-
-
 @helper
 def _cut_row(
-    stride: int, size: int, x: Any, x1: Any, x2: Any, y: Any, y1: Any, y2: Any, at: int,
+    stride: int, size: int, x: Any, drift: Any, inverse_x: Any, y: Any, slope: Any, inverse_y: Any, at: int,
     n: int, where: Any, how: Any,
 ) -> int:  # fmt: skip
-    """Append the pieces of a row to the list of ``n`` and return their new number.
+    """Append the pieces of a straight row to the list of ``n`` and return their new number.
 
-    The row runs along X = x + x1 k + x2 k^2, Y = y + y1 k + y2 k^2, k = 0 .. size-1, and is written
-    from ``at`` on.
+    The row runs along X = x + (1 + drift) k, Y = y + slope k, k = 0 .. size-1, and is written from ``at``
+    on; the inverses are those of drift and slope (``_inverse``).
     """
+    edge_x = 1.0 if inverse_x > 0 else 0.0
+    edge_y = 1.0 if inverse_y > 0 else 0.0
     k = 0
-    drift = x1 - 1.0
-    last = size - 1
-    straight = x2 == 0.0 and y2 == 0.0
     while k < size:
-        xk = x + k * (x1 + k * x2)
-        yk = y + k * (y1 + k * y2)
+        xk = x + k * drift
+        yk = y + k * slope
         ix = math.floor(xk)
         iy = math.floor(yk)
         fx = xk - ix
         fy = yk - iy
-        sx = drift + 2.0 * k * x2
-        sy = y1 + 2.0 * k * y2
-        length = size - k
-        if not (straight and 0.0 <= fx + last * drift < 1.0 and 0.0 <= fy + last * y1 < 1.0):
-            length = _piece_length(fx, sx, x2, fy, sy, y2, length)
-        where[n, 0] = (iy - 2) * stride + ix - 2
+        # A pixel that lies just on the edge is exact with the taps of either side.
+        room: Any = min((edge_x - fx) * inverse_x, (edge_y - fy) * inverse_y)
+        length: Any = min(np.intp(min(room, 1.0 * size)) + 1, size - k)
+        where[n, 0] = (iy - 2) * stride + ix + k - 2
         where[n, 1] = at + k
         where[n, 2] = length
         how[n, 0] = fx - 0.5
-        how[n, 1] = sx
+        how[n, 1] = drift
         how[n, 2] = fy - 0.5
-        how[n, 3] = sy
+        how[n, 3] = slope
+        n += 1
+        k += length
+    return n
+
+
+@inlined
+def _inverse(slope: Any) -> Any:
+    """1/slope; where there is none, what makes any way long."""
+    return 1 / slope if abs(slope) > 1e-12 else 1e12
+
+
+@helper
+def _cut_bent_row(
+    stride: int, size: int, x: Any, x1: Any, x2: Any, y: Any, y1: Any, y2: Any, at: int,
+    n: int, where: Any, how: Any,
+) -> int:  # fmt: skip
+    """The same for a row along X = x + x1 k + x2 k^2, Y = y + y1 k + y2 k^2."""
+    k = 0
+    while k < size:
+        ix = math.floor(x + k * (x1 + k * x2))
+        iy = math.floor(y + k * (y1 + k * y2))
+        length = 1
+        while k + length < size:
+            end = k + length
+            xe = x + end * (x1 + end * x2) - length
+            ye = y + end * (y1 + end * y2)
+            if not (ix <= xe < ix + 1 and iy <= ye < iy + 1):
+                break
+            length += 1
+        where[n, 0] = (iy - 2) * stride + ix - 2
+        where[n, 1] = at + k
+        where[n, 2] = length
+        how[n, 0] = x + k * (x1 + k * x2) - ix - 0.5
+        how[n, 1] = x1 - 1 + 2 * k * x2
+        how[n, 2] = y + k * (y1 + k * y2) - iy - 0.5
+        how[n, 3] = y1 + 2 * k * y2
         n += 1
         k += length
     return n
@@ -306,8 +312,8 @@ def plan_rows(p: Any, x: Any, y: Any, size: int, stride: int, starts: Any, taus:
     for row in range(size):
         xr = x + row * p[2]
         yr = y + row * (1 + p[5])
-        ix = math.floor(xr)
-        iy = math.floor(yr)
+        ix = np.intp(xr)  # positive, so this is the floor
+        iy = np.intp(yr)
         fx = xr - ix
         fy = yr - iy
         inside_x &= (fx + end_x >= 0.0) & (fx + end_x < 1.0)
@@ -356,22 +362,24 @@ def warp_cut_rows(
     """
     reach = (size - 1) / 2
     n = 0
-    x2 = y2 = 0.0
-    x1, y1 = 1 + p[1], p[4]
-    if order == 2:
-        x2, y2 = p[3], p[9]
+    inverse_x = _inverse(p[1])
+    inverse_y = _inverse(p[4])
     for row in range(first, first + count):
         eta = row - reach
         u, v = displacement(p, order, -reach, eta)
-        if order == 2:
+        at = (row - first) * line
+        if order == 1:
+            n = _cut_row(
+                stride, size, x + u, p[1], inverse_x, y + row + v, p[4], inverse_y, at, n, where, how
+            )  # fmt: skip
+        else:
             x1 = 1 + p[1] + p[4] * eta - 2 * p[3] * reach
             y1 = p[7] + p[10] * eta - 2 * p[9] * reach
-        at = (row - first) * line
-        n = _cut_row(stride, size, x + u, x1, x2, y + row + v, y1, y2, at, n, where, how)
+            n = _cut_bent_row(stride, size, x + u, x1, p[3], y + row + v, y1, p[9], at, n, where, how)
     if order == 1:
         _warp_pieces(c, np.uintp(stride), n, where, how, ramp, table, out)
     else:
-        _warp_bent_pieces(c, np.uintp(stride), n, where, how, f4(x2), f4(y2), ramp, table, out)
+        _warp_bent_pieces(c, np.uintp(stride), n, where, how, f4(p[3]), f4(p[9]), ramp, table, out)
 
 
 @helper

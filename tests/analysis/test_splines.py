@@ -8,7 +8,7 @@ from scipy import ndimage
 
 from analysis.gauss_newton import compose, warp_zois
 from analysis.splines import PAD, basis, prefilter_taps, tap_table
-from analysis.warp import coefficients, displacement
+from analysis.warp import _cut_row, coefficients, displacement
 
 RNG = np.random.default_rng(0)
 IMAGE = ndimage.gaussian_filter(RNG.normal(0, 1, (70, 90)), 1.0).astype(np.float32) * 100
@@ -53,6 +53,32 @@ def test_warp_is_the_interpolated_image(motion: tuple, size: int) -> None:
     columns = 30 + np.arange(size) + u
     expected = ndimage.map_coordinates(IMAGE.astype(float), [rows, columns], order=5, mode="mirror")
     assert np.max(np.abs(out[0] - expected)) < 1e-3 * np.abs(IMAGE).max()
+
+
+@pytest.mark.parametrize("slope", [0.0, -0.0, 1e-18, -1e-18, 1e-9, -1e-9, 0.03, -0.03, 0.6, -0.6])
+@pytest.mark.parametrize("drift", [0.0, -1e-17, 0.01, -0.2, -1.9])
+def test_a_row_is_cut_into_pieces_that_cover_it(slope: float, drift: float) -> None:
+    """Each pixel once, with taps around it, whatever the slopes and however close the edge of a pixel."""
+    size, stride = 32, 200
+    for x, y in ((60.0, 40.0), (31.3, 40.5), (60.3, 40.9999999999), (60.999999999999, 40.0), (61.5, 40.25)):
+        where, how = np.empty((2 * size, 3), np.int64), np.empty((2 * size, 4), np.float32)
+        n = _cut_row(
+            stride, size, x, drift, _reciprocal(drift), y, slope, _reciprocal(slope), 5, 0, where, how
+        )  # fmt: skip
+        lengths = where[:n, 2]
+        assert (lengths >= 1).all() and lengths.sum() == size
+        assert np.array_equal(where[:n, 1], 5 + np.cumsum(lengths) - lengths)
+        for (start, at, length), (tx, sx, ty, sy) in zip(where[:n], how[:n].astype(float), strict=True):
+            k = np.arange(length)
+            rows, columns = start // stride + 2, start % stride + 2 + k
+            assert np.all(np.abs(tx + sx * k) <= 0.5 + 1e-6) and np.all(np.abs(ty + sy * k) <= 0.5 + 1e-6)
+            pixel = at - 5 + k
+            assert rows + ty + 0.5 + sy * k == pytest.approx(y + slope * pixel, abs=1e-5)
+            assert columns + tx + 0.5 + sx * k == pytest.approx(x + (1 + drift) * pixel, abs=1e-5)
+
+
+def _reciprocal(slope: float) -> float:
+    return 1 / slope if abs(slope) > 1e-12 else 1e12
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -11,6 +11,8 @@ import numba
 import numpy as np
 from numba import njit, prange
 
+from analysis.vectors import LANES, fused, spread, total
+
 
 def describe() -> str:
     model = "unknown processor"
@@ -30,30 +32,33 @@ def _triad(a, b, c):
         a[i] = b[i] + np.float32(1.5) * c[i]
 
 
-@njit(parallel=True, fastmath=True, cache=True)
-def _multiply_add(rows, out, repeats):
-    for r in prange(rows.shape[0]):
-        row = rows[r]
-        to = out[r]
+@njit(parallel=True, cache=True)
+def _multiply_add(out, repeats):
+    """Ten independent chains of v = v x + y in whole vectors: nothing waits, nothing is loaded."""
+    for r in prange(out.shape[0]):
+        x = spread(np.float32(0.999))
+        y = spread(np.float32(0.001))
+        # Ten different values, or the compiler would keep one chain for all.
+        a, b, c = spread(np.float32(0.1)), spread(np.float32(0.2)), spread(np.float32(0.3))
+        d, e, f = spread(np.float32(0.4)), spread(np.float32(0.5)), spread(np.float32(0.6))
+        g, h, i, j = (
+            spread(np.float32(0.7)),
+            spread(np.float32(0.8)),
+            spread(np.float32(0.9)),
+            spread(np.float32(0.0)),
+        )
         for _ in range(repeats):
-            for k in range(row.size):
-                x = row[k]
-                y = x * x + np.float32(0.1)
-                y = y * x + np.float32(0.2)
-                y = y * x + np.float32(0.3)
-                y = y * x + np.float32(0.4)
-                y = y * x + np.float32(0.5)
-                y = y * x + np.float32(0.6)
-                y = y * x + np.float32(0.7)
-                y = y * x + np.float32(0.8)
-                y = y * x + np.float32(0.9)
-                y = y * x + np.float32(0.11)
-                y = y * x + np.float32(0.12)
-                y = y * x + np.float32(0.13)
-                y = y * x + np.float32(0.14)
-                y = y * x + np.float32(0.15)
-                y = y * x + np.float32(0.16)
-                to[k] += y * x + np.float32(0.17)
+            a = fused(a, x, y)
+            b = fused(b, x, y)
+            c = fused(c, x, y)
+            d = fused(d, x, y)
+            e = fused(e, x, y)
+            f = fused(f, x, y)
+            g = fused(g, x, y)
+            h = fused(h, x, y)
+            i = fused(i, x, y)
+            j = fused(j, x, y)
+        out[r] = total(a + b + c + d + e + (f + g + h + i + j))
 
 
 def best(function, *arguments, repeats: int = 5) -> float:
@@ -75,8 +80,7 @@ def bandwidth() -> float:
 
 
 def arithmetic() -> float:
-    """Floating-point operations a second of a polynomial over arrays within the first cache."""
-    rows = np.full((8, 1024), 0.5, np.float32)
-    out = np.zeros_like(rows)
-    repeats = 2000
-    return rows.size * repeats * 33 / best(_multiply_add, rows, out, repeats, repeats=4)
+    """Floating-point operations a second of multiply-adds between registers: what no real loop reaches."""
+    out = np.zeros(8, np.float32)
+    repeats = 1_000_000
+    return out.size * repeats * 20 * LANES / best(_multiply_add, out, repeats, repeats=4)
