@@ -17,7 +17,7 @@ from analysis.renewal import UNSHARED
 from analysis.settings import NoiseModel
 from analysis.splines import prefilter_taps, tap_table
 from analysis.strain_field import Status, StrainField
-from analysis.validity import CLIPPED_SHARE, bends, judge, stretch_of
+from analysis.validity import CLIPPED_SHARE
 from analysis.windows import profile
 
 if TYPE_CHECKING:
@@ -95,7 +95,7 @@ class Attempt:
         if len(which) == 0:
             return
         places: Places = which if len(which) < len(guess) else np.s_[:]  # as a rule all: no copies
-        from analysis.gauss_newton import CONVERGED, LEFT_IMAGE
+        from analysis.verdict import judge
 
         iterate = self._iterate if self.kernel._sensors is None else self._iterate_phases
         found = iterate(places, guess[places])
@@ -106,26 +106,14 @@ class Attempt:
         else:
             self.p[which], self.left[which], self.nuisance[which] = found.values, found.left, found.nuisance
             self.iterations[which] = found.iterations
-        gain = found.nuisance[:, 0]
-        left, expected = found.left / ready.freedom[places], self._expected(places, gain)
-        status = judge(
-            found.state == CONVERGED,
-            found.state == LEFT_IMAGE,
-            left,
-            expected,
-            ready.signal[places],
-            gain,
-            ready.freedom[places] * kernel._sharpness,
-            self.noise is not None and kernel._noise is not None,
-        )
-        noise = kernel._share_variance[places] * np.maximum(expected, left)[:, None]
-        limit = kernel.settings.bending_px
-        # Few bend by more than the limit; only of those does it matter how much strain explains.
-        suspect = bends(found.bending, noise, ready.shapes.noise, 0.0, limit)
-        which = np.flatnonzero((status == Status.OK) & suspect)
-        stretch = stretch_of(found.values[which], kernel.grid.size / 6)
-        uneven = bends(found.bending[which], noise[which], ready.shapes.noise, stretch, limit)
-        status[which[uneven]] = Status.UNEVEN
+        gain, freedom = found.nuisance[:, 0], ready.freedom[places]
+        status = np.empty(len(which), np.uint8)
+        judge(
+            found.state, found.left / freedom, self._expected(places, gain), ready.signal[places], gain,
+            freedom * kernel._sharpness, self.noise is not None and kernel._noise is not None,
+            found.bending, kernel._share_variance[places], ready.shapes.noise, found.values,
+            kernel.grid.size / 6, kernel.settings.bending_px, status,
+        )  # fmt: skip
         self.status[places] = status
 
     def _iterate_phases(self, which: Places, guess: Floats) -> Outcome:

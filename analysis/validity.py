@@ -1,14 +1,12 @@
-"""Which ZOIs can be believed: from the state of the iteration and what the fit leaves to a status.
+"""Which ZOIs can be believed: the limits of what a fit may leave, and which ZOIs have a pattern at all.
 
-Each ZOI is judged by its own numbers alone.
+Each ZOI is judged by its own numbers alone (``verdict``).
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-
-from analysis.strain_field import Status
 
 Floats = NDArray[np.float64]
 
@@ -54,78 +52,3 @@ def has_pattern(
     strong = np.all(energy > PATTERN_OVER_NOISE * noise_energy, axis=1)
     sigma = np.sqrt(unit_variance.max(axis=1)) * max(noise, 0.1)
     return np.asarray(strong & (unit_variance.min(axis=1) > 0) & (sigma < WORST_SIGMA_U))
-
-
-def judge(
-    converged: NDArray[np.bool_],
-    outside: NDArray[np.bool_],
-    left: Floats,
-    expected: Floats,
-    signal: Floats,
-    gain: Floats,
-    pixels: Floats,
-    noise_known: bool,
-) -> NDArray[np.uint8]:
-    """A status for each measured ZOI, (A,).
-
-    Parameters
-    ----------
-    converged, outside : (A,) bool
-    left : (A,), GL^2
-        Variance a pixel that the fit leaves.
-    expected : (A,), GL^2
-        Variance expected from the noise of both images.
-    signal : (A,), GL^2
-        Variance of the pattern in the reference.
-    gain : (A,)
-    pixels : (A,)
-        Effective number of independent pixels of each ZOI.
-    noise_known : bool
-        Whether ``expected`` stands on noise that was given.
-    """
-    chance = NOISE_FACTOR + CHANCE * np.sqrt(2 / np.maximum(pixels, 1))
-    allowed = (chance if noise_known else np.maximum(chance, UNKNOWN_NOISE_FACTOR)) * expected
-    pattern = signal * np.minimum(gain, 1.0) ** 2
-    status = np.full(len(left), Status.OK, np.uint8)
-    status[~(left <= allowed + MODEL_SHARE * pattern)] = Status.POOR_MATCH
-    status[~((gain > LEAST_GAIN) & (gain < MOST_GAIN))] = Status.POOR_MATCH
-    status[~converged] = Status.NOT_CONVERGED
-    status[~(left <= allowed + LOST_SHARE * pattern)] = Status.LOST
-    status[outside] = Status.OUTSIDE
-    return status
-
-
-def bends(
-    bending: Floats, unit: Floats, noise: Floats, stretch: Floats | float, limit: float
-) -> NDArray[np.bool_]:
-    """Whether the displacement in each ZOI jumps, or bends so much that its centre is wrong, (A,).
-
-    Parameters
-    ----------
-    bending : (A,), px^2
-        See ``shapes.bent``.
-    unit : (A, 2), px^2
-        Variance of u and of v from the noise, of a ZOI without anything else to find.
-    noise : (2,)
-        ``shapes.Shapes.noise``.
-    stretch : (A,) or float, px
-        Displacement that the strain makes over the width of the window (``stretch_of``). Where a
-        specimen necks the strain is steep, but small beside itself; across a crack it is not.
-    limit : float, px
-        What the displacement at the centre may be wrong by.
-    """
-    mean = (unit[:, 0] + unit[:, 1]) * noise[0]
-    spread = np.sqrt(2 * noise[1] * (unit[:, 0] ** 2 + unit[:, 1] ** 2))
-    allowed = limit**2 + (BENDING_SHARE * stretch) ** 2
-    return np.asarray(~(bending <= mean + BENDING_CHANCE * spread + allowed))
-
-
-def stretch_of(parameters: Floats, lever: float) -> Floats:
-    """Magnitude of the Green-Lagrange strain times ``lever`` px, (A,); (A, 6 or 12) as the kernel has them."""
-    half = parameters.shape[1] // 2
-    du_dx, du_dy = parameters[:, 1], parameters[:, 2]
-    dv_dx, dv_dy = parameters[:, half + 1], parameters[:, half + 2]
-    xx = du_dx + (du_dx**2 + dv_dx**2) / 2
-    yy = dv_dy + (du_dy**2 + dv_dy**2) / 2
-    xy = (du_dy + dv_dx + du_dx * du_dy + dv_dx * dv_dy) / 2
-    return np.asarray(lever * np.sqrt(xx**2 + yy**2 + 2 * xy**2))

@@ -5,19 +5,24 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from analysis.gauss_newton import CONVERGED, LEFT_IMAGE, RUNNING
 from analysis.strain_field import Status
-from analysis.validity import bends, has_pattern, judge, stretch_of
+from analysis.validity import has_pattern
+from analysis.verdict import judge, stretch_of
 from tests.accuracy import rejection
 
 
-def verdict(left=1.0, expected=1.0, signal=900.0, gain=1.0, converged=True, outside=False, known=True) -> int:
-    one = np.ones(1)
-    return int(
-        judge(
-            one * converged > 0, one * outside > 0, one * left, one * expected, one * signal, one * gain, one * 350,
-            known,
-        )[0]
+def verdict(
+    left=1.0, expected=1.0, signal=900.0, gain=1.0, state=CONVERGED, known=True, bending=0.0, unit=1e-4, values=None,
+    limit=0.05,
+) -> int:  # fmt: skip
+    one, out = np.ones(1), np.zeros(1, np.uint8)
+    judge(
+        np.full(1, state, np.uint8), one * left, one * expected, one * signal, one * gain, one * 350, known,
+        one * bending, np.full((1, 2), unit), np.array([1.5, 0.5]), np.zeros((1, 6)) if values is None else values,
+        5.0, limit, out,
     )  # fmt: skip
+    return int(out[0])
 
 
 def test_verdicts() -> None:
@@ -25,25 +30,35 @@ def test_verdicts() -> None:
     assert verdict(left=8.0) == Status.POOR_MATCH
     assert verdict(left=4.5, known=False) == Status.OK
     assert verdict(gain=0.05) == Status.POOR_MATCH
-    assert verdict(converged=False) == Status.NOT_CONVERGED
+    assert verdict(state=RUNNING) == Status.NOT_CONVERGED
     assert verdict(left=800.0) == Status.LOST
-    assert verdict(outside=True) == Status.OUTSIDE
+    assert verdict(left=800.0, state=LEFT_IMAGE) == Status.OUTSIDE
     assert verdict(left=np.nan) != Status.OK
 
 
-def test_bending_beyond_its_noise_and_the_limit() -> None:
-    unit, noise = np.array([[1e-4, 1e-4], [1e-4, 1e-4], [1e-8, 1e-8], [1e-8, 1e-8]]), np.array([1.5, 0.5])
-    found = np.array([0.002, 0.02, 0.048**2, 0.052**2])
-    assert bends(found, unit, noise, np.zeros(4), 0.05).tolist() == [False, True, False, True]
-    assert bends(np.array([np.nan]), unit[:1], noise, np.zeros(1), 0.05).tolist() == [True]
-    assert bends(found, unit, noise, np.full(4, 1.0), 0.05).tolist() == [False] * 4
-    assert bends(found, unit, noise, np.zeros(4), np.inf).tolist() == [False] * 4
+@pytest.mark.parametrize(
+    ("bending", "unit", "uneven"),
+    [
+        (0.002, 1e-4, False),
+        (0.02, 1e-4, True),
+        (0.048**2, 1e-8, False),
+        (0.052**2, 1e-8, True),
+        (np.nan, 1e-4, True),
+    ],
+)
+def test_bending_beyond_its_noise_and_the_limit(bending: float, unit: float, uneven: bool) -> None:
+    assert (verdict(bending=bending, unit=unit) == Status.UNEVEN) == uneven
+    assert verdict(bending=bending, unit=unit, state=RUNNING) == Status.NOT_CONVERGED
+    if np.isfinite(bending):
+        strained = np.array([[0.0, 0.3, 0.0, 0.0, 0.0, 0.0]])
+        assert verdict(bending=bending, unit=unit, values=strained) == Status.OK
+        assert verdict(bending=bending, unit=unit, limit=np.inf) == Status.OK
 
 
 def test_the_stretch_of_a_strain_is_free_of_rotation() -> None:
     c, s, stretched = np.cos(0.5), np.sin(0.5), 1.1
     turned = np.array([[3.0, stretched * c - 1, -s, -2.0, stretched * s, c - 1]])
-    assert stretch_of(turned, 5.0) == pytest.approx(5.0 * (stretched**2 - 1) / 2)
+    assert stretch_of(turned, 0, 5.0) == pytest.approx(5.0 * (stretched**2 - 1) / 2)
 
 
 def test_a_zoi_of_noise_has_no_pattern() -> None:
