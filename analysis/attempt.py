@@ -30,6 +30,10 @@ Places = NDArray[np.intp] | slice
 RESCUE_ROUNDS = 40
 SEARCH_SHARE = 0.3
 """Share of lost ZOIs from which on the whole picture is searched again."""
+_WORTH_RETRYING = np.isin(
+    list(Status), (Status.LOST, Status.NOT_CONVERGED, Status.POOR_MATCH, Status.OUTSIDE)
+)
+"""By status."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +62,7 @@ class Outcome:
 class Attempt:
     """The measuring of one image: parameters and verdict of every active ZOI, as they come."""
 
-    def __init__(self, kernel: PhaseKernel, image: NDArray[np.float32], noise: NoiseModel | None) -> None:
+    def __init__(self, kernel: PhaseKernel, image: NDArray[Any], noise: NoiseModel | None) -> None:
         from analysis.warp import coefficients
 
         self.kernel = kernel
@@ -68,14 +72,8 @@ class Attempt:
         degree = kernel.settings.interpolant
         offset = np.float32(self.ready.pattern.mean)
         self.coefficients = coefficients(image, offset, prefilter_taps(degree))
-        count = len(self.ready.origins)
-        self.p = np.full((count, kernel._modes), np.nan)
-        self.left = np.full(count, np.nan)
-        self.nuisance = np.full((count, 2), np.nan)
-        self.iterations = np.zeros(count, np.uint8)
         self.status = self.ready.status.copy()
         self.tolerance, self.trust = kernel._tolerance(self._current_std())
-        self._guess = self.p
 
     def _current_std(self) -> float:
         if self.noise is None:
@@ -85,10 +83,16 @@ class Attempt:
     def run(self, guess: Floats) -> None:
         """Measure every ZOI that has a pattern and a guess; the others are LOST."""
         self._guess = guess
-        known = np.isfinite(guess @ np.ones(guess.shape[1]))
         able = self.ready.status == Status.OK
+        known = np.isfinite(guess.sum()) or np.isfinite(guess @ np.ones(guess.shape[1]))  # as a rule all
         self.status[able & ~known] = Status.LOST
-        self._track(np.flatnonzero(able & known), guess)
+        which = np.flatnonzero(able & known)
+        if len(which) < len(guess):
+            self.p = np.full(guess.shape, np.nan)
+            self.left = np.full(len(guess), np.nan)
+            self.nuisance = np.full((len(guess), 2), np.nan)
+            self.iterations = np.zeros(len(guess), np.uint8)
+        self._track(which, guess)
 
     def _track(self, which: NDArray[np.intp], guess: Floats) -> None:
         """Iterate the ZOIs ``which`` from their guesses and keep what comes out."""
@@ -100,7 +104,7 @@ class Attempt:
         iterate = self._iterate if self.kernel._sensors is None else self._iterate_phases
         found = iterate(places, guess[places])
         ready, kernel = self.ready, self.kernel
-        if len(which) == len(self.p):
+        if len(which) == len(guess):
             self.p, self.left, self.nuisance = found.values, found.left, found.nuisance
             self.iterations = found.iterations
         else:
@@ -137,12 +141,12 @@ class Attempt:
         size, count = kernel.grid.size, len(guess)
         height, width = ready.shape
         out = Outcome(
-            guess.copy(), np.full(count, np.nan), np.full(count, np.nan), np.full((count, 2), np.nan),
-            np.zeros(count, np.uint8), np.zeros(count, np.uint8),
+            guess.copy(), np.empty(count), np.empty(count), np.empty((count, 2)),
+            np.empty(count, np.uint8), np.empty(count, np.uint8),
         )  # fmt: skip
         track(
             self.coefficients, width, height, ready.images.ravel(), ready.images[0].size, ready.images.shape[2],
-            ready.origins[which], size, settings.order, ready.shapes.rows, ready.shapes.mix,
+            ready.origins[which], size, kernel.grid.step, settings.order, ready.shapes.rows, ready.shapes.mix,
             ready.inverse[which], ready.cross[which],
             ready.weight * ready.energy[which], parameter_scale(settings.order, size),
             self.tolerance[which], self.trust[which], tap_table(settings.interpolant),
@@ -158,12 +162,14 @@ class Attempt:
 
     def _variances(self, which: Places, gain: Floats) -> tuple[Floats, Floats]:
         level = self.ready.level[which]
-        model = self.kernel._noise
-        reference = np.full(len(gain), self.kernel.reference_noise**2)
-        if model is not None:
+        model, own = self.kernel._noise, self.noise
+        if model is None:
+            reference = np.full(len(gain), self.kernel.reference_noise**2)
+        else:
             reference = model.variance(level)
-        current = reference if self.noise is None else self.noise.variance(level * np.maximum(gain, 0))
-        return reference, np.asarray(current)
+        if own is None:
+            return reference, reference
+        return reference, own.variance(level if own.slope == 0 else level * np.maximum(gain, 0))
 
     def rescue(self, before: Floats | None) -> None:
         """Try lost ZOIs again: without extrapolation, from neighbours, and by a search."""
@@ -179,8 +185,7 @@ class Attempt:
             self._from_neighbours()
 
     def _lost(self) -> NDArray[np.bool_]:
-        failed = np.isin(self.status, (Status.LOST, Status.NOT_CONVERGED, Status.POOR_MATCH, Status.OUTSIDE))
-        return np.asarray(failed & (self.ready.status == Status.OK))
+        return np.asarray(_WORTH_RETRYING[self.status] & (self.ready.status == Status.OK))
 
     def _retry(self, guess: Floats) -> None:
         """Track lost ZOIs from another guess; a worse outcome does not replace a better one."""
@@ -232,17 +237,21 @@ class Attempt:
         guess[:, affine] = mean.reshape(6, -1)[:, kernel._index].T
         return kernel._local(guess), number.ravel()[kernel._index].astype(np.uint8)
 
-    def field(self, before: Floats | None, carried: Motion, clipped: NDArray[np.bool_] | None) -> StrainField:
-        """Put everything on the grid."""
+    def field(
+        self, predicted: Floats | None, carried: Motion, clipped: NDArray[np.bool_] | None
+    ) -> StrainField:
+        """Put everything on the grid; ``predicted`` are the parameters that were expected, (A, modes)."""
+        from analysis.assembly import weigh
+
         if clipped is not None:
             self._reject_clipped(clipped)
         kernel = self.kernel
         ok = self.status == Status.OK
+        gain = self.nuisance[:, 0]
         reference, current = self._noise_parts(ok)
-        covariance_reference, covariance = self._covariances(ok, reference, current)
-        with np.errstate(invalid="ignore", divide="ignore"):
-            residual = self.left / self.ready.freedom / (self.nuisance[:, 0] ** 2 * reference + current)
-        noise = float(np.sqrt(np.median(current[ok]))) if ok.any() else float("nan")
+        residual, first, whole = np.empty((3, len(ok)), np.float32)
+        weigh(ok, self.left, self.ready.freedom, gain, reference, current, residual, first, whole)
+        covariance_reference, covariance = self._covariances(ok, reference, current, first, whole)
         values = kernel._total(self.p)
         if not ok.all():
             values = np.where(ok[:, None], values, np.nan)
@@ -253,16 +262,22 @@ class Attempt:
             parameters=self._spread(values),
             covariance=covariance,
             covariance_reference=covariance_reference,
-            residual=self._spread(residual[:, None].astype(np.float32))[0],
+            residual=self._spread(residual[:, None])[0],
             status=status.reshape(kernel.grid.shape),
             iterations=self._spread(self.iterations[:, None], 0)[0],
-            gain=self._spread(self.nuisance[:, :1].astype(np.float32))[0],
-            noise=noise,
+            gain=self._spread(gain[:, None].astype(np.float32))[0],
+            noise=self._noise_found(ok, current),
             window=kernel.settings.window,
             motion=None
-            if before is None
-            else carried.after(values, before + carried.ahead, self.trust, kernel.grid.size / 6),
+            if predicted is None
+            else carried.after(values, predicted, self.trust, kernel.grid.size / 6),
         )
+
+    def _noise_found(self, ok: NDArray[np.bool_], current: Floats) -> float:
+        """Standard deviation of the deformed image, GL, as given or found; the median over the ZOIs."""
+        if self.noise is not None and self.noise.slope == 0 and ok.any():
+            return float(np.sqrt(self.noise.floor))
+        return float(np.sqrt(np.median(current[ok]))) if ok.any() else float("nan")
 
     def _spread(self, values: NDArray[Any], empty: float = np.nan) -> NDArray[Any]:
         """(A, K) onto the grid: (K, R, C); where all ZOIs are active, the same memory."""
@@ -293,18 +308,31 @@ class Attempt:
         return reference, np.full(len(ok), rest)
 
     def _covariances(
-        self, ok: NDArray[np.bool_], reference: Floats, current: Floats
+        self,
+        ok: NDArray[np.bool_],
+        reference: Floats,
+        current: Floats,
+        first: NDArray[np.float32],
+        whole: NDArray[np.float32],
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Covariance that the reference causes, and the whole, (21, R, C), NaN where there is no value."""
+        """Covariance that the reference causes, and the whole, (21, R, C), NaN where there is no value.
+
+        ``first`` and ``whole`` (A,) are what scales the unit covariances (``assembly.weigh``).
+        """
+        from analysis.assembly import LEAST_GAIN, scale
+
         kernel, model = self.kernel, self.kernel._noise
-        own = 1 / np.maximum(self.nuisance[:, 0], 0.1) ** 2
         grows = any(m is not None and m.slope > 0 for m in (model, self.noise))
         if kernel._placement is None and not (grows and self.ready.covariance_level is not None):
-            # The unit covariances lie ready on the grid: two products and no copying about.
-            first = np.where(ok, reference, np.nan).astype(np.float32)
-            whole = np.where(ok, reference + current * own, np.nan).astype(np.float32)
             unit = kernel._unit
-            return unit * self._spread(first[:, None]), unit * self._spread(whole[:, None])
+            out = np.empty((2, *unit.shape), np.float32)
+            flat = out.reshape(2, len(unit), -1)
+            scale(
+                unit.reshape(len(unit), -1), self._spread(first[:, None]).ravel(),
+                self._spread(whole[:, None]).ravel(), flat[0], flat[1],
+            )  # fmt: skip
+            return out[0], out[1]
+        own = 1 / np.maximum(self.nuisance[:, 0], LEAST_GAIN) ** 2
         from_reference, from_current = self._level_covariances(reference, current, own)
         placement = kernel._placement
         if placement is not None:

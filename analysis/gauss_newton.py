@@ -15,7 +15,7 @@ from analysis.compiled import helper, inlined, parallel
 from analysis.moments import CHANNELS, DEGREES, DIFFERENCE_ROWS, add_difference_columns, difference_moments
 from analysis.shapes import N_SHAPES, bent, shares
 from analysis.splines import PAD
-from analysis.vectors import LANES
+from analysis.vectors import LANES, fetch
 from analysis.warp import ROWS, displacement, inside, new_plan, plan_rows, warp_cut_rows, warp_rows
 
 f4 = np.float32
@@ -31,6 +31,8 @@ LEFT_BY_LENGTH = 0.03
 """The same per px of the step, the next order of the expansion (measured: 0.004-0.03)."""
 LONGEST_STEP = 3.0
 """Pixels; a longer step at the edge of the ZOI is shortened to this."""
+AHEAD, BEYOND = 16, 3
+"""ZOIs ahead of the present one whose pixels are asked for; taps beyond the pixel that they make."""
 
 
 @helper
@@ -145,10 +147,36 @@ def _solve(inverse: Any, z: int, m: Any, step: Any, energy: Any) -> Any:
     return left
 
 
+@inlined
+def _fetch(
+    c: Any, width: int, images: Any, samples: int, pitch: int, origin: Any, size: int, spacing: int, q: Any
+) -> None:  # fmt: skip
+    """Ask for what a ZOI to come needs of the images and its neighbours do not: its last rows and columns.
+
+    Rows lie further apart than the processor looks ahead by itself. ``q`` says about where the ZOI has moved.
+    """
+    fresh = min(spacing, size)
+    down, right = int(q[len(q) // 2]) + PAD + BEYOND, int(q[0]) + PAD + BEYOND
+    for x in range(size - fresh + LANES - 1, size + LANES - 1, LANES):
+        column = origin[1] + min(x, size - 1)
+        for y in range(origin[0] + size - fresh, origin[0] + size):
+            for k in range(4):
+                fetch(images, np.uintp(y * pitch + column + k * samples))
+            fetch(c, np.uintp((y + down) * (width + 2 * PAD) + column + right))
+
+
+@inlined
+def _fetch_all(array: Any, z: int) -> None:
+    """Ask for what an array (A, m, n) holds of ZOI ``z``."""
+    each = array.shape[1] * array.shape[2]
+    for n in range(0, each, LANES):
+        fetch(array, np.uintp(z * each + n))
+
+
 @parallel
 def track(
     c: Any, width: int, height: int, images: Any, samples: int, pitch: int, origins: Any, size: int,
-    order: int, rows: Any, mix: Any, inverse: Any, cross: Any, squares: Any,
+    spacing: int, order: int, rows: Any, mix: Any, inverse: Any, cross: Any, squares: Any,
     units: Any, tolerance: Any, trust: Any, table: Any, over: Any,
     max_iterations: int, p: Any, left: Any, bending: Any, nuisance: Any, state: Any, iterations: Any,
 ) -> None:  # fmt: skip
@@ -161,6 +189,8 @@ def track(
     images : flat float32, ``samples`` of each, ``pitch`` a row
         Filtered reference f_x, f_y, f and the reference as it was recorded (``Prepared.images``).
     origins : (A, 2) int64, first row and column of each ZOI
+    spacing : int, px
+        Between neighbouring ZOIs, which follow each other; only the speed depends on it.
     rows : (4, whole(size)) float32
         Window times P0 .. P3, zero beyond ``size``; ``mix`` (4, 4) has the polynomials (``shapes``).
     inverse : (A, P, P) float32
@@ -196,7 +226,13 @@ def track(
         for z in range(chunk * 32, min(chunk * 32 + 32, len(origins))):
             top, first = origins[z]
             q = p[z]
-            state[z] = RUNNING
+            _fetch(
+                c, width, images, samples, pitch, origins[min(z + AHEAD, len(origins) - 1)], size, spacing, q
+            )
+            _fetch_all(inverse, z + 2)
+            _fetch_all(cross, z + 2)
+            state[z], iterations[z] = RUNNING, 0
+            left[z] = bending[z] = nuisance[z, 0] = nuisance[z, 1] = np.nan
             for iteration in range(max_iterations):
                 if not _within_image(q, order, first + reach, top + reach, reach, width, height, over):
                     state[z] = LEFT_IMAGE

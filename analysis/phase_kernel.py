@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import logging
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -223,7 +224,7 @@ class PhaseKernel:
         ValueError
             The image has another size than the reference, or the start another grid.
         """
-        image = as_image(deformed, "the deformed image")
+        image = as_recorded(deformed, "the deformed image")
         if image.shape != self._prepared.shape:
             raise ValueError(
                 f"the deformed image has {image.shape[1]} x {image.shape[0]} px, "
@@ -233,9 +234,10 @@ class PhaseKernel:
         attempt = Attempt(self, image, model)
         before = self._start_values(start)
         carried = self._carried_motion(start)
-        attempt.run(self._first_guess(image, before, carried))
+        predicted = None if before is None else before + carried.ahead
+        attempt.run(self._searched(image) if predicted is None else self._local(predicted))
         attempt.rescue(None if before is None else self._local(before))
-        return attempt.field(before, carried, _clipped(image, clipped, model))
+        return attempt.field(predicted, carried, _clipped(image, clipped, model))
 
     def _start_values(self, start: StrainField | None) -> Floats | None:
         """Parameters of the field before, (A, modes); NaN for a ZOI without."""
@@ -252,12 +254,6 @@ class PhaseKernel:
             return motion
         return Motion.none(self._index, self._modes)
 
-    def _first_guess(self, image: NDArray[np.float32], before: Floats | None, carried: Motion) -> Floats:
-        """Start of the iteration, (A, modes): the field before carried on, or a search."""
-        if before is None:
-            return self._searched(image)
-        return self._local(before + carried.ahead)
-
     def _local(self, total: Floats) -> Floats:
         """Parameters against this reference from those against the original one."""
         return total if self._placement is None else self._placement.locate(total)
@@ -266,11 +262,12 @@ class PhaseKernel:
         """Parameters against the original reference from those against this one."""
         return local if self._placement is None else self._placement.compose(local)
 
-    def _searched(self, image: NDArray[np.float32]) -> Floats:
+    def _searched(self, recorded: NDArray[Any]) -> Floats:
         """Whole-pixel displacements of all ZOIs, (A, modes)."""
         from analysis.climb import climb
         from analysis.start import find_blocks
 
+        image = recorded.astype(np.float32)
         ready, size = self._prepared, self.grid.size
         blocks = find_blocks(self._reference, image, self._region)
         centre = ready.origins + (size - 1) / 2
@@ -298,6 +295,11 @@ def as_image(image: ArrayLike, what: str) -> NDArray[np.float32]:
     ValueError
         Not two-dimensional, empty, of a wrong type, or with values that are not finite.
     """
+    return np.asarray(as_recorded(image, what), np.float32)
+
+
+def as_recorded(image: ArrayLike, what: str) -> NDArray[Any]:
+    """The same as uint8, uint16 or float32, whichever it is already, read-only; raises the same."""
     array = np.asarray(image)
     if array.ndim != 2 or array.size == 0:
         raise ValueError(
@@ -305,9 +307,12 @@ def as_image(image: ArrayLike, what: str) -> NDArray[np.float32]:
         )
     if array.dtype.kind not in "uif":
         raise ValueError(f"{what} must hold grey levels, got {array.dtype}")
-    out = np.ascontiguousarray(array, np.float32)
+    kind = array.dtype if array.dtype in (np.uint8, np.uint16) else np.float32
+    out = np.ascontiguousarray(array, kind).view()
     if array.dtype.kind == "f" and not np.isfinite(np.sum(out)):
         raise ValueError(f"{what} holds values that are not finite")
+    # numba takes what may be written for another type, and would compile every loop twice.
+    out.flags.writeable = False
     return out
 
 
@@ -320,7 +325,7 @@ def _check_fit(grid: ZoiGrid, shape: tuple[int, ...]) -> None:
 
 
 def _clipped(
-    image: NDArray[np.float32], given: NDArray[np.bool_] | None, noise: NoiseModel | None
+    image: NDArray[Any], given: NDArray[np.bool_] | None, noise: NoiseModel | None
 ) -> NDArray[np.bool_] | None:
     """Saturated pixels, as given or from the noise model; None where there are none."""
     if given is None:

@@ -27,6 +27,7 @@ _FLAGS = tuple(sorted(FAST))
 _FLOAT = ir.FloatType()
 _VECTOR = ir.VectorType(_FLOAT, LANES)
 _INT = ir.IntType(32)
+_BYTES = ir.IntType(8).as_pointer()
 _ALIGNMENT = 4
 _POINTER = 64
 """Bytes: a vector may start at any sample."""
@@ -133,6 +134,21 @@ def load_from(_typing: Any, place: Any, samples: Any) -> Any:
         )
 
     return vector(types.uintp, types.uintp), generate
+
+
+@intrinsic
+def fetch(_typing: Any, array: Any, index: Any) -> Any:
+    """Ask for the cache line of a sample of a float32 array; any index (uintp) will do, it is not read."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = builder.bitcast(_address(context, builder, signature.args[0], *arguments), _BYTES)
+        kind = ir.FunctionType(ir.VoidType(), [_BYTES, _INT, _INT, _INT])
+        ask = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
+        read, second_level, data = (ir.Constant(_INT, i) for i in (0, 2, 1))
+        builder.call(ask, [place, read, second_level, data])
+        return context.get_dummy_value()
+
+    return types.void(array, types.uintp), generate
 
 
 @intrinsic

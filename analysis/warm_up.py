@@ -25,13 +25,12 @@ def warm_up() -> None:
     y, x = np.mgrid[:96, :96].astype(np.float32)
     image = 100 + 40 * np.sin(x * 1.3 + 0.2 * y) * np.cos(0.9 * y - 0.35 * x)
     grid = ZoiGrid.cover(Roi(8, 8, 80, 80), size=32, step=16)
-    # Frames and means of bursts are read-only, which numba takes for another type.
-    frozen = image.copy()
-    frozen.flags.writeable = False
     for settings in (KernelSettings(), KernelSettings(order=2), KernelSettings(estimator="phase")):
         kernel = PhaseKernel(image, grid, settings, NoiseModel(0.1, 1.0))
         field = kernel.measure(image)
-        kernel.measure(frozen, start=field)
+        kernel.measure(image, start=field)
+    for kind in (np.uint8, np.uint16):
+        kernel.measure(image.astype(kind), start=field)
 
 
 def announce() -> None:

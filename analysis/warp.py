@@ -21,8 +21,10 @@ from analysis.vectors import LANES, address, further, fused, load, load_from, sp
 f4 = np.float32
 GROUP = 4 * LANES
 """Samples that are filtered at a time: one sum after the other would wait for each product."""
-BAND, STRIP = 32, 2 * GROUP
+BAND, STRIP = 16, 2 * GROUP
 """Rows and columns that are filtered along y at a time, so that a row is read once from afar, not 31 times."""
+PART, RING = 128, BAND + 2 * PREFILTER_REACH
+"""Rows that one thread filters one after the other, and how many of them it keeps filtered along x."""
 ROWS = 16
 """Rows that are warped and summed before the next: few enough for the first-level cache."""
 _lanes = np.uintp(LANES)
@@ -40,49 +42,59 @@ def _mirror(i: int, n: int) -> int:
 
 
 @parallel
-def coefficients(image: NDArray[np.float32], offset: Any, taps: NDArray[np.float32]) -> Any:
-    """Spline coefficients of ``image - offset``, mirrored PAD pixels beyond each edge.
+def coefficients(image: NDArray[Any], offset: Any, taps: NDArray[np.float32]) -> Any:
+    """Spline coefficients of ``image - offset`` (uint8, uint16 or float32), mirrored PAD pixels beyond each edge.
 
     Returns flat float32: (H + 2 PAD) rows of W + 2 PAD, and a vector more than that. ``taps`` is one
-    side of the symmetric prefilter.
+    side of the symmetric prefilter. A part of the image is filtered along x and y in one go, so that
+    what lies between stays in the cache.
     """
     height, width = image.shape
-    reach = PREFILTER_REACH
-    across = (width + GROUP - 1) // GROUP * GROUP
     stride = width + 2 * PAD
-    pitch = across + LINE  # an odd number of cache lines, or the rows would displace each other
-    along_x = np.empty((height, pitch), np.float32)
+    across = (width + GROUP - 1) // GROUP * GROUP
     out = np.empty((height + 2 * PAD) * stride + LANES, np.float32)
     out[out.size - LANES :] = 0
-    for y in prange(height):
-        line = np.zeros(across + 2 * reach, np.float32)
-        for x in range(width):
-            line[x + reach] = image[y, x] - offset
-        for x in range(reach):
-            line[x] = image[y, _mirror(x - reach, width)] - offset
-            line[width + reach + x] = image[y, _mirror(width + x, width)] - offset
-        _filter_along(line, taps, along_x[y, :across])
-    starts = np.empty(height + 2 * reach, np.intp)
-    for y in range(-reach, height + reach):
-        starts[y + reach] = _mirror(y, height) * pitch
-    for block in prange((height + BAND - 1) // BAND):
-        line = np.empty((BAND, across), np.float32)
-        first = block * BAND
-        count = min(BAND, height - first)
-        for x in range(0, across, STRIP):
+    for part in prange((height + PART - 1) // PART):
+        line = np.zeros(across + 2 * PREFILTER_REACH, np.float32)
+        # An odd number of cache lines a row, or the rows would displace each other.
+        ring = np.empty((RING, across + LINE), np.float32)
+        band = np.empty((BAND, across), np.float32)
+        starts = np.empty(RING, np.intp)
+        ahead = part * PART - PREFILTER_REACH
+        last = min(part * PART + PART, height)
+        for first in range(part * PART, last, BAND):
+            count = min(BAND, last - first)
+            for y in range(ahead, first + count + PREFILTER_REACH):
+                _mirrored_line(image[_mirror(y, height)], offset, line)
+                _filter_along(line, taps, ring[(y + PREFILTER_REACH) % RING, :across])
+            ahead = first + count + PREFILTER_REACH
+            for i in range(RING):
+                starts[i] = (first + i) % RING * ring.shape[1]
+            for x in range(0, across, STRIP):
+                for y in range(count):
+                    _filter_across(ring, starts[y:], x, min(x + STRIP, across), taps, band[y])
             for y in range(count):
-                _filter_across(along_x, starts[first + y :], x, min(x + STRIP, across), taps, line[y])
-        for y in range(count):
-            row = out[(first + y + PAD) * stride : (first + y + PAD + 1) * stride]
-            row[PAD : PAD + width] = line[y, :width]
-            for x in range(PAD):
-                row[x] = line[y, _mirror(x - PAD, width)]
-                row[PAD + width + x] = line[y, _mirror(width + x, width)]
+                row = out[(first + y + PAD) * stride : (first + y + PAD + 1) * stride]
+                row[PAD : PAD + width] = band[y, :width]
+                for x in range(PAD):
+                    row[x] = band[y, _mirror(x - PAD, width)]
+                    row[PAD + width + x] = band[y, _mirror(width + x, width)]
     for y in range(PAD):
         for to, source in ((y, _mirror(y - PAD, height)), (PAD + height + y, _mirror(height + y, height))):
             source += PAD
             out[to * stride : (to + 1) * stride] = out[source * stride : (source + 1) * stride]
     return out
+
+
+@helper
+def _mirrored_line(row: Any, offset: Any, line: Any) -> None:
+    """A row of an image less ``offset`` with ``PREFILTER_REACH`` mirrored samples before and behind it."""
+    width = row.size
+    for x in range(width):
+        line[x + PREFILTER_REACH] = f4(row[x]) - offset
+    for x in range(PREFILTER_REACH):
+        line[x] = line[_mirror(x - PREFILTER_REACH, width) + PREFILTER_REACH]
+        line[width + PREFILTER_REACH + x] = line[_mirror(width + x, width) + PREFILTER_REACH]
 
 
 @helper

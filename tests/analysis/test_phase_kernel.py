@@ -27,6 +27,15 @@ def test_any_kind_of_grey_image(dtype: type) -> None:
     assert abs(np.mean(field.u) - 0.3) < 1e-3 and abs(np.mean(field.v) + 0.2) < 1e-3
 
 
+def test_whole_grey_levels_are_the_same_in_any_type() -> None:
+    picture_of = {kind: picture(bits=8, u=0.3).astype(kind) for kind in (np.uint8, np.uint16, np.float32)}
+    kernel = PhaseKernel(picture(bits=8), GRID)
+    expected = kernel.measure(picture_of[np.float32])
+    for image in picture_of.values():
+        image.flags.writeable = False  # as frames are
+        assert np.array_equal(kernel.measure(image).parameters, expected.parameters)
+
+
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize(
     "motion",
