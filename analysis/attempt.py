@@ -140,6 +140,7 @@ class Attempt:
         ready, kernel, settings = self.ready, self.kernel, self.kernel.settings
         size, count = kernel.grid.size, len(guess)
         height, width = ready.shape
+        padded = which if isinstance(which, slice) else np.append(which, -1)
         out = Outcome(
             guess.copy(), np.empty(count), np.empty(count), np.empty((count, 2)),
             np.empty(count, np.uint8), np.empty(count, np.uint8),
@@ -147,7 +148,7 @@ class Attempt:
         track(
             self.coefficients, width, height, ready.images.ravel(), ready.images[0].size, ready.images.shape[2],
             ready.origins[which], size, kernel.grid.step, settings.order, ready.shapes.rows, ready.shapes.mix,
-            ready.inverse[which], ready.cross[which],
+            ready.inverse[padded], ready.cross[padded],
             ready.weight * ready.energy[which], parameter_scale(settings.order, size),
             self.tolerance[which], self.trust[which], tap_table(settings.interpolant),
             kernel._over, max_iterations or settings.max_iterations,

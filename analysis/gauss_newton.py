@@ -12,7 +12,14 @@ import numpy as np
 from numba import prange
 
 from analysis.compiled import helper, inlined, parallel
-from analysis.moments import CHANNELS, DEGREES, DIFFERENCE_ROWS, add_difference_columns, difference_moments
+from analysis.moments import (
+    CHANNELS,
+    DEGREES,
+    DIFFERENCE_ROWS,
+    add_difference_columns,
+    difference_moments,
+    weighted_rows,
+)
 from analysis.shapes import N_SHAPES, bent, shares
 from analysis.splines import PAD
 from analysis.vectors import LANES, fetch
@@ -135,15 +142,13 @@ def _moments(
 
 
 @inlined
-def _solve(inverse: Any, z: int, m: Any, step: Any, energy: Any) -> Any:
+def _solve(inverse: Any, z: int, m: Any, step: Any, energy: Any, solved: Any) -> Any:
     """Parameters of one linear fit, of ZOI ``z``, and the weighted sum of squares it leaves."""
+    weighted_rows(inverse, np.uintp(z * len(m) * len(m)), m, len(m), solved)
     left = energy
     for i in range(len(m)):
-        total = 0.0
-        for j in range(len(m)):
-            total += inverse[z, i, j] * m[j]
-        step[i] = total
-        left -= total * m[i]
+        step[i] = solved[i]
+        left -= step[i] * m[i]
     return left
 
 
@@ -193,8 +198,8 @@ def track(
         Between neighbouring ZOIs, which follow each other; only the speed depends on it.
     rows : (4, whole(size)) float32
         Window times P0 .. P3, zero beyond ``size``; ``mix`` (4, 4) has the polynomials (``shapes``).
-    inverse : (A, P, P) float32
-    cross : (A, 10, P) float32
+    inverse : (A + 1, P, P) float32
+    cross : (A + 1, P, 10) float32
     squares : (A, 2) float64
         Sums of w f_x^2 and w f_y^2.
     tolerance : (A, 2) float64
@@ -222,6 +227,7 @@ def track(
         sums = np.empty((CHANNELS, DEGREES, DEGREES))
         m = np.empty(count)
         step = np.empty(count)
+        solved = np.empty(count + LANES, np.float32)
         bent_by = np.empty(2 * N_SHAPES)
         for z in range(chunk * 32, min(chunk * 32 + 32, len(origins))):
             top, first = origins[z]
@@ -241,12 +247,13 @@ def track(
                     c, width, images, samples, pitch, top, first, size, order, rows, mix,
                     q, ramp, table, plan, g, columns, sums, m, bent_by,
                 )  # fmt: skip
-                left[z] = _solve(inverse, z, m, step, energy)
+                left[z] = _solve(inverse, z, m, step, energy, solved)
                 gain = 1 + step[modes]
                 nuisance[z, 0] = gain
                 nuisance[z, 1] = step[modes + 3]
                 gain = min(max(gain, GAIN_RANGE[0]), GAIN_RANGE[1])
-                bending[z] = bent(bent_by, cross, z, step, squares[z, 0], squares[z, 1]) / gain**2
+                bends = bent(bent_by, cross, z, step, squares[z, 0], squares[z, 1], solved)
+                bending[z] = bends / gain**2
                 longest = 0.0
                 for i in range(modes):
                     longest = max(longest, abs(step[i]) / gain)

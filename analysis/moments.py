@@ -38,6 +38,21 @@ def dot(a: Any, i: Any, b: Any, j: Any, size: int) -> Any:
 
 
 @inlined
+def weighted_rows(a: Any, at: Any, weights: Any, width: int, out: Any) -> None:
+    """out[n] = sum over k of weights[k] a[at + k width + n], n < ``width``.
+
+    Reads and writes whole vectors: up to LANES samples more than there are, both in ``a`` and in ``out``.
+    """
+    for n in range(0, width, LANES):
+        i = at + np.uintp(n)
+        value = spread(np.float32(weights[0])) * load(a, i)
+        for k in range(1, len(weights)):
+            i += np.uintp(width)
+            value += spread(np.float32(weights[k])) * load(a, i)
+        store(out, np.uintp(n), value)
+
+
+@inlined
 def add_difference_columns(
     images: Any, samples: Any, at: Any, width: Any, g: Any, line: Any, first: int, count: int, rows: Any, out: Any
 ) -> None:  # fmt: skip

@@ -36,9 +36,10 @@ class Prepared:
         beyond H rows of W, since loops read whole vectors.
     origins : (A, 2) int64
         First row and column of each ZOI.
-    inverse : (A, P, P) float32
-    cross : (A, 10, P) float32
-        Of the shapes that the fit cannot follow with the columns of J (``shapes.cross_moments``).
+    inverse : (A + 1, P, P) float32
+    cross : (A + 1, P, 10) float32
+        Of the shapes that the fit cannot follow with the columns of J (``shapes.cross_moments``). Both
+        have a ZOI more than there is, of zeros, since loops read whole vectors.
     shapes : Shapes
     energy : (A, 2) float64, (GL/px)^2
         Mean of f_x^2 and f_y^2 under the window.
@@ -102,8 +103,9 @@ def prepare_reference(
     half = len(units) // 2
     affine = units[[0, 1, 2, half, half + 1, half + 2]]
     count = len(origins)
-    inverse = np.empty((count, len(table), len(table)), np.float32)
-    cross = np.empty((count, 2 * N_SHAPES, len(table)), np.float32)
+    inverse = np.empty((count + 1, len(table), len(table)), np.float32)
+    cross = np.empty((count + 1, len(table), 2 * N_SHAPES), np.float32)
+    inverse[count] = cross[count] = 0
     shapes = shapes_of(line, whole(size))
     images = _padded(pattern.grad_x, pattern.grad_y, pattern.level, image - np.float32(mean))
     covariance = np.empty((count, 21), np.float32)

@@ -137,12 +137,12 @@ def prepare(
         Window and squared window times powers of xi (the window is the same along y).
     mix : see ``shapes.Shapes``
     table : (P, 3), units : (6,)
-    inverse : (A, P, P) float32, written
+    inverse : (A + 1, P, P) float32, written but for the last
         Zero where there is no pattern.
     covariance, covariance_level : (A, 21) float32, written
         Of the six affine parameters, px units, for noise of variance 1 GL^2 and for noise of
         variance ``level``.
-    cross : (A, 10, P) float32, written
+    cross : (A + 1, P, 10) float32, written but for the last
         Of the shapes that the fit cannot follow with the columns of J (``shapes.cross_moments``).
     freedom : (A,) float32, written
         Sum of the weights less what the fit takes: expected weighted residual per GL^2 of noise.

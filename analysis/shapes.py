@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.compiled import helper, inlined
-from analysis.moments import DEGREES, PRODUCT, PRODUCT_ROWS
+from analysis.moments import DEGREES, PRODUCT, PRODUCT_ROWS, weighted_rows
 
 N_SHAPES = 5
 _SQRT_HALF = math.sqrt(0.5)
@@ -75,14 +75,14 @@ def _orthonormal(x: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray
 
 @helper
 def cross_moments(m: Any, table: Any, mix: Any, out: Any) -> None:
-    """Sums of w times the shapes of u, then of v, times the columns of J, written to ``out`` (10, P).
+    """Sums of w times the shapes of u, then of v, times the columns of J, written to ``out`` (P, 10).
 
     ``m[product, l, k]`` are the sums of w eta^l xi^k times the products of f_x, f_y, f, 1 (``moments``).
     """
     for column in range(len(table)):
         channel, px, py = table[column]
-        _combine(m[PRODUCT[0, channel]], px, py, mix, out[:N_SHAPES, column])
-        _combine(m[PRODUCT[1, channel]], px, py, mix, out[N_SHAPES:, column])
+        _combine(m[PRODUCT[0, channel]], px, py, mix, out[column, :N_SHAPES])
+        _combine(m[PRODUCT[1, channel]], px, py, mix, out[column, N_SHAPES:])
 
 
 @helper
@@ -114,17 +114,16 @@ def shares(s: Any, component: int, out: Any) -> None:
 
 
 @inlined
-def bent(s: Any, cross: Any, z: int, step: Any, unit_x: Any, unit_y: Any) -> Any:
+def bent(s: Any, cross: Any, z: int, step: Any, unit_x: Any, unit_y: Any, fitted: Any) -> Any:
     """Sum of the squared shares, px^2, of what is left of the difference after a linear fit of ZOI ``z``.
 
     ``s`` (10,) are the sums with the whole difference, ``step`` (P,) is the fit, ``unit_x`` and ``unit_y`` the
-    sums of w f_x^2 and w f_y^2.
+    sums of w f_x^2 and w f_y^2; ``fitted`` float32, 10 in whole vectors, is for use here.
     """
-    total = 0.0
-    for i in range(2 * N_SHAPES):
-        share = s[i]
-        for j in range(len(step)):
-            share -= cross[z, i, j] * step[j]
-        share /= unit_x if i < N_SHAPES else unit_y
-        total += share * share
-    return total
+    width = 2 * N_SHAPES
+    weighted_rows(cross, np.uintp(z * len(step) * width), step, width, fitted)
+    of_u = of_v = 0.0
+    for i in range(N_SHAPES):
+        of_u += (s[i] - fitted[i]) ** 2
+        of_v += (s[N_SHAPES + i] - fitted[N_SHAPES + i]) ** 2
+    return of_u / unit_x**2 + of_v / unit_y**2
