@@ -63,7 +63,7 @@ class Attempt:
     """The measuring of one image: parameters and verdict of every active ZOI, as they come."""
 
     def __init__(self, kernel: PhaseKernel, image: NDArray[Any], noise: NoiseModel | None) -> None:
-        from analysis.warp import coefficients
+        from analysis.prefilter import coefficients
 
         self.kernel = kernel
         self.image = image

@@ -12,6 +12,7 @@ import numpy as np
 from numba import prange
 
 from analysis.compiled import helper, inlined, parallel
+from analysis.cutting import ROWS, displacement, inside, new_plan, plan_rows
 from analysis.moments import (
     CHANNELS,
     DEGREES,
@@ -23,7 +24,7 @@ from analysis.moments import (
 from analysis.shapes import N_SHAPES, bent, shares
 from analysis.splines import PAD
 from analysis.vectors import LANES, fetch
-from analysis.warp import ROWS, displacement, inside, new_plan, plan_rows, warp_cut_rows, warp_rows
+from analysis.warp import warp_cut_rows, warp_rows
 
 f4 = np.float32
 
@@ -190,7 +191,7 @@ def track(
     Parameters
     ----------
     c : flat float32
-        Spline coefficients of the deformed image (``warp.coefficients``).
+        Spline coefficients of the deformed image (``prefilter.coefficients``).
     images : flat float32, ``samples`` of each, ``pitch`` a row
         Filtered reference f_x, f_y, f and the reference as it was recorded (``Prepared.images``).
     origins : (A, 2) int64, first row and column of each ZOI

@@ -184,7 +184,7 @@ def iterate(
     ----------
     sensors : (A, 7, n, n), origins : (A, 2), guess : (A, 6), tolerance : (A, 2)
     coefficients : flat float32
-        Of the deformed image (``warp.coefficients``).
+        Of the deformed image (``prefilter.coefficients``).
     over : float, px
         How far a ZOI may leave the image.
 

@@ -188,6 +188,16 @@ def fused(_typing: Any, a: Any, b: Any, c: Any) -> Any:
 
 
 @intrinsic
+def above(_typing: Any, value: Any, limit: Any, yes: Any, no: Any) -> Any:
+    """In each lane ``yes`` where value > limit, else ``no``."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return builder.select(builder.fcmp_ordered(">", arguments[0], arguments[1]), *arguments[2:])
+
+    return vector(vector, vector, vector, vector), generate
+
+
+@intrinsic
 def total(_typing: Any, value: Any) -> Any:
     """Sum over the lanes, float32."""
 

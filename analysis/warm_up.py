@@ -35,9 +35,9 @@ def warm_up() -> None:
 
 def announce() -> None:
     """Say in the log that compilation is about to happen, where it is."""
-    from analysis import climb, gauss_newton, sensitivity, warp
+    from analysis import climb, gauss_newton, prefilter, sensitivity
     from analysis.compiled import is_cached
 
-    loops = (warp.coefficients, sensitivity.prepare, gauss_newton.track, climb.climb)
+    loops = (prefilter.coefficients, sensitivity.prepare, gauss_newton.track, climb.climb)
     if not all(map(is_cached, loops)):
         log.info("compiling the kernel for this machine, once, about %d s", COMPILE_SECONDS)

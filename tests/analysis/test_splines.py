@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from analysis.cutting import cut_leaning_row, cut_row, displacement
 from analysis.gauss_newton import compose, warp_zois
+from analysis.prefilter import GROUP, PART, coefficients
 from analysis.splines import PAD, basis, prefilter_taps, tap_table
-from analysis.warp import GROUP, PART, _cut_row, coefficients, displacement
+from analysis.vectors import LANES
 
 RNG = np.random.default_rng(0)
 IMAGE = ndimage.gaussian_filter(RNG.normal(0, 1, (70, 90)), 1.0).astype(np.float32) * 100
@@ -41,9 +43,18 @@ def test_prefilter_is_that_of_scipy(degree: int, kind: type, shape: tuple[int, i
 
 
 @pytest.mark.parametrize(
-    "motion", [(0.3, 0, 0, -0.6, 0, 0), (1.2, 0.01, -0.09, -2.4, 0.09, -0.02), (0, 0, 0, 0, 0, 0)]
+    "motion",
+    [
+        (0.3, 0, 0, -0.6, 0, 0),
+        (1.2, 0.01, -0.09, -2.4, 0.09, -0.02),
+        (0, 0, 0, 0, 0, 0),
+        (0.7, -0.03, 0.1, 0.4, -0.125, 0.02),
+        (0.2, 0.2, 0.01, 0.3, 0.03, 0),
+        (-0.4, -0.01, 0.06, 1.3, -0.06, 0.01),
+        (0.1, 0.01, -0.3, 0.2, 0.3, 0.02),
+    ],
 )
-@pytest.mark.parametrize("size", [16, 21])
+@pytest.mark.parametrize("size", [16, 21, 32])
 def test_warp_is_the_interpolated_image(motion: tuple, size: int) -> None:
     origin = np.array([[24, 30]])
     out = np.empty((1, size, size), np.float32)
@@ -65,7 +76,7 @@ def test_a_row_is_cut_into_pieces_that_cover_it(slope: float, drift: float) -> N
     size, stride = 32, 200
     for x, y in ((60.0, 40.0), (31.3, 40.5), (60.3, 40.9999999999), (60.999999999999, 40.0), (61.5, 40.25)):
         where, how = np.empty((2 * size, 3), np.int64), np.empty((2 * size, 4), np.float32)
-        n = _cut_row(
+        n = cut_row(
             stride, size, x, drift, _reciprocal(drift), y, slope, _reciprocal(slope), 5, 0, where, how
         )  # fmt: skip
         lengths = where[:n, 2]
@@ -77,6 +88,29 @@ def test_a_row_is_cut_into_pieces_that_cover_it(slope: float, drift: float) -> N
             assert np.all(np.abs(tx + sx * k) <= 0.5 + 1e-6) and np.all(np.abs(ty + sy * k) <= 0.5 + 1e-6)
             pixel = at - 5 + k
             assert rows + ty + 0.5 + sy * k == pytest.approx(y + slope * pixel, abs=1e-5)
+            assert columns + tx + 0.5 + sx * k == pytest.approx(x + (1 + drift) * pixel, abs=1e-5)
+
+
+@pytest.mark.parametrize("slope", [0.0, -0.0, 1e-18, -1e-9, 0.03, -0.03, 2 / (LANES - 1), -2 / (LANES - 1)])
+@pytest.mark.parametrize("drift", [0.0, -1e-17, 0.01, -0.2, -1.9])
+def test_a_leaning_row_is_cut_into_vectors_that_pass_three_rows_at_most(slope: float, drift: float) -> None:
+    size, stride = 29, 200
+    for x, y in ((60.0, 40.0), (31.3, 40.5), (60.3, 40.9999999999), (60.999999999999, 40.0), (61.5, 40.25)):
+        where, how = np.empty((2 * size, 3), np.int64), np.empty((2 * size, 4), np.float32)
+        n = cut_leaning_row(stride, size, x, drift, _reciprocal(drift), y, slope, 5, 0, where, how)
+        lengths = where[:n, 2]
+        assert (lengths >= 1).all() and (lengths <= LANES).all() and lengths.sum() == size
+        assert np.array_equal(where[:n, 1], 5 + np.cumsum(lengths) - lengths)
+        for (start, at, length), (tx, sx, ty, sy) in zip(where[:n], how[:n].astype(float), strict=True):
+            k = np.arange(length)
+            rows, columns = start // stride + 2, start % stride + 2 + k
+            passed = ty + sy * k + 0.5
+            assert np.all(np.abs(tx + sx * k) <= 0.5 + 1e-6)
+            assert np.all(passed >= -1e-6) and np.all(
+                passed <= (3 if abs(slope) * (LANES - 1) > 1 else 2) + 1e-6
+            )
+            pixel = at - 5 + k
+            assert rows + passed == pytest.approx(y + slope * pixel, abs=1e-5)
             assert columns + tx + 0.5 + sx * k == pytest.approx(x + (1 + drift) * pixel, abs=1e-5)
 
 
