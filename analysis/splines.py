@@ -1,6 +1,6 @@
 """B-splines: weights of the taps, the prefilter as a short filter, gradients on whole pixels.
 
-Only tables and filters on whole images are here; the prefilter of a frame is in ``prefilter.py``, the warp in ``warp.py``.
+Only tables and filters on whole images are here; a frame is filtered in ``prefilter.py`` and warped in ``warp.py``.
 Source: M. Unser, A. Aldroubi, M. Eden, B-spline signal processing, IEEE Trans. Signal Process.
 41 (1993) 821-848, doi:10.1109/78.193220.
 """

@@ -50,11 +50,8 @@ def _taps(r: Any, a: Any) -> Any:
 
 
 @inlined
-def _pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: Any) -> Any:
-    """A vector of pixels; ``first`` is the flat index of the first of the 36 taps of its first pixel."""
-    a = _weights(tau_x, t)
-    b = _weights(tau_y, t)
-    row = address(c, first)
+def _six_rows(row: Any, stride: Any, a: Any, b: Any) -> Any:
+    """Sum of the taps from the address ``row`` on, with weights ``a`` along and ``b`` across; and the last row."""
     value = b[0] * _taps(row, a)
     row = further(row, stride)
     value += b[1] * _taps(row, a)
@@ -65,7 +62,14 @@ def _pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: Any) -> 
     row = further(row, stride)
     value += b[4] * _taps(row, a)
     row = further(row, stride)
-    return value + b[5] * _taps(row, a)
+    return value + b[5] * _taps(row, a), row
+
+
+@inlined
+def _pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: Any) -> Any:
+    """A vector of pixels; ``first`` is the flat index of the first of the 36 taps of its first pixel."""
+    value, _ = _six_rows(address(c, first), stride, _weights(tau_x, t), _weights(tau_y, t))
+    return value
 
 
 @inlined
@@ -96,18 +100,7 @@ def _leaning_pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: 
             above(tau_y, more, b[2], b[3]), above(tau_y, more, b[3], b[4]), above(tau_y, more, b[4], b[5]),
             above(tau_y, more, b[5], b[6]),
         )  # fmt: skip
-    row = address(c, first)
-    value = b[0] * _taps(row, a)
-    row = further(row, stride)
-    value += b[1] * _taps(row, a)
-    row = further(row, stride)
-    value += b[2] * _taps(row, a)
-    row = further(row, stride)
-    value += b[3] * _taps(row, a)
-    row = further(row, stride)
-    value += b[4] * _taps(row, a)
-    row = further(row, stride)
-    value += b[5] * _taps(row, a)
+    value, row = _six_rows(address(c, first), stride, a, b)
     row = further(row, stride)
     value += b[6] * _taps(row, a)
     if steep:
