@@ -146,29 +146,48 @@ def inverse_slope(slope: Any) -> Any:
 
 
 @helper
+def _bent_length(
+    most: int, x: Any, x1: Any, x2: Any, ix: Any, y: Any, y1: Any, y2: Any, iy: Any
+) -> int:  # fmt: skip
+    """Pixels from the first of a bent row on, ``most`` at most, until an integer part changes."""
+    length = 1
+    while length < most:
+        xe = x + length * (x1 - 1 + length * x2)
+        ye = y + length * (y1 + length * y2)
+        if not (ix <= xe < ix + 1 and iy <= ye < iy + 1):
+            break
+        length += 1
+    return length
+
+
+@helper
 def cut_bent_row(
     stride: int, size: int, x: Any, x1: Any, x2: Any, y: Any, y1: Any, y2: Any, at: int,
     n: int, where: Any, how: Any,
 ) -> int:  # fmt: skip
-    """The same for a row along X = x + x1 k + x2 k^2, Y = y + y1 k + y2 k^2."""
+    """``cut_row`` for a row along X = x + x1 k + x2 k^2, Y = y + y1 k + y2 k^2."""
     k = 0
     while k < size:
-        ix = math.floor(x + k * (x1 + k * x2))
-        iy = math.floor(y + k * (y1 + k * y2))
-        length = 1
-        while k + length < size:
-            end = k + length
-            xe = x + end * (x1 + end * x2) - length
-            ye = y + end * (y1 + end * y2)
-            if not (ix <= xe < ix + 1 and iy <= ye < iy + 1):
-                break
-            length += 1
+        xk, yk = x + k * (x1 + k * x2), y + k * (y1 + k * y2)
+        ix, iy = math.floor(xk), math.floor(yk)
+        rest = size - 1 - k
+        last = size - 1
+        xe, ye = x + last * (x1 + last * x2) - rest, y + last * (y1 + last * y2)
+        # A parabola leaves the span of its ends by a quarter of its bend at most.
+        bow_x, bow_y = abs(x2) * rest * rest / 4, abs(y2) * rest * rest / 4
+        if (
+            ix <= min(xk, xe) - bow_x and max(xk, xe) + bow_x < ix + 1
+            and iy <= min(yk, ye) - bow_y and max(yk, ye) + bow_y < iy + 1
+        ):  # fmt: skip
+            length = rest + 1
+        else:
+            length = _bent_length(size - k, xk, x1 + 2 * k * x2, x2, ix, yk, y1 + 2 * k * y2, y2, iy)
         where[n, 0] = (iy - 2) * stride + ix - 2
         where[n, 1] = at + k
         where[n, 2] = length
-        how[n, 0] = x + k * (x1 + k * x2) - ix - 0.5
+        how[n, 0] = xk - ix - 0.5
         how[n, 1] = x1 - 1 + 2 * k * x2
-        how[n, 2] = y + k * (y1 + k * y2) - iy - 0.5
+        how[n, 2] = yk - iy - 0.5
         how[n, 3] = y1 + 2 * k * y2
         n += 1
         k += length

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from analysis.cutting import cut_leaning_row, cut_row, displacement
+from analysis.cutting import cut_bent_row, cut_leaning_row, cut_row, displacement
 from analysis.gauss_newton import compose, warp_zois
 from analysis.prefilter import GROUP, PART, coefficients
 from analysis.splines import PAD, basis, prefilter_taps, tap_table
@@ -112,6 +112,27 @@ def test_a_leaning_row_is_cut_into_vectors_that_pass_three_rows_at_most(slope: f
             pixel = at - 5 + k
             assert rows + passed == pytest.approx(y + slope * pixel, abs=1e-5)
             assert columns + tx + 0.5 + sx * k == pytest.approx(x + (1 + drift) * pixel, abs=1e-5)
+
+
+@pytest.mark.parametrize("slope", [0.0, 1e-9, 0.03, -0.6])
+@pytest.mark.parametrize("bend", [0.0, 1e-9, 1e-3, -1e-3, 0.02])
+def test_a_bent_row_is_cut_into_pieces_that_cover_it(bend: float, slope: float) -> None:
+    size, stride = 32, 200
+    for x, y in ((60.0, 40.0), (31.3, 40.5), (60.3, 40.9999999999), (60.999999999999, 40.0), (61.5, 40.25)):
+        where, how = np.empty((2 * size, 3), np.int64), np.empty((2 * size, 4), np.float32)
+        n = cut_bent_row(stride, size, x, 1 + slope / 3, bend, y, slope, -bend / 2, 5, 0, where, how)
+        lengths = where[:n, 2]
+        assert (lengths >= 1).all() and lengths.sum() == size
+        assert np.array_equal(where[:n, 1], 5 + np.cumsum(lengths) - lengths)
+        for (start, at, length), (tx, sx, ty, sy) in zip(where[:n], how[:n].astype(float), strict=True):
+            k, pixel = np.arange(length), at - 5 + np.arange(length)
+            columns, rows = tx + (sx + bend * k) * k, ty + (sy - bend / 2 * k) * k
+            assert np.all(np.abs(columns) <= 0.5 + 1e-6) and np.all(np.abs(rows) <= 0.5 + 1e-6)
+            expected = x + (1 + slope / 3) * pixel + bend * pixel**2
+            assert start % stride + 2.5 + k + columns == pytest.approx(expected, abs=1e-4)
+            assert start // stride + 2.5 + rows == pytest.approx(
+                y + (slope - bend / 2 * pixel) * pixel, abs=1e-4
+            )
 
 
 def _reciprocal(slope: float) -> float:
