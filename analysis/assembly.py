@@ -9,7 +9,6 @@ from numba import prange
 
 from analysis.compiled import helper, parallel
 
-f4 = np.float32
 RUN = 1024
 """ZOIs whose covariances are scaled at a time."""
 LEAST_GAIN = 0.1

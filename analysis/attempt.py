@@ -62,6 +62,12 @@ class Outcome:
 class Attempt:
     """The measuring of one image: parameters and verdict of every active ZOI, as they come."""
 
+    # As in Outcome, of all ZOIs; there once ``run`` was called.
+    p: Floats
+    left: Floats
+    nuisance: Floats
+    iterations: NDArray[np.uint8]
+
     def __init__(self, kernel: PhaseKernel, image: NDArray[Any], noise: NoiseModel | None) -> None:
         from analysis.prefilter import coefficients
 
@@ -191,13 +197,14 @@ class Attempt:
     def _retry(self, guess: Floats) -> None:
         """Track lost ZOIs from another guess; a worse outcome does not replace a better one."""
         which = np.flatnonzero(self._lost() & np.isfinite(guess).all(axis=1))
-        kept = [a[which].copy() for a in (self.p, self.left, self.nuisance, self.iterations, self.status)]
+        kept = [a[which].copy() for a in self._found()]
         self._track(which, guess)
         worse = self.status[which] != Status.OK
-        for array, old in zip(
-            (self.p, self.left, self.nuisance, self.iterations, self.status), kept, strict=True
-        ):
+        for array, old in zip(self._found(), kept, strict=True):
             array[which[worse]] = old[worse]
+
+    def _found(self) -> tuple[NDArray[Any], ...]:
+        return self.p, self.left, self.nuisance, self.iterations, self.status
 
     def _from_neighbours(self) -> None:
         """Let good ZOIs lend their shape to lost neighbours, round by round."""
