@@ -8,14 +8,14 @@ import numpy as np
 
 log = logging.getLogger("analysis")
 
-COMPILE_SECONDS = 60
+COMPILE_SECONDS = 80
 """About how long the first compilation takes; said in the announcement."""
 
 
 def warm_up() -> None:
     """Compile, or load from numba's cache, every loop that a kernel can need.
 
-    The first time on a machine this takes up to a minute and says so in the log.
+    The first time on a machine this takes a minute or two and says so in the log.
     """
     from analysis.phase_kernel import PhaseKernel
     from analysis.settings import KernelSettings, NoiseModel

@@ -197,7 +197,7 @@ def warp_cut_rows(
         overwritten or never read.
     """
     reach = (size - 1) / 2
-    n = 0
+    n = np.intp(0)  # a literal 0 would have numba compile the loops twice
     inverse_x = inverse_slope(p[1])
     inverse_y = inverse_slope(p[4])
     # How many rows a vector passes; where they are few it need not be cut there.
