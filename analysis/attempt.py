@@ -67,6 +67,7 @@ class Attempt:
     left: Floats
     nuisance: Floats
     iterations: NDArray[np.uint8]
+    _guess: Floats
 
     def __init__(self, kernel: PhaseKernel, image: NDArray[Any], noise: NoiseModel | None) -> None:
         from analysis.prefilter import coefficients

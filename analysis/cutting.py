@@ -77,6 +77,21 @@ def plan_rows(p: Any, x: Any, y: Any, size: int, stride: int, starts: Any, taus:
     return inside_x and inside_y
 
 
+@inlined
+def _append(
+    first: int, at: int, length: int, fx: Any, x_slope: Any, fy: Any, y_slope: Any, n: int, where: Any, how: Any
+) -> int:  # fmt: skip
+    """Write piece ``n``: first of the taps, place, length, fractions and their slopes; returns the next number."""
+    where[n, 0] = first
+    where[n, 1] = at
+    where[n, 2] = length
+    how[n, 0] = fx - 0.5
+    how[n, 1] = x_slope
+    how[n, 2] = fy - 0.5
+    how[n, 3] = y_slope
+    return n + 1
+
+
 @helper
 def cut_row(
     stride: int, size: int, x: Any, drift: Any, inverse_x: Any, y: Any, slope: Any, inverse_y: Any, at: int,
@@ -100,14 +115,7 @@ def cut_row(
         # A pixel that lies just on the edge is exact with the taps of either side.
         room: Any = min((edge_x - fx) * inverse_x, (edge_y - fy) * inverse_y)
         length: Any = min(np.intp(min(room, 1.0 * size)) + 1, size - k)
-        where[n, 0] = (iy - 2) * stride + ix + k - 2
-        where[n, 1] = at + k
-        where[n, 2] = length
-        how[n, 0] = fx - 0.5
-        how[n, 1] = drift
-        how[n, 2] = fy - 0.5
-        how[n, 3] = slope
-        n += 1
+        n = _append((iy - 2) * stride + ix + k - 2, at + k, length, fx, drift, fy, slope, n, where, how)
         k += length
     return n
 
@@ -127,14 +135,7 @@ def cut_leaning_row(
         fx = xk - ix
         length: Any = min(np.intp(min((edge_x - fx) * inverse_x, 1.0 * size)) + 1, LANES, size - k)
         iy = math.floor(min(yk, yk + (length - 1) * slope))
-        where[n, 0] = (iy - 2) * stride + ix + k - 2
-        where[n, 1] = at + k
-        where[n, 2] = length
-        how[n, 0] = fx - 0.5
-        how[n, 1] = drift
-        how[n, 2] = yk - iy - 0.5
-        how[n, 3] = slope
-        n += 1
+        n = _append((iy - 2) * stride + ix + k - 2, at + k, length, fx, drift, yk - iy, slope, n, where, how)
         k += length
     return n
 
@@ -182,13 +183,8 @@ def cut_bent_row(
             length = rest + 1
         else:
             length = _bent_length(size - k, xk, x1 + 2 * k * x2, x2, ix, yk, y1 + 2 * k * y2, y2, iy)
-        where[n, 0] = (iy - 2) * stride + ix - 2
-        where[n, 1] = at + k
-        where[n, 2] = length
-        how[n, 0] = xk - ix - 0.5
-        how[n, 1] = x1 - 1 + 2 * k * x2
-        how[n, 2] = yk - iy - 0.5
-        how[n, 3] = y1 + 2 * k * y2
-        n += 1
+        first = (iy - 2) * stride + ix - 2
+        x_slope, y_slope = x1 - 1 + 2 * k * x2, y1 + 2 * k * y2
+        n = _append(first, at + k, length, xk - ix, x_slope, yk - iy, y_slope, n, where, how)
         k += length
     return n

@@ -155,12 +155,13 @@ def _solve(inverse: Any, z: int, m: Any, step: Any, energy: Any, solved: Any) ->
 
 @inlined
 def _fetch(
-    c: Any, width: int, images: Any, samples: int, pitch: int, origin: Any, size: int, spacing: int, q: Any
+    c: Any, width: int, images: Any, samples: int, pitch: int, origins: Any, z: int, size: int, spacing: int, q: Any
 ) -> None:  # fmt: skip
     """Ask for what a ZOI to come needs of the images and its neighbours do not: its last rows and columns.
 
     Rows lie further apart than the processor looks ahead by itself. ``q`` says about where the ZOI has moved.
     """
+    origin = origins[min(z + AHEAD, len(origins) - 1)]
     fresh = min(spacing, size)
     down, right = int(q[len(q) // 2]) + PAD + BEYOND, int(q[0]) + PAD + BEYOND
     for x in range(size - fresh + LANES - 1, size + LANES - 1, LANES):
@@ -233,9 +234,7 @@ def track(
         for z in range(chunk * 32, min(chunk * 32 + 32, len(origins))):
             top, first = origins[z]
             q = p[z]
-            _fetch(
-                c, width, images, samples, pitch, origins[min(z + AHEAD, len(origins) - 1)], size, spacing, q
-            )
+            _fetch(c, width, images, samples, pitch, origins, z, size, spacing, q)
             _fetch_all(inverse, z + 2)
             _fetch_all(cross, z + 2)
             state[z], iterations[z] = RUNNING, 0

@@ -51,20 +51,20 @@ def coefficients(image: NDArray[Any], offset: Any, taps: NDArray[np.float32]) ->
         # An odd number of cache lines a row, or the rows would displace each other.
         ring = np.empty((RING, across + LINE), np.float32)
         band = np.empty((BAND, across), np.float32)
-        starts = np.empty(RING, np.intp)
+        beside, starts = np.arange(2 * PREFILTER_REACH + 1), np.empty(RING, np.intp)
         ahead = part * PART - PREFILTER_REACH
         last = min(part * PART + PART, height)
         for first in range(part * PART, last, BAND):
             count = min(BAND, last - first)
             for y in range(ahead, first + count + PREFILTER_REACH):
                 _mirrored_line(image[_mirror(y, height)], offset, line)
-                _filter_along(line, taps, ring[(y + PREFILTER_REACH) % RING, :across])
+                _filter(line, beside, 0, across, taps, ring[(y + PREFILTER_REACH) % RING])
             ahead = first + count + PREFILTER_REACH
             for i in range(RING):
                 starts[i] = (first + i) % RING * ring.shape[1]
             for x in range(0, across, STRIP):
                 for y in range(count):
-                    _filter_across(ring, starts[y:], x, min(x + STRIP, across), taps, band[y])
+                    _filter(ring, starts[y:], x, min(x + STRIP, across), taps, band[y])
             for y in range(count):
                 row = out[(first + y + PAD) * stride : (first + y + PAD + 1) * stride]
                 row[PAD : PAD + width] = band[y, :width]
@@ -90,29 +90,8 @@ def _mirrored_line(row: Any, offset: Any, line: Any) -> None:
 
 
 @helper
-def _filter_along(line: Any, taps: Any, out: Any) -> None:
-    """Symmetric filter along a line that begins ``PREFILTER_REACH`` samples before ``out``."""
-    for n in range(0, out.size, GROUP):
-        i = np.uintp(n + PREFILTER_REACH)
-        tap = spread(taps[0])
-        v0 = tap * load(line, i)
-        v1 = tap * load(line, i + _lanes)
-        v2 = tap * load(line, i + _two * _lanes)
-        v3 = tap * load(line, i + _three * _lanes)
-        for k in range(1, PREFILTER_REACH + 1):
-            tap = spread(taps[k])
-            p = i - np.uintp(k)
-            q = i + np.uintp(k)
-            v0 += tap * (load(line, p) + load(line, q))
-            v1 += tap * (load(line, p + _lanes) + load(line, q + _lanes))
-            v2 += tap * (load(line, p + _two * _lanes) + load(line, q + _two * _lanes))
-            v3 += tap * (load(line, p + _three * _lanes) + load(line, q + _three * _lanes))
-        _store_group(out, np.uintp(n), v0, v1, v2, v3)
-
-
-@helper
-def _filter_across(rows: Any, starts: Any, first: int, last: int, taps: Any, out: Any) -> None:
-    """The same across rows of which the flat indices are given, for the columns ``first`` .. ``last``."""
+def _filter(rows: Any, starts: Any, first: int, last: int, taps: Any, out: Any) -> None:
+    """Symmetric filter of the samples ``first`` .. ``last``; ``starts`` (31,) are the flat indices of its taps."""
     reach = PREFILTER_REACH
     for n in range(first, last, GROUP):
         i = np.uintp(starts[reach] + n)

@@ -29,8 +29,9 @@ _VECTOR = ir.VectorType(_FLOAT, LANES)
 _INT = ir.IntType(32)
 _BYTES = ir.IntType(8).as_pointer()
 _ALIGNMENT = 4
-_POINTER = 64
 """Bytes: a vector may start at any sample."""
+_POINTER = 64
+"""Bits of an address."""
 
 
 def whole(size: int) -> int:

@@ -74,7 +74,7 @@ def _pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: Any) -> 
 
 @inlined
 def _leaning_weights(tau: Any, limit: Any, w: Any) -> Any:
-    """Weights moved on by a tap in the lanes where ``tau`` is above ``limit``: seven for six."""
+    """Weights moved on by a tap in the lanes where ``tau`` is above ``limit``: seven for the first six."""
     zero = spread(f4(0))
     return (
         above(tau, limit, zero, w[0]), above(tau, limit, w[0], w[1]), above(tau, limit, w[1], w[2]),
@@ -92,19 +92,15 @@ def _leaning_pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: 
         inner = inner - above(tau_y, more, one, zero)
     a = _weights(tau_x, t)
     b = _leaning_weights(tau_y, half, _weights(inner, t))
-    last = zero
+    seventh, eighth = b[6], zero
     if steep:
-        last = above(tau_y, more, b[6], zero)
-        b = (
-            above(tau_y, more, zero, b[0]), above(tau_y, more, b[0], b[1]), above(tau_y, more, b[1], b[2]),
-            above(tau_y, more, b[2], b[3]), above(tau_y, more, b[3], b[4]), above(tau_y, more, b[4], b[5]),
-            above(tau_y, more, b[5], b[6]),
-        )  # fmt: skip
+        seventh, eighth = above(tau_y, more, b[5], b[6]), above(tau_y, more, b[6], zero)
+        b = _leaning_weights(tau_y, more, b)
     value, row = _six_rows(address(c, first), stride, a, b)
     row = further(row, stride)
-    value += b[6] * _taps(row, a)
+    value += seventh * _taps(row, a)
     if steep:
-        value += last * _taps(further(row, stride), a)
+        value += eighth * _taps(further(row, stride), a)
     return value
 
 
