@@ -20,8 +20,7 @@ from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 
 if TYPE_CHECKING:
-    from acquire.camera import Camera
-    from acquire.load_cell import LoadCell
+    pass
 
 # A glob may hold a question mark too: settings are the last one followed by key=value pairs.
 _SETTINGS = re.compile(r"\?((?:[A-Za-z_]\w*=[^&?]*)(?:&[A-Za-z_]\w*=[^&?]*)*)$")
@@ -247,26 +246,3 @@ def _load(path: str) -> Callable[..., Device]:
     module, _, name = path.partition(":")
     found: Callable[..., Device] = getattr(importlib.import_module(module), name)
     return found
-
-
-CAMERAS: Registry[Camera] = Registry(
-    "camera",
-    "phasedic.cameras",
-    {
-        "": "acquire.v4l2:open_v4l2",
-        "opencv": "acquire.opencv_camera:open_opencv",
-        "video": "acquire.video_file:open_video",
-        "files": "acquire.image_files:open_files",
-        "session": "acquire.session_devices:open_session_camera",
-    },
-)
-LOAD_CELLS: Registry[LoadCell] = Registry(
-    "load cell",
-    "phasedic.load_cells",
-    {
-        "": "acquire.serial_cell:open_serial",
-        "none": "acquire.no_load_cell:open_none",
-        "session": "acquire.session_devices:open_session_load",
-    },
-    fallback="acquire.serial_cell:open_serial",
-)

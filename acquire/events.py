@@ -69,3 +69,25 @@ def ignore_event(event: Event) -> None:
 def device_event(sink: EventSink, source: str, text: str, level: Level = "warning", **data: Any) -> None:
     """Tell ``sink`` about a device, stamped now."""
     sink(Event(time.monotonic(), EventKind.DEVICE, source, text, level, data))
+
+
+class Muffler:
+    """Lets a fault that may come with every frame be told at once, then as a count once a while.
+
+    Parameters
+    ----------
+    interval_s : float, s
+    """
+
+    def __init__(self, interval_s: float = 2.0) -> None:
+        self._interval_s = interval_s
+        self._told_t = float("-inf")
+        self._kept = 0
+
+    def told(self, t: float) -> int:
+        """How many to tell of now, this one included; 0: keep quiet."""
+        self._kept += 1
+        if t - self._told_t < self._interval_s:
+            return 0
+        count, self._kept, self._told_t = self._kept, 0, t
+        return count

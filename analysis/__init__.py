@@ -9,14 +9,11 @@ Nothing here knows of files, threads, devices or the clock. Compiled code (numba
 the first ``PhaseKernel`` is made; ``warm_up`` does that ahead of a test.
 """
 
-from analysis.phase_kernel import PhaseKernel
-from analysis.prepared import PatternError
-from analysis.settings import KernelSettings, NoiseModel
-from analysis.strain_field import Status, StrainField
-from analysis.warm_up import warm_up
-from analysis.zoi_grid import Roi, ZoiGrid
+from analysis.field import Roi, Status, StrainField, ZoiGrid
+from analysis.kernel import Estimator, KernelSettings, NoiseModel, PatternError, PhaseKernel, warm_up
 
 __all__ = [
+    "Estimator",
     "KernelSettings",
     "NoiseModel",
     "PatternError",

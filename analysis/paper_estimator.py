@@ -30,7 +30,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.zoi_grid import ZoiGrid
+from analysis.field import ZoiGrid
 
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]

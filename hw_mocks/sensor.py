@@ -128,7 +128,7 @@ class Exposer:
         (H, W) uint8 or uint16, GL
             Read-only.
         """
-        from hw_mocks.speckle_kernels import GOLDEN, expose
+        from hw_mocks.speckle_loops import GOLDEN, expose
 
         sensor = self.sensor
         image = np.empty(self._shape, np.uint8 if sensor.bits == 8 else np.uint16)

@@ -210,7 +210,7 @@ class Speckle:
     def _splat_at(
         self, x: Array, y: Array, gradient: Gradient, shape: tuple[int, int], level: float
     ) -> Image:
-        from hw_mocks.speckle_kernels import splat
+        from hw_mocks.speckle_loops import splat
 
         a, b, c, stretch = _metric(gradient, self.radius)
         reach = REACH_FAST * self.radius * stretch
@@ -271,7 +271,7 @@ class Speckle:
         ----------
         x, y : (N,) float64, px
         """
-        from hw_mocks.speckle_kernels import evaluate
+        from hw_mocks.speckle_loops import evaluate
 
         reach = REACH_EXACT * self.radius
         origin = -self._margin - 2 * reach

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable, Sequence
 
 from acquire.errors import PhasedicError
-from live.arguments import make_parser
+from live.commands.arguments import make_parser
 
 Command = Callable[[argparse.Namespace], int]
 

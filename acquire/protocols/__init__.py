@@ -1,41 +1,12 @@
 """The protocols of load cells and indicators: bytes to readings, and commands to bytes.
 
-Pure: no ports, no threads, no clock. ``acquire.serial_cell`` drives them. A protocol's module
-says what its lines look like, and what damage its lines do not let anyone detect.
+Pure: no ports, no threads, no clock; ``acquire.serial_line`` drives them. One file a protocol, which says
+what its lines look like and what damage they do not let anyone detect; ``registry`` finds one by name,
+``base`` is the contract, ``units`` has the units of force and mass.
 """
 
-from __future__ import annotations
-
-import importlib
-from collections.abc import Mapping
-
-from acquire.errors import ConfigError
 from acquire.protocols.base import Mode, Parser, Protocol, Reading
+from acquire.protocols.registry import PROTOCOLS, find_protocol
+from acquire.protocols.units import is_mass, newtons_per
 
-__all__ = ["PROTOCOLS", "Mode", "Parser", "Protocol", "Reading", "find_protocol"]
-
-# Imported when used; each module has a PROTOCOL.
-PROTOCOLS: Mapping[str, str] = {
-    "ascii": "acquire.protocols.ascii",
-    "mt-sics": "acquire.protocols.mt_sics",
-    "aed-standard": "acquire.protocols.aed_standard",
-    "mark10": "acquire.protocols.mark10",
-    "sauter": "acquire.protocols.sauter",
-    "hbm-aed": "acquire.protocols.hbm_aed",
-    "modbus": "acquire.protocols.modbus",
-    "lines": "acquire.protocols.lines",
-}
-
-
-def find_protocol(name: str) -> Protocol:
-    """The protocol called ``name``.
-
-    Raises
-    ------
-    ConfigError
-        Nobody knows it; lists those there are.
-    """
-    if name not in PROTOCOLS:
-        raise ConfigError(f"no protocol is called {name!r}; there are: {', '.join(PROTOCOLS)}")
-    protocol: Protocol = importlib.import_module(PROTOCOLS[name]).PROTOCOL
-    return protocol
+__all__ = ["PROTOCOLS", "Mode", "Parser", "Protocol", "Reading", "find_protocol", "is_mass", "newtons_per"]

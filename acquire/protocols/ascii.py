@@ -19,9 +19,9 @@ from dataclasses import dataclass
 
 from acquire.addresses import Options
 from acquire.errors import ConfigError
-from acquire.line_buffer import Line
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.line_buffer import Line
 from acquire.protocols.line_parser import LineParser, bad, number
 from acquire.protocols.units import is_unit
 

@@ -14,9 +14,9 @@ import re
 
 from acquire.addresses import Options
 from acquire.errors import ConfigError
-from acquire.line_buffer import Line
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.line_buffer import Line
 from acquire.protocols.line_parser import LineParser, bad, number
 
 NOMINAL_COUNTS = 1_000_000

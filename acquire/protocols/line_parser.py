@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from abc import abstractmethod
 
-from acquire.line_buffer import Line, LineBuffer
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Reading
+from acquire.protocols.line_buffer import Line, LineBuffer
 
 
 class LineParser(Parser):

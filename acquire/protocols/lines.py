@@ -22,9 +22,9 @@ from typing import Any
 
 from acquire.addresses import Options
 from acquire.errors import ConfigError
-from acquire.line_buffer import Line, LineBuffer
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.line_buffer import Line, LineBuffer
 from acquire.protocols.line_parser import LineParser, bad, number
 
 STATES = {"overload": LoadFlag.OVERLOAD, "underload": LoadFlag.UNDERLOAD, "error": LoadFlag.ERROR}

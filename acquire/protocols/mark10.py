@@ -11,8 +11,8 @@ from __future__ import annotations
 import re
 
 from acquire.addresses import Options
-from acquire.line_buffer import Line
 from acquire.protocols.base import Parser, Protocol, Reading
+from acquire.protocols.line_buffer import Line
 from acquire.protocols.line_parser import LineParser, bad, number
 
 _LINE = re.compile(rb" *([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?: *(lbF|ozF|kgF|gF|kN|mN|N))? *", re.IGNORECASE)

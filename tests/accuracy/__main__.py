@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from analysis import KernelSettings, NoiseModel, PhaseKernel
-from analysis.deconvolution import effect
-from analysis.windows import profile
+from analysis.evaluate.deconvolution import effect
+from analysis.field.windows import profile
 from tests.accuracy import rejection
 from tests.accuracy.limit import NAMES, gaussian, l10, noise_limit
 from tests.accuracy.real import star, star_field, wave

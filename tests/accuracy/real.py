@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
-from analysis.deconvolution import deconvolved, effect
+from analysis.evaluate.deconvolution import deconvolved, effect
 
 STAR, SAMPLE14 = "star_dic_challenge_2", "dic_challenge_1_sample14"
 

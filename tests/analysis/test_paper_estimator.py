@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from analysis.field.grid import Roi, ZoiGrid
 from analysis.paper_estimator import PaperEstimator, PaperSettings, gaussian_windows
-from analysis.zoi_grid import Roi, ZoiGrid
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 

@@ -21,7 +21,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid, warm_up
+from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
+from analysis.kernel import warm_up
 from tests.accuracy.truth import Speckle, affine, digitise
 from tests.bench import machine
 from tests.bench.peers import HOW_TO_ADD, Peer, Points, missing, peers
@@ -248,7 +249,7 @@ def scaling(report: Report) -> None:
 
 
 def bursts(report: Report) -> None:
-    from acquire.burst import burst_of
+    from acquire.burst.accumulate import burst_of
     from acquire.frame import Frame
 
     rng = np.random.default_rng(0)

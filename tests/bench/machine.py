@@ -11,7 +11,7 @@ import numba
 import numpy as np
 from numba import njit, prange
 
-from analysis.vectors import LANES, fused, spread, total
+from analysis.compiled.vectors import LANES, fused, spread, total
 
 
 def describe() -> str:

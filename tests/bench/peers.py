@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis import ZoiGrid
-from live import characterise_others as others
-from live.characterise_others import Points
+from live.characterise.experiments import others
+from live.characterise.experiments.others import Points
 
 Flow = Callable[[], NDArray[np.floating]]
 HOW_TO_ADD = """The extra `peers` adds them: about 3 GB, and builds of OpenCV that overwrite ours, so best in an

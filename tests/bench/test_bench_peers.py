@@ -8,7 +8,7 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 
-import live.characterise_others as others
+import live.characterise.experiments.others as others
 from analysis import Roi, ZoiGrid
 from tests.bench import __main__ as bench
 from tests.bench import peers

@@ -14,15 +14,16 @@ import numpy as np
 import pytest
 
 from acquire.addresses import parse_address
-from acquire.camera import Camera, open_camera
+from acquire.camera.contract import Camera
+from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DataError, DeviceError, PhasedicError
 from acquire.events import ignore_event
 from acquire.frame import Frame
-from acquire.opencv_camera import OpenCVCamera, OpenCVSettings
-from acquire.v4l2 import V4L2Camera
-from acquire.v4l2_setup import V4L2Settings
-from tests.acquire import session_fixtures
-from tests.acquire.fake_v4l2 import FakeCamera, FakeKernel
+from acquire.opencv.webcam import OpenCVCamera, OpenCVSettings
+from acquire.v4l2.camera import V4L2Camera
+from acquire.v4l2.setup import V4L2Settings
+from tests.acquire.session import fixtures as session_fixtures
+from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeKernel
 from tests.contracts.entry_points import install_example
 
 Opener = Callable[[Path, pytest.MonkeyPatch], Camera]

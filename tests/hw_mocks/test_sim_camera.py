@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from acquire.addresses import parse_address
-from acquire.camera import Camera
+from acquire.camera.contract import Camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event, ignore_event
 from acquire.frame import Frame

@@ -13,7 +13,7 @@ import pytest
 from acquire.addresses import Options, parse_address
 from acquire.errors import ConfigError
 from acquire.events import Event, ignore_event
-from acquire.load_cell import LoadCell
+from acquire.load_cell.contract import LoadCell
 from acquire.load_sample import LoadSample
 from hw_mocks.ascii_indicator import AsciiIndicator
 from hw_mocks.faults import SERIAL_FAULTS

@@ -8,11 +8,11 @@ from collections.abc import Callable
 import numpy as np
 
 from acquire.frame import Burst, CameraInfo, Frame, frozen
-from acquire.load_log import LoadLog
+from acquire.load_cell.log import LoadLog
 from acquire.load_sample import LoadSample
-from analysis.strain_field import StrainField
-from analysis.zoi_grid import Roi, ZoiGrid
-from live.measurement import Measurement
+from analysis.field.grid import Roi, ZoiGrid
+from analysis.field.strain_field import StrainField
+from live.measure.measurement import Measurement
 
 START = 1000.0
 CAMERA = CameraInfo("sim:made-up", "made up", 128, 96, 12, live=False, clock="nominal", fps=10.0)

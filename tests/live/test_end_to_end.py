@@ -12,14 +12,15 @@ import numpy as np
 import pytest
 
 from acquire.events import EventKind
-from acquire.session import Session
-from live import run_live
+from acquire.session.reader import Session
 from live.cli import main
-from live.config import load_config
-from live.measurement import Measurement
-from live.rig import Rig
-from live.run_live import LiveRun, Outcome
-from live.status import Screen
+from live.measure.measurement import Measurement
+from live.run import live_run as run_live
+from live.run.live_run import LiveRun
+from live.run.outcome import Outcome
+from live.setup.config import load_config
+from live.setup.rig import Rig
+from live.tell.screen import Screen
 
 SIM = "sim:woven?lockstep=yes&seconds=3&fps=15&width=224&height=192&bits=12"
 SMALL = {

@@ -14,7 +14,7 @@ import pytest
 
 from analysis import Status
 from live.cli import main
-from live.results_reader import Strain
+from live.results.reader import Strain
 
 pytestmark = [pytest.mark.data, pytest.mark.slow]
 

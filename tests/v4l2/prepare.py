@@ -35,9 +35,10 @@ def pictures() -> dict[str, NDArray[np.uint8] | NDArray[np.uint16]]:
 
 def compile_loops() -> None:
     """Every loop a run needs, for both sample types, by a small run of the measuring path."""
-    from acquire.burst import burst_of
+    from acquire.burst.accumulate import burst_of
     from acquire.frame import Frame, frozen
-    from analysis import KernelSettings, PhaseKernel, Roi, ZoiGrid, warm_up
+    from analysis import KernelSettings, PhaseKernel, Roi, ZoiGrid
+    from analysis.kernel import warm_up
 
     warm_up()
     grid = ZoiGrid.cover(Roi(0, 0, 640, 480), size=64, step=64)

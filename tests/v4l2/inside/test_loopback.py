@@ -8,8 +8,8 @@ from itertools import islice, pairwise
 import numpy as np
 import pytest
 
-from acquire.camera import open_camera
-from acquire.v4l2_formats import FORMATS, PixelFormat
+from acquire.camera.opening import open_camera
+from acquire.v4l2.formats import FORMATS, PixelFormat
 from tests.v4l2.inside import vivid
 
 # vivid has neither MJPG nor Y14.

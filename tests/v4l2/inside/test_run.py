@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquire.session import Session
+from acquire.session.reader import Session
 from tests.v4l2.inside import running, vivid
 
 LOAD = "/dev/ttyACM0?protocol=ascii&baud=115200&unit=N"

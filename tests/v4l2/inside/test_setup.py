@@ -9,9 +9,9 @@ from itertools import islice
 
 import pytest
 
-from acquire.camera import open_camera
-from acquire.devices import list_cameras
+from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DeviceError
+from acquire.v4l2.listing import list_cameras
 from tests.v4l2.inside import vivid
 
 SMALL = "/dev/video0?format=GREY&width=640&height=360"

@@ -16,8 +16,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire import v4l2_api as api
-from acquire.v4l2_device import NotACamera, V4L2Device
+from acquire.v4l2 import api
+from acquire.v4l2.device import NotACamera, V4L2Device
 
 CAMERA, SCREEN = "/dev/video0", "/dev/video1"
 DRIVER = Path("/sys/bus/platform/drivers/vivid")

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from acquire.session import Session
+from acquire.session.reader import Session
 from tests.v4l2.prepare import SHAPE, SHIFT_PX, STRAIN, pictures
 
 

@@ -1,0 +1,278 @@
+"""From frames to bursts: the mean of n consecutive frames, its noise and its clipped pixels.
+
+The live grab thread and a replay use the same ``BurstAccumulator``; sums are whole numbers, so
+a burst of the same frames is the same to the last bit whenever and however often it is made.
+Nothing here reads a clock or a file.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.burst.smear import motion_between_frames, shortened
+from acquire.errors import ConfigError, DataError
+from acquire.frame import Burst, Frame, frozen
+
+log = logging.getLogger(__name__)
+
+MOST_FRAMES = 65536  # a sum of so many 16-bit samples still fits into 32 bits
+
+
+@cache
+def compile_loops() -> None:
+    """Have the compiled loops ready (once a process), so that no frame is lost to a compiler later."""
+    from acquire.burst.accumulate_loops import GROUP, fold, scratch
+    from acquire.burst.smear_loops import tile_sums
+
+    if not (fold.stats.cache_path and any(Path(fold.stats.cache_path).glob("smear_loops.tile_sums-*.nbi"))):
+        log.info("compiling the burst loops, once on this machine; this takes some ten seconds")
+    mean, clipped, total = np.empty(9, np.float32), np.empty(9, np.bool_), np.empty(9, np.uint32)
+    for dtype in (np.uint8, np.uint16):
+        image = frozen(np.zeros((3, 3), dtype))
+        fold(
+            (image.reshape(-1),) * GROUP,
+            1,
+            image.reshape(-1),
+            *scratch(dtype),
+            total,
+            mean,
+            clipped,
+            255,
+            True,
+            1,
+        )
+        tile_sums(image, image, 1, 1, 1)
+
+
+class BurstAccumulator:
+    """Takes frames one by one and gives a burst after every n consecutive, undamaged ones.
+
+    A gap in the sequence or a damaged frame starts the burst anew. Whatever was left out is
+    counted in ``Burst.lost`` of the next burst.
+
+    Parameters
+    ----------
+    n : int
+        Frames in a burst, 1..65536.
+    not_before : float, s
+        Frames whose time is earlier are left out: those that lay in the driver's buffers
+        when the burst was asked for.
+    shorten_above_px : float or None, px
+        Motion during a burst above which the next ones have fewer frames, and up to n again
+        when it allows; None: always n. It depends on the pictures alone, so that a replay of
+        the same frames gives the same bursts.
+
+    Attributes
+    ----------
+    length : int
+        Frames of the burst that is being taken.
+
+    Raises
+    ------
+    ConfigError
+        An impossible n.
+    """
+
+    def __init__(
+        self, n: int, *, not_before: float = -math.inf, shorten_above_px: float | None = None
+    ) -> None:
+        if not 1 <= n <= MOST_FRAMES:
+            raise ConfigError(f"a burst of {n} frames is not possible; allowed: 1 to {MOST_FRAMES}")
+        compile_loops()
+        self._n, self._not_before, self._shorten_above_px = n, not_before, shorten_above_px
+        self.length = n
+        self._times: list[float] = []
+        self._sums: _Sums | None = None
+        self._lost = 0
+        self._first = self._last = -1
+
+    @property
+    def pending(self) -> int:
+        """Frames of the burst that is not complete yet."""
+        return len(self._times)
+
+    def add(self, frame: Frame) -> Burst | None:
+        """Take a frame; the burst when this one completes it.
+
+        Raises
+        ------
+        DataError
+            The picture is of another size or depth than the one before.
+        """
+        if self._gap_before(frame):
+            self._start_anew()
+        self._lost += frame.lost_before
+        if frame.damaged or frame.t < self._not_before:
+            self._start_anew()
+            self._lost += 1
+            return None
+        if self._sums is None:
+            self._sums, self._first = _Sums(frame), frame.index
+        self._last = frame.index
+        self._times.append(frame.t)
+        done = len(self._times) == self.length
+        self._sums.add(frame, self.length if done else 0)
+        return self._finish(self._sums, frame) if done else None
+
+    def _gap_before(self, frame: Frame) -> bool:
+        return bool(self._times) and (frame.lost_before > 0 or frame.index != self._last + 1)
+
+    def _start_anew(self) -> None:
+        self._lost += len(self._times)
+        self._times, self._sums = [], None
+
+    def _finish(self, sums: _Sums, frame: Frame) -> Burst:
+        start, times, n = self._times[0], self._times, self.length
+        noise = sums.noise(n)
+        burst = Burst(
+            mean=frozen(sums.mean),
+            n=n,
+            noise=noise,
+            clipped=frozen(sums.clipped),
+            bits=frame.bits,
+            t=start + math.fsum(t - start for t in times) / n,
+            duration=times[-1] - start,
+            first_index=self._first,
+            last_index=self._last,
+            lost=self._lost,
+            clock=frame.clock,
+            motion_px=sums.motion(frame, n, noise),
+        )
+        self._times, self._sums, self._lost = [], None, 0
+        if self._shorten_above_px is not None:
+            self.length = shortened(n, burst.motion_px, self._n, self._shorten_above_px)
+        return burst
+
+
+class _Sums:
+    """The running sums of one burst. Frames are kept, not copied, until a group can be folded."""
+
+    def __init__(self, like: Frame) -> None:
+        self._like = like
+        self.mean = np.empty(like.image.shape, np.float32)
+        self.clipped = np.empty(like.image.shape, np.bool_)
+        self._total = np.empty(0, np.uint32)
+        self._waiting: list[NDArray[Any]] = []
+        self._previous: NDArray[Any] | None = None
+        self._squares = 0
+
+    def add(self, frame: Frame, n: int) -> None:
+        """Take a frame; ``n > 0``: it is the last of n."""
+        from acquire.burst.accumulate_loops import GROUP
+
+        if (frame.image.shape, frame.image.dtype, frame.bits) != self._kind:
+            raise DataError(
+                f"frame {frame.index} is {_words(frame)}, but the burst began with {_words(self._like)}; "
+                "one burst needs frames of one kind"
+            )
+        self._waiting.append(np.ascontiguousarray(frame.image).reshape(-1))
+        if n > 0 or len(self._waiting) == GROUP:
+            self._fold(n)
+
+    @property
+    def _kind(self) -> tuple[Any, ...]:
+        return self._like.image.shape, self._like.image.dtype, self._like.bits
+
+    def _fold(self, n: int) -> None:
+        from acquire.burst.accumulate_loops import GROUP, fold, scratch
+
+        images, first = self._waiting, self._previous is None
+        if not (first and n) and self._total.size == 0:
+            self._total = np.empty(self.mean.size, np.uint32)
+        self._squares += int(
+            fold(
+                tuple(images + images[-1:] * (GROUP - len(images))),
+                len(images),
+                images[0] if self._previous is None else self._previous,
+                *scratch(images[0].dtype),
+                self._total,
+                self.mean.reshape(-1),
+                self.clipped.reshape(-1),
+                2**self._like.bits - 1,
+                first,
+                n,
+            )
+        )
+        self._previous, self._waiting = images[-1], []
+
+    def noise(self, n: int) -> float:
+        """Of one frame, GL: from successive differences, so that slow motion hardly counts."""
+        return math.sqrt(self._squares / (2 * (n - 1) * self.mean.size)) if n > 1 else math.nan
+
+    def motion(self, last: Frame, n: int, noise: float) -> float:
+        """During the exposure of all n frames, px: from the first to the last, and one frame more."""
+        if n < 2:
+            return math.nan
+        return motion_between_frames(self._like.image, last.image, noise) * n / (n - 1)
+
+
+def _words(frame: Frame) -> str:
+    height, width = frame.image.shape
+    return f"{width}x{height} {frame.image.dtype} with {frame.bits} bits"
+
+
+def average_bursts(frames: Iterable[Frame], n: int, *, not_before: float = -math.inf) -> Iterator[Burst]:
+    """Complete bursts of n consecutive undamaged frames.
+
+    Parameters
+    ----------
+    frames : iterable of Frame
+    n : int
+        Frames in a burst.
+    not_before : float, s
+        Earlier frames are left out (and counted).
+
+    Raises
+    ------
+    ConfigError
+        An impossible n, at once.
+    DataError
+        Frames of different kinds.
+    """
+    accumulator = BurstAccumulator(n, not_before=not_before)
+    return (burst for burst in map(accumulator.add, frames) if burst is not None)
+
+
+def burst_of(frames: Sequence[Frame]) -> Burst:
+    """One burst of exactly these frames.
+
+    Raises
+    ------
+    ConfigError
+        No frames.
+    DataError
+        They are not consecutive, or one is damaged.
+    """
+    bursts = list(average_bursts(frames, len(frames)))
+    if not bursts:
+        raise DataError(
+            f"frames {frames[0].index} to {frames[-1].index} are not {len(frames)} consecutive whole frames; "
+            "choose others"
+        )
+    return bursts[0]
+
+
+def sum_of(burst: Burst) -> NDArray[np.uint32]:
+    """The exact sum a burst's mean was made of, (H, W) uint32, GL.
+
+    Raises
+    ------
+    ValueError
+        n frames of that many bits do not fit: the float32 mean no longer tells the sum exactly.
+    """
+    if burst.n * (2**burst.bits - 1) >= 2**23:
+        raise ValueError(f"the sum of {burst.n} frames of {burst.bits} bits cannot be told from its mean")
+    return np.rint(burst.mean.astype(np.float64) * burst.n).astype(np.uint32)
+
+
+def mean_of_sum(total: NDArray[np.uint32], n: int) -> NDArray[np.float32]:
+    """The mean of n frames from their exact sum: the bits that ``Burst.mean`` had, (H, W) float32, GL."""
+    return frozen((total / np.float64(n)).astype(np.float32))

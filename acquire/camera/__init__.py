@@ -1,0 +1,22 @@
+"""What a camera is, and what opens any of them by its address.
+
+``contract`` says what every camera promises, ``base`` is what ours share, ``guards`` judge repeated and
+missing frames, ``cropped`` is a part of the picture, ``opening`` finds the camera that an address names.
+"""
+
+from acquire.camera.base import CameraBase
+from acquire.camera.contract import Camera
+from acquire.camera.cropped import CroppedCamera
+from acquire.camera.guards import FailureGuard, RepeatGuard, missing_between
+from acquire.camera.opening import CAMERAS, open_camera
+
+__all__ = [
+    "CAMERAS",
+    "Camera",
+    "CameraBase",
+    "CroppedCamera",
+    "FailureGuard",
+    "RepeatGuard",
+    "missing_between",
+    "open_camera",
+]

@@ -1,0 +1,47 @@
+"""The contract of a camera, and the one function that opens any of them.
+
+A camera is a context manager and an iterable of frames. V4L2 devices, OpenCV cameras,
+video and image files, recorded sessions and the simulator differ in nothing else;
+``tests/contracts`` holds all of them to this text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import TracebackType
+from typing import Protocol, Self, runtime_checkable
+
+from acquire.frame import CameraInfo, Frame
+
+
+@runtime_checkable
+class Camera(Protocol):
+    """What every camera does.
+
+    - Opening (``open_camera``) claims the device, sets it up, reads back what is in force and
+      raises ``ConfigError``, ``DeviceError`` or ``DataError`` where that fails. ``info`` is
+      complete from then on.
+    - ``with`` starts the stream and closes everything at its end; a camera never entered is
+      closed with ``close()``. Both may be called again without effect.
+    - Iterating gives ``Frame`` objects with strictly increasing ``index`` and non-decreasing
+      ``t``, each with its own read-only memory. It ends when the source is exhausted or after
+      ``stop()``. A fault that the device can recover from is an event and a wait, never an
+      exception; ``DeviceError`` or ``DataError`` is raised only when nothing more can come.
+    - ``stop()`` may be called from any thread, before or during the iteration, which then
+      ends within half a second.
+    """
+
+    @property
+    def info(self) -> CameraInfo: ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+    def __iter__(self) -> Iterator[Frame]: ...
+
+    def stop(self) -> None: ...
+
+    def close(self) -> None: ...

@@ -1,0 +1,13 @@
+"""What a load cell is, and the load against time.
+
+``contract`` says what every load cell promises, ``log`` gives the force at a time, ``check`` judges rate,
+noise and gaps, ``calibration`` makes newtons of readings, ``none`` is the absent one, ``opening`` finds the
+load cell that an address names.
+"""
+
+from acquire.load_cell import calibration, check
+from acquire.load_cell.contract import LoadCell
+from acquire.load_cell.log import LoadLog
+from acquire.load_cell.opening import LOAD_CELLS, open_load_cell
+
+__all__ = ["LOAD_CELLS", "LoadCell", "LoadLog", "calibration", "check", "open_load_cell"]

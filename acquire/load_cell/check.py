@@ -1,0 +1,152 @@
+"""Ten seconds of a load cell, judged before the test: rate, noise, range, flags, what the lines look like."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import threading
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquire.load_cell.contract import LoadCell
+from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
+
+LINES_SHOWN = 5
+SLOW_HZ = 5.0
+STUCK = 20  # samples without any change
+
+
+@dataclass(frozen=True, slots=True)
+class LoadReport:
+    """What was seen.
+
+    Attributes
+    ----------
+    samples, good : int
+        Lines, and those with a value.
+    seconds : float, s
+        From the first sample to the last.
+    rate : float, 1/s
+        Of all samples, NaN with fewer than two.
+    jitter_s, longest_s : float, s
+        Standard deviation and greatest of the intervals.
+    unique : int
+        Different values.
+    step_N : float, N
+        Least difference between two values: the resolution of the display.
+    lowest_N, highest_N, mean_N, noise_N : float, N
+        Noise: standard deviation of one reading from successive differences, so that a slow
+        drift does not count.
+    of_capacity : float or None
+        Greatest force as a part of the capacity.
+    flags : tuple of (name, count)
+    lines : tuple of bytes
+        The last different lines.
+    remarks : tuple of str
+        What a person should look into.
+    """
+
+    samples: int
+    good: int
+    seconds: float
+    rate: float
+    jitter_s: float
+    longest_s: float
+    unique: int
+    step_N: float
+    lowest_N: float
+    highest_N: float
+    mean_N: float
+    noise_N: float
+    of_capacity: float | None
+    flags: tuple[tuple[str, int], ...]
+    lines: tuple[bytes, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def ready(self) -> bool:
+        """Whether a test can begin with it."""
+        return self.good > 0 and not self.remarks
+
+
+def listen(cell: LoadCell, seconds: float) -> list[LoadSample]:
+    """The samples of so many seconds; the cell is closed after that."""
+    timer = threading.Timer(seconds, cell.stop)
+    with cell:
+        timer.start()
+        try:
+            return list(cell)
+        finally:
+            timer.cancel()
+
+
+def report(samples: Sequence[LoadSample], info: LoadCellInfo) -> LoadReport:
+    """What these samples tell."""
+    times = np.array([sample.t for sample in samples])
+    steps = np.diff(times)
+    forces = np.array([sample.force for sample in samples if not math.isnan(sample.force)])
+    values = np.unique(forces)
+    flags = Counter(str(flag.name).lower() for sample in samples for flag in sample.flags)
+    span = float(times[-1] - times[0]) if len(times) > 1 else 0.0
+    greatest = float(np.abs(forces).max()) if forces.size else math.nan
+    found = LoadReport(
+        samples=len(samples),
+        good=len(forces),
+        seconds=span,
+        rate=len(steps) / span if span > 0 else math.nan,
+        jitter_s=float(steps.std()) if steps.size else math.nan,
+        longest_s=float(steps.max()) if steps.size else math.nan,
+        unique=len(values),
+        step_N=float(np.diff(values).min()) if len(values) > 1 else math.nan,
+        lowest_N=float(forces.min()) if forces.size else math.nan,
+        highest_N=float(forces.max()) if forces.size else math.nan,
+        mean_N=float(forces.mean()) if forces.size else math.nan,
+        noise_N=float(np.diff(forces).std() / math.sqrt(2)) if forces.size > 2 else math.nan,
+        of_capacity=greatest / info.capacity_N if info.capacity_N and forces.size else None,
+        flags=tuple(sorted(flags.items())),
+        lines=tuple(dict.fromkeys(sample.raw for sample in reversed(samples)))[:LINES_SHOWN],
+        remarks=(),
+    )
+    return dataclasses.replace(found, remarks=tuple(_remarks(found, samples)))
+
+
+def _remarks(found: LoadReport, samples: Sequence[LoadSample]) -> list[str]:
+    if not samples:
+        return ["nothing came: check cable, port, baud, and whether the device must be asked (mode=poll)"]
+    if not found.good:
+        return ["lines came, but no value: check protocol, baud, parity and column against the lines above"]
+    remarks = []
+    bad = sum(LoadFlag.ERROR in sample.flags for sample in samples)
+    beyond = sum(bool(sample.flags & (LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD)) for sample in samples)
+    if bad:
+        remarks.append(f"{bad} of {found.samples} lines gave no value: noise on the line, or another grammar")
+    if beyond:
+        remarks.append(f"{beyond} samples in overload or saturated: unload the cell, or check its wiring")
+    if found.rate < SLOW_HZ:
+        remarks.append(
+            f"only {found.rate:.3g} samples a second: the force at a burst is interpolated over long gaps"
+        )
+    if found.longest_s > 5 / found.rate and found.longest_s > 0.25:
+        remarks.append(f"a gap of {found.longest_s:.2f} s: across such gaps the force is not known")
+    if found.unique == 1 and found.good >= STUCK:
+        remarks.append("every value is the same: a frozen display, or far too coarse for this load")
+    return remarks
+
+
+def report_lines(found: LoadReport) -> list[str]:
+    """The report for a person."""
+    lines = [f"{found.samples} samples in {found.seconds:.1f} s, {found.good} with a value"]
+    if found.good:
+        lines += [
+            f"rate     {found.rate:.4g} 1/s, jitter {found.jitter_s * 1e3:.2f} ms,"
+            f" longest gap {found.longest_s * 1e3:.0f} ms",
+            f"force    mean {found.mean_N:.6g} N, from {found.lowest_N:.6g} to {found.highest_N:.6g} N"
+            + ("" if found.of_capacity is None else f" ({found.of_capacity:.1%} of the capacity)"),
+            f"noise    {found.noise_N:.3g} N (one reading), {found.unique} different values, step {found.step_N:.3g} N",
+        ]
+    lines += [f"flag     {name}: {count}" for name, count in found.flags]
+    lines += [f"line     {line.decode('ascii', 'backslashreplace')!r}" for line in found.lines]
+    return lines + [f"look     {remark}" for remark in found.remarks]

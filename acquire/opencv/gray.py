@@ -1,0 +1,65 @@
+"""Colour pictures as grey ones: equal channels are grey already, anything else has to be chosen."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import ConfigError, DataError
+from acquire.opencv.setup import load_cv2
+
+GRAYS = ("luma", "r", "g", "b")
+_PLANE = {"b": 0, "g": 1, "r": 2}  # OpenCV's order
+
+WEBCAM_WARNING = (
+    "grey is the luma of a compressed colour stream: about 220 of 256 levels, clipped at both ends, "
+    "with noise that averaging does not remove; a camera with a raw grey format measures better"
+)
+
+
+def to_gray(picture: NDArray[Any], gray: str | None, source: str) -> NDArray[Any]:
+    """The picture as one plane.
+
+    Parameters
+    ----------
+    picture : (H, W) or (H, W, 1 | 3 | 4) uint8 | uint16
+        Blue, green, red (and alpha, ignored), as OpenCV has them.
+    gray : "luma" | "r" | "g" | "b" | None
+        None: only a picture whose channels are equal is taken.
+    source : str
+        For messages.
+
+    Raises
+    ------
+    ConfigError
+        The channels differ and ``gray`` is not said.
+    DataError
+        Neither 8- nor 16-bit, or a number of channels nobody knows.
+    """
+    if picture.dtype not in (np.uint8, np.uint16):
+        raise DataError(f"{source}: samples are {picture.dtype}; save it with 8 or 16 bits a sample")
+    if picture.ndim == 2:
+        return picture
+    if picture.ndim != 3 or picture.shape[2] not in (1, 3, 4):
+        raise DataError(f"{source}: a picture of shape {picture.shape} is neither grey nor colour")
+    if picture.shape[2] == 1:
+        return picture[:, :, 0].copy()
+    return _one_plane(picture, gray, source)
+
+
+def _one_plane(picture: NDArray[Any], gray: str | None, source: str) -> NDArray[Any]:
+    first = picture[:, :, 0]
+    if all(np.array_equal(first, picture[:, :, k]) for k in (1, 2)):
+        return first.copy()
+    if gray is None:
+        raise ConfigError(
+            f"{source}: a colour picture; say what is grey: gray=luma, gray=r, gray=g or gray=b"
+        )
+    if gray in _PLANE:
+        return picture[:, :, _PLANE[gray]].copy()
+    cv2 = load_cv2()
+
+    luma: NDArray[Any] = cv2.cvtColor(np.ascontiguousarray(picture[:, :, :3]), cv2.COLOR_BGR2GRAY)
+    return luma

@@ -1,0 +1,236 @@
+"""A folder, a glob or a single image as a camera: ``files:shots/*.tif?fps=5&gray=luma&bits=12``.
+
+Pictures are read when they are asked for, in natural order (2 before 10), pages of a multi-page
+TIFF one after the other. Nobody stamped them: ``clock`` is "nominal", or times come from a CSV.
+"""
+
+from __future__ import annotations
+
+import glob
+import logging
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from acquire.addresses import Address, Options
+from acquire.camera import CameraBase
+from acquire.errors import ConfigError, DataError
+from acquire.events import EventSink
+from acquire.frame import CameraInfo, Frame, frozen
+from acquire.opencv.gray import GRAYS, to_gray
+from acquire.opencv.image_stamps import read_stamps
+from acquire.opencv.setup import load_cv2
+from acquire.opencv.tiff_pages import count_pages
+
+log = logging.getLogger(__name__)
+
+SUFFIXES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")
+_LOSSY = (".jpg", ".jpeg")
+_DIGITS = re.compile(r"(\d+)")
+
+
+def natural_key(path: Path) -> list[tuple[int, str]]:
+    """Sort key under which shot_2 comes before shot_10."""
+    parts = _DIGITS.split(str(path))
+    return [(int(part), "") if part.isdecimal() else (0, part.lower()) for part in parts]
+
+
+def find_images(target: str) -> list[Path]:
+    """The images a folder, glob or file name stands for, in natural order.
+
+    Raises
+    ------
+    DataError
+        There is none.
+    """
+    path = Path(target).expanduser()
+    if path.is_dir():
+        found = [item for item in path.iterdir() if item.suffix.lower() in SUFFIXES]
+    elif path.is_file():
+        found = [path]
+    else:
+        names = glob.glob(str(path), recursive=True)  # noqa: PTH207 (absolute patterns too)
+        found = [Path(name) for name in names if Path(name).is_file()]
+    if not found:
+        raise DataError(f"files:{target}: no image there; looked in {Path.cwd()} for {', '.join(SUFFIXES)}")
+    return sorted(found, key=natural_key)
+
+
+def read_image(path: str | Path, gray: str | None = None, page: int = 0) -> NDArray[Any]:
+    """One grey picture, (H, W) uint8 or uint16, GL.
+
+    Parameters
+    ----------
+    path : str or Path
+    gray : "luma" | "r" | "g" | "b" | None
+        What is grey in a colour picture.
+    page : int
+        Of a multi-page TIFF.
+
+    Raises
+    ------
+    DataError
+        Missing, truncated, not an image, or not of 8 or 16 bits.
+    ConfigError
+        A colour picture and ``gray`` not said.
+    """
+    path = Path(path)
+    try:
+        with path.open("rb") as file:
+            whole = path.suffix.lower() not in _LOSSY or _ends_like_a_jpeg(file.read())
+    except OSError as error:
+        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
+    picture = _decode(path, page) if whole else None
+    if picture is None:
+        raise DataError(f"{path}: not an image, or cut off; copy it again or take it out of the list")
+    return to_gray(picture, gray, str(path))
+
+
+def _ends_like_a_jpeg(content: bytes) -> bool:
+    return content.rstrip(b"\0").endswith(b"\xff\xd9")
+
+
+def _decode(path: Path, page: int) -> NDArray[Any] | None:
+    cv2 = load_cv2()
+
+    try:
+        if page == 0:
+            picture: NDArray[Any] | None = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+            return picture
+        well, pages = cv2.imreadmulti(str(path), page, 1, flags=cv2.IMREAD_UNCHANGED)
+        return pages[0] if well and pages else None
+    except cv2.error as error:
+        log.debug("%s: %s", path, error)
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class FileSettings:
+    """What an address of image files says beside their names.
+
+    Attributes
+    ----------
+    fps : float, 1/s
+    gray : str or None
+    bits : int or None
+        Significant bits; None: those of the file's samples.
+    stamps : str or None
+        CSV with the time of each picture.
+    """
+
+    fps: float = 1.0
+    gray: str | None = None
+    bits: int | None = None
+    stamps: str | None = None
+
+
+class ImageFiles(CameraBase):
+    """Image files as a camera; see ``acquire.camera.Camera``.
+
+    Raises
+    ------
+    DataError, ConfigError
+        No image, an unreadable first one, or stamps that do not fit.
+    """
+
+    def __init__(self, address: str, paths: list[Path], settings: FileSettings) -> None:
+        super().__init__()
+        self._paths, self._settings = paths, settings
+        self._stamps = read_stamps(Path(settings.stamps), paths) if settings.stamps else None
+        first = read_image(paths[0], settings.gray)
+        self._bits = settings.bits or 8 * first.itemsize
+        self._check_range(first, paths[0])
+        self._shape, self._dtype = first.shape, first.dtype
+        self.info = CameraInfo(
+            address=address,
+            name=f"{len(paths)} image file{'s' * (len(paths) > 1)}, {paths[0].name} ...",
+            width=first.shape[1],
+            height=first.shape[0],
+            bits=self._bits,
+            live=False,
+            clock="nominal",
+            fps=None if self._stamps else settings.fps,
+            pixel_format=paths[0].suffix.lstrip(".").upper(),
+            controls={"files": len(paths), "gray": settings.gray, "stamps": settings.stamps},
+            warnings=tuple(self._warnings(first)),
+        )
+
+    def __iter__(self) -> Iterator[Frame]:
+        for index, (path, page) in enumerate(self._pictures()):
+            if self.stopped.is_set():
+                return
+            t = self._time(index)
+            yield Frame(self._read(path, page), index, t, "nominal", 0, self._bits, t)
+
+    def _pictures(self) -> Iterator[tuple[Path, int]]:
+        for path in self._paths:
+            for page in range(count_pages(path)):
+                yield path, page
+
+    def _time(self, index: int) -> float:
+        if self._stamps is None:
+            return index / self._settings.fps
+        if index >= len(self._stamps):
+            raise DataError(
+                f"{self._settings.stamps}: {len(self._stamps)} times, but there are more pictures"
+            )
+        return self._stamps[index]
+
+    def _read(self, path: Path, page: int) -> NDArray[Any]:
+        image = read_image(path, self._settings.gray, page)
+        if image.shape != self._shape or image.dtype != self._dtype:
+            raise DataError(
+                f"{path} is {_size(image.shape)} {image.dtype}, but {self._paths[0]} is "
+                f"{_size(self._shape)} {self._dtype}; all images of one test must be alike"
+            )
+        self._check_range(image, path)
+        return frozen(image)
+
+    def _check_range(self, image: NDArray[Any], path: Path) -> None:
+        if self._bits > 8 * image.itemsize:
+            raise ConfigError(f"{path}: bits={self._bits}, but its samples have {8 * image.itemsize}")
+        if self._bits < 8 * image.itemsize and image.max() >= 2**self._bits:
+            raise DataError(
+                f"{path}: a value of {image.max()} does not fit into bits={self._bits}; give the camera's bits"
+            )
+
+    def _warnings(self, first: NDArray[Any]) -> Iterator[str]:
+        if any(path.suffix.lower() in _LOSSY for path in self._paths):
+            yield "JPEG is lossy: its artefacts (0.6 to 1.7 GL) do not average out; TIFF or PNG measure better"
+        for bits in (10, 12, 14):
+            if self._settings.bits is None and first.itemsize == 2 and 2**8 <= first.max() < 2**bits:
+                yield (
+                    f"16-bit files whose largest value is {first.max()}: if the camera has {bits} bits say "
+                    f"bits={bits}, so that clipped pixels are seen"
+                )
+                return
+
+
+def _size(shape: tuple[int, ...]) -> str:
+    return f"{shape[1]}x{shape[0]}"
+
+
+def open_files(address: Address, on_event: EventSink) -> ImageFiles:
+    """Open ``files:folder|glob|name?fps=&gray=&bits=&stamps=``.
+
+    Raises
+    ------
+    ConfigError, DataError
+        See ``acquire.camera.open_camera``.
+    """
+    options = Options(address)
+    gray = options.text("gray")
+    if gray is not None and gray not in GRAYS:
+        raise ConfigError(f"{address.text}: gray={gray} is not possible; allowed: {', '.join(GRAYS)}")
+    settings = FileSettings(
+        fps=options.number("fps", 1.0, minimum=1e-6, maximum=1e6),
+        gray=gray,
+        bits=options.integer("bits", minimum=1, maximum=16),
+        stamps=options.text("stamps"),
+    )
+    options.done()
+    return ImageFiles(address.text, find_images(address.target), settings)

@@ -1,0 +1,102 @@
+"""Video files as a camera: ``video:test.mp4?gray=luma``. Frames come as fast as they are fetched.
+
+Times are those of the container; what compression did to the picture cannot be undone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from acquire.addresses import Address, Options
+from acquire.camera import CameraBase
+from acquire.errors import DataError
+from acquire.events import EventSink, device_event
+from acquire.frame import CameraInfo, Frame, frozen
+from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
+from acquire.opencv.setup import load_cv2
+
+
+class VideoFile(CameraBase):
+    """A video file as a camera that waits for its reader; see ``acquire.camera.Camera``.
+
+    Raises
+    ------
+    DataError
+        Missing, or not a video.
+    """
+
+    def __init__(self, address: str, path: Path, gray: str, on_event: EventSink) -> None:
+        super().__init__()
+        cv2 = load_cv2()
+
+        if not path.is_file():
+            raise DataError(f"{address}: there is no file {path}")
+        self._address, self._path, self._gray_plane, self._on_event = address, path, gray, on_event
+        self._capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
+        if not self._capture.isOpened():
+            raise DataError(f"{path}: not a video that can be read, or cut off; try to play or convert it")
+        self._promised = int(self._capture.get(cv2.CAP_PROP_FRAME_COUNT))
+        self._fps = self._capture.get(cv2.CAP_PROP_FPS) or 25.0
+        self.info = CameraInfo(
+            address=address,
+            name=path.name,
+            width=int(self._capture.get(cv2.CAP_PROP_FRAME_WIDTH)),
+            height=int(self._capture.get(cv2.CAP_PROP_FRAME_HEIGHT)),
+            bits=8,
+            live=False,
+            clock="nominal",
+            fps=self._fps,
+            pixel_format=_fourcc(int(self._capture.get(cv2.CAP_PROP_FOURCC))),
+            controls={"gray": gray, "frames": self._promised},
+            warnings=(WEBCAM_WARNING,),
+        )
+
+    def __iter__(self) -> Iterator[Frame]:
+        cv2 = load_cv2()
+
+        index, t = 0, 0.0
+        while not self.stopped.is_set():
+            well, picture = self._capture.read()
+            if not well:
+                self._tell_if_short(index)
+                return
+            stamp = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
+            t = stamp if stamp > t or index == 0 else t + 1 / self._fps
+            yield Frame(frozen(self._grey(picture, index)), index, t, "nominal", 0, 8, stamp)
+            index += 1
+
+    def _grey(self, picture: NDArray[Any], index: int) -> NDArray[Any]:
+        image = to_gray(picture, self._gray_plane, str(self._path))
+        if image.shape != (self.info.height, self.info.width):
+            raise DataError(f"{self._path}: frame {index} is of another size than the first")
+        return image
+
+    def _tell_if_short(self, count: int) -> None:
+        if count < self._promised:
+            text = f"{self._path}: ends after {count} of {self._promised} frames; it may be cut off"
+            device_event(self._on_event, self._address, text)
+
+    def _release(self) -> None:
+        self._capture.release()
+
+
+def _fourcc(code: int) -> str:
+    return code.to_bytes(4, "little", signed=False).decode("latin-1").strip("\0 ")
+
+
+def open_video(address: Address, on_event: EventSink) -> VideoFile:
+    """Open ``video:test.mp4?gray=``.
+
+    Raises
+    ------
+    ConfigError, DataError
+        See ``acquire.camera.open_camera``.
+    """
+    options = Options(address)
+    gray = options.choice("gray", GRAYS, "luma")
+    options.done()
+    return VideoFile(address.text, Path(address.target).expanduser(), gray, on_event)

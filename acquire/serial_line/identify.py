@@ -1,0 +1,219 @@
+"""Finding out what talks on a serial port: listening at the usual speeds, and asking only when told to.
+
+Listening sends nothing. ``questions`` lists what asking would send, so that it can be shown first:
+an unknown machine may move.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+from acquire.addresses import Options, parse_address
+from acquire.errors import DeviceError
+from acquire.load_sample import LoadFlag
+from acquire.protocols import Parser, Protocol, Reading, find_protocol, is_mass
+from acquire.serial_line.ports import PORT_ERRORS, LineSettings, Port, open_port
+
+SPEEDS = (9600, 115200, 57600, 19200, 2400, 4800, 38400, 1200)
+LISTEN_S = 1.5
+ENOUGH_LINES = 5
+# What sends unasked, the strictest grammar first; ascii with columns where the plain one leaves a choice.
+HEARD = (
+    ("mt-sics", ""),
+    ("aed-standard", ""),
+    ("ascii", ""),
+    ("ascii", "millis=1"),
+    ("ascii", "millis=1&column=2"),
+    ("hbm-aed", "decimals=0"),
+)
+ASKED = ("mt-sics", "aed-standard", "mark10", "sauter", "hbm-aed", "modbus")
+ASKED_SETTINGS = {"modbus": "profile=laumas-tlb", "hbm-aed": "decimals=0"}
+SURE = 0.8  # part of the lines that must be readings
+
+Opener = Callable[[LineSettings], Port]
+Clock = Callable[[], float]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A guess at what is on the port.
+
+    Attributes
+    ----------
+    address : str
+        To be used as ``--load``.
+    protocol : str
+    score : float
+        Part of the lines that are readings in this protocol.
+    lines : tuple of bytes
+        Some of what was heard.
+    remark : str
+        What still has to be said or checked.
+    """
+
+    address: str
+    protocol: str
+    score: float
+    lines: tuple[bytes, ...]
+    remark: str
+
+
+@dataclass(frozen=True, slots=True)
+class Question:
+    """A query that reads, and how it would be sent."""
+
+    protocol: str
+    line: LineSettings
+    data: bytes
+
+
+def hear(
+    line: LineSettings, seconds: float = LISTEN_S, opener: Opener = open_port, clock: Clock = time.monotonic
+) -> bytes:
+    """What comes on a port by itself within so many seconds.
+
+    Raises
+    ------
+    ConfigError, DeviceError
+        The port cannot be opened, or is lost.
+    """
+    port = opener(line)
+    try:
+        return _collect(port, seconds, clock)
+    except PORT_ERRORS as error:
+        raise DeviceError(f"{line.url}: lost while listening ({error}); check the cable") from error
+    finally:
+        port.close()
+
+
+def _collect(port: Port, seconds: float, clock: Clock) -> bytes:
+    until, heard = clock() + seconds, bytearray()
+    while clock() < until:
+        heard += port.read(1)
+        if waiting := port.in_waiting:
+            heard += port.read(waiting)
+    return bytes(heard)
+
+
+def listen(
+    device: str, *, seconds: float = LISTEN_S, opener: Opener = open_port, clock: Clock = time.monotonic
+) -> Iterator[tuple[int, bytes, Finding | None]]:
+    """Listen at one speed after the other until something is understood.
+
+    Yields
+    ------
+    speed, what was heard, and the finding (None where it makes no sense)
+    """
+    for baud in SPEEDS:
+        heard = hear(LineSettings(device, baud), seconds, opener, clock)
+        finding = guess(device, baud, heard)
+        yield baud, heard, finding
+        if finding is not None:
+            return
+
+
+def guess(device: str, baud: int, heard: bytes) -> Finding | None:
+    """The protocol that understands most of what was heard; None where none does."""
+    parity = _parity(heard)
+    text = bytes(byte & 0x7F for byte in heard) if parity != "N" else heard
+    found = [_try(device, baud, parity, name, settings, text) for name, settings in HEARD]
+    sure = [finding for finding in found if finding is not None and finding.score >= SURE]
+    return max(sure, key=lambda finding: finding.score) if sure else None
+
+
+def _parity(heard: bytes) -> str:
+    """The parity of seven-bit characters that were received as eight bits."""
+    if not heard or max(heard) < 0x80:
+        return "N"
+    ones = {byte.bit_count() % 2 for byte in heard}
+    return {frozenset({0}): "E", frozenset({1}): "O"}.get(frozenset(ones), "N")
+
+
+def _try(device: str, baud: int, parity: str, name: str, settings: str, heard: bytes) -> Finding | None:
+    protocol = find_protocol(name)
+    parser = _parser(protocol, device, settings)
+    readings = parser.feed(heard) + parser.silence()
+    if len(readings) < ENOUGH_LINES:
+        return None
+    parts = [f"protocol={name}", f"baud={baud}", f"bytesize={7 if parity != 'N' else 8}", f"parity={parity}"]
+    remark = _remark(readings)
+    more = [settings] if settings and name != "hbm-aed" else []
+    return Finding(
+        address=f"{device}?{'&'.join([*parts, *more])}",
+        protocol=name,
+        score=sum(_understood(reading) for reading in readings) / len(readings),
+        lines=tuple(reading.raw for reading in readings[-3:]),
+        remark=remark,
+    )
+
+
+def _parser(protocol: Protocol, device: str, settings: str) -> Parser:
+    address = parse_address(f"{device}?{settings}" if settings else device)
+    return protocol.make_parser(Options(address))
+
+
+def _understood(reading: Reading) -> bool:
+    return LoadFlag.ERROR not in reading.flags
+
+
+def _remark(readings: list[Reading]) -> str:
+    units = {reading.unit for reading in readings if reading.unit}
+    if not units:
+        return "the line names no unit: add unit=N, or the one on the display"
+    masses = sorted(unit for unit in units if is_mass(unit))
+    if masses:
+        return f"the line says {masses[0]}: add mass_reads_force=yes if that stands for a force"
+    return ""
+
+
+def questions(device: str) -> list[Question]:
+    """What asking would send: queries that read, none that moves, tares or sets anything."""
+    found = []
+    for name in ASKED:
+        protocol = find_protocol(name)
+        parser = _parser(protocol, device, ASKED_SETTINGS.get(name, ""))
+        data = {**protocol.commands, **parser.commands}["single"]
+        line = LineSettings(device, protocol.baud, protocol.bytesize, protocol.parity)
+        found.append(Question(name, line, data))
+    return found
+
+
+def ask(question: Question, opener: Opener = open_port, clock: Clock = time.monotonic) -> Finding | None:
+    """Send one question and look whether the answer makes sense.
+
+    Raises
+    ------
+    ConfigError, DeviceError
+    """
+    port = opener(question.line)
+    try:
+        _collect(port, 0.3, clock)  # what it says unasked is no answer
+        port.write(question.data)
+        heard = _collect(port, 0.7, clock)
+    except PORT_ERRORS as error:
+        raise DeviceError(f"{question.line.url}: lost while asking ({error}); check the cable") from error
+    finally:
+        port.close()
+    return _answer(question, heard)
+
+
+def _answer(question: Question, heard: bytes) -> Finding | None:
+    protocol, line = find_protocol(question.protocol), question.line
+    parser = _parser(protocol, line.url, ASKED_SETTINGS.get(question.protocol, ""))
+    parser.feed(b"\r\n" if protocol.silence_s >= 0.1 else b"")
+    readings = [r for r in parser.feed(heard) + parser.silence() if _understood(r)]
+    if not readings:
+        return None
+    settings = ASKED_SETTINGS.get(question.protocol, "")
+    parts = [f"protocol={question.protocol}", f"baud={line.baud}", *([settings] if settings else [])]
+    return Finding(
+        f"{line.url}?{'&'.join(parts)}", question.protocol, 1.0, (readings[0].raw,), _remark(readings)
+    )
+
+
+def at_speed(question: Question, baud: int) -> Question:
+    """The same question at another speed."""
+    return dataclasses.replace(question, line=dataclasses.replace(question.line, baud=baud))

@@ -1,0 +1,27 @@
+"""``python -m acquire.session FILE`` reads a session once: the child of ``acquire.hdf5.probe``."""
+
+from __future__ import annotations
+
+import sys
+
+from acquire.errors import DataError
+
+
+def main(path: str) -> int:
+    """The child: 0 where all is readable, else the error's words and its exit code."""
+    from acquire.session.part import SessionPart
+
+    try:
+        part = SessionPart(path, probed=True)
+        part.walk_pictures()
+        for read in (part.load_samples, part.events, part.clock_pairs, part.ledger):
+            read()
+        part.close()
+    except DataError as error:
+        print(error)
+        return error.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

@@ -1,0 +1,231 @@
+"""Where everything stands in a session file, and how it is encoded. Writer and reader share it.
+
+The file is HDF5 in NeXus conventions (docs/session-format.md describes it for other programs).
+All groups, datasets and attributes exist before the first frame, since a file in SWMR mode
+can only grow.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.clock import ClockPair
+from acquire.events import Event, EventKind
+from acquire.frame import CameraInfo, Clock
+from acquire.hdf5 import NO_UNIT, new_group, new_json, say, to_json
+from acquire.load_sample import LoadCellInfo, LoadFlag
+from acquire.record_mode import RecordMode
+
+FORMAT = "phasedic-session"
+FORMAT_VERSION = 1
+NO_SET = "none"
+NO_CROP = (0, 0, 0, 0)
+EVENT_BYTES = 512  # of one row; longer events go on in rows that begin with CONTINUED
+CONTINUED = b"+"
+LEDGER_BYTES = 8192
+CLOCKS: tuple[Clock, ...] = ("device", "host", "nominal")
+STABLE = {None: -1, False: 0, True: 1}
+MOST_BURST_FRAMES = 65536
+ROWS = 512  # of a chunk of a one-dimensional dataset
+
+Columns = dict[str, tuple[Any, Any, str, str]]  # name: (dtype, value of a missing row, unit, meaning)
+
+FRAME_COLUMNS: Columns = {
+    "time_s": ("f8", np.nan, "s", "time since the start of the session, mid-exposure where known"),
+    "monotonic_s": ("f8", np.nan, "s", "the same on the machine's monotonic clock"),
+    "raw_monotonic_s": ("f8", np.nan, "s", "the stamp as it came, monotonic clock"),
+    "index": ("i8", -1, NO_UNIT, "sequence number of the source"),
+    "lost_before": ("u4", 0, NO_UNIT, "frames known to be lost since the frame before"),
+    "damaged": ("u1", 0, NO_UNIT, "1: the device said that the content is not whole"),
+    "clock": ("u1", 0, NO_UNIT, "who stamped: 0 device, 1 host, 2 nobody (a given rate)"),
+}
+LOAD_COLUMNS: Columns = {
+    "time_s": ("f8", np.nan, "s", "time since the start of the session"),
+    "monotonic_s": ("f8", np.nan, "s", "the same on the machine's monotonic clock"),
+    "force": ("f8", np.nan, "N", "tension positive; NaN where the line gave no valid value"),
+    "flags": ("u4", 0, NO_UNIT, "bits: see flag_names"),
+    "stable": ("i1", -1, NO_UNIT, "1 yes, 0 no, -1 not said"),
+    "device_ms": ("f8", np.nan, "ms", "the device's own time, where it sends one"),
+    "unit": ("S8", b"", NO_UNIT, "unit on the line, or as the user said"),
+    "line_end": ("u8", 0, NO_UNIT, "where in lines the line of this sample ends"),
+}
+BURST_COLUMNS: Columns = {
+    "time_s": ("f8", np.nan, "s", "mean time of the frames, since the start of the session"),
+    "monotonic_s": ("f8", np.nan, "s", "the same on the machine's monotonic clock"),
+    "n": ("u4", 0, NO_UNIT, "frames summed"),
+    "noise": ("f8", np.nan, "GL", "temporal standard deviation of one frame"),
+    "duration": ("f8", np.nan, "s", "time from the first frame to the last"),
+    "first_index": ("i8", -1, NO_UNIT, "sequence number of the first frame"),
+    "last_index": ("i8", -1, NO_UNIT, "sequence number of the last frame"),
+    "lost": ("u4", 0, NO_UNIT, "frames lost or left out since the burst before"),
+    "clock": ("u1", 0, NO_UNIT, "who stamped: 0 device, 1 host, 2 nobody (a given rate)"),
+}
+CLOCK_COLUMNS: Columns = {
+    "monotonic_s": ("f8", np.nan, "s", "monotonic clock"),
+    "utc": ("S27", b"", NO_UNIT, "the same instant in UTC, ISO 8601"),
+}
+
+
+def clock_word(code: int) -> Clock:
+    """The word for a stored clock code."""
+    return CLOCKS[code]
+
+
+def image_dtype(bits: int) -> np.dtype[Any]:
+    """uint8 up to 8 significant bits, else uint16."""
+    return np.dtype(np.uint8 if bits <= 8 else np.uint16)
+
+
+def new_columns(group: h5py.Group, columns: Columns, checksum: bool) -> None:
+    """Empty one-dimensional datasets that can grow, each with its unit and meaning."""
+    for name, (dtype, missing, unit, meaning) in columns.items():
+        dataset = group.create_dataset(
+            name, (0,), dtype, maxshape=(None,), chunks=(ROWS,), fillvalue=missing, fletcher32=checksum
+        )
+        say(dataset, units=unit, long_name=meaning)
+
+
+def new_images(group: h5py.Group, name: str, shape: tuple[int, ...], dtype: Any, checksum: bool) -> None:
+    """An empty stack of pictures; one chunk holds exactly one of them."""
+    dataset = group.create_dataset(
+        name, (0, *shape), dtype, maxshape=(None, *shape), chunks=(1, *shape), fletcher32=checksum
+    )
+    say(dataset, units="GL")
+
+
+def describe_camera(info: CameraInfo) -> dict[str, Any]:
+    """``CameraInfo`` as JSON values."""
+    names = ("address", "name", "width", "height", "bits", "live", "clock", "fps", "exposure_s")
+    return {name: getattr(info, name) for name in (*names, "pixel_format", "controls", "warnings")}
+
+
+def describe_load(info: LoadCellInfo | None) -> dict[str, Any] | None:
+    """``LoadCellInfo`` as JSON values."""
+    if info is None:
+        return None
+    names = ("address", "name", "protocol", "clock", "sign", "capacity_N", "settings", "warnings")
+    return {name: getattr(info, name) for name in names}
+
+
+def camera_from(text: dict[str, Any]) -> CameraInfo:
+    """What ``describe_camera`` described."""
+    return CameraInfo(**{**text, "warnings": tuple(text.get("warnings", ()))})
+
+
+def load_from(text: dict[str, Any] | None) -> LoadCellInfo | None:
+    """What ``describe_load`` described."""
+    return LoadCellInfo(**{**text, "warnings": tuple(text.get("warnings", ()))}) if text else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Descriptions:
+    """What a session file says once, at its start."""
+
+    camera: CameraInfo
+    load: LoadCellInfo | None
+    start: ClockPair
+    config: Mapping[str, Any]
+    metadata: Mapping[str, Any]
+    versions: Mapping[str, Any]
+    mode: RecordMode
+    burst_frames: int
+    set_id: str
+    part: int
+
+
+def create(file: h5py.File, about: Descriptions, checksum: bool) -> None:
+    """Everything that will ever stand in the file, empty."""
+    say(file, NX_class="NXroot", default="entry", format=FORMAT, format_version=FORMAT_VERSION)
+    say(file, set_id=about.set_id or NO_SET, part=about.part)
+    shown = "bursts" if about.mode.kind == "bursts" else "frames"
+    entry = new_group(file, "entry", "NXentry", default=shown)
+    say(entry, record=about.mode.text(), crop=np.array(about.mode.crop or NO_CROP, np.int64))
+    say(entry.create_dataset("start_time", data=np.bytes_(about.start.iso())), units="ISO 8601 UTC")
+    say(entry.create_dataset("start_monotonic_s", data=about.start.monotonic), units="s")
+    for name in ("config", "metadata", "versions"):
+        new_json(entry, name, getattr(about, name))
+    instrument = new_group(entry, "instrument", "NXinstrument")
+    new_json(new_group(instrument, "camera", "NXdetector"), "description", describe_camera(about.camera))
+    new_json(new_group(instrument, "load_cell", "NXsensor"), "description", describe_load(about.load))
+    _create_frames(entry, about.camera, checksum)
+    _create_bursts(entry, about.camera, about.burst_frames, checksum)
+    _create_load(entry, checksum)
+    new_columns(new_group(entry, "clock", "NXcollection"), CLOCK_COLUMNS, checksum)
+    entry.create_dataset(
+        "events", (0,), f"S{EVENT_BYTES}", maxshape=(None,), chunks=(16,), fletcher32=checksum
+    )
+    entry.create_dataset("ledger", (1,), f"S{LEDGER_BYTES}")
+    say(entry["events"], units=NO_UNIT)
+    say(entry["ledger"], units=NO_UNIT)
+
+
+def _create_frames(entry: h5py.Group, camera: CameraInfo, checksum: bool) -> None:
+    axes = ["time_s", ".", "."]
+    frames = new_group(entry, "frames", "NXdata", signal="image", axes=axes, time_s_indices=0)
+    new_columns(frames, FRAME_COLUMNS, checksum)
+    new_images(frames, "image", (camera.height, camera.width), image_dtype(camera.bits), checksum)
+    say(frames["image"], bits=camera.bits)
+
+
+def _create_bursts(entry: h5py.Group, camera: CameraInfo, frames: int, checksum: bool) -> None:
+    axes = ["time_s", ".", "."]
+    bursts = new_group(entry, "bursts", "NXdata", signal="sum", axes=axes, time_s_indices=0)
+    new_columns(bursts, BURST_COLUMNS, checksum)
+    size = (camera.height, camera.width)
+    dtype = np.uint16 if (2**camera.bits - 1) * frames < 2**16 else np.uint32
+    new_images(bursts, "sum", size, dtype, checksum)
+    say(bursts["sum"], long_name="sum of the n frames; the mean is sum / n")
+    packed = (camera.height * camera.width + 7) // 8
+    clipped = bursts.create_dataset(
+        "clipped", (0, packed), "u1", maxshape=(None, packed), chunks=(1, packed), compression="gzip",
+        compression_opts=1, fletcher32=checksum,
+    )  # fmt: skip
+    meaning = "pixels at saturation in any frame: one bit each, rows end to end, high bit first"
+    say(clipped, units=NO_UNIT, long_name=meaning)
+
+
+def _create_load(entry: h5py.Group, checksum: bool) -> None:
+    load = new_group(entry, "load", "NXdata", signal="force", axes=["time_s"], time_s_indices=0)
+    new_columns(load, LOAD_COLUMNS, checksum)
+    say(load["flags"], flag_names=json.dumps({flag.name: flag.value for flag in LoadFlag}))
+    lines = load.create_dataset("lines", (0,), "u1", maxshape=(None,), chunks=(8192,), fletcher32=checksum)
+    meaning = "the bytes of the lines, one after the other, each ended by a line feed"
+    say(lines, units=NO_UNIT, long_name=meaning)
+
+
+def event_rows(event: Event, start: float) -> NDArray[np.bytes_]:
+    """An event as rows of the events dataset: (n,) of EVENT_BYTES each."""
+    said = {"kind": event.kind.value, "level": event.level, "source": event.source, "text": event.text}
+    stamped = {"time_s": event.t - start, "monotonic_s": event.t, **said, "data": event.data}
+    text = to_json(stamped).encode("ascii")
+    rows = [text[:EVENT_BYTES]]
+    step = EVENT_BYTES - len(CONTINUED)
+    rows += [CONTINUED + text[i : i + step] for i in range(EVENT_BYTES, len(text), step)]
+    return np.array(rows, f"S{EVENT_BYTES}")
+
+
+def events_from(rows: NDArray[np.bytes_]) -> list[Event]:
+    """The events that ``event_rows`` wrote; one whose end is missing is left out."""
+    texts: list[bytearray] = []
+    for row in rows.tolist():
+        if row.startswith(CONTINUED) and texts:
+            texts[-1] += row[len(CONTINUED) :]
+        else:
+            texts.append(bytearray(row))
+    return [event for event in map(_event_from, texts) if event is not None]
+
+
+def _event_from(text: bytearray) -> Event | None:
+    try:
+        said = json.loads(bytes(text))
+        kind = EventKind(said["kind"])
+        return Event(said["monotonic_s"], kind, said["source"], said["text"], said["level"], said["data"])
+    except (ValueError, KeyError, TypeError):
+        return None

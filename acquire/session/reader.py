@@ -1,0 +1,203 @@
+"""A recorded test: what was grabbed, what the load cell said, what happened, what was set.
+
+``SessionWriter`` records (acquire.session_writer), ``Session`` reads. The file is described
+for other programs in docs/session-format.md. Results of measurements are never stored here:
+they are another file that can be made again.
+"""
+
+from __future__ import annotations
+
+import os
+from bisect import bisect_right
+from collections.abc import Iterator
+from datetime import datetime
+from itertools import accumulate
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.clock import ClockPair
+from acquire.errors import DataError
+from acquire.events import Event
+from acquire.frame import Burst, CameraInfo, Frame
+from acquire.load_sample import LoadCellInfo, LoadSample
+from acquire.record_mode import RecordMode
+from acquire.session.part import SessionPart
+from acquire.session.rotation import RotatingWriter, first_path, part_path
+from acquire.session.writer import SessionWriter
+
+__all__ = ["RecordMode", "RotatingWriter", "Session", "SessionWriter"]
+
+
+class Session:
+    """A recorded session, open for reading; a context manager. A rotated set of files is one session.
+
+    Attributes
+    ----------
+    path : Path
+    recovered : str or None
+        Says so where a file was not closed by its writer, or one of a set is missing.
+    camera : CameraInfo
+        Of the pictures as they are recorded: with ``mode.crop``, that part of the camera's.
+    load_cell : LoadCellInfo or None
+    config, metadata, versions : dict
+    mode : RecordMode
+        Of mode "bursts" it is ``bursts`` that hold the pictures, not ``frames``.
+    start_utc : datetime
+    start_monotonic : float, s
+    """
+
+    def __init__(self, parts: list[SessionPart], missing: str | None = None) -> None:
+        self._parts = parts
+        first = parts[0]
+        self.path: Path = first.path
+        words = [f"{part.path} {part.recovered}" for part in parts if part.recovered]
+        self.recovered: str | None = "; ".join([*words, missing] if missing else words) or None
+        self.camera: CameraInfo = first.camera
+        self.load_cell: LoadCellInfo | None = first.load_cell
+        self.config: dict[str, Any] = first.config
+        self.metadata: dict[str, Any] = first.metadata
+        self.versions: dict[str, Any] = first.versions
+        self.mode: RecordMode = first.mode
+        self.start_utc: datetime = first.start.utc
+        self.start_monotonic: float = first.start.monotonic
+
+    @classmethod
+    def open(cls, path: str | os.PathLike[str]) -> Self:
+        """Open a session file, or the whole set that it belongs to.
+
+        Raises
+        ------
+        DataError
+            Not there, not a session, newer than this program, or damaged; says what to do.
+        """
+        part = SessionPart(path)
+        if not part.set_id:
+            return cls([part])
+        parts, missing = _whole_set(part)
+        return cls(parts, missing)
+
+    def __len__(self) -> int:
+        """Frames recorded."""
+        return sum(len(part) for part in self._parts)
+
+    @property
+    def indices(self) -> NDArray[np.int64]:
+        """Sequence numbers of the frames, (N,)."""
+        return np.concatenate([part.columns["index"] for part in self._parts])
+
+    @property
+    def times(self) -> NDArray[np.float64]:
+        """Times of the frames, (N,) monotonic s."""
+        return np.concatenate([part.columns["monotonic_s"] for part in self._parts])
+
+    def frame(self, number: int) -> Frame:
+        """The frame recorded as ``number``, 0 .. len - 1.
+
+        Raises
+        ------
+        DataError
+            There is no such frame, or its bytes are damaged.
+        """
+        part, row = self._locate([len(part) for part in self._parts], number, "frame")
+        return part.frame(row)
+
+    def frames(self, start: int | None = None, stop: int | None = None) -> Iterator[Frame]:
+        """The frames from number ``start`` up to, not including, ``stop``, one by one."""
+        for number in range(*slice(start, stop).indices(len(self))):
+            yield self.frame(number)
+
+    @property
+    def burst_count(self) -> int:
+        """Bursts recorded as such (mode "bursts")."""
+        return sum(len(part.bursts["n"]) for part in self._parts)
+
+    def burst(self, number: int) -> Burst:
+        """The burst recorded as ``number``; raises as ``frame``."""
+        part, row = self._locate([len(part.bursts["n"]) for part in self._parts], number, "burst")
+        return part.burst(row)
+
+    def bursts(self) -> Iterator[Burst]:
+        """The bursts that were recorded as such, one by one, bit-equal to what was measured."""
+        for number in range(self.burst_count):
+            yield self.burst(number)
+
+    def _locate(self, lengths: list[int], number: int, what: str) -> tuple[SessionPart, int]:
+        if not 0 <= number < sum(lengths):
+            raise DataError(f"{self.path}: no {what} {number}; there are {sum(lengths)}, from 0")
+        starts = [0, *accumulate(lengths)]
+        at = bisect_right(starts, number) - 1
+        return self._parts[at], number - starts[at]
+
+    def load_samples(self) -> list[LoadSample]:
+        """All load samples, with their raw lines."""
+        return [sample for part in self._parts for sample in part.load_samples()]
+
+    def events(self) -> list[Event]:
+        """All events."""
+        return [event for part in self._parts for event in part.events()]
+
+    @property
+    def ledger(self) -> dict[str, Any] | None:
+        """The final counts; None where the run did not come to its end."""
+        return self._parts[-1].ledger()
+
+    @property
+    def clock_pairs(self) -> list[ClockPair]:
+        """The pairs of monotonic and UTC readings."""
+        pairs = [pair for part in self._parts for pair in part.clock_pairs()]
+        return list(dict.fromkeys(pairs))
+
+    def refresh(self) -> None:
+        """Look for what a writer still at work has added to the files that are open."""
+        for part in self._parts:
+            part.refresh()
+
+    def close(self) -> None:
+        """Close the files; may be called again without effect."""
+        for part in self._parts:
+            part.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _whole_set(opened: SessionPart) -> tuple[list[SessionPart], str | None]:
+    """All parts of the set in order, and a sentence on those that are missing."""
+    first = first_path(opened.path)
+    parts: list[SessionPart] = []
+    missing: list[str] = []
+    for path in [part_path(first, number) for number in range(_last_part(first) + 1)]:
+        if path == opened.path:
+            parts.append(opened)
+        elif (part := _same_set(path, opened.set_id)) is not None:
+            parts.append(part)
+        else:
+            missing.append(path.name)
+    if not missing:
+        return parts, None
+    return parts, f"files of this session are missing or unreadable: {', '.join(missing)}"
+
+
+def _last_part(first: Path) -> int:
+    numbers = [path.stem.rpartition(".")[2] for path in first.parent.glob(f"{first.stem}.*{first.suffix}")]
+    return max((int(number) for number in numbers if number.isdecimal()), default=0)
+
+
+def _same_set(path: Path, set_id: str) -> SessionPart | None:
+    try:
+        part = SessionPart(path)
+    except DataError:
+        return None
+    if part.set_id == set_id:
+        return part
+    part.close()
+    return None

@@ -1,0 +1,164 @@
+"""A V4L2 camera set up as its address asks: everything read back, a difference refused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from acquire.errors import ConfigError, DeviceError
+from acquire.v4l2.controls import Control, ControlWishes, apply_controls, exposure_s, still_automatic
+from acquire.v4l2.device import Mode, V4L2Device
+from acquire.v4l2.formats import FORMATS, PixelFormat, Plane, preferred, warning_of
+
+
+@dataclass(frozen=True, slots=True)
+class V4L2Settings:
+    """What an address asks of a V4L2 camera; None: whatever it has.
+
+    Attributes
+    ----------
+    format : str or None
+        Four-character code; None: the best grey one there is.
+    width, height : int or None, px
+    fps : float or None, 1/s
+    input : int or None
+    plane : "raw" | "r" | "g" | "b"
+        Of a Bayer mosaic.
+    buffers : int
+    stall_s : float or None, s
+        Time without a picture that counts as a stall; None: from frame rate and exposure.
+    controls : ControlWishes
+    """
+
+    format: str | None = None
+    width: int | None = None
+    height: int | None = None
+    fps: float | None = None
+    input: int | None = None
+    plane: Plane = "raw"
+    buffers: int = 8
+    stall_s: float | None = None
+    controls: ControlWishes = field(default_factory=ControlWishes)
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What is in force.
+
+    Attributes
+    ----------
+    mode : Mode
+    format : PixelFormat
+    controls : mapping of str to JSON value
+    exposure_s : float or None, s
+    warnings : tuple of str
+    """
+
+    mode: Mode
+    format: PixelFormat
+    controls: dict[str, Any]
+    exposure_s: float | None
+    warnings: tuple[str, ...]
+
+
+def set_up(device: V4L2Device, settings: V4L2Settings, where: str) -> Setup:
+    """Set the camera up.
+
+    Parameters
+    ----------
+    device : V4L2Device
+    settings : V4L2Settings
+    where : str
+        The address, for messages.
+
+    Raises
+    ------
+    ConfigError
+        The camera does not honour what was asked; says what it offers.
+    DeviceError
+        It offers nothing that can be measured with.
+    OSError
+        From the kernel.
+    """
+    if settings.input is not None:
+        _choose_input(device, settings.input, where)
+    fourcc = _choose_format(device, settings.format, where)
+    _set_format(device, fourcc, settings, where)
+    controls = apply_controls(device, settings.controls, where)
+    if settings.fps is not None:
+        _set_fps(device, fourcc, settings.fps, where)
+    return _in_force(device, settings, controls)
+
+
+def _choose_input(device: V4L2Device, index: int, where: str) -> None:
+    names = device.inputs()
+    if not 0 <= index < len(names):
+        offered = ", ".join(f"{k} ({name})" for k, name in enumerate(names)) or "none"
+        raise ConfigError(f"{where}: input={index} is not there; the camera has: {offered}")
+    device.select_input(index)
+
+
+def _choose_format(device: V4L2Device, asked: str | None, where: str) -> str:
+    offered = [offer.fourcc for offer in device.formats()]
+    usable = [code for code in offered if code in FORMATS]
+    if asked is None:
+        best = preferred(offered)
+        if best is None:
+            hint = "; format=MJPG takes the compressed pictures, with a warning" * bool(usable)
+            raise DeviceError(
+                f"{where}: offers {_list(offered)}, none of them raw grey levels we can read{hint}"
+            )
+        return best
+    if asked not in usable:
+        raise ConfigError(f"{where}: format={asked} is not possible; the camera offers {_list(usable)}")
+    return asked
+
+
+def _list(words: list[str]) -> str:
+    return ", ".join(words) or "nothing"
+
+
+def _set_format(device: V4L2Device, fourcc: str, settings: V4L2Settings, where: str) -> None:
+    now = device.mode()
+    width, height = settings.width or now.width, settings.height or now.height
+    device.set_format(fourcc, width, height)
+    got = device.mode()
+    if got.fourcc != fourcc:
+        raise ConfigError(f"{where}: asked for format={fourcc}, the driver gives {got.fourcc}; ask for that")
+    asked = (settings.width or got.width, settings.height or got.height)
+    if (got.width, got.height) != asked:
+        sizes = _list([str(size) for size in device.sizes(fourcc)])
+        raise ConfigError(
+            f"{where}: asked for {asked[0]}x{asked[1]}, the driver gives {got.width}x{got.height}; "
+            f"{fourcc} is offered in {sizes}"
+        )
+
+
+def _set_fps(device: V4L2Device, fourcc: str, fps: float, where: str) -> None:
+    device.set_fps(fps)
+    mode = device.mode()
+    if mode.fps is None or abs(mode.fps - fps) > 0.01 * fps:
+        rates = _list([f"{rate:g}" for rate in device.rates(fourcc, mode.width, mode.height)])
+        given = "no frame rate at all" if mode.fps is None else f"{mode.fps:g}"
+        raise ConfigError(
+            f"{where}: asked for fps={fps:g}, the driver gives {given}; "
+            f"{fourcc} {mode.width}x{mode.height} is offered at {rates} 1/s"
+        )
+
+
+def _in_force(device: V4L2Device, settings: V4L2Settings, controls: dict[int, Control]) -> Setup:
+    mode = device.mode()
+    pixel_format = FORMATS[mode.fourcc]
+    automatic = still_automatic(controls)
+    warnings = [warning_of(pixel_format, full_range=mode.full_range, plane=settings.plane)]
+    if automatic:
+        warnings.append(
+            f"the camera goes on changing by itself: {', '.join(automatic)}; grey levels may drift"
+        )
+    return Setup(
+        mode=mode,
+        format=pixel_format,
+        controls={control.name: control.shown() for control in controls.values()},
+        exposure_s=exposure_s(controls),
+        warnings=tuple(text for text in warnings if text),
+    )

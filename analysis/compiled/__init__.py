@@ -1,0 +1,1 @@
+"""How loops are compiled (``loops``), and the vector instructions they say outright (``vectors``): numba."""

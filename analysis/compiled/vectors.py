@@ -1,0 +1,210 @@
+"""Vectors of float32 in compiled loops, said outright: numba's own vectors leave half of the processor idle.
+
+A loop over pixels that numba turns into vectors by itself first checks that its arrays do not overlap,
+which for a row of 32 pixels takes as long as the row, and uses half of a 512-bit unit. With these
+functions a compiled loop handles ``LANES`` pixels at a time, with + - * between vectors. Any array is
+taken as flat memory, C order, and nothing is checked: the caller sees to it that index .. index + LANES
+lies inside.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.core.imputils import lower_builtin
+from numba.core.typing.templates import AbstractTemplate, infer_global, signature
+from numba.extending import intrinsic, models, register_model
+
+from analysis.compiled.loops import FAST
+
+LANES: int = 16 if llvm.get_host_cpu_features().get("avx512f") else 8
+_FLAGS = tuple(sorted(FAST))
+_FLOAT = ir.FloatType()
+_VECTOR = ir.VectorType(_FLOAT, LANES)
+_INT = ir.IntType(32)
+_BYTES = ir.IntType(8).as_pointer()
+_ALIGNMENT = 4
+"""Bytes: a vector may start at any sample."""
+_POINTER = 64
+"""Bits of an address."""
+
+
+def whole(size: int) -> int:
+    """``size`` rounded up to whole vectors."""
+    return (size + LANES - 1) // LANES * LANES
+
+
+class Vector(types.Type):
+    """Type of LANES float32 inside compiled code."""
+
+    def __init__(self) -> None:
+        super().__init__("Vector")
+
+
+vector = Vector()
+
+
+@register_model(Vector)
+class _VectorModel(models.PrimitiveModel):  # type: ignore[misc]
+    def __init__(self, manager: Any, numba_type: Any) -> None:
+        super().__init__(manager, numba_type, _VECTOR)
+
+
+def _define(operation: Callable[..., Any], instruction: str) -> None:
+    """Let ``operation`` take two vectors."""
+
+    class Rule(AbstractTemplate):  # type: ignore[misc]
+        def generic(self, arguments: Any, _keywords: Any) -> Any:
+            if len(arguments) == 2 and all(isinstance(a, Vector) for a in arguments):
+                return signature(vector, vector, vector)
+            return None
+
+    def lower(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return getattr(builder, instruction)(*arguments, flags=_FLAGS)
+
+    infer_global(operation)(Rule)
+    lower_builtin(operation, Vector, Vector)(lower)
+
+
+for _operation, _instruction in (
+    (operator.add, "fadd"), (operator.iadd, "fadd"), (operator.sub, "fsub"), (operator.mul, "fmul"),
+):  # fmt: skip
+    _define(_operation, _instruction)
+
+
+def _address(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
+    data = context.make_array(array_type)(context, builder, array).data
+    return builder.bitcast(builder.gep(data, [index]), _VECTOR.as_pointer())
+
+
+@intrinsic
+def load(_typing: Any, array: Any, index: Any) -> Any:
+    """LANES samples of a float32 array from the flat ``index`` (uintp) on."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = _address(context, builder, signature.args[0], *arguments)
+        return builder.load(place, align=_ALIGNMENT)
+
+    return vector(array, types.uintp), generate
+
+
+@intrinsic
+def address(_typing: Any, array: Any, index: Any) -> Any:
+    """Where the flat ``index`` (uintp) of a float32 array lies in memory, for ``load_from``."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = _address(context, builder, signature.args[0], *arguments)
+        return _opaque(builder, builder.ptrtoint(place, ir.IntType(_POINTER)))
+
+    return types.uintp(array, types.uintp), generate
+
+
+@intrinsic
+def further(_typing: Any, place: Any, samples: Any) -> Any:
+    """An address so many float32 (uintp) behind another."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        bytes_on = builder.mul(arguments[1], ir.Constant(arguments[1].type, _ALIGNMENT))
+        return _opaque(builder, builder.add(arguments[0], bytes_on))
+
+    return types.uintp(types.uintp, types.uintp), generate
+
+
+def _opaque(builder: Any, value: Any) -> Any:
+    """The same integer, of which the compiler forgets how it was made.
+
+    Else it would add row and column anew in every load, and loads with an index register count twice
+    where instructions are issued.
+    """
+    return builder.asm(ir.FunctionType(value.type, [value.type]), "", "=r,0", [value], False)
+
+
+@intrinsic
+def load_from(_typing: Any, place: Any, samples: Any) -> Any:
+    """LANES samples so many float32 (a constant) behind an address."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        bytes_on = builder.mul(arguments[1], ir.Constant(arguments[1].type, _ALIGNMENT))
+        return builder.load(
+            builder.inttoptr(builder.add(arguments[0], bytes_on), _VECTOR.as_pointer()), align=_ALIGNMENT
+        )
+
+    return vector(types.uintp, types.uintp), generate
+
+
+@intrinsic
+def fetch(_typing: Any, array: Any, index: Any) -> Any:
+    """Ask for the cache line of a sample of a float32 array; any index (uintp) will do, it is not read."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = builder.bitcast(_address(context, builder, signature.args[0], *arguments), _BYTES)
+        kind = ir.FunctionType(ir.VoidType(), [_BYTES, _INT, _INT, _INT])
+        ask = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
+        read, second_level, data = (ir.Constant(_INT, i) for i in (0, 2, 1))
+        builder.call(ask, [place, read, second_level, data])
+        return context.get_dummy_value()
+
+    return types.void(array, types.uintp), generate
+
+
+@intrinsic
+def store(_typing: Any, array: Any, index: Any, value: Any) -> Any:
+    """Write a vector to a float32 array from the flat ``index`` (uintp) on."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        place = _address(context, builder, signature.args[0], *arguments[:2])
+        builder.store(arguments[2], place, align=_ALIGNMENT)
+        return context.get_dummy_value()
+
+    return types.void(array, types.uintp, vector), generate
+
+
+@intrinsic
+def spread(_typing: Any, value: Any) -> Any:
+    """A float32 in every lane."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        empty = ir.Constant(_VECTOR, ir.Undefined)
+        first = builder.insert_element(empty, arguments[0], ir.Constant(_INT, 0))
+        return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(_INT, LANES), [0] * LANES))
+
+    return vector(types.float32), generate
+
+
+@intrinsic
+def fused(_typing: Any, a: Any, b: Any, c: Any) -> Any:
+    """a b + c in one instruction where the processor has it; a product used twice is not fused by itself."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        kind = ir.FunctionType(_VECTOR, [_VECTOR] * 3)
+        add = cgutils.get_or_insert_function(builder.module, kind, f"llvm.fmuladd.v{LANES}f32")
+        return builder.call(add, arguments, fastmath=_FLAGS)
+
+    return vector(vector, vector, vector), generate
+
+
+@intrinsic
+def above(_typing: Any, value: Any, limit: Any, yes: Any, no: Any) -> Any:
+    """In each lane ``yes`` where value > limit, else ``no``."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        return builder.select(builder.fcmp_ordered(">", arguments[0], arguments[1]), *arguments[2:])
+
+    return vector(vector, vector, vector, vector), generate
+
+
+@intrinsic
+def total(_typing: Any, value: Any) -> Any:
+    """Sum over the lanes, float32."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
+        kind = ir.FunctionType(_FLOAT, [_FLOAT, _VECTOR])
+        add = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fadd.v{LANES}f32")
+        return builder.call(add, [ir.Constant(_FLOAT, -0.0), arguments[0]], fastmath=_FLAGS)
+
+    return types.float32(vector), generate

@@ -1,0 +1,317 @@
+"""The result of one measurement: displacement, gradients, their uncertainty and a status, per ZOI.
+
+Strains, rotation and principal values are derived here from the displacement gradient
+(docs/method.md); nothing is smoothed. x points right and y down on the screen, so a positive
+``omega`` is clockwise.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.field.grid import ZoiGrid
+from analysis.field.motion import Motion
+from analysis.field.status import Status
+from analysis.field.tensor import Floats, Measure, StrainTensor, half_logarithm
+from analysis.field.uncertainty import PAIR_INDEX, combination, variance_of_sum
+from analysis.field.windows import Window
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StrainField:
+    """One measured field on the grid of the reference; NaN where the status is not OK.
+
+    Attributes
+    ----------
+    grid : ZoiGrid
+    parameters : (6, R, C) or (12, R, C) float64
+        u, du_dx, du_dy (and, order 2, the coefficients of x^2, xy, y^2), then the same of v; at
+        the centres of the ZOIs, px and px per px.
+    covariance : (21, R, C) float32
+        Of the six affine values, pairs (i, j >= i) in order; includes the reference's part.
+    covariance_reference : (21, R, C) float32
+        The part of it that the noise of the reference causes, common to all frames.
+    residual : (R, C) float32
+        Variance of what the fit leaves over the variance expected from the noise; about 1.
+    status : (R, C) uint8, see Status
+    iterations : (R, C) uint8
+    gain : (R, C) float32
+        Contrast of the deformed image over that of the reference.
+    noise : float, GL
+        Standard deviation of the deformed image that the uncertainty was computed with.
+    window : str
+        The least-squares weight, which says how far neighbouring values are correlated.
+    motion : Motion, optional
+        For the start in the next frame.
+    """
+
+    grid: ZoiGrid
+    parameters: Floats
+    covariance: NDArray[np.float32]
+    covariance_reference: NDArray[np.float32]
+    residual: NDArray[np.float32]
+    status: NDArray[np.uint8]
+    iterations: NDArray[np.uint8]
+    gain: NDArray[np.float32]
+    noise: float = float("nan")
+    window: Window = "gaussian"
+    motion: Motion | None = None
+    _cache: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    def __post_init__(self) -> None:
+        for name in ("parameters", "covariance", "covariance_reference", "residual", "status",
+                     "iterations", "gain"):  # fmt: skip
+            array = getattr(self, name)
+            if array is not None:
+                array.flags.writeable = False
+
+    @classmethod
+    def from_values(
+        cls,
+        grid: ZoiGrid,
+        values: Mapping[str, ArrayLike],
+        sigmas: Mapping[str, ArrayLike] | float = 0.0,
+        status: ArrayLike | None = None,
+        residual: ArrayLike = 1.0,
+    ) -> StrainField:
+        """A field from plain arrays, as they are read from a file or imposed by a test.
+
+        Parameters
+        ----------
+        grid : ZoiGrid
+        values : mapping of "u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy" to (R, C); 0 where missing
+        sigmas : mapping of the same names to (R, C), or one number for all
+        status : (R, C), optional
+            OK where the grid is active and NOT_MEASURED elsewhere, if not given.
+        residual : (R, C)
+        """
+        names = ("u", "du_dx", "du_dy", "v", "dv_dx", "dv_dy")
+        parameters = np.stack([_filled(values.get(n, 0.0), grid) for n in names])
+        covariance = np.zeros((21, *grid.shape), np.float32)
+        for i, name in enumerate(names):
+            sigma = sigmas.get(name, 0.0) if isinstance(sigmas, Mapping) else sigmas
+            covariance[PAIR_INDEX[i, i]] = _filled(sigma, grid) ** 2
+        if status is None:
+            status = np.where(grid.active, Status.OK, Status.NOT_MEASURED)
+        states = np.array(status, np.uint8)
+        parameters[:, states != Status.OK] = np.nan
+        covariance[:, states != Status.OK] = np.nan
+        return cls(
+            grid, parameters, covariance, np.zeros_like(covariance),
+            _filled(residual, grid).astype(np.float32), states,
+            np.zeros(grid.shape, np.uint8), np.ones(grid.shape, np.float32),
+        )  # fmt: skip
+
+    @property
+    def _half(self) -> int:
+        return len(self.parameters) // 2
+
+    @property
+    def u(self) -> Floats:
+        """Displacement along x (right), (R, C), px."""
+        return np.asarray(self.parameters[0])
+
+    @property
+    def du_dx(self) -> Floats:
+        return np.asarray(self.parameters[1])
+
+    @property
+    def du_dy(self) -> Floats:
+        return np.asarray(self.parameters[2])
+
+    @property
+    def v(self) -> Floats:
+        """Displacement along y (down), (R, C), px."""
+        return np.asarray(self.parameters[self._half])
+
+    @property
+    def dv_dx(self) -> Floats:
+        return np.asarray(self.parameters[self._half + 1])
+
+    @property
+    def dv_dy(self) -> Floats:
+        return np.asarray(self.parameters[self._half + 2])
+
+    @property
+    def exx(self) -> Floats:
+        """Small strain along x, (R, C)."""
+        return self.du_dx
+
+    @property
+    def eyy(self) -> Floats:
+        """Small strain along y, (R, C)."""
+        return self.dv_dy
+
+    @property
+    def exy(self) -> Floats:
+        """Small shear strain, tensor component, (R, C)."""
+        return self.value("exy")
+
+    @property
+    def gamma_xy(self) -> Floats:
+        """Engineering shear, 2 exy, (R, C)."""
+        return self.value("gamma_xy")
+
+    @property
+    def omega(self) -> Floats:
+        """Small rotation (dv_dx - du_dy)/2, (R, C), rad, positive clockwise on the screen."""
+        return self.value("omega")
+
+    @property
+    def sigma_u(self) -> Floats:
+        """Standard uncertainty of u, (R, C), px."""
+        return self.sigma("u")
+
+    @property
+    def sigma_v(self) -> Floats:
+        return self.sigma("v")
+
+    @property
+    def sigma_du_dx(self) -> Floats:
+        return self.sigma("du_dx")
+
+    @property
+    def sigma_du_dy(self) -> Floats:
+        return self.sigma("du_dy")
+
+    @property
+    def sigma_dv_dx(self) -> Floats:
+        return self.sigma("dv_dx")
+
+    @property
+    def sigma_dv_dy(self) -> Floats:
+        return self.sigma("dv_dy")
+
+    @property
+    def sigma_exx(self) -> Floats:
+        return self.sigma("exx")
+
+    @property
+    def sigma_eyy(self) -> Floats:
+        return self.sigma("eyy")
+
+    @property
+    def sigma_exy(self) -> Floats:
+        return self.sigma("exy")
+
+    @property
+    def sigma_gamma_xy(self) -> Floats:
+        return self.sigma("gamma_xy")
+
+    @property
+    def sigma_omega(self) -> Floats:
+        return self.sigma("omega")
+
+    @property
+    def ok(self) -> NDArray[np.bool_]:
+        """ZOIs with a valid value, (R, C)."""
+        return np.asarray(self.status == Status.OK)
+
+    @property
+    def refused(self) -> dict[Status, int]:
+        """How many ZOIs have no value for each reason, the commonest first; those not asked for are left out."""
+        found, counts = np.unique(self.status, return_counts=True)
+        tally = {Status(int(s)): int(n) for s, n in zip(found, counts, strict=True)}
+        asked = {s: n for s, n in tally.items() if s not in (Status.OK, Status.NOT_MEASURED)}
+        return dict(sorted(asked.items(), key=lambda item: -item[1]))
+
+    @property
+    def n_valid(self) -> int:
+        """Number of ZOIs with a valid value."""
+        return int(np.count_nonzero(self.ok))
+
+    def value(self, name: str) -> Floats:
+        """A value by its name (see ``VALUES``), (R, C).
+
+        Raises
+        ------
+        ValueError
+            Unknown name.
+        """
+        half = self._half
+        terms = combination(name).items()
+        return np.asarray(sum(c * self.parameters[i % 3 + half * (i // 3)] for i, c in terms))
+
+    def sigma(self, name: str, part: Literal["all", "reference", "current"] = "all") -> Floats:
+        """Standard uncertainty of a value, (R, C), in its unit.
+
+        ``part`` separates what the noise of the reference causes, which is common to all
+        frames measured against it, from what the noise of the deformed image causes.
+        """
+        key = f"{part} {name}"
+        if key not in self._cache:
+            self._cache[key] = np.sqrt(np.maximum(self._variance(name, part), 0))
+        return np.asarray(self._cache[key])
+
+    def _variance(self, name: str, part: str) -> Floats:
+        if part == "current":
+            return self._variance(name, "all") - self._variance(name, "reference")
+        covariance = self.covariance_reference if part == "reference" else self.covariance
+        terms = combination(name)
+        return np.asarray(
+            sum(
+                a * b * covariance[PAIR_INDEX[i, j]].astype(np.float64)
+                for i, a in terms.items()
+                for j, b in terms.items()
+            )
+        )
+
+    def mean(self, name: str, where: ArrayLike | None = None) -> tuple[float, float]:
+        """Mean of a value over the valid ZOIs and the standard uncertainty of that mean.
+
+        Overlapping ZOIs see the same noise; their correlation, known from the window, is
+        taken into account. (NaN, NaN) where no ZOI is valid.
+
+        Parameters
+        ----------
+        name : str
+            One of ``VALUES``.
+        where : (R, C) bool, optional
+            Only these ZOIs, a gauge.
+        """
+        chosen = self.ok if where is None else self.ok & np.asarray(where, bool)
+        count = int(np.count_nonzero(chosen))
+        if count == 0:
+            return float("nan"), float("nan")
+        value = float(self.value(name)[chosen].mean())
+        # A ZOI without predicted noise (sigma NaN) leaves the mean without a sigma, not without a value.
+        variance = variance_of_sum(np.where(chosen, self.sigma(name), 0.0), name, self.grid, self.window)
+        return value, float(np.sqrt(max(variance, 0.0)) / count)
+
+    def strain(self, measure: Measure = "small") -> StrainTensor:
+        """The strain tensor of a measure: "small", "green" (Green-Lagrange) or "hencky".
+
+        Raises
+        ------
+        ValueError
+            Unknown measure.
+        """
+        if measure == "small":
+            return StrainTensor(measure, self.exx, self.eyy, self.exy)
+        if measure not in ("green", "hencky"):
+            raise ValueError(f"unknown strain measure {measure!r}; known: small, green, hencky")
+        cxx = (1 + self.du_dx) ** 2 + self.dv_dx**2
+        cyy = self.du_dy**2 + (1 + self.dv_dy) ** 2
+        cxy = (1 + self.du_dx) * self.du_dy + self.dv_dx * (1 + self.dv_dy)
+        if measure == "green":
+            return StrainTensor(measure, (cxx - 1) / 2, (cyy - 1) / 2, cxy / 2)
+        return half_logarithm(cxx, cyy, cxy)
+
+    @property
+    def rotation(self) -> Floats:
+        """Finite rotation by polar decomposition of F = I + grad u, (R, C), rad."""
+        return np.asarray(np.arctan2(self.dv_dx - self.du_dy, 2 + self.du_dx + self.dv_dy))
+
+    @property
+    def principal(self) -> tuple[Floats, Floats, Floats]:
+        """Largest and smallest principal small strain and the angle of the first to x (rad)."""
+        return self.strain("small").principal
+
+
+def _filled(values: ArrayLike, grid: ZoiGrid) -> Floats:
+    return np.array(np.broadcast_to(np.asarray(values, np.float64), grid.shape))

@@ -1,0 +1,79 @@
+"""Values as combinations of the fitted parameters, and the variance of their sums over overlapping ZOIs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+
+import numpy as np
+
+from analysis.field.grid import ZoiGrid
+from analysis.field.tensor import Floats
+from analysis.field.windows import Window, overlap
+
+U, DU_DX, DU_DY, V, DV_DX, DV_DY = range(6)
+
+
+_PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]
+
+
+PAIR_INDEX = {pair: k for k, pair in enumerate(_PAIRS)} | {(j, i): k for k, (i, j) in enumerate(_PAIRS)}
+"""Where the covariance of parameters i and j stands among the 21 of ``StrainField.covariance``."""
+
+
+# Each named value as a linear combination of u, du_dx, du_dy, v, dv_dx, dv_dy.
+_COMBINATIONS: Mapping[str, Mapping[int, float]] = {
+    "u": {U: 1.0},
+    "v": {V: 1.0},
+    "du_dx": {DU_DX: 1.0},
+    "du_dy": {DU_DY: 1.0},
+    "dv_dx": {DV_DX: 1.0},
+    "dv_dy": {DV_DY: 1.0},
+    "exx": {DU_DX: 1.0},
+    "eyy": {DV_DY: 1.0},
+    "exy": {DU_DY: 0.5, DV_DX: 0.5},
+    "gamma_xy": {DU_DY: 1.0, DV_DX: 1.0},
+    "omega": {DU_DY: -0.5, DV_DX: 0.5},
+}
+
+
+VALUES = tuple(_COMBINATIONS)
+"""Names that ``mean`` and ``sigma`` know."""
+
+
+def combination(name: str) -> Mapping[int, float]:
+    """A named value as {parameter index: factor}.
+
+    Raises
+    ------
+    ValueError
+        Unknown name; the message lists the known ones.
+    """
+    if name not in _COMBINATIONS:
+        raise ValueError(f"unknown value {name!r}; known: {', '.join(VALUES)}")
+    return _COMBINATIONS[name]
+
+
+def variance_of_sum(sigma: Floats, name: str, grid: ZoiGrid, window: Window) -> float:
+    """Variance of the sum of one value over all ZOIs: sum of sigma_i sigma_j rho(lag_ij).
+
+    rho is a product of one correlation along x and one along y for each parameter; the two
+    parts of exy and omega are equally strong and uncorrelated for a pattern without direction.
+    """
+    terms = combination(name)
+    total = 0.0
+    for parameter in terms:
+        along_y, along_x = _correlations(grid.shape, window, grid.size, grid.step, parameter % 3)
+        total += float(np.sum(sigma * (along_y @ sigma @ along_x))) / len(terms)
+    return total
+
+
+@lru_cache(maxsize=64)
+def _correlations(
+    shape: tuple[int, int], window: Window, size: int, step: int, kind: int
+) -> tuple[Floats, Floats]:
+    """Correlation matrices (R, R) and (C, C) of a displacement (0), an x (1) or a y gradient (2)."""
+    along = [int(kind == 2), int(kind == 1)]
+    rho = [overlap(window, size, step, n, moment) for n, moment in zip(shape, along, strict=True)]
+    lags = [np.abs(np.subtract.outer(np.arange(n), np.arange(n))) for n in shape]
+    return rho[0][lags[0]], rho[1][lags[1]]

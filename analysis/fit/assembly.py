@@ -1,0 +1,62 @@
+"""A measured frame put together: residual and covariances of every ZOI, in compiled loops."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import prange
+
+from analysis.compiled.loops import helper, parallel
+
+RUN = 1024
+"""ZOIs whose covariances are scaled at a time."""
+LEAST_GAIN = 0.1
+"""The gain by which the noise of the deformed image is divided at least."""
+
+
+@parallel
+def weigh(
+    measured: Any, left: Any, freedom: Any, gain: Any, reference: Any, current: Any,
+    residual: Any, from_reference: Any, whole: Any,
+) -> None:  # fmt: skip
+    """What is left over what noise explains, and the variance that scales the unit covariances.
+
+    Parameters
+    ----------
+    measured : (A,) bool
+    left : (A,), GL^2
+        Weighted sum of squares that the fit leaves.
+    freedom, gain : (A,)
+    reference, current : (A,), GL^2
+        Variance a pixel of the two images.
+    residual : (A,) float32, written
+    from_reference, whole : (A,) float32, GL^2, written
+        In grey levels of the reference; NaN where nothing was measured.
+    """
+    for z in prange(len(measured)):
+        residual[z] = left[z] / freedom[z] / (gain[z] ** 2 * reference[z] + current[z])
+        from_reference[z] = np.nan
+        whole[z] = np.nan
+        if measured[z]:
+            from_reference[z] = reference[z]
+            whole[z] = reference[z] + current[z] / max(gain[z], LEAST_GAIN) ** 2
+
+
+@parallel
+def scale(unit: Any, from_reference: Any, whole: Any, out_reference: Any, out: Any) -> None:
+    """The unit covariances (21, N) times two variances (N,) each, written to the last two."""
+    count = unit.shape[1]
+    for run in prange((count + RUN - 1) // RUN):
+        a = run * RUN
+        b = min(a + RUN, count)
+        for k in range(len(unit)):
+            _products(unit[k, a:b], from_reference[a:b], out_reference[k, a:b])
+            _products(unit[k, a:b], whole[a:b], out[k, a:b])
+
+
+@helper
+def _products(a: Any, b: Any, out: Any) -> None:
+    for n in range(out.size):
+        i = np.uintp(n)
+        out[i] = a[i] * b[i]

@@ -1,0 +1,315 @@
+"""The iteration: warp, take moments of the difference, solve, compose, until the step is small.
+
+One compiled loop over ZOIs; each is done by one thread from start to end, so its numbers depend
+neither on the number of threads nor on the other ZOIs.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import prange
+
+from analysis.compiled.loops import helper, inlined, parallel
+from analysis.compiled.vectors import LANES, fetch
+from analysis.fit.moments import (
+    CHANNELS,
+    DEGREES,
+    DIFFERENCE_ROWS,
+    add_difference_columns,
+    difference_moments,
+    weighted_rows,
+)
+from analysis.fit.shapes import N_SHAPES, bent, shares
+from analysis.picture import PAD
+from analysis.picture.cutting import ROWS, displacement, inside, new_plan, plan_rows
+from analysis.picture.warp import warp_cut_rows, warp_rows
+
+f4 = np.float32
+
+RUNNING, CONVERGED, LEFT_IMAGE, DIVERGED = 0, 1, 2, 3
+GAIN_RANGE = (0.15, 6.0)
+"""A step is divided by the estimated gain only within this range."""
+LEFT_BY_NOISE = 1.15
+"""Share of a step left as error after it, per px of uncertainty from one image (measured: 0.5-1 rms)."""
+LEFT_BY_MISFIT = 0.003
+"""The same without noise (measured: up to 0.002)."""
+LEFT_BY_LENGTH = 0.03
+"""The same per px of the step, the next order of the expansion (measured: 0.004-0.03)."""
+LONGEST_STEP = 3.0
+"""Pixels; a longer step at the edge of the ZOI is shortened to this."""
+AHEAD, BEYOND = 16, 3
+"""ZOIs ahead of the present one whose pixels are asked for; taps beyond the pixel that they make."""
+
+
+@helper
+def _within_image(
+    p: Any, order: int, cx: Any, cy: Any, reach: Any, width: int, height: int, over: Any
+) -> bool:
+    """Whether the corners of the warped ZOI stay in the image, or at most ``over`` px beyond it."""
+    for corner in range(4):
+        x = reach if corner & 1 else -reach
+        y = reach if corner & 2 else -reach
+        u, v = displacement(p, order, x, y)
+        if not inside(cx + x + u, cy + y + v, -over, width - 1 + over, -over, height - 1 + over):
+            return False
+    return True
+
+
+@helper
+def compose(p: Any, order: int, d: Any) -> None:
+    """W := W o (identity + d)^-1, in place; exact for order 1, to second order in x for order 2."""
+    half = 3 if order == 1 else 6
+    a = 1 + d[1]
+    b = d[2]
+    c = d[half + 1]
+    e = 1 + d[half + 2]
+    det = a * e - b * c
+    ia, ib, ic, ie = e / det, -b / det, -c / det, a / det
+    # x = M (y - t) of the inverse step; for order 2 less M times its quadratic part at M (y - t).
+    tx = -(ia * d[0] + ib * d[half])
+    ty = -(ic * d[0] + ie * d[half])
+    if order == 1:
+        for r in range(0, 6, 3):
+            ux, uy = p[r + 1] + (r == 0), p[r + 2] + (r == 3)
+            p[r] += ux * tx + uy * ty
+            p[r + 1] = ux * ia + uy * ic - (r == 0)
+            p[r + 2] = ux * ib + uy * ie - (r == 3)
+        return
+    # The inverse step as a quadratic polynomial: X = tx + ia x + ib y + q . (x^2, xy, y^2), Y likewise.
+    qx = np.empty(3)
+    qy = np.empty(3)
+    for k in range(3):
+        qx[k] = -(ia * d[3 + k] + ib * d[9 + k])
+        qy[k] = -(ic * d[3 + k] + ie * d[9 + k])
+    for r in range(0, 12, 6):
+        p0, ux, uy = p[r], p[r + 1] + (r == 0), p[r + 2] + (r == 6)
+        xx, xy, yy = p[r + 3], p[r + 4], p[r + 5]
+        p[r] = p0 + ux * tx + uy * ty + xx * tx * tx + xy * tx * ty + yy * ty * ty
+        gx = ux + 2 * xx * tx + xy * ty
+        gy = uy + 2 * yy * ty + xy * tx
+        p[r + 1] = gx * ia + gy * ic - (r == 0)
+        p[r + 2] = gx * ib + gy * ie - (r == 6)
+        p[r + 3] = gx * qx[0] + gy * qy[0] + xx * ia * ia + xy * ia * ic + yy * ic * ic
+        p[r + 4] = gx * qx[1] + gy * qy[1] + 2 * xx * ia * ib + xy * (ia * ie + ib * ic) + 2 * yy * ic * ie
+        p[r + 5] = gx * qx[2] + gy * qy[2] + xx * ib * ib + xy * ib * ie + yy * ie * ie
+
+
+@inlined
+def _moments(
+    c: Any, width: int, images: Any, samples: int, pitch: int, top: int, first: int, size: int, order: int,
+    rows: Any, mix: Any, q: Any, ramp: Any, table: Any, plan: Any, g: Any, columns: Any, sums: Any, m: Any,
+    bent_by: Any,
+) -> Any:  # fmt: skip
+    """Warp one ZOI and write J' w d to ``m`` and the sums with the shapes to ``bent_by``; returns d' w d."""
+    starts, taus, where, how = plan
+    half = 3 if order == 1 else 6
+    stride = width + 2 * PAD
+    line = rows.shape[1]
+    reach = (size - 1) / 2
+    whole = False
+    if order == 1:
+        u, v = displacement(q, order, -reach, -reach)
+        whole = plan_rows(q, first + PAD + u, top + PAD + v, size, stride, starts, taus)
+    columns[:] = 0
+    for y in range(0, size, ROWS):
+        count = min(ROWS, size - y)
+        if whole:
+            warp_rows(
+                c, np.uintp(stride), f4(q[1]), f4(q[4]), y, count, size, starts, taus,
+                ramp, table, g, np.uintp(line),
+            )  # fmt: skip
+        else:
+            warp_cut_rows(
+                c, stride, q, order, first + PAD, top + PAD, y, count, size, where, how, ramp, table, g, line
+            )  # fmt: skip
+        at = np.uintp((top + y) * pitch + first)
+        add_difference_columns(
+            images, np.uintp(samples), at, np.uintp(pitch), g, np.uintp(line), y, count, rows, columns
+        )  # fmt: skip
+    energy = difference_moments(columns, rows, line, sums)
+    x, xx = mix[1, 1], mix[2, 2]
+    for k in range(CHANNELS):
+        n = k * half if k < 2 else len(m) - 12 + 3 * k
+        m[n], m[n + 1], m[n + 2] = sums[k, 0, 0], sums[k, 0, 1] / x, sums[k, 1, 0] / x
+        if k < 2:
+            shares(sums, k, bent_by)
+        if k < 2 and order == 2:
+            m[n + 3] = (sums[k, 0, 2] - mix[2, 0] * sums[k, 0, 0]) / xx
+            m[n + 4] = sums[k, 1, 1] / x**2
+            m[n + 5] = (sums[k, 2, 0] - mix[2, 0] * sums[k, 0, 0]) / xx
+    return energy
+
+
+@inlined
+def _solve(inverse: Any, z: int, m: Any, step: Any, energy: Any, solved: Any) -> Any:
+    """Parameters of one linear fit, of ZOI ``z``, and the weighted sum of squares it leaves."""
+    weighted_rows(inverse, np.uintp(z * len(m) * len(m)), m, len(m), solved)
+    left = energy
+    for i in range(len(m)):
+        step[i] = solved[i]
+        left -= step[i] * m[i]
+    return left
+
+
+@inlined
+def _fetch(
+    c: Any, width: int, images: Any, samples: int, pitch: int, origins: Any, z: int, size: int, spacing: int, q: Any
+) -> None:  # fmt: skip
+    """Ask for what a ZOI to come needs of the images and its neighbours do not: its last rows and columns.
+
+    Rows lie further apart than the processor looks ahead by itself. ``q`` says about where the ZOI has moved.
+    """
+    origin = origins[min(z + AHEAD, len(origins) - 1)]
+    fresh = min(spacing, size)
+    down, right = int(q[len(q) // 2]) + PAD + BEYOND, int(q[0]) + PAD + BEYOND
+    for x in range(size - fresh + LANES - 1, size + LANES - 1, LANES):
+        column = origin[1] + min(x, size - 1)
+        for y in range(origin[0] + size - fresh, origin[0] + size):
+            for k in range(4):
+                fetch(images, np.uintp(y * pitch + column + k * samples))
+            fetch(c, np.uintp((y + down) * (width + 2 * PAD) + column + right))
+
+
+@inlined
+def _fetch_all(array: Any, z: int) -> None:
+    """Ask for what an array (A, m, n) holds of ZOI ``z``."""
+    each = array.shape[1] * array.shape[2]
+    for n in range(0, each, LANES):
+        fetch(array, np.uintp(z * each + n))
+
+
+@parallel
+def track(
+    c: Any, width: int, height: int, images: Any, samples: int, pitch: int, origins: Any, size: int,
+    spacing: int, order: int, rows: Any, mix: Any, inverse: Any, cross: Any, squares: Any,
+    units: Any, tolerance: Any, trust: Any, table: Any, over: Any,
+    max_iterations: int, p: Any, left: Any, bending: Any, nuisance: Any, state: Any, iterations: Any,
+) -> None:  # fmt: skip
+    """Measure all ZOIs.
+
+    Parameters
+    ----------
+    c : flat float32
+        Spline coefficients of the deformed image (``prefilter.coefficients``).
+    images : flat float32, ``samples`` of each, ``pitch`` a row
+        Filtered reference f_x, f_y, f and the reference as it was recorded (``Prepared.images``).
+    origins : (A, 2) int64, first row and column of each ZOI
+    spacing : int, px
+        Between neighbouring ZOIs, which follow each other; only the speed depends on it.
+    rows : (4, whole(size)) float32
+        Window times P0 .. P3, zero beyond ``size``; ``mix`` (4, 4) has the polynomials (``shapes``).
+    inverse : (A + 1, P, P) float32
+    cross : (A + 1, P, 10) float32
+    squares : (A, 2) float64
+        Sums of w f_x^2 and w f_y^2.
+    tolerance : (A, 2) float64
+        Error that may be left in u and v (px) and in the gradients.
+    trust : (A,) float64, px
+        Predicted uncertainty of u and v from the noise of the deformed image.
+    p : (A, 6 or 12) float64, px units, start values in, result out
+    left : (A,) float64, out: weighted sum of squared differences after the fit, GL^2
+    bending : (A,) float64, out: what the fit leaves of a displacement that bends or jumps, px^2 (``shapes.bent``)
+    nuisance : (A, 2) float64, out: gain, and offset in GL
+    state, iterations : (A,) uint8, out
+    """
+    count = inverse.shape[1]
+    modes = p.shape[1]
+    half = modes // 2
+    reach = (size - 1) / 2
+    lever = size / 6.0
+    line = rows.shape[1]
+    chunks = (len(origins) + 31) // 32
+    for chunk in prange(chunks):
+        g = np.zeros(ROWS * line + LANES, np.float32)
+        ramp = np.arange(line).astype(np.float32)
+        plan = new_plan(size)
+        columns = np.empty((DIFFERENCE_ROWS, line), np.float32)
+        sums = np.empty((CHANNELS, DEGREES, DEGREES))
+        m = np.empty(count)
+        step = np.empty(count)
+        solved = np.empty(count + LANES, np.float32)
+        bent_by = np.empty(2 * N_SHAPES)
+        for z in range(chunk * 32, min(chunk * 32 + 32, len(origins))):
+            top, first = origins[z]
+            q = p[z]
+            _fetch(c, width, images, samples, pitch, origins, z, size, spacing, q)
+            _fetch_all(inverse, z + 2)
+            _fetch_all(cross, z + 2)
+            state[z], iterations[z] = RUNNING, 0
+            left[z] = bending[z] = nuisance[z, 0] = nuisance[z, 1] = np.nan
+            for iteration in range(max_iterations):
+                if not _within_image(q, order, first + reach, top + reach, reach, width, height, over):
+                    state[z] = LEFT_IMAGE
+                    break
+                energy = _moments(
+                    c, width, images, samples, pitch, top, first, size, order, rows, mix,
+                    q, ramp, table, plan, g, columns, sums, m, bent_by,
+                )  # fmt: skip
+                left[z] = _solve(inverse, z, m, step, energy, solved)
+                gain = 1 + step[modes]
+                nuisance[z, 0] = gain
+                nuisance[z, 1] = step[modes + 3]
+                gain = min(max(gain, GAIN_RANGE[0]), GAIN_RANGE[1])
+                bends = bent(bent_by, cross, z, step, squares[z, 0], squares[z, 1], solved)
+                bending[z] = bends / gain**2
+                longest = 0.0
+                for i in range(modes):
+                    longest = max(longest, abs(step[i]) / gain)
+                if not longest < 1e3:
+                    state[z] = DIVERGED
+                    break
+                brake = min(1.0, LONGEST_STEP / longest) if longest > 0 else 1.0
+                for i in range(modes):
+                    step[i] *= units[i] / gain * brake
+                compose(q, order, step)
+                iterations[z] = iteration + 1
+                if brake == 1.0 and _settled(step, half, lever, tolerance[z, 0], tolerance[z, 1], trust[z]):
+                    state[z] = CONVERGED
+                    break
+
+
+@helper
+def _settled(step: Any, half: int, lever: Any, length_left: Any, slope_left: Any, trust: Any) -> Any:
+    """Whether the error that this step has left is below the tolerances of u, v and the gradients."""
+    move = max(abs(step[0]), abs(step[half]))
+    turn = 0.0
+    for i in range(1, 3):
+        turn = max(turn, abs(step[i]), abs(step[half + i]))
+    length = max(move, turn * lever)
+    left = length * (LEFT_BY_MISFIT + LEFT_BY_NOISE * trust + LEFT_BY_LENGTH * length)
+    return left <= length_left and left <= slope_left * lever
+
+
+@parallel
+def warp_zois(c: Any, width: int, origins: Any, size: int, p: Any, table: Any, out: Any) -> None:
+    """The deformed image in every warped ZOI of order 1, (A, n, n) float32, written to ``out``."""
+    line = (size + LANES - 1) // LANES * LANES
+    for z in prange(len(origins)):
+        rows = np.empty(line + LANES, np.float32)
+        ramp = np.arange(line).astype(np.float32)
+        _, _, where, how = new_plan(size)
+        for y in range(size):
+            warp_cut_rows(
+                c, width + 2 * PAD, p[z], 1, origins[z, 1] + PAD, origins[z, 0] + PAD, y, 1, size,
+                where, how, ramp, table, rows, line,
+            )  # fmt: skip
+            out[z, y] = rows[:size]
+
+
+@helper
+def compose_all(p: Any, steps: Any) -> None:
+    """``compose`` for every ZOI of order 1, in place."""
+    for z in range(len(p)):
+        compose(p[z], 1, steps[z])
+
+
+@helper
+def within_image(p: Any, origins: Any, size: int, width: int, height: int, over: Any, out: Any) -> None:
+    """Whether each warped ZOI of order 1 lies in the image, written to ``out`` (A,) bool."""
+    reach = (size - 1) / 2
+    for z in range(len(p)):
+        out[z] = _within_image(
+            p[z], 1, origins[z, 1] + reach, origins[z, 0] + reach, reach, width, height, over
+        )  # fmt: skip

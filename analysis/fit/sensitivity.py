@@ -1,0 +1,205 @@
+"""How a ZOI answers to its modes: the normal matrix, its inverse and the unit covariances.
+
+With the filtered reference f and its gradient, the columns of J are f_x b, f_y b for the
+monomials b of the shape function, and the nuisances f, x f, y f, 1, x, y. Everything the iteration
+needs is (J' w J)^-1 and the moments J' w d of the difference image d (docs/method.md): the
+"sensors" of a ZOI are never stored, only the images they are made of. Coordinates are scaled to
+-1..1 over the ZOI. Compiled loops.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from analysis.compiled.loops import helper, parallel
+from analysis.fit.moments import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, product_moments
+from analysis.fit.shapes import cross_moments
+
+RIDGE = 1e-7
+"""Added to the unit diagonal of the scaled normal matrix."""
+
+
+def columns(order: int) -> NDArray[np.int64]:
+    """Columns of J as (channel, power of x, power of y), (P, 3): u modes, v modes, nuisances."""
+    powers = [(0, 0), (1, 0), (0, 1)] + ([(2, 0), (1, 1), (0, 2)] if order == 2 else [])
+    linear = [(0, 0), (1, 0), (0, 1)]
+    table = [(0, *p) for p in powers] + [(1, *p) for p in powers]
+    table += [(2, *p) for p in linear] + [(3, *p) for p in linear]
+    return np.array(table, np.int64)
+
+
+def parameter_scale(order: int, size: int) -> NDArray[np.float64]:
+    """Units of the parameters for coordinates in px instead of half sizes, (6,) or (12,)."""
+    half = size / 2
+    one = [1, 1 / half, 1 / half] + ([half**-2] * 3 if order == 2 else [])
+    return np.array(one + one)
+
+
+def square_rows(line: NDArray[np.float64], length: int) -> NDArray[np.float32]:
+    """line^2 * xi^k for k = 0 .. 4, (5, length), zero beyond the ZOI; xi from -1 to 1 over it."""
+    size = len(line)
+    xi = (np.arange(size) - (size - 1) / 2) / (size / 2)
+    rows = np.stack([line**2 * xi**k for k in range(SQUARE_ROWS)])
+    return np.pad(rows, ((0, 0), (0, length - size))).astype(np.float32)
+
+
+@helper
+def _assemble(moments: Any, table: Any, out: Any) -> None:
+    for i in range(len(table)):
+        for j in range(len(table)):
+            product = PRODUCT[table[i, 0], table[j, 0]]
+            out[i, j] = moments[product, table[i, 2] + table[j, 2], table[i, 1] + table[j, 1]]
+
+
+@helper
+def _invert(matrix: Any, low: Any, inverse: Any) -> bool:
+    """Inverse of a symmetric positive matrix by Cholesky after scaling to a unit diagonal, ridged."""
+    n = len(matrix)
+    scale = np.empty(n)
+    for i in range(n):
+        if not matrix[i, i] > 0:
+            return False
+        scale[i] = 1 / math.sqrt(matrix[i, i])
+    for i in range(n):
+        for j in range(i + 1):
+            total = matrix[i, j] * scale[i] * scale[j]
+            if i == j:
+                total += RIDGE
+            for k in range(j):
+                total -= low[i, k] * low[j, k]
+            if i == j:
+                if not total > 0:
+                    return False
+                low[i, i] = math.sqrt(total)
+            else:
+                low[i, j] = total / low[j, j]
+    back = np.zeros((n, n))  # inverse of the triangle
+    for j in range(n):
+        back[j, j] = 1 / low[j, j]
+        for i in range(j + 1, n):
+            total = 0.0
+            for k in range(j, i):
+                total -= low[i, k] * back[k, j]
+            back[i, j] = total / low[i, i]
+    for i in range(n):
+        for j in range(i + 1):
+            total = 0.0
+            for k in range(i, n):
+                total += back[k, i] * back[k, j]
+            inverse[i, j] = total * scale[i] * scale[j]
+            inverse[j, i] = inverse[i, j]
+    return True
+
+
+@helper
+def _sandwich(inverse: Any, middle: Any, affine: Any, units: Any, out: Any) -> None:
+    """The 21 affine entries of inverse @ middle @ inverse, in px units."""
+    n = len(inverse)
+    part = np.empty((6, n))
+    for a in range(6):
+        for j in range(n):
+            total = 0.0
+            for k in range(n):
+                total += inverse[affine[a], k] * middle[k, j]
+            part[a, j] = total
+    pair = 0
+    for a in range(6):
+        for b in range(a, 6):
+            total = 0.0
+            for k in range(n):
+                total += part[a, k] * inverse[affine[b], k]
+            out[pair] = total * units[a] * units[b]
+            pair += 1
+
+
+@parallel
+def prepare(
+    images: Any, by_level: Any, samples: int, pitch: int, origins: Any, size: int, powers: Any, squares: Any,
+    mix: Any, table: Any, units: Any,
+    inverse: Any, covariance: Any, covariance_level: Any, cross: Any, freedom: Any, energy: Any,
+) -> None:  # fmt: skip
+    """Normal matrices of all ZOIs.
+
+    Parameters
+    ----------
+    images : flat float32
+        f_x, f_y (GL/px) and f of the filtered reference, ``samples`` values each, ``pitch`` a row.
+    by_level : flat float32, or empty
+        The same times the grey level, then the level, for a noise that grows with it; empty: not wanted.
+    origins : (A, 2) int64
+        First row and column of each ZOI.
+    powers, squares : (6, line) and (5, line) float32
+        Window and squared window times powers of xi (the window is the same along y).
+    mix : see ``shapes.Shapes``
+    table : (P, 3), units : (6,)
+    inverse : (A + 1, P, P) float32, written but for the last
+        Zero where there is no pattern.
+    covariance, covariance_level : (A, 21) float32, written
+        Of the six affine parameters, px units, for noise of variance 1 GL^2 and for noise of
+        variance ``level``.
+    cross : (A + 1, P, 10) float32, written but for the last
+        Of the shapes that the fit cannot follow with the columns of J (``shapes.cross_moments``).
+    freedom : (A,) float32, written
+        Sum of the weights less what the fit takes: expected weighted residual per GL^2 of noise.
+    energy : (A, 4) float32, written
+        Over the window: mean of f_x^2 and f_y^2, (GL/px)^2, variance (GL^2) and mean (GL) of f.
+    """
+    count = len(table)
+    order = 1 if count == 12 else 2
+    affine = np.array([0, 1, 2, (count - 6) // 2, (count - 6) // 2 + 1, (count - 6) // 2 + 2])
+    down, end, o = np.uintp(pitch), np.uintp(3 * samples), np.uintp(0)
+    one = np.ones(powers.shape[1], np.float32)
+    chunks = (len(origins) + 31) // 32
+    for chunk in prange(chunks):
+        columns = np.empty((PRODUCT_ROWS + SQUARE_ROWS, powers.shape[1]), np.float32)
+        normal = np.empty((count, count))
+        middle = np.empty((count, count))
+        inv = np.empty((count, count))
+        low = np.empty((count, count))
+        of_w = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
+        of_q = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
+        for z in range(chunk * 32, min(chunk * 32 + 32, len(origins))):
+            at = np.uintp(origins[z, 0] * pitch + origins[z, 1])
+            product_moments(
+                images, images, one, o, o, one, np.uintp(samples), at, down, size,
+                powers, squares, order, columns, of_w, of_q,
+            )  # fmt: skip
+            _assemble(of_w, table, normal)
+            total = of_w[6, 0, 0]
+            energy[z, 0] = of_w[0, 0, 0] / total
+            energy[z, 1] = of_w[2, 0, 0] / total
+            energy[z, 3] = of_w[9, 0, 0] / total
+            energy[z, 2] = of_w[5, 0, 0] / total - (of_w[9, 0, 0] / total) ** 2
+            if not _invert(normal, low, inv):
+                inverse[z] = 0
+                cross[z] = 0
+                covariance[z] = 0
+                freedom[z] = 0
+                continue
+            inverse[z] = inv
+            cross_moments(of_w, table, mix, cross[z])
+            _assemble(of_q, table, middle)
+            _sandwich(inv, middle, affine, units, covariance[z])
+            freedom[z] = total - _taken(inv, middle)
+            if by_level.size:
+                product_moments(
+                    by_level, images, by_level, end + at, down, one, np.uintp(samples), at, down, size,
+                    powers, squares, order, columns, of_w, of_q,
+                )  # fmt: skip
+                _assemble(of_q, table, middle)
+                _sandwich(inv, middle, affine, units, covariance_level[z])
+
+
+@helper
+def _taken(inverse: Any, middle: Any) -> Any:
+    """Trace of inverse @ middle, both symmetric."""
+    out = 0.0
+    for i in range(len(inverse)):
+        for j in range(len(inverse)):
+            out += inverse[i, j] * middle[i, j]
+    return out

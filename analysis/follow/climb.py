@@ -1,0 +1,96 @@
+"""Each ZOI's own whole-pixel displacement: the best of some candidates, then uphill. Compiled."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import prange
+
+from analysis.compiled.loops import helper, parallel
+
+f4 = np.float32
+MOVES = 12
+
+
+@helper
+def _dot(a: Any, b: Any) -> Any:
+    p = f4(0)
+    q = f4(0)
+    r = f4(0)
+    for n in range(a.size):
+        k = np.uintp(n)
+        p += a[k] * b[k]
+        q += b[k]
+        r += b[k] * b[k]
+    return p, q, r
+
+
+@helper
+def correlation(reference: Any, deformed: Any, top: int, left: int, dy: int, dx: int, size: int) -> Any:
+    """Zero-mean normalised correlation of a ZOI with its shifted self; -2 outside the image."""
+    height, width = deformed.shape
+    if top + dy < 0 or left + dx < 0 or top + dy + size > height or left + dx + size > width:
+        return -2.0
+    fg = 0.0
+    g = 0.0
+    gg = 0.0
+    f = 0.0
+    ff = 0.0
+    for y in range(size):
+        a = reference[top + y, left : left + size]
+        b = deformed[top + dy + y, left + dx : left + dx + size]
+        p, q, r = _dot(a, b)
+        _, s, t = _dot(a, a)
+        fg += p
+        g += q
+        gg += r
+        f += s
+        ff += t
+    n = size * size
+    spread = (ff - f * f / n) * (gg - g * g / n)
+    return (fg - f * g / n) / np.sqrt(spread) if spread > 0 else -1.0
+
+
+@parallel
+def climb(
+    reference: Any, deformed: Any, origins: Any, size: int, candidates: Any, out: Any, score: Any
+) -> None:
+    """Best whole-pixel displacement (x, y) of each ZOI.
+
+    Parameters
+    ----------
+    reference, deformed : (H, W) float32
+    origins : (A, 2) int64
+    candidates : (A, K, 2) int64, (x, y)
+    out : (A, 2) int64 and score : (A,) float64, written; score -2 where nothing lies in the image
+    """
+    for z in prange(len(origins)):
+        top, left = origins[z]
+        best = -2.0
+        x = candidates[z, 0, 0]
+        y = candidates[z, 0, 1]
+        for k in range(candidates.shape[1]):
+            cx = candidates[z, k, 0]
+            cy = candidates[z, k, 1]
+            if k > 0 and cx == candidates[z, k - 1, 0] and cy == candidates[z, k - 1, 1]:
+                continue
+            value = correlation(reference, deformed, top, left, cy, cx, size)
+            if value > best:
+                best, x, y = value, cx, cy
+        for _ in range(MOVES):
+            sx = 0
+            sy = 0
+            for ny in range(-1, 2):
+                for nx in range(-1, 2):
+                    if nx != 0 or ny != 0:
+                        value = correlation(reference, deformed, top, left, y + ny, x + nx, size)
+                        if value > best:
+                            best, sx, sy = value, nx, ny
+            if sx == 0 and sy == 0:
+                break
+            x += sx
+            y += sy
+        out[z, 0] = x
+        out[z, 1] = y
+        score[z] = best

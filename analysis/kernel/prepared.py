@@ -1,0 +1,165 @@
+"""A reference made ready: filtered pattern, normal matrices and which ZOIs can be measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.field import Status, profile
+from analysis.fit.validity import CLIPPED_SHARE, has_pattern
+from analysis.kernel.images import clipped_share, padded
+from analysis.kernel.noise import NoiseModel
+from analysis.kernel.settings import KernelSettings
+from analysis.picture import Pattern, filtered_pattern
+
+if TYPE_CHECKING:
+    from analysis.fit.shapes import Shapes
+
+
+class PatternError(ValueError):
+    """The reference has no pattern that could be followed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prepared:
+    """Everything of a reference that does not change from frame to frame; A active ZOIs.
+
+    Attributes
+    ----------
+    shape : (H, W)
+    pattern : Pattern
+    images : (4, H + 1, pitch) float32
+        Gradients and level of the filtered reference, f_x, f_y, f, and the reference less its mean; zero
+        beyond H rows of W, since loops read whole vectors.
+    origins : (A, 2) int64
+        First row and column of each ZOI.
+    inverse : (A + 1, P, P) float32
+    cross : (A + 1, P, 10) float32
+        Of the shapes that the fit cannot follow with the columns of J (``shapes.cross_moments``). Both
+        have a ZOI more than there is, of zeros, since loops read whole vectors.
+    shapes : Shapes
+    energy : (A, 2) float64, (GL/px)^2
+        Mean of f_x^2 and f_y^2 under the window.
+    covariance, covariance_level : (A, 21) float32
+        For noise of variance 1 GL^2, and of variance 1 GL^2 a grey level.
+    freedom, weight : (A,) and float
+        Effective number of pixels less what the fit takes; sum of the weights.
+    signal : (A,) float64, GL^2
+        Variance of the filtered pattern.
+    level : (A,) float64, GL
+        Mean grey level.
+    status : (A,) uint8
+        OK, NO_PATTERN or CLIPPED.
+    """
+
+    shape: tuple[int, int]
+    pattern: Pattern
+    images: NDArray[np.float32]
+    origins: NDArray[np.int64]
+    inverse: NDArray[np.float32]
+    cross: NDArray[np.float32]
+    shapes: Shapes
+    energy: NDArray[np.float64]
+    covariance: NDArray[np.float32]
+    covariance_level: NDArray[np.float32] | None
+    freedom: NDArray[np.float64]
+    weight: float
+    signal: NDArray[np.float64]
+    level: NDArray[np.float64]
+    status: NDArray[np.uint8]
+
+
+def prepare_reference(
+    image: NDArray[np.float32],
+    origins: NDArray[np.int64],
+    size: int,
+    settings: KernelSettings,
+    noise: NoiseModel | None,
+    clipped: NDArray[np.bool_] | None = None,
+) -> Prepared:
+    """Filter the reference and compute the normal matrix of each ZOI.
+
+    Parameters
+    ----------
+    image : (H, W) float32, GL
+    origins : (A, 2) int64, first row and column of each ZOI
+    noise : NoiseModel or None
+        Of this image; None: taken from its spectrum.
+    clipped : (H, W) bool, optional
+        Saturated pixels.
+    """
+    from analysis.compiled.vectors import whole
+    from analysis.fit.sensitivity import columns, parameter_scale, prepare, square_rows
+    from analysis.fit.shapes import N_SHAPES, shapes_of
+
+    mean = float(image.mean(dtype=np.float64))
+    std = None if noise is None else float(np.sqrt(noise.variance(mean)))
+    pattern = filtered_pattern(image, std, settings.interpolant)
+    line = profile(settings.window, size)
+    table, units = columns(settings.order), parameter_scale(settings.order, size)
+    half = len(units) // 2
+    affine = units[[0, 1, 2, half, half + 1, half + 2]]
+    count = len(origins)
+    inverse = np.empty((count + 1, len(table), len(table)), np.float32)
+    cross = np.empty((count + 1, len(table), 2 * N_SHAPES), np.float32)
+    inverse[count] = cross[count] = 0
+    shapes = shapes_of(line, whole(size))
+    images = padded(pattern.grad_x, pattern.grad_y, pattern.level, image - np.float32(mean))
+    covariance = np.empty((count, 21), np.float32)
+    by_level = _by_level(images, pattern, mean, noise)
+    signal_dependent = by_level.size > 0
+    covariance_level = np.empty((count if signal_dependent else 0, 21), np.float32)
+    freedom, energy = np.empty(count, np.float32), np.empty((count, 4), np.float32)
+    prepare(
+        images.ravel(), by_level.ravel(), images[0].size, images.shape[2], origins, size,
+        shapes.powers, square_rows(line, whole(size)), shapes.mix,
+        table, affine, inverse, covariance, covariance_level, cross, freedom, energy,
+    )  # fmt: skip
+    status = _measurable(pattern, covariance, energy)
+    if clipped is not None and clipped.any():
+        status[clipped_share(clipped, origins, line) > CLIPPED_SHARE] = Status.CLIPPED
+    return Prepared(
+        shape=(image.shape[0], image.shape[1]),
+        pattern=pattern,
+        images=images,
+        origins=origins,
+        inverse=inverse,
+        cross=cross,
+        shapes=shapes,
+        energy=energy[:, :2].astype(np.float64),
+        covariance=covariance,
+        covariance_level=covariance_level if signal_dependent else None,
+        freedom=np.maximum(freedom.astype(np.float64), 1e-3),
+        weight=float(line.sum() ** 2),
+        signal=np.maximum(energy[:, 2].astype(np.float64), 0),
+        level=energy[:, 3].astype(np.float64) + mean,
+        status=status,
+    )
+
+
+def _measurable(
+    pattern: Pattern, covariance: NDArray[np.float32], energy: NDArray[np.float32]
+) -> NDArray[np.uint8]:
+    """OK or NO_PATTERN for each ZOI, (A,)."""
+    variances = covariance[:, [0, 15]].astype(np.float64)  # of u and of v among the 21 pairs
+    good = has_pattern(
+        energy[:, :2].astype(np.float64), variances, pattern.noise, pattern.noise**2 * pattern.left_gradient
+    )
+    return np.where(good, Status.OK, Status.NO_PATTERN).astype(np.uint8)
+
+
+def _by_level(
+    images: NDArray[np.float32], pattern: Pattern, mean: float, noise: NoiseModel | None
+) -> NDArray[np.float32]:
+    """f_x, f_y, f times the grey level and the level itself, for a noise that grows with it; else empty."""
+    if noise is None or noise.slope <= 0:
+        return np.empty(0, np.float32)
+    level = np.maximum(pattern.level + np.float32(mean), 0)
+    height, width = level.shape
+    out = np.zeros_like(images)
+    out[:3, :height, :width] = images[:3, :height, :width] * level
+    out[3, :height, :width] = level
+    return out

@@ -1,0 +1,238 @@
+"""What a picture of a pattern is worth before it is measured: size, contrast, gradient, noise, spectrum.
+
+Everything comes from one picture, or its noise from a burst of pictures of the same scene. No
+estimate of displacement is made here; ``predicted_sigma`` turns the figures into what a Gaussian ZOI
+can reach at best (docs/method.md, closed forms).
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.field import ZoiGrid
+from analysis.picture.spectrum import NOISE_BAND, filtered_pattern, radial_spectrum
+
+Floats = NDArray[np.float64]
+
+BURST_LEAST = 2
+SIGNAL_OVER_NOISE = 2.0
+"""A frequency carries pattern where its power is at least this many times that of the noise."""
+SMALLEST_PICTURE = 16
+SLOW_SHARE = 12
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PatternReport:
+    """Figures of one picture.
+
+    Attributes
+    ----------
+    mean : float, GL
+    contrast : float, GL
+        Standard deviation of the pattern, its noise taken out.
+    noise : float, GL
+        Of the picture, as given or from the corners of its spectrum.
+    gradient : float, GL/px
+        g, rms of one component of the gradient, noise filtered out; mean square over x and y.
+    speckle_radius : float, px
+        r of a blob exp(-rho^2 / (2 r^2)) with the same autocorrelation at half height.
+    autocorrelation_fwhm : float, px
+        Full width at half height of the autocorrelation, often called the speckle size.
+    clipped : float
+        Share of pixels at either end of the scale; NaN where the depth is not known.
+    band : float, cycles/px
+        Highest frequency whose power is at least twice that of the noise.
+    spectrum_radius : (M,) float64, cycles/px
+    spectrum_power : (M,) float64, GL^2
+        Mean power in rings; white noise of variance s^2 is s^2 everywhere.
+    """
+
+    mean: float
+    contrast: float
+    noise: float
+    gradient: float
+    speckle_radius: float
+    autocorrelation_fwhm: float
+    clipped: float
+    band: float
+    spectrum_radius: Floats
+    spectrum_power: Floats
+
+    def predicted_sigma(self, size: int, noise: float | None = None) -> tuple[float, float]:
+        """(sigma_u px, sigma_strain) of a Gaussian ZOI against a reference of the same noise; see below."""
+        return predicted_sigma(size, self.noise if noise is None else noise, self.gradient)
+
+
+def describe_pattern(image: ArrayLike, bits: int | None = None, noise: float | None = None) -> PatternReport:
+    """All figures of one picture.
+
+    Parameters
+    ----------
+    image : (H, W), GL
+    bits : int, optional
+        Depth of the camera, for the share of clipped pixels.
+    noise : float, GL, optional
+        Standard deviation of the noise of this picture; None: from the corners of its spectrum.
+
+    Raises
+    ------
+    ValueError
+        Not a grey picture, or smaller than 16 px.
+    """
+    picture = _picture(image)
+    zero = (picture - picture.mean()).astype(np.float32)
+    radius, power = radial_spectrum(zero)
+    sigma = _corner_noise(radius, power) if noise is None else float(noise)
+    pattern = filtered_pattern(picture.astype(np.float32), sigma, 5)
+    square = np.mean(pattern.grad_x.astype(float) ** 2 + pattern.grad_y.astype(float) ** 2) / 2
+    fwhm = autocorrelation_fwhm(picture, sigma)
+    seen = radius[power >= SIGNAL_OVER_NOISE * max(sigma**2, 1e-12)]
+    return PatternReport(
+        mean=float(picture.mean()),
+        contrast=math.sqrt(max(float(picture.var()) - sigma**2, 0.0)),
+        noise=sigma,
+        gradient=math.sqrt(float(square)),
+        speckle_radius=fwhm / (4 * math.sqrt(math.log(2))),
+        autocorrelation_fwhm=fwhm,
+        clipped=float("nan") if bits is None else clipped_share(picture, bits),
+        band=float(seen.max()) if seen.size else 0.0,
+        spectrum_radius=radius,
+        spectrum_power=power,
+    )
+
+
+def autocorrelation_fwhm(image: ArrayLike, noise: float = 0.0) -> float:
+    """Full width at half height of the autocorrelation, mean of x and y, px; NaN where it never falls.
+
+    The variance of the noise is taken out of the value at zero lag. Between lags the logarithm is
+    interpolated over the square of the lag, which is exact for Gaussian speckle. What varies over more
+    than a twelfth of the shorter side is light or background, not speckle, and taken out first.
+    """
+    from scipy.fft import irfft2, rfft2
+    from scipy.ndimage import gaussian_filter
+
+    picture = _picture(image)
+    zero = picture - gaussian_filter(picture, min(picture.shape) / SLOW_SHARE, mode="nearest")
+    zero -= zero.mean()
+    shape = (2 * zero.shape[0], 2 * zero.shape[1])
+    product = irfft2(np.abs(rfft2(zero, shape, workers=2)) ** 2, shape, workers=2)
+    rows, columns = zero.shape
+    along_x = product[0, : columns // 2] / (rows * (columns - np.arange(columns // 2)))
+    along_y = product[: rows // 2, 0] / (columns * (rows - np.arange(rows // 2)))
+    return 2 * float(np.mean([_half_width(line, noise) for line in (along_x, along_y)]))
+
+
+def _half_width(line: Floats, noise: float) -> float:
+    values = line / (line[0] - noise**2) if line[0] > noise**2 else np.zeros_like(line)
+    values[0] = 1.0
+    below = np.flatnonzero(values < 0.5)
+    if below.size == 0 or not line[0] > noise**2:
+        return float("nan")
+    k = int(below[0])
+    high, low = math.log(values[k - 1]), math.log(max(values[k], 1e-6))
+    share = (high - math.log(0.5)) / (high - low)
+    return math.sqrt((k - 1) ** 2 + share * (k**2 - (k - 1) ** 2))
+
+
+def sssig(image: ArrayLike, grid: ZoiGrid, noise: float | None = None) -> tuple[Floats, Floats]:
+    """Sum of squares of the gradients along x and along y in each ZOI, (R, C) each, GL^2/px^2.
+
+    The figure by which the field judges a subset; the noise is filtered out first.
+    """
+    pattern = filtered_pattern(_picture(image).astype(np.float32), noise, 5)
+    return _box_sums(pattern.grad_x, grid), _box_sums(pattern.grad_y, grid)
+
+
+def _box_sums(gradient: NDArray[np.float32], grid: ZoiGrid) -> Floats:
+    total = np.pad(gradient.astype(np.float64) ** 2, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
+    top, left, size = grid.first_y[:, None], grid.first_x[None, :], grid.size
+    return np.asarray(
+        total[top + size, left + size] - total[top, left + size] - total[top + size, left] + total[top, left]
+    )
+
+
+def noise_of_burst(images: ArrayLike) -> float:
+    """Temporal noise of one frame, GL, from successive differences of frames of a still scene.
+
+    Parameters
+    ----------
+    images : (N, H, W), N >= 2, GL
+
+    Raises
+    ------
+    ValueError
+        Fewer than two frames.
+    """
+    frames = np.asarray(images)
+    if frames.ndim != 3 or len(frames) < BURST_LEAST:
+        raise ValueError(
+            f"noise needs a stack of at least {BURST_LEAST} frames, got the shape {frames.shape}"
+        )
+    total = 0.0
+    for first, second in itertools.pairwise(frames):
+        total += float(np.mean((second.astype(np.float64) - first) ** 2))
+    return math.sqrt(total / (2 * (len(frames) - 1)))
+
+
+def noise_of_picture(image: ArrayLike) -> float:
+    """Noise of one picture, GL, from the corners of its spectrum, where pattern hardly reaches.
+
+    An upper bound where the pattern is finer than about 1.5 px, a lower one where the camera or a
+    file format has smoothed the picture.
+    """
+    picture = _picture(image)
+    return _corner_noise(*radial_spectrum((picture - picture.mean()).astype(np.float32)))
+
+
+def _corner_noise(radius: Floats, power: Floats) -> float:
+    return math.sqrt(float(np.median(power[radius > NOISE_BAND])))
+
+
+def clipped_share(image: ArrayLike, bits: int) -> float:
+    """Share of pixels at 0 or at the top of the scale."""
+    picture = np.asarray(image)
+    return float(np.mean((picture <= 0) | (picture >= 2**bits - 1)))
+
+
+def predicted_sigma(size: int, noise: float, gradient: float) -> tuple[float, float]:
+    """Noise limit of a Gaussian ZOI (sigma_w = size/6) of order 1: (sigma_u px, sigma_strain).
+
+    Parameters
+    ----------
+    size : int, px
+    noise : float, GL
+        Of either picture.
+    gradient : float, GL/px
+        g of the pattern. Holds for speckle small against the ZOI.
+
+    Notes
+    -----
+    Weighted least squares with weight w and white noise in both pictures:
+    var = 2 sigma^2 (J'wJ)^-1 (J'w^2J)(J'wJ)^-1, in the mean over a pattern without direction
+    sigma_u = sigma / (g s sqrt(2 pi)) and sigma_strain = sigma / (g s^2 2 sqrt(pi)).
+    """
+    s = size / 6
+    u = noise / (gradient * s * math.sqrt(2 * math.pi))
+    return u, noise / (gradient * s**2 * 2 * math.sqrt(math.pi))
+
+
+def resolution_length(size: int) -> float:
+    """l_10% of a Gaussian ZOI of order 1, px: the period of a sine that has lost 10 %.
+
+    exp(-2 pi^2 s^2 / l^2) = 0.9, s = size/6: 13.69 s.
+    """
+    return math.pi * math.sqrt(2 / -math.log(0.9)) * size / 6
+
+
+def _picture(image: ArrayLike) -> Floats:
+    picture = np.asarray(image, np.float64)
+    if picture.ndim != 2 or min(picture.shape) < SMALLEST_PICTURE:
+        raise ValueError(
+            f"a grey picture of at least {SMALLEST_PICTURE} px is needed, got an array of shape {picture.shape}"
+        )
+    return picture

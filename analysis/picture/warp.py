@@ -1,0 +1,222 @@
+"""Rows of the deformed image along a deformed line: compiled loops.
+
+One kind of warp for all motions: the full 6 x 6 taps of the tensor-product spline, with the fraction of
+every pixel, a vector of pixels at a time (``cutting`` says where a row has to be cut for that).
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from analysis.compiled.loops import helper, inlined
+from analysis.compiled.vectors import LANES, above, address, further, fused, load, load_from, spread, store
+from analysis.picture.cutting import (
+    MOST_PASSED,
+    cut_bent_row,
+    cut_leaning_row,
+    cut_row,
+    displacement,
+    inverse_slope,
+)
+
+f4 = np.float32
+_zero, _one, _two, _three, _four, _five = (np.uintp(i) for i in range(6))
+
+
+@inlined
+def _weights(tau: Any, t: Any) -> Any:
+    """The six tap weights at tau = fraction - 1/2; ``t`` is the spread table."""
+    s = tau * tau
+    zero = spread(f4(0))
+    e0 = spread(t[0]) + s * (spread(t[2]) + s * spread(t[4]))
+    o0 = spread(t[1]) + s * (spread(t[3]) + s * spread(t[5]))
+    e1 = spread(t[6]) + s * (spread(t[8]) + s * spread(t[10]))
+    o1 = spread(t[7]) + s * (spread(t[9]) + s * spread(t[11]))
+    e2 = spread(t[12]) + s * (spread(t[14]) + s * spread(t[16]))
+    o2 = spread(t[13]) + s * (spread(t[15]) + s * spread(t[17]))
+    other = zero - tau
+    return (
+        fused(other, o0, e0), fused(other, o1, e1), fused(other, o2, e2),
+        fused(tau, o2, e2), fused(tau, o1, e1), fused(tau, o0, e0),
+    )  # fmt: skip
+
+
+@inlined
+def _taps(r: Any, a: Any) -> Any:
+    left = a[0] * load_from(r, _zero) + a[1] * load_from(r, _one) + a[2] * load_from(r, _two)
+    return left + (a[3] * load_from(r, _three) + a[4] * load_from(r, _four) + a[5] * load_from(r, _five))
+
+
+@inlined
+def _six_rows(row: Any, stride: Any, a: Any, b: Any) -> Any:
+    """Sum of the taps from the address ``row`` on, with weights ``a`` along and ``b`` across; and the last row."""
+    value = b[0] * _taps(row, a)
+    row = further(row, stride)
+    value += b[1] * _taps(row, a)
+    row = further(row, stride)
+    value += b[2] * _taps(row, a)
+    row = further(row, stride)
+    value += b[3] * _taps(row, a)
+    row = further(row, stride)
+    value += b[4] * _taps(row, a)
+    row = further(row, stride)
+    return value + b[5] * _taps(row, a), row
+
+
+@inlined
+def _pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: Any) -> Any:
+    """A vector of pixels; ``first`` is the flat index of the first of the 36 taps of its first pixel."""
+    value, _ = _six_rows(address(c, first), stride, _weights(tau_x, t), _weights(tau_y, t))
+    return value
+
+
+@inlined
+def _leaning_weights(tau: Any, limit: Any, w: Any) -> Any:
+    """Weights moved on by a tap in the lanes where ``tau`` is above ``limit``: seven for the first six."""
+    zero = spread(f4(0))
+    return (
+        above(tau, limit, zero, w[0]), above(tau, limit, w[0], w[1]), above(tau, limit, w[1], w[2]),
+        above(tau, limit, w[2], w[3]), above(tau, limit, w[3], w[4]), above(tau, limit, w[4], w[5]),
+        above(tau, limit, w[5], zero),
+    )  # fmt: skip
+
+
+@inlined
+def _leaning_pixels(c: Any, stride: Any, first: Any, tau_x: Any, tau_y: Any, t: Any, steep: bool) -> Any:
+    """A vector of pixels with tau_y up to 3/2, ``steep``: 5/2, that is with taps in seven or eight rows."""
+    zero, one, half, more = spread(f4(0)), spread(f4(1)), spread(f4(0.5)), spread(f4(1.5))
+    inner = tau_y - above(tau_y, half, one, zero)
+    if steep:
+        inner = inner - above(tau_y, more, one, zero)
+    a = _weights(tau_x, t)
+    b = _leaning_weights(tau_y, half, _weights(inner, t))
+    seventh, eighth = b[6], zero
+    if steep:
+        seventh, eighth = above(tau_y, more, b[5], b[6]), above(tau_y, more, b[6], zero)
+        b = _leaning_weights(tau_y, more, b)
+    value, row = _six_rows(address(c, first), stride, a, b)
+    row = further(row, stride)
+    value += seventh * _taps(row, a)
+    if steep:
+        value += eighth * _taps(further(row, stride), a)
+    return value
+
+
+@helper
+def _warp_pieces(c: Any, stride: Any, n: int, where: Any, how: Any, ramp: Any, table: Any, out: Any) -> None:
+    """Warp ``n`` pieces: tau_x = how[0] + how[1] k, tau_y = how[2] + how[3] k."""
+    t = table
+    for piece in range(n):
+        first = np.uintp(where[piece, 0])
+        at = np.uintp(where[piece, 1])
+        x0 = spread(how[piece, 0])
+        x1 = spread(how[piece, 1])
+        y0 = spread(how[piece, 2])
+        y1 = spread(how[piece, 3])
+        for done in range(0, where[piece, 2], LANES):
+            k = np.uintp(done)
+            r = load(ramp, k)
+            store(out, at + k, _pixels(c, stride, first + k, x0 + r * x1, y0 + r * y1, t))
+
+
+@helper
+def _warp_leaning_pieces(
+    c: Any, stride: Any, n: int, where: Any, how: Any, ramp: Any, table: Any, out: Any, steep: bool
+) -> None:
+    """The same for pieces of ``cut_leaning_row``."""
+    t = table
+    r = load(ramp, _zero)
+    for piece in range(n):
+        first = np.uintp(where[piece, 0])
+        tau_x = spread(how[piece, 0]) + r * spread(how[piece, 1])
+        tau_y = spread(how[piece, 2]) + r * spread(how[piece, 3])
+        if steep:
+            value = _leaning_pixels(c, stride, first, tau_x, tau_y, t, True)
+        else:
+            value = _leaning_pixels(c, stride, first, tau_x, tau_y, t, False)
+        store(out, np.uintp(where[piece, 1]), value)
+
+
+@helper
+def _warp_bent_pieces(
+    c: Any, stride: Any, n: int, where: Any, how: Any, x2: Any, y2: Any, ramp: Any, table: Any, out: Any
+) -> None:
+    """The same with tau_x = how[0] + how[1] k + x2 k^2, tau_y likewise."""
+    t = table
+    for piece in range(n):
+        first = np.uintp(where[piece, 0])
+        at = np.uintp(where[piece, 1])
+        for done in range(0, where[piece, 2], LANES):
+            k = np.uintp(done)
+            r = load(ramp, k)
+            tau_x = spread(how[piece, 0]) + r * (spread(how[piece, 1]) + r * spread(x2))
+            tau_y = spread(how[piece, 2]) + r * (spread(how[piece, 3]) + r * spread(y2))
+            store(out, at + k, _pixels(c, stride, first + k, tau_x, tau_y, t))
+
+
+@inlined
+def warp_rows(
+    c: Any, stride: Any, x1: Any, y1: Any, first: int, count: int, size: int, starts: Any, taus: Any,
+    ramp: Any, table: Any, out: Any, line: Any,
+) -> None:  # fmt: skip
+    """Rows ``first`` .. of a planned ZOI, ``line`` apart in ``out``; x1 and y1 are the slopes of the fractions."""
+    t = table
+    sx = spread(x1)
+    sy = spread(y1)
+    at = np.uintp(0)
+    for row in range(first, first + count):
+        start = np.uintp(starts[row])
+        x0 = spread(taus[0, row])
+        y0 = spread(taus[1, row])
+        for n in range(0, size, LANES):
+            k = np.uintp(n)
+            r = load(ramp, k)
+            store(out, at + k, _pixels(c, stride, start + k, x0 + r * sx, y0 + r * sy, t))
+        at += line
+
+
+@helper
+def warp_cut_rows(
+    c: Any, stride: int, p: Any, order: int, x: Any, y: Any, first: int, count: int, size: int,
+    where: Any, how: Any, ramp: Any, table: Any, out: Any, line: int,
+) -> None:  # fmt: skip
+    """The same for any motion of order 1 or 2, in pieces.
+
+    Parameters
+    ----------
+    x, y : first column and row of the ZOI, px from the first sample of ``c``
+    where, how : (>= count * size, 3) int64 and (.., 4) float32, for use here
+    out : flat float32
+        Written in whole vectors of which each may begin at any pixel: what is written too much is
+        overwritten or never read.
+    """
+    reach = (size - 1) / 2
+    n = np.intp(0)  # a literal 0 would have numba compile the loops twice
+    inverse_x = inverse_slope(p[1])
+    inverse_y = inverse_slope(p[4])
+    # How many rows a vector passes; where they are few it need not be cut there.
+    passed = abs(p[4]) * (LANES - 1) if order == 1 else np.inf
+    for row in range(first, first + count):
+        eta = row - reach
+        u, v = displacement(p, order, -reach, eta)
+        at = (row - first) * line
+        if passed <= MOST_PASSED:
+            n = cut_leaning_row(
+                stride, size, x + u, p[1], inverse_x, y + row + v, p[4], at, n, where, how
+            )  # fmt: skip
+        elif order == 1:
+            n = cut_row(
+                stride, size, x + u, p[1], inverse_x, y + row + v, p[4], inverse_y, at, n, where, how
+            )  # fmt: skip
+        else:
+            x1 = 1 + p[1] + p[4] * eta - 2 * p[3] * reach
+            y1 = p[7] + p[10] * eta - 2 * p[9] * reach
+            n = cut_bent_row(stride, size, x + u, x1, p[3], y + row + v, y1, p[9], at, n, where, how)
+    if passed <= MOST_PASSED:
+        _warp_leaning_pieces(c, np.uintp(stride), n, where, how, ramp, table, out, passed > 1)
+    elif order == 1:
+        _warp_pieces(c, np.uintp(stride), n, where, how, ramp, table, out)
+    else:
+        _warp_bent_pieces(c, np.uintp(stride), n, where, how, f4(p[3]), f4(p[9]), ramp, table, out)

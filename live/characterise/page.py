@@ -1,0 +1,121 @@
+"""The Markdown page of ``phasedic characterise``: verdicts first, then section by section."""
+
+from __future__ import annotations
+
+import datetime
+import os
+import platform
+from collections.abc import Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from acquire.errors import DataError
+from live.characterise.outcome import Outcome, Verdict, Word
+
+WORDS: tuple[Word, ...] = ("better", "equal", "worse")
+LIBRARIES = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless")
+
+INTRODUCTION = """How well phase-DIC measures, on rendered truth and on real pictures, beside the paper it comes from:
+J. Molimard, *Implementation of the direct evaluation of strains in a frequency-based image analysis code for random
+patterns*. Three columns run through the page: the figure the paper prints; the paper's own estimator as we read it
+(one shot, bi-triangular window for the displacement, Gaussian for the strain, errata mended:
+`analysis/paper_estimator.py`); and ours, the kernel with its default settings.
+
+What was assumed where the paper does not say: speckle is a sum of Gaussian blobs exp(-rho^2/(2 r^2)) of either sign, r
+being "the radius", with a standard deviation of 18 % of full scale and no clipped pixels; noise is white, and "31 GL"
+its standard deviation unless a section says otherwise; a frequency is usable from 5 % of the largest amplitude of its
+ZOI; the pseudo-inverse is unweighted; the strain comes from the derivatives of the phases of all usable frequencies
+together, by least squares with six in-situ sensitivities. Truth is rendered analytically in the deformed place, no
+picture is interpolated. How the estimators work is derived in [method.md](method.md).
+
+What your own pattern can give: `phasedic characterise --pattern reference.tif --noise GL --out DIR`. One ZOI of a
+recorded session: `phasedic inspect session.h5 --zoi R,C --frame N`.
+"""
+
+
+def machine() -> str:
+    """What the figures were made with and on, in one line."""
+    versions = []
+    for name in LIBRARIES:
+        try:
+            versions.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            continue
+    return (
+        f"{_processor()}, {os.cpu_count()} cores, {platform.system()}, Python {platform.python_version()}; "
+        + ", ".join(versions)
+    )
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return platform.processor() or platform.machine()
+    return next(
+        (line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), platform.machine()
+    )
+
+
+def page(outcomes: Sequence[Outcome], command: str, images: str, intro: str = INTRODUCTION) -> str:
+    """The whole page.
+
+    Parameters
+    ----------
+    outcomes : sequence of Outcome
+    command : str
+        What made it, as typed.
+    images : str
+        Folder of the figures as seen from the page; "" where they lie beside it.
+    intro : str
+    """
+    seconds = sum(outcome.seconds for outcome in outcomes)
+    today = datetime.datetime.now(datetime.UTC).date().isoformat()
+    made = f"Made by `{command}` on {today} in {seconds:.0f} s on {machine()}."
+    parts = ["# Characterisation", intro.strip(), made, standing(outcomes)]
+    parts += [f"## {outcome.title}\n\n{linked(outcome, images)}" for outcome in outcomes]
+    return "\n\n".join(part for part in parts if part) + "\n"
+
+
+def linked(outcome: Outcome, images: str) -> str:
+    """The text of an outcome with its figures where they lie, and the names of its CSV files."""
+    text = outcome.text.strip()
+    prefix = f"{images}/" if images else ""
+    for name in outcome.figures:
+        text = text.replace(f"]({name})", f"]({prefix}{name})")
+    if outcome.tables:
+        text += (
+            "\n\nNumbers: " + ", ".join(f"[{t.name}.csv]({prefix}{t.name}.csv)" for t in outcome.tables) + "."
+        )
+    return text
+
+
+def standing(outcomes: Sequence[Outcome]) -> str:
+    """Where ours is better, equal (within 10 %) or worse, from the figures of all sections."""
+    verdicts = [verdict for outcome in outcomes for verdict in outcome.verdicts]
+    if not verdicts:
+        return ""
+    counts = ", ".join(f"{word} in {sum(v.word == word for v in verdicts)}" for word in WORDS)
+    lines = ["## Where we stand", "", f"Of {len(verdicts)} comparisons (equal: within 10 %): {counts}."]
+    for word in reversed(WORDS):
+        chosen = [v for v in verdicts if v.word == word]
+        if chosen:
+            lines += ["", f"**{word.capitalize()}** (ours first):", "", *(_line(v) for v in chosen)]
+    return "\n".join(lines)
+
+
+def _line(verdict: Verdict) -> str:
+    return f"- {verdict.subject} ({verdict.against})"
+
+
+def write_page(
+    outcomes: list[Outcome], target: Path, folder: Path, typed: str, intro: str | None = None
+) -> None:
+    """Write the Markdown page; figures are linked from where it stands."""
+
+    images = os.path.relpath(folder, target.parent)
+    text = page(outcomes, typed, "" if images == "." else images, INTRODUCTION if intro is None else intro)
+    try:
+        target.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise DataError(f"{target} cannot be written: {error.strerror}; give another --page") from error

@@ -1,0 +1,193 @@
+"""``phasedic demo``: a live run on the simulated rig, and what it measured against the truth.
+
+The truth of a ZOI is the best straight field (least squares with the ZOI's own weight) through the
+displacement that the simulator prescribes: what a ZOI of that size can see at all. It is computed
+here from the prescribed displacement alone, without any of the measuring code.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from live.commands.overrides import overrides
+from live.commands.run import conclude, run_to_the_end
+from live.measure import Measurement
+from live.run import LiveRun, Outcome
+from live.setup import Config, load_config
+from live.tell import Screen, evaluate, quantity
+
+if TYPE_CHECKING:
+    from analysis import ZoiGrid
+    from hw_mocks.specimen import VirtualSpecimen
+
+Array = NDArray[np.float64]
+WIDTH_MM, THICKNESS_MM = 20.0, 2.0
+RELATIVE = 0.003  # of the strain, beside three times the predicted uncertainty
+LEAST_WITHIN = 0.97  # 99 % are to be expected; of 150 values, chance takes one in a few runs below that
+
+
+def demo(arguments: argparse.Namespace) -> int:
+    """Run the demo; the exit code of the run, or 1 where it missed the truth."""
+    screen = Screen()
+    config = load_config(_config_file(arguments), {**_defaults(arguments), **overrides(arguments)})
+    live = LiveRun(config, screen)
+    kept = Kept()
+    live.watch(kept.add)
+    outcome = run_to_the_end(live, screen)
+    conclude(outcome, live, screen)
+    if outcome.rig.specimen is None or not kept.measurements:
+        return outcome.exit_code
+    agreed = compare(outcome, kept, config, screen.say)
+    return outcome.exit_code if agreed else outcome.exit_code or 1
+
+
+def _config_file(arguments: argparse.Namespace) -> Any:
+    from pathlib import Path
+
+    return Path(arguments.config) if arguments.config else None
+
+
+def _defaults(arguments: argparse.Namespace) -> dict[str, Any]:
+    section = WIDTH_MM * THICKNESS_MM
+    seconds = f"&seconds={arguments.seconds:g}" if arguments.seconds else ""
+    fps = "auto" if arguments.fps is None else f"{arguments.fps:g}"
+    return {
+        "camera.address": (
+            f"sim:{arguments.specimen}?bits=12&fps={fps}&buffers=64&section_mm2={section:g}{seconds}"
+        ),
+        "load.address": "sim:",
+        "specimen.width_mm": WIDTH_MM,
+        "specimen.thickness_mm": THICKNESS_MM,
+        "metadata.specimen": f"simulated tensile specimen, {arguments.specimen}",
+        "metadata.note": "simulated camera and load cell",
+    }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Instance:
+    """What is kept of a measurement for the comparison; ``times`` (n,) are those of its frames, s."""
+
+    times: Array
+    valid: NDArray[np.bool_]
+    mean: tuple[float, float, float]
+    sigma: tuple[float, float, float]
+
+
+class Kept:
+    """Collects what the comparison needs."""
+
+    def __init__(self) -> None:
+        self.measurements: list[Instance] = []
+
+    def add(self, m: Measurement) -> None:
+        """Keep means, sigmas and which ZOIs they are over."""
+        pairs = [m.field.mean(name) for name in ("exx", "eyy", "exy")]
+        (xx, s_xx), (yy, s_yy), (xy, s_xy) = pairs
+        times = m.t + np.linspace(-0.5, 0.5, m.burst.n) * m.burst.duration
+        self.measurements.append(Instance(times, np.isfinite(m.field.exx), (xx, yy, xy), (s_xx, s_yy, s_xy)))
+
+
+class ZoiTruth:
+    """The true gradients that ZOIs of a grid can see.
+
+    Parameters
+    ----------
+    specimen : VirtualSpecimen
+    grid : ZoiGrid
+    corner : (x, y), px
+        Where the grid's picture begins in the camera's, where it is only a part of it.
+    """
+
+    def __init__(self, specimen: VirtualSpecimen, grid: ZoiGrid, corner: tuple[int, int] = (0, 0)) -> None:
+        self._specimen, self._grid = specimen, grid
+        half = (grid.size - 1) / 2
+        place = np.arange(grid.size) - half
+        sigma = grid.size / 6
+        self._w = np.exp(-(place**2) / (2 * sigma**2))
+        self._w /= self._w.sum()
+        self._wx = self._w * place / (self._w @ place**2)
+        self._x0, self._y0 = grid.x[0] - half, grid.y[0] - half
+        columns = np.arange(round(grid.x[-1] + half) + 1 - round(self._x0)) + round(self._x0)
+        rows = np.arange(round(grid.y[-1] + half) + 1 - round(self._y0)) + round(self._y0)
+        self._x, self._y = np.meshgrid(columns + float(corner[0]), rows + float(corner[1]))
+
+    def strains(self, t: float) -> tuple[Array, Array, Array]:
+        """(exx, eyy, exy) of each ZOI, (R, C), ``t`` seconds since the start of the simulated test."""
+        u, v = self._specimen.displacement(self._x, self._y, t)
+        du_dx, du_dy = self._gradient(u)
+        dv_dx, dv_dy = self._gradient(v)
+        return du_dx, dv_dy, (du_dy + dv_dx) / 2
+
+    def _gradient(self, d: Array) -> tuple[Array, Array]:
+        """Weighted least squares of a plane: the weight is even, so the slopes separate."""
+        along_x = self._moved(d, self._w, axis=0)
+        along_y = self._moved(d, self._wx, axis=0)
+        return self._moved(along_x, self._wx, axis=1), self._moved(along_y, self._w, axis=1)
+
+    def _moved(self, d: Array, weights: Array, axis: int) -> Array:
+        windows = np.lib.stride_tricks.sliding_window_view(d, len(weights), axis=axis)
+        chosen = windows[:: self._grid.step] if axis == 0 else windows[:, :: self._grid.step]
+        return np.asarray(chosen @ weights)
+
+
+def middle_of(specimen: VirtualSpecimen, times: Array) -> float:
+    """When the strain was that of the mean of the frames: not in the middle where the ramp begins in a burst."""
+    strain = specimen.axial_strain(times)
+    if not strain[-1] > strain[0]:
+        return float(times.mean())
+    return float(np.interp(strain.mean(), strain, times))
+
+
+def compare(outcome: Outcome, kept: Kept, config: Config, say: Callable[[str], None]) -> bool:
+    """Print what was measured against the truth; whether the elastic part agrees."""
+    specimen = outcome.rig.specimen
+    assert specimen is not None
+    crop = config.camera.crop or (0, 0, 0, 0)
+    truth = ZoiTruth(specimen, outcome.grid, (crop[0], crop[1]))
+    ratios, errors = [], []
+    for m in kept.measurements:
+        times = np.array([specimen.elapsed(t) for t in m.times])
+        elapsed = middle_of(specimen, times)
+        true = np.array([e[m.valid].mean() if m.valid.any() else math.nan for e in truth.strains(elapsed)])
+        error, sigma = np.array(m.mean) - true, np.array(m.sigma)
+        if times[-1] <= specimen.yield_s:
+            ratios.append([np.abs(error) / (RELATIVE * np.abs(true) + k * sigma) for k in (3, 5)])
+            errors.append(error)
+    say("")
+    say("against the simulated truth (elastic part; exx, eyy, exy):")
+    agreed = _say_strain(np.array(ratios), np.array(errors), say)
+    _say_force(outcome, specimen, say)
+    figures = evaluate(outcome.outputs.history, outcome.loads, config.specimen)
+    say(f"  E  {quantity(figures.E / 1e9, figures.sigma_E / 1e9, 'GPa')}, true {specimen.E / 1e9:g} GPa")
+    say(f"  nu {quantity(figures.nu, figures.sigma_nu, '')}, true {specimen.nu:g}")
+    return agreed
+
+
+def _say_strain(ratios: Array, errors: Array, say: Callable[[str], None]) -> bool:
+    """``ratios`` (N, 2, 3): the error of each of the three in units of 0.3 % + 3 sigma, and of 0.3 % + 5 sigma."""
+    if not ratios.size:
+        say("  no instant of the elastic part was measured")
+        return False
+    within, rms = ratios[:, 0] <= 1, np.sqrt(np.mean(errors**2, axis=0)) * 1e6
+    beyond = int(np.sum(~(ratios[:, 1] <= 1)))
+    say(f"  mean strain: error {rms[0]:.2f}, {rms[1]:.2f}, {rms[2]:.2f} um/m rms in {len(ratios)} instants")
+    say(
+        f"  {within.mean():.1%} of these {within.size} values within {RELATIVE:.1%} of the strain + 3 sigma,"
+        f" {beyond} beyond 5 sigma"
+    )
+    return float(within.mean()) >= LEAST_WITHIN and beyond == 0
+
+
+def _say_force(outcome: Outcome, specimen: VirtualSpecimen, say: Callable[[str], None]) -> None:
+    t, force = outcome.loads.arrays()
+    true = specimen.force(np.array([specimen.elapsed(time) for time in t]))
+    error = (force - true)[np.isfinite(force)]
+    if error.size:
+        say(f"  force: mean error {error.mean():+.2f} N, scatter {error.std():.2f} N in {error.size} samples")

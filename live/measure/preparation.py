@@ -1,0 +1,80 @@
+"""Before the first burst: noise of a frame, correction, and the kernel on the reference."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.frame import Burst
+
+if TYPE_CHECKING:
+    from analysis import KernelSettings, PhaseKernel, ZoiGrid
+log = logging.getLogger(__name__)
+
+
+def usable(error: ValueError, what: str) -> PhasedicError:
+    """An error of the numerics as one with an exit code: no pattern is the data's, the rest is usage."""
+    kind = DataError if type(error).__name__ == "PatternError" else ConfigError
+    return kind(f"{what}: {error}")
+
+
+Correction = Callable[[Burst], Burst]
+
+
+def unchanged(burst: Burst) -> Burst:
+    """The correction of those who have none."""
+    return burst
+
+
+def frame_noise(burst: Burst, stated_GL: float | None) -> float | None:
+    """The noise of one frame, GL: as measured within the burst, else as stated, else None.
+
+    A burst without any scatter (noise-free pictures) tells nothing, and what was stated counts.
+    """
+    if stated_GL is not None:
+        return stated_GL
+    return burst.noise if math.isfinite(burst.noise) and burst.noise > 0 else None
+
+
+def averaged(noise_GL: float | None, n: int) -> float | None:
+    """The noise of the mean of n frames; quantisation, 1/12 GL^2, is the least there is of one frame."""
+    return None if noise_GL is None else max(noise_GL, 12**-0.5) / math.sqrt(n)
+
+
+def prepare(
+    reference: Burst,
+    grid: ZoiGrid,
+    settings: KernelSettings,
+    stated_noise_GL: float | None,
+    correct: Correction = unchanged,
+) -> tuple[PhaseKernel, float | None]:
+    """The kernel on ``reference``, and the noise of one frame that goes with it.
+
+    Raises
+    ------
+    ValueError
+        The grid leaves the picture, or the reference has no pattern.
+    """
+    from analysis import PhaseKernel
+
+    noise_GL = frame_noise(reference, stated_noise_GL)
+    kernel = PhaseKernel(correct(reference).mean, grid, settings, noise=averaged(noise_GL, reference.n))
+    return kernel, noise_GL
+
+
+def motion_between(
+    kernel: PhaseKernel, first: Burst, second: Burst, correct: Correction = unchanged
+) -> float:
+    """How far the picture moved from one half of the reference burst to the other, px.
+
+    The median over the ZOIs of the displacement between the two; NaN where none can be measured.
+    """
+    a = kernel.measure(correct(first).mean)
+    b = kernel.measure(correct(second).mean, start=a)
+    moved = np.hypot(b.u - a.u, b.v - a.v)
+    return float(np.median(moved[np.isfinite(moved)])) if np.isfinite(moved).any() else math.nan

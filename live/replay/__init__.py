@@ -1,0 +1,10 @@
+"""A recorded session, or any folder of pictures, through the same measuring path.
+
+``replay`` runs it; ``session`` and ``pictures`` make the ``material`` (reference, bursts, loads), ``store``
+finds the bursts of a session whatever it holds.
+"""
+
+from live.replay.material import ReplayRequest
+from live.replay.replay import replay
+
+__all__ = ["ReplayRequest", "replay"]

@@ -1,0 +1,126 @@
+"""Replay: a recorded session, or any folder of pictures, through the very same measuring path.
+
+``replay`` measures every burst; ``--as-measured`` measures the bursts that the live run measured,
+with the references it took, and is then bit-equal to it on the same machine.
+"""
+
+from __future__ import annotations
+
+import datetime
+import threading
+import time
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from acquire.camera import open_camera
+from acquire.errors import ConfigError
+from acquire.events import EventKind
+from acquire.load_cell import LoadLog
+from acquire.session import Session
+from live.measure import measure, prepare, usable
+from live.outputs import Outputs, make_outputs, open_view
+from live.replay.material import Material, ReplayRequest
+from live.replay.pictures import picture_material, picture_of
+from live.replay.session import session_config, session_material, session_path
+from live.setup import Config, correction, grid_for, kernel_settings, load_config, make_folder, read_mask
+from live.tell import Journal, Ledger, Screen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Replayed:
+    """What a replay leaves behind."""
+
+    folder: Path
+    outputs: Outputs
+    loads: LoadLog
+    ledger: Ledger
+    config: Config
+    exit_code: int
+
+
+def replay(request: ReplayRequest, screen: Screen, stopping: threading.Event) -> Replayed:
+    """Replay ``request.source``; setting ``stopping`` ends it early and cleanly.
+
+    Raises
+    ------
+    ConfigError, DataError
+        As for a run; also where --as-measured finds frames missing.
+    """
+    path = session_path(request.source)
+    if path is None:
+        return _replay_pictures(request, screen, stopping)
+    with Session.open(path) as session:
+        if session.recovered:
+            screen.say(f"note: {session.recovered}")
+        overrides = {"camera.address": f"session:{path}", "load.address": f"session:{path}"}
+        config = session_config(session, request, overrides, path)
+        material = session_material(session, request, config, path)
+        return _run(material, config, request, screen, stopping)
+
+
+# -- a session ----------------------------------------------------------------------------------
+
+
+# -- pictures -----------------------------------------------------------------------------------
+
+
+def _replay_pictures(request: ReplayRequest, screen: Screen, stopping: threading.Event) -> Replayed:
+    if request.as_measured:
+        raise ConfigError(f"{request.source}: --as-measured needs a session; pictures have none")
+    config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
+    config = replace(config, load=replace(config.load, address="none:"))
+    camera = open_camera(request.source)
+    try:
+        with camera:
+            return _run(picture_material(camera, request, config), config, request, screen, stopping)
+    finally:
+        camera.close()
+
+
+# -- the run ------------------------------------------------------------------------------------
+
+
+def _run(
+    material: Material, config: Config, request: ReplayRequest, screen: Screen, stopping: threading.Event
+) -> Replayed:
+    camera = material.camera
+    mask = read_mask(config.measure.mask, camera.width, camera.height)
+    grid = grid_for(config, camera.width, camera.height, mask)
+    correct = correction(config, camera)
+    journal, ledger = Journal(), Ledger()
+    try:
+        kernel, noise_GL = prepare(
+            material.reference, grid, kernel_settings(config), config.measure.noise_GL, correct
+        )
+    except ValueError as error:
+        raise usable(error, f"the reference of {request.source}") from error
+    folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
+    outputs = make_outputs(config, folder, camera, grid, material.loads, journal, ledger, material.start)
+    screen.say(f"replaying {request.source} into {folder}")
+    open_view(outputs, config, screen)
+    for event in material.events:
+        if outputs.view is not None and event.kind is not EventKind.MEASURED:
+            outputs.view.event(event)
+    if outputs.view is not None:
+        for t, force in zip(*material.loads.arrays(), strict=True):
+            outputs.view.load(float(t), float(force))
+    try:
+        for m in measure(
+            material.bursts,
+            kernel,
+            material.loads,
+            noise_GL=noise_GL,
+            correct=correct,
+            renew_at=config.measure.renew_at,
+            on_event=journal,
+            timer=time.perf_counter,
+        ):
+            ledger.add(measured=m.burst.n, grabbed=m.burst.n)
+            outputs.picture(picture_of(m.burst))
+            screen.instant(outputs.add(m), ledger, 0.0)
+            if stopping.is_set():
+                break
+    finally:
+        outputs.close()
+    code = 130 if stopping.is_set() else 5 if outputs.failed else 0
+    return Replayed(folder, outputs, material.loads, ledger, config, code)

@@ -1,0 +1,87 @@
+"""A recorded session as the material of a replay."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from acquire.addresses import parse_address
+from acquire.burst import LIMIT_PX
+from acquire.errors import DataError
+from acquire.events import Event, EventKind
+from acquire.frame import Burst
+from acquire.load_cell import LoadLog
+from acquire.session import Session
+from live.measure import NewReference
+from live.replay.material import Material, ReplayRequest, window_of, within
+from live.replay.store import Store, open_store
+from live.setup import Config, from_dict, settings_in
+
+
+def session_path(source: str) -> Path | None:
+    """The session's path, or None where ``source`` is an address of pictures."""
+    address = parse_address(source)
+    if address.scheme == "session":
+        return Path(address.target)
+    if address.scheme and address.scheme in ("files", "video", "sim", "opencv"):
+        return None
+    if Path(source).suffix.lower() in (".h5", ".hdf5") or Path(source).is_file():
+        return Path(source)
+    raise DataError(
+        f"{source}: no such session; give a session.h5, or pictures as 'files:folder/*.tif' or 'video:file.mp4'"
+    )
+
+
+def session_config(session: Session, request: ReplayRequest, extra: Mapping[str, Any], path: Path) -> Config:
+    """The configuration in force when the session was recorded, overridden by file and command line."""
+    stored = {k: v for k, v in session.config.items() if k not in ("output", "record")}
+    stored["metadata"] = dict(session.metadata)
+    for section, keys in (("measure", ("mask",)), ("camera", ("dark", "flat"))):
+        stored[section] = _beside(stored.get(section, {}), keys, path)
+    file = {} if request.config_file is None else settings_in(request.config_file)
+    return from_dict(stored, {**file, **extra, **request.overrides}, str(path))
+
+
+def _beside(section: Mapping[str, Any], keys: Iterable[str], path: Path) -> dict[str, Any]:
+    """A folder that was moved has its mask, dark and flat frame beside the session."""
+    moved = {key: section[key] for key in keys if section.get(key) and not Path(section[key]).exists()}
+    return {**section, **{key: str(path.with_name(Path(old).name)) for key, old in moved.items()}}
+
+
+def session_material(session: Session, request: ReplayRequest, config: Config, path: Path) -> Material:
+    loads = LoadLog(config.load.max_gap_s)
+    for sample in session.load_samples():
+        loads.append(sample)
+    loads.close()
+    events = tuple(session.events())
+    told = [e for e in events if e.kind is EventKind.REFERENCE and not e.data.get("renewed")]
+    stored = open_store(session, path)
+    if told and "measure.reference_burst" not in request.overrides:
+        reference, after = stored.burst(told[-1].data), int(told[-1].data["last"])
+    else:
+        reference, after = stored.first_burst(config.measure.reference_burst or 1)
+    window = window_of(request, session.start_monotonic)
+    if request.as_measured:
+        bursts = _as_measured(stored, events, window)
+    else:
+        whole = session.mode.kind == "all"
+        n = config.measure.burst if whole else request.overrides.get("measure.burst")
+        bursts = within(
+            stored.bursts_after(after, n, LIMIT_PX if config.measure.shorten_bursts else None), window
+        )
+    start = (session.start_monotonic, session.start_utc)
+    return Material(session.camera, reference, bursts, loads, start, events)
+
+
+def _as_measured(
+    stored: Store, events: Iterable[Event], window: tuple[float, float]
+) -> Iterator[Burst | NewReference]:
+    for event in events:
+        renewed = event.kind is EventKind.REFERENCE and event.data.get("renewed")
+        if renewed and not event.data.get("automatic"):  # the pipeline does those again by itself
+            yield NewReference(stored.burst(event.data))
+        elif event.kind is EventKind.MEASURED:
+            burst = stored.burst(event.data)
+            if window[0] <= burst.t <= window[1]:
+                yield burst

@@ -1,0 +1,26 @@
+"""``python -m live.results FILE`` reads a strain.h5 once: the child of ``acquire.hdf5.probe``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from acquire.errors import DataError
+from live.results.reader import Strain
+
+
+def main(path: str) -> int:
+    """The child: 0 where all can be read, else the error's words and its exit code."""
+    try:
+        with Strain.open(Path(path), probed=True) as strain:
+            strain.maps("status")
+            for name in strain.names if strain.n else ():
+                strain.maps(name, -1)
+    except DataError as error:
+        print(error)
+        return error.exit_code
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1]))

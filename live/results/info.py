@@ -1,0 +1,51 @@
+"""What stands beside the numbers of a test in its files."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Protocol
+
+from live.results.row import StrainMeasure
+
+if TYPE_CHECKING:
+    from acquire.frame import CameraInfo
+
+
+class Loads(Protocol):
+    """What the results need of a load log (``acquire.load_log.LoadLog``)."""
+
+    def force_at(self, t: float) -> float: ...
+
+    def covers(self, t: float) -> bool: ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResultsInfo:
+    """What stands beside the numbers.
+
+    Attributes
+    ----------
+    start_monotonic : float, s
+        Zero of ``time_s``.
+    start_utc : str
+        The same instant, ISO 8601.
+    config, metadata, versions : mapping to JSON values
+        In force, free words of the user, and of the programs.
+    camera : CameraInfo or None
+    strain_measure : "small" | "green" | "hencky"
+    area_m2 : float or None, m^2
+        Cross-section of the specimen; with it the rows have a stress.
+    """
+
+    start_monotonic: float
+    start_utc: str
+    config: Mapping[str, Any]
+    metadata: Mapping[str, Any]
+    versions: Mapping[str, Any]
+    camera: CameraInfo | None
+    strain_measure: StrainMeasure
+    area_m2: float | None
+
+
+FORMAT, FORMAT_VERSION = "phasedic-strain", 1

@@ -1,0 +1,102 @@
+"""One row of the results: the strain maps of one instant, their means, and what belongs to them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from analysis.field import StrainField
+    from live.measure import Measurement
+
+StrainMeasure = Literal["small", "green", "hencky"]
+STRAINS = ("exx", "eyy", "exy")
+GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
+
+
+class RowInfo(Protocol):
+    """What a row needs to know of the test."""
+
+    @property
+    def start_monotonic(self) -> float: ...
+
+    @property
+    def strain_measure(self) -> StrainMeasure: ...
+
+    @property
+    def area_m2(self) -> float | None: ...
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Row:
+    """What is written of one measurement.
+
+    Attributes
+    ----------
+    maps : mapping of name to (R, C) array
+        u, v (px), gradients and strains (dimensionless), sigma_* of each, residual, status,
+        iterations.
+    values : mapping of name to number
+        One a row, in the order of the columns of ``strain.csv``.
+    """
+
+    maps: dict[str, NDArray[Any]]
+    values: dict[str, float | int]
+
+    @classmethod
+    def of(cls, measurement: Measurement, force: float, info: RowInfo) -> Row:
+        """The row of ``measurement``, with ``force`` (N) and the measure of strain of ``info``."""
+        maps = maps_of(measurement.field, info.strain_measure)
+        return cls(maps, _values(measurement, maps, force, info))
+
+
+def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any]]:
+    """The (R, C) arrays of a field by the names they have in files; strains in ``measure``."""
+    plain = ("u", "v", *GRADIENTS, *STRAINS)
+    maps = {name: getattr(field, name) for name in plain}
+    maps |= {f"sigma_{name}": getattr(field, f"sigma_{name}") for name in plain}
+    maps |= {name: getattr(field, name) for name in ("residual", "status", "iterations")}
+    if measure != "small":
+        strain = field.strain(measure)
+        maps |= {name: getattr(strain, name) for name in STRAINS}
+    return maps
+
+
+def _values(
+    measurement: Measurement, maps: dict[str, NDArray[Any]], force: float, info: RowInfo
+) -> dict[str, float | int]:
+    burst, field = measurement.burst, measurement.field
+    means = {name: field.mean(name) for name in STRAINS}
+    values: dict[str, float | int] = {
+        "frame": burst.first_index,
+        "time_s": burst.t - info.start_monotonic,
+        "force_N": force,
+    }
+    values |= {name: _mean(name, means[name][0], maps, info.strain_measure) for name in STRAINS}
+    values |= {f"sigma_{name}": means[name][1] for name in STRAINS}
+    values |= {
+        "n_valid": int(np.isfinite(maps["exx"]).sum()),
+        "n_zoi": int(np.count_nonzero(field.grid.active)),
+        "noise_GL": burst.noise,
+        "n_frames": burst.n,
+        "last_frame": burst.last_index,
+        "lost": burst.lost,
+        "duration_s": burst.duration,
+        "u_px": _nanmean(maps["u"]),
+        "v_px": _nanmean(maps["v"]),
+    }
+    if info.area_m2 is not None:
+        values["stress_Pa"] = force / info.area_m2
+    return values
+
+
+def _mean(name: str, small: float, maps: dict[str, NDArray[Any]], measure: StrainMeasure) -> float:
+    return small if measure == "small" else _nanmean(maps[name])
+
+
+def _nanmean(values: NDArray[Any]) -> float:
+    valid = values[np.isfinite(values)]
+    return float(valid.mean(dtype=np.float64)) if valid.size else float("nan")

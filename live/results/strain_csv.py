@@ -1,0 +1,60 @@
+"""``strain.csv``: one line a measurement, flushed as it is written; the header carries the units."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from acquire.errors import DataError
+from live.results.row import Row
+
+COLUMNS = (
+    *("frame", "time_s", "force_N", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy"),
+    *("n_valid", "n_zoi", "noise_GL", "n_frames", "last_frame", "lost", "duration_s", "u_px", "v_px"),
+)
+"""Means over the valid ZOIs; strains are dimensionless. ``stress_Pa`` follows where it is known."""
+
+
+class CsvWriter:
+    """Appends rows to a new file.
+
+    Raises
+    ------
+    DataError
+        The file exists, or cannot be written.
+    """
+
+    def __init__(self, path: Path, *, with_stress: bool = False) -> None:
+        self._path = path
+        self._columns = (*COLUMNS, "stress_Pa") if with_stress else COLUMNS
+        try:
+            self._file = path.open("x", encoding="ascii", newline="\n")
+        except OSError as error:
+            raise self._trouble(error) from error
+        self._put(",".join(self._columns))
+
+    def write(self, row: Row) -> None:
+        """One line; see the class for what is raised."""
+        self._put(",".join(_text(row.values[column]) for column in self._columns))
+
+    def close(self) -> None:
+        """Close the file; what stands in it was flushed line by line."""
+        try:
+            self._file.close()
+        except OSError as error:
+            raise self._trouble(error) from error
+
+    def _put(self, line: str) -> None:
+        try:
+            self._file.write(line + "\n")
+            self._file.flush()
+        except OSError as error:
+            raise self._trouble(error) from error
+
+    def _trouble(self, error: OSError) -> DataError:
+        return DataError(
+            f"{self._path}: cannot be written ({error.strerror}); make room or choose another --out"
+        )
+
+
+def _text(value: float | int) -> str:
+    return str(value) if isinstance(value, int) else f"{value:.10g}"

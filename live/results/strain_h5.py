@@ -1,0 +1,212 @@
+"""``strain.h5``: the strain maps of a test, crash-safe row by row and readable by NeXus viewers.
+
+Every dataset and attribute is made before SWMR mode is switched on, and every row is flushed:
+after a kill the finished rows are there (open with ``swmr=True``, as ``Strain.open`` does).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from acquire.errors import DataError
+from acquire.hdf5 import let_go
+from live.results.info import FORMAT, FORMAT_VERSION
+from live.results.row import GRADIENTS, STRAINS, Row
+from live.results.strain_csv import COLUMNS
+
+if TYPE_CHECKING:
+    from analysis.field import ZoiGrid
+    from live.results.info import ResultsInfo
+
+
+_WHOLE = {"frame", "last_frame", "n_frames", "lost", "n_valid", "n_zoi"}
+_UNITS = {"time_s": "s", "force_N": "N", "noise_GL": "GL", "duration_s": "s", "u_px": "px", "v_px": "px"}
+_UNITS["stress_Pa"] = "Pa"
+_MAPS = ("u", "v", *GRADIENTS, *STRAINS)
+_WORDS = {
+    "u": "displacement along x (right)",
+    "v": "displacement along y (down)",
+    "du_dx": "du/dx",
+    "du_dy": "du/dy",
+    "dv_dx": "dv/dx",
+    "dv_dy": "dv/dy",
+    "exx": "strain xx",
+    "eyy": "strain yy",
+    "exy": "strain xy (tensor component, gamma/2)",
+    "residual": "residual chi^2 (about 1 when all is well)",
+    "status": "status of the ZOI (0 = ok)",
+    "iterations": "iterations",
+}
+
+
+class StrainWriter:
+    """Makes the file and appends rows to it.
+
+    Raises
+    ------
+    DataError
+        The file exists or cannot be written. After a failed write ``failed`` is True, and what
+        was flushed before stays readable.
+    """
+
+    def __init__(self, path: Path, grid: ZoiGrid, info: ResultsInfo) -> None:
+        self._path, self.failed, self._rows = path, False, 0
+        self._file = self._guard(lambda: _create(path, grid, info))
+        entry = self._file["entry"]
+        self._maps = {n: entry["strain"][n] for n in _map_names()}
+        self._values = {n: entry["mean"][n] for n in _value_names(info)}
+
+    def write(self, row: Row) -> None:
+        """Append one row and flush it."""
+        self._guard(lambda: self._append(row))
+
+    def close(self) -> None:
+        """Close the file; after a failed write it is let go as it stands on the disk."""
+        if self.failed:
+            let_go(self._file)
+        else:
+            self._guard(self._file.close)
+
+    def _append(self, row: Row) -> None:
+        k = self._rows
+        for name, dataset in self._maps.items():
+            dataset.resize(k + 1, axis=0)
+            dataset[k] = row.maps[name]
+        for name, dataset in self._values.items():
+            dataset.resize(k + 1, axis=0)
+            dataset[k] = row.values[name]
+        self._file.flush()
+        self._rows = k + 1
+
+    def _guard(self, action: Callable[[], Any]) -> Any:
+        try:
+            return action()
+        except (OSError, RuntimeError) as error:  # HDF5 tells of a full disk by a RuntimeError
+            self.failed = True
+            raise self._trouble(error) from error
+
+    def _trouble(self, error: Exception) -> DataError:
+        return DataError(
+            f"{self._path}: cannot be written ({error}); make room on the disk or choose another --out. "
+            f"The {self._rows} rows before are safe"
+        )
+
+
+def _map_names() -> tuple[str, ...]:
+    return (*_MAPS, *(f"sigma_{n}" for n in _MAPS), "residual", "status", "iterations")
+
+
+def _value_names(info: ResultsInfo) -> tuple[str, ...]:
+    # The time comes last: a reader that sees it sees the whole row.
+    names = tuple(name for name in COLUMNS if name != "time_s")
+    return (*names, "stress_Pa", "time_s") if info.area_m2 is not None else (*names, "time_s")
+
+
+def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
+    import h5py
+
+    # These bounds give the format that survives SIGKILL; older ones promise nothing.
+    file = h5py.File(path, "x", libver=("v110", "v110"))
+    file.attrs.update(
+        NX_class="NXroot",
+        default="entry",
+        format=FORMAT,
+        format_version=FORMAT_VERSION,
+        creator="phasedic",
+        start_time=info.start_utc,
+    )
+    entry = _group(file, "entry", "NXentry", default="strain")
+    entry["start_time"] = info.start_utc
+    entry["start_monotonic_s"] = info.start_monotonic
+    entry["start_monotonic_s"].attrs["units"] = "s"
+    entry["title"] = str(info.metadata.get("specimen", "") or "phasedic")
+    _add_strain(entry, grid, info)
+    _add_mean(entry, info)
+    _add_notes(entry, info)
+    file.flush()
+    file.swmr_mode = True
+    return file
+
+
+def _group(parent: Any, name: str, nx_class: str, **attrs: Any) -> Any:
+    group = parent.create_group(name)
+    group.attrs.update(NX_class=nx_class, **attrs)
+    return group
+
+
+def _add_mean(entry: Any, info: ResultsInfo) -> None:
+    mean = _group(entry, "mean", "NXdata", signal="eyy", axes=["time_s"], title="Means over the valid ZOIs")
+    mean.attrs["auxiliary_signals"] = ["exx", "exy"]
+    for name in _value_names(info):
+        kind = np.int64 if name in _WHOLE else np.float64
+        dataset = mean.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(256,))
+        dataset.attrs["units"] = _UNITS.get(name, "")
+        if name in STRAINS:
+            dataset.attrs["uncertainties"] = f"sigma_{name}"
+    entry["strain/time_s"] = mean["time_s"]
+    for name in ("force_N", "frame", "last_frame", "n_frames", "noise_GL", "lost"):
+        entry[f"strain/{name}"] = mean[name]
+
+
+def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
+    strain = _group(entry, "strain", "NXdata", signal="eyy", axes=["time_s", "y", "x"])
+    strain.attrs.update(
+        strain_measure=info.strain_measure,
+        grid=json.dumps(grid.to_dict()),
+        frame_of_reference="fields lie on the reference picture; x right, y down, px",
+        auxiliary_signals=["exx", "exy"],
+    )
+    shape = np.shape(grid.active)
+    for name in _map_names():
+        _add_map(strain, name, shape)
+    for name, values in (("x", grid.x), ("y", grid.y)):
+        strain[name] = np.asarray(values, np.float64)
+        strain[name].attrs.update(units="px", long_name=f"{name} of the centre of the ZOI (px)")
+    strain["active"] = np.asarray(grid.active, np.uint8)
+    strain["active"].attrs["units"] = ""
+    for name, value in (("size", grid.size), ("step", grid.step)):
+        strain[name] = int(value)
+        strain[name].attrs["units"] = "px"
+
+
+def _add_map(strain: Any, name: str, shape: tuple[int, ...]) -> None:
+    kind: Any = np.uint8 if name in ("status", "iterations") else np.float32
+    dataset = strain.create_dataset(
+        name, (0, *shape), kind, maxshape=(None, *shape), chunks=(1, *shape), fillvalue=_fill(kind)
+    )
+    plain = name.removeprefix("sigma_")
+    unit = "px" if plain in ("u", "v") else ""
+    words = _WORDS[plain] if plain == name else f"standard uncertainty of {_WORDS[plain]}"
+    dataset.attrs.update(units=unit, long_name=f"{words} ({unit})" if unit else words)
+    if name == "status":
+        dataset.attrs["meaning"] = json.dumps(_status_words())
+
+
+def _fill(kind: Any) -> Any:
+    return np.nan if kind is np.float32 else 255
+
+
+def _status_words() -> dict[str, str]:
+    from analysis.field import Status
+
+    return {str(int(status)): f"{status.name}: {status.text}" for status in Status}
+
+
+def _add_notes(entry: Any, info: ResultsInfo) -> None:
+    for name in ("config", "metadata", "versions"):
+        entry[name] = json.dumps(getattr(info, name), default=str, indent=1)
+        entry[name].attrs["format"] = "JSON"
+    camera = _group(entry, "camera", "NXdetector")
+    if info.camera is None:
+        return
+    camera["description"] = info.camera.name
+    for key in ("address", "width", "height", "bits", "fps", "exposure_s", "pixel_format", "clock"):
+        value = getattr(info.camera, key)
+        if value is not None:
+            camera.attrs[key] = value
+    camera.attrs["controls"] = json.dumps(dict(info.camera.controls), default=str)

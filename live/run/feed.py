@@ -1,0 +1,84 @@
+"""From the grab thread to the measuring path: references and bursts in order, skips counted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from acquire.frame import Burst
+from live.measure import NewReference, Reference
+from live.run.grabber import Grabber
+from live.tell import Ledger
+
+POLL_S = 0.2
+
+
+class Feed:
+    """What the measuring thread takes from the grabber.
+
+    Parameters
+    ----------
+    grabber : Grabber
+    ledger : Ledger
+        Told of every burst that is not measured.
+    idle : callable
+        Called with a few words whenever nothing has come for a while, and after each burst with "".
+    """
+
+    def __init__(self, grabber: Grabber, ledger: Ledger, idle: Callable[[str], None]) -> None:
+        self._grabber, self._ledger, self._idle = grabber, ledger, idle
+        self._held: Burst | None = None
+        self.paused = False
+
+    def next_reference(self) -> Reference | None:
+        """Wait for a reference burst; None where the run ended before it was complete.
+
+        A burst that came after it is held for the measurement, those before it are skipped.
+        """
+        while True:
+            ended = not self._grabber.running
+            burst = self._grabber.bursts.get(POLL_S)
+            self.count_skipped()
+            reference = None if self._grabber.references.empty() else self._grabber.references.get()
+            if burst is not None and reference and burst.first_index > reference.burst.last_index:
+                self._held = burst
+            elif burst is not None:
+                self._ledger.add(skipped=burst.n)
+            if reference is not None or ended:
+                return reference
+            self._idle("taking the reference")
+
+    def bursts(self) -> Iterator[Burst | NewReference]:
+        """The newest burst each time, and a new reference before the bursts that come after it."""
+        while self._held is not None or not self._grabber.bursts.finished:
+            burst, self._held = self._held or self._grabber.bursts.get(POLL_S), None
+            self.count_skipped()
+            if burst is None:
+                self._idle("waiting for frames")
+            elif self.paused:
+                self._ledger.add(skipped=burst.n)
+            elif self._grabber.references.empty():
+                yield burst
+            else:
+                yield NewReference(self._reference_before(burst))
+            self._idle("")
+        self.count_skipped()
+
+    def _reference_before(self, burst: Burst) -> Burst:
+        """The new reference; ``burst`` is held where it came after it."""
+        reference = self._grabber.references.get().burst
+        if burst.first_index > reference.last_index:
+            self._held = burst
+        else:
+            self._ledger.add(skipped=burst.n)
+        return reference
+
+    def let_pass(self) -> None:
+        """Measure nothing any more; all that comes is counted as skipped."""
+        self.paused = True
+        for _ in self.bursts():
+            pass
+
+    def count_skipped(self) -> None:
+        """Account for bursts that newer ones replaced."""
+        for burst in self._grabber.bursts.take_skipped():
+            self._ledger.add(skipped=burst.n)

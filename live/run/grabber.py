@@ -1,0 +1,154 @@
+"""The grab thread: drains the camera, hands frames to the recorder and makes bursts.
+
+It does nothing else, so that the camera is never kept waiting. The reference is taken from the
+first frames, and again on demand; everything after it becomes bursts.
+"""
+
+from __future__ import annotations
+
+import logging
+import queue
+import threading
+from collections.abc import Callable
+
+from acquire.burst import BurstAccumulator
+from acquire.camera import Camera
+from acquire.errors import PhasedicError
+from acquire.events import EventKind, Muffler
+from acquire.frame import Burst, Frame
+from live.measure import Reference, ReferenceTaker
+from live.run.channels import Mailbox
+from live.tell import Journal, Ledger
+
+log = logging.getLogger(__name__)
+
+
+class Grabber:
+    """Runs the camera in a thread of its own.
+
+    Attributes
+    ----------
+    references : queue of Reference
+    bursts : Mailbox of Burst
+        Newest wins; with a source that waits for its reader, nothing is skipped.
+    error : Exception or None
+        Why the camera ended, where it did not end well.
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        journal: Journal,
+        ledger: Ledger,
+        *,
+        burst: int,
+        reference_burst: int,
+        seconds: float | None = None,
+        shorten_above_px: float | None = None,
+        on_frame: Callable[[Frame], None] = lambda frame: None,
+        on_burst: Callable[[Burst], None] = lambda burst: None,
+    ) -> None:
+        self._camera, self._journal, self._ledger = camera, journal, ledger
+        self._n, self._n_reference, self._seconds = burst, reference_burst, seconds
+        self._on_frame, self._on_burst = on_frame, on_burst
+        self.references: queue.SimpleQueue[Reference] = queue.SimpleQueue()
+        self.bursts: Mailbox[Burst] = Mailbox(waits=not camera.info.live)
+        self.error: Exception | None = None
+        self.fps = 0.0
+        self._taker: ReferenceTaker | None = ReferenceTaker(reference_burst)
+        self._shorten = shorten_above_px
+        self._accumulator = self._new_accumulator()
+        self._fed = 0
+        self._muffler, self._unsaid = Muffler(), 0
+        self._first_t: float | None = None
+        self._last_t: float | None = None
+        self._retake = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="grab", daemon=True)
+
+    def _new_accumulator(self) -> BurstAccumulator:
+        return BurstAccumulator(self._n, shorten_above_px=self._shorten)
+
+    def start(self) -> None:
+        """Begin to drain the camera, which must have been entered."""
+        self._thread.start()
+
+    def take_reference(self) -> None:
+        """Make the next frames a reference burst."""
+        self._retake.set()
+
+    def join(self) -> None:
+        """Wait for the end."""
+        self._thread.join()
+
+    @property
+    def running(self) -> bool:
+        """Whether frames may still come."""
+        return self._thread.is_alive()
+
+    def _work(self) -> None:
+        try:
+            for frame in self._camera:
+                self._take(frame)
+                if self._seconds is not None and frame.t - (self._first_t or 0.0) >= self._seconds:
+                    break
+        except PhasedicError as error:
+            self._ended_by(error, str(error))
+        except Exception as error:
+            log.exception("the grab thread failed")
+            self._ended_by(error, f"a defect in the grab thread: {error!r}")
+        finally:
+            self._ledger.add(left_out=self._fed)
+            self.bursts.close()
+
+    def _ended_by(self, error: Exception, text: str) -> None:
+        self.error = error
+        self._journal.tell(EventKind.DEVICE, self._camera.info.address, text, "error")
+
+    def _take(self, frame: Frame) -> None:
+        self._ledger.add(grabbed=1, lost=frame.lost_before)
+        if frame.lost_before:
+            self._tell_loss(frame)
+        self._rate(frame)
+        self._on_frame(frame)
+        self._fed += 1
+        if self._retake.is_set():
+            self._retake.clear()
+            self._taker = ReferenceTaker(self._n_reference)
+        if self._taker is not None:
+            self._feed_reference(self._taker, frame)
+        elif (burst := self._accumulator.add(frame)) is not None:
+            self._used(burst.n)
+            self._on_burst(burst)
+            self.bursts.put(burst)
+
+    def _tell_loss(self, frame: Frame) -> None:
+        """Each gap stands in the session; the screen hears of them at most every two seconds."""
+        self._unsaid += frame.lost_before
+        if not self._muffler.told(frame.t):
+            return
+        text = f"{self._unsaid} frames were lost, the last before frame {frame.index}"
+        data = {"count": self._unsaid, "before": frame.index}
+        self._journal.tell(EventKind.LOST, self._camera.info.address, text, "warning", data)
+        self._unsaid = 0
+
+    def _feed_reference(self, taker: ReferenceTaker, frame: Frame) -> None:
+        reference = taker.add(frame)
+        if reference is None:
+            return
+        self._used(reference.burst.n)
+        self._on_burst(reference.burst)
+        self._ledger.add(reference=reference.burst.n)
+        self._taker, self._accumulator = None, self._new_accumulator()
+        self.references.put(reference)
+
+    def _used(self, n: int) -> None:
+        self._ledger.add(left_out=self._fed - n)
+        self._fed = 0
+
+    def _rate(self, frame: Frame) -> None:
+        if self._first_t is None:
+            self._first_t = frame.t
+        elif self._last_t is not None and frame.t > self._last_t:
+            rate = 1 / (frame.t - self._last_t)
+            self.fps += 0.1 * (rate - self.fps) if self.fps else rate
+        self._last_t = frame.t

@@ -1,0 +1,219 @@
+"""The recording path: a byte-bounded buffer and one thread that writes the session.
+
+It takes everything. When the buffer or the disk is full it counts what it could not write, says
+so, and the measurement goes on.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from acquire.clock import ClockPair
+from acquire.errors import DataError
+from acquire.events import Event, EventKind
+from acquire.frame import Burst, CameraInfo, Frame
+from acquire.hdf5 import forecast, network_share
+from acquire.load_sample import LoadSample
+from acquire.record_mode import RecordMode
+from acquire.session import RotatingWriter, SessionWriter
+from live.run.channels import ByteBuffer
+from live.tell import Journal, Ledger, Screen
+
+if TYPE_CHECKING:
+    pass
+
+log = logging.getLogger(__name__)
+_SMALL = 512  # bytes counted for a sample or an event
+_CLOCK_EVERY_S = 60.0
+
+_DISK_EVERY_S = 5.0
+_DISK_WARN_S = 180.0
+
+Item = Frame | Burst | LoadSample | Event
+
+
+def open_writer(
+    path: Path, rotate_MB: float | None, about: Mapping[str, Any]
+) -> SessionWriter | RotatingWriter:
+    """A new session file, or a set of files that begins another one after ``rotate_MB``."""
+    if rotate_MB is None:
+        return SessionWriter(path, **about)
+    return RotatingWriter(path, int(rotate_MB * 1e6), **about)
+
+
+class Recorder:
+    """Writes frames, load samples and events from a thread of its own.
+
+    Parameters
+    ----------
+    writer : SessionWriter or RotatingWriter
+        Used from the recorder's thread only, and closed by it.
+    mode : RecordMode
+        Which frames are written, or bursts in their place.
+    ledger : Ledger
+    journal : Journal
+        Told of gaps and of a disk that takes no more.
+    limit : int, bytes
+        What may wait for the disk.
+    waits : bool
+        Wait for room instead of leaving a gap (sources that wait for their reader).
+    on_failure : callable
+        Called once when nothing more can be written.
+    """
+
+    def __init__(
+        self,
+        writer: SessionWriter | RotatingWriter,
+        ledger: Ledger,
+        journal: Journal,
+        limit: int,
+        *,
+        mode: RecordMode | None = None,
+        waits: bool = False,
+        on_failure: Callable[[], None] = lambda: None,
+    ) -> None:
+        self._writer, self._ledger, self._journal = writer, ledger, journal
+        self._buffer: ByteBuffer[Item] = ByteBuffer(limit, waits=waits)
+        self._on_failure = on_failure
+        self._mode = mode or RecordMode()
+        self._number = self._gap = 0
+        self._next_disk, self._disk_told, self._began = (
+            time.monotonic() + _DISK_EVERY_S,
+            False,
+            time.monotonic(),
+        )
+        self._next_clock = time.monotonic() + _CLOCK_EVERY_S
+        self.failed: str | None = None
+        self._thread = threading.Thread(target=self._work, name="record", daemon=True)
+        self._thread.start()
+
+    def frame(self, frame: Frame) -> None:
+        """Queue a frame, where the mode keeps it; one that finds no room is part of a counted gap."""
+        self._number += 1
+        if not self._mode.keeps(self._number - 1):
+            self._ledger.add(thinned=1)
+        elif not self._queued(frame, frame.image.nbytes, 1, frame.index):
+            self._ledger.add(unrecorded=1)
+
+    def burst(self, burst: Burst) -> None:
+        """Queue a burst, where bursts are what is recorded; its frames then count as recorded."""
+        if self._mode.kind == "bursts" and not self._queued(
+            burst, burst.mean.nbytes, burst.n, burst.first_index
+        ):
+            self._ledger.add(unrecorded=burst.n, thinned=-burst.n)
+
+    def _queued(self, item: Frame | Burst, size: int, n: int, index: int) -> bool:
+        if self.failed is None and self._buffer.put(item, size):
+            self._end_gap()
+            return True
+        if self._gap == 0 and self.failed is None:
+            text = "the disk is too slow, frames are not recorded; measuring goes on"
+            self._journal.tell(EventKind.RECORDER, "recorder", text, "error", {"from": index})
+        self._gap += n
+        return False
+
+    def _end_gap(self) -> None:
+        if not self._gap:
+            return
+        text = f"recording again after {self._gap} frames that are not in the session"
+        self._journal.tell(EventKind.RECORDER, "recorder", text, "warning", {"count": self._gap})
+        self._gap = 0
+
+    def sample(self, sample: LoadSample) -> None:
+        """Queue a load sample."""
+        self._buffer.put(sample, _SMALL + len(sample.raw), always=True)
+
+    def event(self, event: Event) -> None:
+        """Queue an event."""
+        self._buffer.put(event, _SMALL, always=True)
+
+    @property
+    def waiting_bytes(self) -> int:
+        """What waits for the disk."""
+        return self._buffer.waiting_bytes
+
+    def close(self, ledger: dict[str, Any]) -> None:
+        """Write what waits, then the ledger, and close the file."""
+        self._buffer.close()
+        self._thread.join()
+        if self.failed is None:
+            self._guarded(lambda: self._writer.write_ledger(ledger | self._ledger.as_dict()))
+            self._guarded(lambda: self._writer.write_clock(ClockPair.now()))
+        self._guarded(self._writer.close)
+
+    def _work(self) -> None:
+        self._guarded(lambda: self._writer.write_clock(ClockPair.now()))
+        while not self._buffer.finished:
+            item = self._buffer.get(timeout_s=0.5)
+            if item is not None:
+                self._write(item)
+            elif self.failed is None:
+                self._guarded(self._writer.flush)  # nothing more comes for a while
+            if self.failed is None:
+                self._now_and_then(time.monotonic())
+
+    def _now_and_then(self, now: float) -> None:
+        if now > self._next_clock:
+            self._next_clock += _CLOCK_EVERY_S
+            self._guarded(lambda: self._writer.write_clock(ClockPair.now()))
+        if now > self._next_disk:
+            self._next_disk = now + _DISK_EVERY_S
+            self._look_at_the_disk(now - self._began)
+
+    def _look_at_the_disk(self, elapsed_s: float) -> None:
+        rate = self._writer.bytes_written / elapsed_s
+        left = forecast(self._writer.path, rate)
+        if left < _DISK_WARN_S and not self._disk_told:
+            text = f"the disk is full in {left:.0f} s at this rate; free some space, the recording goes on"
+            self._journal.tell(EventKind.RECORDER, str(self._writer.path), text, "warning", {"seconds": left})
+        self._disk_told = left < _DISK_WARN_S
+
+    def _write(self, item: Item) -> None:
+        if isinstance(item, Frame):
+            written = self.failed is None and self._guarded(lambda: self._writer.write_frame(item))
+            self._ledger.add(**{"recorded" if written else "unrecorded": 1})
+        elif isinstance(item, Burst):
+            written = self.failed is None and self._guarded(lambda: self._writer.write_burst(item))
+            self._ledger.add(**{"recorded" if written else "unrecorded": item.n, "thinned": -item.n})
+        elif self.failed is not None:
+            return
+        elif isinstance(item, LoadSample):
+            self._guarded(lambda: self._writer.write_load(item))
+        else:
+            self._guarded(lambda: self._writer.write_event(item))
+
+    def _guarded(self, write: Callable[[], object]) -> bool:
+        """Run one write; the first one that fails ends the recording, loudly, and nothing else."""
+        try:
+            write()
+        except DataError as error:
+            self._fail(str(error))
+        except Exception as error:
+            log.exception("the recorder failed")
+            self._fail(f"a defect of the recorder: {error!r}")
+        else:
+            return True
+        return False
+
+    def _fail(self, why: str) -> None:
+        if self.failed is not None:
+            return
+        self.failed = why
+        text = f"recording has stopped, measuring goes on: {why}"
+        self._journal.tell(EventKind.RECORDER, "recorder", text, "error")
+        self._on_failure()
+
+
+def tell_room(path: Path, camera: CameraInfo, mode: RecordMode, screen: Screen) -> None:
+    """Say how long the disk lasts, and that a network share is a risk."""
+    rate = camera.width * camera.height * (2 if camera.bits > 8 else 1) * (camera.fps or 30.0) / mode.every
+    minutes = forecast(path, rate) / 60
+    where = f"recording about {rate / 1e6:.0f} MB/s at most, room for {minutes:.0f} minutes"
+    screen.say(f"warning: {where}" if minutes < 30 else where)
+    if share := network_share(path):
+        screen.say(f"warning: {path.parent} is on a network share ({share}); a local disk is safer")

@@ -1,0 +1,145 @@
+"""The configuration of a run: sections of a TOML file, overridden by the command line.
+
+Every key has a type, bounds and a default. An unknown key, a wrong type or an impossible value is a
+``ConfigError`` that names the key and says what is allowed. The configuration in force is stored in
+every file as JSON (``as_dict``) and read back with ``from_dict``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from acquire.errors import ConfigError
+from live.setup.sections import (
+    CameraConfig,
+    LoadConfig,
+    MeasureConfig,
+    OutputConfig,
+    RecordConfig,
+    SpecimenConfig,
+    ViewConfig,
+    _Refused,
+)
+
+Section = TypeVar("Section")
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """All sections, and free metadata (specimen, operator, material, note ...)."""
+
+    camera: CameraConfig = field(default_factory=CameraConfig)
+    load: LoadConfig = field(default_factory=LoadConfig)
+    measure: MeasureConfig = field(default_factory=MeasureConfig)
+    record: RecordConfig = field(default_factory=RecordConfig)
+    view: ViewConfig = field(default_factory=ViewConfig)
+    specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
+    output: OutputConfig = field(default_factory=OutputConfig)
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Nested plain values, fit for JSON."""
+        return dataclasses.asdict(self)
+
+
+_SECTIONS: dict[str, type] = {
+    f.name: f.default_factory  # type: ignore[misc]
+    for f in dataclasses.fields(Config)
+    if f.name != "metadata"
+}
+
+
+def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
+    """Read ``path`` and lay ``overrides`` ("measure.zoi" -> 32) over it.
+
+    Raises
+    ------
+    ConfigError
+        Missing or malformed file, unknown key, wrong type, impossible value.
+    """
+    return _overlaid({} if path is None else _read_toml(path), overrides, str(path or "command line"))
+
+
+def from_dict(stored: Mapping[str, Any], overrides: Mapping[str, Any], where: str) -> Config:
+    """The configuration stored in a file, with ``overrides`` laid over it; raises ConfigError."""
+    return _overlaid(_without_none(stored), overrides, where)
+
+
+def settings_in(path: Path) -> dict[str, Any]:
+    """What ``path`` sets, as "section.key" -> value, once it has been checked; raises ConfigError."""
+    load_config(path, {})
+    tree = _read_toml(path)
+    return {f"{name}.{key}": value for name, section in tree.items() for key, value in section.items()}
+
+
+def _without_none(stored: Mapping[str, Any]) -> dict[str, Any]:
+    return {
+        name: {k: v for k, v in section.items() if v is not None} if isinstance(section, Mapping) else section
+        for name, section in stored.items()
+    }
+
+
+def _overlaid(tree: Mapping[str, Any], overrides: Mapping[str, Any], where: str) -> Config:
+    merged: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in tree.items()}
+    for dotted, value in overrides.items():
+        name, _, key = dotted.partition(".")
+        section = merged.setdefault(name, {})
+        if isinstance(section, dict):
+            section[key] = value
+    return _build(merged, where)
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: there is no such configuration file") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read ({error}); give a text file in TOML") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}") from None
+
+
+def _build(tree: Mapping[str, Any], where: str) -> Config:
+    known = [*_SECTIONS, "metadata"]
+    parts: dict[str, Any] = {}
+    for name, content in tree.items():
+        if name not in known:
+            raise ConfigError(f"{where}: unknown section [{name}]{_meant(name, known)}")
+        if not isinstance(content, Mapping):
+            raise ConfigError(f"{where}: {name} must be a section, [{name}] with keys below it")
+        parts[name] = dict(content) if name == "metadata" else _section(_SECTIONS[name], name, content, where)
+    _check_metadata(parts.get("metadata", {}), where)
+    return Config(**parts)
+
+
+def _section(kind: type[Section], name: str, content: Mapping[str, Any], where: str) -> Section:
+    fields = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    values = {}
+    for key, value in content.items():
+        if key not in fields:
+            raise ConfigError(f"{where}: unknown key {name}.{key}{_meant(key, list(fields))}")
+        try:
+            values[key] = fields[key].metadata["check"](value)
+        except _Refused as allowed:
+            raise ConfigError(
+                f"{where}: {name}.{key} = {value!r} is not possible; allowed: {allowed}"
+            ) from None
+    return kind(**values)
+
+
+def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:
+    for key, value in metadata.items():
+        if not isinstance(value, str | int | float | bool):
+            raise ConfigError(f"{where}: metadata.{key} must be a text or a number, in one line")
+
+
+def _meant(word: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(word, known, 1)
+    return f" (did you mean {near[0]}?)" * bool(near) + "; known: " + ", ".join(known)

@@ -1,0 +1,65 @@
+"""From the configuration to the grid, the kernel settings, the mask, the results and the view."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import ConfigError
+from live.measure import usable
+from live.setup.config import Config
+
+if TYPE_CHECKING:
+    from analysis import KernelSettings, ZoiGrid
+
+
+def grid_for(config: Config, width: int, height: int, mask: NDArray[np.bool_] | None) -> ZoiGrid:
+    """The grid of ZOIs on pictures of ``width`` x ``height`` px; only where ``mask`` (H, W) is True.
+
+    Raises
+    ------
+    ConfigError
+        The ROI leaves the picture, or no ZOI fits into it.
+    """
+    from analysis import Roi, ZoiGrid
+
+    m = config.measure
+    x, y, w, h = m.roi or whole_picture(width, height, m.zoi)
+    if x + w > width or y + h > height:
+        raise ConfigError(
+            f"measure.roi = {x},{y},{w},{h} leaves the picture of {width} x {height} px;"
+            f" allowed: x + width <= {width}, y + height <= {height}"
+        )
+    try:
+        return ZoiGrid.cover(Roi(x, y, w, h), size=m.zoi, step=m.step, mask=mask)
+    except ValueError as error:
+        raise ConfigError(f"measure: {error}") from None
+
+
+def whole_picture(width: int, height: int, zoi: int) -> tuple[int, int, int, int]:
+    """The region measured where none is given: all, but for a rim of an eighth of a ZOI.
+
+    A ZOI at the very edge would leave the picture with the first small motion.
+    """
+    rim = zoi // 8
+    if min(width, height) < zoi + 2 * rim:
+        return 0, 0, width, height
+    return rim, rim, width - 2 * rim, height - 2 * rim
+
+
+def kernel_settings(config: Config) -> KernelSettings:
+    """The settings of the kernel; raises ConfigError where they do not go together."""
+    from analysis import KernelSettings
+
+    m = config.measure
+    try:
+        return KernelSettings(
+            window=cast(Any, m.window),
+            estimator=cast(Any, m.estimator),
+            order=m.order,
+            bending_px=m.bending_px,
+        )
+    except ValueError as error:
+        raise usable(error, "measure") from None

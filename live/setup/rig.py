@@ -1,0 +1,104 @@
+"""From addresses to devices: opens camera and load cell together.
+
+The one door to ``hw_mocks``: two ``sim:`` addresses share one specimen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from acquire.addresses import Address, parse_address
+from acquire.camera import CAMERAS, Camera, CroppedCamera, open_camera
+from acquire.events import EventSink, ignore_event
+from acquire.load_cell import LOAD_CELLS, LoadCell, open_load_cell
+from acquire.record_mode import Crop
+
+if TYPE_CHECKING:
+    from hw_mocks.specimen import VirtualSpecimen
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig:
+    """The devices of one test.
+
+    Attributes
+    ----------
+    camera : Camera
+    load : LoadCell
+    specimen : VirtualSpecimen or None
+        The truth, where the camera is simulated.
+    """
+
+    camera: Camera
+    load: LoadCell
+    specimen: VirtualSpecimen | None
+
+    def close(self) -> None:
+        """Close both devices."""
+        self.load.close()
+        self.camera.close()
+
+
+def open_rig(
+    camera_address: str, load_address: str, on_event: EventSink = ignore_event, *, crop: Crop | None = None
+) -> Rig:
+    """Open both devices; raises as ``open_camera`` and ``open_load_cell``.
+
+    Parameters
+    ----------
+    crop : (x, y, width, height), px, optional
+        The part of the picture that is used.
+    """
+    specimen = _specimen(camera_address, load_address)
+    camera = _open_camera(camera_address, on_event, specimen)
+    try:
+        camera = camera if crop is None else CroppedCamera(camera, crop)
+        load = _open_load(load_address, on_event, specimen)
+    except BaseException:
+        camera.close()
+        raise
+    return Rig(camera, load, specimen if _simulated(camera_address) else None)
+
+
+def _simulated(address: str) -> bool:
+    return parse_address(address).scheme == "sim"
+
+
+def _specimen(camera_address: str, load_address: str) -> VirtualSpecimen | None:
+    if not (_simulated(camera_address) or _simulated(load_address)):
+        return None
+    from hw_mocks.specimen import specimen_from
+
+    return specimen_from(parse_address(camera_address if _simulated(camera_address) else load_address))
+
+
+def _open_camera(address: str, on_event: EventSink, specimen: VirtualSpecimen | None) -> Camera:
+    if not _simulated(address):
+        return open_camera(address, on_event)
+    assert specimen is not None
+    from hw_mocks.sim_camera import open_sim_camera
+
+    return open_sim_camera(parse_address(address), on_event, specimen)
+
+
+def _open_load(address: str, on_event: EventSink, specimen: VirtualSpecimen | None) -> LoadCell:
+    if not _simulated(address):
+        return open_load_cell(address, on_event)
+    assert specimen is not None
+    from hw_mocks.sim_load_cell import open_sim_load
+
+    return open_sim_load(parse_address(address), on_event, specimen)
+
+
+def register_simulators() -> None:
+    """Let ``open_camera`` and ``open_load_cell`` know ``sim:``, each with a specimen of its own."""
+
+    def camera(address: Address, on_event: EventSink) -> Camera:
+        return _open_camera(address.text, on_event, _specimen(address.text, "none:"))
+
+    def load(address: Address, on_event: EventSink) -> LoadCell:
+        return _open_load(address.text, on_event, _specimen("none:", address.text))
+
+    CAMERAS.register("sim", camera)
+    LOAD_CELLS.register("sim", load)

@@ -1,0 +1,23 @@
+"""What is told to a person and kept for the record.
+
+``journal`` has every event, ``ledger`` the fate of every frame, ``screen`` the terminal, ``card`` the
+status in the view, ``summary`` the figures at the end.
+"""
+
+from live.tell.card import StatusCard
+from live.tell.journal import Journal
+from live.tell.ledger import Ledger
+from live.tell.screen import Screen
+from live.tell.summary import elastic_lines, evaluate, file_lines, quantity, summary_lines
+
+__all__ = [
+    "Journal",
+    "Ledger",
+    "Screen",
+    "StatusCard",
+    "elastic_lines",
+    "evaluate",
+    "file_lines",
+    "quantity",
+    "summary_lines",
+]

@@ -1,0 +1,46 @@
+"""The status card of the view: where the test stands, in a few lines of Markdown."""
+
+from __future__ import annotations
+
+import math
+
+from acquire.load_cell import LoadLog
+from live.measure import History
+from live.setup import SpecimenConfig
+from live.tell.ledger import Ledger
+from live.tell.summary import elastic_lines, evaluate
+
+EVERY_S = 1.0  # of the test
+
+
+class StatusCard:
+    """Writes the card anew once a second of the test."""
+
+    def __init__(self, specimen: SpecimenConfig, loads: LoadLog) -> None:
+        self._specimen, self._loads = specimen, loads
+        self._last = -math.inf
+
+    def due(self, history: History, ledger: Ledger) -> str | None:
+        """The card, or None where the last one is fresh enough."""
+        now = history.instants[-1].t
+        if now - self._last < EVERY_S:
+            return None
+        self._last = now
+        return "\n\n".join(self._lines(history, ledger))
+
+    def _lines(self, history: History, ledger: Ledger) -> list[str]:
+        i = history.instants[-1]
+        lines = [
+            f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
+            f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, mean **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
+        ]
+        figures = evaluate(history, self._loads, self._specimen)
+        lines += [
+            line.replace("  ", ", ").replace("+-", "±") for line in elastic_lines(figures, self._specimen)
+        ]
+        lost = ledger.lost + ledger.unrecorded
+        lines.append(
+            f"recorded {ledger.recorded}, measured {ledger.measured}, skipped {ledger.skipped},"
+            f" lost {f'**{lost}**' if lost else 0}"
+        )
+        return lines

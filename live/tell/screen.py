@@ -1,0 +1,82 @@
+"""The screen: plain sentences, and one status line that is renewed in place on a terminal.
+
+A terminal that has gone away must not end a recording: what cannot be printed is let go.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, TextIO
+
+if TYPE_CHECKING:
+    from live.measure import Instant
+    from live.setup import Rig
+    from live.tell.ledger import Ledger
+
+_TERMINAL_EVERY_S, _FILE_EVERY_S = 0.25, 5.0
+
+
+class Screen:
+    """Prints to ``stream``; the status line at most four times a second (a log: every 5 s)."""
+
+    def __init__(
+        self, stream: TextIO | None = None, now: Callable[[], float] = time.monotonic, quiet: bool = False
+    ) -> None:
+        self._stream = stream or sys.stdout
+        self._now, self._quiet = now, quiet
+        self._terminal = self._stream.isatty()
+        self._every = _TERMINAL_EVERY_S if self._terminal else _FILE_EVERY_S
+        self._last = -math.inf
+        self._width = 0
+
+    def say(self, text: str = "") -> None:
+        """A line that stays."""
+        if not self._quiet:
+            self._write(" " * self._width + "\r" * (self._width > 0) + text + "\n")
+            self._width = 0
+
+    def status(self, text: str) -> None:
+        """The status line, renewed in place on a terminal."""
+        if self._quiet or self._now() - self._last < self._every:
+            return
+        self._last = self._now()
+        if self._terminal:
+            self._write(text.ljust(self._width) + "\r")
+            self._width = len(text)
+        else:
+            self._write(text + "\n")
+
+    def waiting(self, ledger: Ledger, what: str) -> None:
+        """Nothing to show yet."""
+        self.status(f"{what} ... {ledger.grabbed} frames")
+
+    def instant(self, i: Instant, ledger: Ledger, fps: float) -> None:
+        """Where the test stands."""
+        force = "" if math.isnan(i.force) else f"  {i.force:.1f} N"
+        lost = f"  LOST {ledger.lost + ledger.unrecorded}" if ledger.loss else ""
+        self.status(
+            f"{fps:.0f} fps{force}  exx {i.exx * 1e6:+.0f}  eyy {i.eyy * 1e6:+.0f}  exy {i.exy * 1e6:+.0f} um/m"
+            f"  {i.n_valid}/{i.n_zoi} ZOIs in {i.measure_s * 1e3:.0f} ms"
+            f"  recorded {ledger.recorded}  skipped {ledger.skipped}{lost}"
+        )
+
+    def announce(self, rig: Rig, folder: Path) -> None:
+        """What is about to happen."""
+        c, cell = rig.camera.info, rig.load.info
+        fps = f", {c.fps:g} fps" if c.fps else ""
+        self.say(f"camera: {c.name}, {c.width} x {c.height} px, {c.bits} bits{fps}")
+        self.say(f"load cell: {cell.name}")
+        for warning in (*c.warnings, *cell.warnings):
+            self.say(f"warning: {warning}")
+        self.say(f"files: {folder}")
+
+    def _write(self, text: str) -> None:
+        try:
+            self._stream.write(text)
+            self._stream.flush()
+        except (OSError, ValueError):
+            self._quiet = True

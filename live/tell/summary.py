@@ -1,0 +1,83 @@
+"""The short summary at the end of a run: what was measured, how well, and where it lies."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from acquire.load_cell import LoadLog
+from analysis.evaluate import Tensile, tensile_figures
+from live.measure import History
+from live.setup import SpecimenConfig
+
+
+def quantity(value: float, sigma: float, unit: str) -> str:
+    """``value +- sigma unit`` with as many digits as the uncertainty deserves."""
+    if not math.isfinite(value):
+        return "not known"
+    if not math.isfinite(sigma) or sigma <= 0:
+        return f"{value:.4g} {unit}".rstrip()
+    digits = max(0, min(6, 1 - math.floor(math.log10(sigma))))
+    return f"{value:.{digits}f} +- {sigma:.{digits}f} {unit}".rstrip()
+
+
+def evaluate(history: History, loads: LoadLog, specimen: SpecimenConfig) -> Tensile:
+    """The tensile figures of the run; stresses are forces (N) where the section is not known."""
+    axial, transverse = history.along(specimen.axis)
+    return tensile_figures(axial, transverse, history.forces(loads) / (specimen.area_m2 or 1.0))
+
+
+def elastic_lines(figures: Tensile, specimen: SpecimenConfig) -> list[str]:
+    """E, nu, Rp0.2 and Rm in words; nothing where the curve told nothing."""
+    if not math.isfinite(figures.E):
+        return []
+    if specimen.area_m2 is None:
+        stiffness = quantity(figures.E / 1e3, figures.sigma_E / 1e3, "kN per unit strain")
+        strengths = [f"highest force {figures.Rm:.4g} N"]
+        first = [f"EA = {stiffness} (give [specimen] width_mm and thickness_mm for E)"]
+    else:
+        first = [f"E = {quantity(figures.E / 1e9, figures.sigma_E / 1e9, 'GPa')}"]
+        strengths = [f"Rp0.2 = {figures.Rp02 / 1e6:.4g} MPa"] * math.isfinite(figures.Rp02)
+        strengths += [f"highest stress {figures.Rm / 1e6:.4g} MPa"]
+    nu = f"nu = {quantity(figures.nu, figures.sigma_nu, '')}"
+    return ["  ".join([*first, nu]) + f"  ({figures.n_elastic} points)", "  ".join(strengths)]
+
+
+def noise_line(history: History) -> str:
+    """The noise of the picture and of the strain, typical of the run."""
+    noise = history.column("noise_GL")
+    noise = noise[np.isfinite(noise)]
+    picture = f"one frame {np.median(noise):.3g} GL, " if noise.size else ""
+    one = np.nanmedian(history.column("zoi_sigma")) * 1e6
+    mean = np.nanmedian(history.column("sigma_eyy")) * 1e6
+    return (
+        f"noise: {picture}strain of one ZOI {one:.3g} um/m, of the mean {mean:.2g} um/m (predicted, 1 sigma)"
+    )
+
+
+def summary_lines(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
+    """The summary, a line each."""
+    valid = [instant for instant in history.instants if instant.n_valid]
+    if not valid:
+        return ["no ZOI could be measured; see the events above"]
+    last = valid[-1]
+    largest = max(valid, key=lambda instant: abs(instant.largest)).largest
+    refused = f" ({last.refused})" if last.refused else ""
+    lines = [
+        f"measured {len(history.instants)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
+        f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} um/m;"
+        f" largest of any ZOI {largest * 1e6:+.0f} um/m",
+        noise_line(history),
+    ]
+    return lines + elastic_lines(evaluate(history, loads, specimen), specimen)
+
+
+def file_lines(folder: Path) -> list[str]:
+    """The files in ``folder``, with sizes."""
+    return [
+        f"  {path}  ({path.stat().st_size / 1e6:.1f} MB)"
+        for path in sorted(folder.iterdir())
+        if path.is_file() and path.stat().st_size
+    ]

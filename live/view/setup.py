@@ -1,0 +1,75 @@
+"""What the view needs to know before the first picture."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from analysis.field import ZoiGrid
+
+STRAINS = ("exx", "eyy", "exy")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ViewSetup:
+    """What is shown, and how.
+
+    Attributes
+    ----------
+    title : str
+        Name of the test, shown by the viewer.
+    width, height : int, px
+        Of the camera's picture.
+    bits : int
+        Significant bits of a sample of it.
+    grid : ZoiGrid
+    start_monotonic : float, s
+        Zero of the timeline "time".
+    area_m2 : float or None, m^2
+        Cross-section; with it the curve is stress against strain, else load against strain.
+    axis : "x" | "y"
+        Direction of the load in the picture.
+    strain_range : float or None
+        Fixed symmetric range of the maps (dimensionless); None: automatic.
+    picture_hz : float, 1/s
+        Pictures shown per second of the test, at most.
+    """
+
+    title: str
+    width: int
+    height: int
+    bits: int
+    grid: ZoiGrid
+    start_monotonic: float
+    area_m2: float | None = None
+    axis: Literal["x", "y"] = "y"
+    strain_range: float | None = None
+    picture_hz: float = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """How much goes to one place, per second of the test; and how much in all.
+
+    Attributes
+    ----------
+    picture_hz, map_hz : float, 1/s
+    quality : int
+        Of the JPEG, 1..100.
+    longest_px : int
+        Larger pictures are reduced by a whole factor.
+    limit_bytes : float
+        When the pictures and maps drawn come to this much they stop; the curves go on.
+    repeat_bytes : float
+        Each time that much was drawn, the curves are sent again from their beginning: a server
+        forgets the oldest, and a viewer that comes later is to see the whole test.
+    """
+
+    picture_hz: float
+    map_hz: float
+    quality: int
+    longest_px: int
+    limit_bytes: float = math.inf
+    repeat_bytes: float = math.inf

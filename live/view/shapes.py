@@ -1,0 +1,94 @@
+"""Where things lie on the picture: sample ZOIs, arrows, and the mean motion of the specimen.
+
+Places are those of rerun, whose pixel (0, 0) covers 0..1: ours (its centre is 0) plus 0.5.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from analysis.field import StrainField, ZoiGrid
+
+Points = NDArray[np.float64]
+_MOST_BOXES, _MOST_ARROWS, _MOST_POINTS = 16, 240, 2000
+
+
+def centres(grid: ZoiGrid) -> Points:
+    """(R, C, 2) centres of all ZOIs, px of the viewer."""
+    x, y = np.meshgrid(np.asarray(grid.x, np.float64), np.asarray(grid.y, np.float64))
+    places: Points = np.stack([x, y], axis=-1) + 0.5
+    return places
+
+
+def every(grid: ZoiGrid, most: int, apart_px: float = 0.0) -> tuple[slice, slice]:
+    """Rows and columns of an evenly thinned grid of at most about ``most`` ZOIs, centred."""
+    rows, columns = grid.active.shape
+    step = max(math.ceil(math.sqrt(rows * columns / most)), math.ceil(apart_px / grid.step), 1)
+    return _centred(rows, step), _centred(columns, step)
+
+
+def _centred(count: int, step: int) -> slice:
+    return slice((count - 1) % step // 2, None, step)
+
+
+def sample_boxes(grid: ZoiGrid) -> Points:
+    """(N, 2) centres of a few active ZOIs that do not overlap, spread over the grid."""
+    pick = every(grid, _MOST_BOXES, 1.5 * grid.size)
+    return np.asarray(centres(grid)[pick][grid.active[pick]])
+
+
+def thinned(grid: ZoiGrid, wanted: NDArray[np.bool_]) -> Points:
+    """(N, 2) centres of the wanted ZOIs; every second, third ... where there are very many."""
+    found = centres(grid)[wanted]
+    return np.asarray(found[:: max(1, math.ceil(len(found) / _MOST_POINTS))])
+
+
+def mean_motion(field: StrainField) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The affine motion common to all valid ZOIs, as matrix (3, 3) and shift (3,) px.
+
+    The maps lie on the reference picture; with it they follow the specimen on the present one.
+    """
+    valid = np.isfinite(field.u)
+    if not valid.any():
+        return np.eye(3), np.zeros(3)
+    matrix = np.eye(3)
+    parts = (field.du_dx, field.du_dy, field.dv_dx, field.dv_dy)
+    matrix[:2, :2] += np.array([float(p[valid].mean(dtype=np.float64)) for p in parts]).reshape(2, 2)
+    middle = centres(field.grid)[valid].mean(axis=0)
+    moved = np.array([field.u[valid].mean(dtype=np.float64), field.v[valid].mean(dtype=np.float64)])
+    shift = np.zeros(3)
+    shift[:2] = middle + moved - matrix[:2, :2] @ middle
+    return matrix, shift
+
+
+class ArrowScale:
+    """Displacement arrows, magnified by a round factor that changes seldom."""
+
+    def __init__(self) -> None:
+        self._factor = 0.0
+
+    def arrows(self, field: StrainField) -> tuple[Points, Points, float]:
+        """(N, 2) origins, (N, 2) vectors as drawn (px), and the factor of magnification."""
+        pick = every(field.grid, _MOST_ARROWS)
+        shown = np.stack([field.u[pick], field.v[pick]], axis=-1).astype(np.float64)
+        valid = np.isfinite(shown).all(axis=-1)
+        origins, vectors = centres(field.grid)[pick][valid], shown[valid]
+        room = field.grid.step * (pick[0].step or 1)
+        self._follow(vectors, 1.6 * room)
+        return origins, vectors * self._factor, self._factor
+
+    def _follow(self, vectors: Points, room: float) -> None:
+        longest = float(np.percentile(np.hypot(*vectors.T), 95)) if len(vectors) else 0.0
+        fits = room / max(longest, 1e-3)
+        if not fits / 5 < self._factor <= fits:
+            self._factor = _round_below(min(fits, 1000.0))
+
+
+def _round_below(value: float) -> float:
+    decade = 10.0 ** math.floor(math.log10(value))
+    return max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1 + 1e-9)) * decade

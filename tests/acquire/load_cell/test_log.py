@@ -1,0 +1,104 @@
+"""The load log: what it interpolates and where it refuses."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from acquire.load_cell.log import LoadLog
+from acquire.load_sample import LoadFlag, LoadSample
+
+
+def log_of(*pairs: tuple[float, float]) -> LoadLog:
+    log = LoadLog(max_gap_s=0.25)
+    for t, force in pairs:
+        log.append(LoadSample(t, force))
+    return log
+
+
+@pytest.mark.parametrize(
+    ("t", "force"),
+    [(0.0, 10.0), (0.05, 15.0), (0.1, 20.0), (0.15, 25.0), (0.2, 30.0)],
+    ids=["first", "between", "on a sample", "between again", "last"],
+)
+def test_interpolates(t: float, force: float) -> None:
+    assert log_of((0.0, 10), (0.1, 20), (0.2, 30)).force_at(t) == pytest.approx(force)
+
+
+@pytest.mark.parametrize("t", [-0.01, 0.21, 5.0])
+def test_unknown_outside(t: float) -> None:
+    assert math.isnan(log_of((0.0, 10), (0.1, 20), (0.2, 30)).force_at(t))
+
+
+def test_unknown_when_empty() -> None:
+    assert math.isnan(LoadLog().force_at(0.0))
+
+
+def test_unknown_across_a_gap_but_not_beside_it() -> None:
+    log = log_of((0.0, 0), (0.1, 1), (0.5, 5), (0.6, 6))
+    assert math.isnan(log.force_at(0.3))
+    assert log.force_at(0.55) == pytest.approx(5.5)
+
+
+def test_a_gap_of_just_the_allowed_length_is_bridged() -> None:
+    assert log_of((0.0, 0), (0.25, 1)).force_at(0.125) == 0.5
+
+
+def test_unknown_beside_an_overload() -> None:
+    log = LoadLog()
+    log.append(LoadSample(0.0, 1.0))
+    log.append(LoadSample(0.1, math.nan, flags=LoadFlag.OVERLOAD))
+    log.append(LoadSample(0.2, 3.0))
+    assert math.isnan(log.force_at(0.05)) and math.isnan(log.force_at(0.15))
+    assert log.force_at(0.2) == 3.0
+
+
+@pytest.mark.parametrize(
+    "between",
+    [LoadSample(0.1, math.nan, flags=LoadFlag.ERROR), LoadSample(0.1, 99.0, flags=LoadFlag.STALE)],
+    ids=["garbage", "stale"],
+)
+def test_what_is_no_force_at_a_known_time_leaves_no_mark(between: LoadSample) -> None:
+    log = LoadLog()
+    log.append(LoadSample(0.0, 1.0))
+    log.append(between)
+    log.append(LoadSample(0.2, 3.0))
+    assert log.force_at(0.1) == pytest.approx(2.0)
+    assert len(log) == 3
+
+
+def test_two_samples_at_one_time() -> None:
+    log = log_of((0.0, 1), (0.1, 2), (0.1, 3), (0.2, 4))
+    assert log.force_at(0.1) == 2.0
+    assert log.force_at(0.15) == pytest.approx(3.5)
+
+
+def test_a_time_that_goes_back_counts_as_the_last() -> None:
+    log = log_of((1.0, 1), (0.5, 2))
+    assert log.arrays()[0].tolist() == [1.0, 1.0]
+
+
+def test_covers() -> None:
+    log = log_of((0.0, 1), (1.0, 2))
+    assert log.covers(1.0) and not log.covers(1.1)
+    log.close()
+    assert log.covers(1.1)
+
+
+def test_mean_and_number() -> None:
+    log = log_of((0.0, 1), (0.1, 2), (0.2, 6))
+    assert log.mean(0.1, 0.2) == (4.0, 2)
+    value, n = log.mean(0.3, 0.4)
+    assert math.isnan(value) and n == 0
+
+
+def test_mean_does_not_hide_an_overload() -> None:
+    assert math.isnan(log_of((0.0, 1), (0.1, math.nan)).mean(0, 1)[0])
+
+
+def test_latest_and_arrays() -> None:
+    log = log_of((0.0, 1), (0.1, 2))
+    assert log.latest is not None and log.latest.force == 2
+    np.testing.assert_array_equal(log.arrays(), [[0.0, 0.1], [1, 2]])

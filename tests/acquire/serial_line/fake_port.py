@@ -1,0 +1,129 @@
+"""A serial port and a clock that are not there: a script of what happens, played read by read."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from acquire.addresses import parse_address
+from acquire.errors import DeviceError
+from acquire.events import Event
+from acquire.load_sample import LoadSample
+from acquire.serial_line.cell import SerialCell
+from acquire.serial_line.ports import LineSettings
+from acquire.serial_line.settings import read_settings
+
+SILENCE = b""
+
+
+class FakeTime:
+    """A clock that only moves when somebody waits."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+
+class FakePort:
+    """Plays ``script``: bytes arrive (after ``pace`` seconds), silence lasts the read time-out, errors are raised.
+
+    After the script ``ends`` is called and silence reigns.
+    """
+
+    def __init__(
+        self,
+        time: FakeTime,
+        script: list[bytes | Exception],
+        *,
+        pace: float = 0.01,
+        answers: dict[bytes, bytes] | None = None,
+    ) -> None:
+        self._time, self._script, self._pace = time, list(script), pace
+        self._buffer = bytearray()
+        self._answers = answers or {}
+        self.sent: list[bytes] = []
+        self.closed = 0
+        self.timeout = 0.1
+        self.finished = False
+
+    @property
+    def in_waiting(self) -> int:
+        return len(self._buffer)
+
+    def read(self, size: int, /) -> bytes:
+        if not self._buffer:
+            self._next()
+        taken, self._buffer = self._buffer[:size], self._buffer[size:]
+        return bytes(taken)
+
+    def _next(self) -> None:
+        if not self._script:
+            self.finished = True
+            self._time.sleep(self.timeout)
+            return
+        item = self._script.pop(0)
+        if isinstance(item, Exception):
+            raise item
+        self._time.sleep(self._pace if item else self.timeout)
+        self._buffer += item
+
+    def write(self, data: bytes, /) -> int:
+        self.sent.append(data)
+        self._buffer += self._answers.get(data, b"")
+        return len(data)
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+class Bench:
+    """A serial cell on fake ports, its events, and a way to run it to the end of the script.
+
+    Each port of ``ports`` is handed out once; an exception among them is what opening raises.
+    """
+
+    def __init__(
+        self, *scripts: list[bytes | Exception] | Exception, address: str = "", wait: str = "0", **port: Any
+    ) -> None:
+        self.time = FakeTime()
+        self.events: list[Event] = []
+        self.opened: list[LineSettings] = []
+        self.ports = [s if isinstance(s, Exception) else FakePort(self.time, s, **port) for s in scripts]
+        self._left = list(self.ports)
+        separator = "&" if "?" in address else "?"
+        settings = read_settings(parse_address(f"{address or '/dev/fake?unit=N'}{separator}wait={wait}"))
+        self.cell = SerialCell(
+            settings, self.events.append, opener=self._open, clock=self.time, sleep=self.time.sleep
+        )
+
+    def _open(self, line: LineSettings) -> FakePort:
+        self.opened.append(line)
+        if not self._left:
+            raise DeviceError("no more ports in this test")
+        port = self._left.pop(0)
+        if isinstance(port, Exception):
+            raise port
+        port.timeout = line.read_timeout_s
+        return port
+
+    def run(self, silences: int = 2) -> list[LoadSample]:
+        """All samples until the last port has nothing more to say, and then some silence."""
+        with self.cell:
+            return list(self._until_the_end(silences))
+
+    def _until_the_end(self, silences: int) -> Iterator[LoadSample]:
+        last = self.ports[-1]
+        quiet = 0
+        while quiet <= silences:
+            yield from self.cell._pass()
+            quiet += isinstance(last, FakePort) and last.finished
+
+    @property
+    def told(self) -> list[str]:
+        """The sentences of the events."""
+        return [event.text for event in self.events]

@@ -1,0 +1,115 @@
+"""When a sample was taken: line speed, the device's own clock, late and old messages."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import pytest
+
+from acquire.serial_line.clock import ArrivalTimes, DeviceClock, Pace
+
+
+def test_a_byte_began_as_many_byte_times_ago_as_came_after_it() -> None:
+    times = ArrivalTimes(0.001)
+    times.received(10, 5.0)
+    times.received(4, 6.0)
+    assert times.began(0) == pytest.approx(4.990)
+    assert times.began(9) == pytest.approx(4.999)
+    assert times.began(10) == pytest.approx(5.996)
+
+
+def test_many_reads_cost_no_memory() -> None:
+    times = ArrivalTimes(0.0)
+    for k in range(20_000):
+        times.received(3, float(k))
+    assert times.began(59_999) == 19_999.0
+    assert len(times._reads) <= 4096
+
+
+def test_the_device_clock_takes_jitter_away() -> None:
+    rng, clock = random.Random(1), DeviceClock()
+    errors = []
+    for k in range(2000):
+        true = 50.0 + 0.0125 * k
+        t = clock.stamp(12.5 * k, true + rng.expovariate(1 / 0.004)).t
+        errors.append(t - true)
+    assert max(errors[50:]) - min(errors[50:]) < 0.001
+    assert 0.003 < clock.jitter_s < 0.007
+
+
+@pytest.mark.parametrize("drift", [100e-6, -100e-6, 0.0])
+def test_drift_is_followed_and_estimated(drift: float) -> None:
+    rng, clock = random.Random(2), DeviceClock()
+    for k in range(8000):
+        true = 50.0 + 0.0125 * k
+        t = clock.stamp(12.5 * k * (1 + drift), true + rng.expovariate(1 / 0.002)).t
+    assert t - true == pytest.approx(0.0, abs=0.002)
+    assert clock.drift == pytest.approx(drift, abs=3e-5)
+
+
+def test_drift_is_unknown_at_first() -> None:
+    clock = DeviceClock()
+    assert math.isnan(clock.drift) and math.isnan(clock.jitter_s)
+    clock.stamp(0.0, 1.0)
+    assert math.isnan(clock.drift)
+
+
+@pytest.mark.parametrize("uptime_ms", [70.0, 300.0, 5000.0, 4e9], ids=lambda ms: f"up for {ms} ms")
+def test_a_restart_is_doubted_until_it_has_settled(uptime_ms: float) -> None:
+    clock = DeviceClock()
+    for k in range(10):
+        clock.stamp(uptime_ms + 10 * k, 1.0 + 0.01 * k)
+    stamps = [clock.stamp(10.0 * k, 1.11 + 0.01 * k) for k in range(80)]
+    doubtful = [stamp.doubtful for stamp in stamps]
+    assert doubtful == [True] * doubtful.index(False) + [False] * (80 - doubtful.index(False))
+    assert 0.49 <= 0.01 * doubtful.index(False) <= 0.52
+    assert [s.t for s in stamps] == pytest.approx([1.11 + 0.01 * k for k in range(80)], abs=1e-3)
+    assert clock.jumps == 1
+
+
+def test_a_single_wrong_stamp_is_doubted_alone() -> None:
+    clock = DeviceClock()
+    stamps = [clock.stamp(3.6e6 if k == 5 else 10.0 * k, 1.0 + 0.01 * k) for k in range(10)]
+    assert [s.doubtful for s in stamps] == [k == 5 for k in range(10)]
+    assert clock.jumps == 0
+
+
+def test_late_messages_keep_their_own_stamps() -> None:
+    clock = DeviceClock()
+    for k in range(10):
+        clock.stamp(10.0 * k, 1.0 + 0.01 * k)
+    stamps = [clock.stamp(10.0 * k, 4.0) for k in range(10, 200)]
+    assert not any(s.doubtful for s in stamps)
+    assert [s.t for s in stamps] == pytest.approx([1.0 + 0.01 * k for k in range(10, 200)], abs=2e-3)
+
+
+def test_a_device_that_lost_time_is_tied_anew_in_the_end() -> None:
+    clock = DeviceClock()
+    for k in range(10):
+        clock.stamp(10.0 * k, 1.0 + 0.01 * k)
+    for k in range(10, 1000):
+        last = clock.stamp(10.0 * k, 3.0 + 0.01 * k)
+    assert clock.jumps == 1 and last.t == pytest.approx(3.0 + 9.99, abs=1e-3)
+
+
+def test_pace() -> None:
+    pace = Pace()
+    assert not any(pace.late(1, 0.0125 * k) for k in range(200))
+    assert pace.late(2, 2.5 + 0.2)  # after a pause
+
+
+@pytest.mark.parametrize("known_for", [0, 1, 10, 20, 200])
+def test_a_backlog_is_late_however_early_it_comes(known_for: int) -> None:
+    pace = Pace()
+    assert not any(pace.late(1, 0.0125 * k) for k in range(known_for))
+    assert pace.late(160, 0.0125 * known_for)
+    pace.restart()
+    assert pace.late(2, 0.0125 * (known_for + 1))
+
+
+def test_a_fast_stream_in_large_reads_is_not_late_once_its_pace_is_known() -> None:
+    pace = Pace()
+    late = [pace.late(16, 0.016 * k) for k in range(300)]
+    assert not any(late[15:])
+    assert pace.late(400, 0.016 * 300)

@@ -1,0 +1,139 @@
+"""Every fault of a real line by name, on a true pty: never a wrong force, and each told in its event."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import pytest
+
+from acquire.events import Event
+from acquire.load_cell.opening import open_load_cell
+from acquire.load_sample import LoadFlag, LoadSample
+from hw_mocks.ascii_indicator import AsciiIndicator
+from hw_mocks.faults import SERIAL_FAULTS, FaultPlan, parse_faults
+from hw_mocks.indicator_output import Sensing
+from hw_mocks.indicator_server import IndicatorServer
+
+RATE, AT_S, SECONDS = 80.0, 0.6, 2.6
+
+
+def truth(t: float) -> float:
+    """The force on the cell, N: a slow ramp, so that a stale value shows."""
+    return 100.0 + 20.0 * t
+
+
+@dataclass
+class Run:
+    """What the reader made of one fault."""
+
+    began: float = 0.0
+    samples: list[LoadSample] = field(default_factory=list)
+    events: list[Event] = field(default_factory=list)
+
+    @property
+    def told(self) -> str:
+        return " | ".join(event.text for event in self.events)
+
+    def flagged(self, flag: LoadFlag) -> int:
+        return sum(flag in sample.flags for sample in self.samples)
+
+
+def run_with(faults: str, plain: bool) -> Run:
+    """Read for some seconds from an indicator with this fault; plain: without stamps of its own."""
+    run = Run()
+    plan = parse_faults(faults, SERIAL_FAULTS, "test") if faults else FaultPlan()
+    began: list[float] = []
+
+    def elapsed(t: float) -> float:
+        began.append(t) if not began else None
+        return t - began[0]
+
+    sensing = Sensing(lambda t: truth(elapsed(t)), elapsed, RATE, 0.0, 10_000.0)
+    with IndicatorServer(
+        AsciiIndicator(0.01, style="plain" if plain else "millis"), sensing, faults=plan
+    ) as server:
+        address = f"{server.path}?timeout=0.5&unit=N{'&max_step=40' if plain else '&millis=1&column=2'}"
+        cell = open_load_cell(address, run.events.append)
+        timer = threading.Timer(SECONDS, cell.stop)
+        timer.start()
+        with cell:
+            run.samples = list(cell)
+        timer.cancel()
+    run.began = began[0]
+    return run
+
+
+SHORT = {"silence": "*0.8", "late": "*0.4", "backlog": "*2", "unplug": "*0.4", "overload": "*0.3"}
+SHORT |= dict.fromkeys(("unstable", "unit", "comma", "cr", "reset"), "*0.3")
+
+
+PLAIN = ("late", "backlog", "partial", "duplicate")
+NAMES = ["", *SERIAL_FAULTS, *(f"{name} plain" for name in PLAIN)]
+
+
+@pytest.fixture(scope="module")
+def runs() -> dict[str, Run]:
+    """One run for each fault, all at the same time."""
+    found: dict[str, Run] = {}
+
+    def one(name: str, text: str) -> None:
+        found[name] = run_with(text, name.endswith("plain"))
+
+    texts = {"": ""} | {name: f"{name}@{AT_S}{SHORT.get(name, '')}" for name in SERIAL_FAULTS}
+    texts |= {f"{name} plain": texts[name] for name in PLAIN}
+    threads = [threading.Thread(target=one, args=item) for item in texts.items()]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_force_is_wrong(name: str, runs: dict[str, Run]) -> None:
+    run = runs[name]
+    doubtful = LoadFlag.STALE | LoadFlag.STEP
+    good = [s for s in run.samples if not math.isnan(s.force) and not s.flags & doubtful]
+    assert len(good) > 40
+    # 0.15 s of the ramp: what a busy machine may delay a line by before it is known to be late.
+    for s in good:
+        assert s.force == pytest.approx(truth(s.t - run.began), abs=20.0 * 0.15), (name, s)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_times_never_go_back(name: str, runs: dict[str, Run]) -> None:
+    times = [s.t for s in runs[name].samples]
+    assert times == sorted(times)
+
+
+SIGNS: dict[str, Callable[[Run], bool]] = {
+    "garbage": lambda run: run.flagged(LoadFlag.ERROR) >= 1,
+    "nul": lambda run: run.flagged(LoadFlag.ERROR) >= 1,
+    "silence": lambda run: "no reading for 0.5 s; last good sample" in run.told,
+    "late": lambda run: run.flagged(LoadFlag.STALE) == 0,  # the device's own stamps are right
+    "partial plain": lambda run: run.flagged(LoadFlag.STEP) >= 1,
+    "late plain": lambda run: run.flagged(LoadFlag.STALE) >= 10,
+    "backlog plain": lambda run: run.flagged(LoadFlag.STALE) >= 100,
+    "unplug": lambda run: "lost" in run.told and "connected again" in run.told,
+    "overload": lambda run: "load alarm" in run.told and run.flagged(LoadFlag.OVERLOAD) >= 10,
+    "unit": lambda run: "unit on the line changed" in run.told,
+    "comma": lambda run: run.flagged(LoadFlag.ERROR) >= 10,
+    "jump": lambda run: "clock jumped" in run.told,
+    "reset": lambda run: "clock jumped" in run.told and run.flagged(LoadFlag.STALE) >= 20,
+    "backlog": lambda run: run.flagged(LoadFlag.STALE) >= 100 and "clock jumped" not in run.told,
+}
+
+
+@pytest.mark.parametrize("name", SIGNS)
+def test_the_fault_shows(name: str, runs: dict[str, Run]) -> None:
+    run = runs[name]
+    assert SIGNS[name](run), (run.told, [s for s in run.samples if s.flags][:3])
+
+
+def test_without_a_fault_nothing_is_told(runs: dict[str, Run]) -> None:
+    assert [event.level for event in runs[""].events] == ["info"]
+    assert "device clock: arrivals" in runs[""].told
+    assert not any(sample.flags & ~LoadFlag.STALE for sample in runs[""].samples)

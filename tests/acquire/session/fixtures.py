@@ -1,0 +1,61 @@
+"""Small sessions for the tests."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquire.clock import ClockPair
+from acquire.frame import CameraInfo, Frame, frozen
+from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
+from acquire.session.reader import SessionWriter
+
+START = ClockPair(1000.1, datetime(2026, 5, 9, 7, 35, 25, 123456, tzinfo=UTC))
+CAMERA = CameraInfo(
+    "sim:", "test camera", 16, 12, 12, True, "device", 60.0, 0.008, "Y12", {"gain": 3}, ("a warning",)
+)
+LOAD = LoadCellInfo("/dev/ttyUSB0", "ascii on /dev/ttyUSB0", "ascii", sign=-1, capacity_N=500.0)
+
+
+def frame(number: int, camera: CameraInfo = CAMERA, **changes: Any) -> Frame:
+    """A frame with a picture of its own."""
+    rng = np.random.default_rng(number)
+    dtype = np.uint8 if camera.bits <= 8 else np.uint16
+    image = rng.integers(0, 2**camera.bits, (camera.height, camera.width)).astype(dtype)
+    t = START.monotonic + number / 60 + 1 / 3
+    plain: dict[str, Any] = {
+        "image": frozen(image),
+        "index": 5 + number,
+        "t": t,
+        "clock": camera.clock,
+        "lost_before": 0,
+        "bits": camera.bits,
+        "raw_t": t + 0.004,
+    }
+    return Frame(**{**plain, **changes})
+
+
+def sample(number: int) -> LoadSample:
+    """A load sample; every seventh one is an overload."""
+    t = START.monotonic + number / 80
+    if number % 7 == 6:
+        return LoadSample(
+            t, float("nan"), "kgf", False, LoadFlag.OVERLOAD | LoadFlag.NET, b"OL,+9999999.9  g"
+        )
+    return LoadSample(t, number / 3, "N", None, LoadFlag.NONE, b"%d.5 N\x00" % number, number * 12.5)
+
+
+def writer(path: Path, camera: CameraInfo = CAMERA, **changes: Any) -> SessionWriter:
+    """A new session of the test camera."""
+    about: dict[str, Any] = {
+        "camera": camera,
+        "load": LOAD,
+        "start": START,
+        "config": {"measure": {"zoi": 64}},
+        "metadata": {"operator": "Zoé"},
+        "versions": {"phasedic": "0.1.0"},
+    }
+    return SessionWriter(path, **{**about, **changes})

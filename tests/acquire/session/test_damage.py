@@ -1,0 +1,33 @@
+"""A damaged session is refused or read right: never a hang, a crash or a wrong number.
+
+Many more cases: ``python -m tests.acquire.fuzz_session --cases 20000``.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from acquire.errors import DataError
+from acquire.hdf5 import superblock as session_probe
+from acquire.session.reader import Session
+from tests.acquire.session.fuzz import fuzz, whole_session
+
+
+def test_damaged_files_are_refused_or_right(tmp_path: Path) -> None:
+    ends = fuzz(tmp_path, range(250))
+    assert {end for _, end in ends} <= {"refused", "right"}, ends
+
+
+def test_a_damaged_unfinished_file_is_tried_in_a_child_with_a_time_limit(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = whole_session(tmp_path / "whole.h5", abandoned=True)
+    path = tmp_path / "cut.h5"
+    path.write_bytes(content[: len(content) // 2])
+    with pytest.raises(DataError, match="does not come to an end"):
+        session_probe.probe(path, timeout_s=2.0)
+    monkeypatch.setattr(session_probe, "PROBE_S", 2.0)
+    with pytest.raises(DataError):
+        Session.open(path)

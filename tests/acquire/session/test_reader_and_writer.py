@@ -1,0 +1,239 @@
+"""A session read back is what was written, whatever the state in which the writer left it."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from acquire.clock import ClockPair
+from acquire.errors import DataError
+from acquire.events import Event, EventKind
+from acquire.frame import Frame
+from acquire.load_sample import LoadSample
+from acquire.session.reader import Session
+from tests.acquire.session.fixtures import CAMERA, LOAD, START, frame, sample, writer
+
+
+def assert_same_frame(a: Frame, b: Frame) -> None:
+    np.testing.assert_array_equal(a.image, b.image)
+    assert a.image.dtype == b.image.dtype and not b.image.flags.writeable
+    for name in ("index", "t", "clock", "lost_before", "bits", "raw_t", "damaged"):
+        assert getattr(a, name) == getattr(b, name), name
+
+
+def assert_same_sample(a: LoadSample, b: LoadSample) -> None:
+    assert (math.isnan(a.force) and math.isnan(b.force)) or a.force == b.force
+    assert dataclasses.replace(a, force=0.0) == dataclasses.replace(b, force=0.0)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "session.h5"
+
+
+def test_frames_come_back_bit_equal(path: Path) -> None:
+    frames = [
+        frame(0),
+        frame(1, lost_before=2, index=8),
+        frame(2, damaged=True, clock="host", index=9),
+        frame(3, index=2**40),
+    ]
+    with writer(path) as session:
+        assert [session.write_frame(f) for f in frames] == [0, 1, 2, 3]
+    with Session.open(path) as back:
+        assert len(back) == 4 and back.recovered is None
+        for a, b in zip(frames, back.frames(), strict=True):
+            assert_same_frame(a, b)
+        assert [f.index for f in back.frames(1, 3)] == [8, 9]
+        assert back.times.tolist() == [f.t for f in frames]
+        assert back.indices.tolist() == [f.index for f in frames]
+
+
+def test_eight_bit_frames(path: Path) -> None:
+    camera = dataclasses.replace(CAMERA, bits=8)
+    with writer(path, camera) as session:
+        session.write_frame(frame(0, camera))
+    with Session.open(path) as back:
+        assert_same_frame(frame(0, camera), back.frame(0))
+
+
+def test_load_samples_come_back_with_their_lines(path: Path) -> None:
+    samples = [sample(n) for n in range(40)] + [LoadSample(START.monotonic + 1, 1.0, raw=b"a\nb")]
+    with writer(path) as session:
+        for number, s in enumerate(samples):
+            session.write_load(s)
+            if number % 10 == 0:
+                session.write_frame(frame(number))
+    with Session.open(path) as back:
+        for a, b in zip(samples, back.load_samples(), strict=True):
+            assert_same_sample(a, b)
+
+
+def test_what_was_said_once_comes_back(path: Path) -> None:
+    writer(path).close()
+    with Session.open(path) as back:
+        assert {f.name: getattr(back.camera, f.name) for f in dataclasses.fields(CAMERA)} == {
+            f.name: getattr(CAMERA, f.name) for f in dataclasses.fields(CAMERA)
+        }
+        assert back.load_cell is not None and back.load_cell.name == LOAD.name and back.load_cell.sign == -1
+        assert back.config == {"measure": {"zoi": 64}}
+        assert back.metadata == {"operator": "Zoé"}
+        assert back.start_utc == START.utc and back.start_monotonic == START.monotonic
+        assert back.ledger is None
+        assert len(back) == 0 and back.load_samples() == [] and back.events() == []
+
+
+def test_without_a_load_cell(path: Path) -> None:
+    writer(path, load=None).close()
+    with Session.open(path) as back:
+        assert back.load_cell is None
+
+
+@pytest.mark.parametrize("length", [0, 300, 512, 5000], ids=lambda n: f"{n} characters")
+def test_events_of_any_length(path: Path, length: int) -> None:
+    events = [
+        Event(1001.5, EventKind.NOTE, "operator", "é" * length, "warning", {"n": 3}),
+        Event(1002.25, EventKind.MEASURED, "measurement", "x", data={"first": 1, "last": 8, "n": 8}),
+    ]
+    with writer(path) as session:
+        for event in events:
+            session.write_event(event)
+    with Session.open(path) as back:
+        assert back.events() == events
+
+
+def test_not_a_number_in_an_event_becomes_null(path: Path) -> None:
+    with writer(path) as session:
+        session.write_event(Event(1001.0, EventKind.REFERENCE, "x", "y", data={"force_N": math.nan}))
+    with Session.open(path) as back:
+        assert back.events()[0].data == {"force_N": None}
+
+
+def test_ledger_and_clock_pairs(path: Path) -> None:
+    later = ClockPair(START.monotonic + 60, START.utc)
+    with writer(path) as session:
+        session.write_clock(later)
+        session.write_ledger({"grabbed": 3, "lost": 0})
+    with Session.open(path) as back:
+        assert back.ledger == {"grabbed": 3, "lost": 0}
+        assert back.clock_pairs == [START, later]
+
+
+def test_an_existing_file_is_never_overwritten(path: Path) -> None:
+    path.write_bytes(b"precious")
+    with pytest.raises(DataError, match="not overwritten"):
+        writer(path)
+    assert path.read_bytes() == b"precious"
+
+
+def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="choose a folder"):
+        writer(tmp_path / "no" / "session.h5")
+
+
+def test_a_frame_that_does_not_fit_is_refused_and_leaves_the_rest(path: Path) -> None:
+    with writer(path) as session:
+        session.write_frame(frame(0))
+        with pytest.raises(DataError, match="described as"):
+            session.write_frame(frame(1, dataclasses.replace(CAMERA, width=20)))
+        session.write_frame(frame(2))
+    with Session.open(path) as back:
+        assert back.indices.tolist() == [5, 7]
+
+
+def test_a_closed_session_takes_nothing_more(path: Path) -> None:
+    session = writer(path)
+    session.close()
+    session.close()
+    with pytest.raises(DataError, match="closed"):
+        session.write_frame(frame(0))
+
+
+def test_a_file_still_being_written_can_be_followed(path: Path) -> None:
+    with writer(path) as session:
+        session.write_frame(frame(0))
+        with Session.open(path) as back:
+            assert back.recovered is not None and "still recording" in back.recovered
+            assert len(back) == 1
+            session.write_load(sample(1))
+            session.write_frame(frame(1))
+            back.refresh()
+            assert len(back) == 2 and len(back.load_samples()) == 1
+            assert_same_frame(frame(1), back.frame(1))
+
+
+def test_a_slow_load_cell_reaches_the_file_without_frames(path: Path) -> None:
+    with writer(path) as session:
+        for number in range(3):
+            session.write_load(LoadSample(START.monotonic + number, float(number)))
+        with Session.open(path) as back:
+            assert [s.force for s in back.load_samples()] == [0.0, 1.0, 2.0]
+
+
+def test_fast_load_samples_are_flushed_together(path: Path) -> None:
+    with writer(path) as session:
+        for number in range(100):
+            session.write_load(LoadSample(START.monotonic + number * 1e-3, float(number)))
+        with Session.open(path) as back:
+            assert 80 <= len(back.load_samples()) < 100
+        session.flush()
+        with Session.open(path) as back:
+            assert len(back.load_samples()) == 100
+
+
+def test_foreign_files(tmp_path: Path) -> None:
+    text, other = tmp_path / "a.h5", tmp_path / "b.h5"
+    text.write_text("hello")
+    h5py.File(other, "w").close()
+    with pytest.raises(DataError, match="not an HDF5 file"):
+        Session.open(text)
+    with pytest.raises(DataError, match="not a session"):
+        Session.open(other)
+    with pytest.raises(DataError, match="no such file"):
+        Session.open(tmp_path / "c.h5")
+
+
+def test_a_newer_format_is_refused(path: Path) -> None:
+    writer(path).close()
+    with h5py.File(path, "r+") as file:
+        file.attrs["format_version"] = 99
+    with pytest.raises(DataError, match=r"format version 99.*update"):
+        Session.open(path)
+
+
+def test_a_truncated_file_is_refused(path: Path) -> None:
+    with writer(path) as session:
+        for number in range(20):
+            session.write_frame(frame(number))
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(DataError, match="truncated"):
+        Session.open(path)
+
+
+def test_every_dataset_has_units_and_the_plots_are_named(path: Path) -> None:
+    writer(path).close()
+    without = []
+
+    def look(name: str, item: object) -> None:
+        if isinstance(item, h5py.Dataset) and "units" not in item.attrs:
+            without.append(name)
+
+    with h5py.File(path) as file:
+        file.visititems(look)
+        assert without == []
+        assert file["entry"].attrs["default"] == b"frames"
+        for group, signal in (("frames", "image"), ("load", "force")):
+            assert file["entry"][group].attrs["NX_class"] == b"NXdata"
+            assert file["entry"][group].attrs["signal"] == signal.encode()
+
+
+def test_no_frame_beyond_the_end(path: Path) -> None:
+    writer(path).close()
+    with Session.open(path) as back, pytest.raises(DataError, match="no frame 0"):
+        back.frame(0)

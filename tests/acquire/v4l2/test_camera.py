@@ -1,0 +1,440 @@
+from __future__ import annotations
+
+import errno
+import threading
+from collections.abc import Callable
+from itertools import islice
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquire.addresses import parse_address
+from acquire.errors import ConfigError, DeviceError
+from acquire.events import Event
+from acquire.frame import Frame
+from acquire.v4l2 import api
+from acquire.v4l2.camera import V4L2Camera, v4l2_settings
+from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
+
+
+class Bench:
+    """A fake kernel, a camera opened on it, and the events it told."""
+
+    def __init__(self, *cameras: FakeCamera, address: str = "/dev/video0") -> None:
+        self.kernel = FakeKernel(*(cameras or (FakeCamera(),)))
+        self.fake = self.kernel.cameras[0]
+        self.events: list[Event] = []
+        self.address = address
+
+    def open(self) -> V4L2Camera:
+        parsed = parse_address(self.address)
+        settings = v4l2_settings(parsed)
+        return V4L2Camera(
+            self.address, parsed.target, settings, self.events.append, self.kernel, self.kernel.pause
+        )
+
+    def take(self, count: int) -> list[Frame]:
+        with self.open() as camera:
+            return list(islice(camera, count))
+
+    def texts(self) -> str:
+        return "\n".join(event.text for event in self.events)
+
+
+def test_request_codes_are_those_of_videodev2_h() -> None:
+    # Printed by a C program that includes <linux/videodev2.h> on x86_64.
+    codes = {
+        "QUERYCAP": 0x80685600, "ENUM_FMT": 0xC0405602, "G_FMT": 0xC0D05604, "S_FMT": 0xC0D05605,
+        "REQBUFS": 0xC0145608, "QUERYBUF": 0xC0585609, "QBUF": 0xC058560F, "DQBUF": 0xC0585611,
+        "STREAMON": 0x40045612, "STREAMOFF": 0x40045613, "G_PARM": 0xC0CC5615, "S_PARM": 0xC0CC5616,
+        "ENUMINPUT": 0xC050561A, "G_INPUT": 0x80045626, "S_INPUT": 0xC0045627, "G_CTRL": 0xC008561B,
+        "S_CTRL": 0xC008561C, "QUERYCTRL": 0xC0445624, "QUERYMENU": 0xC02C5625,
+        "ENUM_FRAMESIZES": 0xC02C564A, "ENUM_FRAMEINTERVALS": 0xC034564B,
+    }  # fmt: skip
+    assert {name: getattr(api, name) for name in codes} == codes
+
+
+def test_the_best_grey_format_is_taken_and_told() -> None:
+    bench = Bench()
+    camera = bench.open()
+    assert camera.info.pixel_format == "Y12"
+    assert (camera.info.bits, camera.info.width, camera.info.height, camera.info.fps) == (12, 8, 4, 10)
+    assert (camera.info.live, camera.info.clock, camera.info.name) == (
+        True,
+        "device",
+        "fake camera (fake, usb-1)",
+    )
+    camera.close()
+    camera.close()
+
+
+@pytest.mark.parametrize("fourcc", ["GREY", "Y10", "Y12", "Y16", "YUYV", "UYVY", "RGGB", "RG12"])
+@pytest.mark.parametrize("padding", [0, 6])
+def test_pictures_come_as_the_sensor_counted_them(fourcc: str, padding: int) -> None:
+    bench = Bench(
+        FakeCamera(formats=("YUYV", fourcc), padding=padding),
+        address=f"/dev/video0?format={fourcc}&width=16&height=8",
+    )
+    frames = bench.take(3)
+    for k, frame in enumerate(frames):
+        expected = (np.arange(128).reshape(8, 16) + k) % 251
+        assert np.array_equal(frame.image, expected)
+        assert not frame.image.flags.writeable
+        assert frame.image.base is None or not isinstance(frame.image.base, memoryview)
+    assert frames[0].image.dtype == (np.uint16 if fourcc in ("Y10", "Y12", "Y16", "RG12") else np.uint8)
+
+
+def test_a_plane_of_a_mosaic_is_half_as_large() -> None:
+    bench = Bench(FakeCamera(formats=("RGGB",), fourcc="RGGB"), address="/dev/video0?plane=b")
+    camera = bench.open()
+    assert (camera.info.width, camera.info.height) == (4, 2)
+    with camera:
+        frame = next(iter(camera))
+    assert np.array_equal(frame.image, np.arange(32).reshape(4, 8)[1::2, 1::2])
+
+
+def test_motion_jpeg_only_on_request_and_with_a_warning() -> None:
+    bench = Bench(FakeCamera(formats=("MJPG",), fourcc="MJPG", size=(16, 8)))
+    with pytest.raises(DeviceError, match="format=MJPG takes the compressed"):
+        bench.open()
+    bench.address = "/dev/video0?format=MJPG"
+    camera = bench.open()
+    assert "no averaging removes" in camera.info.warnings[0]
+    with camera:
+        frame = next(iter(camera))
+    assert np.abs(frame.image.astype(int) - np.arange(128).reshape(8, 16)).max() < 30
+
+
+def test_numbers_and_stamps_are_those_of_the_driver() -> None:
+    bench = Bench()
+    frames = bench.take(3)
+    assert [frame.index for frame in frames] == [0, 1, 2]
+    assert [frame.raw_t for frame in frames] == pytest.approx([1000.1, 1000.2, 1000.3])
+    assert [frame.t for frame in frames] == [frame.raw_t for frame in frames]
+    assert {frame.clock for frame in frames} == {"device"}
+
+
+@pytest.mark.parametrize(("source", "shift"), [(api.SOURCE_START_OF_EXPOSURE, 0.004), (0, -0.004)])
+def test_time_is_mid_exposure_where_it_can_be_known(source: int, shift: float) -> None:
+    fake = FakeCamera(flags=api.STAMP_MONOTONIC | source, controls=exposure_controls())
+    frame = Bench(fake, address="/dev/video0?exposure_us=8000").take(1)[0]
+    assert frame.t - frame.raw_t == pytest.approx(shift)
+
+
+def test_stamps_on_another_clock_are_replaced_by_the_hosts() -> None:
+    frame = Bench(FakeCamera(flags=0)).take(1)[0]
+    assert frame.clock == "host"
+    assert frame.raw_t == pytest.approx(1000.1)
+
+
+def test_gaps_in_the_sequence_are_counted() -> None:
+    bench = Bench()
+    bench.fake.script.extend([_nothing, _set(skip_next=3), _nothing])
+    frames = bench.take(3)
+    assert [frame.index for frame in frames] == [0, 4, 5]
+    assert [frame.lost_before for frame in frames] == [0, 3, 0]
+
+
+def test_damaged_frames_are_marked() -> None:
+    bench = Bench()
+    bench.fake.script.extend([_nothing, _set(damaged_next=True)])
+    assert [frame.damaged for frame in bench.take(3)] == [False, True, False]
+    assert "frame 1 is damaged" in bench.texts()
+
+
+def test_a_short_frame_counts_as_lost() -> None:
+    bench = Bench()
+    bench.fake.script.extend([_nothing, _set(short_next=True)])
+    frames = bench.take(2)
+    assert [(frame.index, frame.lost_before) for frame in frames] == [(0, 0), (2, 1)]
+    assert "without a whole picture" in bench.texts()
+
+
+def test_a_driver_that_does_not_count_is_told_and_stamps_tell_the_losses() -> None:
+    bench = Bench(FakeCamera(counts=False))
+    bench.fake.script.extend([_nothing, _nothing, _set(skip_next=2)])
+    frames = bench.take(4)
+    assert [frame.index for frame in frames] == [0, 1, 4, 5]
+    assert [frame.lost_before for frame in frames] == [0, 0, 2, 0]
+    assert bench.texts().count("does not number") == 1
+
+
+def test_frames_from_before_the_start_are_left_out() -> None:
+    bench = Bench()
+    with bench.open() as camera:
+        bench.kernel.t += 5.0  # nobody fetched; the buffers filled up
+        frame = next(iter(camera))
+    assert frame.raw_t >= bench.kernel.t - 0.3
+    assert "older than the start" in bench.texts()
+
+
+@pytest.mark.parametrize("error", [errno.EIO, errno.EPROTO])
+def test_a_fatal_error_reopens_the_camera_and_counts_the_gap(error: int) -> None:
+    bench = Bench()
+    bench.fake.script.extend([_nothing, _nothing, _set(dead=error)])
+
+    def heal() -> None:
+        bench.fake.dead = 0
+
+    bench.kernel.on_wait = iter([heal])
+    frames = bench.take(4)
+    assert [frame.index for frame in frames[:2]] == [0, 1]
+    gap = frames[2].lost_before
+    assert gap == round((frames[2].raw_t - frames[1].raw_t) * 10) - 1
+    assert [frame.index for frame in frames[2:]] == [2 + gap, 3 + gap]
+    assert "last good frame 1" in bench.events[0].text
+    assert "opened again" in bench.events[1].text
+    assert bench.fake.opened >= 2
+
+
+def test_an_unplugged_camera_is_found_again_under_another_name() -> None:
+    other = FakeCamera(path="/dev/video5", card="another camera")
+    bench = Bench(FakeCamera(bus="usb-2"), other)
+    bench.fake.script.extend([_nothing, _set(present=False)])
+
+    def replug() -> None:
+        bench.fake.path, bench.fake.present = "/dev/video1", True
+
+    bench.kernel.on_wait = iter([_idle, _idle, replug])
+    frames = bench.take(3)
+    assert [frame.index for frame in frames] == sorted({frame.index for frame in frames})
+    assert frames[1].lost_before > 0
+    assert "unplugged" in bench.events[0].text
+    assert "opened again as /dev/video1" in bench.texts()
+    assert not other.streaming
+
+
+def test_plugged_into_another_port_it_is_known_by_its_name() -> None:
+    bench = Bench()
+    bench.fake.script.extend([_nothing, _set(present=False)])
+
+    def replug() -> None:
+        bench.fake.path, bench.fake.bus, bench.fake.present = "/dev/video3", "usb-7", True
+
+    bench.kernel.on_wait = iter([replug])
+    assert len(bench.take(2)) == 2
+    assert "/dev/video3" in bench.texts()
+
+
+def test_two_cameras_of_one_name_are_not_mistaken_for_each_other() -> None:
+    twin = FakeCamera(path="/dev/video2", bus="usb-9")
+    bench = Bench(FakeCamera(), twin)
+    bench.fake.script.extend([_nothing, _set(present=False)])
+
+    def replug() -> None:
+        bench.fake.present = True
+
+    bench.kernel.on_wait = iter([_idle, _idle, replug])
+    # While it is away the twin is the only one of its name.
+    with bench.open() as camera:
+        frames = list(islice(camera, 2))
+        assert not twin.streaming
+    assert len(frames) == 2
+
+
+def test_a_stall_is_told_once_and_its_end_too() -> None:
+    bench = Bench()
+    bench.fake.script.extend([_nothing, _set(stalled=True)])
+
+    def go_on() -> None:
+        bench.fake.stalled = False
+        bench.fake.next_t = bench.kernel.t
+
+    bench.kernel.on_wait = iter([_idle] * 7 + [go_on])
+    frames = bench.take(3)
+    assert len(frames) == 3
+    assert bench.texts().count("no picture for") == 1
+    assert "pictures again after" in bench.texts()
+
+
+def test_a_long_stall_opens_the_camera_anew() -> None:
+    bench = Bench()
+    bench.fake.script.extend([_nothing, _set(stalled=True)])
+
+    def go_on() -> None:
+        bench.fake.stalled = False
+
+    bench.kernel.on_wait = iter([_idle] * 60 + [go_on])
+    frames = bench.take(2)
+    assert bench.fake.opened >= 3
+    assert frames[1].index > frames[0].index + 10
+    assert len([event for event in bench.events if event.level == "error"]) == 1
+
+
+def test_waking_for_nothing_counts_as_a_dead_device() -> None:
+    bench = Bench()
+    with bench.open() as camera:
+        stream = iter(camera)
+        next(stream)
+        bench.fake.queued.clear()  # as a driver does that reports an error without a buffer
+
+        def heal() -> None:
+            assert "fatal error" in bench.texts()
+
+        bench.kernel.on_wait = iter([heal])
+        assert next(stream).index > 0
+
+
+def test_stop_ends_the_iteration_also_while_the_camera_is_away() -> None:
+    bench = Bench()
+    camera = bench.open()
+    bench.fake.script.extend([_nothing, _set(present=False)])
+    camera._pause = lambda seconds: camera.stopped.is_set()
+    bench.kernel.on_wait = iter(())
+    with camera:
+        frames = []
+        for frame in camera:
+            frames.append(frame)
+            camera.stop()
+    assert len(frames) == 1
+
+
+def test_closing_from_another_thread_while_it_streams() -> None:
+    bench = Bench()
+    camera = bench.open()
+    seen = []
+
+    def read() -> None:
+        seen.extend(camera)
+
+    with camera:
+        reader = threading.Thread(target=read)
+        reader.start()
+    reader.join()  # as the stream has ended, and no buffer was taken from under it
+    assert not bench.kernel._handles
+    assert bench.fake.maps_open == 0
+    assert not bench.events
+
+
+def test_a_missing_device_names_what_there_is() -> None:
+    with pytest.raises(
+        DeviceError, match=r"/dev/video9: there is no such device.*/dev/video0 \(fake camera\)"
+    ):
+        Bench(address="/dev/video9").open()
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [(errno.EACCES, "usermod -aG video"), (errno.EBUSY, "another program holds"), (errno.ENODEV, "unplug")],
+)
+def test_why_it_does_not_open(error: int, words: str) -> None:
+    with pytest.raises(DeviceError, match=words):
+        Bench(FakeCamera(open_error=error)).open()
+
+
+def test_a_camera_held_by_another_program_is_told_at_the_start_of_the_stream() -> None:
+    bench = Bench(FakeCamera(request_errors={api.REQBUFS: errno.EBUSY}))
+    camera = bench.open()
+    with pytest.raises(DeviceError, match="another program"):
+        camera.__enter__()
+    camera.close()
+
+
+@pytest.mark.parametrize(
+    ("caps", "words"),
+    [(0x2, "captures no video"), (api.CAP_CAPTURE_MPLANE, "multiplanar"), (api.CAP_CAPTURE, "cannot stream")],
+)
+def test_what_is_no_camera(caps: int, words: str) -> None:
+    with pytest.raises(DeviceError, match=words):
+        Bench(FakeCamera(caps=caps)).open()
+
+
+@pytest.mark.parametrize(
+    ("query", "words"),
+    [
+        ("format=Y16", "format=Y16 is not possible; the camera offers YUYV, GREY, Y12, MJPG"),
+        ("width=640&height=480", "asked for 640x480, the driver gives 16x8; Y12 is offered in 8x4, 16x8"),
+        ("fps=25", "asked for fps=25, the driver gives 20; Y12 8x4 is offered at 20, 10 1/s"),
+        ("input=3", r"input=3 is not there; the camera has: 0 \(Camera 1\)"),
+        ("colour=1", "unknown setting 'colour'; known: format, .* controls of this camera: none"),
+        ("exposure_us=100", "no control for an exposure"),
+        ("brightness=x", "whole numbers"),
+        ("plane=y", "plane=y"),
+        ("fps=-1", "fps=-1"),
+    ],
+)
+def test_what_is_not_honoured_is_refused_with_what_there_is(query: str, words: str) -> None:
+    bench = Bench(address=f"/dev/video0?{query}")
+    with pytest.raises(ConfigError, match=words):
+        bench.open()
+    assert not bench.kernel._handles
+
+
+def exposure_controls(**more: Any) -> dict[int, FakeControl]:
+    controls = [
+        FakeControl(
+            0x9A0901, "Auto Exposure", 3, 0, 3, value=3, menu=("Auto", "Manual", "Shutter", "Aperture")
+        ),
+        FakeControl(0x9A0902, "Exposure Time, Absolute", 1, 1, 5000, value=157, held_by=(0x9A0901, 3)),
+        FakeControl(0x980912, "Gain, Automatic", 2, 0, 1, value=1),
+        FakeControl(0x980913, "Gain", 1, 0, 100, 4, value=16, held_by=(0x980912, 1)),
+        FakeControl(
+            0x980918, "Power Line Frequency", 3, 0, 3, value=3, menu=("Disabled", "50 Hz", "60 Hz", "Auto")
+        ),
+        FakeControl(0x980900, "Brightness", 1, 0, 255, value=128),
+    ]
+    return {control.id: control for control in controls}
+
+
+def test_automatic_controls_are_put_on_manual_first() -> None:
+    bench = Bench(
+        FakeCamera(controls=exposure_controls()), address="/dev/video0?exposure_us=8000&gain=40&brightness=10"
+    )
+    camera = bench.open()
+    assert camera.info.exposure_s == pytest.approx(0.008)
+    assert camera.info.controls == {
+        "auto_exposure": "Manual",
+        "exposure_time_absolute": 80,
+        "gain_automatic": 0,
+        "gain": 40,
+        "power_line_frequency": "Disabled",
+        "brightness": 10,
+    }
+    assert camera.info.warnings == ()
+
+
+def test_controls_left_automatic_are_named() -> None:
+    bench = Bench(FakeCamera(controls=exposure_controls()), address="/dev/video0?manual=no")
+    camera = bench.open()
+    assert camera.info.exposure_s is None
+    assert "auto_exposure, gain_automatic, power_line_frequency" in camera.info.warnings[0]
+
+
+def test_a_held_control_is_refused_not_ignored() -> None:
+    bench = Bench(FakeCamera(controls=exposure_controls()), address="/dev/video0?manual=no&exposure_us=8000")
+    with pytest.raises(ConfigError, match="held by an automatic control"):
+        bench.open()
+
+
+@pytest.mark.parametrize(
+    ("query", "words"),
+    [
+        ("gain=41", "gain=41: the driver makes it 40; allowed: 0 to 100 in steps of 4"),
+        ("brightness=300", "brightness=300: the driver makes it 255; allowed: 0 to 255"),
+        ("exposure_us=2000000", "the driver makes it 5000"),
+    ],
+)
+def test_clamped_values_are_refused(query: str, words: str) -> None:
+    bench = Bench(FakeCamera(controls=exposure_controls()), address=f"/dev/video0?{query}")
+    with pytest.raises(ConfigError, match=words):
+        bench.open()
+
+
+def test_the_rate_asked_for_is_in_force() -> None:
+    bench = Bench(address="/dev/video0?fps=20&format=GREY&width=16&height=8")
+    assert bench.open().info.fps == 20
+
+
+def _nothing(camera: FakeCamera) -> None: ...
+
+
+def _idle() -> None: ...
+
+
+def _set(**values: Any) -> Callable[[FakeCamera], None]:
+    def change(camera: FakeCamera) -> None:
+        for name, value in values.items():
+            setattr(camera, name, value)
+
+    return change

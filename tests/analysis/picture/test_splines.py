@@ -1,0 +1,156 @@
+"""Tables of the B-splines, the prefilter and the warp, against scipy and against known functions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from analysis.compiled.vectors import LANES
+from analysis.fit.iteration import compose, warp_zois
+from analysis.picture.cutting import cut_bent_row, cut_leaning_row, cut_row, displacement
+from analysis.picture.prefilter import GROUP, PART, coefficients
+from analysis.picture.splines import PAD, basis, prefilter_taps, tap_table
+
+RNG = np.random.default_rng(0)
+IMAGE = ndimage.gaussian_filter(RNG.normal(0, 1, (70, 90)), 1.0).astype(np.float32) * 100
+
+
+@pytest.mark.parametrize("degree", [1, 3, 5])
+def test_tap_weights_are_the_spline(degree: int) -> None:
+    table = tap_table(degree).reshape(3, 6).astype(float)
+    for fraction in (0.0, 0.3, 0.77):
+        tau = fraction - 0.5
+        powers = tau ** np.arange(6)
+        signs = (-1.0) ** np.arange(6)
+        right, left = table @ powers, table @ (powers * signs)
+        found = [*left, *right[::-1]]
+        expected = basis(degree, fraction - np.arange(-2.0, 4.0))
+        assert np.allclose(found, expected, atol=1e-6)
+        assert np.sum(found) == pytest.approx(1, abs=1e-6)
+
+
+@pytest.mark.parametrize("shape", [(70, 90), (9, 11), (2 * PART + 33, 40), (PART, 2 * GROUP)])
+@pytest.mark.parametrize("kind", [np.float32, np.uint8, np.uint16])
+@pytest.mark.parametrize("degree", [3, 5])
+def test_prefilter_is_that_of_scipy(degree: int, kind: type, shape: tuple[int, int]) -> None:
+    image = np.random.default_rng(1).integers(0, 256, shape).astype(kind)
+    found = coefficients(image, np.float32(100), prefilter_taps(degree))
+    expected = ndimage.spline_filter(image.astype(float) - 100, degree, mode="mirror")
+    expected = np.pad(expected, PAD, mode="reflect")
+    found = found[: expected.size].reshape(expected.shape)
+    assert np.max(np.abs(found - expected)) < 1e-4 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize(
+    "motion",
+    [
+        (0.3, 0, 0, -0.6, 0, 0),
+        (1.2, 0.01, -0.09, -2.4, 0.09, -0.02),
+        (0, 0, 0, 0, 0, 0),
+        (0.7, -0.03, 0.1, 0.4, -0.125, 0.02),
+        (0.2, 0.2, 0.01, 0.3, 0.03, 0),
+        (-0.4, -0.01, 0.06, 1.3, -0.06, 0.01),
+        (0.1, 0.01, -0.3, 0.2, 0.3, 0.02),
+    ],
+)
+@pytest.mark.parametrize("size", [16, 21, 32])
+def test_warp_is_the_interpolated_image(motion: tuple, size: int) -> None:
+    origin = np.array([[24, 30]])
+    out = np.empty((1, size, size), np.float32)
+    flat = coefficients(IMAGE, np.float32(0), prefilter_taps(5))
+    warp_zois(flat, IMAGE.shape[1], origin, size, np.array([motion], float), tap_table(5), out)
+    x = np.arange(size) - (size - 1) / 2
+    u = motion[0] + motion[1] * x + motion[2] * x[:, None]
+    v = motion[3] + motion[4] * x + motion[5] * x[:, None]
+    rows = 24 + np.arange(size)[:, None] + v
+    columns = 30 + np.arange(size) + u
+    expected = ndimage.map_coordinates(IMAGE.astype(float), [rows, columns], order=5, mode="mirror")
+    assert np.max(np.abs(out[0] - expected)) < 1e-3 * np.abs(IMAGE).max()
+
+
+@pytest.mark.parametrize("slope", [0.0, -0.0, 1e-18, -1e-18, 1e-9, -1e-9, 0.03, -0.03, 0.6, -0.6])
+@pytest.mark.parametrize("drift", [0.0, -1e-17, 0.01, -0.2, -1.9])
+def test_a_row_is_cut_into_pieces_that_cover_it(slope: float, drift: float) -> None:
+    """Each pixel once, with taps around it, whatever the slopes and however close the edge of a pixel."""
+    size, stride = 32, 200
+    for x, y in ((60.0, 40.0), (31.3, 40.5), (60.3, 40.9999999999), (60.999999999999, 40.0), (61.5, 40.25)):
+        where, how = np.empty((2 * size, 3), np.int64), np.empty((2 * size, 4), np.float32)
+        n = cut_row(
+            stride, size, x, drift, _reciprocal(drift), y, slope, _reciprocal(slope), 5, 0, where, how
+        )  # fmt: skip
+        lengths = where[:n, 2]
+        assert (lengths >= 1).all() and lengths.sum() == size
+        assert np.array_equal(where[:n, 1], 5 + np.cumsum(lengths) - lengths)
+        for (start, at, length), (tx, sx, ty, sy) in zip(where[:n], how[:n].astype(float), strict=True):
+            k = np.arange(length)
+            rows, columns = start // stride + 2, start % stride + 2 + k
+            assert np.all(np.abs(tx + sx * k) <= 0.5 + 1e-6) and np.all(np.abs(ty + sy * k) <= 0.5 + 1e-6)
+            pixel = at - 5 + k
+            assert rows + ty + 0.5 + sy * k == pytest.approx(y + slope * pixel, abs=1e-5)
+            assert columns + tx + 0.5 + sx * k == pytest.approx(x + (1 + drift) * pixel, abs=1e-5)
+
+
+@pytest.mark.parametrize("slope", [0.0, -0.0, 1e-18, -1e-9, 0.03, -0.03, 2 / (LANES - 1), -2 / (LANES - 1)])
+@pytest.mark.parametrize("drift", [0.0, -1e-17, 0.01, -0.2, -1.9])
+def test_a_leaning_row_is_cut_into_vectors_that_pass_three_rows_at_most(slope: float, drift: float) -> None:
+    size, stride = 29, 200
+    for x, y in ((60.0, 40.0), (31.3, 40.5), (60.3, 40.9999999999), (60.999999999999, 40.0), (61.5, 40.25)):
+        where, how = np.empty((2 * size, 3), np.int64), np.empty((2 * size, 4), np.float32)
+        n = cut_leaning_row(stride, size, x, drift, _reciprocal(drift), y, slope, 5, 0, where, how)
+        lengths = where[:n, 2]
+        assert (lengths >= 1).all() and (lengths <= LANES).all() and lengths.sum() == size
+        assert np.array_equal(where[:n, 1], 5 + np.cumsum(lengths) - lengths)
+        for (start, at, length), (tx, sx, ty, sy) in zip(where[:n], how[:n].astype(float), strict=True):
+            k = np.arange(length)
+            rows, columns = start // stride + 2, start % stride + 2 + k
+            passed = ty + sy * k + 0.5
+            assert np.all(np.abs(tx + sx * k) <= 0.5 + 1e-6)
+            assert np.all(passed >= -1e-6) and np.all(
+                passed <= (3 if abs(slope) * (LANES - 1) > 1 else 2) + 1e-6
+            )
+            pixel = at - 5 + k
+            assert rows + passed == pytest.approx(y + slope * pixel, abs=1e-5)
+            assert columns + tx + 0.5 + sx * k == pytest.approx(x + (1 + drift) * pixel, abs=1e-5)
+
+
+@pytest.mark.parametrize("slope", [0.0, 1e-9, 0.03, -0.6])
+@pytest.mark.parametrize("bend", [0.0, 1e-9, 1e-3, -1e-3, 0.02])
+def test_a_bent_row_is_cut_into_pieces_that_cover_it(bend: float, slope: float) -> None:
+    size, stride = 32, 200
+    for x, y in ((60.0, 40.0), (31.3, 40.5), (60.3, 40.9999999999), (60.999999999999, 40.0), (61.5, 40.25)):
+        where, how = np.empty((2 * size, 3), np.int64), np.empty((2 * size, 4), np.float32)
+        n = cut_bent_row(stride, size, x, 1 + slope / 3, bend, y, slope, -bend / 2, 5, 0, where, how)
+        lengths = where[:n, 2]
+        assert (lengths >= 1).all() and lengths.sum() == size
+        assert np.array_equal(where[:n, 1], 5 + np.cumsum(lengths) - lengths)
+        for (start, at, length), (tx, sx, ty, sy) in zip(where[:n], how[:n].astype(float), strict=True):
+            k, pixel = np.arange(length), at - 5 + np.arange(length)
+            columns, rows = tx + (sx + bend * k) * k, ty + (sy - bend / 2 * k) * k
+            assert np.all(np.abs(columns) <= 0.5 + 1e-6) and np.all(np.abs(rows) <= 0.5 + 1e-6)
+            expected = x + (1 + slope / 3) * pixel + bend * pixel**2
+            assert start % stride + 2.5 + k + columns == pytest.approx(expected, abs=1e-4)
+            assert start // stride + 2.5 + rows == pytest.approx(
+                y + (slope - bend / 2 * pixel) * pixel, abs=1e-4
+            )
+
+
+def _reciprocal(slope: float) -> float:
+    return 1 / slope if abs(slope) > 1e-12 else 1e12
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_composition_undoes_the_step(order: int) -> None:
+    modes = 6 if order == 1 else 12
+    p, step = (RNG.normal(0, 0.01, modes) for _ in range(2))
+    if order == 2:  # exact to second order in place: keep the quadratic parts small
+        p[[3, 4, 5, 9, 10, 11]] *= 1e-3
+        step[[3, 4, 5, 9, 10, 11]] *= 1e-3
+    x, y = 3.0, -2.0
+    composed = p.copy()
+    compose(composed, order, step)
+    du, dv = displacement(step, order, x, y)
+    u, v = displacement(p, order, x, y)
+    cu, cv = displacement(composed, order, x + du, y + dv)
+    assert x + du + cu == pytest.approx(x + u, abs=1e-9 if order == 1 else 2e-5)
+    assert y + dv + cv == pytest.approx(y + v, abs=1e-9 if order == 1 else 2e-5)

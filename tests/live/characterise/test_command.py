@@ -1,0 +1,212 @@
+"""The commands: characterise on rendered truth and on a picture of one's own, and inspect."""
+
+from __future__ import annotations
+
+import argparse
+import io
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import live.characterise.command as characterise
+from acquire.errors import ConfigError, DataError
+from acquire.frame import frozen
+from hw_mocks.deformation import Affine
+from hw_mocks.speckle import Speckle
+from live.characterise.command import EXPERIMENTS, add_arguments, chosen, command, run
+from live.characterise.outcome import Bench, Outcome
+from live.characterise.page import page, standing
+from live.characterise.progress import Progress
+from live.commands.inspect import add_arguments as add_inspect
+from live.commands.inspect import command as inspect
+from tests.acquire.session.fixtures import CAMERA, frame, writer
+
+
+def parsed(*words: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    return parser.parse_args(words)
+
+
+@pytest.fixture
+def picture(tmp_path: Path) -> Path:
+    import cv2
+
+    levels = np.rint(Speckle((180, 220), 2.0, seed=6).reference() * 255).astype(np.uint8)
+    cv2.imwrite(str(tmp_path / "mine.png"), levels)
+    return tmp_path / "mine.png"
+
+
+def test_names_are_checked_and_ordered() -> None:
+    assert chosen(None) == list(EXPERIMENTS)
+    assert chosen(["fig3", "fig1"]) == ["fig1", "fig3"]
+    with pytest.raises(ConfigError, match="fig9: not known"):
+        chosen(["fig1", "fig9"])
+
+
+def test_a_run_takes_up_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[str] = []
+
+    def experiment(name: str, bench: Bench) -> Outcome:
+        calls.append(name)
+        bench.tick(0.5)
+        return Outcome(name, name, "words")
+
+    monkeypatch.setattr(characterise, "_timed", experiment)
+    bench = Bench(tmp_path, quick=True)
+    screen = io.StringIO()
+    run(["fig1"], bench, screen)
+    again = run(["fig1", "fig3"], bench, screen)
+    assert calls == ["fig1", "fig3"]
+    assert [outcome.name for outcome in again] == ["fig1", "fig3"]
+    run(["fig1"], replace(bench, quick=False), screen)
+    assert calls == ["fig1", "fig3", "fig1"]
+    assert "as it was" in screen.getvalue()
+
+
+def test_progress_is_a_bar_on_a_terminal_only() -> None:
+    class Terminal(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    terminal, log = Terminal(), io.StringIO()
+    for screen in (terminal, log):
+        progress = Progress("fig1", screen)
+        progress(0.5)
+        progress.done("1.0 s")
+    assert "50 %" in terminal.getvalue()
+    assert terminal.getvalue().endswith("1.0 s\n")
+    assert log.getvalue() == "fig1         1.0 s\n"
+    Progress("fig1", None).done("nowhere")
+
+
+def test_fig1_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out, target = tmp_path / "images", tmp_path / "page.md"
+    words = ["--quick", "--only", "fig1", "open-hole", "--out", str(out), "--page", str(target)]
+    assert command(parsed(*words)) == 0
+    text = target.read_text(encoding="utf-8")
+    assert "](images/fig1_phases.png)" in text
+    assert "--data DIR" in text  # what is missing is said
+    assert (out / "fig1_phases.png").stat().st_size > 10_000
+    assert (out / "fig1_phases.csv").read_text(encoding="utf-8").startswith("kx rad/px,")
+    assert "page:" in capsys.readouterr().out
+
+
+def test_the_page_says_where_we_are_worse_first() -> None:
+    from live.characterise.outcome import Verdict
+
+    outcome = Outcome("a", "A", "t", verdicts=(Verdict("x", "p", "better"), Verdict("y", "q", "worse")))
+    said = standing([outcome])
+    assert said.index("**Worse**") < said.index("**Better**")
+    assert "better in 1, equal in 0, worse in 1" in said
+    whole = page([outcome], "phasedic characterise --out a", "")
+    assert "Made by `phasedic characterise --out a`" in whole
+    assert standing([]) == ""
+
+
+@pytest.mark.slow
+def test_ones_own_pattern(tmp_path: Path, picture: Path) -> None:
+    words = [
+        "--pattern",
+        str(picture),
+        "--noise",
+        "2.1",
+        "--burst",
+        "4",
+        "--quick",
+        "--out",
+        str(tmp_path / "out"),
+    ]
+    assert command(parsed(*words, "--target", "400")) == 0
+    text = (tmp_path / "out" / "pattern.md").read_text(encoding="utf-8")
+    assert "no independent truth" in text.replace("\n", " ")
+    assert "Recommendation" in text
+    assert "8 bit" in text
+    assert (tmp_path / "out" / "pattern.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "error", "said"),
+    [
+        (["--pattern", "none.png"], DataError, "none.png"),
+        (["--only", "x"], ConfigError, "not known"),
+        (["--data", "nowhere"], ConfigError, "nowhere"),
+        (["--pattern", "mine.png", "--noise", "-1"], ConfigError, "--noise"),
+        (["--pattern", "mine.png", "--burst", "0"], ConfigError, "--burst"),
+        (["--pattern", "mine.png", "--target", "0"], ConfigError, "--target"),
+        (["--pattern", "mine.png", "--roi", "0,0,900,9"], ConfigError, "leaves the picture"),
+        (["--pattern", "mine.png", "--roi", "a"], ConfigError, "four whole numbers"),
+        (["--pattern", "mine.png", "--roi", "0,0,20,20"], DataError, "too few"),
+    ],
+)
+def test_refusals(
+    tmp_path: Path,
+    picture: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    words: list[str],
+    error: type[Exception],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(error, match=said):
+        command(parsed(*words, "--out", "out"))
+
+
+def test_a_blank_picture_is_refused(tmp_path: Path) -> None:
+    import cv2
+
+    cv2.imwrite(str(tmp_path / "blank.png"), np.full((120, 120), 90, np.uint8))
+    with pytest.raises(DataError, match="no pattern"):
+        command(parsed("--pattern", str(tmp_path / "blank.png"), "--quick", "--out", str(tmp_path / "out")))
+
+
+@pytest.fixture
+def session(tmp_path: Path) -> Path:
+    camera = replace(CAMERA, width=128, height=96)
+    speckle = Speckle((96, 128), 2.0, seed=9)
+    path = tmp_path / "run.h5"
+    with writer(path, camera, config={"measure": {"zoi": 32, "step": 16}}) as out:
+        for number, shift in enumerate((0.0, 0.4)):
+            image = np.rint(speckle.fast(Affine(shift, -shift)) * 4095).astype(np.uint16)
+            out.write_frame(frame(number, camera, image=frozen(image)))
+    return path
+
+
+def inspected(*words: str) -> argparse.Namespace:
+    parser = argparse.ArgumentParser()
+    add_inspect(parser)
+    return parser.parse_args(words)
+
+
+def test_inspect_draws_one_zoi(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "zoi.png"
+    words = [str(session), "--zoi", "1,2", "--frame", "1", "--out", str(out)]
+    assert inspect(inspected(*words)) == 0
+    said = capsys.readouterr().out
+    assert "ZOI 1,2 (32 px at x 36, y 20)" in said
+    assert "u = 0.3" in said or "u = 0.4" in said
+    assert out.stat().st_size > 10_000
+    with pytest.raises(ConfigError, match="nothing is overwritten"):
+        inspect(inspected(*words))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [(["--zoi", "9,9", "--frame", "1"], "rows 0 to"), (["--zoi", "x", "--frame", "1"], "row,column")],
+)
+def test_inspect_refuses(session: Path, tmp_path: Path, words: list[str], said: str) -> None:
+    with pytest.raises(ConfigError, match=said):
+        inspect(inspected(str(session), *words, "--out", str(tmp_path / "new.png")))
+
+
+def test_the_committed_page_links_to_what_is_there() -> None:
+    docs = Path(__file__).parents[2] / "docs"
+    text = (docs / "characterisation.md").read_text(encoding="utf-8")
+    targets = re.findall(r"\]\(([^)]+)\)", text)
+    assert len(targets) > 20
+    for target in targets:
+        assert (docs / target).is_file(), target
+    assert "## Where we stand" in text

@@ -1,0 +1,84 @@
+"""Maps as PNG: drawn, treated only on request, and refused with words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from acquire.errors import ConfigError
+from analysis import Roi, ZoiGrid
+from hw_mocks.deformation import Affine
+from hw_mocks.speckle import Speckle
+from live.cli import main
+from live.maps.map import Picture, draw
+from live.results.reader import Strain
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("maps")
+    speckle = Speckle((160, 192), radius=2.0, seed=3)
+    for i, strain in enumerate((0.0, 1e-3)):
+        picture = 255 * speckle.render(Affine(dv_dy=strain, x0=96, y0=80), (160, 192))
+        cv2.imwrite(str(folder / f"a{i}.png"), np.rint(picture).astype(np.uint8))
+    arguments = ["--zoi", "48", "--step", "8", "--no-view", "--no-rrd", "--out", str(folder / "out")]
+    assert main(["replay", f"files:{folder}/*.png", *arguments]) == 0
+    return folder
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        ["--field", "eyy"],
+        ["--field", "v", "--over", "a0.png"],
+        ["--field", "status"],
+        ["--field", "sigma_eyy", "--row", "0", "--limit", "1e-3"],
+        ["--field", "eyy", "--median", "3", "--low-pass", "9", "--deconvolve", "2"],
+    ],
+)
+def test_a_picture_comes_out(results: Path, tmp_path: Path, more: list[str]) -> None:
+    more = [str(results / word) if word.endswith(".png") else word for word in more]
+    png = tmp_path / "map.png"
+    assert main(["map", str(results / "out" / "strain.h5"), str(png), *more]) == 0
+    drawn = cv2.imread(str(png))
+    assert min(drawn.shape[:2]) > 300
+    assert drawn.std() > 5
+
+
+def test_what_was_done_is_named() -> None:
+    grid = ZoiGrid.cover(Roi(0, 0, 192, 160), 48, 8)
+    assert Picture("eyy").treatment(grid) == ""
+    named = Picture("eyy", median=3, low_pass_px=9, deconvolution=3).treatment(grid)
+    assert named == "deconvolved, 3 steps: l_10% 62 px, noise x 0.86, median 3 x 3, low-pass 9 px"
+    assert Picture("u", deconvolution=3).treatment(grid) == "deconvolved, 3 steps: l_10% 62 px, noise x 1.05"
+
+
+@pytest.mark.parametrize(
+    ("key", "value"), [("order", 2), ("window", "uniform"), ("estimator", "phase")], ids=str
+)
+def test_only_a_known_blur_is_taken_off(results: Path, key: str, value: object) -> None:
+    with Strain.open(results / "out" / "strain.h5") as strain:
+        strain.config.setdefault("measure", {})[key] = value
+        with pytest.raises(ConfigError, match=f"only maps measured with {key} = .* can be deconvolved"):
+            draw(strain, Picture("eyy", deconvolution=3), None)
+
+
+@pytest.mark.parametrize(
+    ("more", "code", "says"),
+    [
+        (["--field", "ezz"], 4, "no map 'ezz'"),
+        (["--row", "7"], 4, "no row 7"),
+        (["--field", "status", "--median", "3"], 2, "neither filtered nor deconvolved"),
+        (["--deconvolve", "-1"], 2, "must not be negative"),
+        (["--field", "sigma_eyy", "--deconvolve", "3"], 2, "has no blur"),
+    ],
+)
+def test_refusals(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], code: int, says: str
+) -> None:
+    assert main(["map", str(results / "out" / "strain.h5"), str(tmp_path / "x.png"), *more]) == code
+    assert says in capsys.readouterr().err
+    assert not (tmp_path / "x.png").exists()

@@ -1,0 +1,260 @@
+"""strain.h5 and strain.csv: what is written comes back, also after a kill; forces wait for their load."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from acquire.errors import DataError
+from acquire.load_cell.log import LoadLog
+from acquire.load_sample import LoadSample
+from live.results import reader as results_reader
+from live.results.strain_csv import COLUMNS
+from live.results.writer import HOLD_S, Results, Strain
+from tests.live.made_up import CAMERA, START, make_grid, make_loads, make_measurement
+
+
+def open_results(folder: Path, loads: LoadLog | None = None, **more: Any) -> Results:
+    return Results(
+        folder,
+        grid=make_grid(),
+        start_monotonic=START,
+        start_utc="2030-01-02T03:04:05+00:00",
+        loads=make_loads(10.0, lambda t: 100.0 * t) if loads is None else loads,
+        config={"measure": {"zoi": 32}},
+        metadata={"specimen": "S1"},
+        versions={"phasedic": "0.1.0"},
+        camera=CAMERA,
+        **more,
+    )
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_what_was_written_comes_back(tmp_path: Path) -> None:
+    with open_results(tmp_path) as results:
+        for k in range(5):
+            results.add(make_measurement(k, 1e-3 * k))
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        assert strain.n == 5
+        assert not strain.unfinished
+        assert strain.start_utc == "2030-01-02T03:04:05+00:00"
+        assert strain.config == {"measure": {"zoi": 32}}
+        assert strain.metadata == {"specimen": "S1"}
+        assert strain.grid.size == 32
+        np.testing.assert_array_equal(strain.grid.active, make_grid().active)
+        np.testing.assert_allclose(strain.time_s, 0.1 * np.arange(5), atol=1e-12)
+        np.testing.assert_allclose(strain.values["force_N"], 10.0 * np.arange(5), atol=1e-6)
+        np.testing.assert_allclose(strain.values["eyy"], 1e-3 * np.arange(5))
+        field = make_measurement(4, 4e-3).field
+        for name in ("u", "v", "dv_dy", "exx", "eyy", "exy", "sigma_eyy", "sigma_u", "residual"):
+            np.testing.assert_array_equal(strain.maps(name, 4), getattr(field, name).astype(np.float32), name)
+        np.testing.assert_array_equal(strain.maps("status", 4), field.status)
+        assert strain.maps("exx").shape == (5, *strain.grid.shape)
+        assert len(strain.maps("exx", slice(1, 3))) == 2
+
+
+def test_the_table_has_the_columns_scripts_rely_on(tmp_path: Path) -> None:
+    with open_results(tmp_path) as results:
+        results.add(make_measurement(3, 2e-3))
+    first = "frame,time_s,force_N,exx,eyy,exy,sigma_exx,sigma_eyy,sigma_exy,n_valid,n_zoi"
+    text = (tmp_path / "strain.csv").read_text()
+    assert text.startswith(first)
+    (row,) = rows_of(tmp_path / "strain.csv")
+    n_active = int(make_grid().active.sum())
+    assert (row["frame"], row["last_frame"], row["n_frames"], row["lost"]) == ("24", "31", "8", "1")
+    assert (int(row["n_valid"]), int(row["n_zoi"])) == (n_active - 1, n_active)
+    assert float(row["eyy"]) == pytest.approx(2e-3, rel=1e-9)
+    assert float(row["sigma_eyy"]) == pytest.approx(make_measurement(0).field.mean("eyy")[1], rel=1e-8)
+    assert float(row["force_N"]) == pytest.approx(30.0, rel=1e-6)
+
+
+def test_table_and_maps_say_the_same(tmp_path: Path) -> None:
+    with open_results(tmp_path, area_m2=4e-5) as results:
+        for k in range(3):
+            results.add(make_measurement(k, 1e-4 + 1e-3 * k))
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        for k, row in enumerate(rows_of(tmp_path / "strain.csv")):
+            for column in (*COLUMNS, "stress_Pa"):
+                assert float(row[column]) == pytest.approx(float(strain.values[column][k]), rel=1e-9), column
+        np.testing.assert_allclose(strain.values["stress_Pa"], strain.values["force_N"] / 4e-5)
+
+
+def test_another_measure_of_strain(tmp_path: Path) -> None:
+    with open_results(tmp_path, strain_measure="green") as results:
+        results.add(make_measurement(0, 0.02))
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        assert strain.strain_measure == "green"
+        assert strain.values["eyy"][0] == pytest.approx(0.02 + 0.02**2 / 2)
+        assert np.nanmax(strain.maps("eyy", 0)) == pytest.approx(0.0202, rel=1e-6)
+
+
+def test_a_row_waits_for_its_force(tmp_path: Path) -> None:
+    loads = make_loads(0.15, lambda t: 100.0 * t)
+    with open_results(tmp_path, loads) as results:
+        results.add(make_measurement(0))
+        results.add(make_measurement(1))
+        results.add(make_measurement(2))
+        assert (results.written, results.held) == (2, 1)
+        for k in range(16, 40):
+            loads.append(LoadSample(START + k / 100, float(k)))
+        results.add(make_measurement(3))
+        assert results.held == 0
+    forces = [float(row["force_N"]) for row in rows_of(tmp_path / "strain.csv")]
+    np.testing.assert_allclose(forces, [0.0, 10.0, 20.0, 30.0], atol=1e-6)
+
+
+def test_a_silent_load_cell_holds_rows_back_only_so_long(tmp_path: Path) -> None:
+    with open_results(tmp_path, LoadLog()) as results:
+        for k in range(40):
+            results.add(make_measurement(k))
+            assert results.held <= HOLD_S / 0.1 + 1
+        assert results.written == 40 - results.held > 10
+    rows = rows_of(tmp_path / "strain.csv")
+    assert len(rows) == 40
+    assert all(row["force_N"] == "nan" for row in rows)
+
+
+def test_nothing_is_overwritten(tmp_path: Path) -> None:
+    (tmp_path / "strain.csv").write_text("precious")
+    with pytest.raises(DataError, match=r"strain\.csv exists already"):
+        open_results(tmp_path)
+    assert (tmp_path / "strain.csv").read_text() == "precious"
+    assert not (tmp_path / "strain.h5").exists()
+
+
+def test_a_disk_that_takes_no_more_is_told_and_spoils_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = open_results(tmp_path)
+    results.add(make_measurement(0))
+
+    def full(*_: object) -> None:
+        raise RuntimeError("unable to flush: no space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(h5py.File, "flush", full)
+        with pytest.raises(DataError, match=r"strain\.h5: cannot be written .*no space.* 1 rows"):
+            results.add(make_measurement(1))
+    results.close()
+    results.close()
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        assert strain.n >= 1
+
+
+def test_nexus_viewers_find_the_default_plot(tmp_path: Path) -> None:
+    with open_results(tmp_path) as results:
+        results.add(make_measurement(0))
+    with h5py.File(tmp_path / "strain.h5") as file:
+        assert (file.attrs["format"], file.attrs["format_version"]) == ("phasedic-strain", 1)
+        assert file.attrs["NX_class"] == "NXroot"
+        entry = file[file.attrs["default"]]
+        assert entry.attrs["NX_class"] == "NXentry"
+        data = entry[entry.attrs["default"]]
+        assert data.attrs["NX_class"] == "NXdata"
+        signal = data[data.attrs["signal"]]
+        assert [len(data[axis]) for axis in data.attrs["axes"]] == list(signal.shape)
+        assert len(data["force_N"]) == len(data["frame"]) == 1
+        for name, item in data.items():
+            assert "units" in item.attrs, name
+        words = json.loads(data["status"].attrs["meaning"])
+        assert words["0"].startswith("OK")
+
+
+WRITER = """
+import itertools, sys
+from pathlib import Path
+from tests.live.made_up import make_measurement
+from tests.live.test_results import open_results
+results = open_results(Path(sys.argv[1]))
+for k in itertools.count():
+    results.add(make_measurement(k, 1e-5 * k))
+    print(k, flush=True)
+"""
+
+
+def test_a_killed_writer_leaves_all_its_rows(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", WRITER, str(tmp_path)]
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[2]
+    ) as writer:
+        assert writer.stdout is not None
+        last = next(int(line) for line in writer.stdout if int(line) >= 20)
+        os.kill(writer.pid, signal.SIGKILL)
+        last = max([last, *(int(line) for line in writer.stdout)])
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        assert strain.unfinished
+        assert strain.n in (last + 1, last + 2)
+        np.testing.assert_allclose(strain.values["eyy"], 1e-5 * np.arange(strain.n), rtol=1e-6, atol=1e-12)
+        assert np.isfinite(strain.maps("eyy")[:, 1, 1]).all()
+    assert len(rows_of(tmp_path / "strain.csv")) >= last + 1
+
+
+def test_what_is_not_ours_is_refused_in_words(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="no such file"):
+        Strain.open(tmp_path / "missing.h5")
+    text = tmp_path / "text.h5"
+    text.write_text("hello")
+    with pytest.raises(DataError, match="not an HDF5 file"):
+        Strain.open(text)
+    foreign = tmp_path / "foreign.h5"
+    with h5py.File(foreign, "w") as file:
+        file["x"] = 1
+    with pytest.raises(DataError, match="something else, not phasedic-strain"):
+        Strain.open(foreign)
+    with h5py.File(foreign, "a") as file:
+        file.attrs["format"], file.attrs["format_version"] = "phasedic-strain", 1
+    with pytest.raises(DataError, match="damaged"):
+        Strain.open(foreign)
+    with h5py.File(foreign, "a") as file:
+        file.attrs["format_version"] = 2
+    with pytest.raises(DataError, match="version 2, this program reads up to 1; update"):
+        Strain.open(foreign)
+
+
+def test_a_truncated_file_is_refused_in_words(tmp_path: Path) -> None:
+    with open_results(tmp_path) as results:
+        for k in range(5):
+            results.add(make_measurement(k))
+    path = tmp_path / "strain.h5"
+    with path.open("r+b") as file:
+        file.truncate(path.stat().st_size // 3)
+    with pytest.raises(DataError, match=r"strain\.h5"):
+        Strain.open(path)
+
+
+def test_an_unfinished_file_that_lost_its_end_does_not_hang(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    results = open_results(tmp_path)
+    for k in range(5):
+        results.add(make_measurement(k))
+    torn = tmp_path / "torn.h5"
+    torn.write_bytes((tmp_path / "strain.h5").read_bytes()[:30_000])
+    results.close()
+    monkeypatch.setattr(results_reader, "PROBE_S", 2.0)
+    with pytest.raises(DataError, match=r"torn\.h5.* (damaged|truncated)"):
+        Strain.open(torn)
+
+
+def test_unknown_maps_and_rows_are_refused(tmp_path: Path) -> None:
+    with open_results(tmp_path) as results:
+        results.add(make_measurement(0))
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        with pytest.raises(DataError, match="no map 'ezz'"):
+            strain.maps("ezz")
+        with pytest.raises(DataError, match="no row 1"):
+            strain.maps("exx", 1)

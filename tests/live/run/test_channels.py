@@ -1,0 +1,88 @@
+"""Mailbox and buffer: newest wins, bounded, everything counted."""
+
+from __future__ import annotations
+
+import threading
+
+from live.run.channels import ByteBuffer, Mailbox
+
+
+def test_newest_wins_and_the_rest_is_counted() -> None:
+    box: Mailbox[int] = Mailbox()
+    for i in range(5):
+        box.put(i)
+    assert box.get(0) == 4
+    assert box.take_skipped() == [0, 1, 2, 3]
+    assert box.take_skipped() == []
+    assert box.get(0) is None
+
+
+def test_a_closed_mailbox_gives_what_lies_there() -> None:
+    box: Mailbox[int] = Mailbox()
+    box.put(1)
+    box.close()
+    assert not box.finished
+    assert box.get() == 1
+    assert box.finished
+    assert box.get() is None
+    box.put(2)
+    assert box.take_skipped() == [2]
+
+
+def test_a_waiting_mailbox_skips_nothing() -> None:
+    box: Mailbox[int] = Mailbox(waits=True)
+
+    def produce() -> None:
+        for i in range(200):
+            box.put(i)
+        box.close()
+
+    thread = threading.Thread(target=produce)
+    thread.start()
+    taken = []
+    while not box.finished:
+        item = box.get(1.0)
+        if item is not None:
+            taken.append(item)
+    thread.join()
+    assert taken == list(range(200))
+    assert box.take_skipped() == []
+
+
+def test_closing_frees_a_waiting_producer() -> None:
+    box: Mailbox[int] = Mailbox(waits=True)
+    box.put(1)
+    thread = threading.Thread(target=box.put, args=(2,))
+    thread.start()
+    box.close()
+    thread.join(5)
+    assert not thread.is_alive()
+    assert box.take_skipped() == [2]
+
+
+def test_the_buffer_is_bounded_in_bytes() -> None:
+    buffer: ByteBuffer[str] = ByteBuffer(100)
+    assert buffer.put("a", 60)
+    assert not buffer.put("b", 60)
+    assert buffer.put("c", 40)
+    assert buffer.put("small", 500, always=True)
+    assert buffer.waiting_bytes == 600
+    assert [buffer.get(0), buffer.get(0), buffer.get(0), buffer.get(0)] == ["a", "c", "small", None]
+    assert buffer.put("large", 1000)  # an empty one takes anything, else it would never be written
+    buffer.close()
+    assert not buffer.put("late", 1)
+    assert buffer.get() == "large"
+    assert buffer.finished
+
+
+def test_a_waiting_buffer_loses_nothing() -> None:
+    buffer: ByteBuffer[int] = ByteBuffer(3, waits=True)
+    thread = threading.Thread(target=lambda: [buffer.put(i, 1) for i in range(100)] and buffer.close())
+    thread.start()
+    taken = []
+    while not buffer.finished:
+        item = buffer.get(1.0)
+        if item is not None:
+            taken.append(item)
+    thread.join()
+    assert taken == list(range(100))

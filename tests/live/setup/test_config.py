@@ -1,0 +1,100 @@
+"""The configuration: what is read, what is refused, and what the refusal says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquire.errors import ConfigError
+from live.setup.config import Config, from_dict, load_config, settings_in
+
+
+def written(folder: Path, text: str) -> Path:
+    path = folder / "rig.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_file_and_command_line(tmp_path: Path) -> None:
+    path = written(
+        tmp_path, "[measure]\nzoi = 32\nstep = 8\nroi = [0, 0, 100, 90]\n[metadata]\noperator = 'J'\n"
+    )
+    config = load_config(path, {"measure.zoi": 48, "camera.address": "sim:"})
+    assert (config.measure.zoi, config.measure.step, config.measure.roi) == (48, 8, (0, 0, 100, 90))
+    assert config.camera.address == "sim:"
+    assert config.metadata == {"operator": "J"}
+
+
+def test_stored_configuration_comes_back() -> None:
+    config = load_config(None, {"measure.burst": 3, "specimen.width_mm": 10.0, "metadata.note": "x"})
+    assert from_dict(config.as_dict(), {}, "a session") == config
+
+
+def test_a_file_sets_only_what_it_says(tmp_path: Path) -> None:
+    assert settings_in(written(tmp_path, "[measure]\nzoi = 32\n")) == {"measure.zoi": 32}
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[measure]\nzio = 32\n", "measure.zio (did you mean zoi?)"),
+        ("[mesure]\nzoi = 32\n", "[mesure] (did you mean measure?)"),
+        ("[measure]\nzoi = 'big'\n", "measure.zoi = 'big' is not possible; allowed: a whole number from 8"),
+        ("[measure]\nburst = 0\n", "measure.burst = 0 is not possible"),
+        ("[measure]\nzoi = true\n", "measure.zoi = True"),
+        ("[measure]\nroi = [1, 2, 3]\n", "four whole numbers"),
+        ("[measure]\nroi = [-1, 2, 3, 4]\n", "from 0"),
+        ("[measure]\nwindow = 'hann'\n", "one of 'gaussian', 'uniform', 'tukey', 'bi-triangular'"),
+        ("[record]\nmode = 'every=0'\n", "every=K"),
+        ("[specimen]\nwidth_mm = nan\n", "specimen.width_mm"),
+        ("[load]\nmax_gap_s = inf\n", "load.max_gap_s"),
+        ("measure = 3\n", "must be a section"),
+        ("[metadata]\nx = [1]\n", "metadata.x"),
+        ("[measure\n", "not valid TOML"),
+    ],
+)
+def test_refusals_name_the_key_and_what_is_allowed(tmp_path: Path, text: str, says: str) -> None:
+    with pytest.raises(ConfigError) as caught:
+        load_config(written(tmp_path, text), {})
+    assert says in str(caught.value)
+    assert "rig.toml" in str(caught.value)
+
+
+def test_missing_and_binary_files(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="no such configuration file"):
+        load_config(tmp_path / "none.toml", {})
+    binary = tmp_path / "b.toml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ConfigError, match="cannot be read"):
+        load_config(binary, {})
+
+
+@given(st.text(max_size=200))
+def test_any_text_gives_a_configuration_or_a_clear_refusal(text: str) -> None:
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "x.toml"
+        path.write_text(text, encoding="utf-8", errors="replace")
+        try:
+            assert isinstance(load_config(path, {}), Config)
+        except ConfigError as error:
+            assert "x.toml" in str(error)
+
+
+@given(
+    st.recursive(
+        st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+        lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+    )
+)
+def test_any_value_of_a_stored_key_is_taken_or_refused(value: Any) -> None:
+    for key in ("zoi", "roi", "mask", "window", "noise_GL"):
+        try:
+            from_dict({"measure": {key: value}}, {}, "a session")
+        except ConfigError as error:
+            assert f"measure.{key}" in str(error)

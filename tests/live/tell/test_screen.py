@@ -1,0 +1,116 @@
+"""Screen, operator, ledger, journal and numbers in words."""
+
+from __future__ import annotations
+
+import io
+import math
+from typing import Any
+
+import pytest
+
+from acquire.events import Event, EventKind
+from live.operate.keyboard import Operator, listen
+from live.tell.journal import Journal
+from live.tell.ledger import Ledger
+from live.tell.screen import Screen
+from live.tell.summary import quantity
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+class Gone(Terminal):
+    def write(self, text: str) -> int:
+        raise OSError(5, "Input/output error")
+
+
+def test_the_status_line_is_renewed_in_place_and_not_too_often() -> None:
+    now = [0.0]
+    stream = Terminal()
+    screen = Screen(stream, now=lambda: now[0])
+    screen.status("one long line")
+    screen.status("too early")
+    now[0] = 1.0
+    screen.status("two")
+    screen.say("stays")
+    assert stream.getvalue() == "one long line\rtwo          \r   \rstays\n"
+
+
+def test_a_lost_terminal_does_not_matter() -> None:
+    screen = Screen(Gone())
+    screen.say("nobody reads this")
+    screen.say("nor this")
+
+
+class FakeLive:
+    def __init__(self) -> None:
+        self.calls: list[Any] = []
+
+    def stop(self, reason: str) -> None:
+        self.calls.append(("stop", reason))
+
+    def command(self, kind: EventKind, note: str = "") -> None:
+        self.calls.append((kind, note))
+
+
+def test_the_keys() -> None:
+    live, stream = FakeLive(), io.StringIO()
+    operator = Operator(live, Screen(stream))  # type: ignore[arg-type]
+    for line in ("r\n", "t", "p", "p", "n slipped in the grip", "", "x", "q"):
+        operator.line(line)
+    assert live.calls == [
+        (EventKind.NEW_REFERENCE, ""),
+        (EventKind.TARE, ""),
+        (EventKind.PAUSE, ""),
+        (EventKind.RESUME, ""),
+        (EventKind.NOTE, "slipped in the grip"),
+        ("stop", "ended by the operator"),
+    ]
+    assert "keys" in stream.getvalue()
+
+
+def test_only_a_terminal_is_listened_to() -> None:
+    assert listen(FakeLive(), io.StringIO("q\n"), Screen(io.StringIO())) is None  # type: ignore[arg-type]
+    assert listen(FakeLive(), None, Screen(io.StringIO())) is None  # type: ignore[arg-type]
+    live = FakeLive()
+    thread = listen(live, Terminal("q\n"), Screen(io.StringIO()))  # type: ignore[arg-type]
+    assert thread is not None
+    thread.join(5)
+    assert live.calls == [("stop", "ended by the operator")]
+
+
+def test_the_ledger_tells_when_it_does_not_add_up() -> None:
+    ledger = Ledger()
+    ledger.add(grabbed=10, measured=6, skipped=2, reference=1, left_out=1, recorded=10)
+    assert ledger.adds_up
+    assert not ledger.loss
+    ledger.add(grabbed=1)
+    assert not ledger.adds_up
+    assert "DOES NOT ADD UP" in ledger.line()
+    ledger.add(left_out=1, unrecorded=1)
+    assert ledger.adds_up
+    assert ledger.loss
+
+
+def test_late_listeners_hear_everything_once() -> None:
+    journal, heard = Journal(), []
+    journal(Event(1.0, EventKind.DEVICE, "a", "first"))
+    journal.add_listener(heard.append)
+    journal(Event(2.0, EventKind.LOST, "a", "second", "warning"))
+    assert [event.text for event in heard] == ["first", "second"]
+    assert [event.text for event in journal.events("warning")] == ["second"]
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "says"),
+    [
+        (70.123456, 0.0234, "70.123 +- 0.023 GPa"),
+        (70.1, math.nan, "70.1 GPa"),
+        (math.nan, 1.0, "not known"),
+        (123456.0, 1200.0, "123456 +- 1200 GPa"),
+    ],
+)
+def test_quantities_have_the_digits_they_deserve(value: float, sigma: float, says: str) -> None:
+    assert quantity(value, sigma, "GPa") == says

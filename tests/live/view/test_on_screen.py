@@ -1,0 +1,34 @@
+"""The viewer itself opens what we draw, without a complaint in any of its views; needs a graphics stack."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from live.view.layout import blueprint
+from live.view.setup import STRAINS
+from tests.live.view.screenshot import ViewerGone, screenshot
+from tests.live.view.test_rerun_view import Rates, draw_a_test, make_setup, scene_into
+
+pytestmark = pytest.mark.slow
+
+
+def test_the_viewer_shows_every_view_without_complaint(tmp_path: Path) -> None:
+    setup = make_setup(area_m2=4e-5)
+    path, shot = tmp_path / "view.rrd", tmp_path / "shot.png"
+    with scene_into(path, Rates(5.0, 5.0, 80, 1280), setup) as scene:
+        scene.stream.send_blueprint(blueprint(setup))
+        scene.status("**all is well**")
+        draw_a_test(scene)
+    try:
+        state = screenshot(str(path), shot, size="1200x800", settle_s=3.0)
+    except ViewerGone as reason:
+        pytest.skip(str(reason))
+    views = {view.name: view for view in state.views}
+    assert {"Camera", "Stress – strain", "Status", "Events", *(f"Strain {name}" for name in STRAINS)} <= set(
+        views
+    )
+    assert [(name, view.reports) for name, view in views.items() if view.reports] == []
+    assert {line.name for line in state.recordings[0].timelines} >= {"time"}
+    assert shot.stat().st_size > 30_000
