@@ -4,23 +4,20 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import importlib
 import logging
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from acquire.errors import PhasedicError
-from live.commands.arguments import make_parser
-
-Command = Callable[[argparse.Namespace], int]
+from live.commands.arguments import Command, parse
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
-    arguments = make_parser().parse_args(argv)
+    command, arguments = parse(sys.argv[1:] if argv is None else argv)
     _set_up_logging(arguments)
-    code = _outcome(arguments)
+    code = _outcome(command, arguments)
     _let_go_of_lost_streams()
     return code
 
@@ -48,17 +45,10 @@ def _set_up_logging(arguments: argparse.Namespace) -> None:
         logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.INFO)
 
 
-def _command(start: str) -> Command:
-    """The function that ``start`` names as module:function."""
-    module, _, name = start.partition(":")
-    command: Command = getattr(importlib.import_module(module), name)
-    return command
-
-
-def _outcome(arguments: argparse.Namespace) -> int:
+def _outcome(command: Command, arguments: argparse.Namespace) -> int:
     """Run the command; what it raises becomes a message and an exit code."""
     try:
-        return _command(arguments.start)(arguments)
+        return command(arguments)
     except PhasedicError as error:
         print(f"phasedic: {error}", file=sys.stderr)
         return error.exit_code

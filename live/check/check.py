@@ -13,7 +13,6 @@ from acquire.frame import CameraInfo, Frame
 from live.measure import Reference, ReferenceTaker
 from live.setup import DEFAULT_REFERENCE_BURST, Config, open_rig
 
-NOT_READY = 6
 FEWEST = 8  # frames
 RADIUS_PX = (1.2, 6.0)
 MOST_CLIPPED, MOST_FLICKER, LEAST_CONTRAST, MOST_WITHOUT_PATTERN = 1e-4, 0.01, 0.05, 0.02

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from acquire.errors import DataError
 from acquire.frame import CameraInfo
 from live.check.check import LEAST_CONTRAST, MOST_CLIPPED, MOST_FLICKER, MOST_WITHOUT_PATTERN, RADIUS_PX
 from live.measure import Reference, averaged, frame_noise, prepare
@@ -87,9 +88,10 @@ def _floor(taken: Reference, camera: CameraInfo, config: Config, target: float |
     grid = grid_for(config, camera.width, camera.height, mask)
     assert taken.halves is not None
     first, second = taken.halves
+    settings = kernel_settings(config)
     try:
-        kernel, noise = prepare(first, grid, kernel_settings(config), config.measure.noise_GL)
-    except ValueError as error:
+        kernel, noise = prepare(first, grid, settings, config.measure.noise_GL)
+    except DataError as error:
         return [Line("pattern", str(error), False, "spray a pattern, set focus and exposure")]
     field = kernel.measure(second.mean, noise=averaged(noise, second.n))
     lost = 1 - float(np.isfinite(field.u).sum()) / max(int(grid.active.sum()), 1)

@@ -3,20 +3,28 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from acquire.errors import ConfigError
-from live.check.check import NOT_READY, take
+from live.check.check import take
 from live.check.judge import judge
-from live.commands.overrides import overrides
-from live.setup import load_config
+from live.commands.exit_codes import NOT_READY
+from live.commands.options import add_measure, add_options, configured
 from live.tell import Screen
 
 
-def check(arguments: argparse.Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic check``."""
+    add_options(parser, "camera", "camera", "crop")
+    parser.add_argument(
+        "--target", type=float, metavar="UM_M", help="strain noise of one ZOI that is needed, um/m"
+    )
+    add_measure(parser)
+
+
+def command(arguments: argparse.Namespace) -> int:
     """Run the check; 0 ready, 6 not ready."""
     screen = Screen()
-    config = load_config(Path(arguments.config) if arguments.config else None, overrides(arguments))
+    config = configured(arguments)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")
     taken, means, camera = take(config)

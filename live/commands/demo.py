@@ -16,11 +16,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from live.commands.overrides import overrides
+from live.commands.options import add_measure, add_options, configured
 from live.commands.run import conclude, run_to_the_end
 from live.measure import Measurement
-from live.run import LiveRun, Outcome
-from live.setup import Config, load_config
+from live.outputs import Consumer
+from live.run import Outcome
+from live.setup import Config
 from live.tell import Screen, evaluate, quantity
 
 if TYPE_CHECKING:
@@ -33,30 +34,32 @@ RELATIVE = 0.003  # of the strain, beside three times the predicted uncertainty
 LEAST_WITHIN = 0.97  # 99 % are to be expected; of 150 values, chance takes one in a few runs below that
 
 
-def demo(arguments: argparse.Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic demo``."""
+    parser.add_argument("--specimen", default="woven", help="woven (default), uniform or hole")
+    words = "frame rate of the simulated camera (default: what this machine renders, at most 30)"
+    parser.add_argument("--fps", type=float, help=words)
+    add_options(parser, "time", "seconds")
+    add_measure(parser)
+
+
+def command(arguments: argparse.Namespace) -> int:
     """Run the demo; the exit code of the run, or 1 where it missed the truth."""
     screen = Screen()
-    config = load_config(_config_file(arguments), {**_defaults(arguments), **overrides(arguments)})
-    live = LiveRun(config, screen)
+    config = configured(arguments, _defaults(arguments))
     kept = Kept()
-    live.watch(kept.add)
-    outcome = run_to_the_end(live, screen)
-    conclude(outcome, live, screen)
+    outcome = run_to_the_end(config, screen, [kept])
+    conclude(outcome, screen)
     if outcome.rig.specimen is None or not kept.measurements:
         return outcome.exit_code
     agreed = compare(outcome, kept, config, screen.say)
     return outcome.exit_code if agreed else outcome.exit_code or 1
 
 
-def _config_file(arguments: argparse.Namespace) -> Any:
-    from pathlib import Path
-
-    return Path(arguments.config) if arguments.config else None
-
-
 def _defaults(arguments: argparse.Namespace) -> dict[str, Any]:
     section = WIDTH_MM * THICKNESS_MM
-    seconds = f"&seconds={arguments.seconds:g}" if arguments.seconds else ""
+    given = getattr(arguments, "output.seconds")
+    seconds = f"&seconds={given:g}" if given else ""
     fps = "auto" if arguments.fps is None else f"{arguments.fps:g}"
     return {
         "camera.address": (
@@ -80,18 +83,27 @@ class Instance:
     sigma: tuple[float, float, float]
 
 
-class Kept:
+class Kept(Consumer):
     """Collects what the comparison needs."""
+
+    name = "comparison with the truth"
+    blocks = False
 
     def __init__(self) -> None:
         self.measurements: list[Instance] = []
 
-    def add(self, m: Measurement) -> None:
+    def measurement(self, measurement: Measurement) -> None:
         """Keep means, sigmas and which ZOIs they are over."""
-        pairs = [m.field.mean(name) for name in ("exx", "eyy", "exy")]
-        (xx, s_xx), (yy, s_yy), (xy, s_xy) = pairs
+        m, i = measurement, measurement.instant
         times = m.t + np.linspace(-0.5, 0.5, m.burst.n) * m.burst.duration
-        self.measurements.append(Instance(times, np.isfinite(m.field.exx), (xx, yy, xy), (s_xx, s_yy, s_xy)))
+        self.measurements.append(
+            Instance(
+                times,
+                np.isfinite(m.field.exx),
+                (i.exx, i.eyy, i.exy),
+                (i.sigma_exx, i.sigma_eyy, i.sigma_exy),
+            )
+        )
 
 
 class ZoiTruth:
@@ -164,7 +176,7 @@ def compare(outcome: Outcome, kept: Kept, config: Config, say: Callable[[str], N
     say("against the simulated truth (elastic part; exx, eyy, exy):")
     agreed = _say_strain(np.array(ratios), np.array(errors), say)
     _say_force(outcome, specimen, say)
-    figures = evaluate(outcome.outputs.history, outcome.loads, config.specimen)
+    figures = evaluate(outcome.books.history, outcome.books.loads, config.specimen)
     say(f"  E  {quantity(figures.E / 1e9, figures.sigma_E / 1e9, 'GPa')}, true {specimen.E / 1e9:g} GPa")
     say(f"  nu {quantity(figures.nu, figures.sigma_nu, '')}, true {specimen.nu:g}")
     return agreed
@@ -186,7 +198,7 @@ def _say_strain(ratios: Array, errors: Array, say: Callable[[str], None]) -> boo
 
 
 def _say_force(outcome: Outcome, specimen: VirtualSpecimen, say: Callable[[str], None]) -> None:
-    t, force = outcome.loads.arrays()
+    t, force = outcome.books.loads.arrays()
     true = specimen.force(np.array([specimen.elapsed(time) for time in t]))
     error = (force - true)[np.isfinite(force)]
     if error.size:

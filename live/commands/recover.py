@@ -3,11 +3,18 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 
-from live.commands.load import Say
+Say = Callable[[str], None]
 
 
-def recover(arguments: argparse.Namespace, say: Say = print) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic recover``."""
+    parser.add_argument("session")
+    parser.add_argument("--out", metavar="FILE", help="the copy (default: beside it)")
+
+
+def command(arguments: argparse.Namespace, say: Say = print) -> int:
     """``phasedic recover SESSION [--out FILE]``; 5 when something could not be read."""
     from acquire.session import recover as copy
 

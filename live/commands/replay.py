@@ -6,12 +6,22 @@ import argparse
 import threading
 from pathlib import Path
 
-from live.commands.overrides import overrides
+from live.commands.options import add_measure, overrides
 from live.commands.run import signals
 from live.tell import Screen, file_lines, summary_lines
 
 
-def replay_command(arguments: argparse.Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic replay``."""
+    parser.add_argument("source", help="session.h5, 'files:shots/*.tif' or 'video:file.mp4'")
+    parser.add_argument("--as-measured", action="store_true", help="the bursts of the live run, bit-equal")
+    parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin here, seconds")
+    parser.add_argument("--to", dest="end_s", type=float, metavar="S", help="end here, seconds")
+    parser.add_argument("--reference", metavar="FILE", help="reference picture (default: the first)")
+    add_measure(parser)
+
+
+def command(arguments: argparse.Namespace) -> int:
     """``phasedic replay``."""
     from live.replay import ReplayRequest, replay
 
@@ -29,7 +39,7 @@ def replay_command(arguments: argparse.Namespace) -> int:
         done = replay(request, screen, stopping)
     screen.say()
     for line in [
-        *summary_lines(done.outputs.history, done.loads, done.config.specimen),
+        *summary_lines(done.books.history, done.books.loads, done.config.specimen),
         *file_lines(done.folder),
     ]:
         screen.say(line)

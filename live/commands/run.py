@@ -1,4 +1,4 @@
-"""What the commands ``run``, ``replay`` and ``devices`` do; printing and signals are here."""
+"""``phasedic run``: a live test with signals, keyboard and what is printed at its end."""
 
 from __future__ import annotations
 
@@ -6,22 +6,17 @@ import argparse
 import contextlib
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable, Iterator, Sequence
 from types import FrameType
 
-from live.commands.overrides import overrides
-from live.run import LiveRun, Outcome
-from live.setup import load_config
+from live.commands.exit_codes import EXIT_WORDS
+from live.commands.options import add_measure, add_options, configured
+from live.operate import listen
+from live.outputs import Consumer
+from live.run import INTERRUPTED, Outcome, Stop, run_live
+from live.setup import Config
 from live.tell import Screen, file_lines, summary_lines
 from live.view import rerun_command
-
-EXIT_WORDS = {
-    1: "a defect of phasedic, see the log",
-    3: "the camera was lost before the end",
-    5: "finished with loss; the ledger and the events tell what is missing",
-    130: "interrupted; everything was closed cleanly",
-}
 
 
 @contextlib.contextmanager
@@ -47,32 +42,50 @@ def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[No
             signal.signal(number, handler)
 
 
-def run(arguments: argparse.Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic run``."""
+    add_options(
+        parser,
+        "devices and recording",
+        "camera",
+        "load",
+        "no-record",
+        "record",
+        "dark",
+        "flat",
+        "crop",
+        "seconds",
+    )
+    add_measure(parser)
+
+
+def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
-    config = load_config(Path(arguments.config) if arguments.config else None, overrides(arguments))
-    screen = Screen()
-    live = LiveRun(config, screen)
-    outcome = run_to_the_end(live, screen)
-    conclude(outcome, live, screen)
+    config, screen = configured(arguments), Screen()
+    outcome = run_to_the_end(config, screen)
+    conclude(outcome, screen)
     return outcome.exit_code
 
 
-def run_to_the_end(live: LiveRun, screen: Screen) -> Outcome:
+def run_to_the_end(config: Config, screen: Screen, consumers: Sequence[Consumer] = ()) -> Outcome:
     """Run with signals, keyboard and viewer attached."""
-    from live.operate import listen
+    stop = Stop()
+    with signals(lambda: stop.ask(INTERRUPTED), screen.say):
+        return run_live(
+            config, screen, stop=stop, consumers=consumers, hands=lambda live: listen(live, sys.stdin, screen)
+        )
 
-    with signals(lambda: live.stop("interrupted"), screen.say):
-        listen(live, sys.stdin, screen)
-        return live.run()
 
-
-def conclude(outcome: Outcome, live: LiveRun, screen: Screen) -> None:
+def conclude(outcome: Outcome, screen: Screen) -> None:
     """Print the summary, the ledger, the losses and the files."""
     screen.say()
-    for line in summary_lines(outcome.outputs.history, outcome.loads, live.config.specimen):
+    books = outcome.books
+    for line in summary_lines(books.history, books.loads, outcome.config.specimen):
         screen.say(line)
-    screen.say(outcome.ledger.line())
-    troubles = live.journal.events("warning", "error")
+    screen.say(books.ledger.line())
+    for report in outcome.outputs.reports:
+        screen.say(f"  {report.line()}")
+    troubles = books.journal.events("warning", "error")
     if troubles:
         screen.say(
             f"{len(troubles)} warnings and errors, the last: {troubles[-1].source}: {troubles[-1].text}"

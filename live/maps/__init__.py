@@ -4,13 +4,16 @@ PNG.
 
 from live.maps.colours import MICROSTRAIN, AutoRange, Unit, colour, nice_above, number, ramp, ticks, unit_for
 from live.maps.display_filter import PAPER_LOW_PASS, for_display
+from live.maps.map import Picture, draw
 
 __all__ = [
     "MICROSTRAIN",
     "PAPER_LOW_PASS",
     "AutoRange",
+    "Picture",
     "Unit",
     "colour",
+    "draw",
     "for_display",
     "nice_above",
     "number",

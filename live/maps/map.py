@@ -1,16 +1,14 @@
-"""``phasedic map``: a map of the results over a picture, as a PNG to put into a report.
+"""A map of the results over a picture, as a figure to put into a report.
 
 Values are drawn as they were measured, one square a ZOI; filters and deconvolution are options, and
-the title names them. A ZOI that was rejected stays transparent, and ``--field status`` shows why.
+the title names them. A ZOI that was rejected stays transparent, and the field "status" shows why.
 Needs matplotlib (``pip install phasedic[plots]``).
 """
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -48,7 +46,7 @@ class Picture:
     low_pass_px : float, px
         Sigma of a Gaussian filter; 0 for none.
     deconvolution : int
-        Steps that take off the window's blur (``analysis.deconvolution``); 0 for none.
+        Steps that take off the window's blur (``analysis.evaluate.deconvolution``); 0 for none.
     """
 
     field: str
@@ -69,30 +67,6 @@ class Picture:
         words += [f"median {self.median} x {self.median}"] * (self.median > 1)
         words += [f"low-pass {self.low_pass_px:g} px"] * (self.low_pass_px > 0)
         return ", ".join(words)
-
-
-def command(arguments: argparse.Namespace) -> int:
-    """``phasedic map``."""
-    from acquire.opencv import read_image
-
-    background = None if arguments.over is None else read_image(Path(arguments.over), gray="luma")
-    path = Path(arguments.png)
-    if path.exists():
-        raise ConfigError(f"{path} exists and is not overwritten; choose another name")
-    with Strain.open(Path(arguments.results)) as strain:
-        picture = Picture(
-            arguments.field,
-            arguments.row,
-            arguments.limit,
-            arguments.title or "",
-            arguments.median,
-            arguments.low_pass,
-            arguments.deconvolve,
-        )
-        figure = draw(strain, picture, background)
-        figure.savefig(path, dpi=110)
-    print(path)
-    return 0
 
 
 def pyplot() -> Any:

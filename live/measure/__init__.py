@@ -1,11 +1,12 @@
 """The one measuring path, live and in a replay: no thread, file, device or clock.
 
 ``preparation`` makes a kernel of a reference burst (``reference``), ``pipeline`` measures burst after burst
-with a ``tracker``, ``measurement`` is what comes out, ``history`` its means; ``smear`` warns of motion
-within a burst.
+with a ``tracker``, ``measurement`` is what comes out with its means (``instant``, kept in ``history``),
+``settling`` waits for its force; ``smear`` warns of motion within a burst.
 """
 
-from live.measure.history import History, Instant
+from live.measure.history import History
+from live.measure.instant import Instant
 from live.measure.measurement import Measurement
 from live.measure.pipeline import NewReference, measure
 from live.measure.preparation import (
@@ -18,16 +19,20 @@ from live.measure.preparation import (
     usable,
 )
 from live.measure.reference import Reference, ReferenceTaker
+from live.measure.settling import HOLD_S, Loads, Settling
 from live.measure.smear import SmearGuard
 
 __all__ = [
+    "HOLD_S",
     "Correction",
     "History",
     "Instant",
+    "Loads",
     "Measurement",
     "NewReference",
     "Reference",
     "ReferenceTaker",
+    "Settling",
     "SmearGuard",
     "averaged",
     "frame_noise",

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from acquire.frame import Burst
 from analysis.field import StrainField
+from live.measure.instant import Instant, instant_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
-    """A burst, its strain field and the force at its time.
+    """A burst, its strain field, and the means of that with the force at its time.
 
     Attributes
     ----------
@@ -18,19 +19,31 @@ class Measurement:
         0, 1, 2 ... of the measured bursts.
     burst : Burst
     field : StrainField
-    force : float, N
-        At the burst's time by interpolation; NaN where no load is known (yet).
-    measure_s : float, s
-        Time the kernel took, for the status line; 0.0 where nobody measured it.
+    instant : Instant
     """
 
     number: int
     burst: Burst
     field: StrainField
-    force: float
-    measure_s: float = 0.0
+    instant: Instant
+
+    @classmethod
+    def of(
+        cls, number: int, burst: Burst, field: StrainField, force: float, measure_s: float = 0.0
+    ) -> Measurement:
+        """The same with its means; ``force`` (N) is NaN where it is not known, ``measure_s`` the kernel's time."""
+        return cls(number, burst, field, instant_of(burst, field, force, measure_s))
 
     @property
     def t(self) -> float:
         """Time of the burst in monotonic seconds."""
         return self.burst.t
+
+    @property
+    def force(self) -> float:
+        """Force at that time, N; NaN where no load is known (yet)."""
+        return self.instant.force
+
+    def with_force(self, force: float) -> Measurement:
+        """The same once the force is known."""
+        return replace(self, instant=replace(self.instant, force=force))

@@ -15,7 +15,7 @@ from acquire.frame import Burst
 from acquire.load_cell import LoadLog
 from live.measure.measurement import Measurement
 from live.measure.preparation import Correction, unchanged
-from live.measure.tracker import _Tracker
+from live.measure.tracker import Tracker
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
@@ -52,7 +52,7 @@ def measure(
     loads : LoadLog
         Gives the force at a burst's time.
     noise_GL : float or None, GL
-        Noise of one frame; None: estimated by the kernel from the residual.
+        Noise of one frame (``frame_noise``); None: estimated by the kernel from the residual.
     correct : callable
         Takes the fixed pattern of the sensor out of a burst.
     renew_at : float
@@ -68,7 +68,7 @@ def measure(
     Measurement
         One a burst, in order.
     """
-    tracker = _Tracker(kernel, noise_GL, renew_at, on_event)
+    tracker = Tracker(kernel, noise_GL, renew_at, on_event)
     number = 0
     for item in bursts:
         if isinstance(item, NewReference):
@@ -76,5 +76,6 @@ def measure(
             continue
         began = timer()
         field = tracker.measure(correct(item))
-        yield Measurement(number, item, field, loads.force_at(item.t), timer() - began)
+        took = timer() - began
+        yield Measurement.of(number, item, field, loads.force_at(item.t), took)
         number += 1

@@ -19,7 +19,9 @@ log = logging.getLogger(__name__)
 
 def usable(error: ValueError, what: str) -> PhasedicError:
     """An error of the numerics as one with an exit code: no pattern is the data's, the rest is usage."""
-    kind = DataError if type(error).__name__ == "PatternError" else ConfigError
+    from analysis import PatternError
+
+    kind = DataError if isinstance(error, PatternError) else ConfigError
     return kind(f"{what}: {error}")
 
 
@@ -32,9 +34,9 @@ def unchanged(burst: Burst) -> Burst:
 
 
 def frame_noise(burst: Burst, stated_GL: float | None) -> float | None:
-    """The noise of one frame, GL: as measured within the burst, else as stated, else None.
+    """The noise of one frame, GL: as stated, else as measured within the burst, else None.
 
-    A burst without any scatter (noise-free pictures) tells nothing, and what was stated counts.
+    A burst without any scatter (noise-free pictures) tells nothing.
     """
     if stated_GL is not None:
         return stated_GL
@@ -52,19 +54,25 @@ def prepare(
     settings: KernelSettings,
     stated_noise_GL: float | None,
     correct: Correction = unchanged,
+    what: str = "the reference",
 ) -> tuple[PhaseKernel, float | None]:
     """The kernel on ``reference``, and the noise of one frame that goes with it.
 
     Raises
     ------
-    ValueError
-        The grid leaves the picture, or the reference has no pattern.
+    ConfigError
+        The grid leaves the picture.
+    DataError
+        The reference, called ``what`` for a person, has no pattern.
     """
     from analysis import PhaseKernel
 
     noise_GL = frame_noise(reference, stated_noise_GL)
-    kernel = PhaseKernel(correct(reference).mean, grid, settings, noise=averaged(noise_GL, reference.n))
-    return kernel, noise_GL
+    noise = averaged(noise_GL, reference.n)
+    try:
+        return PhaseKernel(correct(reference).mean, grid, settings, noise=noise), noise_GL
+    except ValueError as error:
+        raise usable(error, what) from error
 
 
 def motion_between(

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from analysis import PhaseKernel, StrainField
 
 
-class _Tracker:
+class Tracker:
     """The kernel in force, the field before, and the renewal of the reference.
 
     All of it depends on the bursts alone, so that a replay of the same bursts does the same.

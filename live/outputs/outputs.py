@@ -1,102 +1,88 @@
-"""What is done with each measurement, live or in a replay: results, view, history, screen.
-
-A trouble in one of them stops that one alone, loudly.
-"""
+"""What is done with all that a test gives, live or in a replay: every consumer gets its share."""
 
 from __future__ import annotations
 
-import logging
-import queue
-import threading
-from collections.abc import Callable
+from collections.abc import Sequence
 
-from acquire.errors import PhasedicError
-from acquire.events import EventKind
+from acquire.events import Event, EventKind
 from acquire.frame import Frame
-from live.measure import History, Instant, Measurement
-from live.results import Results
-from live.tell import Journal, Ledger, StatusCard
-from live.view import RerunView
-
-log = logging.getLogger(__name__)
-WAITING = 64  # measurements
+from acquire.load_cell import LoadLog
+from acquire.load_sample import LoadSample
+from live.measure import History, Instant, Measurement, Settling
+from live.outputs.consumer import Consumer, Report
+from live.outputs.worker import Worker
+from live.tell import Journal
 
 
 class Outputs:
-    """Passes each measurement on to those who want it; results are written by a thread of their own.
+    """Passes everything on to all consumers; a trouble in one of them stops that one alone.
 
-    A disk with bad moments holds up the measurement only when ``WAITING`` measurements wait for it,
-    and then nothing is lost: bursts are skipped, and counted, as with any slow measurement.
+    Parameters
+    ----------
+    consumers : sequence of Consumer
+    loads : LoadLog
+        Says when the force of a measurement is final.
+    journal : Journal
+        Told where a consumer fails; its events go to the consumers.
+    history : History
+        Gets the means of every measurement.
+
+    Attributes
+    ----------
+    history : History
     """
 
     def __init__(
-        self,
-        results: Results | None,
-        view: RerunView | None,
-        journal: Journal,
-        card: StatusCard,
-        ledger: Ledger,
+        self, consumers: Sequence[Consumer], loads: LoadLog, journal: Journal, history: History
     ) -> None:
-        self._view, self._journal = view, journal
-        self._card, self._ledger = card, ledger
-        self.history = History()
-        self.failed = False
-        self._waiting: queue.Queue[Measurement | None] = queue.Queue(WAITING)
-        self._writer = threading.Thread(target=self._write_all, args=(results,), name="results", daemon=True)
-        self._writer.start()
+        self.history, self._journal = history, journal
+        self._settling = Settling(loads)
+        self._reports: Sequence[Report] = ()
+        self._workers = [Worker(consumer, self._failure) for consumer in consumers]
+        for worker in self._workers:
+            worker.start()
+        journal.add_listener(self.event)
 
     def add(self, measurement: Measurement) -> Instant:
         """Take one measurement."""
-        if not self.failed:
-            self._waiting.put(measurement)
-        if self._view is not None:
-            self._view.show(measurement)
-        instant = self.history.add(measurement)
-        if self._view is not None and (card := self._card.due(self.history, self._ledger)):
-            self._view.status(card)
-        return instant
+        self.history.add(measurement.instant)
+        self._give("measurement", measurement)
+        for settled in self._settling.add(measurement):
+            self._give("settled", settled)
+        return measurement.instant
 
-    def picture(self, frame: Frame) -> None:
-        """Offer a frame to the view, which takes a few a second."""
-        if self._view is not None:
-            self._view.picture(frame)
+    def frame(self, frame: Frame) -> None:
+        """Take a frame; never waits."""
+        self._give("frame", frame)
 
-    def load(self, t: float, force: float) -> None:
-        """Offer a load sample to the view."""
-        if self._view is not None:
-            self._view.load(t, force)
+    def load(self, sample: LoadSample) -> None:
+        """Take a load sample; never waits."""
+        self._give("load", sample)
+
+    def event(self, event: Event) -> None:
+        """Take an event; never waits."""
+        self._give("event", event)
 
     @property
-    def view(self) -> RerunView | None:
-        """The view, where there is one."""
-        return self._view
+    def reports(self) -> Sequence[Report]:
+        """How the consumers fared, once they have ended."""
+        return self._reports
 
-    def close(self) -> None:
-        """Write what waits and what is held back, and close."""
-        self._waiting.put(None)
-        self._writer.join()
-        if self._view is not None:
-            self._view.close(5.0)
-            if self._view.failed:
-                self._journal.tell(EventKind.VIEW, "view", self._view.failed, "warning")
+    @property
+    def failed(self) -> bool:
+        """Whether a consumer that matters has stopped early."""
+        return any(worker.failed and worker.vital for worker in self._workers)
 
-    def _write_all(self, results: Results | None) -> None:
-        while (measurement := self._waiting.get()) is not None:
-            if results is not None and not self.failed:
-                self._guarded(results.add, measurement)
-        if results is not None:
-            self._guarded(results.close)
+    def end(self) -> None:
+        """Settle what still waits for its force, and end all consumers."""
+        for settled in self._settling.rest():
+            self._give("settled", settled)
+        self._reports = [worker.end() for worker in self._workers]
 
-    def _guarded(self, step: Callable[..., None], *arguments: Measurement) -> None:
-        """One step of the results; the first that fails ends them, loudly, and nothing else."""
-        try:
-            step(*arguments)
-            return
-        except PhasedicError as error:
-            text = f"the results stop here, all else goes on: {error}"
-        except Exception as error:
-            log.exception("the results failed")
-            text = f"the results stop here by a defect, all else goes on: {error!r}"
-        if not self.failed:
-            self.failed = True
-            self._journal.tell(EventKind.MEASUREMENT, "results", text, "error")
+    def _give(self, kind: str, item: object) -> None:
+        for worker in self._workers:
+            worker.give(kind, item)
+
+    def _failure(self, name: str, why: str, vital: bool) -> None:
+        text = f"{name} stopped, all else goes on: {why}"
+        self._journal.tell(EventKind.VIEW, name, text, "error" if vital else "warning")

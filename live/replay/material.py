@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-import datetime
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from acquire.clock import ClockPair
 from acquire.errors import ConfigError
 from acquire.events import Event
 from acquire.frame import Burst, CameraInfo
 from acquire.load_cell import LoadLog
+from acquire.load_sample import LoadSample
 from live.measure import NewReference
 
 
@@ -50,8 +51,9 @@ class Material:
     reference: Burst
     bursts: Iterable[Burst | NewReference]
     loads: LoadLog
-    start: tuple[float, datetime.datetime]
+    start: ClockPair
     events: tuple[Event, ...] = ()
+    samples: tuple[LoadSample, ...] = ()
 
 
 def window_of(request: ReplayRequest, origin: float) -> tuple[float, float]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from acquire.burst import average_bursts, burst_of
 from acquire.camera import Camera
+from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
@@ -26,7 +27,9 @@ def picture_material(camera: Camera, request: ReplayRequest, config: Config) -> 
     loads = LoadLog(config.load.max_gap_s)
     loads.close()
     bursts = within(average_bursts(frames, config.measure.burst or 1), window_of(request, 0.0))
-    return Material(camera.info, reference, bursts, loads, (0.0, datetime.datetime.now(datetime.UTC)))
+    return Material(
+        camera.info, reference, bursts, loads, ClockPair(0.0, datetime.datetime.now(datetime.UTC))
+    )
 
 
 def _leading_burst(frames: Iterator[Frame], n: int, source: str) -> Burst:

@@ -15,15 +15,14 @@ from pathlib import Path
 from acquire.camera import open_camera
 from acquire.errors import ConfigError
 from acquire.events import EventKind
-from acquire.load_cell import LoadLog
 from acquire.session import Session
-from live.measure import measure, prepare, usable
-from live.outputs import Outputs, make_outputs, open_view
+from live.measure import History, measure, prepare
+from live.outputs import About, Outputs, make_outputs
 from live.replay.material import Material, ReplayRequest
 from live.replay.pictures import picture_material, picture_of
 from live.replay.session import session_config, session_material, session_path
 from live.setup import Config, correction, grid_for, kernel_settings, load_config, make_folder, read_mask
-from live.tell import Journal, Ledger, Screen
+from live.tell import Books, Journal, Ledger, Screen
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,9 +30,7 @@ class Replayed:
     """What a replay leaves behind."""
 
     folder: Path
-    outputs: Outputs
-    loads: LoadLog
-    ledger: Ledger
+    books: Books
     config: Config
     exit_code: int
 
@@ -87,24 +84,15 @@ def _run(
     mask = read_mask(config.measure.mask, camera.width, camera.height)
     grid = grid_for(config, camera.width, camera.height, mask)
     correct = correction(config, camera)
-    journal, ledger = Journal(), Ledger()
-    try:
-        kernel, noise_GL = prepare(
-            material.reference, grid, kernel_settings(config), config.measure.noise_GL, correct
-        )
-    except ValueError as error:
-        raise usable(error, f"the reference of {request.source}") from error
+    settings, stated = kernel_settings(config), config.measure.noise_GL
+    what = f"the reference of {request.source}"
+    kernel, noise_GL = prepare(material.reference, grid, settings, stated, correct, what)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
-    outputs = make_outputs(config, folder, camera, grid, material.loads, journal, ledger, material.start)
+    books = Books(Journal(), Ledger(), material.loads, History())
     screen.say(f"replaying {request.source} into {folder}")
-    open_view(outputs, config, screen)
-    for event in material.events:
-        if outputs.view is not None and event.kind is not EventKind.MEASURED:
-            outputs.view.event(event)
-    if outputs.view is not None:
-        for t, force in zip(*material.loads.arrays(), strict=True):
-            outputs.view.load(float(t), float(force))
+    outputs = make_outputs(About(config, folder, camera, grid, material.start), books, screen)
     try:
+        _give_past(material, outputs)
         for m in measure(
             material.bursts,
             kernel,
@@ -112,15 +100,24 @@ def _run(
             noise_GL=noise_GL,
             correct=correct,
             renew_at=config.measure.renew_at,
-            on_event=journal,
+            on_event=books.journal,
             timer=time.perf_counter,
         ):
-            ledger.add(measured=m.burst.n, grabbed=m.burst.n)
-            outputs.picture(picture_of(m.burst))
-            screen.instant(outputs.add(m), ledger, 0.0)
+            books.ledger.add(measured=m.burst.n, grabbed=m.burst.n)
+            outputs.frame(picture_of(m.burst))
+            screen.instant(outputs.add(m), books.ledger, 0.0)
             if stopping.is_set():
                 break
     finally:
-        outputs.close()
+        outputs.end()
     code = 130 if stopping.is_set() else 5 if outputs.failed else 0
-    return Replayed(folder, outputs, material.loads, ledger, config, code)
+    return Replayed(folder, books, config, code)
+
+
+def _give_past(material: Material, outputs: Outputs) -> None:
+    """What was recorded beside the pictures: events and loads."""
+    for event in material.events:
+        if event.kind is not EventKind.MEASURED:
+            outputs.event(event)
+    for sample in material.samples:
+        outputs.load(sample)

@@ -8,6 +8,7 @@ from typing import Any
 
 from acquire.addresses import parse_address
 from acquire.burst import LIMIT_PX
+from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
@@ -51,7 +52,8 @@ def _beside(section: Mapping[str, Any], keys: Iterable[str], path: Path) -> dict
 
 def session_material(session: Session, request: ReplayRequest, config: Config, path: Path) -> Material:
     loads = LoadLog(config.load.max_gap_s)
-    for sample in session.load_samples():
+    samples = tuple(session.load_samples())
+    for sample in samples:
         loads.append(sample)
     loads.close()
     events = tuple(session.events())
@@ -70,8 +72,8 @@ def session_material(session: Session, request: ReplayRequest, config: Config, p
         bursts = within(
             stored.bursts_after(after, n, LIMIT_PX if config.measure.shorten_bursts else None), window
         )
-    start = (session.start_monotonic, session.start_utc)
-    return Material(session.camera, reference, bursts, loads, start, events)
+    start = ClockPair(session.start_monotonic, session.start_utc)
+    return Material(session.camera, reference, bursts, loads, start, events, samples)
 
 
 def _as_measured(

@@ -4,20 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 from live.results.row import StrainMeasure
 
 if TYPE_CHECKING:
     from acquire.frame import CameraInfo
 
-
-class Loads(Protocol):
-    """What the results need of a load log (``acquire.load_log.LoadLog``)."""
-
-    def force_at(self, t: float) -> float: ...
-
-    def covers(self, t: float) -> bool: ...
+FORMAT, FORMAT_VERSION = "phasedic-strain", 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,8 +38,5 @@ class ResultsInfo:
     metadata: Mapping[str, Any]
     versions: Mapping[str, Any]
     camera: CameraInfo | None
-    strain_measure: StrainMeasure
-    area_m2: float | None
-
-
-FORMAT, FORMAT_VERSION = "phasedic-strain", 1
+    strain_measure: StrainMeasure = "small"
+    area_m2: float | None = None

@@ -47,10 +47,10 @@ class Row:
     values: dict[str, float | int]
 
     @classmethod
-    def of(cls, measurement: Measurement, force: float, info: RowInfo) -> Row:
-        """The row of ``measurement``, with ``force`` (N) and the measure of strain of ``info``."""
+    def of(cls, measurement: Measurement, info: RowInfo) -> Row:
+        """The row of ``measurement`` in the measure of strain of ``info``."""
         maps = maps_of(measurement.field, info.strain_measure)
-        return cls(maps, _values(measurement, maps, force, info))
+        return cls(maps, _values(measurement, maps, info))
 
 
 def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any]]:
@@ -65,31 +65,28 @@ def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any
     return maps
 
 
-def _values(
-    measurement: Measurement, maps: dict[str, NDArray[Any]], force: float, info: RowInfo
-) -> dict[str, float | int]:
-    burst, field = measurement.burst, measurement.field
-    means = {name: field.mean(name) for name in STRAINS}
+def _values(measurement: Measurement, maps: dict[str, NDArray[Any]], info: RowInfo) -> dict[str, float | int]:
+    burst, instant = measurement.burst, measurement.instant
     values: dict[str, float | int] = {
         "frame": burst.first_index,
         "time_s": burst.t - info.start_monotonic,
-        "force_N": force,
+        "force_N": instant.force,
     }
-    values |= {name: _mean(name, means[name][0], maps, info.strain_measure) for name in STRAINS}
-    values |= {f"sigma_{name}": means[name][1] for name in STRAINS}
+    values |= {name: _mean(name, getattr(instant, name), maps, info.strain_measure) for name in STRAINS}
+    values |= {f"sigma_{name}": getattr(instant, f"sigma_{name}") for name in STRAINS}
     values |= {
-        "n_valid": int(np.isfinite(maps["exx"]).sum()),
-        "n_zoi": int(np.count_nonzero(field.grid.active)),
+        "n_valid": instant.n_valid,
+        "n_zoi": instant.n_zoi,
         "noise_GL": burst.noise,
         "n_frames": burst.n,
         "last_frame": burst.last_index,
         "lost": burst.lost,
         "duration_s": burst.duration,
-        "u_px": _nanmean(maps["u"]),
-        "v_px": _nanmean(maps["v"]),
+        "u_px": instant.u,
+        "v_px": instant.v,
     }
     if info.area_m2 is not None:
-        values["stress_Pa"] = force / info.area_m2
+        values["stress_Pa"] = instant.force / info.area_m2
     return values
 
 

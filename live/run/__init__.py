@@ -1,12 +1,13 @@
 """The threads of a live test.
 
-``live_run`` joins them: ``grabber`` drains the camera, ``recorder`` writes the session, ``load_thread``
-drains the load cell, ``measuring`` measures what comes through ``feed`` and ``channels``, once
-``reference_step`` has a reference and ``rehearsal`` has run everything once. ``outcome`` is what is left
-behind.
+``run_live`` opens everything: ``setting`` (run once by ``rehearsal``), ``recorder``, and a ``live_run``
+that joins the threads: ``grabber`` drains the camera, ``load_thread`` the load cell, ``measuring`` measures
+what comes through ``feed`` and ``channels`` once ``reference_step`` has a reference. ``stopping`` is the
+wish to end, ``outcome`` what is left behind.
 """
 
-from live.run.live_run import LiveRun
+from live.run.live_run import INTERRUPTED, LiveRun, run_live
 from live.run.outcome import Outcome
+from live.run.stopping import Stop
 
-__all__ = ["LiveRun", "Outcome"]
+__all__ = ["INTERRUPTED", "LiveRun", "Outcome", "Stop", "run_live"]

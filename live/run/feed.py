@@ -47,6 +47,11 @@ class Feed:
                 return reference
             self._idle("taking the reference")
 
+    def another_reference(self) -> Reference | None:
+        """Have a reference taken from the next frames, and wait for it."""
+        self._grabber.take_reference()
+        return self.next_reference()
+
     def bursts(self) -> Iterator[Burst | NewReference]:
         """The newest burst each time, and a new reference before the bursts that come after it."""
         while self._held is not None or not self._grabber.bursts.finished:

@@ -7,24 +7,63 @@ first frames, and again on demand; everything after it becomes bursts.
 from __future__ import annotations
 
 import logging
+import math
 import queue
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 
-from acquire.burst import BurstAccumulator
+from acquire.burst import LIMIT_PX, BurstAccumulator
 from acquire.camera import Camera
 from acquire.errors import PhasedicError
 from acquire.events import EventKind, Muffler
 from acquire.frame import Burst, Frame
 from live.measure import Reference, ReferenceTaker
 from live.run.channels import Mailbox
-from live.tell import Journal, Ledger
+from live.setup import Config
+from live.tell import Books
 
 log = logging.getLogger(__name__)
 
 
+@dataclass(frozen=True, slots=True)
+class GrabPlan:
+    """What becomes of the frames.
+
+    Attributes
+    ----------
+    burst, reference_burst : int
+        Frames in each.
+    seconds : float, s
+        End after this time of frames.
+    shorten_above_px : float or None, px
+        Shorten bursts within which the picture moves by more.
+    """
+
+    burst: int
+    reference_burst: int
+    seconds: float = math.inf
+    shorten_above_px: float | None = None
+
+    @classmethod
+    def of(cls, config: Config, bursts: tuple[int, int]) -> GrabPlan:
+        """The plan of a configuration; ``bursts`` are the frames in the reference and in a measured burst."""
+        reference, burst = bursts
+        seconds = math.inf if config.output.seconds is None else config.output.seconds
+        return cls(burst, reference, seconds, LIMIT_PX if config.measure.shorten_bursts else None)
+
+
 class Grabber:
     """Runs the camera in a thread of its own.
+
+    Parameters
+    ----------
+    camera : Camera
+        Entered before ``start``.
+    plan : GrabPlan
+    books : Books
+    on_frame, on_burst : callable
+        Told of every frame, and of every burst; they must not wait.
 
     Attributes
     ----------
@@ -38,25 +77,18 @@ class Grabber:
     def __init__(
         self,
         camera: Camera,
-        journal: Journal,
-        ledger: Ledger,
-        *,
-        burst: int,
-        reference_burst: int,
-        seconds: float | None = None,
-        shorten_above_px: float | None = None,
+        plan: GrabPlan,
+        books: Books,
         on_frame: Callable[[Frame], None] = lambda frame: None,
         on_burst: Callable[[Burst], None] = lambda burst: None,
     ) -> None:
-        self._camera, self._journal, self._ledger = camera, journal, ledger
-        self._n, self._n_reference, self._seconds = burst, reference_burst, seconds
-        self._on_frame, self._on_burst = on_frame, on_burst
+        self._camera, self._journal, self._ledger = camera, books.journal, books.ledger
+        self._plan, self._on_frame, self._on_burst = plan, on_frame, on_burst
         self.references: queue.SimpleQueue[Reference] = queue.SimpleQueue()
         self.bursts: Mailbox[Burst] = Mailbox(waits=not camera.info.live)
         self.error: Exception | None = None
         self.fps = 0.0
-        self._taker: ReferenceTaker | None = ReferenceTaker(reference_burst)
-        self._shorten = shorten_above_px
+        self._taker: ReferenceTaker | None = ReferenceTaker(plan.reference_burst)
         self._accumulator = self._new_accumulator()
         self._fed = 0
         self._muffler, self._unsaid = Muffler(), 0
@@ -66,7 +98,7 @@ class Grabber:
         self._thread = threading.Thread(target=self._work, name="grab", daemon=True)
 
     def _new_accumulator(self) -> BurstAccumulator:
-        return BurstAccumulator(self._n, shorten_above_px=self._shorten)
+        return BurstAccumulator(self._plan.burst, shorten_above_px=self._plan.shorten_above_px)
 
     def start(self) -> None:
         """Begin to drain the camera, which must have been entered."""
@@ -89,7 +121,7 @@ class Grabber:
         try:
             for frame in self._camera:
                 self._take(frame)
-                if self._seconds is not None and frame.t - (self._first_t or 0.0) >= self._seconds:
+                if frame.t - (self._first_t or 0.0) >= self._plan.seconds:
                     break
         except PhasedicError as error:
             self._ended_by(error, str(error))
@@ -113,7 +145,7 @@ class Grabber:
         self._fed += 1
         if self._retake.is_set():
             self._retake.clear()
-            self._taker = ReferenceTaker(self._n_reference)
+            self._taker = ReferenceTaker(self._plan.reference_burst)
         if self._taker is not None:
             self._feed_reference(self._taker, frame)
         elif (burst := self._accumulator.add(frame)) is not None:

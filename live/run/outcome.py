@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from acquire.load_cell import LoadLog
 from live.outputs import Outputs
-from live.setup import Rig
-from live.tell import Ledger
+from live.setup import Config, Rig
+from live.tell import Books
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from analysis import ZoiGrid
-log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,10 +22,11 @@ class Outcome:
     Attributes
     ----------
     folder : Path
-    ledger : Ledger
+    config : Config
+        As it was in force.
+    books : Books
+        Events, ledger, loads, and the means of every measured instant.
     outputs : Outputs
-        Its ``history`` holds the means of every measured instant.
-    loads : LoadLog
     rig : Rig
         Closed; its specimen tells the truth of a simulated test.
     grid : ZoiGrid
@@ -35,9 +34,9 @@ class Outcome:
     """
 
     folder: Path
-    ledger: Ledger
+    config: Config
+    books: Books
     outputs: Outputs
-    loads: LoadLog
     rig: Rig
     grid: ZoiGrid
     exit_code: int

@@ -11,7 +11,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from acquire.clock import ClockPair
 from acquire.errors import DataError
@@ -22,10 +22,10 @@ from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import RotatingWriter, SessionWriter
 from live.run.channels import ByteBuffer
-from live.tell import Journal, Ledger, Screen
-
-if TYPE_CHECKING:
-    pass
+from live.run.setting import Setting
+from live.run.stopping import Stop
+from live.setup import versions
+from live.tell import Books, Journal, Ledger, Screen
 
 log = logging.getLogger(__name__)
 _SMALL = 512  # bytes counted for a sample or an event
@@ -37,13 +37,93 @@ _DISK_WARN_S = 180.0
 Item = Frame | Burst | LoadSample | Event
 
 
-def open_writer(
-    path: Path, rotate_MB: float | None, about: Mapping[str, Any]
-) -> SessionWriter | RotatingWriter:
-    """A new session file, or a set of files that begins another one after ``rotate_MB``."""
+class Recording(Protocol):
+    """What a run gives to its recording, from any thread; nothing here waits for the disk."""
+
+    @property
+    def failed(self) -> str | None:
+        """Why nothing more is written; None while all is well."""
+        ...
+
+    def frame(self, frame: Frame) -> None: ...
+
+    def burst(self, burst: Burst) -> None: ...
+
+    def sample(self, sample: LoadSample) -> None: ...
+
+    def close(self, ledger: dict[str, Any]) -> None: ...
+
+
+class NoRecording:
+    """The recording of a run that wants none."""
+
+    failed: str | None = None
+
+    def frame(self, frame: Frame) -> None:
+        """Let it go."""
+
+    def burst(self, burst: Burst) -> None:
+        """Let it go."""
+
+    def sample(self, sample: LoadSample) -> None:
+        """Let it go."""
+
+    def close(self, ledger: dict[str, Any]) -> None:
+        """Nothing is open."""
+
+
+def open_recording(setting: Setting, books: Books, screen: Screen, stop: Stop) -> Recording:
+    """The recording that the configuration asks for, in the folder of the run.
+
+    Raises
+    ------
+    DataError
+        The file exists, or cannot be made.
+    """
+    record, camera = setting.config.record, setting.rig.camera.info
+    if not record.enabled:
+        return NoRecording()
+    path, mode = setting.folder / "session.h5", RecordMode.parse(record.mode)
+    writer = _open_writer(path, setting, mode)
+    _tell_room(path, camera, mode, screen)
+    recorder = Recorder(
+        writer,
+        books.ledger,
+        books.journal,
+        int(record.buffer_MB * 1e6),
+        mode=mode,
+        waits=not camera.live,
+        on_failure=lambda: stop.ask("recording failed") if record.when_full == "stop" else None,
+    )
+    books.journal.add_listener(recorder.event)
+    return recorder
+
+
+def _open_writer(path: Path, setting: Setting, mode: RecordMode) -> SessionWriter | RotatingWriter:
+    """A new session file, or a set of files that begins another one when it has grown."""
+    config, rotate_MB = setting.config, setting.config.record.rotate_MB
+    about: Mapping[str, Any] = {
+        "camera": setting.rig.camera.info,
+        "load": setting.rig.load.info,
+        "start": setting.start,
+        "config": config.as_dict(),
+        "metadata": dict(config.metadata),
+        "versions": versions(),
+        "mode": mode,
+    }
     if rotate_MB is None:
         return SessionWriter(path, **about)
     return RotatingWriter(path, int(rotate_MB * 1e6), **about)
+
+
+def _tell_room(path: Path, camera: CameraInfo, mode: RecordMode, screen: Screen) -> None:
+    """Say how long the disk lasts, and that a network share is a risk."""
+    rate = camera.width * camera.height * (2 if camera.bits > 8 else 1) * (camera.fps or 30.0) / mode.every
+    minutes = forecast(path, rate) / 60
+    where = f"recording about {rate / 1e6:.0f} MB/s at most, room for {minutes:.0f} minutes"
+    screen.say(f"warning: {where}" if minutes < 30 else where)
+    if share := network_share(path):
+        screen.say(f"warning: {path.parent} is on a network share ({share}); a local disk is safer")
 
 
 class Recorder:
@@ -64,6 +144,8 @@ class Recorder:
         Wait for room instead of leaving a gap (sources that wait for their reader).
     on_failure : callable
         Called once when nothing more can be written.
+    now : callable
+        The clock, s.
     """
 
     def __init__(
@@ -76,18 +158,18 @@ class Recorder:
         mode: RecordMode | None = None,
         waits: bool = False,
         on_failure: Callable[[], None] = lambda: None,
+        now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._writer, self._ledger, self._journal = writer, ledger, journal
         self._buffer: ByteBuffer[Item] = ByteBuffer(limit, waits=waits)
         self._on_failure = on_failure
         self._mode = mode or RecordMode()
         self._number = self._gap = 0
-        self._next_disk, self._disk_told, self._began = (
-            time.monotonic() + _DISK_EVERY_S,
-            False,
-            time.monotonic(),
-        )
-        self._next_clock = time.monotonic() + _CLOCK_EVERY_S
+        self._now = now
+        self._began = now()
+        self._next_clock = self._began + _CLOCK_EVERY_S
+        self._next_disk = self._began + _DISK_EVERY_S
+        self._disk_told = False
         self.failed: str | None = None
         self._thread = threading.Thread(target=self._work, name="record", daemon=True)
         self._thread.start()
@@ -155,7 +237,7 @@ class Recorder:
             elif self.failed is None:
                 self._guarded(self._writer.flush)  # nothing more comes for a while
             if self.failed is None:
-                self._now_and_then(time.monotonic())
+                self._now_and_then(self._now())
 
     def _now_and_then(self, now: float) -> None:
         if now > self._next_clock:
@@ -207,13 +289,3 @@ class Recorder:
         text = f"recording has stopped, measuring goes on: {why}"
         self._journal.tell(EventKind.RECORDER, "recorder", text, "error")
         self._on_failure()
-
-
-def tell_room(path: Path, camera: CameraInfo, mode: RecordMode, screen: Screen) -> None:
-    """Say how long the disk lasts, and that a network share is a risk."""
-    rate = camera.width * camera.height * (2 if camera.bits > 8 else 1) * (camera.fps or 30.0) / mode.every
-    minutes = forecast(path, rate) / 60
-    where = f"recording about {rate / 1e6:.0f} MB/s at most, room for {minutes:.0f} minutes"
-    screen.say(f"warning: {where}" if minutes < 30 else where)
-    if share := network_share(path):
-        screen.say(f"warning: {path.parent} is on a network share ({share}); a local disk is safer")

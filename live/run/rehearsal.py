@@ -34,13 +34,13 @@ def rehearse(camera: CameraInfo, grid: ZoiGrid, settings: KernelSettings, bursts
     warm_up()
     images = [_image(camera, seed) for seed in (1, 2)]
     reference, *_ = [_averaged(camera, images, n) for n in bursts]
-    kernel, noise_GL = prepare(reference.burst, grid, settings, None)
+    kernel, noise_GL = prepare(reference.burst, grid, settings, None, what="measure")
     if reference.halves is not None:
         motion_between(kernel, *reference.halves)
     again: list[Burst] = [reference.burst, reference.burst]
     history = History()
     for measurement in measure(again, kernel, LoadLog(), noise_GL=noise_GL):
-        history.add(measurement)
+        history.add(measurement.instant)
 
 
 def _averaged(camera: CameraInfo, images: list[NDArray[Any]], n: int) -> Reference:

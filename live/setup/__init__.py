@@ -1,15 +1,15 @@
 """From words to objects: configuration, devices, grid, folder.
 
-``sections`` are the keys of the configuration with their checks, ``config`` reads and overlays it, ``rig``
-opens the devices (and is the one door to the simulated ones), ``grid`` lays the ZOIs, ``pictures`` reads
-mask, dark and flat, ``folder`` makes the place for the files.
+``sections`` are the keys of the configuration with their ``checks`` and options, ``config`` reads and
+overlays it, ``rig`` opens the devices (and is the one door to the simulated ones), ``grid`` lays the ZOIs,
+``pictures`` reads mask, dark and flat, ``folder`` makes the place for the files.
 """
 
-from live.setup.config import Config, from_dict, load_config, settings_in
+from live.setup.config import Config, from_dict, load_config, options, settings_in
 from live.setup.folder import FILES, make_folder, versions
 from live.setup.grid import grid_for, kernel_settings, whole_picture
 from live.setup.pictures import correction, read_mask, with_flat_field, with_mask
-from live.setup.rig import Rig, open_rig, register_simulators
+from live.setup.rig import Rig, open_load, open_rig
 from live.setup.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST, SpecimenConfig
 
 __all__ = [
@@ -25,9 +25,10 @@ __all__ = [
     "kernel_settings",
     "load_config",
     "make_folder",
+    "open_load",
     "open_rig",
+    "options",
     "read_mask",
-    "register_simulators",
     "settings_in",
     "versions",
     "whole_picture",

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from acquire.errors import ConfigError
+from live.setup.checks import Option, Refused
 from live.setup.sections import (
     CameraConfig,
     LoadConfig,
@@ -24,7 +25,6 @@ from live.setup.sections import (
     RecordConfig,
     SpecimenConfig,
     ViewConfig,
-    _Refused,
 )
 
 Section = TypeVar("Section")
@@ -53,6 +53,17 @@ _SECTIONS: dict[str, type] = {
     for f in dataclasses.fields(Config)
     if f.name != "metadata"
 }
+
+
+def options() -> dict[str, tuple[str, dataclasses.Field[Any]]]:
+    """What can be said on the command line: option name to ("section.key", field of the section)."""
+    found = {}
+    for name, kind in _SECTIONS.items():
+        for field_ in dataclasses.fields(kind):
+            option: Option | None = field_.metadata["option"]
+            if option is not None:
+                found[option.name] = (f"{name}.{field_.name}", field_)
+    return found
 
 
 def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
@@ -126,8 +137,8 @@ def _section(kind: type[Section], name: str, content: Mapping[str, Any], where: 
         if key not in fields:
             raise ConfigError(f"{where}: unknown key {name}.{key}{_meant(key, list(fields))}")
         try:
-            values[key] = fields[key].metadata["check"](value)
-        except _Refused as allowed:
+            values[key] = fields[key].metadata["check"].accept(value)
+        except Refused as allowed:
             raise ConfigError(
                 f"{where}: {name}.{key} = {value!r} is not possible; allowed: {allowed}"
             ) from None
@@ -142,4 +153,5 @@ def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:
 
 def _meant(word: str, known: list[str]) -> str:
     near = difflib.get_close_matches(word, known, 1)
-    return f" (did you mean {near[0]}?)" * bool(near) + "; known: " + ", ".join(known)
+    meant = f" (did you mean {near[0]}?)" if near else ""
+    return f"{meant}; known: {', '.join(known)}"

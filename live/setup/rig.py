@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from acquire.addresses import Address, parse_address
-from acquire.camera import CAMERAS, Camera, CroppedCamera, open_camera
+from acquire.addresses import parse_address
+from acquire.camera import Camera, CroppedCamera, open_camera
 from acquire.events import EventSink, ignore_event
-from acquire.load_cell import LOAD_CELLS, LoadCell, open_load_cell
+from acquire.load_cell import LoadCell, open_load_cell
 from acquire.record_mode import Crop
 
 if TYPE_CHECKING:
@@ -91,14 +91,6 @@ def _open_load(address: str, on_event: EventSink, specimen: VirtualSpecimen | No
     return open_sim_load(parse_address(address), on_event, specimen)
 
 
-def register_simulators() -> None:
-    """Let ``open_camera`` and ``open_load_cell`` know ``sim:``, each with a specimen of its own."""
-
-    def camera(address: Address, on_event: EventSink) -> Camera:
-        return _open_camera(address.text, on_event, _specimen(address.text, "none:"))
-
-    def load(address: Address, on_event: EventSink) -> LoadCell:
-        return _open_load(address.text, on_event, _specimen("none:", address.text))
-
-    CAMERAS.register("sim", camera)
-    LOAD_CELLS.register("sim", load)
+def open_load(address: str, on_event: EventSink = ignore_event) -> LoadCell:
+    """A load cell alone, a simulated one too; raises as ``open_load_cell``."""
+    return _open_load(address, on_event, _specimen("none:", address))

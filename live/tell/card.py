@@ -20,9 +20,8 @@ class StatusCard:
         self._specimen, self._loads = specimen, loads
         self._last = -math.inf
 
-    def due(self, history: History, ledger: Ledger) -> str | None:
-        """The card, or None where the last one is fresh enough."""
-        now = history.instants[-1].t
+    def due(self, now: float, history: History, ledger: Ledger) -> str | None:
+        """The card at ``now`` (s, monotonic), or None where the last one is fresh enough."""
         if now - self._last < EVERY_S:
             return None
         self._last = now

@@ -1,6 +1,7 @@
 """The journal: every event goes to the log, the screen, the session and the view, once.
 
-Listeners that come later (the session is opened after the devices) are told what they missed.
+Listeners that come later (the session is opened after the devices) are told what they missed, but
+for the one event a burst, which would fill the memory in a long test.
 """
 
 from __future__ import annotations
@@ -42,7 +43,8 @@ class Journal:
     def record(self, event: Event) -> None:
         """Take an event stamped with the time of a frame."""
         with self._lock:
-            self._events.append(event)
+            if event.kind not in _QUIET:
+                self._events.append(event)
             listeners = list(self._listeners)
         if event.kind not in _QUIET:
             log.log(_LEVELS[event.level], "%s: %s", event.source, event.text)

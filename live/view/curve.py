@@ -1,72 +1,16 @@
-"""The stress-strain (or load-strain) curve as points, and the axes to draw it on.
-
-Joins each strain to the force at its time, which may become known only later. Arrays and plain
-numbers only; nothing is drawn here.
-"""
+"""The axes to draw the stress-strain (or load-strain) curve on. Plain numbers; nothing is drawn here."""
 
 from __future__ import annotations
 
-import math
-from bisect import bisect_left
-from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from live.maps import nice_above, ticks, unit_for
-from live.view.thinned import Thinned
 
 MAX_POINTS = 800
-_MAX_GAP_S = 0.5
-_LOADS = 4000
-
-
-class ForceStrain:
-    """Pairs of strain and force.
-
-    A force that came with the strain counts; else it is interpolated from the load samples
-    around its time, as soon as there are some on both sides.
-    """
-
-    def __init__(self) -> None:
-        self._loads: deque[tuple[float, float]] = deque(maxlen=_LOADS)
-        self._waiting: deque[tuple[float, float]] = deque(maxlen=_LOADS)
-        self._points: Thinned[tuple[float, float]] = Thinned(MAX_POINTS)
-
-    def load(self, t: float, force: float) -> None:
-        """One load sample (s, N)."""
-        if self._loads and t < self._loads[-1][0]:
-            return
-        self._loads.append((t, force))
-
-    def strain(self, t: float, strain: float, force: float) -> None:
-        """One measured strain, with its force (N) where it is known, else NaN."""
-        if not math.isfinite(strain):
-            return
-        if math.isfinite(force):
-            self._add(strain, force)
-        else:
-            self._waiting.append((t, strain))
-
-    def points(self) -> NDArray[np.float64]:
-        """(N, 2) strain, force; thinned to at most ``MAX_POINTS``, the newest always there."""
-        while self._waiting and self._loads and self._loads[-1][0] >= self._waiting[0][0]:
-            t, strain = self._waiting.popleft()
-            self._add(strain, self._force_at(t))
-        return np.array(self._points.items(), np.float64).reshape(-1, 2)
-
-    def _add(self, strain: float, force: float) -> None:
-        if math.isfinite(force):
-            self._points.append((strain, force))
-
-    def _force_at(self, t: float) -> float:
-        times = [sample[0] for sample in self._loads]
-        after = bisect_left(times, t)
-        if after == 0:
-            return self._loads[0][1] if times[0] == t else math.nan
-        (t0, f0), (t1, f1) = self._loads[after - 1], self._loads[after]
-        return math.nan if t1 - t0 > _MAX_GAP_S else f0 + (f1 - f0) * (t - t0) / (t1 - t0)
+"""Of the curve, thinned; the newest always there."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 if TYPE_CHECKING:
     from acquire.events import Event
     from acquire.frame import Frame
-    from analysis.field import ZoiGrid
     from live.measure import Measurement
 
 _log = logging.getLogger(__name__)
@@ -25,12 +24,12 @@ _DEPTH, _LOADS, _EVENTS = 2, 20_000, 1000
 
 
 class Drawing(Protocol):
-    """What the publisher calls, always on its own thread (``view_scene.Scene``)."""
+    """What the publisher calls, always on its own thread (``scene.Scene``)."""
 
     def begin(self) -> None: ...
     def picture(self, frame: Frame) -> None: ...
     def measurement(self, measurement: Measurement) -> None: ...
-    def grid(self, grid: ZoiGrid) -> None: ...
+    def points(self, points: list[tuple[float, float]]) -> None: ...
     def loads(self, samples: list[tuple[float, float]]) -> None: ...
     def event(self, event: Event) -> None: ...
     def status(self, markdown: str) -> None: ...
@@ -43,14 +42,14 @@ class _Waiting:
 
     measurements: deque[Measurement] = field(default_factory=lambda: deque(maxlen=_DEPTH))
     loads: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=_LOADS))
+    points: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=_LOADS))
     events: deque[Event] = field(default_factory=lambda: deque(maxlen=_EVENTS))
     picture: Frame | None = None
     status: str | None = None
-    grid: ZoiGrid | None = None
 
     def any(self) -> bool:
-        few = self.picture or self.status is not None or self.grid
-        return bool(self.measurements or self.loads or self.events or few)
+        few = self.picture or self.status is not None
+        return bool(self.measurements or self.loads or self.points or self.events or few)
 
 
 class Publisher:
@@ -105,11 +104,11 @@ class Publisher:
             self._waiting.status = markdown
             self._changed.notify()
 
-    def grid(self, grid: ZoiGrid) -> None:
-        """Offer a new grid."""
+    def point(self, strain: float, force: float) -> None:
+        """Offer a point of the curve; like a load sample it wakes nobody."""
         with self._changed:
-            self._waiting.grid = grid
-            self._changed.notify()
+            self.dropped += len(self._waiting.points) == _LOADS
+            self._waiting.points.append((strain, force))
 
     def close(self, timeout_s: float) -> bool:
         """Draw what waits and end; False where the thread is stuck inside rerun."""
@@ -144,10 +143,10 @@ class Publisher:
 
     def _draw(self, waiting: _Waiting) -> None:
         drawing: Any = self._drawing
-        if waiting.grid is not None:
-            drawing.grid(waiting.grid)
         if waiting.loads:
             drawing.loads(list(waiting.loads))
+        if waiting.points:
+            drawing.points(list(waiting.points))
         for event in waiting.events:
             drawing.event(event)
         if waiting.picture is not None:

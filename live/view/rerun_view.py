@@ -2,8 +2,8 @@
 
 ``RerunView`` serves a running test to any number of viewers on 127.0.0.1, early, late, killed or
 frozen, and writes it to an .rrd file. Nothing here ever blocks or raises into the test: each of
-the two has a thread, a stream and a queue of its own (``view_publisher``). What is drawn stands in
-``view_scene``, where it stands on the screen in ``view_layout``. The view measures nothing, and
+the two has a thread, a stream and a queue of its own (``publisher``). What is drawn stands in
+``scene``, where it stands on the screen in ``layout``. The view measures nothing, and
 nothing it leaves out is missing from the recording or the results.
 
 Rerun's own viewer sends anonymous usage data to its makers unless ``rerun analytics disable`` was
@@ -25,7 +25,6 @@ from live.view.viewer import HOST, free_port, rerun_command, spawn_viewer, url
 if TYPE_CHECKING:
     from acquire.events import Event
     from acquire.frame import Frame
-    from analysis.field import ZoiGrid
     from live.measure import Measurement
 
 __all__ = ["RerunView", "ViewSetup", "spawn_viewer"]
@@ -81,6 +80,11 @@ class RerunView:
         """Offer a measurement; the newest win."""
         self._each(lambda p: p.measurement(measurement))
 
+    def settled(self, measurement: Measurement) -> None:
+        """Offer a point of the curve: a measurement whose force is final."""
+        strain = measurement.instant.eyy if self._setup.axis == "y" else measurement.instant.exx
+        self._each(lambda p: p.point(strain, measurement.force))
+
     def load(self, t: float, force: float) -> None:
         """Offer a load sample (monotonic s, N)."""
         self._each(lambda p: p.load(t, force))
@@ -92,10 +96,6 @@ class RerunView:
     def status(self, text_markdown: str) -> None:
         """Set the status card."""
         self._each(lambda p: p.status(text_markdown))
-
-    def set_reference(self, grid: ZoiGrid) -> None:
-        """Draw another grid of ZOIs from now on."""
-        self._each(lambda p: p.grid(grid))
 
     def close(self, timeout_s: float = 5.0) -> None:
         """Draw what waits, finish the file and end; what is stuck is left behind and told."""

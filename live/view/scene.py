@@ -1,6 +1,6 @@
 """Draws a test into one rerun stream: pictures, maps, curves, events, status.
 
-Knows rerun and the arrays; nothing of threads, queues or servers (``view_publisher``). Rates are
+Knows rerun and the arrays; nothing of threads, queues or servers (``publisher``). Rates are
 per second of the test, so that a replay draws what the live run drew.
 """
 
@@ -14,7 +14,7 @@ import numpy as np
 
 from acquire.events import Event, EventKind
 from live.maps import MICROSTRAIN, AutoRange, Unit, colour, number, ramp, unit_for
-from live.view.curve import ForceStrain
+from live.view.curve import MAX_POINTS
 from live.view.curve_drawing import CurveDrawing
 from live.view.layout import BAR_GAP, BAR_HEIGHT, BAR_LABEL, BAR_TOP, BAR_WIDTH, LETTER, bar_unit
 from live.view.marks import CYAN, YELLOW, encode, reduced, words
@@ -51,7 +51,7 @@ class Scene:
         self.stream, self._setup, self._rates = stream, setup, rates
         self._ranges = {name: AutoRange(setup.strain_range) for name in STRAINS}
         self._limits: dict[str, float] = {}
-        self._curve = ForceStrain()
+        self._curve: Thinned[tuple[float, float]] = Thinned(MAX_POINTS)
         self._drawn_curve = CurveDrawing(self._log, setup)
         self._arrows = ArrowScale()
         self._picture_t = self._map_t = self._load_t = -math.inf
@@ -69,7 +69,7 @@ class Scene:
             style = rr.Measurements.from_fields(names=name, colors=COLOURS[name], widths=2.0)
             self._log(f"strain/{name}", style, static=True)
         self._log("load/force", rr.SeriesLines(colors=YELLOW, names="load", widths=2.0), static=True)
-        self.grid(self._setup.grid)
+        self._outlines(self._setup.grid)
 
     def end(self) -> None:
         """All is drawn: let it reach its place, and close that."""
@@ -97,11 +97,10 @@ class Scene:
         """Curves always, maps no more often than the rates say."""
         field, t = measurement.field, measurement.t
         self._at(t)
-        means = {name: field.mean(name) for name in STRAINS}
+        i = measurement.instant
+        means = {name: (getattr(i, name), getattr(i, f"sigma_{name}")) for name in STRAINS}
         self._mean_strain(t, means)
         self._repeat()
-        name = f"e{self._setup.axis * 2}"
-        self._curve.strain(t, means[name][0], measurement.force)
         if not self._due(t, self._map_t, self._rates.map_hz):
             return
         self._map_t = t
@@ -109,9 +108,10 @@ class Scene:
         for name in STRAINS:
             self._map(field, name)
         self._bar_labels()
-        self._drawn_curve.draw(self._curve.points())
+        points = np.array(self._curve.items(), np.float64).reshape(-1, 2)
+        self._drawn_curve.draw(points)
 
-    def grid(self, grid: ZoiGrid) -> None:
+    def _outlines(self, grid: ZoiGrid) -> None:
         """The outlines of the ZOIs, and where the maps lie."""
         import rerun as rr
 
@@ -194,13 +194,18 @@ class Scene:
         points = [*([x, yk] for yk in y), [x - 0.04 * length, top - 0.09 * length]]
         return words(points, [*(number(s * limit * unit.factor) for s in share), unit.name])
 
+    def points(self, points: Iterable[tuple[float, float]]) -> None:
+        """Points (strain, N) of the curve, drawn with the next maps."""
+        for strain, force in points:
+            if math.isfinite(strain) and math.isfinite(force):
+                self._curve.append((strain, force))
+
     # -- curves -------------------------------------------------------------------------------
 
     def loads(self, samples: Iterable[tuple[float, float]]) -> None:
         """Load samples (s, N), thinned to 50 a second."""
         kept = []
         for t, force in samples:
-            self._curve.load(t, force)
             if t - self._load_t >= _LOAD_STEP_S and math.isfinite(force):
                 kept.append((self._since_start(t), force))
                 self._forces.append(kept[-1])

@@ -54,7 +54,7 @@ def make_measurement(
         lost=1 if number == 3 else 0,
         clock="device",
     )
-    return Measurement(number, burst, make_field(grid, strain), force)
+    return Measurement.of(number, burst, make_field(grid, strain), force)
 
 
 def make_frame(index: int, t: float, shape: tuple[int, int] = (96, 128)) -> Frame:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,8 +16,9 @@ from acquire.events import EventKind
 from acquire.session.reader import Session
 from live.cli import main
 from live.measure.measurement import Measurement
-from live.run import live_run as run_live
-from live.run.live_run import LiveRun
+from live.outputs import Consumer
+from live.run import LiveRun, run_live
+from live.run import live_run as live_module
 from live.run.outcome import Outcome
 from live.setup.config import load_config
 from live.setup.rig import Rig
@@ -34,9 +36,30 @@ SMALL = {
 MAPS = ("u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy", "exx", "eyy", "exy", "sigma_exx", "residual", "status")
 
 
-def live_run(folder: Path, camera: str = SIM, **more: Any) -> LiveRun:
+def live_run(
+    folder: Path, camera: str = SIM, each: Callable[[LiveRun, Measurement], None] | None = None, **more: Any
+) -> Outcome:
+    """A run; ``each`` is called with it and every measurement, in the measuring thread."""
     overrides = {"camera.address": camera, "load.address": "sim:", "output.dir": str(folder), **SMALL, **more}
-    return LiveRun(load_config(None, overrides), Screen(quiet=True))
+    watcher = Watcher(each) if each else None
+    return run_live(
+        load_config(None, overrides),
+        Screen(quiet=True),
+        consumers=[watcher] if watcher else [],
+        hands=watcher.lives.append if watcher else lambda live: None,
+    )
+
+
+class Watcher(Consumer):
+    """Shows every measurement of a run to a function."""
+
+    blocks = False
+
+    def __init__(self, each: Callable[[LiveRun, Measurement], None]) -> None:
+        self._each, self.lives = each, list[LiveRun]()
+
+    def measurement(self, measurement: Measurement) -> None:
+        self._each(self.lives[0], measurement)
 
 
 def strains(folder: Path) -> dict[str, np.ndarray]:
@@ -53,14 +76,14 @@ def assert_bit_equal(a: dict[str, np.ndarray], b: dict[str, np.ndarray]) -> None
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Outcome]:
     folder = tmp_path_factory.mktemp("live") / "run"
-    return folder, live_run(folder).run()
+    return folder, live_run(folder)
 
 
 def test_the_strain_is_that_of_the_specimen(recorded: tuple[Path, Outcome]) -> None:
     _, outcome = recorded
     specimen = outcome.rig.specimen
     assert specimen is not None
-    last = outcome.outputs.history.instants[-1]
+    last = outcome.books.history.instants[-1]
     true = float(specimen.axial_strain(specimen.elapsed(last.t)))
     assert last.n_valid == last.n_zoi > 10
     # The ZOIs do not cover a whole number of cells, so the mean is near the mean strain, not at it.
@@ -70,7 +93,7 @@ def test_the_strain_is_that_of_the_specimen(recorded: tuple[Path, Outcome]) -> N
 
 def test_everything_is_accounted_for(recorded: tuple[Path, Outcome]) -> None:
     folder, outcome = recorded
-    ledger = outcome.ledger
+    ledger = outcome.books.ledger
     assert outcome.exit_code == 0
     assert ledger.adds_up
     assert ledger.recorded == ledger.grabbed == 46
@@ -105,7 +128,7 @@ def test_the_csv_has_a_row_a_measurement(recorded: tuple[Path, Outcome]) -> None
             "n_zoi",
         ]
     )
-    assert float(rows[-1]["eyy"]) == pytest.approx(outcome.outputs.history.instants[-1].eyy, rel=1e-5)
+    assert float(rows[-1]["eyy"]) == pytest.approx(outcome.books.history.instants[-1].eyy, rel=1e-5)
 
 
 def test_replay_as_measured_is_bit_equal(recorded: tuple[Path, Outcome], tmp_path: Path) -> None:
@@ -143,24 +166,21 @@ def test_plain_replay_measures_every_burst_with_other_zois(
 def test_replay_with_forced_skips_is_bit_equal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A camera that does not wait, and a measurement that is too slow for it."""
     folder = tmp_path / "run"
-    live = live_run(folder)
-    open_rig = run_live.open_rig
+    open_rig = live_module.open_rig
 
     def hasty(*arguments: Any, **named: Any) -> Rig:
         rig = open_rig(*arguments, **named)
         monkeypatch.setattr(rig.camera, "info", replace(rig.camera.info, live=True))
         return rig
 
-    def slow(m: Measurement) -> None:
-        assert live.grabber is not None
+    def slow(live: LiveRun, m: Measurement) -> None:
         if m.number < 2:
             live.grabber.join()  # the camera has given everything before this one is done
 
-    monkeypatch.setattr(run_live, "open_rig", hasty)
-    live.watch(slow)
-    outcome = live.run()
-    assert outcome.ledger.skipped > 0
-    assert outcome.ledger.adds_up
+    monkeypatch.setattr(live_module, "open_rig", hasty)
+    outcome = live_run(folder, each=slow)
+    assert outcome.books.ledger.skipped > 0
+    assert outcome.books.ledger.adds_up
     out = tmp_path / "again"
     session = str(folder / "session.h5")
     assert main(["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]) == 0
@@ -169,19 +189,17 @@ def test_replay_with_forced_skips_is_bit_equal(tmp_path: Path, monkeypatch: pyte
 
 def test_a_new_reference_is_composed_and_replayed(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    live = live_run(folder)
 
-    def ask(m: Measurement) -> None:
+    def ask(live: LiveRun, m: Measurement) -> None:
         if m.number == 5:
             live.command(EventKind.NEW_REFERENCE)
 
-    live.watch(ask)
-    outcome = live.run()
-    assert outcome.ledger.adds_up
-    assert outcome.ledger.reference == 8
+    outcome = live_run(folder, each=ask)
+    assert outcome.books.ledger.adds_up
+    assert outcome.books.ledger.reference == 8
     specimen = outcome.rig.specimen
     assert specimen is not None
-    last = outcome.outputs.history.instants[-1]
+    last = outcome.books.history.instants[-1]
     assert last.eyy == pytest.approx(float(specimen.axial_strain(specimen.elapsed(last.t))), rel=0.25)
     out = tmp_path / "again"
     session = str(folder / "session.h5")
@@ -200,8 +218,8 @@ def test_a_new_reference_is_composed_and_replayed(tmp_path: Path) -> None:
 )
 def test_what_is_recorded_in_part_replays_bit_equal(tmp_path: Path, how: dict[str, Any]) -> None:
     folder, out = tmp_path / "run", tmp_path / "again"
-    outcome = live_run(folder, **how).run()
-    assert outcome.ledger.adds_up
+    outcome = live_run(folder, **how)
+    assert outcome.books.ledger.adds_up
     session = str(folder / "session.h5")
     for extra in ([], ["--as-measured"]):
         assert (
@@ -219,7 +237,7 @@ def test_dark_and_flat_frames_take_the_fixed_pattern_out(tmp_path: Path) -> None
     assert main(["average", "--camera", even, "--frames", "16", "--out", str(flat)]) == 0
     errors = []
     for name, more in (("raw", {}), ("corrected", {"camera.flat": str(flat)})):
-        outcome = live_run(tmp_path / name, camera, **more).run()
+        outcome = live_run(tmp_path / name, camera, **more)
         specimen = outcome.rig.specimen
         assert specimen is not None
         last = specimen.displacement(np.array([112.0]), np.array([96.0]), specimen.elapsed(1.9))[0][0]
@@ -231,11 +249,13 @@ def test_dark_and_flat_frames_take_the_fixed_pattern_out(tmp_path: Path) -> None
     assert_bit_equal(strains(tmp_path / "moved"), strains(out))
 
 
-def test_a_rotated_recording_is_one_session(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_rotated_recording_is_one_session(tmp_path: Path) -> None:
     folder, out = tmp_path / "run", tmp_path / "again"
-    live = live_run(folder)
-    object.__setattr__(live.config.record, "rotate_MB", 1.0)  # smaller than the configuration allows
-    assert live.run().exit_code == 0
+    config = load_config(
+        None, {"camera.address": SIM, "load.address": "sim:", "output.dir": str(folder), **SMALL}
+    )
+    object.__setattr__(config.record, "rotate_MB", 1.0)  # smaller than the configuration allows
+    assert run_live(config, Screen(quiet=True)).exit_code == 0
     assert len(list(folder.glob("session*.h5"))) > 2
     session = str(folder / "session.001.h5")
     assert main(["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]) == 0
@@ -244,8 +264,8 @@ def test_a_rotated_recording_is_one_session(tmp_path: Path, monkeypatch: pytest.
 
 def test_every_third_frame_is_a_slower_camera(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder, out = tmp_path / "run", tmp_path / "again"
-    outcome = live_run(folder, **{"record.mode": "every=3"}).run()
-    ledger = outcome.ledger
+    outcome = live_run(folder, **{"record.mode": "every=3"})
+    ledger = outcome.books.ledger
     assert (ledger.recorded, ledger.thinned) == (16, 30)
     assert ledger.adds_up
     assert not ledger.loss
@@ -268,8 +288,7 @@ def test_nothing_is_overwritten(recorded: tuple[Path, Outcome], capsys: pytest.C
 
 
 def test_without_recording_and_load(tmp_path: Path) -> None:
-    live = live_run(tmp_path / "run", **{"load.address": "none:", "record.enabled": False})
-    outcome = live.run()
+    outcome = live_run(tmp_path / "run", **{"load.address": "none:", "record.enabled": False})
     assert outcome.exit_code == 0
     assert not (tmp_path / "run" / "session.h5").exists()
     assert np.isnan(strains(tmp_path / "run")["force_N"]).all()
@@ -277,11 +296,9 @@ def test_without_recording_and_load(tmp_path: Path) -> None:
 
 def test_stopping_from_outside_closes_everything(tmp_path: Path) -> None:
     folder = tmp_path / "run"
-    live = live_run(folder)
-    live.watch(lambda m: live.stop("interrupted") if m.number == 3 else None)
-    outcome = live.run()
+    outcome = live_run(folder, each=lambda live, m: live.stop("interrupted") if m.number == 3 else None)
     assert outcome.exit_code == 130
-    assert outcome.ledger.adds_up
+    assert outcome.books.ledger.adds_up
     with Session.open(folder / "session.h5") as session:
         assert session.ledger is not None
-        assert len(session) == outcome.ledger.recorded
+        assert len(session) == outcome.books.ledger.recorded

@@ -14,7 +14,7 @@ from acquire.serial_line import identify as identify_module
 from hw_mocks.ascii_indicator import AsciiIndicator
 from hw_mocks.indicator_output import Sensing
 from hw_mocks.indicator_server import IndicatorServer
-from live.commands import load as load_commands
+from live.commands import identify, load_calibrate, load_check, recover
 from tests.acquire.session.test_recover import abandoned
 
 
@@ -37,21 +37,21 @@ def bench() -> Iterator[Bench]:
 def test_load_check_says_ready(bench: Bench) -> None:
     said: list[str] = []
     arguments = argparse.Namespace(load=f"{bench.server.path}?unit=N&baud=115200", seconds=1.0)
-    assert load_commands.load_check(arguments, said.append) == 0
+    assert load_check.command(arguments, said.append) == 0
     assert said[-1] == "ready" and any(line.startswith("rate") for line in said)
 
 
 def test_load_check_of_a_silent_port_says_not_ready() -> None:
     said: list[str] = []
     arguments = argparse.Namespace(load="loop://?unit=N&wait=0.2", seconds=0.2)
-    assert load_commands.load_check(arguments, said.append) == 6
+    assert load_check.command(arguments, said.append) == 6
     assert said[-1] == "not ready" and any("nothing came" in line for line in said)
 
 
 def test_identify_proposes_an_address_that_works(bench: Bench) -> None:
     said: list[str] = []
     arguments = argparse.Namespace(device=bench.server.path, ask=False)
-    assert load_commands.identify(arguments, said.append) == 0
+    assert identify.command(arguments, said.append) == 0
     assert any(line.startswith(f"use  --load '{bench.server.path}?protocol=ascii") for line in said)
 
 
@@ -60,7 +60,7 @@ def test_identify_without_asking_sends_nothing_and_gives_up(monkeypatch: pytest.
     monkeypatch.setattr(identify_module.listen, "__kwdefaults__", {**LISTEN, "seconds": 0.2})
     said: list[str] = []
     arguments = argparse.Namespace(device="loop://", ask=False)
-    assert load_commands.identify(arguments, said.append) == 6
+    assert identify.command(arguments, said.append) == 6
     assert any("silence" in line for line in said) and "--ask" in said[-1]
 
 
@@ -82,7 +82,7 @@ def calibrate(bench: Bench, folder: Path, accept: str, **known: float | None) ->
         load=f"{bench.server.path}?unit=N&wait=1", out=str(folder / "cal.toml"), seconds=0.4,
         **{"mass": None, "force": None, **known},
     )  # fmt: skip
-    return load_commands.load_calibrate(arguments, said.append, answer), said
+    return load_calibrate.command(arguments, said.append, answer), said
 
 
 def test_calibrating_with_a_known_force(bench: Bench, tmp_path: Path) -> None:
@@ -105,5 +105,5 @@ def test_calibrating_needs_one_known_load(bench: Bench, tmp_path: Path) -> None:
 def test_recover(tmp_path: Path) -> None:
     said: list[str] = []
     path = abandoned(tmp_path / "killed.h5")
-    assert load_commands.recover(argparse.Namespace(session=str(path), out=None), said.append) == 0
+    assert recover.command(argparse.Namespace(session=str(path), out=None), said.append) == 0
     assert "6 frames" in said[0] and (tmp_path / "killed.recovered.h5").exists()

@@ -1,117 +1,205 @@
-"""The outputs: a trouble in one of them stops that one alone; nothing is overwritten."""
+"""The outputs: every consumer gets its share, as its policy says; a trouble in one stops that one alone."""
 
 from __future__ import annotations
 
-import datetime
-import math
 import threading
-from pathlib import Path
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
 
-from acquire.errors import ConfigError, DataError
-from acquire.load_cell.log import LoadLog
-from analysis import Roi, StrainField, ZoiGrid
-from live.measure.measurement import Measurement
-from live.outputs.outputs import Outputs
-from live.setup.folder import make_folder
-from live.setup.sections import SpecimenConfig
-from live.tell.card import StatusCard
-from live.tell.journal import Journal
-from live.tell.ledger import Ledger
+from acquire.errors import DataError
+from acquire.events import Event, EventKind
+from acquire.load_cell import LoadLog
+from acquire.load_sample import LoadSample
+from live.measure import History, Measurement
+from live.outputs import Consumer, Outputs, Policy
+from live.outputs.worker import MOST_EVENTS
+from live.tell import Journal
 from tests.live.fakes import frame
+from tests.live.made_up import START, make_loads, make_measurement
 
-GRID = ZoiGrid.cover(Roi(0, 0, 64, 64), size=32, step=16)
 
+class Keeper(Consumer):
+    """Keeps the numbers of what comes; waits to be let on, and fails where it is told to."""
 
-class FakeResults:
-    """Keeps what comes; fails where it is told to."""
-
-    def __init__(self, fails_at: int | None = None, error: Exception | None = None) -> None:
+    def __init__(self, **how: Any) -> None:
         self.rows: list[int] = []
-        self.closed = False
-        self._fails_at, self._error = fails_at, error or DataError("strain.h5: the disk is full")
-        self.go = threading.Event()
+        self.ended, self.fails_at, self.error = False, None, DataError("strain.h5: the disk is full")
+        self.go, self.busy = threading.Event(), threading.Event()
         self.go.set()
+        for name, value in how.items():
+            setattr(self, name, value)
 
-    def add(self, measurement: Any) -> None:
+    def measurement(self, measurement: Measurement) -> None:
+        self.busy.set()
         self.go.wait(10)
-        if self._fails_at == len(self.rows):
-            raise self._error
+        if self.fails_at == len(self.rows):
+            raise self.error
         self.rows.append(measurement.number)
 
-    def close(self) -> None:
-        self.closed = True
+    def end(self) -> str:
+        self.ended = True
+        return "kept"
 
 
-def measured(number: int) -> Measurement:
-    from acquire.burst.accumulate import burst_of
-
-    field = StrainField.from_values(GRID, {"du_dx": 1e-3, "dv_dy": -3e-4}, 1e-5)
-    return Measurement(number, burst_of([frame(number)]), field, math.nan)
-
-
-def outputs(results: FakeResults) -> tuple[Outputs, Journal]:
+def outputs(*consumers: Consumer, loads: LoadLog | None = None) -> tuple[Outputs, Journal]:
     journal = Journal()
-    card = StatusCard(SpecimenConfig(), LoadLog())
-    return Outputs(results, None, journal, card, Ledger()), journal  # type: ignore[arg-type]
+    return Outputs(consumers, loads or LoadLog(), journal, History()), journal
 
 
-def test_every_measurement_is_written_and_kept() -> None:
-    results = FakeResults()
-    out, journal = outputs(results)
-    for number in range(100):
-        instant = out.add(measured(number))
-    out.close()
-    assert instant.exx == pytest.approx(1e-3)
-    assert results.rows == list(range(100))
-    assert results.closed
-    assert len(out.history.instants) == 100
+def give(out: Outputs, numbers: Sequence[int]) -> None:
+    for number in numbers:
+        out.add(make_measurement(number))
+
+
+@pytest.mark.parametrize("blocks", [True, False])
+def test_every_measurement_is_passed_on_and_kept(blocks: bool) -> None:
+    keeper = Keeper(policy=Policy.WAIT, blocks=blocks)
+    out, journal = outputs(keeper)
+    give(out, range(100))
+    out.end()
+    assert keeper.rows == list(range(100))
+    assert keeper.ended
+    assert [i.eyy for i in out.history.instants] == pytest.approx([1e-3] * 100)
     assert not out.failed
     assert not journal.events()
+    (report,) = out.reports
+    assert report.line() == "consumer: 100 measurements; kept"
 
 
-def test_a_slow_disk_does_not_hold_up_the_measurement() -> None:
-    results = FakeResults()
-    results.go.clear()
-    out, _ = outputs(results)
-    for number in range(20):
-        out.add(measured(number))  # returns although nothing can be written
-    assert len(out.history.instants) == 20
-    results.go.set()
-    out.close()
-    assert results.rows == list(range(20))
+@pytest.mark.parametrize(
+    ("policy", "kept"),
+    [(Policy.NEWEST, [0, 8, 9]), (Policy.BOUNDED, [0, 1, 2])],
+    ids=["newest wins", "bounded"],
+)
+def test_one_that_falls_behind_is_served_as_its_policy_says(policy: Policy, kept: list[int]) -> None:
+    keeper = Keeper(policy=policy, room=2)
+    keeper.go.clear()
+    out, _ = outputs(keeper)
+    give(out, [0])
+    assert keeper.busy.wait(10)  # it has the first one in hand
+    give(out, range(1, 10))  # returns at once
+    keeper.go.set()
+    out.end()
+    assert keeper.rows == kept
+    assert out.reports[0].line() == "consumer: 3 measurements, 7 passed over; kept"
 
 
+def test_one_that_waits_holds_the_measurement_up_and_loses_nothing() -> None:
+    keeper = Keeper(policy=Policy.WAIT, room=2)
+    keeper.go.clear()
+    out, _ = outputs(keeper)
+    giver = threading.Thread(target=give, args=(out, range(10)))
+    giver.start()
+    assert keeper.busy.wait(10)
+    giver.join(0.2)
+    assert giver.is_alive()
+    keeper.go.set()
+    giver.join(10)
+    out.end()
+    assert keeper.rows == list(range(10))
+
+
+@pytest.mark.parametrize("blocks", [True, False])
 @pytest.mark.parametrize(
     ("error", "says"),
     [(DataError("strain.h5: the disk is full"), "the disk is full"), (TypeError("oops"), "by a defect")],
 )
-def test_a_failure_stops_the_results_alone(error: Exception, says: str) -> None:
-    results = FakeResults(3, error)
-    out, journal = outputs(results)
-    for number in range(200):
-        out.add(measured(number))
-    out.close()
-    assert results.rows == [0, 1, 2]
-    assert results.closed
+def test_a_failure_stops_one_consumer_alone(error: Exception, says: str, blocks: bool) -> None:
+    broken = Keeper(policy=Policy.WAIT, fails_at=3, error=error, vital=True, blocks=blocks)
+    sound = Keeper(policy=Policy.WAIT)
+    out, journal = outputs(broken, sound)
+    give(out, range(200))
+    out.end()
+    assert broken.rows == [0, 1, 2]
+    assert broken.ended
+    assert sound.rows == list(range(200))
     assert len(out.history.instants) == 200
     assert out.failed
     assert [says in event.text for event in journal.events("error")] == [True]
+    assert says in out.reports[0].line()
 
 
-def test_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    now = datetime.datetime(2026, 5, 9, 7, 35, 25, tzinfo=datetime.UTC)
-    first, second = make_folder(None, now), make_folder(None, now)
-    assert first == Path("runs/20260509T073525Z")
-    assert second == Path("runs/20260509T073525Z-2")
-    (tmp_path / "mine").mkdir()
-    assert make_folder("mine", now) == Path("mine")
-    (tmp_path / "mine" / "strain.h5").touch()
-    with pytest.raises(ConfigError, match="nothing is overwritten"):
-        make_folder("mine", now)
-    (tmp_path / "file").touch()
-    with pytest.raises(ConfigError, match="cannot be made"):
-        make_folder("file/below", now)
+def test_a_failure_of_one_that_is_not_vital_is_a_warning() -> None:
+    out, journal = outputs(Keeper(fails_at=0))
+    give(out, [0])
+    out.end()
+    assert not out.failed
+    assert len(journal.events("warning")) == 1
+
+
+def test_one_that_waits_and_fails_lets_the_measurement_go_on() -> None:
+    keeper = Keeper(policy=Policy.WAIT, room=1, fails_at=0)
+    keeper.go.clear()
+    out, _ = outputs(keeper)
+    giver = threading.Thread(target=give, args=(out, range(10)))
+    giver.start()
+    assert keeper.busy.wait(10)
+    keeper.go.set()
+    giver.join(10)
+    assert not giver.is_alive()
+    out.end()
+
+
+def test_one_that_is_stuck_is_left_behind() -> None:
+    keeper = Keeper(patience_s=0.05)
+    keeper.go.clear()
+    out, _ = outputs(keeper)
+    give(out, [0])
+    assert keeper.busy.wait(10)
+    out.end()
+    assert "left behind" in out.reports[0].line()
+    keeper.go.set()
+
+
+class Listener(Consumer):
+    """Takes everything but measurements as they come."""
+
+    name = "listener"
+
+    def __init__(self) -> None:
+        self.seen: dict[str, list[Any]] = {"frame": [], "settled": [], "load": [], "event": []}
+        self.begun, self.go = threading.Event(), threading.Event()
+
+    def begin(self) -> None:
+        self.begun.set()
+        self.go.wait(10)
+
+    def frame(self, frame: Any) -> None:
+        self.seen["frame"].append(frame.index)
+
+    def settled(self, measurement: Measurement) -> None:
+        self.seen["settled"].append(measurement.force)
+
+    def load(self, sample: LoadSample) -> None:
+        self.seen["load"].append(sample)
+
+    def event(self, event: Event) -> None:
+        self.seen["event"].append(event.text)
+
+
+def test_each_kind_reaches_those_who_define_it() -> None:
+    listener, keeper = Listener(), Keeper()
+    loads = make_loads(10.0, lambda t: 100.0 * t)
+    out, journal = outputs(listener, keeper, loads=loads)
+    assert listener.begun.wait(10)
+    give(out, [0, 1])
+    for index in range(3):
+        out.frame(frame(index))
+    sample = LoadSample(START, 5.0, unit="kg")
+    out.load(sample)
+    for k in range(MOST_EVENTS + 5):
+        journal.tell(EventKind.NOTE, "operator", str(k))
+    listener.go.set()
+    out.end()
+    assert listener.seen["frame"] == [2]  # a camera waits for nobody: the newest wins
+    assert listener.seen["settled"] == pytest.approx([0.0, 10.0], abs=1e-6)
+    assert listener.seen["load"] == [sample]
+    assert listener.seen["event"][0] == "5"
+    assert len(listener.seen["event"]) == MOST_EVENTS
+    line = out.reports[0].line()
+    assert (
+        line
+        == "listener: 2 measurements; 1 frames, 2 passed over; 1 load samples; 1000 events, 5 passed over"
+    )

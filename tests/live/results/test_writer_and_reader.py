@@ -1,4 +1,4 @@
-"""strain.h5 and strain.csv: what is written comes back, also after a kill; forces wait for their load."""
+"""strain.h5 and strain.csv: what is written comes back, also after a kill."""
 
 from __future__ import annotations
 
@@ -16,27 +16,23 @@ import numpy as np
 import pytest
 
 from acquire.errors import DataError
-from acquire.load_cell.log import LoadLog
-from acquire.load_sample import LoadSample
-from live.results import reader as results_reader
+from acquire.hdf5 import child
+from live.results import Results, ResultsInfo, Strain
 from live.results.strain_csv import COLUMNS
-from live.results.writer import HOLD_S, Results, Strain
-from tests.live.made_up import CAMERA, START, make_grid, make_loads, make_measurement
+from tests.live.made_up import CAMERA, START, make_grid, make_measurement
 
 
-def open_results(folder: Path, loads: LoadLog | None = None, **more: Any) -> Results:
-    return Results(
-        folder,
-        grid=make_grid(),
-        start_monotonic=START,
-        start_utc="2030-01-02T03:04:05+00:00",
-        loads=make_loads(10.0, lambda t: 100.0 * t) if loads is None else loads,
-        config={"measure": {"zoi": 32}},
-        metadata={"specimen": "S1"},
-        versions={"phasedic": "0.1.0"},
-        camera=CAMERA,
+def open_results(folder: Path, **more: Any) -> Results:
+    info = ResultsInfo(
+        START,
+        "2030-01-02T03:04:05+00:00",
+        {"measure": {"zoi": 32}},
+        {"specimen": "S1"},
+        {"phasedic": "0.1.0"},
+        CAMERA,
         **more,
     )
+    return Results(folder, make_grid(), info)
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -47,7 +43,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
 def test_what_was_written_comes_back(tmp_path: Path) -> None:
     with open_results(tmp_path) as results:
         for k in range(5):
-            results.add(make_measurement(k, 1e-3 * k))
+            results.add(make_measurement(k, 1e-3 * k, force=10.0 * k))
     with Strain.open(tmp_path / "strain.h5") as strain:
         assert strain.n == 5
         assert not strain.unfinished
@@ -69,7 +65,7 @@ def test_what_was_written_comes_back(tmp_path: Path) -> None:
 
 def test_the_table_has_the_columns_scripts_rely_on(tmp_path: Path) -> None:
     with open_results(tmp_path) as results:
-        results.add(make_measurement(3, 2e-3))
+        results.add(make_measurement(3, 2e-3, force=30.0))
     first = "frame,time_s,force_N,exx,eyy,exy,sigma_exx,sigma_eyy,sigma_exy,n_valid,n_zoi"
     text = (tmp_path / "strain.csv").read_text()
     assert text.startswith(first)
@@ -85,7 +81,7 @@ def test_the_table_has_the_columns_scripts_rely_on(tmp_path: Path) -> None:
 def test_table_and_maps_say_the_same(tmp_path: Path) -> None:
     with open_results(tmp_path, area_m2=4e-5) as results:
         for k in range(3):
-            results.add(make_measurement(k, 1e-4 + 1e-3 * k))
+            results.add(make_measurement(k, 1e-4 + 1e-3 * k, force=7.0 * k))
     with Strain.open(tmp_path / "strain.h5") as strain:
         for k, row in enumerate(rows_of(tmp_path / "strain.csv")):
             for column in (*COLUMNS, "stress_Pa"):
@@ -100,32 +96,6 @@ def test_another_measure_of_strain(tmp_path: Path) -> None:
         assert strain.strain_measure == "green"
         assert strain.values["eyy"][0] == pytest.approx(0.02 + 0.02**2 / 2)
         assert np.nanmax(strain.maps("eyy", 0)) == pytest.approx(0.0202, rel=1e-6)
-
-
-def test_a_row_waits_for_its_force(tmp_path: Path) -> None:
-    loads = make_loads(0.15, lambda t: 100.0 * t)
-    with open_results(tmp_path, loads) as results:
-        results.add(make_measurement(0))
-        results.add(make_measurement(1))
-        results.add(make_measurement(2))
-        assert (results.written, results.held) == (2, 1)
-        for k in range(16, 40):
-            loads.append(LoadSample(START + k / 100, float(k)))
-        results.add(make_measurement(3))
-        assert results.held == 0
-    forces = [float(row["force_N"]) for row in rows_of(tmp_path / "strain.csv")]
-    np.testing.assert_allclose(forces, [0.0, 10.0, 20.0, 30.0], atol=1e-6)
-
-
-def test_a_silent_load_cell_holds_rows_back_only_so_long(tmp_path: Path) -> None:
-    with open_results(tmp_path, LoadLog()) as results:
-        for k in range(40):
-            results.add(make_measurement(k))
-            assert results.held <= HOLD_S / 0.1 + 1
-        assert results.written == 40 - results.held > 10
-    rows = rows_of(tmp_path / "strain.csv")
-    assert len(rows) == 40
-    assert all(row["force_N"] == "nan" for row in rows)
 
 
 def test_nothing_is_overwritten(tmp_path: Path) -> None:
@@ -178,7 +148,7 @@ WRITER = """
 import itertools, sys
 from pathlib import Path
 from tests.live.made_up import make_measurement
-from tests.live.test_results import open_results
+from tests.live.results.test_writer_and_reader import open_results
 results = open_results(Path(sys.argv[1]))
 for k in itertools.count():
     results.add(make_measurement(k, 1e-5 * k))
@@ -189,7 +159,7 @@ for k in itertools.count():
 def test_a_killed_writer_leaves_all_its_rows(tmp_path: Path) -> None:
     command = [sys.executable, "-c", WRITER, str(tmp_path)]
     with subprocess.Popen(
-        command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[2]
+        command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3]
     ) as writer:
         assert writer.stdout is not None
         last = next(int(line) for line in writer.stdout if int(line) >= 20)
@@ -245,7 +215,7 @@ def test_an_unfinished_file_that_lost_its_end_does_not_hang(
     torn = tmp_path / "torn.h5"
     torn.write_bytes((tmp_path / "strain.h5").read_bytes()[:30_000])
     results.close()
-    monkeypatch.setattr(results_reader, "PROBE_S", 2.0)
+    monkeypatch.setattr(child, "PROBE_S", 2.0)
     with pytest.raises(DataError, match=r"torn\.h5.* (damaged|truncated)"):
         Strain.open(torn)
 

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from acquire.errors import DeviceError
 from acquire.frame import Burst, Frame
 from live.measure.reference import Reference, ReferenceTaker
-from live.run.grabber import Grabber
-from live.tell.journal import Journal
-from live.tell.ledger import Ledger
+from live.run.grabber import Grabber, GrabPlan
+from live.tell import Books
 from tests.live.fakes import ListCamera, frame
 
 
 def grabbed(camera: ListCamera, *, burst: int = 2, reference: int = 4, seconds: float | None = None):
-    ledger, journal, seen = Ledger(), Journal(), []
-    grabber = Grabber(
-        camera,
-        journal,
-        ledger,
-        burst=burst,
-        reference_burst=reference,
-        seconds=seconds,
-        on_frame=seen.append,
-    )
+    books, seen = Books.new(0.5), []
+    ledger, journal = books.ledger, books.journal
+    plan = GrabPlan(burst, reference, math.inf if seconds is None else seconds)
+    grabber = Grabber(camera, plan, books, seen.append)
     grabber.start()
     bursts: list[Burst] = []
     while not grabber.bursts.finished:
@@ -75,9 +70,8 @@ def test_a_camera_that_dies_is_told_and_kept() -> None:
 
 def test_a_live_source_never_waits() -> None:
     """Nobody takes the bursts: all but the newest are skipped, and counted."""
-    ledger = Ledger()
     camera = ListCamera((frame(i) for i in range(21)), live=True)
-    grabber = Grabber(camera, Journal(), ledger, burst=2, reference_burst=1)
+    grabber = Grabber(camera, GrabPlan(2, 1), Books.new(0.5))
     grabber.start()
     grabber.join()
     assert sum(b.n for b in grabber.bursts.take_skipped()) == 18

@@ -1,15 +1,13 @@
-"""Screen, operator, ledger, journal and numbers in words."""
+"""Screen, ledger, journal and numbers in words."""
 
 from __future__ import annotations
 
 import io
 import math
-from typing import Any
 
 import pytest
 
 from acquire.events import Event, EventKind
-from live.operate.keyboard import Operator, listen
 from live.tell.journal import Journal
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen
@@ -42,43 +40,6 @@ def test_a_lost_terminal_does_not_matter() -> None:
     screen = Screen(Gone())
     screen.say("nobody reads this")
     screen.say("nor this")
-
-
-class FakeLive:
-    def __init__(self) -> None:
-        self.calls: list[Any] = []
-
-    def stop(self, reason: str) -> None:
-        self.calls.append(("stop", reason))
-
-    def command(self, kind: EventKind, note: str = "") -> None:
-        self.calls.append((kind, note))
-
-
-def test_the_keys() -> None:
-    live, stream = FakeLive(), io.StringIO()
-    operator = Operator(live, Screen(stream))  # type: ignore[arg-type]
-    for line in ("r\n", "t", "p", "p", "n slipped in the grip", "", "x", "q"):
-        operator.line(line)
-    assert live.calls == [
-        (EventKind.NEW_REFERENCE, ""),
-        (EventKind.TARE, ""),
-        (EventKind.PAUSE, ""),
-        (EventKind.RESUME, ""),
-        (EventKind.NOTE, "slipped in the grip"),
-        ("stop", "ended by the operator"),
-    ]
-    assert "keys" in stream.getvalue()
-
-
-def test_only_a_terminal_is_listened_to() -> None:
-    assert listen(FakeLive(), io.StringIO("q\n"), Screen(io.StringIO())) is None  # type: ignore[arg-type]
-    assert listen(FakeLive(), None, Screen(io.StringIO())) is None  # type: ignore[arg-type]
-    live = FakeLive()
-    thread = listen(live, Terminal("q\n"), Screen(io.StringIO()))  # type: ignore[arg-type]
-    assert thread is not None
-    thread.join(5)
-    assert live.calls == [("stop", "ended by the operator")]
 
 
 def test_the_ledger_tells_when_it_does_not_add_up() -> None:

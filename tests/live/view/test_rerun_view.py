@@ -45,6 +45,7 @@ def show_a_test(view: RerunView, seconds: float = 3.0) -> None:
         for j in range(10):
             view.load(START + 0.1 * k + 0.01 * j, 10.0 * k)
         view.show(make_measurement(k, 1e-4 * k))
+        view.settled(make_measurement(k, 1e-4 * k, force=10.0 * k))
 
 
 class Slow:
@@ -148,6 +149,7 @@ def draw_a_test(scene: Scene, seconds: float = 3.0) -> None:
     for k in range(round(10 * seconds)):
         scene.picture(make_frame(k, START + 0.1 * k))
         scene.loads([(START + 0.1 * k + 0.01 * j, 10.0 * k) for j in range(10)])
+        scene.points([(1e-4 * k, 10.0 * k)])
         scene.measurement(make_measurement(k, 1e-4 * k))
 
 
@@ -204,7 +206,6 @@ def test_it_serves_on_the_next_port_when_the_wanted_one_is_taken(tmp_path: Path)
         wanted = taken.getsockname()[1]
         view = RerunView(make_setup(), port=wanted, rrd=None)
         show_a_test(view, 0.5)
-        view.set_reference(make_grid())
         assert view.port is not None
         assert view.port > wanted
         assert str(view.port) in view.address
@@ -244,7 +245,7 @@ def test_a_field_without_one_valid_zoi_is_drawn(tmp_path: Path) -> None:
     lost = make_measurement(0)
     field = StrainField.from_values(grid, {}, status=np.full(grid.shape, 5))
     view = RerunView(make_setup(axis="x"), port=None, rrd=tmp_path / "view.rrd")
-    view.show(type(lost)(0, lost.burst, field, 1.0))
+    view.show(type(lost).of(0, lost.burst, field, 1.0))
     view.close(30)
     assert view.failed is None
 

@@ -1,0 +1,40 @@
+"""``phasedic average``: a dark frame (lens covered) or a flat frame (evenly lit)."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from live.commands.options import add_options
+from live.tell import Screen
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic average``."""
+    parser.add_argument("--camera", required=True, metavar="ADDRESS")
+    parser.add_argument("--frames", type=int, default=64, metavar="N", help="default 64")
+    add_options(parser, "picture", "crop")
+    parser.add_argument("--out", required=True, metavar="FILE", help="a TIFF that does not exist yet")
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic average``: a dark frame (lens covered) or a flat frame (evenly lit)."""
+    from acquire.burst import average_bursts, save_mean
+    from acquire.errors import DataError
+    from live.setup import open_rig
+
+    screen = Screen()
+    given = getattr(arguments, "camera.crop")
+    crop = tuple(given) if given else None
+    rig = open_rig(arguments.camera, "none:", lambda event: screen.say(event.text), crop=crop)
+    try:
+        with rig.camera:
+            burst = next(average_bursts(rig.camera, arguments.frames), None)
+    finally:
+        rig.close()
+    if burst is None:
+        raise DataError(f"{arguments.camera}: gave fewer than {arguments.frames} frames without a gap")
+    save_mean(burst.mean, Path(arguments.out))
+    noise = f", noise of one {burst.noise:.2f} GL" if burst.n > 1 else ""
+    screen.say(f"{arguments.out}: {burst.n} frames, mean {burst.mean.mean():.1f} GL{noise}")
+    return 0

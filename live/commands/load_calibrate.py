@@ -1,0 +1,66 @@
+"""``phasedic load-calibrate``: no load, a known load, no load again, and whether to keep it."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+
+from acquire.errors import ConfigError
+from acquire.load_cell import calibration, check
+from live.commands.exit_codes import NOT_READY
+from live.setup import open_load
+
+Say = Callable[[str], None]
+Ask = Callable[[str], str]
+
+GRAVITY = 9.80665  # m/s^2
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic load-calibrate``."""
+    parser.add_argument("--load", required=True, metavar="ADDRESS")
+    parser.add_argument("--mass", type=float, metavar="KG", help="the known load as a mass")
+    parser.add_argument("--force", type=float, metavar="N", help="the known load as a force")
+    parser.add_argument("--out", required=True, metavar="FILE", help="where the calibration is kept")
+    parser.add_argument("--seconds", type=float, default=3.0, metavar="S", help="of each reading (default 3)")
+
+
+def command(arguments: argparse.Namespace, say: Say = print, ask: Ask = input) -> int:
+    """``phasedic load-calibrate --load ADDRESS (--mass KG | --force N) --out FILE [--seconds 3]``.
+
+    Reads no load, the known load, no load again; asks before each and before the result is kept.
+    6 when it was not accepted.
+    """
+    if (arguments.mass is None) == (arguments.force is None):
+        raise ConfigError("give the known load: --mass in kg, or --force in N")
+    known_N = arguments.force if arguments.mass is None else arguments.mass * GRAVITY
+    address = _raw(arguments.load)
+
+    def read(force_N: float, what: str) -> calibration.Point:
+        ask(f"{what}, wait until it is still, then press Enter ")
+        samples = check.listen(
+            open_load(address, lambda event: say(f"{event.level}: {event.text}")), arguments.seconds
+        )
+        found = calibration.point(force_N, [sample.force for sample in samples])
+        say(f"  {found.value:.8g} on the line (noise {found.noise:.3g}, {found.n} readings)")
+        return found
+
+    points = [read(0.0, "take off all load"), read(known_N, f"put on {known_N:.6g} N")]
+    points.append(read(0.0, "take off all load again"))
+    found = calibration.fit(points)
+    say(f"gain {found.gain:.8g} N per unit, zero {found.zero:.8g}, residual {found.residual_N:.3g} N")
+    if ask("accept? (yes/no) ").strip().lower() not in ("y", "yes"):
+        say("not kept")
+        return NOT_READY
+    calibration.save(found, Path(arguments.out), arguments.load)
+    say(f"kept in {arguments.out}; use it with calibration={arguments.out} in the address")
+    return 0
+
+
+def _raw(address: str) -> str:
+    """The address with what stands on the line as value: no unit, no sign, no earlier calibration."""
+    body, mark, settings = address.partition("?")
+    dropped = ("gain", "zero", "sign", "unit", "calibration", "capacity", "max_step", "mass_reads_force")
+    kept = [part for part in settings.split("&") if mark and part.partition("=")[0] not in dropped]
+    return f"{body}?{'&'.join([*kept, 'gain=1', 'sign=1'])}"

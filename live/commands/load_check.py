@@ -1,0 +1,29 @@
+"""``phasedic load-check``: listen to a load cell; ready for a test or not."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+
+from acquire.load_cell import check
+from live.commands.exit_codes import NOT_READY
+from live.setup import open_load
+
+Say = Callable[[str], None]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic load-check``."""
+    parser.add_argument("--load", required=True, metavar="ADDRESS")
+    parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="default 10")
+
+
+def command(arguments: argparse.Namespace, say: Say = print) -> int:
+    """0 when ready for a test, 6 when not."""
+    cell = open_load(arguments.load, lambda event: say(f"{event.level}: {event.text}"))
+    say(f"listening to {cell.info.name} for {arguments.seconds:g} s ...")
+    found = check.report(check.listen(cell, arguments.seconds), cell.info)
+    for line in check.report_lines(found):
+        say(line)
+    say("ready" if found.ready else "not ready")
+    return 0 if found.ready else NOT_READY

@@ -1,0 +1,50 @@
+"""``phasedic map``: a map of the results over a picture, as a PNG (needs matplotlib)."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from acquire.errors import ConfigError
+from acquire.opencv import read_image
+from live.maps import Picture, draw
+from live.results import Strain
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic map``."""
+    parser.add_argument("results", help="strain.h5")
+    parser.add_argument("png", help="the picture to write")
+    parser.add_argument("--field", default="eyy", help="u, v, exx, eyy, exy, sigma_eyy, residual, status ...")
+    parser.add_argument("--row", type=int, default=-1, help="which measured instant (default: the last)")
+    parser.add_argument("--over", metavar="FILE", help="image to draw over")
+    parser.add_argument("--limit", type=float, help="colour range -LIMIT to LIMIT (default: automatic)")
+    parser.add_argument("--title")
+    words = "median filter of N x N ZOIs, for show"
+    parser.add_argument("--median", type=int, default=1, metavar="N", help=words)
+    words = "Gaussian filter, for show"
+    parser.add_argument("--low-pass", type=float, default=0.0, metavar="PX", help=words)
+    words = "take the blur of the ZOI off, for show (order 1): 3 or 7 steps; the title says what they do"
+    parser.add_argument("--deconvolve", type=int, default=0, metavar="STEPS", help=words)
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic map``."""
+    background = None if arguments.over is None else read_image(Path(arguments.over), gray="luma")
+    path = Path(arguments.png)
+    if path.exists():
+        raise ConfigError(f"{path} exists and is not overwritten; choose another name")
+    with Strain.open(Path(arguments.results)) as strain:
+        picture = Picture(
+            arguments.field,
+            arguments.row,
+            arguments.limit,
+            arguments.title or "",
+            arguments.median,
+            arguments.low_pass,
+            arguments.deconvolve,
+        )
+        figure = draw(strain, picture, background)
+        figure.savefig(path, dpi=110)
+    print(path)
+    return 0

@@ -1,0 +1,93 @@
+"""The options of the command line that stand for keys of the configuration, and what they set.
+
+An option is declared where its key is (``live.setup.sections``): name, type, default and help are
+written once. Its value is stored under "section.key".
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from acquire.errors import ConfigError
+from live.setup import Config, load_config, options
+
+MEASURE = (
+    "roi", "mask", "zoi", "step", "burst", "reference-burst", "window", "estimator", "order", "bending",
+    "noise",
+)  # fmt: skip
+OUTPUT = ("out", "no-view", "no-rrd", "axis")
+
+
+def add_options(parser: argparse.ArgumentParser, title: str, *names: str) -> None:
+    """A group of options by their names."""
+    group, known = parser.add_argument_group(title), options()
+    for name in names:
+        key, field = known[name]
+        option, check = field.metadata["option"], field.metadata["check"]
+        words = field.metadata["help"]
+        if option.off:
+            words = f"do not {words}"
+            group.add_argument(f"--{name}", dest=key, action="store_const", const=False, help=words)
+            continue
+        if field.default not in (None, ""):
+            words += f" (default {field.default})"
+        shape = {"choices": option.choices} if option.choices else {"metavar": option.metavar}
+        group.add_argument(f"--{name}", dest=key, type=_reader(check.read), help=words, **shape)
+
+
+def _reader(read: Any) -> Any:
+    """``read`` with words of its own where it refuses."""
+
+    def reader(word: str) -> Any:
+        try:
+            return read(word)
+        except ValueError as error:
+            kind = {int: "a whole number", float: "a number"}.get(read)
+            raise argparse.ArgumentTypeError(f"{word!r}: give {kind}" if kind else str(error)) from None
+
+    return reader
+
+
+def add_measure(parser: argparse.ArgumentParser) -> None:
+    """What says how to measure and where the files go."""
+    parser.add_argument("--config", metavar="FILE", help="TOML file; what is given here overrides it")
+    add_options(parser, "measurement", *MEASURE)
+    add_options(parser, "output", *OUTPUT)
+    parser.add_argument("--section", metavar="W,T", help="width,thickness of the section in mm, for stresses")
+    parser.add_argument(
+        "--meta", action="append", default=[], metavar="KEY=TEXT", help="stored in every file"
+    )
+    add_verbose(parser)
+
+
+def add_verbose(parser: argparse.ArgumentParser) -> None:
+    """--verbose."""
+    parser.add_argument("--verbose", "-v", action="store_true", help="tell more")
+
+
+def overrides(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What the command line sets, as "section.key" -> value."""
+    given = vars(arguments)
+    found = {key: value for key, value in given.items() if "." in key and value is not None}
+    if given.get("section"):
+        found |= _section(given["section"])
+    for pair in given.get("meta") or ():
+        key, _, value = pair.partition("=")
+        found[f"metadata.{key}"] = value
+    return found
+
+
+def configured(arguments: argparse.Namespace, defaults: dict[str, Any] | None = None) -> Config:
+    """The configuration: ``defaults``, overlaid by the file of --config, overlaid by the options."""
+    path = Path(arguments.config) if arguments.config else None
+    return load_config(path, {**(defaults or {}), **overrides(arguments)})
+
+
+def _section(text: str) -> dict[str, float]:
+    try:
+        width, thickness = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ConfigError(f"--section {text}: give width,thickness in mm, for example 10,2") from None
+    return {"specimen.width_mm": width, "specimen.thickness_mm": thickness}

@@ -1,0 +1,88 @@
+"""The means of one measured field over its valid ZOIs, computed once for all who want them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from acquire.frame import Burst
+    from analysis.field import StrainField
+
+
+@dataclass(frozen=True, slots=True)
+class Instant:
+    """Means over the valid ZOIs at one time; strains are small strains, force in N, u and v in px.
+
+    Attributes
+    ----------
+    t : float, s
+        Monotonic.
+    force : float, N
+        At ``t``; NaN where no load is known (yet).
+    exx, eyy, exy, sigma_exx, sigma_eyy, sigma_exy : float
+        Means and the standard uncertainties of the means.
+    u, v : float, px
+    largest : float
+        The strain of largest magnitude of any valid ZOI.
+    zoi_sigma : float
+        Median standard uncertainty of one ZOI's eyy.
+    n_valid, n_zoi : int
+    refused : str
+        Why ZOIs have no value ("3 UNEVEN, 1 LOST"), empty where all have one.
+    noise_GL : float
+        Of one frame, from the burst; NaN where it tells nothing.
+    measure_s : float, s
+        Time the kernel took; 0.0 where nobody measured it.
+    """
+
+    t: float
+    force: float
+    exx: float
+    eyy: float
+    exy: float
+    sigma_exx: float
+    sigma_eyy: float
+    sigma_exy: float
+    u: float
+    v: float
+    largest: float
+    zoi_sigma: float
+    n_valid: int
+    n_zoi: int
+    refused: str
+    noise_GL: float
+    measure_s: float
+
+
+def instant_of(burst: Burst, field: StrainField, force: float, measure_s: float = 0.0) -> Instant:
+    """The means of ``field``, measured from ``burst``."""
+    (exx, s_xx), (eyy, s_yy), (exy, s_xy) = (field.mean(name) for name in ("exx", "eyy", "exy"))
+    valid = field.ok
+    values = np.concatenate([field.exx[valid], field.eyy[valid]])
+    return Instant(
+        t=burst.t,
+        force=force,
+        exx=exx,
+        eyy=eyy,
+        exy=exy,
+        sigma_exx=s_xx,
+        sigma_eyy=s_yy,
+        sigma_exy=s_xy,
+        u=_mean(field.u[valid]),
+        v=_mean(field.v[valid]),
+        largest=float(values[np.argmax(np.abs(values))]) if values.size else math.nan,
+        zoi_sigma=float(np.median(field.sigma_eyy[valid])) if values.size else math.nan,
+        n_valid=int(valid.sum()),
+        n_zoi=int(field.grid.active.sum()),
+        refused=", ".join(f"{n} {status.name}" for status, n in field.refused.items()),
+        noise_GL=burst.noise,
+        measure_s=measure_s,
+    )
+
+
+def _mean(values: np.ndarray) -> float:
+    return float(values.mean(dtype=np.float64)) if values.size else math.nan

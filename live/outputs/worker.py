@@ -1,0 +1,153 @@
+"""One consumer with its thread, its queues and its guard."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections import Counter, deque
+from collections.abc import Callable
+from typing import Any
+
+from acquire.errors import PhasedicError
+from live.outputs.consumer import KINDS, Consumer, Policy, Report, wanted
+
+log = logging.getLogger(__name__)
+
+MOST_SAMPLES, MOST_EVENTS = 20_000, 1000
+_NAP_S = 0.1  # load samples wake nobody
+
+Tell = Callable[[str, str, bool], None]
+"""Called with the consumer's name, what went wrong, and whether the consumer is vital."""
+
+
+class Worker:
+    """Passes things on to one consumer, as its policy says, and never raises.
+
+    Parameters
+    ----------
+    consumer : Consumer
+    tell : callable
+        Told once where the consumer fails.
+    """
+
+    def __init__(self, consumer: Consumer, tell: Tell) -> None:
+        self._consumer, self._tell = consumer, tell
+        self._wanted = wanted(consumer)
+        self._waiting: dict[str, deque[Any]] = {kind: deque() for kind in KINDS}
+        self._most = {"event": MOST_EVENTS, "load": MOST_SAMPLES, "frame": 1}
+        self._taken: Counter[str] = Counter()
+        self._over: Counter[str] = Counter()
+        self._failed = self._words = ""
+        self._changed = threading.Condition()
+        self._ending = False
+        self._thread = threading.Thread(target=self._work, name=consumer.name, daemon=True)
+
+    def start(self) -> None:
+        """Begin; from now on things are taken."""
+        if self._consumer.blocks:
+            self._thread.start()
+        else:
+            self._guarded(self._consumer.begin)
+
+    def give(self, kind: str, item: Any) -> None:
+        """Pass ``item`` on, or let it wait; waits itself only where the policy says so."""
+        if kind not in self._wanted or self._failed or self._ending:
+            return
+        if not self._consumer.blocks:
+            self._hand_over(kind, item)
+            return
+        with self._changed:
+            if self._has_room(kind):
+                self._waiting[kind].append(item)
+            if kind != "load":
+                self._changed.notify_all()
+
+    def _has_room(self, kind: str) -> bool:
+        """Make room as the policy says; False where the new one is refused."""
+        queue, most = self._waiting[kind], self._most.get(kind, self._consumer.room)
+        if len(queue) < most:
+            return True
+        if kind not in self._most and self._consumer.policy is Policy.WAIT:
+            self._changed.wait_for(lambda: len(queue) < most or bool(self._failed) or self._ending)
+            return True
+        self._over[kind] += 1
+        if kind not in self._most and self._consumer.policy is Policy.BOUNDED:
+            return False
+        queue.popleft()
+        return True
+
+    def end(self) -> Report:
+        """Hand over what waits, end the consumer, and say how it fared."""
+        if self._consumer.blocks:
+            with self._changed:
+                self._ending = True
+                self._changed.notify_all()
+            self._thread.join(self._consumer.patience_s)
+            if self._thread.is_alive():
+                self._fail("did not take its data in time and was left behind")
+        elif not self._ending:
+            self._ending = True
+            self._close()
+        return Report(
+            self._consumer.name, dict(self._taken), dict(self._over), self._words, self._failed,
+            self._consumer.vital,
+        )  # fmt: skip
+
+    @property
+    def vital(self) -> bool:
+        """Whether a failure of the consumer is a loss."""
+        return self._consumer.vital
+
+    @property
+    def failed(self) -> str:
+        """Why the consumer stopped early; empty while all is well."""
+        return self._failed
+
+    def _work(self) -> None:
+        self._guarded(self._consumer.begin)
+        while (batch := self._next()) is not None:
+            for kind, item in batch:
+                self._hand_over(kind, item)
+        self._close()
+
+    def _next(self) -> list[tuple[str, Any]] | None:
+        """What waits, kind by kind; None at the end."""
+        with self._changed:
+            while not any(self._waiting.values()) and not self._ending:
+                self._changed.wait(_NAP_S if "load" in self._wanted else None)
+            batch = [(kind, item) for kind in KINDS for item in self._waiting[kind]]
+            for queue in self._waiting.values():
+                queue.clear()
+            self._changed.notify_all()
+            return batch if batch or not self._ending else None
+
+    def _hand_over(self, kind: str, item: Any) -> None:
+        if not self._failed and self._guarded(lambda: getattr(self._consumer, kind)(item)):
+            self._taken[kind] += 1
+
+    def _close(self) -> None:
+        def close() -> None:
+            self._words = self._consumer.end()
+
+        self._guarded(close)
+
+    def _guarded(self, step: Callable[[], None]) -> bool:
+        """One step of the consumer; the first that fails ends it, loudly, and nothing else."""
+        try:
+            step()
+        except PhasedicError as error:
+            self._fail(str(error))
+        except BaseException as error:  # a panic inside a library is not an Exception
+            log.exception("%s failed", self._consumer.name)
+            self._fail(f"by a defect: {error!r}")
+        else:
+            return True
+        return False
+
+    def _fail(self, why: str) -> None:
+        if self._failed:
+            return
+        with self._changed:
+            self._failed = why
+            self._changed.notify_all()
+        self._tell(self._consumer.name, why, self._consumer.vital)

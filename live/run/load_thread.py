@@ -1,0 +1,62 @@
+"""The load thread: drains the load cell into the log, the recording and the outputs."""
+
+from __future__ import annotations
+
+import logging
+import threading
+
+from acquire.errors import PhasedicError
+from acquire.events import EventKind
+from acquire.load_cell import LoadCell
+from live.outputs import Outputs
+from live.run.recorder import Recording
+from live.tell import Books
+
+log = logging.getLogger(__name__)
+
+
+class LoadThread:
+    """Drains ``cell`` in a thread of its own; a trouble there never ends the images.
+
+    Parameters
+    ----------
+    cell : LoadCell
+    books : Books
+    outputs : Outputs
+    recording : Recording
+
+    Attributes
+    ----------
+    failure : int
+        The exit code of what ended the load; 0 where all was well.
+    """
+
+    def __init__(self, cell: LoadCell, books: Books, outputs: Outputs, recording: Recording) -> None:
+        self._cell, self._books, self._outputs, self._recording = cell, books, outputs, recording
+        self.failure = 0
+        self._thread = threading.Thread(target=self._work, name="load", daemon=True)
+
+    def start(self) -> None:
+        """Begin; the load cell must have been entered."""
+        self._thread.start()
+
+    def join(self) -> None:
+        """Wait for the end."""
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _work(self) -> None:
+        try:
+            for sample in self._cell:
+                self._books.loads.append(sample)
+                self._books.ledger.add(load_samples=1)
+                self._recording.sample(sample)
+                self._outputs.load(sample)
+        except Exception as error:
+            if not isinstance(error, PhasedicError):
+                log.exception("the load thread failed")
+            self.failure = getattr(error, "exit_code", 1)
+            text = f"the load is lost, images go on: {error}"
+            self._books.journal.tell(EventKind.DEVICE, self._cell.info.address, text, "error")
+        finally:
+            self._books.loads.close()

@@ -1,0 +1,94 @@
+"""Measuring live: the reference, then burst after burst, whatever else happens."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from acquire.errors import PhasedicError
+from acquire.events import Event, EventKind
+from acquire.frame import Burst
+from live.measure import Instant, SmearGuard, measure
+from live.outputs import Outputs
+from live.run.feed import Feed
+from live.run.reference_step import ReferenceStep
+from live.run.setting import Setting
+from live.tell import Books
+
+if TYPE_CHECKING:
+    from analysis import PhaseKernel
+
+log = logging.getLogger(__name__)
+
+
+class Measuring:
+    """Measures what the feed gives; a trouble here never ends the recording.
+
+    Parameters
+    ----------
+    setting : Setting
+    books : Books
+    outputs : Outputs
+    feed : Feed
+    show : callable taking an Instant
+        Told of every measurement.
+
+    Attributes
+    ----------
+    failure : int
+        1 where a defect ended the measurement, else 0.
+    """
+
+    def __init__(
+        self, setting: Setting, books: Books, outputs: Outputs, feed: Feed, show: Callable[[Instant], None]
+    ) -> None:
+        self._setting, self._books, self._outputs, self._feed = setting, books, outputs, feed
+        self._show = show
+        self.failure = 0
+
+    def to_the_end(self) -> None:
+        """Measure until the camera ends.
+
+        Raises
+        ------
+        PhasedicError
+            The reference cannot be used: the start has failed.
+        """
+        try:
+            prepared = ReferenceStep(self._setting, self._books, self._feed).take()
+            if prepared is not None:
+                self._measure(*prepared)
+        except PhasedicError:
+            raise
+        except Exception as error:
+            log.exception("the measurement failed")
+            self.failure = 1
+            text = f"measuring has stopped by a defect, recording goes on: {error!r}"
+            self._books.journal.tell(EventKind.MEASUREMENT, "measurement", text, "error")
+            self._feed.let_pass()
+
+    def _measure(self, kernel: PhaseKernel, noise_GL: float | None) -> None:
+        journal = self._books.journal
+        guard = SmearGuard(journal.record)
+        for m in measure(
+            self._feed.bursts(),
+            kernel,
+            self._books.loads,
+            noise_GL=noise_GL,
+            correct=self._setting.correct,
+            renew_at=self._setting.config.measure.renew_at,
+            on_event=journal.record,
+            timer=time.perf_counter,
+        ):
+            self._books.ledger.add(measured=m.burst.n)
+            journal.record(_measured(m.burst))
+            self._show(self._outputs.add(m))
+            guard.look(m.burst)
+
+
+def _measured(burst: Burst) -> Event:
+    data = {"first": burst.first_index, "last": burst.last_index, "n": burst.n}
+    text = f"frames {burst.first_index} to {burst.last_index}"
+    return Event(burst.t, EventKind.MEASURED, "measurement", text, "info", data)

@@ -1,0 +1,136 @@
+"""What a value of the configuration may be: checked as it comes from a file, and read from a word.
+
+A check that refuses says what is allowed; whoever asks adds the key and the value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+
+class Refused(ValueError):
+    """Says what is allowed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A kind of value.
+
+    Attributes
+    ----------
+    accept : callable
+        The value as it is used; raises ``Refused``.
+    read : callable
+        From a word of the command line to what ``accept`` takes; raises ValueError.
+    """
+
+    accept: Callable[[Any], Any]
+    read: Callable[[str], Any] = str
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """How a key is said on the command line.
+
+    Attributes
+    ----------
+    name : str
+        Without its dashes.
+    metavar : str
+    choices : tuple of str
+    off : bool
+        A switch that turns the key off.
+    """
+
+    name: str
+    metavar: str = ""
+    choices: tuple[str, ...] = ()
+    off: bool = False
+
+
+def key(
+    check: Check, default: Any, help_text: str, option: Option | None = None, *, optional: bool = False
+) -> Any:
+    """A field of a section: its check, its default, its meaning; None is allowed where ``optional``."""
+    metadata = {"check": check, "help": help_text, "optional": optional, "option": option}
+    return field(default=default, metadata=metadata)
+
+
+def number(low: float = -math.inf, high: float = math.inf) -> Check:
+    """A number within bounds."""
+    bounds = "" if low == -math.inf else f" from {low:g}" + (f" to {high:g}" * (high < math.inf))
+
+    def accept(value: Any) -> float:
+        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+            raise Refused(f"a number{bounds}")
+        return float(value)
+
+    return Check(accept, float)
+
+
+def integer(low: int, high: int) -> Check:
+    """A whole number within bounds."""
+
+    def accept(value: Any) -> int:
+        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+            raise Refused(f"a whole number from {low} to {high}")
+        return value
+
+    return Check(accept, int)
+
+
+def choice(*allowed: str) -> Check:
+    """One of a few words."""
+
+    def accept(value: Any) -> str:
+        if value not in allowed:
+            raise Refused("one of " + ", ".join(repr(word) for word in allowed))
+        return str(value)
+
+    return Check(accept)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise Refused("a text in quotes")
+    return value
+
+
+def _flag(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise Refused("true or false")
+    return value
+
+
+def _box(value: Any) -> tuple[int, int, int, int]:
+    if not isinstance(value, list | tuple) or len(value) != 4 or not all(type(v) is int for v in value):
+        raise Refused("four whole numbers: x, y, width, height in px")
+    x, y, width, height = value
+    if x < 0 or y < 0 or width < 1 or height < 1:
+        raise Refused("x and y from 0, width and height from 1 (px)")
+    return x, y, width, height
+
+
+def _read_box(word: str) -> list[int]:
+    values = [int(part) for part in word.split(",")]
+    if len(values) != 4:
+        raise ValueError("give four whole numbers x,y,width,height")
+    return values
+
+
+def _record_mode(value: Any) -> str:
+    text = _text(value)
+    every = text.removeprefix("every=")
+    if text in ("all", "bursts") or (every != text and every.isdigit() and int(every) >= 1):
+        return text
+    raise Refused("'all', 'bursts' or 'every=K' with K from 1")
+
+
+TEXT = Check(_text)
+FLAG = Check(_flag)
+BOX = Check(_box, _read_box)
+"""x, y, width, height in px."""
+RECORD_MODE = Check(_record_mode)
