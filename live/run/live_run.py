@@ -26,6 +26,7 @@ from acquire.events import Event, EventKind
 from acquire.frame import Burst, Frame
 from acquire.load_cell import LoadLog
 from acquire.record_mode import RecordMode
+from acquire.session import SessionInfo
 from live.measure import Correction, Instant, Measurement, SmearGuard, measure, unchanged, usable
 from live.outputs import Outputs, make_outputs, open_view
 from live.run.feed import Feed
@@ -211,16 +212,16 @@ class LiveRun:
         if not r.enabled:
             return None
         path, mode = folder / "session.h5", RecordMode.parse(r.mode)
-        about = {
-            "camera": rig.camera.info,
-            "load": rig.load.info,
-            "start": start,
-            "config": self.config.as_dict(),
-            "metadata": dict(self.config.metadata),
-            "versions": versions(),
-            "mode": mode,
-        }
-        writer = open_writer(path, r.rotate_MB, about)
+        info = SessionInfo(
+            camera=rig.camera.info,
+            load=rig.load.info,
+            start=start,
+            config=self.config.as_dict(),
+            metadata=dict(self.config.metadata),
+            versions=versions(),
+            mode=mode,
+        )
+        writer = open_writer(path, r.rotate_MB, info)
         tell_room(path, rig.camera.info, mode, self.screen)
         recorder = Recorder(
             writer,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +20,7 @@ from acquire.frame import Burst, CameraInfo, Frame
 from acquire.hdf5 import forecast, network_share
 from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
-from acquire.session import RotatingWriter, SessionWriter
+from acquire.session import RotatingWriter, SessionInfo, SessionWriter
 from live.run.channels import ByteBuffer
 from live.tell import Journal, Ledger, Screen
 
@@ -37,13 +37,11 @@ _DISK_WARN_S = 180.0
 Item = Frame | Burst | LoadSample | Event
 
 
-def open_writer(
-    path: Path, rotate_MB: float | None, about: Mapping[str, Any]
-) -> SessionWriter | RotatingWriter:
+def open_writer(path: Path, rotate_MB: float | None, info: SessionInfo) -> SessionWriter | RotatingWriter:
     """A new session file, or a set of files that begins another one after ``rotate_MB``."""
     if rotate_MB is None:
-        return SessionWriter(path, **about)
-    return RotatingWriter(path, int(rotate_MB * 1e6), **about)
+        return SessionWriter(path, info)
+    return RotatingWriter(path, info, int(rotate_MB * 1e6))
 
 
 class Recorder:
