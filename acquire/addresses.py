@@ -13,14 +13,11 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import TYPE_CHECKING, Generic, TypeVar, overload
+from typing import Generic, TypeVar, overload
 from urllib.parse import unquote
 
 from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
-
-if TYPE_CHECKING:
-    pass
 
 # A glob may hold a question mark too: settings are the last one followed by key=value pairs.
 _SETTINGS = re.compile(r"\?((?:[A-Za-z_]\w*=[^&?]*)(?:&[A-Za-z_]\w*=[^&?]*)*)$")

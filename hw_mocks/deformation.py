@@ -1,8 +1,8 @@
 """Deformations with closed forms: where each reference pixel goes, and the gradient there.
 
 ``Deformation`` is all that the renderer asks for; ``Affine`` and ``Wave`` serve accuracy tests,
-``Motion`` is a specimen at one instant. Displacements are px on the reference grid, x right and
-y down: ``deformed(x + u, y + v) = reference(x, y)``.
+``SpecimenDeformation`` is that of a specimen at one instant. Displacements are px on the reference grid,
+x right and y down: ``deformed(x + u, y + v) = reference(x, y)``.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ class Wave:
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class SpecimenDeformation:
     """A specimen at one instant: its strain field, then turned about its centre and shifted.
 
     Attributes

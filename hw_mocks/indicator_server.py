@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable
 
+from acquire.closing import Closing
 from hw_mocks.faults import FaultPlan
 from hw_mocks.indicator import Indicator
 from hw_mocks.indicator_output import IndicatorOutput, Sensing
@@ -18,7 +19,7 @@ SPLIT_S = 0.03
 PATIENCE_S = 0.2  # for a backlog that does not fit into the line's buffer at once
 
 
-class IndicatorServer:
+class IndicatorServer(Closing):
     """Runs an indicator until ``close``.
 
     Samples are taken on whole milliseconds of the device's clock, as firmware does, so that the
@@ -54,12 +55,6 @@ class IndicatorServer:
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._work, name="sim-indicator", daemon=True)
         self._thread.start()
-
-    def __enter__(self) -> IndicatorServer:
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     @property
     def lost_bytes(self) -> int:

@@ -14,13 +14,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquire.addresses import Address, Options
+from acquire.closing import Closing
 from acquire.errors import DeviceError
 from acquire.events import EventSink, device_event
 from acquire.frame import CameraInfo, Clock, Frame, frozen
@@ -106,7 +106,7 @@ class Ring:
             return frame, frame is not None or not self._closed
 
 
-class SimCamera:
+class SimCamera(Closing):
     """See the module; fulfils ``acquire.camera.Camera``.
 
     Parameters
@@ -195,11 +195,6 @@ class SimCamera:
                 self._thread = threading.Thread(target=self._work, name="sim-camera", daemon=True)
                 self._thread.start()
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def __iter__(self) -> Iterator[Frame]:
         source = self._in_lock_step() if self.specimen.nominal else self._from_ring()

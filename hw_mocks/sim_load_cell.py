@@ -12,12 +12,12 @@ import logging
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from types import TracebackType
 from typing import Self, cast
 
 import numpy as np
 
 from acquire.addresses import Address, Options
+from acquire.closing import Closing
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_cell import LoadCell, open_load_cell
@@ -66,7 +66,7 @@ class SimLoadSettings:
     passed_on: dict[str, str] = field(default_factory=dict)
 
 
-class SimLoadCell:
+class SimLoadCell(Closing):
     """The product's serial load cell on a simulated indicator; fulfils ``LoadCell``.
 
     Parameters
@@ -110,11 +110,6 @@ class SimLoadCell:
         self._cell.__enter__()
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
     def __iter__(self) -> Iterator[LoadSample]:
         return iter(self._cell)
 
@@ -132,7 +127,7 @@ class SimLoadCell:
         self._server.close()
 
 
-class NominalLoadCell:
+class NominalLoadCell(Closing):
     """The load on nominal time, for lock step: as many samples as the test has, at once.
 
     Parameters and attributes as ``SimLoadCell``.
@@ -147,14 +142,6 @@ class NominalLoadCell:
         self._next, self._stopped, self._offset, self._last = 0, False, 0.0, 0.0
         info = LoadCellInfo(address, "simulated load cell on nominal time", "none", "nominal")
         self.info = _described(info, address, settings, self.noise_N)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def __iter__(self) -> Iterator[LoadSample]:
         while not self._stopped and self._next / self._settings.rate <= self._specimen.duration_s + 1e-9:

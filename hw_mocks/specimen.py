@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from acquire.addresses import Address, Options
 from acquire.errors import ConfigError
-from hw_mocks.deformation import Gradient, Motion
+from hw_mocks.deformation import Gradient, SpecimenDeformation
 from hw_mocks.material import Material
 from hw_mocks.programme import Programme, TestClock
 from hw_mocks.strain_modes import Axis, Kind, StrainModes
@@ -146,12 +146,12 @@ class VirtualSpecimen:
         """Load on the specimen, N, tension positive."""
         return np.asarray(self.area_m2 * self.stress(t))
 
-    def at(self, t: float) -> Motion:
+    def at(self, t: float) -> SpecimenDeformation:
         """The deformation ``t`` seconds since the start."""
         progress = float(self.programme.progress(t))
         shift = (progress * self.drift_px[0], progress * self.drift_px[1])
         axial, transverse = float(self.axial_strain(t)), float(self.transverse_strain(t))
-        return Motion(self.modes, axial, transverse, progress * self.rotation_rad, shift)
+        return SpecimenDeformation(self.modes, axial, transverse, progress * self.rotation_rad, shift)
 
     def displacement(self, x: ArrayLike, y: ArrayLike, t: float) -> tuple[Array, Array]:
         """Where reference pixels (x, y) have gone: (u, v) in px."""

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.cv2_loader import load_cv2
 from hw_mocks.deformation import Affine, Deformation, Gradient
 
 Array = NDArray[np.float64]
@@ -134,8 +135,7 @@ class Speckle:
 
     def _piled_up(self, pattern: Image, limit: float) -> NDArray[np.bool_]:
         """The blobs within a radius of which the pattern, of their sign, is beyond the limit."""
-        import cv2
-
+        cv2 = load_cv2()
         size = 2 * math.ceil(self.radius) + 1
         highest = cv2.dilate(pattern, np.ones((size, size), np.uint8))
         lowest = cv2.erode(pattern, np.ones((size, size), np.uint8))

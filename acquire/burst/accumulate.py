@@ -258,21 +258,3 @@ def burst_of(frames: Sequence[Frame]) -> Burst:
             "choose others"
         )
     return bursts[0]
-
-
-def sum_of(burst: Burst) -> NDArray[np.uint32]:
-    """The exact sum a burst's mean was made of, (H, W) uint32, GL.
-
-    Raises
-    ------
-    ValueError
-        n frames of that many bits do not fit: the float32 mean no longer tells the sum exactly.
-    """
-    if burst.n * (2**burst.bits - 1) >= 2**23:
-        raise ValueError(f"the sum of {burst.n} frames of {burst.bits} bits cannot be told from its mean")
-    return np.rint(burst.mean.astype(np.float64) * burst.n).astype(np.uint32)
-
-
-def mean_of_sum(total: NDArray[np.uint32], n: int) -> NDArray[np.float32]:
-    """The mean of n frames from their exact sum: the bits that ``Burst.mean`` had, (H, W) float32, GL."""
-    return frozen((total / np.float64(n)).astype(np.float32))

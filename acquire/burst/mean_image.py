@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
 
 Image = NDArray[np.float32]
@@ -22,8 +23,7 @@ def save_mean(mean: Image, path: Path) -> None:
     DataError
         It cannot be written.
     """
-    import cv2
-
+    cv2 = load_cv2()
     if path.suffix.lower() not in (".tif", ".tiff"):
         raise ConfigError(f"{path}: dark and flat frames are kept as TIFF; choose a name that ends in .tif")
     if path.exists():
@@ -44,13 +44,15 @@ def load_mean(path: str | None) -> Image | None:
     DataError
         Missing or not a grey picture.
     """
-    import cv2
-
     if path is None:
         return None
+    cv2 = load_cv2()
     if not Path(path).is_file():
         raise DataError(f"{path}: there is no such dark or flat frame; take one with phasedic average")
-    image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
+    try:
+        image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
+    except cv2.error:  # a header that asks for more than the limit
+        image = None
     if image is None or image.ndim != 2 or not np.isfinite(image).all():
         raise DataError(f"{path}: is not a grey TIFF; take the frame anew with phasedic average")
     return np.asarray(image, np.float32)

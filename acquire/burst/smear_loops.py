@@ -1,4 +1,4 @@
-"""The compiled sums behind ``acquire.smear``: gradients and differences of two frames, tile by tile."""
+"""The compiled sums behind ``acquire.burst.smear``: gradients and differences of two frames, tile by tile."""
 
 from __future__ import annotations
 

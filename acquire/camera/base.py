@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import threading
-from types import TracebackType
 from typing import Self
 
+from acquire.closing import Closing
 from acquire.frame import CameraInfo
 
 
-class CameraBase:
+class CameraBase(Closing):
     """Base of cameras; a subclass gives ``info``, ``__iter__`` and, where needed, ``_start`` and ``_release``.
 
     Attributes
@@ -27,11 +27,6 @@ class CameraBase:
     def __enter__(self) -> Self:
         self._start()
         return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def stop(self) -> None:
         """End the iteration; from any thread."""

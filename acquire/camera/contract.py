@@ -1,4 +1,4 @@
-"""The contract of a camera, and the one function that opens any of them.
+"""The contract of a camera.
 
 A camera is a context manager and an iterable of frames. V4L2 devices, OpenCV cameras,
 video and image files, recorded sessions and the simulator differ in nothing else;

@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from acquire.addresses import Registry
 from acquire.camera.contract import Camera
 from acquire.events import EventSink, ignore_event
-
-if TYPE_CHECKING:
-    from acquire.camera.contract import Camera
-
 
 CAMERAS: Registry[Camera] = Registry(
     "camera",

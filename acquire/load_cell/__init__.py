@@ -6,8 +6,19 @@ load cell that an address names.
 """
 
 from acquire.load_cell import calibration, check
+from acquire.load_cell.calibration import Calibration
+from acquire.load_cell.calibration import load as load_calibration
 from acquire.load_cell.contract import LoadCell
 from acquire.load_cell.log import LoadLog
 from acquire.load_cell.opening import LOAD_CELLS, open_load_cell
 
-__all__ = ["LOAD_CELLS", "LoadCell", "LoadLog", "calibration", "check", "open_load_cell"]
+__all__ = [
+    "LOAD_CELLS",
+    "Calibration",
+    "LoadCell",
+    "LoadLog",
+    "calibration",
+    "check",
+    "load_calibration",
+    "open_load_cell",
+]

@@ -1,4 +1,4 @@
-"""The contract of a load cell, and the one function that opens any of them.
+"""The contract of a load cell.
 
 A load cell is a context manager and an iterable of load samples; ``tests/contracts``
 holds all of them to this text.

@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from types import TracebackType
-from typing import Self
 
 from acquire.addresses import Address, Options
+from acquire.closing import Closing
 from acquire.errors import ConfigError
 from acquire.events import EventSink
 from acquire.load_sample import LoadCellInfo, LoadSample
 
 
-class NoLoadCell:
+class NoLoadCell(Closing):
     """Gives no samples and ends at once."""
 
     info = LoadCellInfo(address="none:", name="no load cell", protocol="none", clock="nominal")
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def __iter__(self) -> Iterator[LoadSample]:
         return iter(())

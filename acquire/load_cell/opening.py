@@ -2,15 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from acquire.addresses import Registry
 from acquire.events import EventSink, ignore_event
 from acquire.load_cell.contract import LoadCell
-
-if TYPE_CHECKING:
-    from acquire.load_cell.contract import LoadCell
-
 
 LOAD_CELLS: Registry[LoadCell] = Registry(
     "load cell",

@@ -1,12 +1,11 @@
 """All that comes through OpenCV: cameras of other systems, video files, images.
 
-``setup`` imports cv2 with its limits set, ``gray`` makes grey levels of colours, ``webcam``, ``video`` and
-``images`` (with ``tiff_pages`` and ``image_stamps``) are cameras.
+``gray`` makes grey levels of colours, ``webcam``, ``video`` and ``images`` (with ``tiff_pages`` and
+``image_stamps``) are cameras.
 """
 
 from acquire.opencv.gray import to_gray
 from acquire.opencv.images import read_image
-from acquire.opencv.setup import load_cv2
 from acquire.opencv.webcam import capture
 
-__all__ = ["capture", "load_cv2", "read_image", "to_gray"]
+__all__ = ["capture", "read_image", "to_gray"]

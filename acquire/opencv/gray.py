@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
-from acquire.opencv.setup import load_cv2
 
 GRAYS = ("luma", "r", "g", "b")
 _PLANE = {"b": 0, "g": 1, "r": 2}  # OpenCV's order

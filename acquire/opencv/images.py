@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from acquire.addresses import Address, Options
 from acquire.camera import CameraBase
+from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
 from acquire.events import EventSink
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, to_gray
 from acquire.opencv.image_stamps import read_stamps
-from acquire.opencv.setup import load_cv2
 from acquire.opencv.tiff_pages import count_pages
 
 log = logging.getLogger(__name__)

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from acquire.addresses import Address, Options
 from acquire.camera import CameraBase
+from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
 from acquire.events import EventSink, device_event
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
-from acquire.opencv.setup import load_cv2
 
 
 class VideoFile(CameraBase):

@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from acquire.addresses import Address, Options
 from acquire.camera import CameraBase, FailureGuard, RepeatGuard, missing_between
+from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import EventSink, device_event
 from acquire.frame import CameraInfo, Clock, Frame, frozen
 from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
-from acquire.opencv.setup import load_cv2
 
 log = logging.getLogger(__name__)
 

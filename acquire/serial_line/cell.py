@@ -1,6 +1,6 @@
 """A load cell on a serial line: reads in bulk, stamps, scales, reconnects, and never ends a test.
 
-The protocol's parser knows the lines, ``acquire.load_scaling`` the units; here is the port, its
+The protocol's parser knows the lines, ``scaling`` the units; here is the port, its
 loss and return, silence, polling, and the commands.
 """
 
@@ -12,10 +12,10 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterator
-from types import TracebackType
 from typing import Any, Self
 
 from acquire.addresses import Address
+from acquire.closing import Closing
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
@@ -34,7 +34,7 @@ Opener = Callable[[LineSettings], Port]
 Clock = Callable[[], float]
 
 
-class SerialCell:
+class SerialCell(Closing):
     """See ``acquire.load_cell.LoadCell``.
 
     Parameters
@@ -288,11 +288,6 @@ class SerialCell:
             if port is not None and self._settings.mode == "stream":
                 _send(port, self._settings.commands.get("stop", b""))
             _close(port)
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _elsewhere(line: LineSettings, url: str) -> LineSettings:

@@ -46,7 +46,7 @@ class ArrivalTimes:
 
 
 @dataclass(frozen=True, slots=True)
-class Stamp:
+class DeviceTime:
     """When the device stamped a message.
 
     Attributes
@@ -86,7 +86,7 @@ class DeviceClock:
         self._count, self._square = 0, 0.0
         self.jumps = 0
 
-    def stamp(self, device_ms: float, arrived: float) -> Stamp:
+    def stamp(self, device_ms: float, arrived: float) -> DeviceTime:
         """The stamp of a message.
 
         Parameters
@@ -104,17 +104,17 @@ class DeviceClock:
             if arrived - self._first_t < BEGIN_S:
                 self._first_offset = self._offset
         elif not self._settled(offset, arrived):
-            return Stamp(arrived, doubtful=True)
+            return DeviceTime(arrived, doubtful=True)
         else:
             self._tie(offset, arrived)
             self.jumps += 1
             self._last_ms, self._last_t = device_ms, arrived
-            return Stamp(arrived, jumped=True)
+            return DeviceTime(arrived, jumped=True)
         self._last_ms, self._last_t = device_ms, arrived
         t = device_ms * 1e-3 + self._offset
         self._count += 1
         self._square += (arrived - t) ** 2
-        return Stamp(t)
+        return DeviceTime(t)
 
     def _tie(self, offset: float, arrived: float) -> None:
         self._offset = self._first_offset = offset

@@ -8,7 +8,7 @@ from typing import cast
 
 from acquire.addresses import Address, Options
 from acquire.errors import ConfigError
-from acquire.load_cell.calibration import Calibration, load
+from acquire.load_cell import Calibration, load_calibration
 from acquire.load_sample import LoadCellInfo
 from acquire.protocols import PROTOCOLS, Mode, Parser, Protocol, find_protocol, newtons_per
 from acquire.serial_line.ports import LineSettings
@@ -147,7 +147,7 @@ def _commands(
 
 def _calibration(options: Options) -> Calibration | None:
     path = options.text("calibration")
-    return load(path) if path else None
+    return load_calibration(path) if path else None
 
 
 def _sign(options: Options, default: int, calibration: Calibration | None) -> int:

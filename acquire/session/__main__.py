@@ -12,11 +12,10 @@ def main(path: str) -> int:
     from acquire.session.part import SessionPart
 
     try:
-        part = SessionPart(path, probed=True)
-        part.walk_pictures()
-        for read in (part.load_samples, part.events, part.clock_pairs, part.ledger):
-            read()
-        part.close()
+        with SessionPart(path, probed=True) as part:
+            part.walk_pictures()
+            for read in (part.load_samples, part.events, part.clock_pairs, part.ledger):
+                read()
     except DataError as error:
         print(error)
         return error.exit_code

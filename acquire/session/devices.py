@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterator
-from types import TracebackType
-from typing import Self
 
 from acquire.addresses import Address, Options
+from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError
 from acquire.events import EventSink, device_event
 from acquire.frame import CameraInfo, Frame
@@ -18,20 +17,12 @@ from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.session.reader import Session
 
 
-class _SessionDevice:
+class _SessionDevice(Closing):
     """What the two have in common: an open session, a stop, a close."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
         self._stopped = False
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def stop(self) -> None:
         """End the iteration before its next item; from any thread."""

@@ -8,20 +8,17 @@ can only grow.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.clock import ClockPair
 from acquire.events import Event, EventKind
 from acquire.frame import CameraInfo, Clock
 from acquire.hdf5 import NO_UNIT, new_group, new_json, say, to_json
 from acquire.load_sample import LoadCellInfo, LoadFlag
-from acquire.record_mode import RecordMode
+from acquire.session.info import SessionInfo
 
 FORMAT = "phasedic-session"
 FORMAT_VERSION = 1
@@ -32,7 +29,6 @@ CONTINUED = b"+"
 LEDGER_BYTES = 8192
 CLOCKS: tuple[Clock, ...] = ("device", "host", "nominal")
 STABLE = {None: -1, False: 0, True: 1}
-MOST_BURST_FRAMES = 65536
 ROWS = 512  # of a chunk of a one-dimensional dataset
 
 Columns = dict[str, tuple[Any, Any, str, str]]  # name: (dtype, value of a missing row, unit, meaning)
@@ -124,23 +120,7 @@ def load_from(text: dict[str, Any] | None) -> LoadCellInfo | None:
     return LoadCellInfo(**{**text, "warnings": tuple(text.get("warnings", ()))}) if text else None
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Descriptions:
-    """What a session file says once, at its start."""
-
-    camera: CameraInfo
-    load: LoadCellInfo | None
-    start: ClockPair
-    config: Mapping[str, Any]
-    metadata: Mapping[str, Any]
-    versions: Mapping[str, Any]
-    mode: RecordMode
-    burst_frames: int
-    set_id: str
-    part: int
-
-
-def create(file: h5py.File, about: Descriptions, checksum: bool) -> None:
+def create(file: h5py.File, about: SessionInfo, checksum: bool) -> None:
     """Everything that will ever stand in the file, empty."""
     say(file, NX_class="NXroot", default="entry", format=FORMAT, format_version=FORMAT_VERSION)
     say(file, set_id=about.set_id or NO_SET, part=about.part)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.clock import ClockPair
+from acquire.closing import Closing
 from acquire.errors import DataError, PhasedicError
 from acquire.events import Event
 from acquire.frame import Burst, CameraInfo, Frame, frozen
@@ -44,7 +45,7 @@ UNFINISHED = (
 )
 
 
-class SessionPart:
+class SessionPart(Closing):
     """One file of a session.
 
     Parameters
@@ -191,7 +192,7 @@ class SessionPart:
                 self.entry[name].id.get_num_chunks()
 
     def close(self) -> None:
-        """Close the file."""
+        """Close the file; may be called again without effect."""
         self.file.close()
 
 

@@ -1,8 +1,7 @@
-"""A recorded test: what was grabbed, what the load cell said, what happened, what was set.
+"""Reading a recorded test: what was grabbed, what the load cell said, what happened, what was set.
 
-``SessionWriter`` records (acquire.session_writer), ``Session`` reads. The file is described
-for other programs in docs/session-format.md. Results of measurements are never stored here:
-they are another file that can be made again.
+The file is described for other programs in docs/session-format.md. Results of measurements are
+never stored here: they are another file that can be made again.
 """
 
 from __future__ import annotations
@@ -13,26 +12,23 @@ from collections.abc import Iterator
 from datetime import datetime
 from itertools import accumulate
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquire.clock import ClockPair
+from acquire.closing import Closing
 from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Burst, CameraInfo, Frame
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session.part import SessionPart
-from acquire.session.rotation import RotatingWriter, first_path, part_path
-from acquire.session.writer import SessionWriter
-
-__all__ = ["RecordMode", "RotatingWriter", "Session", "SessionWriter"]
+from acquire.session.rotation import first_path, part_path
 
 
-class Session:
+class Session(Closing):
     """A recorded session, open for reading; a context manager. A rotated set of files is one session.
 
     Attributes
@@ -160,14 +156,6 @@ class Session:
         """Close the files; may be called again without effect."""
         for part in self._parts:
             part.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _whole_set(opened: SessionPart) -> tuple[list[SessionPart], str | None]:

@@ -13,6 +13,7 @@ from typing import TypeVar
 from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.events import Event, EventKind, Level
+from acquire.session.info import SessionInfo
 from acquire.session.part import SessionPart
 from acquire.session.writer import SessionWriter
 
@@ -69,17 +70,12 @@ def recover(source: str | os.PathLike[str], target: str | os.PathLike[str] | Non
     """
     path = Path(source)
     clean = Path(target) if target else path.with_name(f"{path.stem}.recovered{path.suffix}")
-    part = SessionPart(path)
-    try:
-        with _writer(clean, part) as writer:
-            return _copy(part, writer)
-    finally:
-        part.close()
+    with SessionPart(path) as part, _writer(clean, part) as writer:
+        return _copy(part, writer)
 
 
 def _writer(path: Path, part: SessionPart) -> SessionWriter:
-    return SessionWriter(
-        path,
+    info = SessionInfo(
         camera=part.camera,
         load=part.load_cell,
         start=part.start,
@@ -89,8 +85,8 @@ def _writer(path: Path, part: SessionPart) -> SessionWriter:
         mode=part.mode,
         set_id=part.set_id,
         part=part.part,
-        cut_already=True,
     )
+    return SessionWriter(path, info, cut_already=True)
 
 
 def _copy(part: SessionPart, writer: SessionWriter) -> Recovered:

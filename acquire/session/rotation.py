@@ -6,22 +6,23 @@ opens the set as one.
 
 from __future__ import annotations
 
+import dataclasses
+import os
 import re
 import uuid
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from acquire.clock import ClockPair
+from acquire.closing import Closing
 from acquire.events import Event
 from acquire.frame import Burst, Frame
 from acquire.load_sample import LoadSample
+from acquire.session.info import SessionInfo
 from acquire.session.writer import SessionWriter
 
 _NUMBERED = re.compile(r"^(?P<stem>.+)\.(?P<number>\d{3,})$")
-
-MakeWriter = Callable[..., SessionWriter]
 
 
 def part_path(first: Path, part: int) -> Path:
@@ -35,15 +36,16 @@ def first_path(any_part: Path) -> Path:
     return any_part.with_name(found["stem"] + any_part.suffix) if found else any_part
 
 
-class RotatingWriter:
+class RotatingWriter(Closing):
     """Writes as ``SessionWriter`` does, and goes on in a new file after every ``rotate_bytes``.
 
     Parameters
     ----------
     path : path
         Of the first file.
+    info : SessionInfo
+        ``set_id`` and ``part`` are given here.
     rotate_bytes : int, bytes
-    about : keyword arguments of ``SessionWriter``
 
     Raises
     ------
@@ -51,12 +53,11 @@ class RotatingWriter:
         As ``SessionWriter``, also from any write that begins a new file.
     """
 
-    def __init__(self, path: str | Path, rotate_bytes: int, **about: Any) -> None:
+    def __init__(self, path: str | os.PathLike[str], info: SessionInfo, rotate_bytes: int) -> None:
         self._first, self._limit = Path(path), rotate_bytes
-        self._about = {**about, "set_id": uuid.uuid4().hex}
+        self._info = dataclasses.replace(info, set_id=uuid.uuid4().hex, part=0)
         self._frames = self._bursts = self._finished_bytes = 0
-        self._part = 0
-        self._writer = SessionWriter(self._first, **self._about)
+        self._writer = SessionWriter(self._first, self._info)
 
     @property
     def path(self) -> Path:
@@ -89,8 +90,8 @@ class RotatingWriter:
     def _rotate_when_full(self) -> None:
         if self._writer.bytes_written < self._limit:
             return
-        self._part += 1
-        following = SessionWriter(part_path(self._first, self._part), **self._about, part=self._part)
+        self._info = dataclasses.replace(self._info, part=self._info.part + 1)
+        following = SessionWriter(part_path(self._first, self._info.part), self._info)
         self._finished_bytes += self._writer.bytes_written
         full, self._writer = self._writer, following
         full.close()
@@ -118,11 +119,3 @@ class RotatingWriter:
     def close(self) -> None:
         """See ``SessionWriter``."""
         self._writer.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

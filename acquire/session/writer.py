@@ -14,50 +14,39 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import h5py
 import numpy as np
 
 from acquire.clock import ClockPair
+from acquire.closing import Closing
 from acquire.errors import DataError
 from acquire.events import Event
-from acquire.frame import Burst, CameraInfo, Frame
+from acquire.frame import Burst, Frame
 from acquire.hdf5 import GrowingDataset, Table, free_bytes, let_go, to_json
-from acquire.load_sample import LoadCellInfo, LoadSample
-from acquire.record_mode import RecordMode
+from acquire.load_sample import LoadSample
 from acquire.session import layout
 from acquire.session.bursts import BurstTable
+from acquire.session.info import SessionInfo
 
 log = logging.getLogger(__name__)
 
-ALL = RecordMode()
 LOAD_HOLD_S = 0.02  # load samples are flushed no more often than this
 
 
-class SessionWriter:
+class SessionWriter(Closing):
     """A new session file.
 
     Parameters
     ----------
     path : path
         Must not exist.
-    camera : CameraInfo
-    load : LoadCellInfo or None
-    start : ClockPair
-        The start of the test; ``time_s`` counts from here.
-    config, metadata, versions : mapping of str to JSON value
-    mode : RecordMode
-        Part of the picture; whether frames or bursts are what the file is for.
-    burst_frames : int
-        Frames of the longest burst that will be written.
+    info : SessionInfo
     checksum : bool
         Fletcher-32 on everything that grows.
-    set_id, part : str, int
-        Of a rotated recording (``acquire.session_rotation``).
     cut_already : bool
-        Pictures and camera are those of ``mode.crop`` already (a copy of a session).
+        Pictures and camera are those of ``info.mode.crop`` already (a copy of a session).
 
     Raises
     ------
@@ -70,40 +59,26 @@ class SessionWriter:
     def __init__(
         self,
         path: str | os.PathLike[str],
+        info: SessionInfo,
         *,
-        camera: CameraInfo,
-        load: LoadCellInfo | None,
-        start: ClockPair,
-        config: Mapping[str, Any],
-        metadata: Mapping[str, Any],
-        versions: Mapping[str, Any],
-        mode: RecordMode = ALL,
-        burst_frames: int = layout.MOST_BURST_FRAMES,
         checksum: bool = True,
-        set_id: str = "",
-        part: int = 0,
         cut_already: bool = False,
     ) -> None:
-        if mode.crop is not None and not cut_already:
-            mode.check(camera.width, camera.height)
-            camera = dataclasses.replace(camera, width=mode.crop[2], height=mode.crop[3])
+        recorded = info if cut_already else info.cropped()
         self.path = Path(path)
-        self._camera, self._start = camera, start.monotonic
-        self._mode = dataclasses.replace(mode, crop=None) if cut_already else mode
+        self._camera, self._start = recorded.camera, info.start.monotonic
+        self._mode = dataclasses.replace(info.mode, crop=None) if cut_already else info.mode
         self._held: list[LoadSample] = []
         self._last_load_t = -math.inf  # of the last sample that was flushed for its own sake
         self._line_end = 0
         self._written_bytes = 0
         self._file: h5py.File | None = _create(self.path)
         try:
-            described = layout.Descriptions(
-                camera, load, start, config, metadata, versions, mode, burst_frames, set_id, part
-            )
             with self._guarded() as file:
-                layout.create(file, described, checksum)
+                layout.create(file, recorded, checksum)
                 self._find_datasets(file["entry"])
                 file.swmr_mode = True
-            self.write_clock(start)
+            self.write_clock(info.start)
             self.flush()
         except BaseException:
             self._abandon()
@@ -263,14 +238,6 @@ class SessionWriter:
             # Datasets may now differ in length; going on would put rows beside the wrong frames.
             self._abandon()
             raise DataError(_write_failure(self.path, error)) from error
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _create(path: Path) -> h5py.File:

@@ -11,9 +11,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
 from acquire.frame import frozen
-from acquire.opencv import load_cv2
 
 Kind = Literal["grey", "luma", "bayer", "jpeg"]
 Plane = Literal["raw", "r", "g", "b"]

@@ -12,31 +12,22 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
 from acquire.addresses import Address, Options
+from acquire.closing import Closing
 from acquire.errors import DataError
 from acquire.events import Event, EventKind, EventSink, device_event
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.load_sample import LoadCellInfo, LoadSample
 
 
-class _Source:
+class _Source(Closing):
     """What camera and load cell share: a stop that any thread may give, and closing twice."""
 
     def __init__(self) -> None:
         self._stopped = threading.Event()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def stop(self) -> None:
         """End the iteration; from any thread."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -20,7 +20,7 @@ from acquire.frame import Burst, CameraInfo, Frame
 from acquire.hdf5 import forecast, network_share
 from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
-from acquire.session import RotatingWriter, SessionWriter
+from acquire.session import RotatingWriter, SessionInfo, SessionWriter
 from live.run.channels import ByteBuffer
 from live.run.setting import Setting
 from live.run.stopping import Stop
@@ -102,18 +102,18 @@ def open_recording(setting: Setting, books: Books, screen: Screen, stop: Stop) -
 def _open_writer(path: Path, setting: Setting, mode: RecordMode) -> SessionWriter | RotatingWriter:
     """A new session file, or a set of files that begins another one when it has grown."""
     config, rotate_MB = setting.config, setting.config.record.rotate_MB
-    about: Mapping[str, Any] = {
-        "camera": setting.rig.camera.info,
-        "load": setting.rig.load.info,
-        "start": setting.start,
-        "config": config.as_dict(),
-        "metadata": dict(config.metadata),
-        "versions": versions(),
-        "mode": mode,
-    }
+    info = SessionInfo(
+        camera=setting.rig.camera.info,
+        load=setting.rig.load.info,
+        start=setting.start,
+        config=config.as_dict(),
+        metadata=dict(config.metadata),
+        versions=versions(),
+        mode=mode,
+    )
     if rotate_MB is None:
-        return SessionWriter(path, **about)
-    return RotatingWriter(path, int(rotate_MB * 1e6), **about)
+        return SessionWriter(path, info)
+    return RotatingWriter(path, info, int(rotate_MB * 1e6))
 
 
 def _tell_room(path: Path, camera: CameraInfo, mode: RecordMode, screen: Screen) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError
-from hw_mocks.deformation import Affine, Deformation, Motion, Wave
+from hw_mocks.deformation import Affine, Deformation, SpecimenDeformation, Wave
 from hw_mocks.material import Material
 from hw_mocks.programme import Programme, TestClock
 from hw_mocks.specimen import VirtualSpecimen, specimen_from
@@ -143,7 +143,7 @@ def test_drift_and_rotation_are_reached_at_the_end_of_the_ramp() -> None:
     x0, y0 = specimen.modes.x0, specimen.modes.y0
     u, v = specimen.displacement(x0, y0, specimen.duration_s)
     assert (float(u), float(v)) == pytest.approx((2.0, -1.0))
-    assert specimen.at(1.0) == Motion(specimen.modes, 0.0, 0.0)
+    assert specimen.at(1.0) == SpecimenDeformation(specimen.modes, 0.0, 0.0)
     assert specimen.at(20.0).angle == 0.02
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from analysis.field import Roi, StrainField, ZoiGrid
 from analysis.paper_estimator import PaperSettings
-from hw_mocks.deformation import Motion
+from hw_mocks.deformation import SpecimenDeformation
 from hw_mocks.strain_modes import StrainModes
 from live.characterise.outcome import (
     Bench,
@@ -46,7 +46,7 @@ def woven(bench: Bench) -> Outcome:
     step = 16 if bench.quick else 8
     shape = (256, 384) if bench.quick else (384, 544)
     modes = StrainModes("woven", "x", (shape[1] - 1) / 2, (shape[0] - 1) / 2, cell=CELL, overstrain=OVER)
-    motion = Motion(modes, MEAN_STRAIN, -NU * MEAN_STRAIN)
+    motion = SpecimenDeformation(modes, MEAN_STRAIN, -NU * MEAN_STRAIN)
     scene, camera = Scene(shape, 2.0, seed=31), Camera(BITS, NOISE)
     pair = scene.pair(motion, camera)
     edge = SIZE // 2

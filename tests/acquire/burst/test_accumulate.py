@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -11,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from acquire.burst.accumulate import BurstAccumulator, average_bursts, burst_of, mean_of_sum, sum_of
+from acquire.burst.accumulate import BurstAccumulator, average_bursts, burst_of
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Frame, frozen
 
@@ -108,17 +107,6 @@ def test_an_exact_list_with_a_gap_is_refused() -> None:
 def test_frames_of_another_kind_are_refused_by_name() -> None:
     with pytest.raises(DataError, match=r"frame 1 is 6x3 .* began with 5x3"):
         burst_of([small(0), frame(np.zeros((3, 6), np.uint8), 1)])
-
-
-def test_the_exact_sum_comes_back_from_the_mean_and_gives_the_same_bits() -> None:
-    rng = np.random.default_rng(3)
-    stack = rng.integers(0, 4096, (37, 40, 50)).astype(np.uint16)
-    burst = burst_of([frame(image, i, bits=12) for i, image in enumerate(stack)])
-    total = sum_of(burst)
-    assert np.array_equal(total, stack.sum(axis=0, dtype=np.uint32))
-    assert np.array_equal(mean_of_sum(total, 37), burst.mean)
-    with pytest.raises(ValueError, match="cannot be told"):
-        sum_of(dataclasses.replace(burst, bits=16, n=400))
 
 
 @settings(max_examples=60, deadline=None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from acquire.clock import ClockPair
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
-from acquire.session.reader import SessionWriter
+from acquire.session import SessionInfo, SessionWriter
 
 START = ClockPair(1000.1, datetime(2026, 5, 9, 7, 35, 25, 123456, tzinfo=UTC))
 CAMERA = CameraInfo(
@@ -48,14 +49,19 @@ def sample(number: int) -> LoadSample:
     return LoadSample(t, number / 3, "N", None, LoadFlag.NONE, b"%d.5 N\x00" % number, number * 12.5)
 
 
+def info(camera: CameraInfo = CAMERA, **changes: Any) -> SessionInfo:
+    """What a session of the test camera says of itself."""
+    about = SessionInfo(
+        camera=camera,
+        load=LOAD,
+        start=START,
+        config={"measure": {"zoi": 64}},
+        metadata={"operator": "Zoé"},
+        versions={"phasedic": "0.1.0"},
+    )
+    return dataclasses.replace(about, **changes)
+
+
 def writer(path: Path, camera: CameraInfo = CAMERA, **changes: Any) -> SessionWriter:
     """A new session of the test camera."""
-    about: dict[str, Any] = {
-        "camera": camera,
-        "load": LOAD,
-        "start": START,
-        "config": {"measure": {"zoi": 64}},
-        "metadata": {"operator": "Zoé"},
-        "versions": {"phasedic": "0.1.0"},
-    }
-    return SessionWriter(path, **{**about, **changes})
+    return SessionWriter(path, info(camera, **changes))

@@ -1,6 +1,6 @@
 """Kills a recording at random moments and looks what is left: the figures of docs/session-format.md.
 
-``python -m tests.acquire.kill_recorder [--kills 100] [--fps 100] [--size 512]``
+``python -m tests.acquire.session.kill_recorder [--kills 100] [--fps 100] [--size 512]``
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 from acquire.clock import ClockPair
 from acquire.frame import Frame, frozen
 from acquire.load_sample import LoadSample
-from acquire.session.reader import Session
+from acquire.session import Session
 from tests.acquire.session.fixtures import CAMERA, writer
 
 LOAD_RATE = 80.0

@@ -1,6 +1,6 @@
 """A damaged session is refused or read right: never a hang, a crash or a wrong number.
 
-Many more cases: ``python -m tests.acquire.fuzz_session --cases 20000``.
+Many more cases: ``python -m tests.acquire.session.fuzz --cases 20000``.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from acquire.errors import DataError
-from acquire.hdf5 import superblock as session_probe
-from acquire.session.reader import Session
+from acquire.hdf5 import child
+from acquire.session import Session
 from tests.acquire.session.fuzz import fuzz, whole_session
 
 
@@ -27,7 +27,7 @@ def test_a_damaged_unfinished_file_is_tried_in_a_child_with_a_time_limit(
     path = tmp_path / "cut.h5"
     path.write_bytes(content[: len(content) // 2])
     with pytest.raises(DataError, match="does not come to an end"):
-        session_probe.probe(path, timeout_s=2.0)
-    monkeypatch.setattr(session_probe, "PROBE_S", 2.0)
+        child.probe(path, "acquire.session", timeout_s=2.0)
+    monkeypatch.setattr(child, "PROBE_S", 2.0)
     with pytest.raises(DataError):
         Session.open(path)

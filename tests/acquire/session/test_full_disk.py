@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from acquire.errors import DataError
-from acquire.session.reader import Session
+from acquire.session import Session
 from tests.acquire.session.fixtures import frame, writer
 
 CHILD = """
 import resource, sys
 from pathlib import Path
 from acquire.errors import DataError
-from tests.acquire.session_fixtures import frame, sample, writer
+from tests.acquire.session.fixtures import frame, sample, writer
 session = writer(Path(sys.argv[1]))
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[2]), resource.RLIM_INFINITY))
 for number in range(10_000):

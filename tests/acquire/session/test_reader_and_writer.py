@@ -15,7 +15,7 @@ from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
-from acquire.session.reader import Session
+from acquire.session import Session
 from tests.acquire.session.fixtures import CAMERA, LOAD, START, frame, sample, writer
 
 

@@ -9,8 +9,7 @@ import pytest
 
 from acquire.errors import DataError
 from acquire.record_mode import RecordMode
-from acquire.session.reader import Session
-from acquire.session.recover import recover
+from acquire.session import Session, recover
 from tests.acquire.session.fixtures import CAMERA, frame, sample, writer
 
 

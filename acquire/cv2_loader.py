@@ -1,4 +1,8 @@
-"""OpenCV, imported when it is first needed, with limits that must be set before that."""
+"""OpenCV, imported when it is first needed, with limits that must be set before that.
+
+The library reads its limits once, while it is loaded: a plain ``import cv2`` anywhere in the process
+that comes first leaves it without them.
+"""
 
 from __future__ import annotations
 
