@@ -1,6 +1,6 @@
 """Damages session files in many ways and looks what reading them does.
 
-``python -m tests.acquire.fuzz_session [--cases 300] [--seed 0]`` prints how often each end was reached.
+``python -m tests.acquire.session.fuzz [--cases 300] [--seed 0]`` prints how often each end was reached.
 A worker process reads; where it hangs or dies the case is told and kept.
 """
 

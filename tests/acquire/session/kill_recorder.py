@@ -1,6 +1,6 @@
 """Kills a recording at random moments and looks what is left: the figures of docs/session-format.md.
 
-``python -m tests.acquire.kill_recorder [--kills 100] [--fps 100] [--size 512]``
+``python -m tests.acquire.session.kill_recorder [--kills 100] [--fps 100] [--size 512]``
 """
 
 from __future__ import annotations

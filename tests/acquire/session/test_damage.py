@@ -1,6 +1,6 @@
 """A damaged session is refused or read right: never a hang, a crash or a wrong number.
 
-Many more cases: ``python -m tests.acquire.fuzz_session --cases 20000``.
+Many more cases: ``python -m tests.acquire.session.fuzz --cases 20000``.
 """
 
 from __future__ import annotations

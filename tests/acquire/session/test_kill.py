@@ -1,4 +1,4 @@
-"""A killed recorder loses no finished frame (many more kills: ``python -m tests.acquire.kill_recorder``)."""
+"""A killed recorder loses no finished frame (many more kills: ``python -m tests.acquire.session.kill_recorder``)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A kernel with cameras that are not there: answers the ioctls of ``acquire.v4l2_api`` from tables.
+"""A kernel with cameras that are not there: answers the ioctls of ``acquire.v4l2.api`` from tables.
 
 Only what stands below ``Kernel`` is faked, so the product's own code runs as it is. Its clock
 moves when somebody waits; faults are switched on by setting attributes or by a script.
