@@ -107,8 +107,8 @@ def test_no_module_is_long(house: House) -> None:
 
 def test_private_means_private(house: House) -> None:
     modules = [module for name, module in house.items() if not room_of(name, PRIVATE)]
-    none_of(found for module in modules for found in shape.private_reads(module))
-    none_of(found for module in modules for found in shape.private_imports(module))
+    laws = (shape.private_reads, shape.private_imports)
+    none_of(found for module in modules for law in laws for found in law(module))
 
 
 def test_what_strings_name_is_there(house: House) -> None:

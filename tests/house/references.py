@@ -7,6 +7,7 @@ import io
 import re
 import tokenize
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 _DOTTED = re.compile(r"(?<![\w./-])(?:acquire|analysis|hw_mocks|live|tests|docs)(?:\.\w+)+")
@@ -61,11 +62,12 @@ def _named(root: Path, parts: list[str]) -> bool:
     return True
 
 
-def _stands(root: Path, found: str) -> Iterator[Path]:
+def _stands(root: Path, found: str) -> Iterator[str]:
     """A path from the root, or the end of one."""
-    for top in ("acquire", "analysis", "hw_mocks", "live", "tests", "docs", "examples"):
-        yield from (
-            path
-            for path in (root / top).rglob(Path(found).name)
-            if f"/{path.as_posix()}".endswith(f"/{found}")
-        )
+    return (path for path in _files(root) if path.endswith(f"/{found}"))
+
+
+@cache
+def _files(root: Path) -> list[str]:
+    tops = ("acquire", "analysis", "hw_mocks", "live", "tests", "docs", "examples")
+    return [f"/{path.relative_to(root).as_posix()}" for top in tops for path in (root / top).rglob("*.py")]
