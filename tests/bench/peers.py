@@ -1,6 +1,6 @@
 """Other engines on the same pair: speed and, beside it, how wrong they are.
 
-OpenCV's engines always; pyvale and SUN-DIC where they are installed, through ``live.characterise_others``.
+OpenCV's engines always; pyvale and SUN-DIC where they are installed, through ``live.characterise.experiments.others``.
 """
 
 from __future__ import annotations

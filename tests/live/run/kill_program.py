@@ -1,6 +1,6 @@
 """Kills whole runs of phasedic at random moments and looks at what they leave on the disk.
 
-``python -m tests.live.kill_program [--kills 100] [--fps 100] [--replay 5]``
+``python -m tests.live.run.kill_program [--kills 100] [--fps 100] [--replay 5]``
 """
 
 from __future__ import annotations

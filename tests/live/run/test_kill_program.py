@@ -1,4 +1,4 @@
-"""A killed run leaves a file that opens and replays (a hundred of them: ``python -m tests.live.kill_program``)."""
+"""A killed run leaves a file that opens and replays (a hundred of them: ``python -m tests.live.run.kill_program``)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Headless pictures of the viewer: what a person would see of an .rrd file or of a running view.
 
-A tool, not a test: ``python -m tests.live.screenshot view.rrd shot.png [--size 1600x900] [--shrink]``; a
+A tool, not a test: ``python -m tests.live.view.screenshot view.rrd shot.png [--size 1600x900] [--shrink]``; a
 running view is given by its address (rerun+http://...). Needs a graphics stack, on Debian the
 packages mesa-vulkan-drivers libvulkan1 libgl1-mesa-dri libxkbcommon-x11-0 libwayland-client0
 fonts-dejavu-core.

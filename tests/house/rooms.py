@@ -1,0 +1,95 @@
+"""The rooms of the house as plain data: a new room is one line of ``ROOMS``."""
+
+from __future__ import annotations
+
+PACKAGES = ("acquire", "analysis", "hw_mocks", "live")
+
+# Room -> what it may import besides itself: rooms by name, "*" for all. The longest name that fits a module is
+# its room, so "acquire" is the ground floor of acquire (frame, errors, events ...), "analysis" is its face,
+# and "live" holds the version. What a type checker alone imports counts too: a type is knowledge of a room.
+ROOMS = {
+    "acquire": "",
+    "acquire.hdf5": "acquire",
+    "acquire.burst": "acquire",
+    "acquire.camera": "acquire",
+    "acquire.load_cell": "acquire",
+    "acquire.protocols": "acquire",
+    "acquire.opencv": "acquire acquire.camera",
+    "acquire.v4l2": "acquire acquire.camera acquire.opencv",
+    "acquire.serial_line": "acquire acquire.load_cell acquire.protocols",
+    "acquire.session": "acquire acquire.hdf5",
+    "analysis.field": "",
+    "analysis.compiled": "",
+    "analysis.picture": "analysis.field analysis.compiled",
+    "analysis.follow": "analysis.field analysis.compiled",
+    "analysis.evaluate": "analysis.field",
+    "analysis.paper_estimator": "analysis.field",
+    "analysis.fit": "analysis.field analysis.compiled analysis.picture",
+    "analysis.kernel": "analysis.field analysis.compiled analysis.picture analysis.fit analysis.follow",
+    "analysis": "analysis.field analysis.kernel",
+    "hw_mocks": "acquire acquire.load_cell",
+    "live": "",
+    "live.measure": "acquire acquire.burst acquire.load_cell analysis analysis.field",
+    "live.setup": "acquire acquire.burst acquire.camera acquire.load_cell acquire.opencv analysis live.measure",
+    "live.results": "acquire acquire.hdf5 analysis.field live.measure",
+    "live.tell": "acquire acquire.load_cell analysis.evaluate live.measure live.setup",
+    "live.maps": "acquire acquire.opencv analysis.field analysis.evaluate live.results",
+    "live.check": "acquire analysis.picture live.measure live.setup",
+    "live.operate": "acquire live.tell",
+    "live.view": "acquire analysis.field live.measure live.maps",
+    "live.outputs": "acquire acquire.load_cell analysis live.measure live.setup live.tell live.results live.view",
+    "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
+    " live.measure live.setup live.tell live.outputs",
+    "live.replay": "acquire acquire.burst acquire.camera acquire.load_cell acquire.opencv acquire.session analysis"
+    " live.measure live.setup live.tell live.outputs",
+    "live.characterise": "acquire analysis analysis.field analysis.picture analysis.paper_estimator hw_mocks live.maps",
+    "live.characterise.experiments": "acquire analysis analysis.field analysis.picture analysis.paper_estimator"
+    " hw_mocks live.maps live.characterise",
+    "live.commands": "*",
+    "live.cli": "acquire.errors live.commands.arguments",
+    "live.export": "acquire analysis.field live.results live.maps live.tell live.setup",
+    "live.report": "acquire analysis.field live.results live.maps live.tell live.setup",
+    "live.batch": "acquire live.replay live.setup live.results",
+    "live.serve": "acquire live.operate live.tell live.outputs live.measure",
+}
+# Rooms that have their line before they have a folder.
+TO_COME = {"live.export", "live.report", "live.batch", "live.serve"}
+# The one door to the simulated devices; it stands in one module, not in its whole room.
+DOORS = {"live.setup.rig": "hw_mocks"}
+
+# What is started by a command alone: no other room's line may name these (a batch replays).
+STARTED = {
+    "live.commands", "live.run", "live.replay", "live.check", "live.characterise", "live.batch", "live.serve",
+}  # fmt: skip
+MAY_START = {"live.batch": {"live.replay"}, "live.characterise.experiments": {"live.characterise"}}
+
+# Library -> the rooms that alone import it.
+LIBRARIES = {
+    "ctypes": "acquire.v4l2",
+    "fcntl": "acquire.v4l2",
+    "h5py": "acquire.hdf5 acquire.session live.results",
+    "llvmlite": "analysis.compiled",
+    "rerun": "live.view",
+    "serial": "acquire.serial_line",
+}
+# Room (and all in it) -> what it never imports.
+NEVER = {
+    # The numerics touch no file, thread, device or clock, and draw nothing.
+    "analysis": "threading multiprocessing subprocess socket time datetime io rerun serial h5py asyncio queue"
+    " select matplotlib",
+    # The one path of live and replay: no thread, file, device or clock.
+    "live.measure": "threading multiprocessing subprocess socket time datetime io os pathlib tempfile shutil rerun"
+    " serial h5py cv2 asyncio queue select",
+    # A session of somebody else is data: nothing of it is executed.
+    "acquire": "pickle marshal shelve dill",
+    "hw_mocks": "pickle marshal shelve dill",
+    "live": "pickle marshal shelve dill",
+}  # fmt: skip
+# Numba takes half a second to import: loaded with these rooms (and */*_loops.py), by others when first used.
+COMPILED = ("analysis.compiled", "analysis.picture", "analysis.fit", "analysis.follow")
+# Whose modules may read another's private attributes: numba's cache has no public face.
+PRIVATE = ("analysis.compiled",)
+# More than MOST_FILES files: one file a protocol; the mocks stay flat.
+MANY_FILES = {"acquire.protocols", "hw_mocks"}
+MOST_FILES = 12
+MOST_LINES = 370
