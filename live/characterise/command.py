@@ -2,7 +2,7 @@
 
 Each experiment is a function that returns an ``Outcome``; what was done is kept in the output
 folder, so that an interrupted run goes on where it was. ``--pattern`` does the same for a picture of
-the user (live.characterise_pattern).
+the user (live.characterise.own_pattern).
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from live.characterise.progress import Progress
 
 Experiment = Callable[[Bench], Outcome]
 EXPERIMENTS: Mapping[str, tuple[str, str]] = MappingProxyType({
-    "fig1": ("live.characterise.experiments.phases", "fig1"),
-    "table1": ("live.characterise.experiments.shift", "table1"),
+    "fig1": ("live.characterise.experiments.fig1", "fig1"),
+    "table1": ("live.characterise.experiments.table1", "table1"),
     "resolution": ("live.characterise.experiments.resolution", "resolution"),
-    "table2": ("live.characterise.experiments.design_page", "table2"),
-    "fig3": ("live.characterise.experiments.strain", "fig3"),
-    "section41": ("live.characterise.experiments.sine", "section41"),
+    "table2": ("live.characterise.experiments.table2", "table2"),
+    "fig3": ("live.characterise.experiments.fig3", "fig3"),
+    "section41": ("live.characterise.experiments.section41", "section41"),
     "woven": ("live.characterise.experiments.woven", "woven"),
     "open-hole": ("live.characterise.experiments.woven", "open_hole"),
     "burst": ("live.characterise.experiments.burst", "burst"),

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
 from analysis import KernelSettings, PhaseKernel
 from analysis.field import Roi, StrainField, ZoiGrid
@@ -228,7 +229,7 @@ def grey_picture(path: Path) -> Image:
     DataError
         Not there, or not a picture.
     """
-    import cv2
+    cv2 = load_cv2()
 
     picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
     if picture is None:

@@ -9,35 +9,42 @@ from __future__ import annotations
 import argparse
 import importlib
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from live.commands.exit_codes import EXIT_CODES
 
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """The module of a command, and its line in the help."""
+
+    module: str
+    words: str
+
+
 COMMANDS = {
-    "run": ("live.commands.run", "measure live, recording everything"),
-    "demo": ("live.commands.demo", "the same on a simulated tensile test, compared with its truth"),
-    "replay": ("live.commands.replay", "measure a recorded session, or any folder of pictures"),
-    "map": ("live.commands.map", "draw a map of the results over a picture, as a PNG"),
-    "characterise": (
+    "run": Entry("live.commands.run", "measure live, recording everything"),
+    "demo": Entry("live.commands.demo", "the same on a simulated tensile test, compared with its truth"),
+    "replay": Entry("live.commands.replay", "measure a recorded session, or any folder of pictures"),
+    "map": Entry("live.commands.map", "draw a map of the results over a picture, as a PNG"),
+    "characterise": Entry(
         "live.characterise.command",
         "how well this measures: the paper reproduced, peers, or your own pattern",
     ),
-    "inspect": ("live.commands.inspect", "one ZOI of a session: its spectrum and its phases"),
-    "check": (
-        "live.commands.check",
-        "is the picture good enough? measured before the test; go or no-go",
+    "inspect": Entry("live.commands.inspect", "one ZOI of a session: its spectrum and its phases"),
+    "check": Entry(
+        "live.commands.check", "is the picture good enough? measured before the test; go or no-go"
     ),
-    "average": ("live.commands.average", "average frames into a dark or flat frame"),
-    "load-check": (
-        "live.commands.load_check",
-        "listen to a load cell: rate, range, noise, flags; ready or not",
+    "average": Entry("live.commands.average", "average frames into a dark or flat frame"),
+    "load-check": Entry(
+        "live.commands.load_check", "listen to a load cell: rate, range, noise, flags; ready or not"
     ),
-    "identify": ("live.commands.identify", "find out what talks on a serial port; only listens"),
-    "load-calibrate": (
-        "live.commands.load_calibrate",
-        "calibrate a load cell: tare, known load, accept",
+    "identify": Entry("live.commands.identify", "find out what talks on a serial port; only listens"),
+    "load-calibrate": Entry(
+        "live.commands.load_calibrate", "calibrate a load cell: tare, known load, accept"
     ),
-    "recover": ("live.commands.recover", "copy what is readable of a damaged or unfinished session"),
-    "devices": ("live.commands.devices", "list cameras with their formats, and serial ports"),
+    "recover": Entry("live.commands.recover", "copy what is readable of a damaged or unfinished session"),
+    "devices": Entry("live.commands.devices", "list cameras with their formats, and serial ports"),
 }
 
 Command = Callable[[argparse.Namespace], int]
@@ -54,14 +61,14 @@ def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
     parser.add_argument("--version", action="version", version=_version())
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     asked = next((word for word in argv if word in COMMANDS), "")
-    for name, (module, words) in COMMANDS.items():
+    for name, entry in COMMANDS.items():
         own = subparsers.add_parser(
-            name, help=words, epilog=EXIT_CODES, formatter_class=argparse.RawDescriptionHelpFormatter
+            name, help=entry.words, epilog=EXIT_CODES, formatter_class=argparse.RawDescriptionHelpFormatter
         )
         if name == asked:
-            importlib.import_module(module).add_arguments(own)
+            importlib.import_module(entry.module).add_arguments(own)
     arguments = parser.parse_args(argv)
-    command: Command = importlib.import_module(COMMANDS[arguments.command][0]).command
+    command: Command = importlib.import_module(COMMANDS[arguments.command].module).command
     return command, arguments
 
 

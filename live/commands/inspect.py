@@ -1,6 +1,6 @@
 """``phasedic inspect``: one ZOI of a session, its windowed spectrum and what its phases say.
 
-The figure is that of live.characterise_spectrum and needs matplotlib. Nothing heavy is imported before
+The figure is that of live.characterise.spectrum and needs matplotlib. Nothing heavy is imported before
 the command runs.
 """
 

@@ -2,7 +2,7 @@
 
 ``preparation`` makes a kernel of a reference burst (``reference``), ``pipeline`` measures burst after burst
 with a ``tracker``, ``measurement`` is what comes out with its means (``instant``, kept in ``history``),
-``settling`` waits for its force; ``smear`` warns of motion within a burst.
+``settling`` waits for its force; ``smear_guard`` warns of motion within a burst.
 """
 
 from live.measure.history import History
@@ -19,8 +19,9 @@ from live.measure.preparation import (
     usable,
 )
 from live.measure.reference import Reference, ReferenceTaker
+from live.measure.rehearsal import rehearse
 from live.measure.settling import HOLD_S, Loads, Settling
-from live.measure.smear import SmearGuard
+from live.measure.smear_guard import SmearGuard
 
 __all__ = [
     "HOLD_S",
@@ -39,6 +40,7 @@ __all__ = [
     "measure",
     "motion_between",
     "prepare",
+    "rehearse",
     "unchanged",
     "usable",
 ]

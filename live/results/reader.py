@@ -10,12 +10,12 @@ from __future__ import annotations
 import json
 import logging
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.closing import Closing
 from acquire.errors import DataError
 from acquire.hdf5 import check_size, probe, read_superblock
 from analysis.field import ZoiGrid
@@ -24,7 +24,7 @@ from live.results.info import FORMAT, FORMAT_VERSION
 _log = logging.getLogger(__name__)
 
 
-class Strain:
+class Strain(Closing):
     """The results of a test, open for reading; a context manager.
 
     Attributes
@@ -108,14 +108,6 @@ class Strain:
     def close(self) -> None:
         """Close the file; again without effect."""
         self._file.close()
-
-    def __enter__(self) -> Strain:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _open(path: Path, probed: bool) -> tuple[Any, bool]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from acquire.closing import Closing
 from acquire.errors import DataError
 from live.results.info import ResultsInfo
 from live.results.row import Row
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from live.measure import Measurement
 
 
-class Results:
+class Results(Closing):
     """Writes ``strain.h5`` and ``strain.csv`` into a folder; a context manager.
 
     Parameters
@@ -79,9 +80,3 @@ class Results:
             self._csv.close()
         finally:
             self._h5.close()
-
-    def __enter__(self) -> Results:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 
 from acquire.clock import ClockPair
 from acquire.record_mode import RecordMode
-from live.measure import Correction
-from live.run.rehearsal import rehearse
+from live.measure import Correction, rehearse
 from live.setup import (
     DEFAULT_BURST,
     DEFAULT_REFERENCE_BURST,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.burst import FlatField, load_mean
+from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
 from acquire.frame import CameraInfo
 from live.measure import Correction, unchanged
@@ -46,7 +47,7 @@ def with_mask(config: Config, mask: NDArray[np.bool_] | None, folder: Path) -> C
     """Keep the mask in the folder of the run, so that a replay finds it there."""
     if mask is None:
         return config
-    import cv2
+    cv2 = load_cv2()
 
     path = folder / "mask.png"
     cv2.imwrite(str(path), mask.astype(np.uint8) * 255)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.cv2_loader import load_cv2
 from live.maps import number
 from live.view.curve import Axis
 
@@ -37,7 +38,7 @@ def rounded(value: float, axis: Axis) -> str:
 
 def reduced(image: NDArray[Any], bits: int, longest_px: int) -> tuple[NDArray[np.uint8], int]:
     """An 8-bit picture of at most ``longest_px``, and the whole factor it was reduced by."""
-    import cv2
+    cv2 = load_cv2()
 
     factor = max(1, math.ceil(max(image.shape) / longest_px))
     if factor > 1:
@@ -50,7 +51,7 @@ def reduced(image: NDArray[Any], bits: int, longest_px: int) -> tuple[NDArray[np
 
 def encode(kind: str, image: NDArray[np.uint8], quality: int) -> bytes:
     """The file ``kind`` (".jpg", ".png") of an image in OpenCV's order of colours."""
-    import cv2
+    cv2 = load_cv2()
 
     flag = cv2.IMWRITE_JPEG_QUALITY if kind == ".jpg" else cv2.IMWRITE_PNG_COMPRESSION
     _, data = cv2.imencode(kind, image, [flag, quality])

@@ -66,6 +66,7 @@ MAY_START = {"live.batch": {"live.replay"}, "live.characterise.experiments": {"l
 # Library -> the rooms that alone import it.
 LIBRARIES = {
     "ctypes": "acquire.v4l2",
+    "cv2": "acquire analysis.follow analysis.kernel",
     "fcntl": "acquire.v4l2",
     "h5py": "acquire.hdf5 acquire.session live.results",
     "llvmlite": "analysis.compiled",
@@ -89,7 +90,7 @@ NEVER = {
 COMPILED = ("analysis.compiled", "analysis.picture", "analysis.fit", "analysis.follow")
 # Whose modules may read another's private attributes: numba's cache has no public face.
 PRIVATE = ("analysis.compiled",)
-# More than MOST_FILES files: one file a protocol; the mocks stay flat.
-MANY_FILES = {"acquire.protocols", "hw_mocks"}
+# More than MOST_FILES files: one file a protocol, one a command; the mocks stay flat.
+MANY_FILES = {"acquire.protocols", "hw_mocks", "live.commands"}
 MOST_FILES = 12
 MOST_LINES = 370

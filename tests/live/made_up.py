@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from acquire.frame import Burst, CameraInfo, Frame, frozen
-from acquire.load_cell.log import LoadLog
+from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
 from analysis.field.grid import Roi, ZoiGrid
 from analysis.field.strain_field import StrainField

@@ -20,6 +20,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.cv2_loader import load_cv2
+
 Floats = NDArray[np.float64]
 Program = Callable[[Any, Any], Floats]
 SUBSET, STEP, RIM = 33, 8, 32
@@ -103,7 +105,7 @@ def sun_dic_points(reference: Any, deformed: Any, rim: int = RIM, cores: int = 1
     ImportError
         Where it is not installed; besides, whatever SUN-DIC and Ray raise.
     """
-    import cv2
+    cv2 = load_cv2()
     import sundic.post_process as results
     import sundic.settings as options
     import sundic.sundic as program

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.cv2_loader import load_cv2
 from analysis.field import Roi, ZoiGrid
 from hw_mocks.deformation import Affine
 from live.characterise.experiments.others import PROGRAMS, Program, installed
@@ -32,7 +33,7 @@ RADIUS = 2.25  # px; 5.3 px full width at half maximum
 
 def pyramid_flow(reference: Any, deformed: Any, points: Floats) -> Floats:
     """OpenCV's pyramidal Lucas-Kanade, 33 px, 3 levels; (N, 2) px at (N, 2) points x, y."""
-    import cv2
+    cv2 = load_cv2()
 
     start = points.astype(np.float32).reshape(-1, 1, 2)
     criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-4)
@@ -44,7 +45,7 @@ def pyramid_flow(reference: Any, deformed: Any, points: Floats) -> Floats:
 
 def dense_flow(reference: Any, deformed: Any, points: Floats) -> Floats:
     """OpenCV's DIS optical flow, medium preset, averaged over 33 px around the points."""
-    import cv2
+    cv2 = load_cv2()
 
     flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM).calc(reference, deformed, None)
     mean = cv2.blur(flow, (SUBSET, SUBSET))

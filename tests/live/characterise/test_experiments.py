@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from live.characterise.experiments.design import CORNERS, PAPER, corner_values, fitted, model_matrix
 from live.characterise.experiments.peers import GAUGE, dense_flow, plane_strain, pyramid_flow
 from live.characterise.experiments.resolution import autocorrelation, fitted_length, half_width
-from live.characterise.experiments.sine import derived, low_pass_for
+from live.characterise.experiments.section41 import derived, low_pass_for
+from live.characterise.experiments.table2_design import CORNERS, PAPER, corner_values, fitted, model_matrix
 from live.characterise.imposed import Expected, Imposed, robust_std
 from live.characterise.own_pattern import recommended
 from live.maps.display_filter import for_display

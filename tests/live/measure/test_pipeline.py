@@ -9,7 +9,7 @@ import pytest
 
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
-from acquire.load_cell.log import LoadLog
+from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
 from analysis import KernelSettings, Roi, ZoiGrid
 from hw_mocks.deformation import Affine

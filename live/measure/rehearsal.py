@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
-from live.measure import History, Reference, ReferenceTaker, measure, motion_between, prepare
+from live.measure.history import History
+from live.measure.pipeline import measure
+from live.measure.preparation import motion_between, prepare
+from live.measure.reference import Reference, ReferenceTaker
 
 if TYPE_CHECKING:
     from analysis import KernelSettings, ZoiGrid

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from live.characterise.experiments.design import (
+from live.characterise.experiments.table2_design import (
     BITS,
     CORNERS,
     FACTORS,

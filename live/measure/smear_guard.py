@@ -1,7 +1,7 @@
 """The smear guard: tells when the picture moves too far while a burst is taken.
 
 Motion v during T multiplies the contrast at wave number k by |sinc(k v T / 2)|; up to 0.05 px that is
-nothing. The motion itself is estimated with each burst (``acquire.smear``).
+nothing. The motion itself is estimated with each burst (``acquire.burst.smear``).
 """
 
 from __future__ import annotations

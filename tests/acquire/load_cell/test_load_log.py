@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from acquire.load_cell.log import LoadLog
+from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadFlag, LoadSample
 
 

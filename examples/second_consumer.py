@@ -1,0 +1,48 @@
+"""A consumer of one's own beside results and view: it prints the largest strain of every measurement.
+
+``python -m examples.second_consumer`` runs it on a simulated test of three seconds.
+"""
+
+from __future__ import annotations
+
+import sys
+
+from live.measure import Measurement
+from live.outputs import Consumer
+from live.run import run_live
+from live.setup import load_config
+from live.tell import Screen
+
+
+class Largest(Consumer):
+    """Prints the largest strain of any ZOI; where the terminal is slow, the newest wins."""
+
+    name = "largest strain"
+    last = 0.0
+
+    def measurement(self, measurement: Measurement) -> None:
+        self.last = measurement.instant.largest
+        print(f"{measurement.number:4}  {self.last * 1e6:+8.0f} um/m")
+
+    def end(self) -> str:
+        return f"the last was {self.last * 1e6:+.0f} um/m"
+
+
+def main(folder: str | None = None) -> int:
+    settings = {
+        "camera.address": "sim:woven?lockstep=yes&seconds=3&fps=15&width=224&height=192",
+        "load.address": "sim:",
+        "measure.zoi": 48,
+        "view.enabled": False,
+        "view.rrd": False,
+        "output.dir": folder,
+    }
+    given = {key: value for key, value in settings.items() if value is not None}
+    outcome = run_live(load_config(None, given), Screen(), consumers=[Largest()])
+    for report in outcome.outputs.reports:
+        print(report.line())
+    return outcome.exit_code
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:2]))
