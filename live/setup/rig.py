@@ -74,6 +74,10 @@ def _specimen(camera_address: str, load_address: str) -> VirtualSpecimen | None:
 
 
 def _open_camera(address: str, on_event: EventSink, specimen: VirtualSpecimen | None) -> Camera:
+    if parse_address(address).scheme == "bench":
+        from hw_mocks.memory_camera import open_memory_camera
+
+        return open_memory_camera(parse_address(address))
     if not _simulated(address):
         return open_camera(address, on_event)
     assert specimen is not None

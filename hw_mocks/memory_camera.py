@@ -1,0 +1,159 @@
+"""A camera from memory: ``bench:?width=1280&height=1024&fps=30`` shows whether a machine keeps up.
+
+Pictures of a speckle pattern that is pulled and let go again are rendered beforehand; then they come
+at a fixed pace, whatever the reader does, from a ring of buffers like a driver's. A reader that is late by
+more than the ring loses frames, and the sequence numbers say so. Nothing is rendered while it runs,
+so that what is measured is the program and not the simulator.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.addresses import Address, Options
+from acquire.camera import CameraBase
+from acquire.frame import CameraInfo, Frame, frozen
+from hw_mocks.deformation import Affine
+from hw_mocks.sensor import Exposer, Sensor
+from hw_mocks.speckle import Speckle
+
+STILL = 1.0
+"""Seconds without motion at the start, for the reference."""
+SHIFT_PX, STRAIN = (0.11, -0.07), (-3e-5, 1e-4)
+"""Motion of the middle (x, y), and strain (exx, eyy), from one picture to the next."""
+
+
+@dataclass(frozen=True, slots=True)
+class MemorySettings:
+    """What comes, and how fast.
+
+    Attributes
+    ----------
+    width, height : int, px
+    bits : int
+    fps : float, 1/s
+    seconds : float, s
+        Then the camera ends.
+    pictures : int
+        Rendered, shown to and fro.
+    buffers : int
+        Of the ring.
+    saturated : float
+        Share of the pixels that are at saturation.
+    """
+
+    width: int = 1280
+    height: int = 1024
+    bits: int = 8
+    fps: float = 30.0
+    seconds: float = 20.0
+    pictures: int = 24
+    buffers: int = 8
+    saturated: float = 0.0
+
+
+class MemoryCamera(CameraBase):
+    """See the module; fulfils ``acquire.camera.Camera``.
+
+    Parameters
+    ----------
+    settings : MemorySettings
+    address : str
+    clock : callable giving monotonic seconds
+
+    Attributes
+    ----------
+    dropped : int
+        Frames lost so far because the ring was full.
+    """
+
+    def __init__(
+        self, settings: MemorySettings, address: str, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        super().__init__()
+        self._settings, self._clock = settings, clock
+        self._pictures = render(settings)
+        self._begin = 0.0
+        self.dropped = 0
+        s = settings
+        self.info = CameraInfo(
+            address, "pictures from memory", s.width, s.height, s.bits, True, "device", s.fps,
+            pixel_format="GREY" if s.bits == 8 else f"Y{s.bits}", warnings=("made-up pictures, for the speed only",),
+        )  # fmt: skip
+
+    def _start(self) -> None:
+        self._begin = self._clock()
+
+    def __iter__(self) -> Iterator[Frame]:
+        """Frames as they fall due; each with its own memory, as from a driver's buffer."""
+        s, number = self._settings, 0
+        total = round(s.seconds * s.fps)
+        while number < total and not self.stopped.wait(max(0.0, self._due(number) - self._clock())):
+            newest = min(int((self._clock() - self._begin) * s.fps) - 1, total - 1)
+            lost = max(0, newest - s.buffers + 1 - number)
+            number += lost
+            self.dropped += lost
+            t = self._due(number)
+            yield Frame(
+                frozen(self._pictures[self._which(number)].copy()), number, t, "device", lost, s.bits, t
+            )
+            number += 1
+
+    def _due(self, number: int) -> float:
+        return self._begin + (number + 1) / self._settings.fps
+
+    def _which(self, number: int) -> int:
+        """The picture of a frame: the first while all is still, then to and fro."""
+        moving = number - round(STILL * self._settings.fps)
+        if moving <= 0:
+            return number % 2  # the same pattern with other noise
+        last = len(self._pictures) - 2
+        step = moving % (2 * last)
+        return 1 + (step if step <= last else 2 * last - step)
+
+
+def render(settings: MemorySettings) -> list[NDArray[np.uint8] | NDArray[np.uint16]]:
+    """The pictures, two of the pattern at rest first, (H, W) each."""
+    shape = (settings.height, settings.width)
+    speckle = Speckle(shape, 2.0, margin=16, seed=1)
+    exposer = Exposer(Sensor.with_noise(settings.bits, 0.01), shape, seed=1)
+    rng = np.random.default_rng(2)
+    bright = rng.random(shape) < settings.saturated
+    pictures = []
+    for k in (0, *range(settings.pictures)):
+        pulled = Affine(
+            k * SHIFT_PX[0], k * SHIFT_PX[1], k * STRAIN[0], 0.0, 0.0, k * STRAIN[1],
+            settings.width / 2, settings.height / 2,
+        )  # fmt: skip
+        image = exposer.expose(speckle.fast(pulled)).copy()
+        image[bright] = 2**settings.bits - 1
+        pictures.append(frozen(image))
+    return pictures
+
+
+def open_memory_camera(address: Address) -> MemoryCamera:
+    """Open ``bench:?width=&height=&bits=&fps=&seconds=&pictures=&buffers=&saturated=``.
+
+    Raises
+    ------
+    ConfigError
+        An unknown key or an impossible value.
+    """
+    options = Options(address)
+    settings = MemorySettings(
+        width=options.integer("width", 1280, minimum=64, maximum=8192),
+        height=options.integer("height", 1024, minimum=64, maximum=8192),
+        bits=int(options.choice("bits", ("8", "10", "12"), "8")),
+        fps=options.number("fps", 30.0, minimum=0.1, maximum=10_000),
+        seconds=options.number("seconds", 20.0, minimum=0.1),
+        pictures=options.integer("pictures", 24, minimum=4, maximum=1000),
+        buffers=options.integer("buffers", 8, minimum=1, maximum=1000),
+        saturated=options.number("saturated", 0.0, minimum=0, maximum=0.5),
+    )
+    options.done()
+    return MemoryCamera(settings, address.text)
