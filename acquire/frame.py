@@ -58,7 +58,7 @@ class Burst:
 
     Attributes
     ----------
-    mean : (H, W) float32, GL
+    mean : (H, W) float32, GL; of one frame the frame itself, uint8 or uint16
     n : int
         Frames averaged.
     noise : float, GL
@@ -80,7 +80,7 @@ class Burst:
         Above 0.05 px the mean is smeared.
     """
 
-    mean: NDArray[np.float32]
+    mean: NDArray[Any]
     n: int
     noise: float
     clipped: NDArray[np.bool_]

@@ -114,6 +114,8 @@ class BurstAccumulator:
             self._start_anew()
             self._lost += 1
             return None
+        if self.length == 1:
+            return self._alone(frame)
         if self._sums is None:
             self._sums, self._first = _Sums(frame), frame.index
         self._last = frame.index
@@ -128,6 +130,17 @@ class BurstAccumulator:
     def _start_anew(self) -> None:
         self._lost += len(self._times)
         self._times, self._sums = [], None
+
+    def _alone(self, frame: Frame) -> Burst:
+        """A burst of one is the frame itself: nothing is averaged, nothing copied."""
+        burst = Burst(
+            mean=frame.image, n=1, noise=math.nan, clipped=frozen(frame.image >= 2**frame.bits - 1),
+            bits=frame.bits, t=frame.t, duration=0.0, first_index=frame.index, last_index=frame.index,
+            lost=self._lost, clock=frame.clock,
+        )  # fmt: skip
+        self._times, self._lost = [], 0
+        self._adapt(burst)
+        return burst
 
     def _finish(self, sums: _Sums, frame: Frame) -> Burst:
         start, times, n = self._times[0], self._times, self.length
@@ -147,9 +160,13 @@ class BurstAccumulator:
             motion_px=sums.motion(frame, n, noise),
         )
         self._times, self._sums, self._lost = [], None, 0
-        if self._shorten_above_px is not None:
-            self.length = shortened(n, burst.motion_px, self._n, self._shorten_above_px)
+        self._adapt(burst)
         return burst
+
+    def _adapt(self, burst: Burst) -> None:
+        """The length of the next burst, where the motion decides it."""
+        if self._shorten_above_px is not None:
+            self.length = shortened(burst.n, burst.motion_px, self._n, self._shorten_above_px)
 
 
 class _Sums:

@@ -29,7 +29,7 @@ def save_mean(mean: Image, path: Path) -> None:
     if path.exists():
         raise ConfigError(f"{path} exists, and nothing is overwritten; choose another name")
     try:
-        written = cv2.imwrite(str(path), mean)
+        written = cv2.imwrite(str(path), mean.astype(np.float32))
     except cv2.error:
         written = False
     if not written:

@@ -37,6 +37,8 @@ class Instant:
         Of one frame, from the burst; NaN where it tells nothing.
     measure_s : float, s
         Time the kernel took; 0.0 where nobody measured it.
+    latency_s : float, s
+        From the stamp of the burst's last frame to this result; NaN in a replay.
     """
 
     t: float
@@ -56,6 +58,7 @@ class Instant:
     refused: str
     noise_GL: float
     measure_s: float
+    latency_s: float = math.nan
 
 
 def instant_of(burst: Burst, field: StrainField, force: float, measure_s: float = 0.0) -> Instant:

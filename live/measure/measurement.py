@@ -44,6 +44,10 @@ class Measurement:
         """Force at that time, N; NaN where no load is known (yet)."""
         return self.instant.force
 
+    def with_latency(self, latency_s: float) -> Measurement:
+        """The same once it is known how long it took, from the stamp of the last frame."""
+        return replace(self, instant=replace(self.instant, latency_s=latency_s))
+
     def with_force(self, force: float) -> Measurement:
         """The same once the force is known."""
         return replace(self, instant=replace(self.instant, force=force))

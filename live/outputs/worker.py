@@ -10,6 +10,7 @@ from typing import Any
 
 from acquire.errors import PhasedicError
 from live.outputs.consumer import KINDS, Consumer, Policy, Report, wanted
+from live.pace import OUTPUT, yield_to_others
 
 log = logging.getLogger(__name__)
 
@@ -104,6 +105,7 @@ class Worker:
         return self._failed
 
     def _work(self) -> None:
+        yield_to_others(OUTPUT)
         self._guarded(self._consumer.begin)
         while (batch := self._next()) is not None:
             for kind, item in batch:

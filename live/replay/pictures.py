@@ -52,5 +52,6 @@ def _reference_frame(path: Path, camera: CameraInfo) -> Frame:
 
 def picture_of(burst: Burst) -> Frame:
     """What the view shows of a burst: its mean, rounded."""
-    image = np.rint(burst.mean).astype(np.uint8 if burst.bits <= 8 else np.uint16)
+    kind = np.uint8 if burst.bits <= 8 else np.uint16
+    image = burst.mean if burst.mean.dtype == kind else np.rint(burst.mean).astype(kind)
     return Frame(frozen(image), burst.first_index, burst.t, burst.clock, 0, burst.bits, burst.t)

@@ -29,6 +29,11 @@ class Feed:
         self._held: Burst | None = None
         self.paused = False
 
+    @property
+    def fps(self) -> float:
+        """Frames a second, as they come."""
+        return self._grabber.fps
+
     def next_reference(self) -> Reference | None:
         """Wait for a reference burst; None where the run ended before it was complete.
 

@@ -1,7 +1,7 @@
 """A live run: devices, threads and outputs joined.
 
 Threads: grab (``Grabber``), load (``LoadThread``), record (``Recorder``), one for each consumer that may
-block, and the caller's, which measures. Bursts reach it through a one-place mailbox, so that it
+block, and one that measures. Bursts reach it through a one-place mailbox, so that it
 always has the newest.
 """
 
@@ -18,6 +18,7 @@ from acquire.events import EventKind
 from acquire.frame import Frame
 from live.measure import Instant
 from live.outputs import About, Consumer, Outputs, make_outputs
+from live.pace import Pace
 from live.run.feed import Feed
 from live.run.grabber import Grabber, GrabPlan
 from live.run.load_thread import LoadThread
@@ -67,7 +68,8 @@ class LiveRun:
         self.grabber = Grabber(self._rig.camera, plan, books, self._take, recording.burst)
         self._feed = Feed(self.grabber, books.ledger, self._idle)
         self._load = LoadThread(self._rig.load, books, outputs, recording)
-        self._measuring = Measuring(setting, books, outputs, self._feed, self._show)
+        self._pace = Pace(lambda: recording.backlog)
+        self._measuring = Measuring(setting, books, outputs, self._feed, self._pace, self._show)
 
     # -- what may be called from other threads ------------------------------------------------
 
@@ -110,7 +112,7 @@ class LiveRun:
         return self
 
     def to_the_end(self) -> None:
-        """Measure in this thread until the camera ends; raises where the start has failed."""
+        """Wait until the camera has ended and all is measured; raises where the start has failed."""
         try:
             self._measuring.to_the_end()
         except PhasedicError:
@@ -155,7 +157,7 @@ class LiveRun:
             self.stop("the time is over")
 
     def _show(self, instant: Instant) -> None:
-        self._screen.instant(instant, self._books.ledger, self.grabber.fps)
+        self._screen.instant(instant, self._books.ledger, self.grabber.fps, self._pace.p95_s)
 
 
 def run_live(

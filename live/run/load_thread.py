@@ -9,6 +9,7 @@ from acquire.errors import PhasedicError
 from acquire.events import EventKind
 from acquire.load_cell import LoadCell
 from live.outputs import Outputs
+from live.pace import LOAD, yield_to_others
 from live.run.recorder import Recording
 from live.tell import Books
 
@@ -46,6 +47,7 @@ class LoadThread:
             self._thread.join()
 
     def _work(self) -> None:
+        yield_to_others(LOAD)
         try:
             for sample in self._cell:
                 self._books.loads.append(sample)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import logging
+import math
+import threading
 import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
@@ -10,8 +12,9 @@ from typing import TYPE_CHECKING
 from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
-from live.measure import Instant, SmearGuard, measure
+from live.measure import Instant, Measurement, SmearGuard, measure
 from live.outputs import Outputs
+from live.pace import MEASURE, Lag, Pace, yield_to_others
 from live.run.feed import Feed
 from live.run.reference_step import ReferenceStep
 from live.run.setting import Setting
@@ -32,6 +35,7 @@ class Measuring:
     books : Books
     outputs : Outputs
     feed : Feed
+    pace : Pace
     show : callable taking an Instant
         Told of every measurement.
 
@@ -42,26 +46,41 @@ class Measuring:
     """
 
     def __init__(
-        self, setting: Setting, books: Books, outputs: Outputs, feed: Feed, show: Callable[[Instant], None]
+        self,
+        setting: Setting,
+        books: Books,
+        outputs: Outputs,
+        feed: Feed,
+        pace: Pace,
+        show: Callable[[Instant], None],
     ) -> None:
         self._setting, self._books, self._outputs, self._feed = setting, books, outputs, feed
-        self._show = show
+        self._pace, self._show = pace, show
         self.failure = 0
+        self._refused: PhasedicError | None = None
+        self._thread = threading.Thread(target=self._work, name="measure", daemon=True)
 
     def to_the_end(self) -> None:
-        """Measure until the camera ends.
+        """Measure, in a thread of its own, until the camera ends.
 
         Raises
         ------
         PhasedicError
             The reference cannot be used: the start has failed.
         """
+        self._thread.start()
+        self._thread.join()
+        if self._refused is not None:
+            raise self._refused
+
+    def _work(self) -> None:
+        yield_to_others(MEASURE)
         try:
             prepared = ReferenceStep(self._setting, self._books, self._feed).take()
             if prepared is not None:
                 self._measure(*prepared)
-        except PhasedicError:
-            raise
+        except PhasedicError as error:
+            self._refused = error
         except Exception as error:
             log.exception("the measurement failed")
             self.failure = 1
@@ -84,8 +103,24 @@ class Measuring:
         ):
             self._books.ledger.add(measured=m.burst.n)
             journal.record(_measured(m.burst))
+            m = self._timed(m)
             self._show(self._outputs.add(m))
             guard.look(m.burst)
+            self._keep_pace(m)
+
+    def _timed(self, m: Measurement) -> Measurement:
+        """With its latency, where the frames were stamped by a clock of this machine."""
+        if m.burst.clock == "nominal":
+            return m
+        return m.with_latency(time.monotonic() - (m.t + m.burst.duration / 2))
+
+    def _keep_pace(self, m: Measurement) -> None:
+        if math.isnan(m.instant.latency_s):
+            return
+        lag = Lag(m.t, m.instant.latency_s, m.instant.measure_s)
+        if warning := self._pace.look(lag, m.burst.n / max(self._feed.fps, 1e-3)):
+            event = Event(m.t, EventKind.MEASUREMENT, "measurement", warning, "warning")
+            self._books.journal.record(event)
 
 
 def _measured(burst: Burst) -> Event:

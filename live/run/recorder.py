@@ -45,6 +45,11 @@ class Recording(Protocol):
         """Why nothing more is written; None while all is well."""
         ...
 
+    @property
+    def backlog(self) -> float:
+        """Share of the buffer that waits for the disk."""
+        ...
+
     def frame(self, frame: Frame) -> None: ...
 
     def burst(self, burst: Burst) -> None: ...
@@ -58,6 +63,7 @@ class NoRecording:
     """The recording of a run that wants none."""
 
     failed: str | None = None
+    backlog = 0.0
 
     def frame(self, frame: Frame) -> None:
         """Let it go."""
@@ -162,7 +168,7 @@ class Recorder:
     ) -> None:
         self._writer, self._ledger, self._journal = writer, ledger, journal
         self._buffer: ByteBuffer[Item] = ByteBuffer(limit, waits=waits)
-        self._on_failure = on_failure
+        self._limit, self._on_failure = limit, on_failure
         self._mode = mode or RecordMode()
         self._number = self._gap = 0
         self._now = now
@@ -213,6 +219,11 @@ class Recorder:
     def event(self, event: Event) -> None:
         """Queue an event."""
         self._buffer.put(event, _SMALL, always=True)
+
+    @property
+    def backlog(self) -> float:
+        """Share of the buffer that waits for the disk."""
+        return self._buffer.waiting_bytes / self._limit
 
     @property
     def waiting_bytes(self) -> int:

@@ -59,11 +59,17 @@ class Ledger:
         """Whether anything is missing that cannot be had again."""
         return self.lost > 0 or self.unrecorded > 0
 
+    @property
+    def skipped_share(self) -> float:
+        """Share of the frames behind the reference that were not measured because measuring was late or paused."""
+        return self.skipped / max(self.measured + self.skipped, 1)
+
     def line(self) -> str:
         """One line for a person."""
+        share = f" ({self.skipped_share:.1%})" * (self.skipped > 0)
         return (
             f"grabbed {self.grabbed} / recorded {self.recorded} / measured {self.measured}"
-            f" / skipped {self.skipped} / lost {self.lost}"
+            f" / skipped {self.skipped}{share} / lost {self.lost}"
             f"  (reference {self.reference}, left over {self.left_out}, not recorded {self.unrecorded};"
             f" {'adds up' if self.adds_up else 'DOES NOT ADD UP'})"
         )

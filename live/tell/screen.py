@@ -54,14 +54,15 @@ class Screen:
         """Nothing to show yet."""
         self.status(f"{what} ... {ledger.grabbed} frames")
 
-    def instant(self, i: Instant, ledger: Ledger, fps: float) -> None:
+    def instant(self, i: Instant, ledger: Ledger, fps: float, p95_s: float = math.nan) -> None:
         """Where the test stands."""
         force = "" if math.isnan(i.force) else f"  {i.force:.1f} N"
         lost = f"  LOST {ledger.lost + ledger.unrecorded}" if ledger.loss else ""
+        late = "" if math.isnan(p95_s) else f"  latency {p95_s * 1e3:.0f} ms"
         self.status(
             f"{fps:.0f} fps{force}  exx {i.exx * 1e6:+.0f}  eyy {i.eyy * 1e6:+.0f}  exy {i.exy * 1e6:+.0f} um/m"
             f"  {i.n_valid}/{i.n_zoi} ZOIs in {i.measure_s * 1e3:.0f} ms"
-            f"  recorded {ledger.recorded}  skipped {ledger.skipped}{lost}"
+            f"  recorded {ledger.recorded}  skipped {ledger.skipped}{lost}{late}"
         )
 
     def announce(self, rig: Rig, folder: Path) -> None:

@@ -57,6 +57,17 @@ def noise_line(history: History) -> str:
     )
 
 
+def latency_lines(history: History) -> list[str]:
+    """How late the results were; nothing in a replay."""
+    late = history.column("latency_s") * 1e3
+    if not np.isfinite(late).any():
+        return []
+    p50, p95 = np.nanpercentile(late, (50, 95))
+    kernel = np.median(history.column("measure_s")) * 1e3
+    words = f"latency from the last frame of a burst: p50 {p50:.0f} ms, p95 {p95:.0f} ms"
+    return [f"{words}, largest {np.nanmax(late):.0f} ms; the kernel took {kernel:.1f} ms"]
+
+
 def summary_lines(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
     """The summary, a line each."""
     valid = [instant for instant in history.instants if instant.n_valid]
@@ -71,6 +82,7 @@ def summary_lines(history: History, loads: LoadLog, specimen: SpecimenConfig) ->
         f" largest of any ZOI {largest * 1e6:+.0f} um/m",
         noise_line(history),
     ]
+    lines += latency_lines(history)
     return lines + elastic_lines(evaluate(history, loads, specimen), specimen)
 
 

@@ -27,7 +27,7 @@ ROOMS = {
     "analysis.fit": "analysis.field analysis.compiled analysis.picture",
     "analysis.kernel": "analysis.field analysis.compiled analysis.picture analysis.fit analysis.follow",
     "analysis": "analysis.field analysis.kernel",
-    "hw_mocks": "acquire acquire.load_cell",
+    "hw_mocks": "acquire acquire.camera acquire.load_cell",
     "live": "",
     "live.measure": "acquire acquire.burst acquire.load_cell analysis analysis.field",
     "live.setup": "acquire acquire.burst acquire.camera acquire.load_cell acquire.opencv analysis live.measure",
@@ -37,9 +37,11 @@ ROOMS = {
     "live.check": "acquire analysis.picture live.measure live.setup",
     "live.operate": "acquire live.tell",
     "live.view": "acquire analysis.field live.measure live.maps",
-    "live.outputs": "acquire acquire.load_cell analysis live.measure live.setup live.tell live.results live.view",
+    "live.pace": "",
+    "live.outputs": "acquire acquire.load_cell analysis live.measure live.pace live.setup live.tell live.results"
+    " live.view",
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
-    " live.measure live.setup live.tell live.outputs",
+    " live.measure live.pace live.setup live.tell live.outputs",
     "live.replay": "acquire acquire.burst acquire.camera acquire.load_cell acquire.opencv acquire.session analysis"
     " live.measure live.setup live.tell live.outputs",
     "live.characterise": "acquire analysis analysis.field analysis.picture analysis.paper_estimator hw_mocks live.maps",

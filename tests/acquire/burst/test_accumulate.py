@@ -31,7 +31,7 @@ def test_mean_noise_and_clipping_are_those_of_plain_arithmetic(dtype: type, bits
     stack = rng.integers(0, 2**bits, (n, 61, 83)).astype(dtype)
     burst = burst_of([frame(image, 40 + i, bits=bits) for i, image in enumerate(stack)])
     exact = stack.astype(np.int64)
-    assert burst.mean.dtype == np.float32
+    assert burst.mean.dtype == (np.float32 if n > 1 else dtype)
     assert np.array_equal(burst.mean, (exact.sum(axis=0) / n).astype(np.float32))
     assert np.array_equal(burst.clipped, (exact == 2**bits - 1).any(axis=0))
     if n == 1:
@@ -52,9 +52,9 @@ def test_noise_is_that_of_one_frame_and_ignores_slow_motion() -> None:
 
 
 def test_memory_is_its_own_and_read_only() -> None:
-    source = small(0)
-    burst = burst_of([source])
-    assert not np.shares_memory(burst.mean, source.image)
+    sources = [small(0), small(1)]
+    burst = burst_of(sources)
+    assert not np.shares_memory(burst.mean, sources[0].image)
     assert not burst.mean.flags.writeable
     assert not burst.clipped.flags.writeable
 
@@ -129,3 +129,15 @@ def _stream(kinds: list[str]) -> Iterator[Frame]:
     for kind in kinds:
         index += 3 if kind == "gap" else 1
         yield small(index, lost=2 if kind == "gap" else 0, damaged=kind == "damaged")
+
+
+@pytest.mark.parametrize("bits", [8, 12])
+def test_a_burst_of_one_is_the_frame_itself(bits: int) -> None:
+    top = 2**bits - 1
+    image = frozen(np.array([[1, top], [top - 1, 0]], np.uint8 if bits == 8 else np.uint16))
+    only = Frame(image, 5, 1.5, "device", 2, bits, 1.5)
+    burst = burst_of([only])
+    assert burst.mean is image
+    assert (burst.n, burst.first_index, burst.last_index, burst.t, burst.lost) == (1, 5, 5, 1.5, 2)
+    assert math.isnan(burst.noise)
+    assert burst.clipped.tolist() == [[False, True], [False, False]]

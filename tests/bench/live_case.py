@@ -1,0 +1,141 @@
+"""One live run with the camera from memory, and what it kept up with: ``python -m tests.bench.live_case --fps 30 ...``.
+
+The run is the program's own (``run_live``): recording to disk, view served and written, load cell at 80 Hz.
+Prints one JSON object.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from live.measure import Measurement
+from live.outputs import Consumer
+from live.run import Outcome, run_live
+from live.setup import load_config
+from live.tell import Screen
+
+SETTLED_S = 2.0
+"""Skips and latencies count from so long after the first measurement."""
+
+
+class Watch(Consumer):
+    """Keeps when each measurement was there."""
+
+    name = "bench"
+    blocks = False
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[float, ...]] = []
+
+    def measurement(self, measurement: Measurement) -> None:
+        i, b = measurement.instant, measurement.burst
+        self.rows.append((b.t, b.first_index, b.last_index, i.latency_s, i.measure_s, i.n_valid))
+
+
+def skipped_share(rows: np.ndarray) -> float:
+    """Share of the frames of ``rows`` (N, 6) that lie between measured bursts."""
+    frames = rows[-1, 2] - rows[0, 1] + 1
+    return float(1 - (rows[:, 2] - rows[:, 1] + 1).sum() / frames)
+
+
+def disk_MB_s(folder: Path, megabytes: int = 512) -> float:
+    """What the disk takes, written in one go and synchronised."""
+    block, path = os.urandom(1 << 20), folder / "disk"
+    begin = time.perf_counter()
+    with path.open("wb") as file:
+        for _ in range(megabytes):
+            file.write(block)
+        file.flush()
+        os.fsync(file.fileno())
+    took = time.perf_counter() - begin
+    path.unlink()
+    return megabytes * 1.048576 / took
+
+
+def run(case: argparse.Namespace, folder: Path) -> tuple[Outcome, np.ndarray]:
+    """The live run, and the rows of its measurements."""
+    camera = (
+        f"bench:?width=1280&height=1024&fps={case.fps:g}&bits={case.bits}&seconds={case.seconds:g}"
+        f"&saturated={case.saturated:g}&buffers=8"
+    )
+    settings = {
+        "camera.address": camera,
+        "load.address": "none:" if case.bare else "sim:?rate=80",
+        "measure.zoi": case.zoi,
+        "measure.step": case.step,
+        "measure.roi": case.roi,
+        "measure.burst": case.burst,
+        "record.enabled": not case.bare,
+        "view.enabled": not case.bare,
+        "view.rrd": not case.bare,
+        "view.spawn": False,
+        "output.dir": str(folder / "run"),
+    }
+    config = load_config(None, {key: value for key, value in settings.items() if value is not None})
+    watch = Watch()
+    outcome = run_live(config, Screen(quiet=not case.loud), consumers=[watch])
+    return outcome, np.array(watch.rows)
+
+
+def figures(case: argparse.Namespace, outcome: Outcome, rows: np.ndarray) -> dict[str, Any]:
+    late = rows[rows[:, 0] > rows[0, 0] + SETTLED_S]
+    p50, p95 = np.percentile(late[:, 3], (50, 95)) * 1e3
+    ledger = outcome.books.ledger
+    return {
+        "fps": case.fps,
+        "burst": case.burst,
+        "bits": case.bits,
+        "ZOI": case.zoi,
+        "ZOIs": int(rows[-1, 5]),
+        "skipped %": 100 * skipped_share(late),
+        "p50 ms": float(p50),
+        "p95 ms": float(p95),
+        "kernel ms": float(np.median(late[:, 4])) * 1e3,
+        "bursts skipped at the start": skipped_at_start(case, rows),
+        "first ms": rows[0, 3] * 1e3,
+        "lost in the ring": ledger.lost,
+        "not recorded": ledger.unrecorded,
+        "exit code": outcome.exit_code,
+    }
+
+
+def skipped_at_start(case: argparse.Namespace, rows: np.ndarray) -> int:
+    """Bursts behind the reference (the first 32 frames) that were not measured, up to a second of measurements."""
+    early = rows[rows[:, 0] < rows[0, 0] + 1.0]
+    missing = early[-1, 2] + 1 - 32 - (early[:, 2] - early[:, 1] + 1).sum()
+    return round(missing / case.burst)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--fps", type=float, default=30.0)
+    parser.add_argument("--burst", type=int, default=1)
+    parser.add_argument("--bits", type=int, default=8)
+    parser.add_argument("--zoi", type=int, default=64)
+    parser.add_argument("--step", type=int, default=35)
+    parser.add_argument("--roi", type=lambda text: [int(v) for v in text.split(",")])
+    parser.add_argument("--saturated", type=float, default=0.0)
+    parser.add_argument("--seconds", type=float, default=22.0)
+    parser.add_argument("--bare", action="store_true", help="no recording, view or load cell")
+    parser.add_argument("--disk", action="store_true", help="measure the disk too")
+    parser.add_argument("--loud", action="store_true", help="print what the run prints")
+    case = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="phasedic-bench-") as name:
+        found = figures(case, *run(case, Path(name)))
+        if case.disk:
+            found["disk MB/s"] = disk_MB_s(Path(name))
+    print(json.dumps(found))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
