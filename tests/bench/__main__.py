@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
 from analysis.kernel import warm_up
 from tests.accuracy.truth import Speckle, affine, digitise
-from tests.bench import machine
+from tests.bench import live, machine
 from tests.bench.peers import HOW_TO_ADD, Peer, Points, missing, peers
 
 SHAPE = (1024, 1024)
@@ -281,6 +281,12 @@ def start_up(report: Report) -> None:
     report.add("Command line", {"phasedic --help s": time.perf_counter() - begin})
 
 
+def running(report: Report) -> None:
+    """The program itself with a camera from memory (``--live``, three minutes)."""
+    for name, words in live.CASES.items():
+        report.add("The running program, 1280x1024", {"case": name} | live.shown(live.case(words)))
+
+
 SECTIONS = (throughput, counts, first_frame, scaling, bursts, start_up, other_engines)
 """Other people's programs last: the threads and processes they start disturb no other row."""
 
@@ -288,6 +294,7 @@ SECTIONS = (throughput, counts, first_frame, scaling, bursts, start_up, other_en
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.bench", description=__doc__)
     parser.add_argument("--json", action="store_true", help="one JSON object instead of tables")
+    parser.add_argument("--live", action="store_true", help="the running program alone, three minutes")
     parser.add_argument("--only", nargs="+", default=[], choices=[s.__name__ for s in SECTIONS])
     options = parser.parse_args()
     warm_up()
@@ -296,7 +303,7 @@ def main() -> None:
     report.values["date"] = f"{datetime.now(UTC):%Y-%m-%d}"
     if not options.json:
         print(f"{report.values['machine']}; {report.values['date']}")
-    for section in SECTIONS:
+    for section in (running,) if options.live else SECTIONS:
         if not options.only or section.__name__ in options.only:
             section(report)
     if options.json:
