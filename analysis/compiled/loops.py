@@ -8,6 +8,7 @@ rest of the package does that only when a kernel is made.
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
@@ -18,6 +19,7 @@ import numba
 log = logging.getLogger("analysis")
 
 _PACKAGE = Path(__file__).parents[1]
+_COMPILED = re.compile(r"^(?:from|import) (?:numba|analysis\.compiled)\b", re.MULTILINE)
 # Sums may be reordered for the vector unit, but NaN and infinity keep their meaning.
 FAST = {"contract", "reassoc", "nsz", "arcp", "afn"}
 
@@ -44,18 +46,25 @@ def _stamped(dispatcher: Any) -> Any:
     numba itself looks only at the file of the function, and would run the old code of its helpers.
     """
     try:
-        dispatcher._cache._cache_file._source_stamp = _stamp()
+        _cache_file(dispatcher)._source_stamp = _own_stamp()
     except AttributeError:  # numba's own affair: an installed package changes all its files at once
         log.debug("the stamp of numba's cache could not be set")
     return dispatcher
 
 
+def stamp(package: Path) -> tuple[tuple[str, float, int], ...]:
+    """Name, time and size of every module of the rooms of a package in which loops are compiled.
+
+    All modules of such a room: compiled code keeps the values of the constants that it was compiled with.
+    """
+    rooms = {m.parent for m in package.rglob("*.py") if _COMPILED.search(m.read_text("utf-8"))}
+    modules = sorted(m for room in rooms for m in room.glob("*.py"))
+    return tuple((m.relative_to(package).as_posix(), m.stat().st_mtime, m.stat().st_size) for m in modules)
+
+
 @lru_cache(maxsize=1)
-def _stamp() -> tuple[tuple[str, float, int], ...]:
-    """Name, time and size of every module of this package with compiled code."""
-    modules = (m for m in sorted(_PACKAGE.rglob("*.py")) if "analysis.compiled" in m.read_text("utf-8"))
-    ours = (*modules, *sorted(Path(__file__).parent.glob("*.py")))
-    return tuple((m.relative_to(_PACKAGE).as_posix(), m.stat().st_mtime, m.stat().st_size) for m in ours)
+def _own_stamp() -> tuple[tuple[str, float, int], ...]:
+    return stamp(_PACKAGE)
 
 
 def is_cached(function: Any) -> bool:
@@ -63,6 +72,11 @@ def is_cached(function: Any) -> bool:
     if function.signatures:
         return True
     try:
-        return bool(function._cache._cache_file._load_index())
+        return bool(_cache_file(function)._load_index())
     except (AttributeError, OSError):  # numba's own affair: only the announcement depends on it
         return False
+
+
+def _cache_file(dispatcher: Any) -> Any:
+    """Where numba keeps the compiled code of a function; it has no public name for its stamp and its index."""
+    return dispatcher._cache._cache_file

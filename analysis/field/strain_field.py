@@ -8,17 +8,18 @@ Strains, rotation and principal values are derived here from the displacement gr
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.field.attributes import Sigma, Value
 from analysis.field.grid import ZoiGrid
 from analysis.field.motion import Motion
 from analysis.field.status import Status
 from analysis.field.tensor import Floats, Measure, StrainTensor, half_logarithm
-from analysis.field.uncertainty import PAIR_INDEX, combination, variance_of_sum
+from analysis.field.uncertainty import PAIR_INDEX, combination, products, variance_of_sum
 from analysis.field.windows import Window
 
 
@@ -61,7 +62,6 @@ class StrainField:
     noise: float = float("nan")
     window: Window = "gaussian"
     motion: Motion | None = None
-    _cache: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def __post_init__(self) -> None:
         for name in ("parameters", "covariance", "covariance_reference", "residual", "status",
@@ -107,105 +107,28 @@ class StrainField:
             np.zeros(grid.shape, np.uint8), np.ones(grid.shape, np.float32),
         )  # fmt: skip
 
-    @property
-    def _half(self) -> int:
-        return len(self.parameters) // 2
-
-    @property
-    def u(self) -> Floats:
-        """Displacement along x (right), (R, C), px."""
-        return np.asarray(self.parameters[0])
-
-    @property
-    def du_dx(self) -> Floats:
-        return np.asarray(self.parameters[1])
-
-    @property
-    def du_dy(self) -> Floats:
-        return np.asarray(self.parameters[2])
-
-    @property
-    def v(self) -> Floats:
-        """Displacement along y (down), (R, C), px."""
-        return np.asarray(self.parameters[self._half])
-
-    @property
-    def dv_dx(self) -> Floats:
-        return np.asarray(self.parameters[self._half + 1])
-
-    @property
-    def dv_dy(self) -> Floats:
-        return np.asarray(self.parameters[self._half + 2])
-
-    @property
-    def exx(self) -> Floats:
-        """Small strain along x, (R, C)."""
-        return self.du_dx
-
-    @property
-    def eyy(self) -> Floats:
-        """Small strain along y, (R, C)."""
-        return self.dv_dy
-
-    @property
-    def exy(self) -> Floats:
-        """Small shear strain, tensor component, (R, C)."""
-        return self.value("exy")
-
-    @property
-    def gamma_xy(self) -> Floats:
-        """Engineering shear, 2 exy, (R, C)."""
-        return self.value("gamma_xy")
-
-    @property
-    def omega(self) -> Floats:
-        """Small rotation (dv_dx - du_dy)/2, (R, C), rad, positive clockwise on the screen."""
-        return self.value("omega")
-
-    @property
-    def sigma_u(self) -> Floats:
-        """Standard uncertainty of u, (R, C), px."""
-        return self.sigma("u")
-
-    @property
-    def sigma_v(self) -> Floats:
-        return self.sigma("v")
-
-    @property
-    def sigma_du_dx(self) -> Floats:
-        return self.sigma("du_dx")
-
-    @property
-    def sigma_du_dy(self) -> Floats:
-        return self.sigma("du_dy")
-
-    @property
-    def sigma_dv_dx(self) -> Floats:
-        return self.sigma("dv_dx")
-
-    @property
-    def sigma_dv_dy(self) -> Floats:
-        return self.sigma("dv_dy")
-
-    @property
-    def sigma_exx(self) -> Floats:
-        return self.sigma("exx")
-
-    @property
-    def sigma_eyy(self) -> Floats:
-        return self.sigma("eyy")
-
-    @property
-    def sigma_exy(self) -> Floats:
-        return self.sigma("exy")
-
-    @property
-    def sigma_gamma_xy(self) -> Floats:
-        return self.sigma("gamma_xy")
-
-    @property
-    def sigma_omega(self) -> Floats:
-        return self.sigma("omega")
+    u = Value("Displacement along x (right), (R, C), px.")
+    v = Value("Displacement along y (down), (R, C), px.")
+    du_dx = Value("Change of u along x, (R, C).")
+    du_dy = Value("Change of u along y, (R, C).")
+    dv_dx = Value("Change of v along x, (R, C).")
+    dv_dy = Value("Change of v along y, (R, C).")
+    exx = Value("Small strain along x, (R, C).")
+    eyy = Value("Small strain along y, (R, C).")
+    exy = Value("Small shear strain, tensor component, (R, C).")
+    gamma_xy = Value("Engineering shear, 2 exy, (R, C).")
+    omega = Value("Small rotation (dv_dx - du_dy)/2, (R, C), rad, positive clockwise on the screen.")
+    sigma_u = Sigma()
+    sigma_v = Sigma()
+    sigma_du_dx = Sigma()
+    sigma_du_dy = Sigma()
+    sigma_dv_dx = Sigma()
+    sigma_dv_dy = Sigma()
+    sigma_exx = Sigma()
+    sigma_eyy = Sigma()
+    sigma_exy = Sigma()
+    sigma_gamma_xy = Sigma()
+    sigma_omega = Sigma()
 
     @property
     def ok(self) -> NDArray[np.bool_]:
@@ -226,16 +149,18 @@ class StrainField:
         return int(np.count_nonzero(self.ok))
 
     def value(self, name: str) -> Floats:
-        """A value by its name (see ``VALUES``), (R, C).
+        """A value by its name (see ``VALUES``), (R, C); read-only where it is one of the parameters.
 
         Raises
         ------
         ValueError
             Unknown name.
         """
-        half = self._half
-        terms = combination(name).items()
-        return np.asarray(sum(c * self.parameters[i % 3 + half * (i // 3)] for i, c in terms))
+        half = len(self.parameters) // 2
+        terms = [(c, self.parameters[i % 3 + half * (i // 3)]) for i, c in combination(name).items()]
+        if len(terms) == 1 and terms[0][0] == 1:
+            return np.asarray(terms[0][1])
+        return np.asarray(sum(c * values for c, values in terms))
 
     def sigma(self, name: str, part: Literal["all", "reference", "current"] = "all") -> Floats:
         """Standard uncertainty of a value, (R, C), in its unit.
@@ -243,23 +168,20 @@ class StrainField:
         ``part`` separates what the noise of the reference causes, which is common to all
         frames measured against it, from what the noise of the deformed image causes.
         """
-        key = f"{part} {name}"
-        if key not in self._cache:
-            self._cache[key] = np.sqrt(np.maximum(self._variance(name, part), 0))
-        return np.asarray(self._cache[key])
-
-    def _variance(self, name: str, part: str) -> Floats:
         if part == "current":
-            return self._variance(name, "all") - self._variance(name, "reference")
-        covariance = self.covariance_reference if part == "reference" else self.covariance
-        terms = combination(name)
-        return np.asarray(
-            sum(
-                a * b * covariance[PAIR_INDEX[i, j]].astype(np.float64)
-                for i, a in terms.items()
-                for j, b in terms.items()
-            )
-        )
+            variance = self._variance(name, self.covariance) - self._variance(name, self.covariance_reference)
+        else:
+            variance = self._variance(name, self.covariance if part == "all" else self.covariance_reference)
+        return np.asarray(np.sqrt(np.maximum(variance, 0, out=variance), out=variance))
+
+    def _variance(self, name: str, covariance: NDArray[np.float32]) -> Floats:
+        (first, factor), *others = products(name)
+        out: Floats = covariance[first].astype(np.float64)
+        if factor != 1:
+            out *= factor
+        for pair, factor in others:
+            out += factor * covariance[pair].astype(np.float64)
+        return out
 
     def mean(self, name: str, where: ArrayLike | None = None) -> tuple[float, float]:
         """Mean of a value over the valid ZOIs and the standard uncertainty of that mean.

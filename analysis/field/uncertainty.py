@@ -12,11 +12,7 @@ from analysis.field.tensor import Floats
 from analysis.field.windows import Window, overlap
 
 U, DU_DX, DU_DY, V, DV_DX, DV_DY = range(6)
-
-
 _PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]
-
-
 PAIR_INDEX = {pair: k for k, pair in enumerate(_PAIRS)} | {(j, i): k for k, (i, j) in enumerate(_PAIRS)}
 """Where the covariance of parameters i and j stands among the 21 of ``StrainField.covariance``."""
 
@@ -52,6 +48,13 @@ def combination(name: str) -> Mapping[int, float]:
     if name not in _COMBINATIONS:
         raise ValueError(f"unknown value {name!r}; known: {', '.join(VALUES)}")
     return _COMBINATIONS[name]
+
+
+@lru_cache(maxsize=len(VALUES))
+def products(name: str) -> tuple[tuple[int, float], ...]:
+    """The variance of a named value as (which of the 21 covariances, factor); raises as ``combination``."""
+    terms = combination(name).items()
+    return tuple((PAIR_INDEX[i, j], a * b) for i, a in terms for j, b in terms)
 
 
 def variance_of_sum(sigma: Floats, name: str, grid: ZoiGrid, window: Window) -> float:

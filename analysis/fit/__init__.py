@@ -2,5 +2,5 @@
 
 ``sensitivity`` and ``moments`` make the normal equations, ``iteration`` solves them, ``shapes`` see a bent
 displacement, ``validity`` has the limits and ``verdict`` the status, ``assembly`` puts residual and
-covariances together.
+covariances together; ``bundles`` are what these loops take and give.
 """

@@ -13,6 +13,7 @@ from numba import prange
 
 from analysis.compiled.loops import helper, inlined, parallel
 from analysis.compiled.vectors import LANES, fetch
+from analysis.fit.bundles import Fit, Out, Picture, Stop
 from analysis.fit.moments import (
     CHANNELS,
     DEGREES,
@@ -44,15 +45,16 @@ AHEAD, BEYOND = 16, 3
 
 
 @helper
-def _within_image(
-    p: Any, order: int, cx: Any, cy: Any, reach: Any, width: int, height: int, over: Any
-) -> bool:
+def _within(picture: Any, p: Any, order: int, cx: Any, cy: Any, reach: Any) -> bool:
     """Whether the corners of the warped ZOI stay in the image, or at most ``over`` px beyond it."""
+    over = picture.over
     for corner in range(4):
         x = reach if corner & 1 else -reach
         y = reach if corner & 2 else -reach
         u, v = displacement(p, order, x, y)
-        if not inside(cx + x + u, cy + y + v, -over, width - 1 + over, -over, height - 1 + over):
+        if not inside(
+            cx + x + u, cy + y + v, -over, picture.width - 1 + over, -over, picture.height - 1 + over
+        ):
             return False
     return True
 
@@ -98,14 +100,14 @@ def compose(p: Any, order: int, d: Any) -> None:
 
 @inlined
 def _moments(
-    c: Any, width: int, images: Any, samples: int, pitch: int, top: int, first: int, size: int, order: int,
-    rows: Any, mix: Any, q: Any, ramp: Any, table: Any, plan: Any, g: Any, columns: Any, sums: Any, m: Any,
-    bent_by: Any,
+    picture: Any, table: Any, fit: Any, top: int, first: int, q: Any, room: Any, m: Any, bent_by: Any
 ) -> Any:  # fmt: skip
     """Warp one ZOI and write J' w d to ``m`` and the sums with the shapes to ``bent_by``; returns d' w d."""
+    plan, ramp, g, columns, sums = room
     starts, taus, where, how = plan
+    size, order, rows, mix = fit.size, fit.order, fit.rows, fit.mix
     half = 3 if order == 1 else 6
-    stride = width + 2 * PAD
+    stride = picture.width + 2 * PAD
     line = rows.shape[1]
     reach = (size - 1) / 2
     whole = False
@@ -117,16 +119,18 @@ def _moments(
         count = min(ROWS, size - y)
         if whole:
             warp_rows(
-                c, np.uintp(stride), f4(q[1]), f4(q[4]), y, count, size, starts, taus,
+                picture.c, np.uintp(stride), f4(q[1]), f4(q[4]), y, count, size, starts, taus,
                 ramp, table, g, np.uintp(line),
             )  # fmt: skip
         else:
             warp_cut_rows(
-                c, stride, q, order, first + PAD, top + PAD, y, count, size, where, how, ramp, table, g, line
+                picture.c, stride, q, order, first + PAD, top + PAD, y, count, size, where, how,
+                ramp, table, g, line,
             )  # fmt: skip
-        at = np.uintp((top + y) * pitch + first)
+        at = np.uintp((top + y) * fit.pitch + first)
         add_difference_columns(
-            images, np.uintp(samples), at, np.uintp(pitch), g, np.uintp(line), y, count, rows, columns
+            fit.images, np.uintp(fit.samples), at, np.uintp(fit.pitch), g, np.uintp(line), y, count,
+            rows, columns,
         )  # fmt: skip
     energy = difference_moments(columns, rows, line, sums)
     x, xx = mix[1, 1], mix[2, 2]
@@ -154,22 +158,21 @@ def _solve(inverse: Any, z: int, m: Any, step: Any, energy: Any, solved: Any) ->
 
 
 @inlined
-def _fetch(
-    c: Any, width: int, images: Any, samples: int, pitch: int, origins: Any, z: int, size: int, spacing: int, q: Any
-) -> None:  # fmt: skip
+def _fetch(picture: Any, fit: Any, z: int, q: Any) -> None:
     """Ask for what a ZOI to come needs of the images and its neighbours do not: its last rows and columns.
 
     Rows lie further apart than the processor looks ahead by itself. ``q`` says about where the ZOI has moved.
     """
-    origin = origins[min(z + AHEAD, len(origins) - 1)]
-    fresh = min(spacing, size)
+    size = fit.size
+    origin = fit.origins[min(z + AHEAD, len(fit.origins) - 1)]
+    fresh = min(fit.spacing, size)
     down, right = int(q[len(q) // 2]) + PAD + BEYOND, int(q[0]) + PAD + BEYOND
     for x in range(size - fresh + LANES - 1, size + LANES - 1, LANES):
         column = origin[1] + min(x, size - 1)
         for y in range(origin[0] + size - fresh, origin[0] + size):
             for k in range(4):
-                fetch(images, np.uintp(y * pitch + column + k * samples))
-            fetch(c, np.uintp((y + down) * (width + 2 * PAD) + column + right))
+                fetch(fit.images, np.uintp(y * fit.pitch + column + k * fit.samples))
+            fetch(picture.c, np.uintp((y + down) * (picture.width + 2 * PAD) + column + right))
 
 
 @inlined
@@ -181,78 +184,53 @@ def _fetch_all(array: Any, z: int) -> None:
 
 
 @parallel
-def track(
-    c: Any, width: int, height: int, images: Any, samples: int, pitch: int, origins: Any, size: int,
-    spacing: int, order: int, rows: Any, mix: Any, inverse: Any, cross: Any, squares: Any,
-    units: Any, tolerance: Any, trust: Any, table: Any, over: Any,
-    max_iterations: int, p: Any, left: Any, bending: Any, nuisance: Any, state: Any, iterations: Any,
-) -> None:  # fmt: skip
-    """Measure all ZOIs.
+def track(picture: Picture, table: Any, fit: Fit, stop: Stop, out: Out) -> None:
+    """Measure all ZOIs from the start values in ``out.p`` and write what is found to ``out``.
 
-    Parameters
-    ----------
-    c : flat float32
-        Spline coefficients of the deformed image (``prefilter.coefficients``).
-    images : flat float32, ``samples`` of each, ``pitch`` a row
-        Filtered reference f_x, f_y, f and the reference as it was recorded (``Prepared.images``).
-    origins : (A, 2) int64, first row and column of each ZOI
-    spacing : int, px
-        Between neighbouring ZOIs, which follow each other; only the speed depends on it.
-    rows : (4, whole(size)) float32
-        Window times P0 .. P3, zero beyond ``size``; ``mix`` (4, 4) has the polynomials (``shapes``).
-    inverse : (A + 1, P, P) float32
-    cross : (A + 1, P, 10) float32
-    squares : (A, 2) float64
-        Sums of w f_x^2 and w f_y^2.
-    tolerance : (A, 2) float64
-        Error that may be left in u and v (px) and in the gradients.
-    trust : (A,) float64, px
-        Predicted uncertainty of u and v from the noise of the deformed image.
-    p : (A, 6 or 12) float64, px units, start values in, result out
-    left : (A,) float64, out: weighted sum of squared differences after the fit, GL^2
-    bending : (A,) float64, out: what the fit leaves of a displacement that bends or jumps, px^2 (``shapes.bent``)
-    nuisance : (A, 2) float64, out: gain, and offset in GL
-    state, iterations : (A,) uint8, out
+    ``table`` (18,) has the weights of the taps (``splines.tap_table``). It is no part of the picture, since
+    read from a tuple it lets the compiler sum in another order, and the last digit of float32 changes.
     """
-    count = inverse.shape[1]
+    # What is written to needs a name of its own: in a parallel loop numba leaves out writes through a tuple
+    # (https://github.com/numba/numba/issues/10338).
+    p, left, bending, nuisance = out.p, out.left, out.bending, out.nuisance
+    state, iterations = out.state, out.iterations
+    count = fit.inverse.shape[1]
     modes = p.shape[1]
     half = modes // 2
-    reach = (size - 1) / 2
-    lever = size / 6.0
-    line = rows.shape[1]
-    chunks = (len(origins) + 31) // 32
+    reach = (fit.size - 1) / 2
+    lever = fit.size / 6.0
+    line = fit.rows.shape[1]
+    chunks = (len(fit.origins) + 31) // 32
     for chunk in prange(chunks):
         g = np.zeros(ROWS * line + LANES, np.float32)
         ramp = np.arange(line).astype(np.float32)
-        plan = new_plan(size)
+        plan = new_plan(fit.size)
         columns = np.empty((DIFFERENCE_ROWS, line), np.float32)
         sums = np.empty((CHANNELS, DEGREES, DEGREES))
+        room = plan, ramp, g, columns, sums
         m = np.empty(count)
         step = np.empty(count)
         solved = np.empty(count + LANES, np.float32)
         bent_by = np.empty(2 * N_SHAPES)
-        for z in range(chunk * 32, min(chunk * 32 + 32, len(origins))):
-            top, first = origins[z]
+        for z in range(chunk * 32, min(chunk * 32 + 32, len(fit.origins))):
+            top, first = fit.origins[z]
             q = p[z]
-            _fetch(c, width, images, samples, pitch, origins, z, size, spacing, q)
-            _fetch_all(inverse, z + 2)
-            _fetch_all(cross, z + 2)
+            _fetch(picture, fit, z, q)
+            _fetch_all(fit.inverse, z + 2)
+            _fetch_all(fit.cross, z + 2)
             state[z], iterations[z] = RUNNING, 0
             left[z] = bending[z] = nuisance[z, 0] = nuisance[z, 1] = np.nan
-            for iteration in range(max_iterations):
-                if not _within_image(q, order, first + reach, top + reach, reach, width, height, over):
+            for iteration in range(stop.max_iterations):
+                if not _within(picture, q, fit.order, first + reach, top + reach, reach):
                     state[z] = LEFT_IMAGE
                     break
-                energy = _moments(
-                    c, width, images, samples, pitch, top, first, size, order, rows, mix,
-                    q, ramp, table, plan, g, columns, sums, m, bent_by,
-                )  # fmt: skip
-                left[z] = _solve(inverse, z, m, step, energy, solved)
-                gain = 1 + step[modes]
+                energy = _moments(picture, table, fit, top, first, q, room, m, bent_by)
+                left[z] = _solve(fit.inverse, z, m, step, energy, solved)
+                gain: Any = 1 + step[modes]
                 nuisance[z, 0] = gain
                 nuisance[z, 1] = step[modes + 3]
                 gain = min(max(gain, GAIN_RANGE[0]), GAIN_RANGE[1])
-                bends = bent(bent_by, cross, z, step, squares[z, 0], squares[z, 1], solved)
+                bends = bent(bent_by, fit.cross, z, step, fit.squares[z, 0], fit.squares[z, 1], solved)
                 bending[z] = bends / gain**2
                 longest = 0.0
                 for i in range(modes):
@@ -262,10 +240,10 @@ def track(
                     break
                 brake = min(1.0, LONGEST_STEP / longest) if longest > 0 else 1.0
                 for i in range(modes):
-                    step[i] *= units[i] / gain * brake
-                compose(q, order, step)
+                    step[i] *= fit.units[i] / gain * brake
+                compose(q, fit.order, step)
                 iterations[z] = iteration + 1
-                if brake == 1.0 and _settled(step, half, lever, tolerance[z, 0], tolerance[z, 1], trust[z]):
+                if brake == 1.0 and _settled(step, half, lever, stop.length[z], stop.slope[z], stop.trust[z]):
                     state[z] = CONVERGED
                     break
 
@@ -283,7 +261,7 @@ def _settled(step: Any, half: int, lever: Any, length_left: Any, slope_left: Any
 
 
 @parallel
-def warp_zois(c: Any, width: int, origins: Any, size: int, p: Any, table: Any, out: Any) -> None:
+def warp_zois(picture: Picture, table: Any, origins: Any, size: int, p: Any, out: Any) -> None:
     """The deformed image in every warped ZOI of order 1, (A, n, n) float32, written to ``out``."""
     line = (size + LANES - 1) // LANES * LANES
     for z in prange(len(origins)):
@@ -292,7 +270,7 @@ def warp_zois(c: Any, width: int, origins: Any, size: int, p: Any, table: Any, o
         _, _, where, how = new_plan(size)
         for y in range(size):
             warp_cut_rows(
-                c, width + 2 * PAD, p[z], 1, origins[z, 1] + PAD, origins[z, 0] + PAD, y, 1, size,
+                picture.c, picture.width + 2 * PAD, p[z], 1, origins[z, 1] + PAD, origins[z, 0] + PAD, y, 1, size,
                 where, how, ramp, table, rows, line,
             )  # fmt: skip
             out[z, y] = rows[:size]
@@ -306,10 +284,8 @@ def compose_all(p: Any, steps: Any) -> None:
 
 
 @helper
-def within_image(p: Any, origins: Any, size: int, width: int, height: int, over: Any, out: Any) -> None:
+def within_image(picture: Picture, origins: Any, size: int, p: Any, out: Any) -> None:
     """Whether each warped ZOI of order 1 lies in the image, written to ``out`` (A,) bool."""
     reach = (size - 1) / 2
     for z in range(len(p)):
-        out[z] = _within_image(
-            p[z], 1, origins[z, 1] + reach, origins[z, 0] + reach, reach, width, height, over
-        )  # fmt: skip
+        out[z] = _within(picture, p[z], 1, origins[z, 1] + reach, origins[z, 0] + reach, reach)

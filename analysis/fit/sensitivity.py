@@ -17,6 +17,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper, parallel
+from analysis.fit.bundles import Images, Normal, WindowRows
 from analysis.fit.moments import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, product_moments
 from analysis.fit.shapes import cross_moments
 
@@ -119,44 +120,34 @@ def _sandwich(inverse: Any, middle: Any, affine: Any, units: Any, out: Any) -> N
 
 @parallel
 def prepare(
-    images: Any, by_level: Any, samples: int, pitch: int, origins: Any, size: int, powers: Any, squares: Any,
-    mix: Any, table: Any, units: Any,
-    inverse: Any, covariance: Any, covariance_level: Any, cross: Any, freedom: Any, energy: Any,
-) -> None:  # fmt: skip
+    images: Images, origins: Any, size: int, rows: WindowRows, table: Any, units: Any, out: Normal
+) -> None:
     """Normal matrices of all ZOIs.
 
     Parameters
     ----------
-    images : flat float32
-        f_x, f_y (GL/px) and f of the filtered reference, ``samples`` values each, ``pitch`` a row.
-    by_level : flat float32, or empty
-        The same times the grey level, then the level, for a noise that grows with it; empty: not wanted.
+    images : Images
     origins : (A, 2) int64
         First row and column of each ZOI.
-    powers, squares : (6, line) and (5, line) float32
-        Window and squared window times powers of xi (the window is the same along y).
-    mix : see ``shapes.Shapes``
+    rows : WindowRows
     table : (P, 3), units : (6,)
-    inverse : (A + 1, P, P) float32, written but for the last
-        Zero where there is no pattern.
-    covariance, covariance_level : (A, 21) float32, written
-        Of the six affine parameters, px units, for noise of variance 1 GL^2 and for noise of
-        variance ``level``.
-    cross : (A + 1, P, 10) float32, written but for the last
-        Of the shapes that the fit cannot follow with the columns of J (``shapes.cross_moments``).
-    freedom : (A,) float32, written
-        Sum of the weights less what the fit takes: expected weighted residual per GL^2 of noise.
-    energy : (A, 4) float32, written
-        Over the window: mean of f_x^2 and f_y^2, (GL/px)^2, variance (GL^2) and mean (GL) of f.
+    out : Normal, written
     """
+    inverse, cross, covariance, covariance_level = (
+        out.inverse,
+        out.cross,
+        out.covariance,
+        out.covariance_level,
+    )
+    freedom, energy = out.freedom, out.energy
     count = len(table)
     order = 1 if count == 12 else 2
     affine = np.array([0, 1, 2, (count - 6) // 2, (count - 6) // 2 + 1, (count - 6) // 2 + 2])
-    down, end, o = np.uintp(pitch), np.uintp(3 * samples), np.uintp(0)
-    one = np.ones(powers.shape[1], np.float32)
+    down, end, o = np.uintp(images.pitch), np.uintp(3 * images.samples), np.uintp(0)
+    one = np.ones(rows.powers.shape[1], np.float32)
     chunks = (len(origins) + 31) // 32
     for chunk in prange(chunks):
-        columns = np.empty((PRODUCT_ROWS + SQUARE_ROWS, powers.shape[1]), np.float32)
+        columns = np.empty((PRODUCT_ROWS + SQUARE_ROWS, rows.powers.shape[1]), np.float32)
         normal = np.empty((count, count))
         middle = np.empty((count, count))
         inv = np.empty((count, count))
@@ -164,10 +155,10 @@ def prepare(
         of_w = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
         of_q = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
         for z in range(chunk * 32, min(chunk * 32 + 32, len(origins))):
-            at = np.uintp(origins[z, 0] * pitch + origins[z, 1])
+            at = np.uintp(origins[z, 0] * images.pitch + origins[z, 1])
             product_moments(
-                images, images, one, o, o, one, np.uintp(samples), at, down, size,
-                powers, squares, order, columns, of_w, of_q,
+                images.plain, images.plain, one, o, o, one, np.uintp(images.samples), at, down, size,
+                rows.powers, rows.squares, order, columns, of_w, of_q,
             )  # fmt: skip
             _assemble(of_w, table, normal)
             total = of_w[6, 0, 0]
@@ -182,14 +173,14 @@ def prepare(
                 freedom[z] = 0
                 continue
             inverse[z] = inv
-            cross_moments(of_w, table, mix, cross[z])
+            cross_moments(of_w, table, rows.mix, cross[z])
             _assemble(of_q, table, middle)
             _sandwich(inv, middle, affine, units, covariance[z])
             freedom[z] = total - _taken(inv, middle)
-            if by_level.size:
+            if images.by_level.size:
                 product_moments(
-                    by_level, images, by_level, end + at, down, one, np.uintp(samples), at, down, size,
-                    powers, squares, order, columns, of_w, of_q,
+                    images.by_level, images.plain, images.by_level, end + at, down, one, np.uintp(images.samples),
+                    at, down, size, rows.powers, rows.squares, order, columns, of_w, of_q,
                 )  # fmt: skip
                 _assemble(of_q, table, middle)
                 _sandwich(inv, middle, affine, units, covariance_level[z])

@@ -12,6 +12,7 @@ from numba import prange
 
 from analysis.compiled.loops import helper, parallel
 from analysis.field import Status
+from analysis.fit.bundles import Known, Out, Rule
 from analysis.fit.iteration import CONVERGED, LEFT_IMAGE
 from analysis.fit.validity import (
     BENDING_CHANCE,
@@ -30,56 +31,39 @@ NOT_CONVERGED, POOR_MATCH = int(Status.NOT_CONVERGED), int(Status.POOR_MATCH)
 
 
 @parallel
-def judge(
-    state: Any, left: Any, expected: Any, signal: Any, gain: Any, pixels: Any, noise_known: bool,
-    bending: Any, unit: Any, noise: Any, values: Any, lever: Any, limit: Any, out: Any,
-) -> None:  # fmt: skip
+def judge(found: Out, left: Any, expected: Any, known: Known, rule: Rule, out: Any) -> None:
     """Write a status for each measured ZOI.
 
     Parameters
     ----------
-    state : (A,) uint8, of ``gauss_newton``
+    found : Out
+        Of the iteration.
     left, expected : (A,), GL^2
         Variance a pixel that the fit leaves, and expected from the noise of both images.
-    signal : (A,), GL^2
-        Variance of the pattern in the reference.
-    gain : (A,)
-    pixels : (A,)
-        Effective number of independent pixels of each ZOI.
-    noise_known : bool
-        Whether ``expected`` stands on noise that was given.
-    bending : (A,), px^2
-        See ``shapes.bent``.
-    unit : (A, 2), px^2 per GL^2
-        Variance of u and of v from noise of 1 GL, of a ZOI without anything else to find.
-    noise : (2,)
-        ``shapes.Shapes.noise``.
-    values : (A, 6 or 12), px units
-    lever : float, px
-        Width of the window that makes a displacement of a strain.
-    limit : float, px
-        What the displacement at the centre may be wrong by.
+    known : Known
+    rule : Rule
     out : (A,) uint8, written
     """
     for z in prange(len(out)):
-        chance = NOISE_FACTOR + CHANCE * math.sqrt(2 / max(pixels[z], 1.0))
-        if not noise_known:
+        gain = found.nuisance[z, 0]
+        chance = NOISE_FACTOR + CHANCE * math.sqrt(2 / max(known.pixels[z], 1.0))
+        if not rule.noise_known:
             chance = max(chance, UNKNOWN_NOISE_FACTOR)
         allowed = chance * expected[z]
-        pattern = signal[z] * min(gain[z], 1.0) ** 2
-        if state[z] == LEFT_IMAGE:
+        pattern = known.signal[z] * min(gain, 1.0) ** 2
+        if found.state[z] == LEFT_IMAGE:
             out[z] = OUTSIDE
         elif not left[z] <= allowed + LOST_SHARE * pattern:
             out[z] = LOST
-        elif state[z] != CONVERGED:
+        elif found.state[z] != CONVERGED:
             out[z] = NOT_CONVERGED
-        elif not (LEAST_GAIN < gain[z] < MOST_GAIN and left[z] <= allowed + MODEL_SHARE * pattern):
+        elif not (LEAST_GAIN < gain < MOST_GAIN and left[z] <= allowed + MODEL_SHARE * pattern):
             out[z] = POOR_MATCH
         else:
             variance = max(expected[z], left[z])
-            stretch = stretch_of(values, z, lever)
-            bends = _bends(bending[z], variance * unit[z, 0], variance * unit[z, 1], noise, stretch, limit)
-            out[z] = UNEVEN if bends else OK
+            stretch = stretch_of(found.p, z, rule.lever)
+            of_u, of_v = variance * known.unit[z, 0], variance * known.unit[z, 1]
+            out[z] = UNEVEN if _bends(found.bending[z], of_u, of_v, rule.noise, stretch, rule.limit) else OK
 
 
 @helper

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import logging
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,10 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.field import ZoiGrid
 from analysis.kernel.noise import NoiseModel
 from analysis.picture import LINE
-
-if TYPE_CHECKING:
-    pass
-log = logging.getLogger("analysis")
 
 
 def clipped_share(

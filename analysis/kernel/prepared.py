@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Status, profile
+from analysis.fit.bundles import Images, Normal, WindowRows
 from analysis.fit.validity import CLIPPED_SHARE, has_pattern
 from analysis.kernel.images import clipped_share, padded
 from analysis.kernel.noise import NoiseModel
@@ -91,34 +92,15 @@ def prepare_reference(
     clipped : (H, W) bool, optional
         Saturated pixels.
     """
-    from analysis.compiled.vectors import whole
-    from analysis.fit.sensitivity import columns, parameter_scale, prepare, square_rows
-    from analysis.fit.shapes import N_SHAPES, shapes_of
-
     mean = float(image.mean(dtype=np.float64))
     std = None if noise is None else float(np.sqrt(noise.variance(mean)))
     pattern = filtered_pattern(image, std, settings.interpolant)
     line = profile(settings.window, size)
-    table, units = columns(settings.order), parameter_scale(settings.order, size)
-    half = len(units) // 2
-    affine = units[[0, 1, 2, half, half + 1, half + 2]]
-    count = len(origins)
-    inverse = np.empty((count + 1, len(table), len(table)), np.float32)
-    cross = np.empty((count + 1, len(table), 2 * N_SHAPES), np.float32)
-    inverse[count] = cross[count] = 0
-    shapes = shapes_of(line, whole(size))
     images = padded(pattern.grad_x, pattern.grad_y, pattern.level, image - np.float32(mean))
-    covariance = np.empty((count, 21), np.float32)
     by_level = _by_level(images, pattern, mean, noise)
-    signal_dependent = by_level.size > 0
-    covariance_level = np.empty((count if signal_dependent else 0, 21), np.float32)
-    freedom, energy = np.empty(count, np.float32), np.empty((count, 4), np.float32)
-    prepare(
-        images.ravel(), by_level.ravel(), images[0].size, images.shape[2], origins, size,
-        shapes.powers, square_rows(line, whole(size)), shapes.mix,
-        table, affine, inverse, covariance, covariance_level, cross, freedom, energy,
-    )  # fmt: skip
-    status = _measurable(pattern, covariance, energy)
+    out, shapes = _fits(images, by_level, origins, line, settings.order)
+    energy = out.energy
+    status = _measurable(pattern, out.covariance, energy)
     if clipped is not None and clipped.any():
         status[clipped_share(clipped, origins, line) > CLIPPED_SHARE] = Status.CLIPPED
     return Prepared(
@@ -126,18 +108,43 @@ def prepare_reference(
         pattern=pattern,
         images=images,
         origins=origins,
-        inverse=inverse,
-        cross=cross,
+        inverse=out.inverse,
+        cross=out.cross,
         shapes=shapes,
         energy=energy[:, :2].astype(np.float64),
-        covariance=covariance,
-        covariance_level=covariance_level if signal_dependent else None,
-        freedom=np.maximum(freedom.astype(np.float64), 1e-3),
+        covariance=out.covariance,
+        covariance_level=out.covariance_level if by_level.size else None,
+        freedom=np.maximum(out.freedom.astype(np.float64), 1e-3),
         weight=float(line.sum() ** 2),
         signal=np.maximum(energy[:, 2].astype(np.float64), 0),
         level=energy[:, 3].astype(np.float64) + mean,
         status=status,
     )
+
+
+def _fits(
+    images: NDArray[np.float32],
+    by_level: NDArray[np.float32],
+    origins: NDArray[np.int64],
+    line: NDArray[np.float64],
+    order: int,
+) -> tuple[Normal, Shapes]:
+    """The linear fit of each ZOI, and the shapes that it cannot follow."""
+    from analysis.compiled.vectors import whole
+    from analysis.fit.sensitivity import columns, parameter_scale, prepare, square_rows
+    from analysis.fit.shapes import N_SHAPES, shapes_of
+
+    size = len(line)
+    table, units = columns(order), parameter_scale(order, size)
+    half = len(units) // 2
+    affine = units[[0, 1, 2, half, half + 1, half + 2]]
+    shapes = shapes_of(line, whole(size))
+    out = Normal.room(len(origins), len(table), 2 * N_SHAPES, by_level.size > 0)
+    prepare(
+        Images(images.ravel(), by_level.ravel(), images[0].size, images.shape[2]), origins, size,
+        WindowRows(shapes.powers, square_rows(line, whole(size)), shapes.mix), table, affine, out,
+    )  # fmt: skip
+    return out, shapes
 
 
 def _measurable(

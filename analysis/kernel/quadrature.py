@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import PAIR_INDEX
+from analysis.fit.bundles import Picture, Stop
 from analysis.kernel.prepared import Prepared
-from analysis.kernel.settings import KernelSettings
 
 BAND = 0.30
 """Highest frequency used, cycles/px."""
@@ -169,55 +169,62 @@ def step_of(sensors: NDArray[np.float32], difference: NDArray[np.float32]) -> ND
 
 def iterate(
     sensors: NDArray[np.float32],
-    ready: Prepared,
+    recorded: NDArray[np.float32],
     origins: NDArray[np.int64],
-    size: int,
-    coefficients: NDArray[np.float32],
+    picture: Picture,
+    table: NDArray[np.float32],
     guess: NDArray[np.float64],
-    tolerance: NDArray[np.float64],
-    settings: KernelSettings,
-    over: float,
+    stop: Stop,
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8], NDArray[np.uint8]]:
     """Warp, take the phases, compose, until the steps are small.
 
     Parameters
     ----------
-    sensors : (A, 7, n, n), origins : (A, 2), guess : (A, 6), tolerance : (A, 2)
-    coefficients : flat float32
-        Of the deformed image (``prefilter.coefficients``).
-    over : float, px
-        How far a ZOI may leave the image.
+    sensors : (A, 7, n, n), origins : (A, 2), guess : (A, 6)
+    recorded : (>= H, >= W) float32, GL
+        The reference less its mean.
+    picture : Picture
+        The deformed image.
+    table : (18,) float32
+        See ``iteration.track``.
+    stop : Stop
 
     Returns
     -------
-    parameters (A, 6), state (A,) and iterations (A,), as ``gauss_newton.track`` gives them.
+    parameters (A, 6), state (A,) and iterations (A,), as ``iteration.track`` gives them.
     """
     from analysis.fit.iteration import CONVERGED, LEFT_IMAGE, RUNNING, compose_all, warp_zois, within_image
-    from analysis.picture import tap_table
 
-    height, width = ready.shape
+    size = sensors.shape[-1]
     p = guess.copy()
     state = np.full(len(p), RUNNING, np.uint8)
     iterations = np.zeros(len(p), np.uint8)
     inside = np.empty(len(p), bool)
-    for _ in range(settings.max_iterations):
-        within_image(p, origins, size, width, height, over, inside)
+    for _ in range(stop.max_iterations):
+        within_image(picture, origins, size, p, inside)
         state[(state == RUNNING) & ~inside] = LEFT_IMAGE
         running = np.flatnonzero(state == RUNNING)
         for first in range(0, len(running), CHUNK):
             z = running[first : first + CHUNK]
             warped = np.empty((len(z), size, size), np.float32)
             part = p[z]
-            warp_zois(coefficients, width, origins[z], size, part, tap_table(settings.interpolant), warped)
-            step = step_of(sensors[z], warped - zois_of(ready.images[3], origins[z], size))
-            step *= np.minimum(1, LONGEST_STEP / np.maximum(np.abs(step[:, [0, 3]]).max(axis=1), 1e-9))[
-                :, None
-            ]
+            warp_zois(picture, table, origins[z], size, part, warped)
+            step = _shortened(step_of(sensors[z], warped - zois_of(recorded, origins[z], size)))
             compose_all(part, step)
             p[z] = part
             iterations[z] += 1
-            left = ERROR_LEFT * np.abs(step)
-            settled = (left[:, [0, 3]] <= tolerance[z, :1]).all(axis=1)
-            settled &= (left[:, [1, 2, 4, 5]] <= tolerance[z, 1:]).all(axis=1)
-            state[z[settled]] = CONVERGED
+            state[z[_settled(step, stop.at(z))]] = CONVERGED
     return p, state, iterations
+
+
+def _shortened(step: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Steps (B, 6) of at most LONGEST_STEP."""
+    length = np.abs(step[:, [0, 3]]).max(axis=1)
+    return np.asarray(step * np.minimum(1, LONGEST_STEP / np.maximum(length, 1e-9))[:, None])
+
+
+def _settled(step: NDArray[np.float64], stop: Stop) -> NDArray[np.bool_]:
+    """Whether what a step (B, 6) has left is below the tolerances, (B,)."""
+    left = ERROR_LEFT * np.abs(step)
+    lengths = (left[:, [0, 3]] <= stop.length[:, None]).all(axis=1)
+    return np.asarray(lengths & (left[:, [1, 2, 4, 5]] <= stop.slope[:, None]).all(axis=1))

@@ -37,11 +37,10 @@ def warm_up() -> None:
 def announce() -> None:
     """Say in the log that compilation is about to happen, where it is."""
     from analysis.compiled.loops import is_cached
-    from analysis.fit import iteration as gauss_newton
-    from analysis.fit import sensitivity
+    from analysis.fit import iteration, sensitivity
     from analysis.follow import climb
     from analysis.picture import prefilter
 
-    loops = (prefilter.coefficients, sensitivity.prepare, gauss_newton.track, climb.climb)
+    loops = (prefilter.coefficients, sensitivity.prepare, iteration.track, climb.climb)
     if not all(map(is_cached, loops)):
         log.info("compiling the kernel for this machine, once, about %d s", COMPILE_SECONDS)

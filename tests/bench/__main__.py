@@ -160,7 +160,7 @@ def first_frame(report: Report) -> None:
         prepare = machine.best(lambda g=grid, s=settings: PhaseKernel(frames[0], g, s, SIGMA), repeats=3)
         kernel = PhaseKernel(frames[0], grid, settings, SIGMA)
         scratch = machine.best(lambda k=kernel: k.measure(frames[3], noise=SIGMA), repeats=3)
-        ready = kernel._prepared
+        ready = kernel.reference.prepared
         own = sum(
             a.nbytes
             for a in (

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import FrozenInstanceError
+
 import numpy as np
 import pytest
 
 from analysis import PhaseKernel, Roi, Status, StrainField, ZoiGrid
+from analysis.field import VALUES
 from tests.analysis.speckle import picture
 
 GRID = ZoiGrid.cover(Roi(0, 0, 64, 64), 32, 16)
@@ -81,3 +84,50 @@ def test_the_refused_are_told_by_their_reasons() -> None:
     field = StrainField.from_values(grid, {}, status=status)
     assert field.refused == {Status.LOST: 2, Status.UNEVEN: 1}
     assert list(field.refused) == [Status.LOST, Status.UNEVEN]
+
+
+def test_every_value_and_its_sigma_are_attributes() -> None:
+    rng = np.random.default_rng(2)
+    field = StrainField.from_values(GRID, {n: rng.normal(size=GRID.shape) for n in VALUES[:6]}, 1e-3)
+    for name in VALUES:
+        assert np.array_equal(getattr(field, name), field.value(name))
+        assert np.array_equal(getattr(field, f"sigma_{name}"), field.sigma(name))
+        assert getattr(StrainField, name).__doc__ and getattr(StrainField, f"sigma_{name}").__doc__
+    assert np.allclose(field.sigma_exy, 1e-3 / np.sqrt(2)) and np.allclose(
+        field.sigma_gamma_xy, 1e-3 * np.sqrt(2)
+    )
+    with pytest.raises(ValueError, match="unknown value 'ezz'"):
+        field.value("ezz")
+
+
+def test_the_parts_of_an_uncertainty_add_up() -> None:
+    covariance, reference = np.zeros((2, 21, *GRID.shape), np.float32)
+    covariance[:], reference[:] = 4e-6, 1e-6
+    plain = uniform()
+    field = StrainField(
+        GRID, plain.parameters, covariance, reference, plain.residual, plain.status, plain.iterations, plain.gain
+    )  # fmt: skip
+    for name in VALUES:
+        whole, first, second = (field.sigma(name, part) for part in ("all", "reference", "current"))
+        assert np.allclose(whole**2, first**2 + second**2)
+
+
+def test_a_field_cannot_be_changed() -> None:
+    field = uniform()
+    with pytest.raises(FrozenInstanceError):
+        field.noise = 1.0  # type: ignore[misc]
+
+
+def test_the_numbers_of_a_status_are_those_in_files() -> None:
+    names = [
+        "OK",
+        "NOT_MEASURED",
+        "NO_PATTERN",
+        "CLIPPED",
+        "OUTSIDE",
+        "LOST",
+        "NOT_CONVERGED",
+        "POOR_MATCH",
+        "UNEVEN",
+    ]
+    assert [(s.name, s.value) for s in Status] == [(n, k) for k, n in enumerate(names)]

@@ -10,6 +10,7 @@ from analysis.field.windows import WINDOWS, Window, profile
 from analysis.fit.shapes import shapes_of
 from analysis.kernel.attempt import Attempt
 from analysis.kernel.noise import as_model
+from analysis.kernel.reference import Reference
 from tests.accuracy.truth import Speckle, digitise, pixels
 
 SHAPE = (256, 256)
@@ -38,10 +39,10 @@ def bending(
     reference = digitise(pattern.at(x, y), 12, noise, rng)
     deformed = digitise(gain * pattern.at(x - u, y), 12, noise, rng)
     model = as_model(float(np.hypot(noise * 4095, 0.3)))
-    kernel = PhaseKernel(reference, GRID, KernelSettings(order=order), model)
-    attempt = Attempt(kernel, deformed.astype(np.float32), model)
-    places = np.arange(len(kernel._index))
-    return attempt._iterate(places, kernel._searched(attempt.image)).bending, attempt
+    ready = Reference.first(reference.astype(np.float32), GRID, KernelSettings(order=order), model, None)
+    image = deformed.astype(np.float32)
+    attempt = Attempt(ready, image, model, ready.searched(image))
+    return attempt.found.bending, attempt
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -63,9 +64,9 @@ def test_a_parabola_is_found_with_the_error_that_it_makes() -> None:
 def test_noise_alone_leaves_what_is_expected_of_it() -> None:
     x, _ = pixels(SHAPE)
     found, attempt = bending(0.2 + 0 * x, noise=0.02)
-    kernel = attempt.kernel
-    unit = kernel._share_variance * 2 * ((0.02 * 4095) ** 2 + 0.1)
-    expected = unit.sum(axis=1) * kernel._prepared.shapes.noise[0]
+    reference = attempt.reference
+    unit = reference.share_variance * 2 * ((0.02 * 4095) ** 2 + 0.1)
+    expected = unit.sum(axis=1) * reference.prepared.shapes.noise[0]
     assert np.mean(found / expected) == pytest.approx(1.0, abs=0.3)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.field.status import Status
+from analysis.fit.bundles import Known, Out, Rule
 from analysis.fit.iteration import CONVERGED, LEFT_IMAGE, RUNNING
 from analysis.fit.validity import has_pattern
 from analysis.fit.verdict import judge, stretch_of
@@ -17,11 +18,13 @@ def verdict(
     limit=0.05,
 ) -> int:  # fmt: skip
     one, out = np.ones(1), np.zeros(1, np.uint8)
-    judge(
-        np.full(1, state, np.uint8), one * left, one * expected, one * signal, one * gain, one * 350, known,
-        one * bending, np.full((1, 2), unit), np.array([1.5, 0.5]), np.zeros((1, 6)) if values is None else values,
-        5.0, limit, out,
-    )  # fmt: skip
+    found = Out.starting(np.zeros((1, 6)) if values is None else values)
+    found.state[0], found.bending[0], found.nuisance[0, 0] = state, bending, gain
+    zoi, rule = (
+        Known(one * signal, one * 350, np.full((1, 2), unit)),
+        Rule(known, np.array([1.5, 0.5]), 5.0, limit),
+    )
+    judge(found, one * left, one * expected, zoi, rule, out)
     return int(out[0])
 
 

@@ -7,6 +7,7 @@ import pytest
 from scipy import ndimage
 
 from analysis.compiled.vectors import LANES
+from analysis.fit.bundles import Picture
 from analysis.fit.iteration import compose, warp_zois
 from analysis.picture.cutting import cut_bent_row, cut_leaning_row, cut_row, displacement
 from analysis.picture.prefilter import GROUP, PART, coefficients
@@ -59,7 +60,8 @@ def test_warp_is_the_interpolated_image(motion: tuple, size: int) -> None:
     origin = np.array([[24, 30]])
     out = np.empty((1, size, size), np.float32)
     flat = coefficients(IMAGE, np.float32(0), prefilter_taps(5))
-    warp_zois(flat, IMAGE.shape[1], origin, size, np.array([motion], float), tap_table(5), out)
+    picture = Picture(flat, IMAGE.shape[1], IMAGE.shape[0], 0.5)
+    warp_zois(picture, tap_table(5), origin, size, np.array([motion], float), out)
     x = np.arange(size) - (size - 1) / 2
     u = motion[0] + motion[1] * x + motion[2] * x[:, None]
     v = motion[3] + motion[4] * x + motion[5] * x[:, None]

@@ -1,0 +1,220 @@
+"""A reference, made once and never changed: what every picture is measured against.
+
+The first is made by ``Reference.first``, one that goes on from a later picture by ``renewed``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.field import Roi, Status, StrainField, ZoiGrid, profile
+from analysis.fit.bundles import Stop
+from analysis.follow.renewal import Placement, place
+from analysis.kernel.images import check_fit, clipped_pixels
+from analysis.kernel.noise import Noise, NoiseModel, as_model
+from analysis.kernel.prepared import PatternError, Prepared, prepare_reference
+from analysis.kernel.quadrature import Sensors, make_sensors
+from analysis.kernel.settings import KernelSettings
+
+Floats = NDArray[np.float64]
+Image = NDArray[np.float32]
+
+SPILL_PX = 0.5
+"""How far a ZOI may stick out of the image. Farther, what is missing counts: two rows less of a 64 px
+Gaussian ZOI gave 270 um/m, many times the predicted uncertainty."""
+_AFFINE = ((0, 15), (6, 11, 18, 20))
+"""Variances of u and v, and of the four gradients, among the 21 pairs."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reference:
+    """One picture with everything that measuring against it needs; A active ZOIs.
+
+    Attributes
+    ----------
+    grid : ZoiGrid
+    settings : KernelSettings
+    noise_model : NoiseModel or None
+        As given; None: not given.
+    image : (H, W) float32, GL
+    region : Roi
+        Where the ZOIs lie in the image, for the search.
+    index : (A,)
+        Flat places of the active ZOIs on the grid.
+    prepared : Prepared
+    sensors : Sensors or None
+        For the estimator by phases.
+    placement : Placement or None
+        Of a renewed reference on the first.
+    sharpness : float
+        Independent pixels a ZOI would have without a window, over the sum of its weights squared.
+    unit_covariance : (21, R, C) float32
+        For noise of variance 1 GL^2, on the grid.
+    unit_sigma : (3, A) float64
+        Smallest of u and v, smallest of the gradients, largest of u and v, for a noise of 1 GL.
+    share_variance : (A, 2) float64, px^2
+        Of u and v if nothing else were sought, for a noise of 1 GL.
+    """
+
+    grid: ZoiGrid
+    settings: KernelSettings
+    noise_model: NoiseModel | None
+    image: Image
+    region: Roi
+    index: NDArray[np.intp]
+    prepared: Prepared
+    sensors: Sensors | None
+    placement: Placement | None
+    sharpness: float
+    unit_covariance: NDArray[np.float32]
+    unit_sigma: Floats
+    share_variance: Floats
+
+    @classmethod
+    def first(
+        cls,
+        image: Image,
+        grid: ZoiGrid,
+        settings: KernelSettings,
+        noise: Noise | None,
+        clipped: NDArray[np.bool_] | None,
+    ) -> Reference:
+        """The reference of a test; parameters and what is raised as for ``PhaseKernel``."""
+        check_fit(grid, image.shape)
+        index = np.flatnonzero(grid.active)
+        rows, columns = np.unravel_index(index, grid.shape)
+        origins = np.stack([grid.first_y[rows], grid.first_x[columns]], axis=1).astype(np.int64)
+        model = None if noise is None else as_model(noise)
+        saturated = clipped_pixels(image, clipped, model)
+        prepared = prepare_reference(image, origins, grid.size, settings, model, saturated)
+        _check_pattern(prepared.status)
+        return _laid_out(image, grid, settings, model, prepared)
+
+    def renewed(
+        self,
+        image: Image,
+        field: StrainField,
+        noise: Noise | None,
+        clipped: NDArray[np.bool_] | None,
+    ) -> Reference:
+        """The reference that goes on from a later picture; parameters as for ``PhaseKernel.renewed``."""
+        settings, size = self.settings, self.grid.size
+        model = None if noise is None else as_model(noise)
+        placement = place(field, self.index, self.modes, self.prepared.shape)
+        saturated = clipped_pixels(image, clipped, model)
+        prepared = prepare_reference(image, placement.origins, size, settings, model, saturated)
+        gone = placement.status != Status.OK
+        prepared = replace(prepared, status=np.where(gone, placement.status, prepared.status))
+        return _laid_out(image, self.grid, settings, model, prepared, placement)
+
+    @property
+    def modes(self) -> int:
+        """Parameters of a ZOI: 6 (order 1) or 12 (order 2)."""
+        return 6 if self.settings.order == 1 else 12
+
+    @property
+    def affine(self) -> list[int]:
+        """Where u, du_dx, du_dy, v, dv_dx, dv_dy stand among the parameters."""
+        half = self.modes // 2
+        return [0, 1, 2, half, half + 1, half + 2]
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the noise, GL, as given or as estimated."""
+        return self.prepared.pattern.noise
+
+    def tolerance(self, current: float) -> Stop:
+        """When the iteration may stop, for a noise of ``current`` GL in the deformed image."""
+        settings = self.settings
+        share = settings.tolerance_sigma * np.hypot(current, self.noise)
+        return Stop(
+            length=np.maximum(share * self.unit_sigma[0], settings.tolerance_px),
+            slope=np.maximum(share * self.unit_sigma[1], settings.tolerance_strain),
+            trust=current * self.unit_sigma[2],
+            max_iterations=settings.max_iterations,
+        )
+
+    def local(self, total: Floats) -> Floats:
+        """Parameters against this reference from those against the original one, (A, modes)."""
+        return total if self.placement is None else self.placement.locate(total)
+
+    def total(self, local: Floats) -> Floats:
+        """Parameters against the original reference from those against this one, (A, modes)."""
+        return local if self.placement is None else self.placement.compose(local)
+
+    def all_modes(self, affine: Floats) -> Floats:
+        """Parameters (A, modes) from the six affine ones, (A, 6); the others are zero."""
+        out = np.zeros((len(affine), self.modes))
+        out[:, self.affine] = affine
+        return out
+
+    def searched(self, image: NDArray[Any]) -> Floats:
+        """Where each ZOI is in a deformed image, from nothing: right to about a pixel, (A, modes)."""
+        from analysis.follow.search import search
+
+        offset = np.float32(self.prepared.pattern.mean)
+        origins, deformed = self.prepared.origins, image.astype(np.float32)
+        return self.all_modes(search(self.image, deformed, offset, self.region, origins, self.grid.size))
+
+    def spread(self, values: NDArray[Any], empty: float = np.nan) -> NDArray[Any]:
+        """(A, K) onto the grid: (K, R, C); where all ZOIs are active, the same memory."""
+        return _spread(values, self.index, self.grid.shape, empty)
+
+
+def _laid_out(
+    image: Image,
+    grid: ZoiGrid,
+    settings: KernelSettings,
+    model: NoiseModel | None,
+    prepared: Prepared,
+    placement: Placement | None = None,
+) -> Reference:
+    """What every frame needs of a prepared picture, once."""
+    line = profile(settings.window, grid.size)
+    sensors = None
+    if settings.estimator == "phase":
+        sensors = make_sensors(prepared, line, grid.size)
+        prepared = replace(prepared, covariance=sensors.covariance)
+    sharpness = float((line.sum() / (line @ line)) ** 2)
+    index = np.flatnonzero(grid.active)
+    lengths, slopes = (np.sqrt(np.maximum(prepared.covariance[:, k].astype(np.float64), 0)) for k in _AFFINE)
+    return Reference(
+        grid=grid,
+        settings=settings,
+        noise_model=model,
+        image=image,
+        region=grid.roi if placement is None else placement.region(grid.size, prepared.shape),
+        index=index,
+        prepared=prepared,
+        sensors=sensors,
+        placement=placement,
+        sharpness=sharpness,
+        unit_covariance=np.ascontiguousarray(_spread(prepared.covariance, index, grid.shape, 0)),
+        unit_sigma=np.stack([lengths.min(1), slopes.min(1), lengths.max(1)]),
+        share_variance=1 / np.maximum(prepared.weight * sharpness * prepared.energy, 1e-12),
+    )
+
+
+def _spread(
+    values: NDArray[Any], index: NDArray[np.intp], shape: tuple[int, int], empty: float
+) -> NDArray[Any]:
+    rows, columns = shape
+    if len(index) == rows * columns:
+        return values.T.reshape(-1, rows, columns)
+    out = np.full((values.shape[1], rows * columns), empty, values.dtype)
+    out[:, index] = values.T
+    return out.reshape(-1, rows, columns)
+
+
+def _check_pattern(status: NDArray[np.uint8]) -> None:
+    if len(status) == 0:
+        raise ValueError("no ZOI of the grid is active: the mask or the selection leaves nothing to measure")
+    if np.all(status == Status.NO_PATTERN):
+        raise PatternError(
+            "the reference shows no pattern that could be followed in any ZOI; "
+            "check focus, exposure and speckle, or take larger ZOIs"
+        )

@@ -1,0 +1,76 @@
+"""A reference is made once: whole from the start, and not changed by what is measured or renewed."""
+
+from __future__ import annotations
+
+from dataclasses import FrozenInstanceError, fields
+
+import numpy as np
+import pytest
+
+import analysis
+from analysis import KernelSettings, PatternError, PhaseKernel, Roi, Status, ZoiGrid
+from analysis.kernel.prepared import PatternError as Raised
+from analysis.kernel.reference import Reference
+from tests.analysis.speckle import SHAPE, picture
+
+GRID = ZoiGrid.cover(Roi(8, 8, 160, 128), size=32, step=16)
+HOLED = GRID.subset(active=np.arange(GRID.active.size).reshape(GRID.shape) % 5 > 0)
+
+
+def reference(grid: ZoiGrid = GRID, order: int = 1) -> Reference:
+    return Reference.first(picture().astype(np.float32), grid, KernelSettings(order=order), 1.0, None)
+
+
+def test_it_cannot_be_changed() -> None:
+    made = reference()
+    for field in fields(made):
+        with pytest.raises(FrozenInstanceError):
+            setattr(made, field.name, None)
+
+
+def test_nothing_that_is_measured_changes_it() -> None:
+    kernel = PhaseKernel(picture(), GRID, noise=1.0)
+    status, unit = kernel.reference.prepared.status.copy(), kernel.reference.unit_covariance.copy()
+    field = kernel.measure(np.where(np.arange(SHAPE[1]) < 100, 2000, picture(u=0.3)), noise=1.0)
+    assert not field.ok.all()
+    renewed = kernel.renewed(picture(u=0.3), field)
+    assert np.array_equal(kernel.reference.prepared.status, status)
+    assert np.array_equal(kernel.reference.unit_covariance, unit)
+    assert kernel.reference.placement is None
+    assert renewed.reference.placement is not None
+    assert np.array_equal(renewed.reference.prepared.status == Status.OK, field.ok.ravel())
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_affine_parameters_stand_among_all(order: int) -> None:
+    made = reference(order=order)
+    affine = np.arange(6.0) + 1 + np.zeros((len(made.index), 1))
+    whole = made.all_modes(affine)
+    assert whole.shape == (len(made.index), made.modes) == (GRID.n_active, 6 * order)
+    assert np.array_equal(whole[:, made.affine], affine)
+    assert whole.sum() == affine.sum()
+
+
+@pytest.mark.parametrize("grid", [GRID, HOLED], ids=["all", "some"])
+def test_values_are_spread_over_the_grid(grid: ZoiGrid) -> None:
+    made = reference(grid)
+    values = np.arange(2.0 * grid.n_active).reshape(-1, 2)
+    spread = made.spread(values)
+    assert spread.shape == (2, *grid.shape)
+    assert np.array_equal(spread[:, grid.active].T, values)
+    assert np.isnan(spread[:, ~grid.active]).all()
+
+
+def test_the_tolerance_grows_with_the_noise_from_a_floor_on() -> None:
+    made, settings = reference(), KernelSettings()
+    quiet, loud = made.tolerance(0.0), made.tolerance(100.0)
+    assert quiet.length.min() >= settings.tolerance_px and quiet.slope.min() >= settings.tolerance_strain
+    assert np.all(loud.length > quiet.length) and np.all(loud.slope > quiet.slope)
+    assert np.all(quiet.trust == 0) and np.all(loud.trust > 0)
+    assert loud.max_iterations == settings.max_iterations
+
+
+def test_there_is_one_error_for_a_reference_without_a_pattern() -> None:
+    assert analysis.PatternError is Raised and issubclass(PatternError, ValueError)
+    with pytest.raises(PatternError, match="focus, exposure and speckle"):
+        Reference.first(np.full(SHAPE, 100, np.float32), GRID, KernelSettings(), None, None)
