@@ -19,7 +19,7 @@ from analysis.field.grid import ZoiGrid
 from analysis.field.motion import Motion
 from analysis.field.status import Status
 from analysis.field.tensor import Floats, Measure, StrainTensor, half_logarithm
-from analysis.field.uncertainty import PAIR_INDEX, combination, products, variance_of_sum
+from analysis.field.uncertainty import PAIR_INDEX, combination, fixed_sum, products, variance_of_sum
 from analysis.field.windows import Window
 
 
@@ -200,7 +200,7 @@ class StrainField:
         count = int(np.count_nonzero(chosen))
         if count == 0:
             return float("nan"), float("nan")
-        value = float(self.value(name)[chosen].mean())
+        value = fixed_sum(self.value(name)[chosen]) / count
         # A ZOI without predicted noise (sigma NaN) leaves the mean without a sigma, not without a value.
         variance = variance_of_sum(np.where(chosen, self.sigma(name), 0.0), name, self.grid, self.window)
         return value, float(np.sqrt(max(variance, 0.0)) / count)

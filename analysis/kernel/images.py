@@ -12,26 +12,6 @@ from analysis.kernel.noise import NoiseModel
 from analysis.picture import LINE
 
 
-def clipped_share(
-    clipped: NDArray[np.bool_], first: NDArray[Any], line: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Share of the window weight of each ZOI on marked pixels, (A,).
-
-    ``first`` (A, 2) are first rows and columns; ZOIs are moved into the image where they stick out.
-    """
-    import cv2
-
-    size = len(line)
-    weight = (line / line.sum()).astype(np.float32)
-    # Anchored so that the sum for the ZOI that starts at a pixel stands at that pixel.
-    share = cv2.sepFilter2D(
-        clipped.astype(np.float32), -1, weight, weight, anchor=(0, 0), borderType=cv2.BORDER_CONSTANT
-    )
-    rows = np.clip(first[:, 0], 0, clipped.shape[0] - size)
-    columns = np.clip(first[:, 1], 0, clipped.shape[1] - size)
-    return np.asarray(share[rows, columns], np.float64)
-
-
 def padded(*images: NDArray[np.float32]) -> NDArray[np.float32]:
     """Images of one size with zeros behind each row and below each image, (K, H + 1, pitch).
 

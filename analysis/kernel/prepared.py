@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis.field import Status, profile
 from analysis.fit.bundles import Images, Normal, WindowRows
 from analysis.fit.validity import CLIPPED_SHARE, has_pattern
-from analysis.kernel.images import clipped_share, padded
+from analysis.kernel.images import padded
 from analysis.kernel.noise import NoiseModel
 from analysis.kernel.settings import KernelSettings
 from analysis.picture import Pattern, filtered_pattern
@@ -102,6 +102,8 @@ def prepare_reference(
     energy = out.energy
     status = _measurable(pattern, out.covariance, energy)
     if clipped is not None and clipped.any():
+        from analysis.fit.clipping import clipped_share
+
         status[clipped_share(clipped, origins, line) > CLIPPED_SHARE] = Status.CLIPPED
     return Prepared(
         shape=(image.shape[0], image.shape[1]),

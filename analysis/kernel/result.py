@@ -11,7 +11,6 @@ from analysis.field import Motion, Status, StrainField, profile
 from analysis.fit.validity import CLIPPED_SHARE
 from analysis.follow.renewal import UNSHARED, Placement
 from analysis.kernel.attempt import Attempt
-from analysis.kernel.images import clipped_share
 
 Floats = NDArray[np.float64]
 Covariance = NDArray[np.float32]
@@ -81,6 +80,8 @@ def _motion(attempt: Attempt, values: Floats, expected: Expected) -> Motion:
 
 def _without_clipped(attempt: Attempt, clipped: NDArray[np.bool_]) -> NDArray[np.uint8]:
     """The status of all ZOIs, CLIPPED where too much of one lies on saturated pixels."""
+    from analysis.fit.clipping import clipped_share
+
     reference, status = attempt.reference, attempt.status.copy()
     good = np.flatnonzero(status == Status.OK)
     shift = np.rint(attempt.found.p[good][:, [reference.modes // 2, 0]]).astype(np.int64)

@@ -68,7 +68,7 @@ MAY_START = {"live.batch": {"live.replay"}, "live.characterise.experiments": {"l
 # Library -> the rooms that alone import it.
 LIBRARIES = {
     "ctypes": "acquire.v4l2",
-    "cv2": "acquire analysis.follow analysis.kernel",
+    "cv2": "acquire analysis.follow",
     "fcntl": "acquire.v4l2",
     "h5py": "acquire.hdf5 acquire.session live.results",
     "llvmlite": "analysis.compiled",

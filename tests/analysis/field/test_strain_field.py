@@ -9,6 +9,7 @@ import pytest
 
 from analysis import PhaseKernel, Roi, Status, StrainField, ZoiGrid
 from analysis.field import VALUES
+from analysis.field.uncertainty import fixed_sum
 from tests.analysis.speckle import picture
 
 GRID = ZoiGrid.cover(Roi(0, 0, 64, 64), 32, 16)
@@ -131,3 +132,16 @@ def test_the_numbers_of_a_status_are_those_in_files() -> None:
         "UNEVEN",
     ]
     assert [(s.name, s.value) for s in Status] == [(n, k) for k, n in enumerate(names)]
+
+
+def test_a_sum_has_the_same_bits_wherever_its_values_lie() -> None:
+    rng = np.random.default_rng(0)
+    values = rng.normal(1e-3, 1e-4, 945)
+    room = np.zeros(len(values) + 8)
+    found = set()
+    for shift in range(8):
+        room[shift : shift + len(values)] = values
+        found.add(fixed_sum(room[shift : shift + len(values)]))
+    assert found == {fixed_sum(values)}
+    assert fixed_sum(values) == pytest.approx(values.sum(), rel=1e-12)
+    assert fixed_sum(values[:0]) == 0.0
