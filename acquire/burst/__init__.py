@@ -5,7 +5,7 @@ tells how far the picture moved within one, ``flat_field`` takes the fixed patte
 ``mean_image`` keeps dark and flat frames as files.
 """
 
-from acquire.burst.accumulate import BurstAccumulator, average_bursts, burst_of
+from acquire.burst.accumulate import BurstAccumulator, average_bursts, burst_of, compile_loops
 from acquire.burst.flat_field import FlatField
 from acquire.burst.mean_image import load_mean, save_mean
 from acquire.burst.smear import LIMIT_PX
@@ -16,6 +16,7 @@ __all__ = [
     "FlatField",
     "average_bursts",
     "burst_of",
+    "compile_loops",
     "load_mean",
     "save_mean",
 ]

@@ -67,13 +67,14 @@ def _own_stamp() -> tuple[tuple[str, float, int], ...]:
     return stamp(_PACKAGE)
 
 
-def is_cached(function: Any) -> bool:
-    """Whether a dispatcher has compiled code in this process or on disk."""
-    if function.signatures:
+def is_cached(function: Any, kind: str = "") -> bool:
+    """Whether a dispatcher has compiled code, in this process or on disk, for a first argument of type ``kind``."""
+    if any(kind in str(signature[0]) for signature in function.signatures):
         return True
     try:
-        return bool(_cache_file(function)._load_index())
-    except (AttributeError, OSError):  # numba's own affair: only the announcement depends on it
+        index = _cache_file(function)._load_index()
+        return any(kind in str(key[0][0]) for key in index)
+    except (AttributeError, IndexError, OSError):  # numba's own affair: only the announcement depends on it
         return False
 
 

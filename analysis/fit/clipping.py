@@ -27,12 +27,13 @@ def clipped_share(
     marked = np.ascontiguousarray(clipped).view(np.uint8)
     marked.flags.writeable = False  # numba takes what may be written for another type
     out = np.empty(len(first))
-    _shares(marked, first, (line / line.sum()).astype(np.float32), out)
+    shares(marked, first, (line / line.sum()).astype(np.float32), out)
     return out
 
 
 @parallel
-def _shares(marked: Any, first: Any, weight: Any, out: Any) -> None:
+def shares(marked: Any, first: Any, weight: Any, out: Any) -> None:
+    """See ``clipped_share``; ``marked`` (H, W) uint8, ``out`` (A,) written."""
     size = weight.size
     for z in prange(len(first)):
         top = min(max(first[z, 0], 0), marked.shape[0] - size)

@@ -9,6 +9,16 @@ from analysis.kernel.noise import NoiseModel
 from analysis.kernel.phase_kernel import PhaseKernel
 from analysis.kernel.prepared import PatternError
 from analysis.kernel.settings import Estimator, KernelSettings
-from analysis.kernel.warm_up import warm_up
+from analysis.kernel.warm_up import KINDS, PARTS, missing, warm_up
 
-__all__ = ["Estimator", "KernelSettings", "NoiseModel", "PatternError", "PhaseKernel", "warm_up"]
+__all__ = [
+    "KINDS",
+    "PARTS",
+    "Estimator",
+    "KernelSettings",
+    "NoiseModel",
+    "PatternError",
+    "PhaseKernel",
+    "missing",
+    "warm_up",
+]

@@ -1,46 +1,148 @@
-"""Compile everything ahead of a test, so that nothing compiles during it."""
+"""Compile everything ahead of a test, so that nothing compiles during it.
+
+The iteration takes as long to compile as all the rest, so two processes can share the work:
+``warm_up(ITERATION)`` in one and ``warm_up(REST)`` in the other; a third then loads both from numba's cache.
+"""
 
 from __future__ import annotations
 
 import logging
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
+
+from analysis.field import Motion, Roi, ZoiGrid, profile
 
 log = logging.getLogger("analysis")
 
 COMPILE_SECONDS = 80
-"""About how long the first compilation takes; said in the announcement."""
+"""About how long one process takes for everything; said in the announcement."""
+ITERATION, REST, PHASE, ALL = "iteration", "rest", "phase", "all"
+PARTS = (ITERATION, REST)
+KINDS = ("uint8", "uint16", "float32")
+"""Of pictures: frames of up to 8 and 16 bits, means of bursts."""
 
 
-def warm_up() -> None:
+def missing(kinds: Sequence[str] = KINDS, *, phase: bool = True) -> bool:
+    """Whether numba's cache lacks a loop that pictures of these kinds (and the estimator by phases) need."""
+    from analysis.compiled.loops import is_cached
+    from analysis.fit import assembly, clipping, iteration, sensitivity, verdict
+    from analysis.follow import alpha_beta, climb
+    from analysis.picture import prefilter
+
+    loops = [
+        sensitivity.prepare, iteration.track, climb.climb, alpha_beta.advance, verdict.judge,
+        assembly.weigh, assembly.scale, clipping.shares,
+    ]  # fmt: skip
+    loops += [iteration.warp_zois, iteration.compose_all, iteration.within_image] * phase
+    return not (all(map(is_cached, loops)) and all(is_cached(prefilter.coefficients, kind) for kind in kinds))
+
+
+def warm_up(part: str = ALL, kinds: Sequence[str] = KINDS, *, phase: bool = True) -> None:
     """Compile, or load from numba's cache, every loop that a kernel can need.
 
     The first time on a machine this takes a minute or two and says so in the log.
+
+    Parameters
+    ----------
+    part : "all" | "iteration" | "rest" | "phase"
+    kinds : sequence of str
+        Of the pictures that will come.
+    phase : bool
+        Also for the estimator by phases.
     """
-    from analysis.field import Roi, ZoiGrid
+    if part == ITERATION:
+        _iteration()
+        return
+    if part == REST:
+        _rest(kinds)
+        return
+    if part == PHASE:
+        _phase()
+        return
+    if missing(kinds, phase=phase):
+        log.info("compiling the kernel for this machine, once, about %d s", COMPILE_SECONDS)
+    _everything(kinds, phase)
+
+
+def _everything(kinds: Sequence[str], phase: bool) -> None:
+    """Measure small pictures in every way that a test can."""
     from analysis.kernel.noise import NoiseModel
     from analysis.kernel.phase_kernel import PhaseKernel
     from analysis.kernel.settings import KernelSettings
 
-    announce()
-    y, x = np.mgrid[:96, :96].astype(np.float32)
-    image = 100 + 40 * np.sin(x * 1.3 + 0.2 * y) * np.cos(0.9 * y - 0.35 * x)
-    grid = ZoiGrid.cover(Roi(8, 8, 80, 80), size=32, step=16)
-    for settings in (KernelSettings(), KernelSettings(order=2), KernelSettings(estimator="phase")):
-        kernel = PhaseKernel(image, grid, settings, NoiseModel(0.1, 1.0))
-        field = kernel.measure(image)
+    image, grid = _small()
+    ways = [KernelSettings(), KernelSettings(order=2)]
+    clipped = image > np.percentile(image, 99)
+    for settings in [*ways, *([KernelSettings(estimator="phase")] * phase)]:
+        kernel = PhaseKernel(image, grid, settings, NoiseModel(0.1, 1.0), clipped)
+        field = kernel.measure(image, clipped=clipped)
         kernel.measure(image, start=field)
-    for kind in (np.uint8, np.uint16):
+    for kind in kinds:
         kernel.measure(image.astype(kind), start=field)
 
 
-def announce() -> None:
-    """Say in the log that compilation is about to happen, where it is."""
-    from analysis.compiled.loops import is_cached
-    from analysis.fit import iteration, sensitivity
-    from analysis.follow import climb
-    from analysis.picture import prefilter
+def _small() -> tuple[NDArray[np.float32], ZoiGrid]:
+    """A picture, (96, 96) float32, and a grid on it."""
+    y, x = np.mgrid[:96, :96].astype(np.float32)
+    image = 100 + 40 * np.sin(x * 1.3 + 0.2 * y) * np.cos(0.9 * y - 0.35 * x)
+    return image, ZoiGrid.cover(Roi(8, 8, 80, 80), size=32, step=16)
 
-    loops = (prefilter.coefficients, sensitivity.prepare, iteration.track, climb.climb)
-    if not all(map(is_cached, loops)):
-        log.info("compiling the kernel for this machine, once, about %d s", COMPILE_SECONDS)
+
+def _iteration() -> None:
+    """The iteration alone: called for no ZOI at all, it is compiled all the same."""
+    from analysis.fit.bundles import Fit, Out, Picture, Stop
+    from analysis.fit.iteration import track
+
+    none, no_images = np.empty(0), np.empty((0, 6, 6), np.float32)
+    fit = Fit(
+        np.empty(0, np.float32), 0, 0, np.empty((0, 2), np.int64), 32, 16, 1,
+        np.empty((4, 32), np.float32), np.empty((4, 4)), no_images, no_images, np.empty((0, 2)), np.empty(6),
+    )  # fmt: skip
+    picture = Picture(np.empty(0, np.float32), 0, 0, 0.5)
+    track(picture, np.empty(18, np.float32), fit, Stop(none, none, none, 12), Out.starting(np.empty((0, 6))))
+
+
+def _phase() -> None:
+    """What only the estimator by phases needs, again for no ZOI at all."""
+    from analysis.fit.bundles import Picture
+    from analysis.fit.iteration import compose_all, warp_zois, within_image
+
+    picture = Picture(np.empty(0, np.float32), 0, 0, 0.5)
+    origins, p = np.empty((0, 2), np.int64), np.empty((0, 6))
+    within_image(picture, origins, 32, p, np.empty(0, np.bool_))
+    warp_zois(picture, np.empty(18, np.float32), origins, 32, p, np.empty((0, 32, 32), np.float32))
+    compose_all(p, p)
+
+
+def _rest(kinds: Sequence[str]) -> None:
+    """All but the iteration and what only the estimator by phases needs."""
+    from analysis.fit.assembly import scale, weigh
+    from analysis.fit.bundles import Known, Out, Rule
+    from analysis.fit.clipping import clipped_share
+    from analysis.fit.verdict import judge
+    from analysis.follow.prediction import motion_after
+    from analysis.kernel.phase_kernel import PhaseKernel
+    from analysis.picture import prefilter_taps
+    from analysis.picture.prefilter import coefficients
+
+    image, grid = _small()
+    kernel = PhaseKernel(image, grid)
+    kernel.reference.searched(image)
+    for kind in kinds:
+        picture = image.astype(kind)
+        picture.flags.writeable = False
+        coefficients(picture, np.float32(100), prefilter_taps(5))
+    line = profile("gaussian", 32)
+    clipped_share(np.zeros((32, 32), np.bool_), np.zeros((1, 2), np.int64), line)
+    none, pairs, single = np.empty(0), np.empty((0, 2)), np.empty(0, np.float32)
+    judge(
+        Out.starting(np.empty((0, 6))), none, none, Known(none, none, pairs),
+        Rule(True, np.empty(2), 1.0, 0.05), np.empty(0, np.uint8),
+    )  # fmt: skip
+    weigh(np.empty(0, np.bool_), none, none, np.empty((2, 2))[:, 0], none, none, single, single, single)
+    unit = np.empty((21, 0), np.float32)
+    scale(unit, single, single, unit, unit)
+    index, values = np.empty(0, np.intp), np.empty((0, 6))
+    motion_after(Motion.none(index, 6), values, values, none, 1.0)

@@ -44,6 +44,7 @@ COMMANDS = {
         "live.commands.load_calibrate", "calibrate a load cell: tare, known load, accept"
     ),
     "recover": Entry("live.commands.recover", "copy what is readable of a damaged or unfinished session"),
+    "warm-up": Entry("live.commands.warm_up", "compile everything ahead of the first test"),
     "devices": Entry("live.commands.devices", "list cameras with their formats, and serial ports"),
 }
 

@@ -34,7 +34,8 @@ def rehearse(camera: CameraInfo, grid: ZoiGrid, settings: KernelSettings, bursts
     """
     from analysis import warm_up
 
-    warm_up()
+    phase = settings.estimator == "phase"
+    warm_up(kinds=("uint8" if camera.bits <= 8 else "uint16", "float32"), phase=phase)
     images = [_image(camera, seed) for seed in (1, 2)]
     reference, *_ = [_averaged(camera, images, n) for n in bursts]
     kernel, noise_GL = prepare(reference.burst, grid, settings, None, what="measure")

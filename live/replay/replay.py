@@ -21,7 +21,17 @@ from live.outputs import About, Outputs, make_outputs
 from live.replay.material import Material, ReplayRequest
 from live.replay.pictures import picture_material, picture_of
 from live.replay.session import session_config, session_material, session_path
-from live.setup import Config, correction, grid_for, kernel_settings, load_config, make_folder, read_mask
+from live.setup import (
+    Config,
+    compile_ahead,
+    correction,
+    grid_for,
+    kernel_settings,
+    kinds_of,
+    load_config,
+    make_folder,
+    read_mask,
+)
 from live.tell import Books, Journal, Ledger, Screen
 
 
@@ -85,6 +95,7 @@ def _run(
     grid = grid_for(config, camera.width, camera.height, mask)
     correct = correction(config, camera)
     settings, stated = kernel_settings(config), config.measure.noise_GL
+    compile_ahead(kinds_of(camera), phase=settings.estimator == "phase", say=screen.status)
     what = f"the reference of {request.source}"
     kernel, noise_GL = prepare(material.reference, grid, settings, stated, correct, what)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,9 +18,11 @@ from live.setup import (
     DEFAULT_REFERENCE_BURST,
     Config,
     Rig,
+    compile_ahead,
     correction,
     grid_for,
     kernel_settings,
+    kinds_of,
     make_folder,
     read_mask,
     with_flat_field,
@@ -31,8 +32,6 @@ from live.tell import Journal, Screen
 
 if TYPE_CHECKING:
     from analysis import KernelSettings, ZoiGrid
-
-_WORTH_TELLING_S = 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,10 +105,11 @@ def _burst_lengths(config: Config, live: bool) -> tuple[int, int]:
 def _rehearse(
     rig: Rig, grid: ZoiGrid, settings: KernelSettings, bursts: tuple[int, int], screen: Screen
 ) -> None:
-    began = time.perf_counter()
-    rehearse(rig.camera.info, grid, settings, bursts)
-    if (took := time.perf_counter() - began) > _WORTH_TELLING_S:
+    phase = settings.estimator == "phase"
+    took = compile_ahead(kinds_of(rig.camera.info), phase=phase, say=screen.status)
+    if took > 0:
         screen.say(f"everything is compiled ({took:.0f} s)")
+    rehearse(rig.camera.info, grid, settings, bursts)
 
 
 def _time_zero(rig: Rig, journal: Journal) -> ClockPair:

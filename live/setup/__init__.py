@@ -2,9 +2,11 @@
 
 ``sections`` are the keys of the configuration with their ``checks`` and options, ``config`` reads and
 overlays it, ``rig`` opens the devices (and is the one door to the simulated ones), ``grid`` lays the ZOIs,
-``pictures`` reads mask, dark and flat, ``folder`` makes the place for the files.
+``pictures`` reads mask, dark and flat, ``compiling`` has the loops compiled ahead, ``folder`` makes the
+place for the files.
 """
 
+from live.setup.compiling import compile_ahead, kinds_of
 from live.setup.config import Config, from_dict, load_config, options, settings_in
 from live.setup.folder import FILES, make_folder, versions
 from live.setup.grid import grid_for, kernel_settings, whole_picture
@@ -19,10 +21,12 @@ __all__ = [
     "Config",
     "Rig",
     "SpecimenConfig",
+    "compile_ahead",
     "correction",
     "from_dict",
     "grid_for",
     "kernel_settings",
+    "kinds_of",
     "load_config",
     "make_folder",
     "open_load",

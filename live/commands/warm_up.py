@@ -1,0 +1,21 @@
+"""``phasedic warm-up``: compile everything ahead, for all kinds of pictures and estimators."""
+
+from __future__ import annotations
+
+import argparse
+
+from analysis.kernel import KINDS
+from live.setup import compile_ahead
+from live.tell import Screen
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """``phasedic warm-up`` has none."""
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """0 once all is there."""
+    screen = Screen()
+    took = compile_ahead(KINDS, phase=True, say=screen.status)
+    screen.say(f"everything is compiled ({took:.0f} s)" if took else "everything was compiled already")
+    return 0
