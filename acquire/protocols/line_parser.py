@@ -27,9 +27,9 @@ class LineParser(Parser):
         readings = (self._read(line) for line in self._buffer.feed(data))
         return [reading for reading in readings if reading is not None]
 
-    def restart(self) -> None:
-        """Forget the line begun."""
-        self._buffer.restart()
+    def restart(self, lost: int = 0) -> None:
+        """Forget the line begun, and count the bytes never fed."""
+        self._buffer.restart(lost)
 
     def _read(self, line: Line) -> Reading | None:
         if not line.whole:

@@ -15,11 +15,12 @@ from acquire.addresses import Options, parse_address
 from acquire.errors import DeviceError
 from acquire.load_sample import LoadFlag
 from acquire.protocols import Parser, Protocol, Reading, find_protocol, is_mass
-from acquire.serial_line.ports import PORT_ERRORS, LineSettings, Port, open_port
+from acquire.serial_line.byte_ports import Port
+from acquire.serial_line.ports import PORT_ERRORS, LineSettings, open_port
 
 SPEEDS = (9600, 115200, 57600, 19200, 2400, 4800, 38400, 1200)
 LISTEN_S = 1.5
-ENOUGH_LINES = 5
+ENOUGH_LINES, ENOUGH_BYTES = 5, 1 << 16
 # What sends unasked, the strictest grammar first; ascii with columns where the plain one leaves a choice.
 HEARD = (
     ("mt-sics", ""),
@@ -91,10 +92,8 @@ def hear(
 
 def _collect(port: Port, seconds: float, clock: Clock) -> bytes:
     until, heard = clock() + seconds, bytearray()
-    while clock() < until:
-        heard += port.read(1)
-        if waiting := port.in_waiting:
-            heard += port.read(waiting)
+    while clock() < until and len(heard) < ENOUGH_BYTES:
+        heard += port.receive(4096)
     return bytes(heard)
 
 
