@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 import pty
 import socket
@@ -209,3 +210,21 @@ class Rfc2217Peer(SocketPeer):
 
 
 PEERS: dict[str, type[Peer]] = {"pty": PtyPeer, "socket": SocketPeer, "rfc2217": Rfc2217Peer}
+
+
+def stamped(rate: float, stall_at: float = math.inf, stall_s: float = 0.0) -> Talk:
+    """Lines whose value is the time at which they were due, s; some wait for ``stall_s`` somewhere on the way."""
+
+    def talk(write: Write, stopped: threading.Event) -> None:
+        begun, sent = time.monotonic(), 0
+        while not stopped.is_set():
+            now = time.monotonic()
+            if stall_at < now - begun < stall_at + stall_s:
+                stopped.wait(0.01)
+                continue
+            due = int((now - begun) * rate)
+            write(b"".join(b"%.4f N\r\n" % (begun + k / rate) for k in range(sent, due)))
+            sent = due
+            stopped.wait(1 / rate)
+
+    return talk

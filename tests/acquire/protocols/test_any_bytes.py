@@ -86,8 +86,8 @@ def test_a_line_with_more_columns_than_the_others_gives_no_value() -> None:
 
 def test_more_columns_that_stay_are_taken_over() -> None:
     made = parser("ascii", "column=2")
-    made.feed(b"\r\n1,2\r\n")
-    values = [r.value for r in made.feed(b"1,3,4\r\n" * 150)]
+    made.feed(b"\r\n1;2\r\n")
+    values = [r.value for r in made.feed(b"1;3;4\r\n" * 150)]
     assert math.isnan(values[99]) and values[-1] == 3.0
 
 
