@@ -137,7 +137,7 @@ class AsciiParser(LineParser):
     def _choose(self, fields: list[_Field]) -> int | None:
         """Where the value stands; None where the line does not tell."""
         millis, column = self._settings.millis, self._settings.column
-        if millis is not None and not _numeric_at(fields, millis):
+        if millis is not None and not (_numeric_at(fields, millis) and self._is_time(fields[millis - 1])):
             return None
         if column is not None:
             return column - 1 if _numeric_at(fields, column) and self._alone(fields, column - 1) else None
@@ -151,20 +151,30 @@ class AsciiParser(LineParser):
         millis = self._settings.millis
         pairs = [(i - 1, i)] if i > 0 and i != millis else []
         pairs += [(i, i + 1)] if i + 1 < len(fields) and i + 2 != millis else []
-        return not any(_may_be_one(fields[before], fields[after]) for before, after in pairs)
+        return not any(self._may_be_one(fields[before], fields[after]) for before, after in pairs)
+
+    def _is_time(self, field: _Field) -> bool:
+        """A comma within milliseconds separates two fields, whatever is said of decimals."""
+        return not (self._settings.decimal_comma and "." in field.digits)
+
+    def _may_be_one(self, before: _Field, after: _Field) -> bool:
+        """Whether two neighbours may be one number: 12,5 or 1,234.5 or 1.234,5 or 1 234."""
+        if (
+            after.apart
+            or after.digits[:1] in ("+", "-")
+            or not (before.numeric and after.numeric)
+            or before.unit
+        ):
+            return False
+        whole, point, _ = after.digits.partition(".")
+        first = before.digits.lstrip("+-")
+        if not point or (self._settings.decimal_comma and len(whole) == 3):
+            return True
+        return len(whole) == 3 and len(first) <= 3 and "." not in first
 
 
 def _numeric_at(fields: list[_Field], column: int) -> bool:
     return column <= len(fields) and fields[column - 1].numeric
-
-
-def _may_be_one(before: _Field, after: _Field) -> bool:
-    """Whether two neighbours may be one number: 12,5 or 1,234.5 or 1.234,5 or 1 234."""
-    if after.apart or after.digits[:1] in ("+", "-") or not (before.numeric and after.numeric) or before.unit:
-        return False
-    whole, point, _ = after.digits.partition(".")
-    first = before.digits.lstrip("+-")
-    return not point or (len(whole) == 3 and len(first) <= 3 and "." not in first)
 
 
 def _unit_alone(after: list[_Field]) -> str | None:

@@ -59,7 +59,7 @@ class LoadWatch:
         self._bad_told = True
         shown = samples[-1].raw[:60].decode("ascii", "backslashreplace")
         told = f"{self._bad} lines in a row give no reading, the last one {shown!r}"
-        self._tell("warning", f"{told}; check protocol, baud and column")
+        self._tell("warning", f"{told}; check protocol, baud, column and decimal")
 
     def last_words(self, now: float) -> str:
         """Of the last good sample: its force and age."""
