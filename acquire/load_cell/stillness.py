@@ -41,7 +41,7 @@ class Stillness:
         """Whether nothing but noise and the last digit moved."""
         if self.n < LEAST:
             return False
-        drift = 5 * self.noise_N * math.sqrt(12 / self.n) + 2 * self.step_N
+        drift = self.noise_N * max(5 * math.sqrt(12 / self.n), 1) + 2 * self.step_N
         return abs(self.moved_N) <= drift and self.range_N <= 10 * self.noise_N + 3 * self.step_N
 
 
