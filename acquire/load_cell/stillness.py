@@ -70,7 +70,7 @@ def stillness(times: ArrayLike, forces: ArrayLike, step_N: float = 0.0) -> Still
 def _flicker(steps: NDArray[np.float64]) -> float:
     """The least change that was seen in both directions: a last digit; a movement has one."""
     up, down = steps[steps > 0], -steps[steps < 0]
-    return float(max(up.min(), down.min())) if up.size and down.size else 0.0
+    return float(min(up.min(), down.min())) if up.size and down.size else 0.0
 
 
 def _rise(t: NDArray[np.float64], f: NDArray[np.float64]) -> float:
