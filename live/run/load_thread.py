@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 
 from acquire.errors import PhasedicError
 from acquire.events import EventKind
 from acquire.load_cell import LoadCell
+from live.operate import TareOrders
 from live.outputs import Outputs
 from live.pace import LOAD, yield_to_others
 from live.run.recorder import Recording
@@ -62,3 +64,12 @@ class LoadThread:
             self._books.journal.tell(EventKind.DEVICE, self._cell.info.address, text, "error")
         finally:
             self._books.loads.close()
+
+
+def tare_orders(cell: LoadCell, books: Books) -> TareOrders:
+    """What carries out orders to tare ``cell`` in this test."""
+
+    def measured() -> bool:
+        return bool(books.history.instants)
+
+    return TareOrders(cell, measured, lambda: books.loads.latest, books.journal.tell, time.monotonic)
