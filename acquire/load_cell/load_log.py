@@ -17,6 +17,7 @@ from bisect import bisect_left, bisect_right
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.events import Event, EventKind
 from acquire.load_sample import LoadFlag, LoadSample
 
 
@@ -33,6 +34,7 @@ class LoadLog:
         self._max_gap_s = max_gap_s
         self._t = array("d")
         self._force = array("d")
+        self._zeros: list[tuple[float, float]] = []
         self._latest: LoadSample | None = None
         self._count = 0
         self._closed = False
@@ -53,6 +55,18 @@ class LoadLog:
     def _add(self, t: float, force: float) -> None:
         self._t.append(max(t, self._t[-1]) if self._t else t)
         self._force.append(force)
+
+    def take_event(self, event: Event) -> None:
+        """Note a tare that says by how much forces fall (``step_N``); other events are let pass."""
+        step = event.data.get("step_N")
+        if event.kind is EventKind.TARE and isinstance(step, int | float) and math.isfinite(step):
+            with self._lock:
+                self._zeros.append((event.t, float(step)))
+
+    def zero_at(self, t: float) -> float:
+        """What the tares before ``t`` have taken off the force, N: added to it, one zero holds for all."""
+        with self._lock:
+            return math.fsum(step for since, step in self._zeros if since <= t)
 
     def close(self) -> None:
         """No more samples will come."""

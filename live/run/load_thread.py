@@ -41,6 +41,7 @@ class LoadThread:
 
     def start(self) -> None:
         """Begin; the load cell must have been entered."""
+        self._books.journal.add_listener(self._books.loads.take_event)
         self._thread.start()
 
     def join(self) -> None:
