@@ -104,7 +104,7 @@ class AsciiParser(LineParser):
         while words and not words[-1].strip(" ,;\t"):
             words.pop()
         gaps = ["", *words[1::2]]
-        fields = [self._field(word, gap) for word, gap in zip(words[::2], gaps, strict=True)]
+        fields = [self._field(word, gap) for word, gap in zip(words[::2], gaps, strict=False)]
         whole = [field for field in fields if field is not None]
         return whole if len(whole) == len(fields) else None
 

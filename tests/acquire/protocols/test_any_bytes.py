@@ -17,6 +17,8 @@ from tests.acquire.protocols.conversation import ALL, any_parser, parser, read_l
 
 SEEDS = [
     b"12.5 N\r\n",
+    b"Readings:\r\n",
+    b" , ;\t,\r\n",
     b"S S     100.00 g\r\n",
     b"ST,GS,+0001.234kg\r\n",
     b"-18.78 lbF\r\n",
