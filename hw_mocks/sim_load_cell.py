@@ -113,9 +113,13 @@ class SimLoadCell(Closing):
     def __iter__(self) -> Iterator[LoadSample]:
         return iter(self._cell)
 
-    def tare(self) -> None:
+    def tare(self, *, force: bool = False) -> None:
         """As the product's serial load cell does it."""
-        self._cell.tare()
+        self._cell.tare(force=force)
+
+    def undo_tare(self) -> None:
+        """As the product's serial load cell does it."""
+        self._cell.undo_tare()
 
     def stop(self) -> None:
         """End the iteration; from any thread."""
@@ -140,6 +144,7 @@ class NominalLoadCell(Closing):
         self.noise_N = float(np.hypot(settings.noise_N, settings.resolution_N / np.sqrt(12)))
         self._rng = np.random.default_rng(settings.seed)
         self._next, self._stopped, self._offset, self._last = 0, False, 0.0, 0.0
+        self._before: list[float] = []
         info = LoadCellInfo(address, "simulated load cell on nominal time", "none", "nominal")
         self.info = _described(info, address, settings, self.noise_N)
 
@@ -157,10 +162,19 @@ class NominalLoadCell(Closing):
         start = self._specimen.clock.start or 0.0
         return LoadSample(start + t, self._last - self._offset, "N", raw=text.encode())
 
-    def tare(self) -> None:
+    def tare(self, *, force: bool = False) -> None:
         """Make the last sample zero."""
-        self._offset = self._last
-        text, data = f"tared: {self._offset:.6g} N is zero now", {"offset_N": self._offset}
+        self._before.append(self._offset)
+        self._move(self._last, f"tared: {self._last:.6g} N is zero now")
+
+    def undo_tare(self) -> None:
+        """As before the last tare, if there was one."""
+        if self._before:
+            self._move(self._before.pop(), "the last tare is undone")
+
+    def _move(self, offset: float, text: str) -> None:
+        data = {"offset_N": offset, "step_N": offset - self._offset}
+        self._offset = offset
         self._on_event(Event(time.monotonic(), EventKind.TARE, self.info.address, text, "info", data))
 
     def stop(self) -> None:

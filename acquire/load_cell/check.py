@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import threading
+import time
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from acquire.load_cell.contract import LoadCell
+from acquire.load_cell.stillness import stillness
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 
 LINES_SHOWN = 5
@@ -28,23 +30,28 @@ class LoadReport:
     samples, good : int
         Lines, and those with a value.
     seconds : float, s
-        From the first sample to the last.
+        That were listened to.
     rate : float, 1/s
         Of all samples, NaN with fewer than two.
     jitter_s, longest_s : float, s
-        Standard deviation and greatest of the intervals.
+        Standard deviation and greatest of the intervals; silence before the first value and after the
+        last one counts for the greatest.
+    silent_s : float, s
+        Since the last value.
     unique : int
         Different values.
     step_N : float, N
         Least difference between two values: the resolution of the display.
     lowest_N, highest_N, mean_N, noise_N : float, N
-        Noise: standard deviation of one reading from successive differences, so that a slow
-        drift does not count.
+        Noise: standard deviation of one reading from second differences, so that a movement of the
+        load does not count.
+    moved_N : float, N
+        Between the lowest and the highest mean of a tenth of the time.
     of_capacity : float or None
         Greatest force as a part of the capacity.
     flags : tuple of (name, count)
     lines : tuple of bytes
-        The last different lines.
+        The last different lines, in their order.
     remarks : tuple of str
         What a person should look into.
     """
@@ -55,12 +62,14 @@ class LoadReport:
     rate: float
     jitter_s: float
     longest_s: float
+    silent_s: float
     unique: int
     step_N: float
     lowest_N: float
     highest_N: float
     mean_N: float
     noise_N: float
+    moved_N: float
     of_capacity: float | None
     flags: tuple[tuple[str, int], ...]
     lines: tuple[bytes, ...]
@@ -72,22 +81,50 @@ class LoadReport:
         return self.good > 0 and not self.remarks
 
 
-def listen(cell: LoadCell, seconds: float) -> list[LoadSample]:
+@dataclass(frozen=True, slots=True)
+class Heard:
+    """What came while somebody listened.
+
+    Attributes
+    ----------
+    samples : tuple of LoadSample
+    began, ended : float, s
+    """
+
+    samples: tuple[LoadSample, ...]
+    began: float
+    ended: float
+
+
+def listen(cell: LoadCell, seconds: float) -> Heard:
     """The samples of so many seconds; the cell is closed after that."""
     timer = threading.Timer(seconds, cell.stop)
     with cell:
         timer.start()
+        began = time.monotonic()
         try:
-            return list(cell)
+            samples = tuple(cell)
         finally:
             timer.cancel()
+    return _as_of_now(samples, began, time.monotonic())
 
 
-def report(samples: Sequence[LoadSample], info: LoadCellInfo) -> LoadReport:
+def _as_of_now(samples: tuple[LoadSample, ...], began: float, ended: float) -> Heard:
+    """A recording is not of now: its own times are all there is."""
+    if samples and not (began - 1 < samples[0].t and samples[-1].t < ended + 1):
+        began, ended = samples[0].t, samples[-1].t
+    return Heard(samples, began, ended)
+
+
+def report(heard: Heard, info: LoadCellInfo) -> LoadReport:
     """What these samples tell."""
+    samples = heard.samples
     times = np.array([sample.t for sample in samples])
     steps = np.diff(times)
-    forces = np.array([sample.force for sample in samples if not math.isnan(sample.force)])
+    good = [sample for sample in samples if not math.isnan(sample.force)]
+    forces = np.array([sample.force for sample in good])
+    gaps = np.diff([heard.began, *(sample.t for sample in good), heard.ended])
+    judged = stillness([sample.t for sample in good], forces)
     values = np.unique(forces)
     flags = Counter(str(flag.name).lower() for sample in samples for flag in sample.flags)
     span = float(times[-1] - times[0]) if len(times) > 1 else 0.0
@@ -95,25 +132,42 @@ def report(samples: Sequence[LoadSample], info: LoadCellInfo) -> LoadReport:
     found = LoadReport(
         samples=len(samples),
         good=len(forces),
-        seconds=span,
+        seconds=heard.ended - heard.began,
         rate=len(steps) / span if span > 0 else math.nan,
         jitter_s=float(steps.std()) if steps.size else math.nan,
-        longest_s=float(steps.max()) if steps.size else math.nan,
+        longest_s=float(gaps.max()),
+        silent_s=float(gaps[-1]),
         unique=len(values),
         step_N=float(np.diff(values).min()) if len(values) > 1 else math.nan,
         lowest_N=float(forces.min()) if forces.size else math.nan,
         highest_N=float(forces.max()) if forces.size else math.nan,
-        mean_N=float(forces.mean()) if forces.size else math.nan,
-        noise_N=float(np.diff(forces).std() / math.sqrt(2)) if forces.size > 2 else math.nan,
+        mean_N=judged.mean_N,
+        noise_N=judged.noise_N,
+        moved_N=_moved(good, heard),
         of_capacity=greatest / info.capacity_N if info.capacity_N and forces.size else None,
         flags=tuple(sorted(flags.items())),
-        lines=tuple(dict.fromkeys(sample.raw for sample in reversed(samples)))[:LINES_SHOWN],
+        lines=_last_lines(samples),
         remarks=(),
     )
-    return dataclasses.replace(found, remarks=tuple(_remarks(found, samples)))
+    return dataclasses.replace(found, remarks=tuple(_remarks(found, samples, judged.step_N)))
 
 
-def _remarks(found: LoadReport, samples: Sequence[LoadSample]) -> list[str]:
+def _moved(good: Sequence[LoadSample], heard: Heard) -> float:
+    """Between the lowest and the highest mean of a tenth of the time, N."""
+    tenth = max((heard.ended - heard.began) / 10, 1e-9)
+    parts: dict[int, list[float]] = {}
+    for sample in good:
+        parts.setdefault(int((sample.t - heard.began) / tenth), []).append(sample.force)
+    means = [math.fsum(part) / len(part) for part in parts.values()]
+    return max(means) - min(means) if means else math.nan
+
+
+def _last_lines(samples: Sequence[LoadSample]) -> tuple[bytes, ...]:
+    newest = dict.fromkeys(sample.raw for sample in reversed(samples) if sample.raw)
+    return tuple(newest)[:LINES_SHOWN][::-1]
+
+
+def _remarks(found: LoadReport, samples: Sequence[LoadSample], digit_N: float) -> list[str]:
     if not samples:
         return ["nothing came: check cable, port, baud, and whether the device must be asked (mode=poll)"]
     if not found.good:
@@ -125,15 +179,28 @@ def _remarks(found: LoadReport, samples: Sequence[LoadSample]) -> list[str]:
         remarks.append(f"{bad} of {found.samples} lines gave no value: noise on the line, or another grammar")
     if beyond:
         remarks.append(f"{beyond} samples in overload or saturated: unload the cell, or check its wiring")
-    if found.rate < SLOW_HZ:
+    if found.rate < SLOW_HZ or math.isnan(found.rate):
         remarks.append(
             f"only {found.rate:.3g} samples a second: the force at a burst is interpolated over long gaps"
         )
-    if found.longest_s > 5 / found.rate and found.longest_s > 0.25:
-        remarks.append(f"a gap of {found.longest_s:.2f} s: across such gaps the force is not known")
+    remarks += _silences(found)
+    if found.moved_N > max(10 * found.noise_N, 5 * digit_N):
+        lowest, highest = f"{found.lowest_N:.6g}", f"{found.highest_N:.6g}"
+        remarks.append(
+            f"the force ran between {lowest} and {highest} N: leave the load still, or look for a drift"
+        )
     if found.unique == 1 and found.good >= STUCK:
         remarks.append("every value is the same: a frozen display, or far too coarse for this load")
     return remarks
+
+
+def _silences(found: LoadReport) -> list[str]:
+    usual = 0.25 if math.isnan(found.rate) else max(5 / found.rate, 0.25)
+    if found.silent_s > usual:
+        return [f"silence for the last {found.silent_s:.2f} s: the device stopped sending; power, cable?"]
+    if found.longest_s > usual:
+        return [f"a gap of {found.longest_s:.2f} s: across such gaps the force is not known"]
+    return []
 
 
 def report_lines(found: LoadReport) -> list[str]:
@@ -146,6 +213,7 @@ def report_lines(found: LoadReport) -> list[str]:
             f"force    mean {found.mean_N:.6g} N, from {found.lowest_N:.6g} to {found.highest_N:.6g} N"
             + ("" if found.of_capacity is None else f" ({found.of_capacity:.1%} of the capacity)"),
             f"noise    {found.noise_N:.3g} N (one reading), {found.unique} different values, step {found.step_N:.3g} N",
+            f"moved    {found.moved_N:.3g} N (means of a tenth of the time)",
         ]
     lines += [f"flag     {name}: {count}" for name, count in found.flags]
     lines += [f"line     {line.decode('ascii', 'backslashreplace')!r}" for line in found.lines]

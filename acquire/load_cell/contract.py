@@ -25,8 +25,10 @@ class LoadCell(Protocol):
       a finite source is exhausted. A lost or silent port is an event and a reconnection, never
       an exception: a test goes on without its load.
     - ``stop()`` may be called from any thread; the iteration then ends within half a second.
-    - ``tare()`` makes the present load zero, in the device where its protocol can, else here
-      (an offset told in the event); may be called from any thread while iterating.
+    - ``tare()`` makes the present load zero, in the device where its protocol can, else here; may be
+      called from any thread while iterating. Unless forced it is refused, in an event, where the load
+      is not known to be still. Its event says by how much forces fall from then on (``step_N``).
+    - ``undo_tare()`` lets zero be where it was before; it tells the like.
     """
 
     @property
@@ -40,7 +42,9 @@ class LoadCell(Protocol):
 
     def __iter__(self) -> Iterator[LoadSample]: ...
 
-    def tare(self) -> None: ...
+    def tare(self, *, force: bool = False) -> None: ...
+
+    def undo_tare(self) -> None: ...
 
     def stop(self) -> None: ...
 

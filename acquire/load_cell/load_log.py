@@ -1,20 +1,23 @@
 """The load against time: filled by one thread while others ask for the force at an instant.
 
 Interpolates, and refuses to where it would invent: outside the log, across a gap, beside an
-overload. Lines that gave no reading at all (garbage, flag ERROR), and readings that waited somewhere
+overload. Lines that gave no reading at all (garbage, flag ERROR), and values that waited somewhere
 so that nobody knows of when they are (flag STALE), leave no mark of their own: they are neither a
-force at a known time nor a hole, and the gap rule decides.
+force at a known time nor a hole, and the gap rule decides. An overload that waited, like lines that were
+never read, may have been at any time since the last value: the force is unknown from there on.
 """
 
 from __future__ import annotations
 
 import math
 import threading
+from array import array
 from bisect import bisect_left, bisect_right
 
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.events import Event, EventKind
 from acquire.load_sample import LoadFlag, LoadSample
 
 
@@ -29,8 +32,9 @@ class LoadLog:
 
     def __init__(self, max_gap_s: float = 0.25) -> None:
         self._max_gap_s = max_gap_s
-        self._t: list[float] = []
-        self._force: list[float] = []
+        self._t = array("d")
+        self._force = array("d")
+        self._zeros: list[tuple[float, float]] = []
         self._latest: LoadSample | None = None
         self._count = 0
         self._closed = False
@@ -41,11 +45,28 @@ class LoadLog:
         with self._lock:
             self._latest = sample
             self._count += 1
-            no_reading = LoadFlag.ERROR in sample.flags and math.isnan(sample.force)
-            if no_reading or LoadFlag.STALE in sample.flags:
+            none, stale = math.isnan(sample.force), LoadFlag.STALE in sample.flags
+            if (stale and not none) or (none and LoadFlag.ERROR in sample.flags):
                 return
-            self._t.append(max(sample.t, self._t[-1]) if self._t else sample.t)
-            self._force.append(sample.force)
+            if stale and self._t:
+                self._add(self._t[-1], math.nan)
+            self._add(sample.t, sample.force)
+
+    def _add(self, t: float, force: float) -> None:
+        self._t.append(max(t, self._t[-1]) if self._t else t)
+        self._force.append(force)
+
+    def take_event(self, event: Event) -> None:
+        """Note a tare that says by how much forces fall (``step_N``); other events are let pass."""
+        step = event.data.get("step_N")
+        if event.kind is EventKind.TARE and isinstance(step, int | float) and math.isfinite(step):
+            with self._lock:
+                self._zeros.append((event.t, float(step)))
+
+    def zero_at(self, t: float) -> float:
+        """What the tares before ``t`` have taken off the force, N: added to it, one zero holds for all."""
+        with self._lock:
+            return math.fsum(step for since, step in self._zeros if since <= t)
 
     def close(self) -> None:
         """No more samples will come."""

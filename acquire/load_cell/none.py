@@ -19,8 +19,11 @@ class NoLoadCell(Closing):
     def __iter__(self) -> Iterator[LoadSample]:
         return iter(())
 
-    def tare(self) -> None:
+    def tare(self, *, force: bool = False) -> None:
         """Nothing to tare."""
+
+    def undo_tare(self) -> None:
+        """Nothing to undo."""
 
     def stop(self) -> None:
         """Nothing to stop."""

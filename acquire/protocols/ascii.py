@@ -3,8 +3,10 @@
 ``12.3``, ``Reading: 12.3 kg``, ``12345,0.512,kg,8388607,21.5,`` (milliseconds, value, unit, raw,
 temperature). A line is an optional label that ends in ``:`` or ``=``, then numbers and units separated
 by commas, semicolons, tabs or spaces. The value is the number in ``column``, else the only number
-beside ``millis``, else the only number followed by a unit; a line that leaves a choice gives no value
-(``12,5 kg`` is one where ``decimal=comma`` is not said).
+beside ``millis``, else the only number followed by a unit. A line that is not taken as a whole gives no
+value, nor does one that leaves a choice: ``12,5 kg``, ``1.234,5 N`` or ``1,234.5`` may be one number or two,
+until ``decimal=comma`` says one or ``decimal=point`` says two. With ``decimal=comma`` points stand between
+thousands, if they stand there.
 
 What cannot be detected: there is no check digit, so a digit lost or changed within a line, or two
 lines run together into one number, reads as another value; ``capacity=`` and ``max_step=`` flag the
@@ -32,8 +34,8 @@ WIDTH_STAYS = 100  # lines in a row
 _LABEL = re.compile(r"[A-Za-z][\w .()\[\]/-]{0,60}[:=]", re.ASCII)
 _FIELD = re.compile(r"([-+]? *[0-9.,]+(?:[eE][-+]?[0-9]+)?)?([A-Za-z]*)")
 _SPACED_SIGN = re.compile(r"([-+]) +(?=[0-9.])")
-_POINT_SPLIT = re.compile(r" *[,;\t] *| +")
-_COMMA_SPLIT = re.compile(r" *[;\t] *| +")
+_POINT_SPLIT = re.compile(r"( *[,;\t] *| +)")
+_COMMA_SPLIT = re.compile(r"( *[;\t] *| +)")
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +48,13 @@ class AsciiSettings:
         Field of the value.
     millis : int or None
         Field of the device's own milliseconds.
-    decimal_comma : bool
+    decimal_comma : bool or None
+        None: not said; then two numbers with a comma between them may be one.
     """
 
     column: int | None = None
     millis: int | None = None
-    decimal_comma: bool = False
+    decimal_comma: bool | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +62,7 @@ class _Field:
     value: float  # NaN: none
     unit: str | None
     digits: str
+    apart: bool  # from the field before, by what no number has within it
 
     @property
     def numeric(self) -> bool:
@@ -97,9 +101,10 @@ class AsciiParser(LineParser):
         text = _SPACED_SIGN.sub(r"\1", text[label.end() if label else 0 :].strip(" \t"))
         split = _COMMA_SPLIT if self._settings.decimal_comma else _POINT_SPLIT
         words = split.split(text)
-        while words and not words[-1]:
+        while words and not words[-1].strip(" ,;\t"):
             words.pop()
-        fields = [self._field(word) for word in words]
+        gaps = ["", *words[1::2]]
+        fields = [self._field(word, gap) for word, gap in zip(words[::2], gaps, strict=False)]
         whole = [field for field in fields if field is not None]
         return whole if len(whole) == len(fields) else None
 
@@ -117,39 +122,59 @@ class AsciiParser(LineParser):
             self._width, self._others = width, 0
         return width == self._width
 
-    def _field(self, word: str) -> _Field | None:
+    def _field(self, word: str, gap: str) -> _Field | None:
         found = _FIELD.fullmatch(word)
         if not found or not word:
             return None
-        value = number(found[1], self._settings.decimal_comma) if found[1] else math.nan
+        comma, digits = bool(self._settings.decimal_comma), found[1] or ""
+        value = number(digits, comma) if digits else math.nan
         if (found[1] and math.isnan(value)) or (found[2] and not is_unit(found[2])):
             return None
-        return _Field(value, found[2] or None, found[1] or "")
+        apart = ";" in gap or "\t" in gap or (self._settings.decimal_comma is False and "," in gap)
+        digits = digits.replace(".", "").replace(",", ".") if comma else digits
+        return _Field(value, found[2] or None, digits, apart)
 
     def _choose(self, fields: list[_Field]) -> int | None:
         """Where the value stands; None where the line does not tell."""
         millis, column = self._settings.millis, self._settings.column
-        if millis is not None and not _numeric_at(fields, millis):
+        if millis is not None and not (_numeric_at(fields, millis) and self._is_time(fields[millis - 1])):
             return None
         if column is not None:
-            return column - 1 if _numeric_at(fields, column) else None
+            return column - 1 if _numeric_at(fields, column) and self._alone(fields, column - 1) else None
         numeric = [i for i, field in enumerate(fields) if field.numeric and i + 1 != millis]
         if len(numeric) != 1:
             numeric = [i for i in numeric if fields[i].unit or _unit_alone(fields[i + 1 : i + 2])]
-            numeric = [i for i in numeric if i in (0, millis) or not _may_be_one(fields[i - 1], fields[i])]
-        return numeric[0] if len(numeric) == 1 else None
+        return numeric[0] if len(numeric) == 1 and self._alone(fields, numeric[0]) else None
+
+    def _alone(self, fields: list[_Field], i: int) -> bool:
+        """Whether the number in field ``i`` cannot be a part of one that its neighbours complete."""
+        millis = self._settings.millis
+        pairs = [(i - 1, i)] if i > 0 and i != millis else []
+        pairs += [(i, i + 1)] if i + 1 < len(fields) and i + 2 != millis else []
+        return not any(self._may_be_one(fields[before], fields[after]) for before, after in pairs)
+
+    def _is_time(self, field: _Field) -> bool:
+        """A comma within milliseconds separates two fields, whatever is said of decimals."""
+        return not (self._settings.decimal_comma and "." in field.digits)
+
+    def _may_be_one(self, before: _Field, after: _Field) -> bool:
+        """Whether two neighbours may be one number: 12,5 or 1,234.5 or 1.234,5 or 1 234."""
+        if (
+            after.apart
+            or after.digits[:1] in ("+", "-")
+            or not (before.numeric and after.numeric)
+            or before.unit
+        ):
+            return False
+        whole, point, _ = after.digits.partition(".")
+        first = before.digits.lstrip("+-")
+        if not point or (self._settings.decimal_comma and len(whole) == 3):
+            return True
+        return len(whole) == 3 and len(first) <= 3 and "." not in first
 
 
 def _numeric_at(fields: list[_Field], column: int) -> bool:
     return column <= len(fields) and fields[column - 1].numeric
-
-
-def _may_be_one(before: _Field, after: _Field) -> bool:
-    """Whether two neighbours may be one number: 12,5 or 1,234.5."""
-    if after.digits[:1] in ("+", "-"):
-        return False
-    whole, point, _ = after.digits.partition(".")
-    return before.numeric and "." not in before.digits and (not point or len(whole) == 3)
 
 
 def _unit_alone(after: list[_Field]) -> str | None:
@@ -160,12 +185,20 @@ def _saturation(fields: list[_Field]) -> LoadFlag:
     return next((SATURATED[f.value] for f in fields if f.value in SATURATED), LoadFlag.NONE)
 
 
+def _decimal(options: Options) -> bool | None:
+    said = any(key == "decimal" for key, _ in options.address.settings)
+    comma = options.choice("decimal", ("point", "comma"), "point") == "comma"
+    return comma if said else None
+
+
 def make_parser(options: Options) -> Parser:
     """Takes ``column``, ``millis`` and ``decimal`` out of the address."""
     settings = AsciiSettings(
         column=options.integer("column", minimum=1, maximum=64),
         millis=options.integer("millis", minimum=1, maximum=64),
-        decimal_comma=options.choice("decimal", ("point", "comma"), "point") == "comma",
+        decimal_comma={"comma": True, "point": False}.get(
+            options.choice("decimal", ("", "point", "comma"), "")
+        ),
     )
     if settings.column is not None and settings.column == settings.millis:
         raise ConfigError(f"{options.address.text}: column and millis must differ")

@@ -67,8 +67,11 @@ class Parser(ABC):
         return []
 
     @abstractmethod
-    def restart(self) -> None:
-        """The connection was interrupted: what is half received will never be completed."""
+    def restart(self, lost: int = 0) -> None:
+        """The connection was interrupted: what is half received will never be completed.
+
+        ``lost`` bytes of it were never fed; they count for ``Reading.start``.
+        """
 
 
 @dataclass(frozen=True, slots=True)

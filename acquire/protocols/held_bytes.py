@@ -31,6 +31,7 @@ class HeldBytes:
         self._start += size
         return taken, start
 
-    def clear(self) -> None:
-        """Forget all of it."""
+    def clear(self, lost: int = 0) -> None:
+        """Forget all of it, and count ``lost`` bytes never added."""
         self.data.clear()
+        self._received += lost

@@ -80,8 +80,8 @@ class LineBuffer:
         self._part.clear()
         self._skipping = False
 
-    def restart(self) -> None:
-        """Forget the line begun; the next one may be partial."""
-        self._position += len(self._part)
+    def restart(self, lost: int = 0) -> None:
+        """Forget the line begun, and count ``lost`` bytes never fed; the next line may be partial."""
+        self._position += len(self._part) + lost
         self._part.clear()
         self._skipping = self._drop_first

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from abc import abstractmethod
 
 from acquire.load_sample import LoadFlag
@@ -27,9 +28,9 @@ class LineParser(Parser):
         readings = (self._read(line) for line in self._buffer.feed(data))
         return [reading for reading in readings if reading is not None]
 
-    def restart(self) -> None:
-        """Forget the line begun."""
-        self._buffer.restart()
+    def restart(self, lost: int = 0) -> None:
+        """Forget the line begun, and count the bytes never fed."""
+        self._buffer.restart(lost)
 
     def _read(self, line: Line) -> Reading | None:
         if not line.whole:
@@ -46,15 +47,21 @@ def bad(line: Line, flags: LoadFlag = LoadFlag.NONE) -> Reading:
     return Reading(math.nan, None, line.data, line.start, flags=flags or LoadFlag.ERROR)
 
 
+_THOUSANDS = re.compile(r"[-+]?[0-9]{1,3}(?:\.[0-9]{3})+,[0-9]*")
+
+
 def number(text: str, decimal_comma: bool = False) -> float:
     """A decimal number, spaces after its sign allowed; NaN where it is none.
 
-    Notations that ``float`` accepts and no device sends (nan, inf, 1_000) are refused.
+    Notations that ``float`` accepts and no device sends (nan, inf, 1_000) are refused. With
+    ``decimal_comma`` a point is none: it may only stand between thousands (1.234,5).
     """
-    plain = text.replace(",", ".") if decimal_comma else text
-    plain = plain.strip(" ")
+    plain = text.strip(" ")
     if plain[:1] in "+-":
         plain = plain[:1] + plain[1:].lstrip(" ")
+    if decimal_comma:
+        plain = plain.replace(".", "") if _THOUSANDS.fullmatch(plain) else plain
+        plain = "" if "." in plain else plain.replace(",", ".")
     if not plain or not set(plain) <= set("0123456789+-.eE"):
         return math.nan
     try:

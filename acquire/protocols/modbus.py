@@ -114,9 +114,9 @@ class ModbusParser(Parser):
         raw, start = self._held.take(LIMIT)
         return [Reading(math.nan, None, raw, start, flags=LoadFlag.ERROR)] if raw else []
 
-    def restart(self) -> None:
-        """Forget the answer begun."""
-        self._held.clear()
+    def restart(self, lost: int = 0) -> None:
+        """Forget the answer begun, and count the bytes never fed."""
+        self._held.clear(lost)
 
 
 def make_parser(options: Options) -> Parser:

@@ -46,9 +46,9 @@ class SauterParser(Parser):
         value = number(found[2].decode())
         return [Reading(value if found[1] == b"1" else -value, None, raw, start)]
 
-    def restart(self) -> None:
-        """Forget the answer begun."""
-        self._held.clear()
+    def restart(self, lost: int = 0) -> None:
+        """Forget the answer begun, and count the bytes never fed."""
+        self._held.clear(lost)
 
 
 def make_parser(options: Options) -> Parser:

@@ -8,7 +8,7 @@ G0 = 9.80665  # m/s^2, standard gravity
 
 FORCES = {
     "n": 1.0,
-    "mn": 1e-3,  # millinewton, unless written MN, which no load cell of a bench sends
+    "mn": 1e-3,
     "dan": 10.0,
     "kn": 1e3,
     "kgf": G0,
@@ -28,6 +28,7 @@ MASSES = {  # kg
     "oz": 0.45359237 / 16,
 }
 UNITS = (*FORCES, *MASSES)
+DOUBTFUL = ("mn", "mg")  # with a capital M: milli- or mega-
 
 
 def is_unit(text: str) -> bool:
@@ -46,16 +47,20 @@ def newtons_per(unit: str, mass_reads_force: bool = False) -> float:
     Parameters
     ----------
     unit : str
-        Upper or lower case.
+        Upper or lower case, but for mN and mg, whose M may be mega.
     mass_reads_force : bool
         Take a mass as the weight it has under standard gravity, 9.80665 m/s^2.
 
     Raises
     ------
     ConfigError
-        An unknown unit, or a mass without leave.
+        An unknown unit, a mass without leave, or ``MN`` and ``MG``.
     """
     name = unit.lower()
+    if name in DOUBTFUL and unit.startswith("M"):
+        raise ConfigError(
+            f"{unit} may be milli or mega; compare the display, and say gain= in newtons for one of it"
+        )
     if name in FORCES:
         return FORCES[name]
     if name not in MASSES:

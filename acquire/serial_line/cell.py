@@ -1,12 +1,11 @@
-"""A load cell on a serial line: reads in bulk, stamps, scales, reconnects, and never ends a test.
+"""A load cell on a serial line: reads in blocks, stamps, scales, and never ends nor delays a test.
 
-The protocol's parser knows the lines, ``scaling`` the units; here is the port, its
-loss and return, silence, polling, and the commands.
+The protocol's parser knows the lines, ``scaling`` the units, ``link`` the port and its return; here is the
+stream of samples, polling, and the commands. Every round is bounded in time and bytes, whatever comes.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import logging
 import math
 import threading
@@ -16,21 +15,26 @@ from typing import Any, Self
 
 from acquire.addresses import Address
 from acquire.closing import Closing
-from acquire.errors import ConfigError, DeviceError
+from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.protocols import Reading
 from acquire.serial_line.clock import ArrivalTimes, DeviceClock, Pace
-from acquire.serial_line.ports import PORT_ERRORS, LineSettings, Port, find_again, identity_of, open_port
+from acquire.serial_line.link import Link, Means, Opener
+from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
 from acquire.serial_line.settings import SerialSettings, describe, read_settings
-from acquire.serial_line.watch import LoadWatch
+from acquire.serial_line.watch import Flood, LoadWatch
 
 log = logging.getLogger(__name__)
 
-RETRY_S = 0.5
+BLOCK = 2048  # bytes of one round
+REST_S = 0.05  # between two rounds at most
+AWAY_S, AWAY_BYTES, AWAY_BLOCK = 0.05, 1 << 22, 1 << 16  # what is thrown away at a time
+ANSWER_S = 1.0  # that an answer may take from its first byte to its last
+TARE_S = 0.3  # that a device may take to tare
+FORCED, UNDO = "force", "undo"
 
-Opener = Callable[[LineSettings], Port]
 Clock = Callable[[], float]
 
 
@@ -58,8 +62,9 @@ class SerialCell(Closing):
         clock: Clock = time.monotonic,
         sleep: Callable[[float], object] | None = None,
     ) -> None:
-        self._settings, self._on_event, self._opener, self._clock = settings, on_event, opener, clock
-        self._stop, self._tare = threading.Event(), threading.Event()
+        self._settings, self._on_event, self._clock = settings, on_event, clock
+        self._stop = threading.Event()
+        self._tare: str | None = None  # asked for: "", FORCED or UNDO
         self._sleep = sleep or self._stop.wait
         self._busy = threading.Lock()
         self._parser = settings.parser
@@ -67,24 +72,31 @@ class SerialCell(Closing):
         self._times, self._device, self._pace = ArrivalTimes(settings.byte_time_s), DeviceClock(), Pace()
         self._last_t = -math.inf  # of the last sample
         self._last_read = math.nan
-        self._watch = LoadWatch(settings.timeout_s, self._tell, clock())
-        self._next_poll = clock()
-        self._awaiting = False  # an answer to a poll
-        self._port: Port | None = opener(settings.line)
-        self._identity = "" if "://" in settings.line.url else identity_of(settings.line.url)
+        self._watch, self._flood = (
+            LoadWatch(settings.timeout_s, self._tell, clock()),
+            Flood(self._tell, clock()),
+        )
+        self._next_poll, self._asked = clock(), math.nan  # when the answer that is awaited was asked for
+        self._taring_until = -math.inf
+        self._skipped = 0  # bytes, in floods
+        self._waited = True  # for the bytes of the last round
+        means = Means(opener, clock, self._stop, self._sleep)
+        self._link = Link(settings.line, means, self._tell, lambda: self._watch.last_words(clock()))
         try:
             self._command("start")
             self._wait_for_first()
         except BaseException:
             self.close()
             raise
-        self.info: LoadCellInfo = describe(settings, self._identity)
+        self.info: LoadCellInfo = describe(settings, self._link.identity)
 
     def _wait_for_first(self) -> None:
         """Wait for a first good reading, since its unit decides whether this is a force at all."""
         until = self._clock() + self._settings.wait_s
         seen = 0
         while self._clock() < until and not self._stop.is_set():
+            if not self._link.connected and not self._reconnect():
+                continue
             for reading in self._readings():
                 seen += 1
                 if not math.isnan(reading.value):
@@ -105,77 +117,102 @@ class SerialCell(Closing):
     # -- the stream ------------------------------------------------------------------------
 
     def __enter__(self) -> Self:
+        """What waited since the opening has no trustworthy time."""
         with self._busy:
-            self._forget_input()
+            self._throw_away()
+            self._begin_anew()
+            self._watch.restart(self._clock())
         return self
 
-    def _forget_input(self) -> None:
-        """What waited since the opening has no trustworthy time."""
-        try:
-            while self._port is not None and self._port.in_waiting:
-                data = self._port.read(self._port.in_waiting)
-                self._times.received(len(data), self._clock())
-                self._parser.feed(data)  # it counts the bytes, so that later ones keep their times
-        except PORT_ERRORS as error:
-            self._lost(error)
-        self._parser.restart()
+    def _throw_away(self) -> int:
+        """Let go what waits, as far as it goes in a moment; the number of bytes."""
+        until, count, empty = self._clock() + AWAY_S, 0, False
+        while not empty and count < AWAY_BYTES and self._clock() < until and not self._stop.is_set():
+            data = self._link.receive(AWAY_BLOCK, wait=False)
+            count, empty = count + len(data), not data
+        if count:
+            self._times.received(count, self._clock())
+        self._parser.restart(count)
+        self._flood.skip(empty, self._clock())
+        return count
+
+    def _begin_anew(self) -> None:
+        """Nothing is known of the stream that begins now."""
         self._pace.restart()
-        self._last_read = math.nan
-        self._watch.restart(self._clock())
+        self._asked = self._last_read = math.nan
 
     def __iter__(self) -> Iterator[LoadSample]:
         while not self._stop.is_set():
             with self._busy:
                 samples = self._pass()
             yield from samples
-        self._tell_clock()
+        self._tell_the_end()
         self.close()
 
-    def _tell_clock(self) -> None:
-        """At the end: how the device's own clock went, where it has one."""
+    def _tell_the_end(self) -> None:
+        """How the device's own clock went, where it has one, and what was never looked at."""
         jitter = self._device.jitter_s
         if not math.isnan(jitter):
             drift = self._device.drift
             known = "" if math.isnan(drift) else f", drift {drift * 1e6:.0f} us/s against this machine"
             self._tell("info", f"device clock: arrivals {jitter * 1e3:.1f} ms late on average (rms){known}")
+        if self._skipped:
+            self._tell(
+                "warning", f"{self._skipped} bytes were skipped, since lines came faster than they are read"
+            )
 
     def _pass(self) -> list[LoadSample]:
         """One round: reconnect where needed, tare where asked, read what is there."""
-        if self._port is None and not self._reconnect():
+        if not self._link.connected and not self._reconnect():
+            self._watch.look((), self._clock())
             return []
-        if self._tare.is_set():
-            self._tare.clear()
-            self._do_tare()
+        samples = self._tare_asked()
         readings = self._readings()
-        late = bool(readings) and self._pace.late(len(readings), self._last_read)
-        samples = [self._sample(reading, late and reading is not readings[-1]) for reading in readings]
+        samples += self._samples(readings)
+        if self._flood.too_late(self._clock()):
+            self._skipped += self._throw_away()
+            self._pace.restart()
+            samples.append(self._hole())
         self._watch.look(samples, self._clock())
         return samples
 
+    def _reconnect(self) -> bool:
+        if not self._link.again():
+            return False
+        self._parser.restart()
+        self._begin_anew()
+        self._flood.skip(True, self._clock())
+        self._command("start")
+        return self._link.connected
+
     def _readings(self) -> list[Reading]:
-        """What one bulk read completes; [] on silence or when the port is lost."""
-        if self._port is None:
-            self._sleep(RETRY_S)
-            return []
-        try:
-            if self._settings.mode == "poll" and not self._awaiting:
-                self._poll()
-            data = self._port.read(1)
-            waiting = self._port.in_waiting if data else 0
-            data += self._port.read(waiting) if waiting else b""
-        except PORT_ERRORS as error:
-            if not self._stop.is_set():
-                self._lost(error)
-            return []
-        if not data:
-            readings = self._parser.silence()
-            self._awaiting = False
-            return readings
+        """What one block completes; [] on silence or when the port is lost."""
+        if self._settings.mode == "poll" and math.isnan(self._asked):
+            self._poll()
+        self._rest()
+        began = self._clock()
+        data = self._link.receive(BLOCK)
         self._last_read = self._clock()
-        self._times.received(len(data), self._last_read)
-        readings = self._parser.feed(data)
-        self._awaiting = self._awaiting and not readings
+        self._waited = self._last_read - began > 1e-3
+        readings = self._feed(data)
+        if not data or self._last_read - self._asked > ANSWER_S:
+            self._asked = math.nan
+            readings += self._parser.silence()
         return readings
+
+    def _feed(self, data: bytes) -> list[Reading]:
+        if data:
+            self._times.received(len(data), self._last_read)
+        readings = self._parser.feed(data)
+        self._flood.read(len(data) >= BLOCK, len(readings), self._last_read)
+        self._asked = math.nan if readings else self._asked
+        return readings
+
+    def _rest(self) -> None:
+        """As long as the last round took where bytes were there already: a flood must not keep the others out."""
+        busy = 0.0 if self._waited else self._clock() - self._last_read
+        if busy > 1e-3:
+            self._sleep(min(busy, REST_S))
 
     def _poll(self) -> None:
         """Ask for a reading when its time has come."""
@@ -183,13 +220,23 @@ class SerialCell(Closing):
         if wait > 0:
             self._sleep(wait)
         self._command("poll")
-        self._awaiting = True
-        self._next_poll = (
-            max(self._next_poll, self._clock() - 1 / self._settings.rate) + 1 / self._settings.rate
-        )
+        period, self._asked = 1 / self._settings.rate, self._clock()
+        self._next_poll = max(self._next_poll, self._asked - period) + period
 
-    def _sample(self, reading: Reading, late: bool) -> LoadSample:
-        t = self._times.began(reading.start)
+    def _samples(self, readings: list[Reading]) -> list[LoadSample]:
+        if not readings:
+            return []
+        times = [self._times.began(reading.start) for reading in readings]
+        if self._flood.late(self._last_read) or self._last_read < self._taring_until:
+            self._pace.restart()
+            late = [True] * len(times)
+        elif self._settings.mode == "poll":
+            late = [True] * (len(times) - 1) + [False]
+        else:
+            late = self._pace.late(times)
+        return [self._sample(*one) for one in zip(readings, times, late, strict=True)]
+
+    def _sample(self, reading: Reading, t: float, late: bool) -> LoadSample:
         if reading.device_ms is not None:
             stamp = self._device.stamp(reading.device_ms, t)
             t, late = stamp.t, stamp.doubtful
@@ -198,68 +245,71 @@ class SerialCell(Closing):
         self._last_t = max(t, self._last_t)
         return self._scaling.sample(reading, self._last_t, LoadFlag.STALE if late else LoadFlag.NONE)
 
-    # -- loss and return -------------------------------------------------------------------
-
-    def _lost(self, error: Exception) -> None:
-        port, self._port = self._port, None
-        self._tell(
-            "error", f"lost ({error}); {self._watch.last_words(self._clock())}; trying to reach it again"
-        )
-        _close(port)
-
-    def _reconnect(self) -> bool:
-        url = find_again(self._settings.line.url, self._identity)
-        try:
-            port = self._opener(_elsewhere(self._settings.line, url))
-        except (DeviceError, ConfigError) as error:
-            log.debug("%s: %s", url, error)
-            self._sleep(RETRY_S)
-            return False
-        self._port = port
-        self._parser.restart()
-        self._pace.restart()
-        self._awaiting = False
-        self._last_read = math.nan
-        self._tell("info", "connected again" + ("" if url == self._settings.line.url else f" as {url}"))
-        try:
-            self._command("start")
-        except PORT_ERRORS as error:
-            self._lost(error)
-        return self._port is not None
+    def _hole(self) -> LoadSample:
+        """Something happened here that no force may be interpolated across."""
+        self._last_t = max(self._clock(), self._last_t)
+        return LoadSample(self._last_t, math.nan, self._settings.unit or "", flags=LoadFlag.STALE)
 
     # -- commands --------------------------------------------------------------------------
 
     def _command(self, name: str) -> bool:
         """Send a command of the protocol; False where it has none, or where the mode needs none."""
         data = self._settings.commands.get(name)
-        if name in ("start", "stop") and self._settings.mode != "stream":
+        if data is None or (name in ("start", "stop") and self._settings.mode != "stream"):
             return False
-        if data is None or self._port is None:
+        return self._link.write(data)
+
+    def tare(self, *, force: bool = False) -> None:
+        """Make the present load zero; done, or refused, by the reading thread at its next round."""
+        self._tare = FORCED if force else ""
+
+    def undo_tare(self) -> None:
+        """Let zero be where it was before the last tare; done by the reading thread."""
+        self._tare = UNDO
+
+    def _tare_asked(self) -> list[LoadSample]:
+        """Move zero where somebody asked; no force may be interpolated across that."""
+        asked, self._tare = self._tare, None
+        if asked is None:
+            return []
+        moved = self._undo() if asked == UNDO else self._tare_now(asked == FORCED)
+        if moved:
+            self._scaling.tared()
+        return [self._hole()] if moved else []
+
+    def _tare_now(self, force: bool) -> bool:
+        zero = self._scaling.zero
+        why_not = zero.why_not(self._clock())
+        if why_not and not force:
+            self._tell("warning", f"not tared: {why_not}; hold the load still, or force the tare")
             return False
-        self._port.write(data)
+        load, data = zero.load(), {"forced": bool(why_not), "undo": False}
+        wanted = self._settings.tare
+        can = wanted == "device" or (wanted == "auto" and "tare" in self._settings.commands)
+        if can and self._command("tare"):
+            self._taring_until = self._clock() + TARE_S
+            step = zero.moved_in_device()
+            text = f"tare sent to the device under {load:.6g} N"
+            self._event(EventKind.TARE, "info", text, offset_N=None, step_N=_known(step), **data)
+            return True
+        if math.isnan(load):
+            self._tell("warning", "nothing to tare: there was no valid sample yet")
+            return False
+        step = zero.take()
+        text = f"tared: {load:.6g} N is zero now"
+        self._event(EventKind.TARE, "info", text, offset_N=zero.offset, step_N=step, **data)
         return True
 
-    def tare(self) -> None:
-        """Make the present load zero; done by the reading thread at its next round."""
-        self._tare.set()
-
-    def _do_tare(self) -> None:
-        in_device = self._settings.tare == "device" or (
-            self._settings.tare == "auto" and "tare" in self._settings.commands
-        )
-        try:
-            if in_device and self._command("tare"):
-                self._scaling.device_tared()
-                self._event(EventKind.TARE, "info", "tare sent to the device", offset_N=None)
-                return
-        except PORT_ERRORS as error:
-            self._lost(error)
-            return
-        offset = self._scaling.tare()
-        if offset is None:
-            self._tell("warning", "nothing to tare: there was no valid sample yet")
-        else:
-            self._event(EventKind.TARE, "info", f"tared: {offset:.6g} N is zero now", offset_N=offset)
+    def _undo(self) -> bool:
+        zero = self._scaling.zero
+        step = zero.undo()
+        if step is None:
+            self._tell("warning", "there is no tare to undo")
+            return False
+        text = f"the last tare is undone: forces rise by {-step:.6g} N"
+        data = {"offset_N": zero.offset, "step_N": step, "forced": False, "undo": True}
+        self._event(EventKind.TARE, "info", text, **data)
+        return True
 
     def _tell(self, level: str, text: str) -> None:
         self._event(EventKind.DEVICE, level, text)
@@ -273,41 +323,18 @@ class SerialCell(Closing):
     def stop(self) -> None:
         """End the iteration; from any thread."""
         self._stop.set()
-        cancel = getattr(self._port, "cancel_read", None)
-        if cancel is not None:
-            try:
-                cancel()
-            except PORT_ERRORS as error:
-                log.debug("cancelling a read: %s", error)
+        self._link.wake()
 
     def close(self) -> None:
         """Stop and close the port; may be called again without effect."""
         self.stop()
         with self._busy:
-            port, self._port = self._port, None
-            if port is not None and self._settings.mode == "stream":
-                _send(port, self._settings.commands.get("stop", b""))
-            _close(port)
+            self._command("stop")
+            self._link.close()
 
 
-def _elsewhere(line: LineSettings, url: str) -> LineSettings:
-    return dataclasses.replace(line, url=url)
-
-
-def _send(port: Port, data: bytes) -> None:
-    try:
-        port.write(data)
-    except PORT_ERRORS as error:
-        log.debug("last command: %s", error)
-
-
-def _close(port: Port | None) -> None:
-    if port is None:
-        return
-    try:
-        port.close()
-    except PORT_ERRORS as error:
-        log.debug("closing: %s", error)
+def _known(value: float) -> float | None:
+    return None if math.isnan(value) else value
 
 
 def open_serial(address: Address, on_event: EventSink) -> SerialCell:

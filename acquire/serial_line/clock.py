@@ -8,7 +8,9 @@ free of the jitter of USB and of this machine; the least delayed arrivals tie th
 from __future__ import annotations
 
 import math
+import statistics
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 BEGIN_S = 5.0  # in which the first offset settles
@@ -154,40 +156,102 @@ class DeviceClock:
 
 
 class Pace:
-    """How many messages a read may bring before they must have waited somewhere.
+    """Which messages come later than the device's own pace lets them.
+
+    A device sends at a pace of its own; the least delayed messages tie that pace to the host's clock, as
+    ``DeviceClock`` does with milliseconds. What comes more than 50 ms, or one period, after its time has
+    waited somewhere. So have more messages than the device can have made. After a pause nobody
+    knows whether the device or the line has paused: messages are late until they have come at their pace for
+    ``settle_s``. Where no pace is known (at first, or of a device that sends when it likes) all but the last
+    message of a read are late.
 
     Parameters
     ----------
-    pause_s : float, s
-        After a longer pause any two messages of one read are late.
-    window_s : float, s
-        Over which the pace is averaged.
-    known_s : float, s
-        Until messages came for so long their pace is unknown, and any two of one read are late.
+    late_s, settle_s : float, s
     """
 
-    def __init__(self, pause_s: float = 0.1, window_s: float = 2.0, known_s: float = 0.2) -> None:
-        self._pause_s, self._window_s, self._known_s = pause_s, window_s, known_s
-        self._reads: deque[tuple[float, int]] = deque()
-        self._last = math.nan
+    RISE, FALL = 0.1, 0.2  # how far the pace known may be wrong, slow and fast
+    GROUP_S, GROUPS, KNOWN = 0.25, 31, 2
 
-    def late(self, count: int, now: float) -> bool:
-        """Whether ``count`` messages that a read at ``now`` brought have waited, all but the last."""
-        pause, self._last = now - self._last, now
-        rate = self._rate(now)
-        self._reads.append((now, count))
-        if count < 2:
-            return False
-        return not (pause <= self._pause_s and count <= 3 + 2 * rate * pause)  # so that NaN is late
-
-    def _rate(self, now: float) -> float:
-        """Messages a second so far; NaN where too little is known."""
-        while self._reads and self._reads[0][0] < now - self._window_s:
-            self._reads.popleft()
-        span = now - self._reads[0][0] if self._reads else 0.0
-        return sum(count for _, count in self._reads) / span if span > self._known_s else math.nan
+    def __init__(self, late_s: float = 0.05, settle_s: float = 0.25) -> None:
+        self._late_s, self._settle_s = late_s, settle_s
+        self._periods: deque[float] = deque(maxlen=self.GROUPS)
+        self.restart()
 
     def restart(self) -> None:
         """The connection was interrupted."""
-        self._reads.clear()
-        self._last = math.nan
+        self._periods.clear()
+        self._group: tuple[float, int] | None = None  # its beginning, messages in it
+        self._due = self._tie = self._last = math.nan
+        self._other = self._other_since = math.nan
+        self._credit = self._late_s
+
+    @property
+    def period(self) -> float:
+        """Seconds from one message to the next, the median of the last groups; NaN where they keep no pace."""
+        found = sorted(self._periods)
+        quarter = len(found) // 4
+        if len(found) < self.KNOWN or (quarter >= 2 and found[-1 - quarter] > 1.5 * found[quarter]):
+            return math.nan
+        return statistics.median(found)
+
+    def late(self, times: Sequence[float]) -> list[bool]:
+        """Whether each of the messages that one read brought, with these stamps, is late.
+
+        Parameters
+        ----------
+        times : sequence of float, s
+            Not empty, ascending.
+        """
+        period = self.period
+        self._learn(times)
+        if math.isnan(period):
+            return [True] * (len(times) - 1) + [False]
+        if math.isnan(self._tie):
+            self._due, self._tie, self._last = times[0] - period, 0.0, times[-1]
+        delays = self._delays(times, period)
+        limit = max(self._late_s, period)
+        if self._doubtful(delays[-1], times[-1], limit) and not self._settled(delays[-1], times[-1], period):
+            return [True] * len(times)
+        self._other = math.nan
+        return [delay - self._tie > limit for delay in delays]
+
+    def _learn(self, times: Sequence[float]) -> None:
+        """The period of messages in groups of a quarter of a second; a stall makes a single odd group."""
+        if self._group is None:
+            self._group = times[-1], 0
+            return
+        begun, count = self._group[0], self._group[1] + len(times)
+        if times[-1] - begun >= self.GROUP_S:
+            self._periods.append((times[-1] - begun) / count)
+            begun, count = times[-1], 0
+        self._group = begun, count
+
+    def _delays(self, times: Sequence[float], period: float) -> list[float]:
+        delays = []
+        for t in times:
+            self._due += period
+            delays.append(t - self._due)
+        return delays
+
+    def _doubtful(self, delay: float, now: float, limit: float) -> bool:
+        """Whether the last message is late, or one too many; else it may tie the pace anew."""
+        elapsed, self._last = now - self._last, now
+        self._credit = min(self._late_s, self._credit + self.FALL * elapsed)
+        fall = max(self._tie - delay, 0.0)
+        if delay - self._tie > limit or fall > self._credit:
+            return True
+        self._credit -= fall
+        self._tie = min(self._tie + self.RISE * min(elapsed, limit), delay)
+        return False
+
+    def _settled(self, delay: float, now: float, period: float) -> bool:
+        """Whether messages have come at their pace, not faster, for long enough: it was the device that paused."""
+        elapsed = now - self._other_since
+        if math.isnan(self._other) or self._other - delay > self.FALL * elapsed + period:
+            self._other, self._other_since = delay, now
+            return False
+        if elapsed < max(self._settle_s, 1.2 * period):
+            return False
+        self._tie, self._credit = delay, self._late_s
+        return True

@@ -7,19 +7,22 @@ an unknown machine may move.
 from __future__ import annotations
 
 import dataclasses
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 from acquire.addresses import Options, parse_address
 from acquire.errors import DeviceError
 from acquire.load_sample import LoadFlag
 from acquire.protocols import Parser, Protocol, Reading, find_protocol, is_mass
-from acquire.serial_line.ports import PORT_ERRORS, LineSettings, Port, open_port
+from acquire.serial_line.byte_ports import Port
+from acquire.serial_line.ports import PORT_ERRORS, LineSettings, open_port
 
 SPEEDS = (9600, 115200, 57600, 19200, 2400, 4800, 38400, 1200)
 LISTEN_S = 1.5
-ENOUGH_LINES = 5
+ENOUGH_LINES, ENOUGH_BYTES = 5, 1 << 16
 # What sends unasked, the strictest grammar first; ascii with columns where the plain one leaves a choice.
 HEARD = (
     ("mt-sics", ""),
@@ -27,6 +30,8 @@ HEARD = (
     ("ascii", ""),
     ("ascii", "millis=1"),
     ("ascii", "millis=1&column=2"),
+    ("ascii", "decimal=comma"),
+    ("ascii", "decimal=comma&millis=1"),
     ("hbm-aed", "decimals=0"),
 )
 ASKED = ("mt-sics", "aed-standard", "mark10", "sauter", "hbm-aed", "modbus")
@@ -91,10 +96,8 @@ def hear(
 
 def _collect(port: Port, seconds: float, clock: Clock) -> bytes:
     until, heard = clock() + seconds, bytearray()
-    while clock() < until:
-        heard += port.read(1)
-        if waiting := port.in_waiting:
-            heard += port.read(waiting)
+    while clock() < until and len(heard) < ENOUGH_BYTES:
+        heard += port.receive(4096)
     return bytes(heard)
 
 
@@ -109,17 +112,18 @@ def listen(
     """
     for baud in SPEEDS:
         heard = hear(LineSettings(device, baud), seconds, opener, clock)
-        finding = guess(device, baud, heard)
+        finding = guess(device, baud, heard, seconds)
         yield baud, heard, finding
         if finding is not None:
             return
 
 
-def guess(device: str, baud: int, heard: bytes) -> Finding | None:
-    """The protocol that understands most of what was heard; None where none does."""
+def guess(device: str, baud: int, heard: bytes, seconds: float = LISTEN_S) -> Finding | None:
+    """The protocol that understands most of what was heard in so many seconds; None where none does."""
     parity = _parity(heard)
     text = bytes(byte & 0x7F for byte in heard) if parity != "N" else heard
-    found = [_try(device, baud, parity, name, settings, text) for name, settings in HEARD]
+    line = LineSettings(device, baud, 7 if parity != "N" else 8, parity)
+    found = [_try(line, name, settings, text, seconds) for name, settings in HEARD]
     sure = [finding for finding in found if finding is not None and finding.score >= SURE]
     return max(sure, key=lambda finding: finding.score) if sure else None
 
@@ -132,22 +136,39 @@ def _parity(heard: bytes) -> str:
     return {frozenset({0}): "E", frozenset({1}): "O"}.get(frozenset(ones), "N")
 
 
-def _try(device: str, baud: int, parity: str, name: str, settings: str, heard: bytes) -> Finding | None:
+def _try(line: LineSettings, name: str, settings: str, heard: bytes, seconds: float) -> Finding | None:
     protocol = find_protocol(name)
-    parser = _parser(protocol, device, settings)
+    parser = _parser(protocol, line.url, settings)
     readings = parser.feed(heard) + parser.silence()
-    if len(readings) < ENOUGH_LINES:
+    if len(readings) < ENOUGH_LINES or ("millis" in settings and not _is_a_clock(readings, seconds)):
         return None
-    parts = [f"protocol={name}", f"baud={baud}", f"bytesize={7 if parity != 'N' else 8}", f"parity={parity}"]
-    remark = _remark(readings)
+    parts = [f"protocol={name}", f"baud={line.baud}", f"bytesize={line.bytesize}", f"parity={line.parity}"]
     more = [settings] if settings and name != "hbm-aed" else []
+    good = [reading for reading in readings if not math.isnan(reading.value)]
     return Finding(
-        address=f"{device}?{'&'.join([*parts, *more])}",
+        address=f"{line.url}?{'&'.join([*parts, *more])}",
         protocol=name,
         score=sum(_understood(reading) for reading in readings) / len(readings),
         lines=tuple(reading.raw for reading in readings[-3:]),
-        remark=remark,
+        remark="; ".join(filter(None, [_reads(good), _remark(readings)])),
     )
+
+
+def _is_a_clock(readings: list[Reading], seconds: float) -> bool:
+    """Whether what would be milliseconds never goes back, and runs about as long as was listened."""
+    times = [reading.device_ms for reading in readings if reading.device_ms is not None]
+    if len(times) < ENOUGH_LINES or any(later < earlier for earlier, later in pairwise(times)):
+        return False
+    span_s = (times[-1] - times[0]) * 1e-3
+    return 0.2 * seconds < span_s < 2 * seconds
+
+
+def _reads(good: list[Reading]) -> str:
+    """What the last line says, for a person to compare with the display."""
+    if not good:
+        return ""
+    shown = good[-1].raw.decode("ascii", "backslashreplace").strip()
+    return f"{shown!r} is read as {good[-1].value:.9g}: compare the display"
 
 
 def _parser(protocol: Protocol, device: str, settings: str) -> Parser:

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import errno
 import os
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
+from urllib.parse import parse_qsl, urlsplit
 
 from acquire.errors import ConfigError, DeviceError
+from acquire.serial_line.byte_ports import WRITE_S, Port, TcpPort, TtyPort
+from acquire.serial_line.rfc2217 import Rfc2217Port, line_settings
 
 
 def _terminal_errors() -> tuple[type[Exception], ...]:
@@ -21,21 +25,8 @@ def _terminal_errors() -> tuple[type[Exception], ...]:
 
 
 LINE_ERRORS: tuple[type[Exception], ...] = (OSError, *_terminal_errors())
-PORT_ERRORS: tuple[type[Exception], ...] = (*LINE_ERRORS, TypeError)
-"""What a port that is gone raises; TypeError comes from one closed while it is read."""
-
-
-class Port(Protocol):
-    """What is used of a ``serial.Serial``."""
-
-    @property
-    def in_waiting(self) -> int: ...
-
-    def read(self, size: int, /) -> bytes: ...
-
-    def write(self, data: bytes, /) -> int | None: ...
-
-    def close(self) -> None: ...
+PORT_ERRORS: tuple[type[Exception], ...] = (*LINE_ERRORS, TypeError, ValueError)
+"""What a port that is gone raises; TypeError and ValueError come from one closed while it is read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,24 +132,56 @@ def open_port(line: LineSettings) -> Port:
     DeviceError
         Not there, busy, or not allowed; lists the ports there are.
     """
+    opener = _NETWORK.get(line.url.partition("://")[0], _by_pyserial)
+    try:
+        return opener(line)
+    except LINE_ERRORS as error:
+        raise DeviceError(_why(line.url, error)) from error
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise ConfigError(f"{line.url}: {error}") from error
+
+
+def _by_pyserial(line: LineSettings) -> Port:
     import serial
 
-    try:
-        port: Port = serial.serial_for_url(
+    return TtyPort(
+        serial.serial_for_url(
             line.url,
             baudrate=line.baud,
             bytesize=line.bytesize,
             parity=line.parity,
             stopbits=line.stopbits,
             timeout=line.read_timeout_s,
-            write_timeout=2.0,
+            write_timeout=WRITE_S,
             exclusive=None if "://" in line.url else True,
         )
-    except LINE_ERRORS as error:
-        raise DeviceError(_why(line.url, error)) from error
-    except (ValueError, TypeError, KeyError, AttributeError) as error:
-        raise ConfigError(f"{line.url}: {error}") from error
-    return port
+    )
+
+
+def _socket(line: LineSettings) -> Port:
+    return TcpPort(*_host_and_port(line.url), line.read_timeout_s)
+
+
+def _rfc2217(line: LineSettings) -> Port:
+    commands = line_settings(line.baud, line.bytesize, line.parity, line.stopbits)
+    try:
+        return Rfc2217Port(*_host_and_port(line.url), commands, line.read_timeout_s)
+    except DeviceError as error:
+        raise DeviceError(f"{line.url}: {error}") from error
+
+
+_NETWORK: Mapping[str, Callable[[LineSettings], Port]] = {"socket": _socket, "rfc2217": _rfc2217}
+_PYSERIALS = {"logging", "ign_set_control", "poll_modem"}  # settings of its URLs that mean nothing here
+
+
+def _host_and_port(url: str) -> tuple[str, int]:
+    parts = urlsplit(url)
+    unknown = {key for key, _ in parse_qsl(parts.query, keep_blank_values=True)} - _PYSERIALS
+    if unknown:
+        raise ValueError(f"unknown setting {min(unknown)!r}")
+    if not parts.hostname or parts.port is None:
+        raise ValueError("a host and a port are missing; write for example socket://192.168.0.7:4001")
+    return parts.hostname, parts.port
 
 
 def _why(url: str, error: Exception) -> str:
@@ -170,6 +193,8 @@ def _why(url: str, error: Exception) -> str:
         )
     if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
         return f"{url}: another program has it open (a serial monitor?); close that one"
+    if url.partition("://")[0] in _NETWORK:
+        return f"{url}: nobody answers there ({error}); check address, cable and power of the converter"
     if "://" not in url and not Path(url).exists():
         return f"{url}: there is no such port; {ports_line()}"
     return f"{url}: cannot be opened ({error}); {ports_line()}"

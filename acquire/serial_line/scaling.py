@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
 
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.protocols import Reading, newtons_per
 from acquire.serial_line.settings import SerialSettings
+from acquire.serial_line.zero import Zero
 
-TARE_WINDOW_S = 0.5
 BEYOND = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD
 
 Tell = Callable[[str, str], None]  # level, sentence
@@ -24,16 +23,21 @@ class Scaling:
     ----------
     settings : SerialSettings
     tell : callable taking level and text
+
+    Attributes
+    ----------
+    zero : Zero
+        What is taken off every force.
     """
 
     def __init__(self, settings: SerialSettings, tell: Tell) -> None:
         self._settings, self._tell = settings, tell
         self._units: dict[str, float | None] = {}
         self._last_unit: str | None = None
-        self._offset = 0.0
-        self._recent: deque[tuple[float, float]] = deque(maxlen=1024)
+        self.zero = Zero()
         self._last_force = math.nan
         self._alarm = False
+        self._decimals = 0
 
     def sample(self, reading: Reading, t: float, flags: LoadFlag = LoadFlag.NONE) -> LoadSample:
         """The sample of a reading that began at ``t``."""
@@ -41,29 +45,46 @@ class Scaling:
         flags |= reading.flags
         force = reading.value
         if not math.isnan(force):
-            force, flags = self._force(force, unit, t, flags)
+            gross, flags = self._gross(force, unit, flags)
+            force, flags = self._stepped(gross - self.zero.offset, flags)
+        self._see(t, force, flags)
         self._watch(flags, force)
         return LoadSample(t, force, unit, reading.stable, flags, reading.raw, reading.device_ms)
 
-    def _force(self, value: float, unit: str, t: float, flags: LoadFlag) -> tuple[float, LoadFlag]:
+    def _gross(self, value: float, unit: str, flags: LoadFlag) -> tuple[float, LoadFlag]:
         factor = self._newtons(unit)
         if factor is None:
             return math.nan, flags | LoadFlag.ERROR
+        self._learn_step(value, factor)
         gross = self._settings.sign * (value - self._settings.zero) * factor
         capacity = self._settings.capacity_N
         if capacity is not None and abs(gross) > capacity:
             flags |= LoadFlag.OUT_OF_RANGE
             if not self._settings.protocol.flags_overload:
                 return math.nan, flags | (LoadFlag.OVERLOAD if gross > 0 else LoadFlag.UNDERLOAD)
-        self._recent.append((t, gross))
-        return self._stepped(gross - self._offset, flags)
+        return gross, flags
+
+    def _learn_step(self, value: float, factor: float) -> None:
+        """The last digit of the display, from the most digits it has shown."""
+        self._decimals = max(self._decimals, len(f"{value:.9g}".partition(".")[2].partition("e")[0]))
+        self.zero.step_N = abs(factor) * 10.0**-self._decimals
 
     def _stepped(self, force: float, flags: LoadFlag) -> tuple[float, LoadFlag]:
+        if math.isnan(force):
+            return force, flags
         limit = self._settings.max_step_N
         if limit is not None and abs(force - self._last_force) > limit:
             flags |= LoadFlag.STEP
         self._last_force = force
         return force, flags
+
+    def _see(self, t: float, force: float, flags: LoadFlag) -> None:
+        """What a tare may rest on; late readings and lines that are none do not count either way."""
+        if flags & BEYOND:
+            self.zero.saw(t, math.nan, "in overload")
+        elif not math.isnan(force) and LoadFlag.STALE not in flags:
+            unfit = "unstable, as the device says" if LoadFlag.UNSTABLE in flags else ""
+            self.zero.saw(t, force + self.zero.offset, unfit)
 
     def _newtons(self, unit: str) -> float | None:
         """Newtons per unit of the line; None, and told once, where it cannot be known."""
@@ -107,19 +128,8 @@ class Scaling:
         if alarm or not math.isnan(force):
             self._alarm = alarm
 
-    def tare(self) -> float | None:
-        """Make the mean of the last half second zero; the new offset in N, None where nothing is known."""
-        if not self._recent:
-            return None
-        since = self._recent[-1][0] - TARE_WINDOW_S
-        recent = [force for t, force in self._recent if t >= since]
-        self._offset = math.fsum(recent) / len(recent)
-        self._last_force = math.nan
-        return self._offset
-
-    def device_tared(self) -> None:
-        """The device's own zero moved: what was learned of steps and means is void."""
-        self._recent.clear()
+    def tared(self) -> None:
+        """Zero moved: the next step is none."""
         self._last_force = math.nan
 
 

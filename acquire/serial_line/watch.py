@@ -1,4 +1,4 @@
-"""Watching a stream of samples: silence, its end, and lines that are no readings, each told once."""
+"""Watching a stream: silence, its end, lines that are no readings, and more than can be read, each told once."""
 
 from __future__ import annotations
 
@@ -8,6 +8,9 @@ from collections.abc import Callable, Sequence
 from acquire.load_sample import LoadFlag, LoadSample
 
 BAD_LINES_TOLD = 10  # in a row
+LATE_S = 0.05
+SKIP_S = 0.25  # that a port may stay full before what waits in it is skipped
+AGAIN_S = 10.0  # without a flood until it is told anew
 
 Tell = Callable[[str, str], None]  # level, sentence
 
@@ -56,7 +59,7 @@ class LoadWatch:
         self._bad_told = True
         shown = samples[-1].raw[:60].decode("ascii", "backslashreplace")
         told = f"{self._bad} lines in a row give no reading, the last one {shown!r}"
-        self._tell("warning", f"{told}; check protocol, baud and column")
+        self._tell("warning", f"{told}; check protocol, baud, column and decimal")
 
     def last_words(self, now: float) -> str:
         """Of the last good sample: its force and age."""
@@ -64,3 +67,47 @@ class LoadWatch:
         if good is None:
             return "there was no good sample before"
         return f"last good sample {good.force:.6g} N, {now - good.t:.1f} s ago"
+
+
+class Flood:
+    """Knows when the port was last found empty.
+
+    Parameters
+    ----------
+    tell : callable taking level and text
+    now : float, s
+    """
+
+    def __init__(self, tell: Tell, now: float) -> None:
+        self._tell = tell
+        self._emptied, self._begun, self._told = now, math.inf, -math.inf  # begun: the first full read
+        self._lines = 0
+
+    def read(self, full: bool, lines: int, now: float) -> None:
+        """A read returned; ``full`` when more may wait behind what it brought."""
+        if not full:
+            self._emptied, self._begun = now, math.inf
+        elif self._begun == math.inf:
+            self._begun, self._lines = now, 0
+        self._lines += lines
+
+    def late(self, now: float) -> bool:
+        """Whether what was just read may have waited for longer than anybody should."""
+        return now - self._emptied > LATE_S
+
+    def too_late(self, now: float) -> bool:
+        """Whether what still waits should be skipped; tells of it."""
+        if now - self._begun <= SKIP_S:
+            return False
+        if now - self._told > AGAIN_S:
+            rate = self._lines / (now - self._begun)
+            text = f"lines come faster than they are read ({rate:.0f}/s); what waits is skipped and flagged STALE:"
+            self._tell("warning", f"{text} have the device send fewer")
+        self._told = now
+        return True
+
+    def skip(self, empty: bool, now: float) -> None:
+        """What waited was thrown away; ``empty`` when nothing was left."""
+        self._begun = math.inf
+        if empty:
+            self._emptied = now

@@ -62,7 +62,11 @@ class SessionLoadCell(_SessionDevice):
                 return
             yield sample
 
-    def tare(self) -> None:
+    def undo_tare(self) -> None:
+        """As ``tare``."""
+        self.tare()
+
+    def tare(self, *, force: bool = False) -> None:
         """Refused in an event: what is recorded is not changed."""
         text = "a recorded load cannot be tared; the tares of the recording are in it"
         device_event(self._on_event, self.info.address, text)

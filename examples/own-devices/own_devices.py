@@ -121,6 +121,7 @@ class CsvForces(_Source):
     def __init__(self, address: str, path: Path, on_event: EventSink) -> None:
         super().__init__()
         self._on_event, self._offset, self._last = on_event, 0.0, 0.0
+        self._before: list[float] = []
         self._rows = _read(path)
         self.info = LoadCellInfo(address=address, name=path.name, protocol="csv", clock="nominal")
 
@@ -131,10 +132,19 @@ class CsvForces(_Source):
             self._last = force
             yield LoadSample(t, force - self._offset, raw=raw.encode())
 
-    def tare(self) -> None:
+    def tare(self, *, force: bool = False) -> None:
         """Make the present force zero."""
-        self._offset = self._last
-        text, data = f"tared by {self._offset:g} N", {"offset_N": self._offset}
+        self._before.append(self._offset)
+        self._move(self._last)
+
+    def undo_tare(self) -> None:
+        """As before the last tare, if there was one."""
+        if self._before:
+            self._move(self._before.pop())
+
+    def _move(self, offset: float) -> None:
+        data = {"offset_N": offset, "step_N": offset - self._offset}
+        self._offset, text = offset, f"zero is at {offset:g} N now"
         self._on_event(Event(time.monotonic(), EventKind.TARE, self.info.address, text, "info", data))
 
 

@@ -50,4 +50,4 @@ def _ask_all(device: str, say: Say) -> int:
 def _propose(address: str, remark: str, say: Say) -> None:
     say(f"use  --load '{address}'")
     if remark:
-        say(f"but  {remark}")
+        say(f"note {remark}")

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from acquire.errors import ConfigError
-from acquire.load_cell import calibration, check
+from acquire.errors import ConfigError, DataError
+from acquire.load_cell import calibration, check, stillness
+from acquire.load_sample import LoadFlag, LoadSample
 from live.commands.exit_codes import NOT_READY
 from live.setup import open_load
 
@@ -15,6 +17,7 @@ Say = Callable[[str], None]
 Ask = Callable[[str], str]
 
 GRAVITY = 9.80665  # m/s^2
+TRIES = 3  # of each reading
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -38,13 +41,17 @@ def command(arguments: argparse.Namespace, say: Say = print, ask: Ask = input) -
     address = _raw(arguments.load)
 
     def read(force_N: float, what: str) -> calibration.Point:
-        ask(f"{what}, wait until it is still, then press Enter ")
-        samples = check.listen(
-            open_load(address, lambda event: say(f"{event.level}: {event.text}")), arguments.seconds
-        )
-        found = calibration.point(force_N, [sample.force for sample in samples])
-        say(f"  {found.value:.8g} on the line (noise {found.noise:.3g}, {found.n} readings)")
-        return found
+        for _ in range(TRIES):
+            ask(f"{what}, wait until it is still, then press Enter ")
+            cell = open_load(address, lambda event: say(f"{event.level}: {event.text}"))
+            heard = check.listen(cell, arguments.seconds)
+            why_not = _unfit(heard.samples)
+            if not why_not:
+                found = calibration.point(force_N, [sample.force for sample in heard.samples])
+                say(f"  {found.value:.8g} on the line (noise {found.noise:.3g}, {found.n} readings)")
+                return found
+            say(f"  not taken: {why_not}")
+        raise DataError(f"{arguments.load}: {TRIES} times {why_not}; look at it with 'phasedic load-check'")
 
     points = [read(0.0, "take off all load"), read(known_N, f"put on {known_N:.6g} N")]
     points.append(read(0.0, "take off all load again"))
@@ -56,6 +63,17 @@ def command(arguments: argparse.Namespace, say: Say = print, ask: Ask = input) -
     calibration.save(found, Path(arguments.out), arguments.load)
     say(f"kept in {arguments.out}; use it with calibration={arguments.out} in the address")
     return 0
+
+
+def _unfit(samples: Sequence[LoadSample]) -> str:
+    """Why no point of a calibration can be made of these; "" where they are still."""
+    if any(sample.flags & (LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD) for sample in samples):
+        return "the cell was in overload or saturated"
+    good = [sample for sample in samples if not math.isnan(sample.force)]
+    found = stillness([sample.t for sample in good], [sample.force for sample in good])
+    if found.n < 3 or found.still:
+        return "" if found.n else "no reading had a value"
+    return f"the load moved, by {found.range_N:.4g} on the line"
 
 
 def _raw(address: str) -> str:

@@ -5,8 +5,14 @@ from __future__ import annotations
 from typing import Protocol
 
 from acquire.events import EventKind
+from live.operate.tare import FORCED, UNDO
 
-HELP = "keys (with Enter): r new reference, t tare, p pause/go on, n TEXT note, q quit"
+HELP = (
+    "keys (with Enter): r new reference, t tare (t! whatever the load does, u undo it), p pause/go on,"
+    " n TEXT note, q quit"
+)
+
+TARES = {"t": "", "t!": FORCED, "u": UNDO}
 
 
 class Orders(Protocol):
@@ -22,7 +28,10 @@ class Orders(Protocol):
         ...
 
     def command(self, kind: EventKind, note: str = "") -> None:
-        """Carry out a command and write it down as an event."""
+        """Carry out a command and write it down as an event.
+
+        A tare may need the same command again within 3 s (``tare``), or one of its words as ``note``.
+        """
         ...
 
 
@@ -33,8 +42,8 @@ def carry_out(line: str, orders: Orders) -> bool:
         orders.stop("ended by the operator")
     elif word == "r":
         orders.command(EventKind.NEW_REFERENCE)
-    elif word == "t":
-        orders.command(EventKind.TARE)
+    elif word in TARES:
+        orders.command(EventKind.TARE, TARES[word])
     elif word == "p":
         orders.command(EventKind.RESUME if orders.paused else EventKind.PAUSE)
     elif word == "n" and rest:

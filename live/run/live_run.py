@@ -21,7 +21,7 @@ from live.outputs import About, Consumer, Outputs, make_outputs
 from live.pace import Pace
 from live.run.feed import Feed
 from live.run.grabber import Grabber, GrabPlan
-from live.run.load_thread import LoadThread
+from live.run.load_thread import LoadThread, tare_orders
 from live.run.measuring import Measuring
 from live.run.outcome import Outcome
 from live.run.recorder import Recording, open_recording
@@ -68,6 +68,7 @@ class LiveRun:
         self.grabber = Grabber(self._rig.camera, plan, books, self._take, recording.burst)
         self._feed = Feed(self.grabber, books.ledger, self._idle)
         self._load = LoadThread(self._rig.load, books, outputs, recording)
+        self._tares = tare_orders(self._rig.load, books)
         self._pace = Pace(lambda: recording.backlog)
         self._measuring = Measuring(setting, books, outputs, self._feed, self._pace, self._show)
 
@@ -84,16 +85,16 @@ class LiveRun:
 
     def command(self, kind: EventKind, note: str = "") -> None:
         """Carry out a command of the operator and write it down."""
+        if kind is EventKind.TARE:
+            self._tares.order(note)
+            return
         texts = {
-            EventKind.TARE: "tare",
             EventKind.PAUSE: "measuring is paused, recording goes on",
             EventKind.RESUME: "measuring goes on",
             EventKind.NEW_REFERENCE: "a new reference is taken from the next frames",
         }
         self._books.journal.tell(kind, "operator", texts.get(kind, note))
-        if kind is EventKind.TARE:
-            self._rig.load.tare()
-        elif kind in (EventKind.PAUSE, EventKind.RESUME):
+        if kind in (EventKind.PAUSE, EventKind.RESUME):
             self._feed.paused = kind is EventKind.PAUSE
         elif kind is EventKind.NEW_REFERENCE:
             self.grabber.take_reference()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 import threading
+import time
 
 from acquire.errors import PhasedicError
 from acquire.events import EventKind
 from acquire.load_cell import LoadCell
+from live.operate import TareOrders
 from live.outputs import Outputs
 from live.pace import LOAD, yield_to_others
 from live.run.recorder import Recording
@@ -39,6 +41,7 @@ class LoadThread:
 
     def start(self) -> None:
         """Begin; the load cell must have been entered."""
+        self._books.journal.add_listener(self._books.loads.take_event)
         self._thread.start()
 
     def join(self) -> None:
@@ -62,3 +65,12 @@ class LoadThread:
             self._books.journal.tell(EventKind.DEVICE, self._cell.info.address, text, "error")
         finally:
             self._books.loads.close()
+
+
+def tare_orders(cell: LoadCell, books: Books) -> TareOrders:
+    """What carries out orders to tare ``cell`` in this test."""
+
+    def measured() -> bool:
+        return bool(books.history.instants)
+
+    return TareOrders(cell, measured, lambda: books.loads.latest, books.journal.tell, time.monotonic)

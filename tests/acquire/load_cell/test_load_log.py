@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from acquire.events import Event, EventKind
 from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadFlag, LoadSample
 
@@ -102,3 +103,44 @@ def test_latest_and_arrays() -> None:
     log = log_of((0.0, 1), (0.1, 2))
     assert log.latest is not None and log.latest.force == 2
     np.testing.assert_array_equal(log.arrays(), [[0.0, 0.1], [1, 2]])
+
+
+def late(t: float, force: float, flags: LoadFlag = LoadFlag.NONE) -> LoadSample:
+    return LoadSample(t, force, flags=flags | LoadFlag.STALE)
+
+
+def test_a_late_overload_leaves_no_force_beside_it() -> None:
+    """Three lines every 0.3 s, of which the first two waited; the middle one was an overload."""
+    log = LoadLog(max_gap_s=0.5)
+    for t in (0.0, 0.3, 0.6, 0.9):
+        log.append(late(t, 10.0))
+        if t == 0.6:
+            log.append(late(t, math.nan, LoadFlag.OVERLOAD))
+        log.append(LoadSample(t, 10.0))
+    assert log.force_at(0.15) == 10.0 and log.force_at(0.75) == 10.0
+    assert all(math.isnan(log.force_at(t)) for t in (0.301, 0.45, 0.599, 0.6))
+    assert math.isnan(log.mean(0.3, 0.5)[0]) and math.isnan(log.mean(0.5, 0.7)[0])
+
+
+def test_late_garbage_and_late_values_leave_no_mark() -> None:
+    log = log_of((0.0, 1.0), (0.1, 1.0))
+    log.append(late(0.15, math.nan, LoadFlag.ERROR))
+    log.append(late(0.15, 99.0))
+    log.append(LoadSample(0.2, 1.0))
+    assert log.force_at(0.15) == 1.0
+
+
+def test_lines_that_were_never_read_may_have_been_anything() -> None:
+    log = log_of((0.0, 1.0), (0.1, 1.0))
+    log.append(late(0.15, math.nan))
+    log.append(LoadSample(0.2, 1.0))
+    assert log.force_at(0.05) == 1.0
+    assert math.isnan(log.force_at(0.12)) and math.isnan(log.force_at(0.17))
+
+
+def test_tares_are_summed_up() -> None:
+    log = log_of((0.0, 100.0), (1.0, 0.0), (2.0, 5.0), (3.0, 105.0))
+    for t, data in ((0.5, {"step_N": 100.0}), (2.5, {"step_N": -100.0}), (2.6, {"step_N": None}), (2.7, {})):
+        log.take_event(Event(t, EventKind.TARE, "a cell", "", "info", data))
+    log.take_event(Event(0.1, EventKind.NOTE, "operator", "", "info", {"step_N": 7.0}))
+    assert [log.zero_at(t) for t in (0.4, 0.5, 2.0, 2.5, 9.0)] == [0.0, 100.0, 100.0, 0.0, 0.0]

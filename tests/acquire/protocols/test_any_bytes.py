@@ -17,6 +17,8 @@ from tests.acquire.protocols.conversation import ALL, any_parser, parser, read_l
 
 SEEDS = [
     b"12.5 N\r\n",
+    b"Readings:\r\n",
+    b" , ;\t,\r\n",
     b"S S     100.00 g\r\n",
     b"ST,GS,+0001.234kg\r\n",
     b"-18.78 lbF\r\n",
@@ -86,8 +88,8 @@ def test_a_line_with_more_columns_than_the_others_gives_no_value() -> None:
 
 def test_more_columns_that_stay_are_taken_over() -> None:
     made = parser("ascii", "column=2")
-    made.feed(b"\r\n1,2\r\n")
-    values = [r.value for r in made.feed(b"1,3,4\r\n" * 150)]
+    made.feed(b"\r\n1;2\r\n")
+    values = [r.value for r in made.feed(b"1;3;4\r\n" * 150)]
     assert math.isnan(values[99]) and values[-1] == 3.0
 
 

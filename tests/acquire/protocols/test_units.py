@@ -37,3 +37,9 @@ def test_other_units_are_refused(unit: str) -> None:
     assert not is_unit(unit)
     with pytest.raises(ConfigError, match="not known"):
         newtons_per(unit)
+
+
+@pytest.mark.parametrize("unit", ["MN", "Mn", "MG", "Mg"])
+def test_mega_is_never_taken_for_milli(unit: str) -> None:
+    with pytest.raises(ConfigError, match="milli or mega"):
+        newtons_per(unit, mass_reads_force=True)

@@ -14,6 +14,11 @@ from acquire.serial_line.ports import LineSettings
 from acquire.serial_line.settings import read_settings
 
 SILENCE = b""
+STALL = b"stall"
+"""Nothing for four seconds."""
+QUICK = b"3 N\r\n"
+"""A line that comes a third of a millisecond after the one before."""
+PACES = {SILENCE: 0.0, STALL: 4.0, QUICK: 1 / 3000}
 
 
 class FakeTime:
@@ -51,15 +56,14 @@ class FakePort:
         self.timeout = 0.1
         self.finished = False
 
-    @property
-    def in_waiting(self) -> int:
-        return len(self._buffer)
-
-    def read(self, size: int, /) -> bytes:
-        if not self._buffer:
+    def receive(self, limit: int, /, *, wait: bool = True) -> bytes:
+        if not self._buffer and wait:
             self._next()
-        taken, self._buffer = self._buffer[:size], self._buffer[size:]
+        taken, self._buffer = self._buffer[:limit], self._buffer[limit:]
         return bytes(taken)
+
+    def wake(self) -> None:
+        pass
 
     def _next(self) -> None:
         if not self._script:
@@ -69,8 +73,8 @@ class FakePort:
         item = self._script.pop(0)
         if isinstance(item, Exception):
             raise item
-        self._time.sleep(self._pace if item else self.timeout)
-        self._buffer += item
+        self._time.sleep(PACES.get(item, self._pace) if item else self.timeout)
+        self._buffer += b"" if item is STALL else item
 
     def write(self, data: bytes, /) -> int:
         self.sent.append(data)

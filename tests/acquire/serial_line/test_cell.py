@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 from itertools import pairwise
 
 import pytest
@@ -12,7 +13,7 @@ from acquire.errors import ConfigError, DeviceError
 from acquire.events import EventKind
 from acquire.load_sample import LoadFlag
 from acquire.serial_line.settings import read_settings
-from tests.acquire.serial_line.fake_port import SILENCE, Bench, FakePort
+from tests.acquire.serial_line.fake_port import QUICK, SILENCE, STALL, Bench, FakePort
 
 FIRST = b"partial\r\n"
 
@@ -128,7 +129,7 @@ def test_a_line_split_over_reads() -> None:
 def test_a_sample_began_its_transmission_time_before_the_read() -> None:
     bench = Bench([FIRST, b"1.25 N\r\n"], address="/dev/fake?baud=9600")
     (sample,) = bench.run(silences=0)
-    assert sample.t == pytest.approx(bench.cell._last_read - 8 * 10 / 9600, abs=1e-9)
+    assert sample.t == pytest.approx(100.02 - 8 * 10 / 9600, abs=1e-9)
 
 
 def test_times_never_go_back() -> None:
@@ -174,9 +175,22 @@ def test_old_lines_with_old_stamps_are_doubted_and_the_clock_stays_tied() -> Non
 
 
 def test_old_lines_without_stamps_are_too_many_for_their_time() -> None:
-    script: list[bytes | Exception] = [FIRST, *[b"1 N\r\n"] * 100, b"2 N\r\n" * 50, b"1 N\r\n"]
+    script: list[bytes | Exception] = [FIRST, *[b"1 N\r\n"] * 100, b"2 N\r\n" * 50, *[b"1 N\r\n"] * 40]
     stale = [LoadFlag.STALE in s.flags for s in Bench(script).run()]
-    assert stale == [False] * 100 + [True] * 49 + [False] * 2
+    assert stale == [False] * 100 + [True] * 74 + [False] * 16
+
+
+def test_lines_after_a_stall_are_late_though_each_comes_in_a_read_of_its_own() -> None:
+    bench = Bench([FIRST, *[b"1 N\r\n"] * 200, STALL, *[QUICK] * 80, *[b"1 N\r\n"] * 20], pace=0.05)
+    samples = bench.run()
+    stale = [LoadFlag.STALE in s.flags for s in samples]
+    assert stale == [False] * 200 + [True] * 79 + [False] * 21
+
+
+def test_a_device_that_pauses_is_late_for_a_moment_only() -> None:
+    bench = Bench([FIRST, *[b"1 N\r\n"] * 200, STALL, *[b"1 N\r\n"] * 100])
+    stale = [LoadFlag.STALE in s.flags for s in bench.run()]
+    assert stale == [False] * 200 + [True] * 25 + [False] * 75
 
 
 # -- silence, loss, return --------------------------------------------------------------------
@@ -233,36 +247,82 @@ def test_what_waited_since_the_opening_is_thrown_away() -> None:
 # -- commands ---------------------------------------------------------------------------------
 
 
+def taring(*lines: bytes, address: str = "", passes: int = 4, **how: bool) -> tuple[Bench, list[float]]:
+    """A tare after so many of these lines; the forces of the others."""
+    bench = Bench([FIRST, *lines], address=address)
+    bench.cell.__enter__()
+    for _ in range(passes):
+        bench.cell._pass()
+    bench.cell.tare(**how)
+    return bench, [s.force for _ in range(len(lines) + 1 - passes) for s in bench.cell._pass()]
+
+
 def test_tare_of_a_line_without_commands_is_an_offset() -> None:
-    bench = Bench([FIRST, b"10 N\r\n", b"10 N\r\n", b"12 N\r\n"])
-    samples = []
-    with bench.cell:
-        for _ in range(3):
-            samples += bench.cell._pass()
-        bench.cell.tare()
-        samples += bench.cell._pass()
-    assert [s.force for s in samples] == [10.0, 10.0, 2.0]
+    bench, forces = taring(*[b"10 N\r\n"] * 3, b"12 N\r\n")
+    assert forces == pytest.approx([math.nan, 2.0], nan_ok=True)  # no force is interpolated across it
     (tare,) = [event for event in bench.events if event.kind is EventKind.TARE]
-    assert tare.data == {"offset_N": 10.0}
+    assert tare.data == {"offset_N": 10.0, "step_N": 10.0, "forced": False, "undo": False}
 
 
 def test_tare_of_a_device_that_can_is_a_command() -> None:
-    bench = Bench(
-        [FIRST, b"S S     10.00 N\r\n", b"S S      0.00 N\r\n"], address="/dev/fake?protocol=mt-sics"
-    )
-    with bench.cell:
-        bench.cell._pass()
-        bench.cell.tare()
-        bench.cell._pass()
+    lines = [b"S S     10.00 N\r\n"] * 3
+    bench, _ = taring(*lines, b"S S      0.00 N\r\n", address="/dev/fake?protocol=mt-sics")
     assert isinstance(bench.ports[0], FakePort) and b"TI\r\n" in bench.ports[0].sent
-    assert any(event.kind is EventKind.TARE for event in bench.events)
+    (tare,) = [event for event in bench.events if event.kind is EventKind.TARE]
+    assert tare.data["step_N"] == 10.0 and tare.data["offset_N"] is None
+    bench.cell.undo_tare()
+    assert math.isnan(bench.cell._pass()[0].force)
+    assert bench.events[-1].data["step_N"] == -10.0
 
 
-def test_tare_without_any_sample_is_told() -> None:
-    bench = Bench([SILENCE])
-    bench.cell.tare()
-    bench.run()
-    assert any("nothing to tare" in text for text in bench.told)
+NOT_STILL = {
+    "no sample": ([SILENCE] * 5, "", "no valid sample in the last 0.5 s"),
+    "silence of two seconds": (
+        [*[b"100 N\r\n"] * 9, *[SILENCE] * 20],
+        "",
+        "no valid sample in the last 0.5 s",
+    ),
+    "moving": ([f"{k} N\r\n".encode() for k in range(20)], "", "the load is not still: it moved by 19 N"),
+    "a step": ([*[b"1 N\r\n"] * 30, b"90 N\r\n"], "", "not still: it moved by 89 N"),
+    "overload": ([*[b"S S   1.00 N\r\n"] * 9, b"S +\r\n"], "mt-sics", "in overload"),
+    "unstable": ([b"S D   1.00 N\r\n"] * 9, "mt-sics", "9 of the 9 samples of the last 0.5 s are unstable"),
+    "one sample": ([b"1 N\r\n"], "", "only 1 samples"),
+}
+
+
+@pytest.mark.parametrize("name", NOT_STILL)
+def test_a_tare_without_a_still_load_is_refused_unless_forced(name: str) -> None:
+    lines, protocol, words = NOT_STILL[name]
+    address = f"/dev/fake?protocol={protocol}" if protocol else ""
+    bench, _ = taring(*lines, address=address, passes=len(lines) + 1)
+    bench.cell._pass()
+    assert any(text.startswith("not tared: ") and words in text for text in bench.told), bench.told
+    assert not any(event.kind is EventKind.TARE for event in bench.events)
+    bench.cell.tare(force=True)
+    bench.cell._pass()
+    tares = [event for event in bench.events if event.kind is EventKind.TARE]
+    assert [tare.data["forced"] for tare in tares] == ([] if name == "no sample" else [True])
+    assert tares or any("nothing to tare" in text for text in bench.told)
+
+
+def test_a_still_load_with_noise_is_tared() -> None:
+    rng = random.Random(3)
+    lines = [f"{100 + rng.gauss(0, 1):.1f} N\r\n".encode() for _ in range(60)]
+    bench, _ = taring(*lines, passes=len(lines))
+    assert any(event.kind is EventKind.TARE for event in bench.events), bench.told
+
+
+def test_tares_are_undone_one_after_the_other() -> None:
+    bench = Bench([FIRST, *[b"10 N\r\n"] * 4, *[b"30 N\r\n"] * 30])
+    with bench.cell as cell:
+        shown = []
+        for order in (None, cell.tare, cell.tare, cell.undo_tare, cell.undo_tare, cell.undo_tare):
+            if order is not None:
+                order(**({"force": True} if order == cell.tare else {}))
+            shown.append([s.force for _ in range(5) for s in cell._pass()][-1])
+    # The second tare is forced while the force has just jumped: zero is the mean of both.
+    assert shown == pytest.approx([10.0, 20.0, shown[2], 20.0, 30.0, 30.0])
+    assert "there is no tare to undo" in bench.told
 
 
 def test_polling_asks_once_and_waits_for_the_answer() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DataError
 from acquire.load_cell.calibration import load
 from acquire.serial_line import identify as identify_module
 from hw_mocks.ascii_indicator import AsciiIndicator
@@ -22,8 +22,8 @@ class Bench:
     """A simulated indicator whose load can be changed."""
 
     def __init__(self) -> None:
-        self.load_N = 0.0
-        sensing = Sensing(lambda t: self.load_N, lambda t: t, 80.0, 0.5, 1000.0)
+        self.load_N = self.per_s = 0.0
+        sensing = Sensing(lambda t: self.load_N + self.per_s * (t % 1.0), lambda t: t, 80.0, 0.5, 1000.0)
         self.server = IndicatorServer(AsciiIndicator(0.1, style="plain"), sensing)
 
 
@@ -68,7 +68,7 @@ LISTEN = dict(identify_module.listen.__kwdefaults__ or {})
 
 
 def calibrate(bench: Bench, folder: Path, accept: str, **known: float | None) -> tuple[int, list[str]]:
-    loads = iter([0.0, 100.0, 0.0])
+    loads = iter([0.0, 100.0, 0.0, 0.0])
     said: list[str] = []
 
     def answer(question: str) -> str:
@@ -95,6 +95,12 @@ def test_calibrating_with_a_known_force(bench: Bench, tmp_path: Path) -> None:
 def test_a_calibration_not_accepted_leaves_no_file(bench: Bench, tmp_path: Path) -> None:
     code, _ = calibrate(bench, tmp_path, "no", mass=10.0)
     assert code == 6 and list(tmp_path.iterdir()) == []
+
+
+def test_a_load_that_moves_is_no_point_of_a_calibration(bench: Bench, tmp_path: Path) -> None:
+    bench.per_s = 500.0
+    with pytest.raises(DataError, match="3 times the load moved"):
+        calibrate(bench, tmp_path, "yes", force=200.0)
 
 
 def test_calibrating_needs_one_known_load(bench: Bench, tmp_path: Path) -> None:

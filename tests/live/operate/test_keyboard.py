@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from acquire.events import EventKind
-from live.operate import carry_out, listen
+from live.operate import FORCED, UNDO, carry_out, listen
 from live.tell import Screen
 
 
@@ -37,6 +37,8 @@ class FakeLive:
     [
         ("r\n", (EventKind.NEW_REFERENCE, "")),
         ("t", (EventKind.TARE, "")),
+        ("t!", (EventKind.TARE, FORCED)),
+        ("u", (EventKind.TARE, UNDO)),
         ("p", (EventKind.PAUSE, "")),
         ("n slipped in the grip", (EventKind.NOTE, "slipped in the grip")),
         ("q", ("stop", "ended by the operator")),

@@ -1,0 +1,251 @@
+"""The way to the port: opened, lost and found again, without ever holding anybody up.
+
+Opening and closing a port may take as long as a network or a driver likes; both are done by threads of
+their own, which are left alone when they take too long. A peer that hangs up at once is tried ever more
+seldom, and told of once.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from acquire.errors import ConfigError, DeviceError
+from acquire.serial_line.byte_ports import Port
+from acquire.serial_line.ports import PORT_ERRORS, LineSettings, find_again, identity_of
+
+log = logging.getLogger(__name__)
+
+OPEN_S = 10.0  # that the first opening may take
+RETRY_S, SELDOM_S = 0.5, 8.0
+STEADY_S = 5.0  # a connection that lasts so long is one
+PATIENCE_S = 0.1  # of one look
+CLOSE_S = 0.5
+
+Opener = Callable[[LineSettings], Port]
+Tell = Callable[[str, str], None]  # level, sentence
+
+
+class Opening:
+    """A port being opened by a thread.
+
+    Parameters
+    ----------
+    opener : callable taking LineSettings
+    line : callable giving LineSettings
+        Asked by the thread, since looking for a port takes time too.
+    """
+
+    def __init__(self, opener: Opener, line: Callable[[], LineSettings]) -> None:
+        self._opener, self._line = opener, line
+        self._lock, self._done, self._abandoned = threading.Lock(), threading.Event(), False
+        self._port: Port | None = None
+        self._error: Exception | None = None
+        self.url = ""
+        threading.Thread(target=self._work, name="opening", daemon=True).start()
+
+    def _work(self) -> None:
+        try:
+            line = self._line()
+            self.url = line.url
+            self._port = self._opener(line)
+        except Exception as error:
+            self._error = error
+        with self._lock:
+            self._done.set()
+            port = self._port if self._abandoned else None
+        close_port(port)
+
+    def done(self, seconds: float) -> bool:
+        """Whether it is decided, after waiting so long at most."""
+        return self._done.wait(seconds)
+
+    def take(self) -> Port:
+        """The port, once it is done; raises what opening it raised."""
+        if self._error is not None:
+            raise self._error
+        assert self._port is not None
+        return self._port
+
+    def abandon(self) -> None:
+        """Nobody waits for it any more."""
+        with self._lock:
+            self._abandoned = True
+            port = self._port if self._done.is_set() else None
+        close_port(port)
+
+
+def close_port(port: Port | None) -> None:
+    """Close a port, and wait for that no longer than half a second."""
+    if port is None:
+        return
+
+    def work() -> None:
+        try:
+            port.close()
+        except PORT_ERRORS as error:
+            log.debug("closing: %s", error)
+
+    thread = threading.Thread(target=work, name="closing", daemon=True)
+    thread.start()
+    thread.join(CLOSE_S)
+
+
+@dataclass(frozen=True, slots=True)
+class Means:
+    """What time and ports are made of; tests bring their own.
+
+    Attributes
+    ----------
+    opener : callable taking LineSettings
+    clock : callable giving monotonic seconds
+    stopped : threading.Event
+    sleep : callable
+        Waits so many seconds, less when stopped.
+    """
+
+    opener: Opener
+    clock: Callable[[], float]
+    stopped: threading.Event
+    sleep: Callable[[float], object]
+
+
+class Link:
+    """A port that is opened again whenever it is lost.
+
+    Parameters
+    ----------
+    line : LineSettings
+    means : Means
+    tell : callable taking level and text
+    last_words : callable
+        What to say of the last sample when the port is lost.
+
+    Attributes
+    ----------
+    identity : str
+        Of the USB device behind it.
+
+    Raises
+    ------
+    ConfigError, DeviceError
+        It cannot be opened.
+    """
+
+    def __init__(
+        self, line: LineSettings, means: Means, tell: Tell, last_words: Callable[[], str] = lambda: ""
+    ) -> None:
+        self._line, self._tell, self._last_words = line, tell, last_words
+        self._opener, self._clock = means.opener, means.clock
+        self._sleep, self._stopped = means.sleep, means.stopped
+        first = Opening(means.opener, lambda: line)
+        if not first.done(OPEN_S):
+            first.abandon()
+            raise DeviceError(
+                f"{line.url}: does not open within {OPEN_S:g} s; check the device and its cable"
+            )
+        self._port: Port | None = first.take()
+        self._opening: Opening | None = None
+        self.identity = "" if "://" in line.url else identity_of(line.url)
+        self._url = line.url
+        self._since, self._next_try = means.clock(), 0.0
+        self._short = 0  # connections in a row that did not last
+        self._missed = False  # told that it is lost, and not yet that it is back
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a port now."""
+        return self._port is not None
+
+    def receive(self, limit: int, *, wait: bool = True) -> bytes:
+        """See ``Port``; b"" also when the port is lost by it."""
+        if self._port is None:
+            return b""
+        try:
+            data = self._port.receive(limit, wait=wait)
+        except PORT_ERRORS as error:
+            self.lose(error)
+            return b""
+        if data and self._missed:
+            self._heard_again()
+        return data
+
+    def _heard_again(self) -> None:
+        if self._short < 2 or self._clock() - self._since >= STEADY_S:
+            self._missed = False
+            self._tell(
+                "info", "connected again" + ("" if self._url == self._line.url else f" as {self._url}")
+            )
+
+    def write(self, data: bytes) -> bool:
+        """Send ``data``; False where that is impossible."""
+        if self._port is None:
+            return False
+        try:
+            self._port.write(data)
+        except PORT_ERRORS as error:
+            self.lose(error)
+            return False
+        return True
+
+    def lose(self, error: Exception) -> None:
+        """The port is gone."""
+        port, self._port = self._port, None
+        close_port(port)
+        if self._stopped.is_set():
+            return
+        now = self._clock()
+        self._short = self._short + 1 if now - self._since < STEADY_S else 1
+        delay = min(RETRY_S * 2 ** (self._short - 1), SELDOM_S)
+        self._next_try = now + delay
+        if self._short == 1:
+            self._tell("error", f"lost ({error}); {self._last_words()}; trying to reach it again")
+        elif self._short == 2:
+            text = (
+                f"lost again at once ({error}): something on the other side hangs up; it is tried again ever"
+            )
+            self._tell("error", f"{text} more seldom (up to every {SELDOM_S:g} s), and told of when it stays")
+        self._missed = True
+
+    def again(self) -> bool:
+        """Whether the lost port is back now; waits for a tenth of a second at most."""
+        if self._opening is None:
+            left = self._next_try - self._clock()
+            if left > 0:
+                self._sleep(min(left, PATIENCE_S))
+                return False
+            self._opening = Opening(self._opener, self._where)
+        if not self._opening.done(PATIENCE_S):
+            return False
+        opening, self._opening = self._opening, None
+        try:
+            self._port = opening.take()
+        except (DeviceError, ConfigError) as error:
+            log.debug("%s: %s", opening.url, error)
+            self._next_try = self._clock() + RETRY_S
+            return False
+        self._url, self._since = opening.url, self._clock()
+        return True
+
+    def _where(self) -> LineSettings:
+        return dataclasses.replace(self._line, url=find_again(self._line.url, self.identity))
+
+    def wake(self) -> None:
+        """End a wait for bytes; from any thread."""
+        port = self._port
+        try:
+            if port is not None:
+                port.wake()
+        except PORT_ERRORS as error:
+            log.debug("waking a read: %s", error)
+
+    def close(self) -> None:
+        """Close the port, and the one that may be about to open."""
+        if self._opening is not None:
+            self._opening.abandon()
+            self._opening = None
+        port, self._port = self._port, None
+        close_port(port)

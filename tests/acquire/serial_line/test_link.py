@@ -1,0 +1,112 @@
+"""The way to the port: lost, found again, and peers that do not stay."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+import pytest
+
+from acquire.errors import DeviceError
+from acquire.serial_line import link as link_module
+from acquire.serial_line.link import Link, Means, Opening, close_port
+from acquire.serial_line.ports import LineSettings
+from tests.acquire.serial_line.fake_port import FakePort, FakeTime
+
+LINE = LineSettings("socket://fake:1")
+
+
+class Road:
+    """A link to ports that each live for ``lives`` reads of a tenth of a second, the last one for ever."""
+
+    def __init__(self, *lives: int) -> None:
+        self.time, self.told, self._lives = FakeTime(), list[str](), list(lives)
+        self.opened: list[float] = []
+        means = Means(self._open, self.time, threading.Event(), self.time.sleep)
+        self.link = Link(LINE, means, lambda level, text: self.told.append(text), lambda: "no sample")
+
+    def _open(self, line: LineSettings) -> FakePort:
+        self.opened.append(self.time.now)
+        reads: list[bytes | Exception] = [b"1"] * (self._lives.pop(0) if self._lives else 10_000)
+        return FakePort(self.time, [*reads, ConnectionError("closed")], pace=0.1)
+
+    def until(self, t: float) -> None:
+        while self.time.now < t:
+            if self.link.connected or self.link.again():
+                self.link.receive(100)
+
+
+def test_a_peer_that_hangs_up_is_tried_ever_more_seldom_and_told_of_once() -> None:
+    road = Road(*[0] * 1000)
+    road.until(160.0)
+    assert len(road.opened) < 15
+    assert road.opened[-1] - road.opened[-2] == pytest.approx(8.0, abs=0.3)
+    assert [text.partition(" (")[0] for text in road.told] == ["lost", "lost again at once"]
+
+
+def test_one_that_says_a_line_and_hangs_up_is_no_better() -> None:
+    road = Road(*[1] * 1000)
+    road.until(160.0)
+    assert len(road.opened) < 15 and len(road.told) == 3  # lost, connected again, lost again at once
+
+
+def test_when_it_stays_at_last_that_is_told_once() -> None:
+    road = Road(*[0] * 5)
+    road.until(160.0)
+    assert [text.partition(" (")[0] for text in road.told] == [
+        "lost",
+        "lost again at once",
+        "connected again",
+    ]
+
+
+def test_a_rare_loss_is_told_each_time_and_mended_soon() -> None:
+    road = Road(100, 100, 100)
+    road.until(140.0)
+    assert [text.partition(" (")[0] for text in road.told] == ["lost", "connected again"] * 3
+    assert len(road.opened) == 4
+
+
+class SlowPort(FakePort):
+    """One that takes long to close."""
+
+    def close(self) -> None:
+        super().close()
+        time.sleep(0.9)
+
+
+def test_closing_waits_for_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link_module, "CLOSE_S", 0.05)
+    port, began = SlowPort(FakeTime(), []), time.monotonic()
+    close_port(port)
+    assert port.closed == 1 and time.monotonic() - began < 0.8
+
+
+def test_a_port_that_opens_when_nobody_waits_any_more_is_closed() -> None:
+    go, port = threading.Event(), FakePort(FakeTime(), [])
+
+    def open_late(line: LineSettings) -> FakePort:
+        go.wait(5)
+        return port
+
+    opening = Opening(open_late, lambda: LINE)
+    assert not opening.done(0.01)
+    opening.abandon()
+    go.set()
+    assert opening.done(5)
+    until = time.monotonic() + 5
+    while not port.closed and time.monotonic() < until:
+        time.sleep(0.001)
+    assert port.closed == 1
+
+
+def test_a_port_that_never_opens_fails_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(link_module, "OPEN_S", 0.05)
+
+    def never(line: LineSettings) -> FakePort:
+        time.sleep(0.5)
+        return FakePort(FakeTime(), [])
+
+    means = Means(never, time.monotonic, threading.Event(), time.sleep)
+    with pytest.raises(DeviceError, match="does not open within"):
+        Link(LINE, means, lambda level, text: None)

@@ -1,0 +1,245 @@
+"""What a load cell may send must delay nothing, and must never become a force that was not there."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from acquire.events import Event
+from acquire.load_cell import LoadCell, open_load_cell
+from acquire.load_sample import LoadFlag, LoadSample
+from acquire.protocols import find_protocol
+from acquire.protocols.modbus import crc16, frame
+from live.run import Outcome, run_live
+from live.setup import load_config
+from live.tell import Screen
+from tests.acquire.protocols.conversation import parser
+from tests.adversary.peers import PEERS, TALKS, Peer, SocketPeer, leave, stamped
+
+SOON_S = 2.0  # on a busy machine; the contract says half a second to stop
+
+
+class Reader:
+    """Reads a load cell in a thread, as a test does."""
+
+    def __init__(self, cell: LoadCell) -> None:
+        self.cell, self.samples = cell, 0
+        self.entered, self.ended = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._work, daemon=True)
+        self._thread.start()
+
+    def _work(self) -> None:
+        with self.cell:
+            self.entered.set()
+            for _ in self.cell:
+                self.samples += 1
+        self.ended.set()
+
+
+@pytest.mark.parametrize("talk", TALKS)
+@pytest.mark.parametrize("kind", PEERS)
+def test_start_and_end_are_soon_whatever_comes(kind: str, talk: str) -> None:
+    events: list[Event] = []
+    with PEERS[kind](TALKS[talk]) as peer:
+        cell = opened(peer, events)
+        reader = Reader(cell)
+        assert reader.entered.wait(SOON_S)
+        time.sleep(0.3)
+        began = time.monotonic()
+        cell.stop()
+        assert reader.ended.wait(SOON_S)
+        cell.close()
+        assert time.monotonic() - began < SOON_S
+        assert reader.samples > 0 or talk != "flood"
+
+
+def opened(peer: Peer, events: list[Event]) -> LoadCell:
+    return open_load_cell(f"{peer.url}?unit=N&wait=0.2", events.append)
+
+
+CAMERA = "bench:?width=160&height=128&fps=30&seconds=1.5&pictures=8&buffers=64"
+
+
+def run_beside(load: str, folder: Path) -> Outcome:
+    """A short test with the camera from memory."""
+    settings = {
+        "camera.address": CAMERA,
+        "load.address": load,
+        "measure.zoi": 48,
+        "measure.step": 32,
+        "measure.burst": 1,
+        "measure.reference_burst": 4,
+        "view.enabled": False,
+        "view.rrd": False,
+        "output.dir": str(folder),
+    }
+    return run_live(load_config(None, settings), Screen(quiet=True))
+
+
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """So that no flood competes with a compiler."""
+    run_beside("none:", tmp_path_factory.mktemp("compiled") / "run")
+
+
+@pytest.mark.usefixtures("compiled")
+@pytest.mark.parametrize(("kind", "talk"), [(kind, "flood") for kind in PEERS] + [("socket", "closed")])
+def test_a_test_goes_on_beside_it(kind: str, talk: str, tmp_path: Path) -> None:
+    with PEERS[kind](TALKS[talk]) as peer:
+        outcome = run_beside(f"{peer.url}?unit=N&wait=0.2", tmp_path / "run")
+    ledger = outcome.books.ledger
+    assert ledger.grabbed + ledger.lost == 45 and ledger.measured > 10 and ledger.adds_up
+    stops = [event for event in outcome.books.journal.events() if event.kind == "stop"]
+    begun = [event for event in outcome.books.journal.events() if event.kind == "start"]
+    assert stops[0].t - begun[0].t < 1.5 + SOON_S
+
+
+# -- lateness ---------------------------------------------------------------------------------
+
+RATE, STALL_AT_S, STALL_S, SECONDS = 200.0, 1.0, 0.7, 2.4
+
+
+def heard(kind: str) -> list[LoadSample]:
+    """What comes of a stream whose values are the times at which they were due, with a stall on the way."""
+    with PEERS[kind](stamped(RATE, STALL_AT_S, STALL_S)) as peer:
+        cell = opened(peer, [])
+        timer = threading.Timer(SECONDS, cell.stop)
+        timer.start()
+        with cell:
+            return list(cell)
+
+
+@pytest.fixture(scope="module")
+def streams() -> dict[str, list[LoadSample]]:
+    found: dict[str, list[LoadSample]] = {}
+    threads = [threading.Thread(target=lambda k=kind: found.update({k: heard(k)})) for kind in PEERS]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return found
+
+
+@pytest.mark.parametrize("kind", PEERS)
+def test_what_waited_on_the_way_is_stale(kind: str, streams: dict[str, list[LoadSample]]) -> None:
+    samples = streams[kind]
+    late = [s.t - s.force for s in samples]
+    stale = [LoadFlag.STALE in s.flags for s in samples]
+    assert sum(delay > 0.2 for delay in late) > 0.5 * STALL_S * RATE  # it did wait
+    assert not any(delay > 0.2 and not doubted for delay, doubted in zip(late, stale, strict=True))
+    assert stale.count(False) > 0.3 * len(stale)
+
+
+# -- peers that hang up -------------------------------------------------------------------------
+
+
+def test_a_peer_that_hangs_up_at_once_is_told_of_once() -> None:
+    events: list[Event] = []
+    with SocketPeer(leave) as peer:
+        cell = opened(peer, events)
+        reader = Reader(cell)
+        assert reader.entered.wait(SOON_S)
+        time.sleep(0.9)
+        cell.stop()
+        assert reader.ended.wait(SOON_S)
+        assert peer.connections <= 4
+    told = [event.text for event in events if "lost" in event.text]
+    assert len(told) <= 2
+
+
+# -- check digits -------------------------------------------------------------------------------
+# Of the protocols only modbus has them.
+
+PROFILE = "profile=laumas-tlb"
+
+
+def answer(value: int) -> bytes:
+    return frame(1, 3, 4, words=(value >> 16 & 0xFFFF, value & 0xFFFF))
+
+
+def swapped(sound: bytes) -> bytes:
+    return sound[:-2] + sound[:-3:-1]
+
+
+def of_another_start(sound: bytes) -> bytes:
+    """The check sum of a CRC that begins with 0."""
+    crc = 0
+    for byte in sound[:-2]:
+        crc ^= byte
+        for _ in range(8):
+            crc = (crc >> 1) ^ (0xA001 if crc & 1 else 0)
+    return sound[:-2] + crc.to_bytes(2, "little")
+
+
+WRONG: dict[str, Callable[[bytes], bytes]] = {
+    "swapped": swapped,
+    "of another start": of_another_start,
+    "none": lambda sound: sound[:-2],
+    "zero": lambda sound: sound[:-2] + b"\0\0",
+    "one more": lambda sound: sound[:-1] + bytes([(sound[-1] + 1) & 0xFF]),
+    "of the frame before": lambda sound: sound[:-2] + crc16(answer(7)[:-2]),
+    "a digit changed": lambda sound: sound[:4] + bytes([sound[4] ^ 1]) + sound[5:],
+    "a byte lost": lambda sound: sound[:4] + sound[5:],
+    "a byte twice": lambda sound: sound[:4] + sound[4:5] + sound[4:],
+}
+
+
+def test_only_modbus_has_check_digits() -> None:
+    names = ("ascii", "mt-sics", "aed-standard", "mark10", "sauter", "hbm-aed")
+    assert all("no check digit" in find_protocol(name).undetected for name in names)
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_stream_with_wrong_check_digits_gives_no_value(name: str) -> None:
+    modbus, values = parser("modbus", PROFILE), []
+    sent = [answer(1000 + k) for k in range(3000)]
+    wrong = [WRONG[name](sound) for sound in sent if WRONG[name](sound) != sound]
+    for damaged in wrong:
+        values += [reading.value for reading in modbus.feed(damaged) + modbus.silence()]
+    assert len(values) >= len(wrong) > 2900 and all(math.isnan(value) for value in values)
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_sound_answers_between_wrong_ones_are_read(name: str) -> None:
+    modbus, values = parser("modbus", PROFILE), []
+    for k in range(300):
+        wrong = k % 3 == 0
+        readings = modbus.feed(WRONG[name](answer(k)) if wrong else answer(k)) + modbus.silence()
+        values += [math.nan if wrong and len(readings) > 1 else readings[0].value]
+    good = [value for value in values if not math.isnan(value)]
+    assert good == [k for k in range(300) if k % 3]
+
+
+def test_every_flip_of_up_to_two_bits_is_found() -> None:
+    sound = answer(123456)
+    bits = range(8 * len(sound))
+    flips = [(1 << a) | (1 << b) for a in bits for b in bits if a <= b]
+    whole = int.from_bytes(sound, "big")
+    for flip in flips:
+        modbus = parser("modbus", PROFILE)
+        damaged = (whole ^ flip).to_bytes(len(sound), "big") if flip.bit_count() else sound
+        readings = modbus.feed(damaged) + modbus.silence()
+        assert all(math.isnan(reading.value) for reading in readings)
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_slave_that_answers_wrongly_gives_no_force_on_a_line(name: str) -> None:
+    """Asked and answered over a socket, as long as it takes for a dozen answers."""
+    events: list[Event] = []
+
+    def talk(write: Callable[[bytes], None], stopped: threading.Event) -> None:
+        while not stopped.wait(0.02):
+            write(WRONG[name](answer(4242)))
+
+    with SocketPeer(talk) as peer:
+        cell = open_load_cell(f"{peer.url}?protocol=modbus&{PROFILE}&unit=N&wait=0&rate=50", events.append)
+        timer = threading.Timer(0.5, cell.stop)
+        timer.start()
+        with cell:
+            samples = list(cell)
+    assert all(math.isnan(sample.force) for sample in samples)
