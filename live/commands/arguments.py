@@ -30,6 +30,7 @@ COMMANDS = {
     "export": Entry(
         "live.commands.export", "a finished run as csv, npz, mat, vtk, tiff, png, mp4, gif, r3xa"
     ),
+    "report": Entry("live.commands.report", "a finished run, or several, as one page: HTML, PDF"),
     "characterise": Entry(
         "live.characterise.command",
         "how well this measures: the paper reproduced, peers, or your own pattern",

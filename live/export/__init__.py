@@ -9,7 +9,7 @@ from live.export.arrays import to_xarray
 from live.export.formats import FORMATS, ExportRequest, export
 from live.export.job import Job, Options
 from live.export.painting import Levels, Painter, Scale, caption, status_table
-from live.export.target import new_file, new_folder
+from live.export.target import check_free, new_file, new_folder
 
 __all__ = [
     "FORMATS",
@@ -20,6 +20,7 @@ __all__ = [
     "Painter",
     "Scale",
     "caption",
+    "check_free",
     "export",
     "new_file",
     "new_folder",

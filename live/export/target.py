@@ -10,6 +10,13 @@ from pathlib import Path
 from acquire.errors import ConfigError, DataError
 
 
+def check_free(*paths: Path) -> None:
+    """Raise ConfigError where one of ``paths`` is there already."""
+    for path in paths:
+        if path.exists():
+            raise ConfigError(f"{path} exists already and is not overwritten; choose another --out")
+
+
 @contextlib.contextmanager
 def new_file(path: Path) -> Iterator[Path]:
     """A path beside ``path`` to write to; it takes its name when all went well, and else is removed.
@@ -37,12 +44,11 @@ def new_folder(path: Path) -> Iterator[Path]:
 def _appearing(path: Path) -> Iterator[Path]:
     # A film is told its format by its suffix, so this must stay the last.
     part = path.with_name(f"{path.stem}.part{path.suffix}")
-    for name in (path, part):
-        _check_free(name)
+    check_free(path, part)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield part
-        _check_free(path)
+        check_free(path)
         part.rename(path)
     except OSError as error:
         _remove(part)
@@ -52,11 +58,6 @@ def _appearing(path: Path) -> Iterator[Path]:
     except BaseException:
         _remove(part)
         raise
-
-
-def _check_free(path: Path) -> None:
-    if path.exists():
-        raise ConfigError(f"{path} exists already and is not overwritten; choose another --out")
 
 
 def _remove(part: Path) -> None:

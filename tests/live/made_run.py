@@ -19,7 +19,7 @@ from live.measure.measurement import Measurement
 from live.results import Results, ResultsInfo
 from tests.live.made_up import CAMERA, START, make_field, make_frame, make_grid, make_measurement
 
-E_PA, YIELD, WIDTH_MM, THICKNESS_MM = 70e9, 0.003, 10.0, 2.0
+E_PA, YIELD, HARDENING_PA, WIDTH_MM, THICKNESS_MM = 70e9, 0.003, 1e8, 10.0, 2.0
 UTC_START = datetime(2030, 1, 2, 3, 4, 5, tzinfo=UTC)
 PULLED = tuple(float(e) for e in [0.0] * 8 + list(np.linspace(2e-4, 8e-3, 40)))
 """Mean axial strain by instant: still at first, then pulled beyond yield."""
@@ -33,8 +33,9 @@ FieldOf = Callable[[int, float], StrainField]
 
 
 def force_of(strain: float) -> float:
-    """N; elastic, then flat."""
-    return E_PA * min(strain, YIELD) * WIDTH_MM * THICKNESS_MM * 1e-6
+    """N; elastic, then all but flat."""
+    stress = E_PA * min(strain, YIELD) + HARDENING_PA * max(strain - YIELD, 0.0)
+    return stress * WIDTH_MM * THICKNESS_MM * 1e-6
 
 
 def make_run(
@@ -48,19 +49,21 @@ def make_run(
 ) -> Path:
     """A folder with ``strain.h5``, ``strain.csv`` and ``session.h5``; returns it."""
     metadata = {"specimen": "S1", "operator": "Zoé"} if metadata is None else metadata
-    _write_results(folder, strains, field_of or _noisy, config, metadata)
+    _write_results(folder, strains, field_of or noisy, config, metadata)
     if session:
         _write_session(folder, strains, config, metadata)
     return folder
 
 
-def _noisy(number: int, strain: float, sigma: float = 1e-5) -> StrainField:
-    """Tension with noise of the size that is stated."""
+def noisy(number: int, strain: float, sigma: float = 1e-5, stated: float | None = None) -> StrainField:
+    """Tension with noise ``sigma`` (px and strain) that is said to be ``stated``."""
     grid, rng = make_grid(), np.random.default_rng(number)
-    plain = make_field(grid, strain, sigma)
+    plain = make_field(grid, strain)
     names = ("u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy")
     values = {n: np.nan_to_num(getattr(plain, n)) + rng.normal(0, sigma, grid.shape) for n in names}
-    return StrainField.from_values(grid, values, sigma, status=plain.status)
+    said = sigma if stated is None else stated
+    # The shear is the mean of two gradients that scatter independently.
+    return StrainField.from_values(grid, values, said, status=plain.status)
 
 
 def _write_results(
