@@ -6,7 +6,7 @@ import argparse
 from contextlib import ExitStack
 from pathlib import Path
 
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, PhasedicError
 from live.export import check_free, new_file
 from live.finished import Display, open_run
 from live.report import (
@@ -67,6 +67,16 @@ def command(arguments: argparse.Namespace) -> int:
             report = make_report(found[0], _wanted(arguments), screen)
     _save(report, out, arguments, screen)
     return 0
+
+
+def write_report(folder: Path, screen: Screen) -> None:
+    """``report.html`` in the folder of a run that has just ended; what goes wrong is told and harms nothing."""
+    try:
+        with open_run(folder) as run:
+            save_page(make_report(run, Wanted(), screen), folder / "report.html")
+        screen.say(f"  {folder / 'report.html'}")
+    except PhasedicError as error:
+        screen.say(f"warning: no report was made: {error}")
 
 
 def _wanted(arguments: argparse.Namespace) -> Wanted:

@@ -123,7 +123,7 @@ def chosen_fields(strain: Strain, asked: str | None, usual: Sequence[str] = USUA
         return tuple(name for name in usual if name in strain.names)
     if asked == "all":
         return strain.names
-    names = tuple(word.strip() for word in asked.split(","))
+    names = tuple(dict.fromkeys(word.strip() for word in asked.split(",")))
     for name in names:
         if name not in strain.names:
             raise ConfigError(f"--fields {name}: there is no such map; there are {', '.join(strain.names)}")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError, PhasedicError
-from acquire.events import Event
+from acquire.events import Event, EventKind
 from acquire.session import Session
 from live.finished.pictures import Pictures, of_images, of_session
 from live.results import Strain
@@ -135,10 +135,12 @@ class RunFolder(Closing):
         area = self.specimen.area_m2
         return None if area is None else self.force / area
 
-    @property
+    @cached_property
     def events(self) -> list[Event]:
         """What was recorded of events, without the one a burst; empty without a recording."""
-        return [] if self.session is None else [e for e in self.session.events() if e.kind != "measured"]
+        if self.session is None:
+            return []
+        return [event for event in self.session.events() if event.kind is not EventKind.MEASURED]
 
     @property
     def start_monotonic(self) -> float:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.events import EventKind
 from acquire.frame import CameraInfo
 from analysis.picture import describe_pattern
 from live.finished import RunFolder
@@ -145,7 +146,7 @@ def _bursts(run: RunFolder) -> str:
 
 
 def _events(run: RunFolder) -> list[dict[str, object]]:
-    return [dict(event.data) for event in run.events if event.kind == "reference"]
+    return [dict(event.data) for event in run.events if event.kind is EventKind.REFERENCE]
 
 
 def _floor(noise: list[Noise], names: tuple[str, ...], factor: float, unit: str) -> str:

@@ -68,9 +68,12 @@ def version_table(run: RunFolder) -> Part:
 
 
 def hashes(run: RunFolder, screen: Screen) -> Part:
-    """The files of the run as they are on the disk."""
+    """The files of the run as they are on the disk, and the recording that was replayed."""
+    files = {path for path in run.path.iterdir() if path.suffix in _KINDS}
+    session = run.session_path
+    beside = [session] if session is not None and session.parent.resolve() != run.path.resolve() else []
     rows = []
-    for path in sorted(path for path in run.path.iterdir() if path.suffix in _KINDS):
+    for path in [*sorted(files), *beside]:
         screen.status(f"reading {path.name} for its hash")
         size = f"{path.stat().st_size:,}".replace(",", "\u202f")
         rows.append((path.name, size, element("span", _sha256(path), class_="code")))

@@ -13,6 +13,7 @@ import numpy as np
 from acquire.clock import ClockPair
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadCellInfo, LoadSample
+from acquire.record_mode import RecordMode
 from acquire.session import SessionInfo, SessionWriter
 from analysis.field.strain_field import StrainField
 from live.measure.measurement import Measurement
@@ -89,9 +90,13 @@ def _write_results(
             results.add(Measurement.of(k, burst, field_of(k, strain), force_of(strain)))
 
 
-def _write_session(
-    folder: Path, strains: Sequence[float], config: Mapping[str, Any], metadata: Mapping[str, Any]
-) -> None:
+def session_writer(
+    folder: Path,
+    config: Mapping[str, Any],
+    metadata: Mapping[str, Any],
+    mode: RecordMode | None = None,
+) -> SessionWriter:
+    """A new ``session.h5``."""
     info = SessionInfo(
         camera=CAMERA,
         load=LoadCellInfo("/dev/ttyUSB0", "made-up cell", "ascii", capacity_N=5000.0),
@@ -99,8 +104,15 @@ def _write_session(
         config=config,
         metadata=metadata,
         versions={"phasedic": "0.1.0"},
+        mode=mode or RecordMode(),
     )
-    with SessionWriter(folder / "session.h5", info) as writer:
+    return SessionWriter(folder / "session.h5", info)
+
+
+def _write_session(
+    folder: Path, strains: Sequence[float], config: Mapping[str, Any], metadata: Mapping[str, Any]
+) -> None:
+    with session_writer(folder, config, metadata) as writer:
         writer.write_event(Event(START, EventKind.START, "phasedic", "the test begins"))
         for k, strain in enumerate(strains):
             t = START + 0.1 * k

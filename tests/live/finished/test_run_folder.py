@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -11,10 +12,11 @@ import numpy as np
 import pytest
 
 from acquire.errors import DataError
+from acquire.record_mode import RecordMode
 from live.cli import main
 from live.finished import open_run
-from tests.live.made_run import CONFIG, E_PA, PULLED, make_run
-from tests.live.made_up import START
+from tests.live.made_run import CONFIG, E_PA, PULLED, make_run, session_writer
+from tests.live.made_up import START, make_measurement
 
 
 def test_results_and_recording_are_tied_together(tmp_path: Path) -> None:
@@ -73,6 +75,20 @@ def test_a_replay_of_pictures_finds_them_again(tmp_path: Path) -> None:
         path.unlink()
     with open_run(out) as run:
         assert run.pictures is None
+
+
+def test_a_recording_of_bursts_gives_their_means(tmp_path: Path) -> None:
+    make_run(tmp_path, PULLED[:5], session=False)
+    image = np.arange(96 * 128, dtype=np.float32).reshape(96, 128) % 4000
+    with session_writer(tmp_path, {}, {}, RecordMode("bursts")) as writer:
+        for k in range(5):
+            burst = make_measurement(k).burst
+            mean = np.round(image + k)
+            clipped = np.zeros(mean.shape, bool)
+            writer.write_burst(dataclasses.replace(burst, mean=mean, clipped=clipped))
+    with open_run(tmp_path) as run:
+        assert run.pictures is not None
+        assert [float(picture[0, 0]) for picture in run.pictures.each([0, 2, 4])] == [0.0, 2.0, 4.0]
 
 
 def test_what_is_not_a_run_is_refused_in_words(tmp_path: Path) -> None:

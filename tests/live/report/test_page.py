@@ -208,6 +208,19 @@ def test_nothing_is_overwritten(run_dir: Path, tmp_path: Path, capsys: pytest.Ca
     assert not out.exists()
 
 
+def test_at_the_end_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = make_run(tmp_path)
+    command.write_report(folder, Screen())
+    assert "Noise floor" in (folder / "report.html").read_text(encoding="utf-8")
+    command.write_report(folder, Screen())
+    command.write_report(tmp_path / "nowhere", Screen())
+    said = capsys.readouterr().out.splitlines()
+    assert [line[:12] for line in said if "hash" not in line] == [
+        "  " + str(folder)[:10],
+        *["warning: no "] * 2,
+    ]
+
+
 def test_thinning_keeps_the_spikes_and_the_gaps() -> None:
     y = np.zeros(50_000)
     y[31_234], y[40_000:40_010] = 7.0, np.nan
