@@ -27,6 +27,10 @@ COMMANDS = {
     "demo": Entry("live.commands.demo", "the same on a simulated tensile test, compared with its truth"),
     "replay": Entry("live.commands.replay", "measure a recorded session, or any folder of pictures"),
     "map": Entry("live.commands.map", "draw a map of the results over a picture, as a PNG"),
+    "export": Entry(
+        "live.commands.export", "a finished run as csv, npz, mat, vtk, tiff, png, mp4, gif, r3xa"
+    ),
+    "report": Entry("live.commands.report", "a finished run, or several, as one page: HTML, PDF"),
     "characterise": Entry(
         "live.characterise.command",
         "how well this measures: the paper reproduced, peers, or your own pattern",

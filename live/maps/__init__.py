@@ -4,11 +4,12 @@ PNG.
 
 from live.maps.colours import MICROSTRAIN, AutoRange, Unit, colour, nice_above, number, ramp, ticks, unit_for
 from live.maps.display_filter import PAPER_LOW_PASS, for_display
-from live.maps.map import Picture, draw
+from live.maps.map import STATUS_COLOURS, Picture, draw
 
 __all__ = [
     "MICROSTRAIN",
     "PAPER_LOW_PASS",
+    "STATUS_COLOURS",
     "AutoRange",
     "Picture",
     "Unit",

@@ -22,10 +22,11 @@ from live.maps.display_filter import for_display
 from live.results import Strain
 
 DISPLACEMENTS = ("u", "v")
-_STATUS_COLOURS = (
+STATUS_COLOURS = (
     "#2a9d4b", "#00000000", "#7f7f7f", "#f2c80f", "#9467bd", "#d62728", "#ff7f0e", "#1f77b4",
     "#8c564b", "#e377c2", "#17becf", "#bcbd22",
 )  # fmt: skip
+"""Of the members of ``Status``, in their order; what was not asked for is transparent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +169,7 @@ def _draw_status(figure: Any, axes: Any, values: NDArray[Any], extent: Any) -> N
     from matplotlib.patches import Patch
 
     states = list(Status)
-    colours = [_STATUS_COLOURS[i % len(_STATUS_COLOURS)] for i in range(len(states))]
+    colours = [STATUS_COLOURS[i % len(STATUS_COLOURS)] for i in range(len(states))]
     bounds = np.arange(len(states) + 1) - 0.5
     place = {int(state): i for i, state in enumerate(states)}
     indices = np.vectorize(lambda value: place.get(int(value), 0))(values)

@@ -49,13 +49,16 @@ ROOMS = {
     " hw_mocks live.maps live.characterise",
     "live.commands": "*",
     "live.cli": "acquire.errors live.commands.arguments",
-    "live.export": "acquire analysis.field live.results live.maps live.tell live.setup",
-    "live.report": "acquire analysis.field live.results live.maps live.tell live.setup",
+    # A finished run is its results and its recording, or the images it measured.
+    "live.finished": "acquire acquire.camera acquire.session analysis.field live.results live.setup",
+    "live.export": "acquire analysis.field live.results live.maps live.tell live.finished",
+    "live.report": "acquire analysis.field analysis.evaluate analysis.picture live.results live.maps live.tell"
+    " live.setup live.finished live.export",
     "live.batch": "acquire live.replay live.setup live.results",
     "live.serve": "acquire live.operate live.tell live.outputs live.measure",
 }
 # Rooms that have their line before they have a folder.
-TO_COME = {"live.export", "live.report", "live.batch", "live.serve"}
+TO_COME = {"live.batch", "live.serve"}
 # The one door to the simulated devices; it stands in one module, not in its whole room.
 DOORS = {"live.setup.rig": "hw_mocks"}
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from docs.make_architecture import PICTURE, drawing
+from tests.house.messages import quoted, spoken, unsaid
 from tests.house.references import dead_in, dead_references, words
 from tests.house.rooms import PACKAGES
 from tests.house.sources import read_house
@@ -55,3 +56,20 @@ def test_the_picture_is_of_today() -> None:
     assert PICTURE.read_text(encoding="utf-8") == drawing(read_house(ROOT, PACKAGES)), (
         "the rooms or what they say of themselves have changed: python -m docs.make_architecture"
     )
+
+
+def test_quoted_messages_are_said() -> None:
+    sources = [path for place in PACKAGES for path in sorted((ROOT / place).rglob("*.py"))]
+    page, words = ROOT / "docs" / "troubleshooting.md", spoken(sources)
+    assert len(list(quoted(page))) > 40
+    assert not list(unsaid(page, words)), "\n" + "\n".join(unsaid(page, words))
+
+
+@pytest.mark.parametrize(
+    ("quote", "said"), [("the … is full", True), ("the disk is full of …", False), ("full. Go", False)]
+)
+def test_a_message_nobody_says_is_found(tmp_path: Path, quote: str, said: bool) -> None:
+    page, module = tmp_path / "page.md", tmp_path / "module.py"
+    page.write_text(f"text\n> {quote}\n", encoding="utf-8")
+    module.write_text("'full. Go'\nraise E(f'{path}: the {what} ' 'is full; go')\n", encoding="utf-8")
+    assert bool(list(unsaid(page, spoken([module])))) is not said

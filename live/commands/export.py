@@ -1,0 +1,66 @@
+"""``phasedic export``: a finished run in the format of another program."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from acquire.errors import ConfigError
+from live.export import FORMATS, ExportRequest, Options, export
+from live.finished import Display, open_run
+from live.tell import Screen
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic export``."""
+    parser.add_argument("run", help="folder of a run or replay, or a strain.h5")
+    parser.add_argument("--to", required=True, choices=tuple(FORMATS), help="format")
+    parser.add_argument("--out", metavar="PATH", help="file or folder to make (default: in RUN/export)")
+    words = "maps between commas, or all (default: the usual ones; of pictures and stacks the axial strain)"
+    parser.add_argument("--fields", metavar="NAMES", help=words)
+    parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin here, seconds")
+    parser.add_argument("--until", dest="end_s", type=float, metavar="S", help="end here, seconds")
+    words = "tables: one line a ZOI and instant, one line an instant (a file a map), or the means"
+    parser.add_argument("--layout", choices=("long", "wide", "means"), default="long", help=words)
+    add_display(parser)
+    films = parser.add_argument_group("pictures and films")
+    films.add_argument("--fps", type=float, default=10.0, metavar="N", help="instants a second (default 10)")
+    films.add_argument("--limit", type=float, help="colour range -LIMIT to LIMIT (default: automatic)")
+    films.add_argument("--no-picture", action="store_true", help="maps on plain grey")
+
+
+def add_display(parser: argparse.ArgumentParser) -> None:
+    """Units and axes."""
+    group = parser.add_argument_group("units and axes")
+    group.add_argument("--mm", action="store_true", help="lengths in mm; needs --scale")
+    group.add_argument("--scale", type=float, metavar="MM/PX", help="what one pixel measures, in mm")
+    group.add_argument("--y-up", action="store_true", help="y upwards: v and exy change their sign")
+    group.add_argument("--percent", action="store_true", help="strains in percent")
+
+
+def display_of(arguments: argparse.Namespace) -> Display:
+    """Units and axes that were asked for; raises ConfigError where mm are asked for without a scale."""
+    if arguments.mm and arguments.scale is None:
+        raise ConfigError("--mm needs the scale: give --scale with what one pixel measures, in mm")
+    if arguments.scale is not None and not arguments.mm:
+        raise ConfigError("--scale does nothing without --mm; give both")
+    return Display(arguments.scale, arguments.y_up, arguments.percent)
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic export``."""
+    if not 0.1 <= arguments.fps <= 240:
+        raise ConfigError(f"--fps {arguments.fps:g} is not possible; give 0.1 to 240")
+    screen = Screen()
+    request = ExportRequest(
+        arguments.to,
+        None if arguments.out is None else Path(arguments.out),
+        arguments.fields,
+        arguments.start_s,
+        arguments.end_s,
+        display_of(arguments),
+        Options(arguments.layout, arguments.fps, arguments.limit, not arguments.no_picture),
+    )
+    with open_run(arguments.run) as run:
+        screen.say(str(export(run, request, screen)))
+    return 0

@@ -1,0 +1,102 @@
+"""``phasedic report``: a finished run, or several, as one HTML page."""
+
+from __future__ import annotations
+
+import argparse
+from contextlib import ExitStack
+from pathlib import Path
+
+from acquire.errors import ConfigError, PhasedicError
+from live.export import check_free, new_file
+from live.finished import Display, open_run
+from live.report import (
+    NO_BROWSER,
+    Report,
+    Wanted,
+    compare,
+    find_browser,
+    make_report,
+    save_figures,
+    save_page,
+    save_pdf,
+    tests_of,
+    write_table,
+)
+from live.tell import Screen
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic report``."""
+    parser.add_argument("run", nargs="?", help="folder of a run or replay, or a strain.h5")
+    parser.add_argument(
+        "--out", metavar="FILE.html", help="page to write (default: report.html in the folder)"
+    )
+    parser.add_argument("--pdf", action="store_true", help="print it to a PDF beside it; needs a browser")
+    parser.add_argument("--figures", metavar="DIR", help="the figures as SVG, PNG and CSV in a new folder")
+    words = "instant of the maps, seconds; may be given again (default: first, elastic, yield, highest, last)"
+    parser.add_argument(
+        "--at", dest="times", action="append", type=float, default=[], metavar="S", help=words
+    )
+    words = "map to show; may be given again (default: the strain along the load)"
+    parser.add_argument("--field", dest="fields", action="append", default=[], metavar="NAME", help=words)
+    parser.add_argument("--scale", type=float, metavar="MM/PX", help="what one pixel measures, in mm")
+    words = "several tests in one page: curves, mean and scatter, and a CSV beside it"
+    parser.add_argument("--compare", nargs="+", default=[], metavar="RUN", help=words)
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic report``."""
+    runs = [*([arguments.run] if arguments.run else []), *arguments.compare]
+    if not runs:
+        raise ConfigError("give the folder of a run, or several after --compare")
+    screen = Screen()
+    if arguments.pdf and find_browser() is None:
+        raise ConfigError(f"--pdf: {NO_BROWSER}")
+    default = Path("comparison.html") if arguments.compare else None
+    with ExitStack() as opened:
+        found = [opened.enter_context(open_run(run)) for run in runs]
+        out = Path(arguments.out) if arguments.out else default or found[0].path / "report.html"
+        check_free(*_targets(out, arguments))
+        if arguments.compare:
+            tests = tests_of(found)
+            report = compare(tests)
+            with new_file(out.with_suffix(".csv")) as part, part.open("x", encoding="utf-8") as file:
+                write_table(tests, file)
+            screen.say(str(out.with_suffix(".csv")))
+        else:
+            report = make_report(found[0], _wanted(arguments), screen)
+    _save(report, out, arguments, screen)
+    return 0
+
+
+def write_report(folder: Path, screen: Screen) -> None:
+    """``report.html`` in the folder of a run that has just ended; what goes wrong is told and harms nothing."""
+    try:
+        with open_run(folder) as run:
+            save_page(make_report(run, Wanted(), screen), folder / "report.html")
+        screen.say(f"  {folder / 'report.html'}")
+    except PhasedicError as error:
+        screen.say(f"warning: no report was made: {error}")
+
+
+def _wanted(arguments: argparse.Namespace) -> Wanted:
+    scale = Display(arguments.scale).mm_per_px
+    return Wanted(tuple(arguments.fields), tuple(arguments.times), scale)
+
+
+def _targets(out: Path, arguments: argparse.Namespace) -> list[Path]:
+    """All that will be made, so that nothing is made where one of them is taken."""
+    beside = [".csv"] * bool(arguments.compare) + [".pdf"] * arguments.pdf
+    figures = [Path(arguments.figures)] if arguments.figures else []
+    return [out, *(out.with_suffix(suffix) for suffix in beside), *figures]
+
+
+def _save(report: Report, out: Path, arguments: argparse.Namespace, screen: Screen) -> None:
+    save_page(report, out)
+    screen.say(str(out))
+    if arguments.figures:
+        save_figures(report.figures, Path(arguments.figures), screen)
+        screen.say(arguments.figures)
+    if arguments.pdf:
+        save_pdf(out, out.with_suffix(".pdf"))
+        screen.say(str(out.with_suffix(".pdf")))

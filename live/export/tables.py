@@ -1,0 +1,133 @@
+"""Tables as text: ``csv`` with one line a ZOI and instant, one line an instant, or the means.
+
+The first lines begin with ``#`` and say what stands in the columns (``pandas.read_csv(..., comment="#")``,
+``numpy.genfromtxt`` and MATLAB's ``readtable(..., CommentStyle="#")`` pass over them); then come the
+names, with their units, and the numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.load_sample import LoadSample
+from live.export.job import Job
+from live.export.target import new_file, new_folder
+from live.finished import RunFolder
+
+FIRST = ("time_s", "force_N", "stress_Pa", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy")
+_OF_AN_INSTANT = ("time_s", "force_N")
+_PLACE = ("row", "column", "x", "y")
+_AVERAGED = ("u_px", "v_px", "exx", "eyy", "exy")
+
+
+def write_csv(job: Job, path: Path) -> None:
+    """A table in the layout of ``job.options``; the wide one is a folder with a file a map."""
+    if job.options.layout == "wide":
+        with new_folder(path) as folder:
+            _wide(job, folder)
+        return
+    with new_file(path) as part, part.open("x", encoding="utf-8", newline="\n") as file:
+        if job.options.layout == "means":
+            means(job, file)
+        else:
+            _long(job, file)
+
+
+def means(job: Job, file: TextIO, notes: bool = True) -> None:
+    """One line an instant: the means over the valid ZOIs, and what else is known of it."""
+    values = job.strain.values
+    names = [name for name in FIRST if name in values]
+    names += [name for name in values if name not in names]
+    if notes:
+        _comment(file, [*job.notes(), *(_mean_words(job, name) for name in names)])
+    _line(file, [job.display.column(name) for name in names])
+    _rows(file, [job.column(name) for name in names])
+
+
+def _mean_words(job: Job, name: str) -> str:
+    if name in _AVERAGED:
+        return job.display.definition(name) + ", mean over the valid ZOIs"
+    if name.startswith("sigma_"):
+        return f"{job.display.definition(name)}, of that mean; the overlap of ZOIs is taken into account"
+    return job.display.definition(name)
+
+
+def field_table(job: Job, number: int, file: TextIO) -> None:
+    """One instant, a line a ZOI, no notes."""
+    _line(file, [job.display.column(name) for name in (*_PLACE, *job.fields)])
+    _rows(file, [*_places(job), *_values(job, number)])
+
+
+def load_table(run: RunFolder, samples: Sequence[LoadSample], file: TextIO) -> None:
+    """All readings of the load cell, seconds since the start of the test."""
+    _line(file, ["time_s", "force_N"])
+    _rows(file, [[s.t - run.start_monotonic for s in samples], [s.force for s in samples]])
+
+
+def _long(job: Job, file: TextIO) -> None:
+    heads = ["instant", *_OF_AN_INSTANT, *_PLACE, *job.fields]
+    _comment(file, [*job.notes(), *(job.display.definition(name) for name in heads)])
+    _line(file, [job.display.column(name) for name in heads])
+    places = _places(job)
+    for _, number in job.steps():
+        same = [np.full(len(places[0]), value) for value in (number, *_instant(job, number))]
+        _rows(file, [*same, *places, *_values(job, number)])
+
+
+def _places(job: Job) -> list[NDArray[Any]]:
+    """Row, column, x and y of each ZOI that was asked for, (N,) each."""
+    grid = job.strain.grid
+    rows, columns = np.nonzero(grid.active)
+    return [rows, columns, job.display.x(grid)[columns], job.display.y(grid)[rows]]
+
+
+def _values(job: Job, number: int) -> list[NDArray[Any]]:
+    return [job.map(name, number)[job.strain.grid.active] for name in job.fields]
+
+
+def _wide(job: Job, folder: Path) -> None:
+    grid, display = job.strain.grid, job.display
+    _, _, x, y = _places(job)
+    unit = display.unit("x")
+    heads = [*_OF_AN_INSTANT, *(f"x{a:.6g}_y{b:.6g}" for a, b in zip(x, y, strict=True))]
+    for name in job.fields:
+        with (folder / f"{display.column(name)}.csv").open("x", encoding="utf-8", newline="\n") as file:
+            _comment(
+                file,
+                [*job.notes(), display.definition(name), f"one column a ZOI, named by its centre in {unit}"],
+            )
+            _line(file, heads)
+            for _, number in job.steps():
+                _rows(
+                    file, [[value] for value in (*_instant(job, number), *job.map(name, number)[grid.active])]
+                )
+
+
+def _instant(job: Job, number: int) -> list[float]:
+    return [float(job.strain.values[name][number]) for name in _OF_AN_INSTANT]
+
+
+def _comment(file: TextIO, lines: Iterable[str]) -> None:
+    file.writelines(f"# {' '.join(line.split())}\n" for line in lines)
+
+
+def _line(file: TextIO, words: Sequence[str]) -> None:
+    file.write(",".join(words) + "\n")
+
+
+def _rows(file: TextIO, columns: Sequence[NDArray[Any] | Sequence[Any]]) -> None:
+    """Columns of equal length as lines; enough digits to give single precision back."""
+    arrays = [np.asarray(column) for column in columns]
+    form = ",".join(_form(array) for array in arrays) + "\n"
+    file.writelines(form % values for values in zip(*(array.tolist() for array in arrays), strict=True))
+
+
+def _form(array: NDArray[Any]) -> str:
+    if array.dtype.kind in "iub":
+        return "%d"
+    return "%.9g" if array.dtype == np.float32 else "%.10g"

@@ -1,0 +1,169 @@
+"""The folder of a finished run: results, recording and settings, tied together.
+
+with open_run("runs/20261122T081747Z") as run:
+    run.strain.values["eyy"], run.stress, run.events
+"""
+
+from __future__ import annotations
+
+import os
+from dataclasses import fields
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.closing import Closing
+from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.events import Event, EventKind
+from acquire.session import Session
+from live.finished.pictures import Pictures, of_images, of_session
+from live.results import Strain
+from live.setup import SpecimenConfig, from_dict
+
+SESSION, STRAIN = "session.h5", "strain.h5"
+_AS_FILES = ("files:", "video:")
+
+
+class RunFolder(Closing):
+    """A finished run, open for reading; a context manager. ``open_run`` makes one.
+
+    Attributes
+    ----------
+    path : Path
+        The folder.
+    strain : Strain
+        Its results: maps and means.
+    """
+
+    def __init__(self, path: Path, strain: Strain) -> None:
+        self.path, self.strain = path, strain
+        self._sessions: list[Session] = []
+
+    @cached_property
+    def session(self) -> Session | None:
+        """The recording, in this folder or the one that was replayed; None where there is none.
+
+        Raises
+        ------
+        DataError
+            It is there and cannot be read.
+        """
+        path = self.session_path
+        if path is None:
+            return None
+        self._sessions.append(Session.open(path))
+        return self._sessions[-1]
+
+    @property
+    def session_path(self) -> Path | None:
+        """Where the recording lies; None where there is none."""
+        address = self.camera_address
+        replayed = address.removeprefix("session:") if address.startswith("session:") else ""
+        tried = [self.path / SESSION, *([Path(replayed), self.path / replayed] if replayed else [])]
+        return next((path for path in tried if path.is_file()), None)
+
+    @property
+    def camera_address(self) -> str:
+        """What was measured, as it was given."""
+        return str(self.section("camera").get("address") or "")
+
+    def section(self, name: str) -> dict[str, Any]:
+        """A section of the configuration that was in force, as it is stored."""
+        found = self.strain.config.get(name)
+        return found if isinstance(found, dict) else {}
+
+    @cached_property
+    def pictures(self) -> Pictures | None:
+        """Pictures of the measured instants; None where they are not here any more.
+
+        Raises
+        ------
+        DataError
+            The recording is there and cannot be read.
+        """
+        if self.session is not None:
+            return of_session(self.session, self.strain)
+        if not self.camera_address.startswith(_AS_FILES):
+            return None
+        try:
+            return of_images(self.camera_address, self.strain)
+        except PhasedicError:
+            return None
+
+    @property
+    def specimen(self) -> SpecimenConfig:
+        """Section and axis of the load, as stored; what is not stored is not known.
+
+        Raises
+        ------
+        DataError
+            The file says what cannot be.
+        """
+        known = {field.name for field in fields(SpecimenConfig)}
+        stored = {key: value for key, value in self.section("specimen").items() if key in known}
+        try:
+            return from_dict({"specimen": stored}, {}, str(self.strain.path)).specimen
+        except ConfigError as error:
+            raise DataError(f"{error}; make the results again with phasedic replay") from None
+
+    @property
+    def title(self) -> str:
+        """Name of the specimen, else of the folder."""
+        return str(self.strain.metadata.get("specimen") or self.path.resolve().name)
+
+    @property
+    def axial(self) -> str:
+        """The strain along the load: "exx" or "eyy"."""
+        return "exx" if self.specimen.axis == "x" else "eyy"
+
+    @property
+    def transverse(self) -> str:
+        """The strain across the load."""
+        return "eyy" if self.specimen.axis == "x" else "exx"
+
+    @property
+    def force(self) -> NDArray[np.float64]:
+        """Force at each instant, (T,) N; NaN where it is not known."""
+        return np.asarray(self.strain.values["force_N"], np.float64)
+
+    @property
+    def stress(self) -> NDArray[np.float64] | None:
+        """Force over the section, (T,) Pa; None where the section is not known."""
+        area = self.specimen.area_m2
+        return None if area is None else self.force / area
+
+    @cached_property
+    def events(self) -> list[Event]:
+        """What was recorded of events, without the one a burst; empty without a recording."""
+        if self.session is None:
+            return []
+        return [event for event in self.session.events() if event.kind is not EventKind.MEASURED]
+
+    @property
+    def start_monotonic(self) -> float:
+        """Time zero of the results on the clock of the recording's events, s."""
+        return 0.0 if self.session is None else self.session.start_monotonic
+
+    def close(self) -> None:
+        """Close the files; again without effect."""
+        self.strain.close()
+        for session in self._sessions:
+            session.close()
+
+
+def open_run(path: str | os.PathLike[str]) -> RunFolder:
+    """Open the folder of a run, or a ``strain.h5`` in it.
+
+    Raises
+    ------
+    DataError
+        There is no ``strain.h5``, or it cannot be read.
+    """
+    place = Path(path)
+    file = place / STRAIN if place.is_dir() else place
+    if not file.exists():
+        raise DataError(f"{place}: no {STRAIN} there; give the folder that phasedic run or replay wrote")
+    return RunFolder(file.parent, Strain.open(file))

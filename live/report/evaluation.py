@@ -1,0 +1,170 @@
+"""What a finished run tells: tensile figures with their line, the instants worth showing, the still phase."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.evaluate import Tensile, tensile_figures
+from live.finished import RunFolder
+
+Array = NDArray[np.float64]
+_LOW, _HIGH = 0.1, 0.6  # the elastic part, of the proof stress, as ``analysis.evaluate`` takes it
+_STILL_FORCE, _STILL_SIGMAS = 0.01, 5.0
+STILL_LEAST = 3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """The curve of a test and its figures.
+
+    Attributes
+    ----------
+    axial, transverse : (T,) float64
+        Mean strains.
+    load : (T,) float64
+        Stress, Pa, or force, N, where the section is not known; NaN where no force is known.
+    is_stress : bool
+    figures : Tensile
+        In the unit of ``load``.
+    intercept : float
+        Of the elastic line, in the unit of ``load``; NaN where there is none.
+    """
+
+    axial: Array
+    transverse: Array
+    load: Array
+    is_stress: bool
+    figures: Tensile
+    intercept: float
+
+    @classmethod
+    def of(cls, run: RunFolder) -> Curve:
+        """The curve of ``run``."""
+        values, stress = run.strain.values, run.stress
+        load = run.force if stress is None else stress
+        axial, transverse = (np.asarray(values[n], np.float64) for n in (run.axial, run.transverse))
+        figures = tensile_figures(axial, transverse, load)
+        return cls(axial, transverse, load, stress is not None, figures, _intercept(axial, load, figures))
+
+    @property
+    def has_load(self) -> bool:
+        """Whether any force is known."""
+        return bool(np.isfinite(self.load).any())
+
+    @property
+    def elastic(self) -> NDArray[np.bool_]:
+        """Instants of the elastic part, (T,)."""
+        return _elastic(self.load, self.figures)
+
+
+def _elastic(load: Array, figures: Tensile) -> NDArray[np.bool_]:
+    top = figures.Rp02 if math.isfinite(figures.Rp02) else figures.Rm
+    if not math.isfinite(top):
+        return np.zeros(len(load), bool)
+    before = np.arange(len(load)) <= int(np.nanargmax(load))
+    return before & (load >= _LOW * top) & (load <= _HIGH * top)
+
+
+def _intercept(axial: Array, load: Array, figures: Tensile) -> float:
+    part = _elastic(load, figures) & np.isfinite(axial)
+    return float(np.mean(load[part]) - figures.E * np.mean(axial[part])) if part.any() else math.nan
+
+
+def instants(run: RunFolder, curve: Curve) -> dict[int, str]:
+    """Row -> what it is: first, elastic, yield, maximum, last; each row once, in order of time."""
+    found = {0: ["first"]}
+
+    def add(row: int, words: str) -> None:
+        found.setdefault(row, []).append(words)
+
+    elastic = np.flatnonzero(curve.elastic)
+    if len(elastic):
+        add(int(elastic[len(elastic) // 2]), "elastic")
+    if math.isfinite(curve.figures.Rp02):
+        add(_yield_row(curve), "yield (0.2 %)")
+    if curve.has_load:
+        add(int(np.nanargmax(curve.load)), "highest force")
+    elif np.isfinite(curve.axial).any():
+        add(int(np.nanargmax(np.abs(curve.axial))), "largest strain")
+    add(run.strain.n - 1, "last")
+    return {row: ", ".join(words) for row, words in sorted(found.items())}
+
+
+def _yield_row(curve: Curve) -> int:
+    plastic = curve.axial - (curve.load - curve.intercept) / curve.figures.E
+    beyond = np.flatnonzero((plastic >= 0.002) & (curve.load >= 0.98 * curve.figures.Rp02))
+    return int(beyond[0]) if len(beyond) else int(np.nanargmax(curve.load))
+
+
+def nearest_rows(run: RunFolder, times: Sequence[float]) -> dict[int, str]:
+    """Row -> "chosen" of the instants nearest to ``times``, s."""
+    t = run.strain.time_s
+    return {int(np.argmin(np.abs(t - time))): "chosen" for time in sorted(times)}
+
+
+def still_rows(run: RunFolder) -> NDArray[np.intp]:
+    """The instants at the start in which nothing moves: force within 1 % of its range, strain within noise."""
+    values, force = run.strain.values, run.force
+    still = np.ones(run.strain.n, bool)
+    for name in ("exx", "eyy", "exy"):
+        mean, sigma = np.asarray(values[name], np.float64), np.asarray(values[f"sigma_{name}"], np.float64)
+        still &= np.abs(mean) <= _STILL_SIGMAS * sigma
+    if np.isfinite(force).any():
+        first = force[np.isfinite(force)][0]
+        room = _STILL_FORCE * float(np.nanmax(force) - np.nanmin(force))
+        still &= np.abs(force - first) <= room
+    moved = np.flatnonzero(~still)
+    return np.arange(moved[0] if len(moved) else len(still))
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Scatter of single ZOIs in the still phase, and what was predicted.
+
+    Attributes
+    ----------
+    name : str
+    measured, predicted : float
+        rms, px or strain.
+    """
+
+    name: str
+    measured: float
+    predicted: float
+
+
+def noise_floor(run: RunFolder, rows: NDArray[np.intp]) -> list[Noise]:
+    """Over the ZOIs of each still instant: displacements about a plane, strains about their mean.
+
+    Taking off the plane leaves rigid motion and the vibration of the rig out; what is left holds the
+    noise of the picture and of the reference, as the stored uncertainties do.
+    """
+    found = []
+    for name in ("u", "v", "exx", "eyy", "exy"):
+        squares, expected, n = 0.0, 0.0, 0
+        for row in rows:
+            values = np.asarray(run.strain.maps(name, int(row)), np.float64)
+            sigma = np.asarray(run.strain.maps(f"sigma_{name}", int(row)), np.float64)
+            known = np.isfinite(values) & np.isfinite(sigma)
+            terms = 3 if name in ("u", "v") else 1
+            if known.sum() <= terms + 1:
+                continue
+            rest = _without_plane(values, known) if terms == 3 else values[known] - values[known].mean()
+            squares += float(rest @ rest) * known.sum() / (known.sum() - terms)
+            expected += float((sigma[known] ** 2).sum())
+            n += int(known.sum())
+        if n:
+            found.append(Noise(name, math.sqrt(squares / n), math.sqrt(expected / n)))
+    return found
+
+
+def _without_plane(values: Array, known: NDArray[np.bool_]) -> Array:
+    y, x = np.nonzero(known)
+    plane = np.stack([np.ones(len(x)), x, y], axis=1)
+    factors = np.linalg.lstsq(plane, values[known], rcond=None)[0]
+    return np.asarray(values[known] - plane @ factors)

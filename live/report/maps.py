@@ -1,0 +1,130 @@
+"""Maps of a report: beside the picture of their instant, all of a name with one colour bar."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.cv2_loader import load_cv2
+from acquire.frame import CameraInfo
+from analysis.field import Status
+from live.export import Levels, Painter, Scale, caption, status_table
+from live.finished import Display, RunFolder, quantity_of
+from live.maps import number, ramp, ticks
+from live.report.page import Part, captioned, element, joined, safe
+
+_QUALITY = 80
+_STEPS = 16  # colours of the bar
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shots:
+    """Pictures of the instants that are shown.
+
+    Attributes
+    ----------
+    images : mapping of row to (H, W) array, or None where there is no picture
+    levels : Levels or None
+        The same for all.
+    size : (width, height), px
+    camera : CameraInfo or None
+        What took them.
+    """
+
+    images: Mapping[int, NDArray[Any] | None]
+    levels: Levels | None
+    size: tuple[int, int]
+    camera: CameraInfo | None = None
+
+
+def shots(run: RunFolder, rows: list[int]) -> Shots:
+    """Read the pictures; without them, plain grey as large as the ZOIs reach.
+
+    Raises
+    ------
+    DataError
+        The recording is there and cannot be read.
+    """
+    pictures = run.pictures
+    if pictures is None:
+        roi = run.strain.grid.roi
+        return Shots(dict.fromkeys(rows), None, (2 * roi.x + roi.width, 2 * roi.y + roi.height))
+    images: dict[int, NDArray[Any] | None] = dict.fromkeys(rows)
+    images.update(zip(rows, pictures.each(rows), strict=False))
+    first = images[rows[0]]
+    levels = Levels.of(first) if first is not None else None
+    return Shots(images, levels, (pictures.info.width, pictures.info.height), pictures.info)
+
+
+def maps(run: RunFolder, name: str, instants: Mapping[int, str], taken: Shots, longest: int) -> Part:
+    """One map at all instants beside its picture."""
+    display = Display()
+    scale = Scale.of(run.strain, name, list(instants), display)
+    painter = Painter(run.strain, name, display, scale, taken.size, longest)
+    pairs = []
+    for row, words in instants.items():
+        base = painter.picture(taken.images[row], taken.levels)
+        beside = [_picture(painter.over(base, row), f"{name}, {words}")]
+        if taken.images[row] is not None:
+            beside.insert(0, _picture(base, f"picture, {words}"))
+        pairs.append(
+            captioned(element("div", joined(beside, "")), f"{words}: {caption(run.strain, row)}", "pair")
+        )
+    words = quantity_of(name).words
+    bar = captioned(
+        _bar(name, scale),
+        f"{words}; beyond the ends the colours stay; without colour there is no value",
+        "bar",
+    )
+    return joined(
+        [element("h3", f"{name}, {scale.unit}"), bar, element("div", joined(pairs), class_="pairs")]
+    )
+
+
+def statuses(run: RunFolder, row: int, taken: Shots, longest: int) -> Part:
+    """Why ZOIs have no value at an instant: the map and the counts."""
+    painter = Painter(run.strain, "status", Display(), None, taken.size, longest)
+    base = painter.picture(taken.images.get(row), taken.levels)
+    picture = _picture(painter.over(base, row), "status of each ZOI")
+    found, counts = np.unique(run.strain.maps("status", row)[run.strain.grid.active], return_counts=True)
+    known = {int(status): status for status in Status}
+    table, lines = status_table(), []
+    for value, count in zip(found.tolist(), counts.tolist(), strict=True):
+        words = f"{known[value].name}: {known[value].text}" if value in known else f"status {value}"
+        red, green, blue, _ = table[min(value, len(table) - 1)]
+        key = Part(f'<span class="key" style="background:rgb({red},{green},{blue})"></span>')
+        lines.append(Part(f"<p>{key}{count} {safe(words)}</p>"))
+    return joined([captioned(element("div", picture), caption(run.strain, row), "pair"), *lines])
+
+
+def _picture(image: NDArray[np.uint8], words: str) -> Part:
+    cv2 = load_cv2()
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    text = base64.b64encode(bytes(data)).decode("ascii")
+    height, width = image.shape[:2]
+    source = f"data:image/jpeg;base64,{text}"
+    return Part(f'<img src="{source}" width="{width}" height="{height}" alt="{safe(words)}">')
+
+
+def _bar(name: str, scale: Scale) -> Part:
+    """The colours from low to high with their numbers, as SVG."""
+    colours = ramp(_STEPS, 1)[::-1, 0]
+    boxes = "".join(
+        f'<rect x="{10 + k * 480 / _STEPS:.1f}" y="4" width="{480 / _STEPS + 0.5:.1f}" height="14"'
+        f' fill="rgb({r},{g},{b})"/>'
+        for k, (r, g, b) in enumerate(colours.tolist())
+    )
+    words = "".join(
+        f'<text class="word" text-anchor="middle" x="{10 + 480 * (v - scale.low) / (scale.high - scale.low):.1f}"'
+        f' y="34">{safe(number(v))}</text>'
+        for v in ticks(scale.low, scale.high, about=7)
+    )
+    label = safe(f"colours of {name} from {scale.low:g} to {scale.high:g} {scale.unit}")
+    return Part(
+        f'<svg class="plot" viewBox="0 0 500 40" role="img" aria-label="{label}">{boxes}{words}</svg>'
+    )

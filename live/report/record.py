@@ -1,0 +1,88 @@
+"""What was kept of a run: ledger, events, definitions, versions, hashes."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+from live.finished import MEANS, RunFolder, quantity_of
+from live.report.page import Part, element, facts, joined, paragraph, table
+from live.setup import versions
+from live.tell import Screen
+
+_MOST_EVENTS = 3000
+_KINDS = (".h5", ".csv", ".json", ".png", ".tif")
+_FIGURES = (
+    ("E", "Pa", "slope of stress over axial mean strain between 10 % and 60 % of Rp0.2, by least squares"),
+    ("EA", "N", "the same of force where the section is not known"),
+    ("nu", "1", "minus the slope of transverse over axial mean strain in the same part"),
+    ("Rp0.2", "Pa", "stress where the curve crosses the elastic line moved by 0.2 % strain"),
+    ("Rm", "Pa", "highest stress: force over the undeformed section"),
+)
+
+
+def ledger(run: RunFolder) -> Part:
+    """The counts of frames."""
+    found = run.session.ledger if run.session is not None else None
+    return facts(found) if found else paragraph("No ledger was recorded.", "dim")
+
+
+def events(run: RunFolder) -> Part:
+    """All events; of more than 3000 the first."""
+    found = run.events
+    rows = [
+        (
+            f"{event.t - run.start_monotonic:.3f}",
+            element("span", event.level, class_=event.level),
+            event.kind.value,
+            event.source,
+            event.text,
+        )
+        for event in found[:_MOST_EVENTS]
+    ]
+    if not rows:
+        return paragraph("No events were recorded.", "dim")
+    left = len(found) - len(rows)
+    more = paragraph(f"{left} more events are in session.h5.", "warning") if left else Part("")
+    return joined([table(("time, s", "level", "kind", "who", "what"), rows, (0,)), more])
+
+
+def definitions(run: RunFolder) -> Part:
+    """What every number is."""
+    names = ["x", "y", *run.strain.names, *(MEANS.get(name, name) for name in run.strain.values)]
+    known = {q.name: q for q in map(quantity_of, names)}
+    rows = [(q.name, q.unit or "1", q.words) for q in known.values()]
+    words = (
+        "x right, y down, from the centre of the first pixel; all maps lie on the reference picture. Strain"
+        f" measure: {run.strain.strain_measure}. Strains are dimensionless in the files."
+    )
+    return joined([paragraph(words), table(("", "unit", "what it is"), [*rows, *_FIGURES])])
+
+
+def version_table(run: RunFolder) -> Part:
+    """Of the programs that measured, and of those that made the report."""
+    then = {str(key): str(value) for key, value in run.strain.versions.items()}
+    now = versions()
+    rows = [(name, then.get(name, ""), now.get(name, "")) for name in {**then, **now}]
+    return table(("", "measured with", "report made with"), rows)
+
+
+def hashes(run: RunFolder, screen: Screen) -> Part:
+    """The files of the run as they are on the disk, and the recording that was replayed."""
+    files = {path for path in run.path.iterdir() if path.suffix in _KINDS}
+    session = run.session_path
+    beside = [session] if session is not None and session.parent.resolve() != run.path.resolve() else []
+    rows = []
+    for path in [*sorted(files), *beside]:
+        screen.status(f"reading {path.name} for its hash")
+        size = f"{path.stat().st_size:,}".replace(",", "\u202f")
+        rows.append((path.name, size, element("span", _sha256(path), class_="code")))
+    return table(("file", "bytes", "SHA-256"), rows, (1,))
+
+
+def _sha256(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"

@@ -1,0 +1,236 @@
+"""The report of one run: what was tested, how, what came out, how well, and from which files."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import DataError
+from live.finished import RunFolder
+from live.report import curves
+from live.report.evaluation import (
+    STILL_LEAST,
+    Curve,
+    Noise,
+    instants,
+    nearest_rows,
+    noise_floor,
+    still_rows,
+)
+from live.report.maps import Shots, maps, shots, statuses
+from live.report.page import Part, captioned, element, facts, joined, page, paragraph, section, table, tiles
+from live.report.practice import Known, reporting_table
+from live.report.record import definitions, events, hashes, ledger, version_table
+from live.report.svg import Figure, draw
+from live.tell import Screen, quantity
+
+MOST_BYTES = 5_000_000
+_SIDES = (720, 480, 320, 200)  # px, of the pictures: smaller ones where the page would be too large
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What a report shows.
+
+    Attributes
+    ----------
+    fields : tuple of str
+        Maps; the strain along the load where empty.
+    times : tuple of float, s
+        Instants of the maps; automatic where empty.
+    mm_per_px : float or None
+    """
+
+    fields: tuple[str, ...] = ()
+    times: tuple[float, ...] = ()
+    mm_per_px: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Report:
+    """A page and the figures on it."""
+
+    html: str
+    figures: tuple[Figure, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Content:
+    """What is worked out once, whatever the size of the pictures."""
+
+    run: RunFolder
+    curve: Curve
+    figures: tuple[Figure, ...]
+    instants: dict[int, str]
+    shots: Shots
+    still: NDArray[np.intp]
+    noise: list[Noise]
+    files: Part
+
+
+def make_report(run: RunFolder, wanted: Wanted, screen: Screen) -> Report:
+    """The report of ``run``, below 5 MB.
+
+    Raises
+    ------
+    DataError
+        Its files cannot be read, or hold no measurement, or not this map.
+    """
+    if not run.strain.n:
+        raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to report")
+    content = _content(run, wanted, screen)
+    for side in _SIDES:
+        text = page(f"{run.title}: phasedic report", _parts(content, wanted, side))
+        if len(text.encode()) < MOST_BYTES:
+            break
+    return Report(text, content.figures)
+
+
+def _content(run: RunFolder, wanted: Wanted, screen: Screen) -> _Content:
+    curve = Curve.of(run)
+    chosen = nearest_rows(run, wanted.times) if wanted.times else instants(run, curve)
+    still = still_rows(run)
+    noise = noise_floor(run, still) if len(still) >= STILL_LEAST else []
+    return _Content(
+        run, curve, _figures(run, curve), chosen, shots(run, list(chosen)), still, noise, hashes(run, screen)
+    )
+
+
+def _figures(run: RunFolder, curve: Curve) -> tuple[Figure, ...]:
+    first = [curves.stress_strain(curve)] if curve.has_load else []
+    found = [*first, curves.force(run), curves.means(run), curves.valid(run)]
+    return tuple(figure for figure in found if figure is not None)
+
+
+def _parts(content: _Content, wanted: Wanted, side: int) -> list[Part]:
+    run, taken, chosen = content.run, content.shots, content.instants
+    fields = wanted.fields or (run.axial,)
+    reference = next((image for image in taken.images.values() if image is not None), None)
+    known = Known(run, taken.camera, reference, content.noise, wanted.mm_per_px)
+    return [
+        _head(run, content.curve),
+        section("Specimen and rig", facts(_rig(run, taken))),
+        section("Curves", plots(content.figures), _about_curves(content.curve)),
+        section("Maps", *(maps(run, name, chosen, taken, side) for name in fields)),
+        section("Noise floor", *_noise_section(content)),
+        section("Status of the ZOIs", statuses(run, max(chosen), taken, min(side, 480))),
+        section("Ledger and events", ledger(run), events(run)),
+        section("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
+        section("Definitions", definitions(run)),
+        section("Versions and files", version_table(run), content.files),
+    ]
+
+
+def _head(run: RunFolder, curve: Curve) -> Part:
+    now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
+    words = f"Test of {run.strain.start_utc}: {run.strain.n} measurements in {run.strain.time_s[-1]:.4g} s."
+    unfinished = "The results were not closed by their writer; all complete rows are here."
+    return joined(
+        [
+            element("h1", run.title),
+            paragraph(f"{words} Report made by phasedic on {now}.", "dim"),
+            paragraph(unfinished, "warning") if run.strain.unfinished else Part(""),
+            tiles({**tensile(curve), **_extent(run, curve)}),
+        ]
+    )
+
+
+def tensile(curve: Curve) -> dict[str, str]:
+    """E, nu and the strengths by name, each with its uncertainty; what the curve does not tell is left out."""
+    found, figures, load = {}, curve.figures, curves.load_unit(curve)
+    if math.isfinite(figures.E):
+        name, factor, unit = ("E", 1e-9, "GPa") if curve.is_stress else ("EA", 1e-3, "kN per unit strain")
+        found[name] = _estimate(figures.E * factor, figures.sigma_E * factor, unit)
+    if math.isfinite(figures.nu):
+        found["nu"] = _estimate(figures.nu, figures.sigma_nu, "")
+    if math.isfinite(figures.Rp02):
+        found["Rp0.2" if curve.is_stress else "Fp0.2"] = f"{figures.Rp02 * load.factor:.4g} {load.name}"
+    if curve.has_load:
+        found["Rm" if curve.is_stress else "highest force"] = (
+            f"{np.nanmax(curve.load) * load.factor:.4g} {load.name}"
+        )
+    return found
+
+
+def _estimate(value: float, sigma: float, unit: str) -> str:
+    return quantity(value, sigma, unit).replace("+-", "±")
+
+
+def _extent(run: RunFolder, curve: Curve) -> dict[str, str]:
+    values, e = run.strain.values, curves.strain_unit(curve.axial)
+    found = {"ZOIs with a value, last": f"{int(values['n_valid'][-1])} of {int(values['n_zoi'][-1])}"}
+    if np.isfinite(curve.axial).any():
+        largest = curve.axial[np.nanargmax(np.abs(curve.axial))] * e.factor
+        found[f"largest mean {run.axial}"] = f"{largest:.4g} {e.name}"
+    return found
+
+
+def _rig(run: RunFolder, taken: Shots) -> dict[str, object]:
+    s, camera, grid = run.specimen, taken.camera, run.strain.grid
+    found: dict[str, object] = {str(key): value for key, value in run.strain.metadata.items()}
+    known = s.width_mm is not None and s.thickness_mm is not None
+    found["section"] = (
+        f"{s.width_mm:g} mm x {s.thickness_mm:g} mm" if known else "not known: forces, no stresses"
+    )
+    found["load along"] = f"{s.axis} of the picture"
+    if camera is not None:
+        fps = f", {camera.fps:g} frames/s" if camera.fps else ""
+        size = f"{camera.width} x {camera.height} px, {camera.bits} bits{fps}, clock: {camera.clock}"
+        found["camera"] = f"{camera.name}: {size}"
+    found["camera address"] = run.camera_address or "not recorded"
+    cell = run.session.load_cell if run.session is not None else None
+    if cell is not None:
+        found["load cell"] = cell.name + (f", capacity {cell.capacity_N:g} N" if cell.capacity_N else "")
+    warnings = [*(camera.warnings if camera else ()), *(cell.warnings if cell else ())]
+    if warnings:
+        found["warnings of the devices"] = "; ".join(warnings)
+    found["ZOIs"] = (
+        f"{grid.n_active} of {grid.size} px, {grid.step} px apart, region x,y,w,h = {grid.roi.text} px"
+    )
+    return found
+
+
+def plots(figures: tuple[Figure, ...]) -> Part:
+    """Figures side by side as there is room."""
+    found = [
+        captioned(Part(draw(figure).replace("<svg ", '<svg class="plot" ', 1)), figure.title)
+        for figure in figures
+    ]
+    return element("div", joined(found), class_="plots")
+
+
+def _about_curves(curve: Curve) -> Part:
+    if not curve.has_load:
+        return paragraph("No force is known at any instant, so there is no stress-strain curve.", "dim")
+    words = "Bands are one standard uncertainty of the mean on either side."
+    if math.isfinite(curve.figures.E):
+        proof = "of the proof stress" if math.isfinite(curve.figures.Rp02) else "of the highest load"
+        words += f" The elastic line has {curve.figures.n_elastic} instants, from 10 % to 60 % {proof}."
+    return paragraph(words, "dim")
+
+
+def _noise_section(content: _Content) -> list[Part]:
+    n = len(content.still)
+    if not content.noise:
+        words = (
+            "No still phase was found: fewer than three instants before anything moves. With the specimen at rest"
+            " for a few seconds at the start of a test the noise floor is measured there."
+        )
+        return [paragraph(words, "open")]
+    rows = []
+    for noise in content.noise:
+        factor, unit = (1.0, "px") if noise.name in ("u", "v") else (1e6, "µm/m")
+        ratio = f"{noise.measured / noise.predicted:.2f}" if noise.predicted else "not known"
+        rows.append(
+            (noise.name, f"{noise.measured * factor:.3g}", f"{noise.predicted * factor:.3g}", unit, ratio)
+        )
+    words = (
+        f"Standard deviation of single ZOIs in the first {n} instants (to {content.run.strain.time_s[n - 1]:.4g} s),"
+        " in which nothing moves yet: displacements about a plane, strains about their mean. Predicted: from the"
+        " noise of the pictures, as every value's sigma."
+    )
+    return [paragraph(words), table(("", "measured", "predicted", "", "ratio"), rows, (1, 2, 4))]

@@ -1,0 +1,105 @@
+"""A run's folder read back: results and recording together, pictures by instant, and what is not there."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+
+from acquire.errors import DataError
+from acquire.record_mode import RecordMode
+from live.cli import main
+from live.finished import open_run
+from tests.live.made_run import CONFIG, E_PA, PULLED, make_run, session_writer
+from tests.live.made_up import START, make_measurement
+
+
+def test_results_and_recording_are_tied_together(tmp_path: Path) -> None:
+    with open_run(make_run(tmp_path)) as run:
+        assert run.title == "S1"
+        assert (run.axial, run.transverse) == ("eyy", "exx")
+        assert run.strain.n == len(PULLED)
+        assert run.stress is not None
+        elastic = (run.strain.values["eyy"] > 1e-4) & (run.strain.values["eyy"] < 2.5e-3)
+        np.testing.assert_allclose(run.stress[elastic] / run.strain.values["eyy"][elastic], E_PA, rtol=0.02)
+        assert [e.kind for e in run.events] == ["start", "reference", "note"]
+        assert run.start_monotonic == START
+        assert run.session is not None
+        assert run.session.ledger is not None
+
+
+def test_pictures_are_those_of_the_middle_of_the_burst(tmp_path: Path) -> None:
+    with open_run(make_run(tmp_path)) as run:
+        assert run.pictures is not None
+        levels = [int(image[0, 0]) - 100 for image in run.pictures.each([0, 3, 47])]
+        assert [level // 8 for level in levels] == [0, 3, 47]
+        assert all(level % 8 in (3, 4) for level in levels)
+
+
+def test_a_results_file_alone_is_a_run_without_pictures(tmp_path: Path) -> None:
+    make_run(tmp_path, session=False)
+    with open_run(tmp_path / "strain.h5") as run:
+        assert run.session is None
+        assert run.pictures is None
+        assert run.events == []
+        assert run.path == tmp_path
+
+
+def test_a_replay_finds_the_session_it_was_made_from(tmp_path: Path) -> None:
+    recorded = make_run(tmp_path / "live") / "session.h5"
+    config = {**CONFIG, "camera": {"address": f"session:{recorded}"}}
+    with open_run(make_run(tmp_path / "again", session=False, config=config)) as run:
+        assert run.session_path == recorded
+        assert run.pictures is not None
+
+
+def test_a_replay_of_pictures_finds_them_again(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    pattern = cv2.GaussianBlur(rng.normal(size=(96, 128)).astype(np.float32), (0, 0), 2.0)
+    for k in range(4):
+        image = np.clip(128 + 300 * pattern + k, 0, 255).astype(np.uint8)
+        image[0, 0] = k
+        cv2.imwrite(str(tmp_path / f"a{k}.png"), image)
+    out = str(tmp_path / "out")
+    arguments = ["--zoi", "32", "--out", out, "--no-view", "--no-rrd"]
+    assert main(["replay", f"files:{tmp_path}/*.png", *arguments]) == 0
+    with open_run(out) as run:
+        assert run.pictures is not None
+        assert [int(image[0, 0]) for image in run.pictures.each([0, 2])] == [1, 3]
+    for path in tmp_path.glob("a*.png"):
+        path.unlink()
+    with open_run(out) as run:
+        assert run.pictures is None
+
+
+def test_a_recording_of_bursts_gives_their_means(tmp_path: Path) -> None:
+    make_run(tmp_path, PULLED[:5], session=False)
+    image = np.arange(96 * 128, dtype=np.float32).reshape(96, 128) % 4000
+    with session_writer(tmp_path, {}, {}, RecordMode("bursts")) as writer:
+        for k in range(5):
+            burst = make_measurement(k).burst
+            mean = np.round(image + k)
+            clipped = np.zeros(mean.shape, bool)
+            writer.write_burst(dataclasses.replace(burst, mean=mean, clipped=clipped))
+    with open_run(tmp_path) as run:
+        assert run.pictures is not None
+        assert [float(picture[0, 0]) for picture in run.pictures.each([0, 2, 4])] == [0.0, 2.0, 4.0]
+
+
+def test_what_is_not_a_run_is_refused_in_words(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"no strain\.h5 there; give the folder"):
+        open_run(tmp_path)
+    make_run(tmp_path)
+    (tmp_path / "session.h5").write_bytes(b"no HDF5")
+    with open_run(tmp_path) as run, pytest.raises(DataError, match=r"session\.h5"):
+        _ = run.pictures
+    with h5py.File(tmp_path / "strain.h5", "a") as file:
+        del file["entry/config"]
+        file["entry/config"] = json.dumps({"specimen": {"width_mm": "wide"}})
+    with open_run(tmp_path) as run, pytest.raises(DataError, match=r"width_mm"):
+        _ = run.specimen
