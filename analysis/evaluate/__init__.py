@@ -1,10 +1,14 @@
 """Figures from fields: what a test engineer or a map wants of them.
 
-``gauges`` are virtual gauges and extensometers on a field, by the ``extension`` of two ends. ``tensile`` has E, nu and the strengths of a stress-strain curve, ``deconvolution`` takes the blur of the
-ZOI off a map.
+``gauges`` are virtual gauges and extensometers on a field, by the ``extension`` of two ends. ``tensile``
+evaluates a test: a ``curve`` by one of the ``standards``, its ``elastic`` line and its ``strengths``, each a
+``figure`` with an interval, from ``series`` of noisy values. ``deconvolution`` takes
+the blur of the ZOI off a map.
 """
 
+from analysis.evaluate.curve import Curve, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
+from analysis.evaluate.figure import CONFIDENCE, Figure
 from analysis.evaluate.gauges import (
     AreaGauge,
     Gauge,
@@ -15,19 +19,33 @@ from analysis.evaluate.gauges import (
     gauge_zois,
     measure_gauge,
 )
-from analysis.evaluate.tensile import Tensile, tensile_figures
+from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
+from analysis.evaluate.tensile import Options, Span, TensileFigures, Zero, ZeroBy, evaluate_test
 
 __all__ = [
+    "CONFIDENCE",
+    "STANDARDS",
     "AreaGauge",
+    "Band",
+    "Curve",
+    "Figure",
     "Gauge",
     "GaugeValue",
+    "Interval",
     "LineGauge",
-    "Tensile",
+    "Options",
+    "Span",
+    "Standard",
+    "TensileFigures",
     "TransverseGauge",
+    "Zero",
+    "ZeroBy",
     "ZoiGauge",
     "deconvolved",
     "effect",
+    "evaluate_test",
+    "free",
     "gauge_zois",
     "measure_gauge",
-    "tensile_figures",
+    "true_curve",
 ]
