@@ -2,8 +2,8 @@
 
 ``gauges`` are virtual gauges and extensometers on a field, by the ``extension`` of two ends. ``tensile``
 evaluates a test: a ``curve`` by one of the ``standards``, its ``elastic`` line and its ``strengths``, each a
-``figure`` with an interval, from ``series`` of noisy values. ``deconvolution`` takes
-the blur of the ZOI off a map.
+``figure`` with an interval, from ``series`` of noisy values. ``lag`` tells how late the
+load comes beside the frames. ``deconvolution`` takes the blur of the ZOI off a map.
 """
 
 from analysis.evaluate.curve import Curve, true_curve
@@ -19,6 +19,7 @@ from analysis.evaluate.gauges import (
     gauge_zois,
     measure_gauge,
 )
+from analysis.evaluate.lag import Track, find_lag
 from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
 from analysis.evaluate.tensile import Options, Span, TensileFigures, Zero, ZeroBy, evaluate_test
 
@@ -37,6 +38,7 @@ __all__ = [
     "Span",
     "Standard",
     "TensileFigures",
+    "Track",
     "TransverseGauge",
     "Zero",
     "ZeroBy",
@@ -44,6 +46,7 @@ __all__ = [
     "deconvolved",
     "effect",
     "evaluate_test",
+    "find_lag",
     "free",
     "gauge_zois",
     "measure_gauge",
