@@ -48,16 +48,22 @@ def extension(field: StrainField, ends: Ends) -> Extension:
     used = share != 0
     weights = share[used]
     x, y = np.meshgrid(field.grid.x, field.grid.y)
-    before = np.array([weights @ x[used], weights @ y[used]])
+    before = np.array([_sum(weights * x[used]), _sum(weights * y[used])])
     length = float(np.hypot(*before))
     if length == 0:
         return Extension(math.nan, math.nan, 0.0)
     # The difference of the lengths loses no digits where the extension is small.
-    moved = np.array([weights @ field.u[used], weights @ field.v[used]])
+    moved = np.array([_sum(weights * field.u[used]), _sum(weights * field.v[used])])
     now = float(np.hypot(*(before + moved)))
     strain = float(moved @ (2 * before + moved)) / (now + length) / length
     spread = weights * _sigma_along(field, (before + moved) / now)[used]
-    return Extension(strain, math.sqrt(float(spread @ _correlation(field, used) @ spread)) / length, length)
+    variance = _sum(np.outer(spread, spread) * _correlation(field, used))
+    return Extension(strain, math.sqrt(max(variance, 0.0)) / length, length)
+
+
+def _sum(values: Floats) -> float:
+    """The sum, in the order of the values: the same bits wherever they lie in memory."""
+    return float(np.cumsum(values)[-1]) if values.size else 0.0
 
 
 def _sigma_along(field: StrainField, direction: Floats) -> Floats:

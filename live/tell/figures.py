@@ -5,7 +5,19 @@ from __future__ import annotations
 import math
 
 from acquire.load_cell import LoadLog
-from analysis.evaluate import CONFIDENCE, Curve, Figure, TensileFigures, evaluate_test
+from analysis.evaluate import (
+    CONFIDENCE,
+    STANDARDS,
+    Curve,
+    Figure,
+    Interval,
+    Options,
+    TensileFigures,
+    Track,
+    evaluate_test,
+    find_lag,
+    free,
+)
 from live.measure import History
 from live.setup import SpecimenConfig
 
@@ -40,7 +52,26 @@ def evaluate(history: History, loads: LoadLog, specimen: SpecimenConfig) -> Tens
     """The tensile figures of the run; stresses are forces (N) where the section is not known."""
     axial, transverse = history.along(specimen.axis)
     stress = history.forces(loads) / (specimen.area_m2 or 1.0)
-    return evaluate_test(Curve(history.column("t"), axial, stress, transverse))
+    return evaluate_test(Curve(history.column("t"), axial, stress, transverse), options_of(specimen))
+
+
+def options_of(specimen: SpecimenConfig) -> Options:
+    """How the configuration asks for the evaluation; a preload (MPa) needs a section, and is let go without."""
+    standard = STANDARDS.get(specimen.standard) or free(Interval("strain", *specimen.modulus_between))
+    if specimen.zero == "preload" and specimen.area_m2 is not None:
+        return Options(standard, "preload", specimen.preload_MPa * 1e6)
+    return Options(standard, "toe" if specimen.zero == "toe" else "raw")
+
+
+def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
+    """How late the load comes, as the test itself tells it; nothing without a load."""
+    t, force = loads.arrays()
+    if not len(t):
+        return []
+    lag = find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
+    if not lag.known:
+        return [f"lag of the load beside the frames: not known ({lag.why})"]
+    return [f"lag of the load beside the frames: {interval(lag, 1e-3, 'ms')} ({CONFIDENCE:.0%}; not applied)"]
 
 
 def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]:
@@ -76,7 +107,8 @@ def figure_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]
     )
     known = [(name, getattr(figures, name)) for name in _EXTENSIONS if getattr(figures, name).known]
     if known:
-        lines.append("  ".join(f"{name} = {interval(figure, 0.01, '%')}" for name, figure in known))
+        length = f"  (gauge length {specimen.gauge_length_mm:g} mm)" if specimen.gauge_length_mm else ""
+        lines.append("  ".join(f"{name} = {interval(figure, 0.01, '%')}" for name, figure in known) + length)
     if figures.rate_elastic.known:
         words = f" ({figures.rate_elastic.why})" if figures.rate_elastic.why else ""
         lines.append(f"strain rate {figures.rate_elastic.value:.3g} 1/s in the elastic part{words}")

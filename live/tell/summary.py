@@ -9,7 +9,7 @@ import numpy as np
 from acquire.load_cell import LoadLog
 from live.measure import History
 from live.setup import SpecimenConfig
-from live.tell.figures import evaluate, figure_lines
+from live.tell.figures import evaluate, figure_lines, lag_line
 
 
 def noise_line(history: History) -> str:
@@ -50,7 +50,8 @@ def summary_lines(history: History, loads: LoadLog, specimen: SpecimenConfig) ->
         noise_line(history),
     ]
     lines += latency_lines(history)
-    return lines + figure_lines(evaluate(history, loads, specimen), specimen)
+    figures = figure_lines(evaluate(history, loads, specimen), specimen)
+    return lines + figures + (lag_line(history, loads, specimen) if figures else [])
 
 
 def file_lines(folder: Path) -> list[str]:

@@ -30,7 +30,15 @@ def test_file_and_command_line(tmp_path: Path) -> None:
 
 
 def test_stored_configuration_comes_back() -> None:
-    config = load_config(None, {"measure.burst": 3, "specimen.width_mm": 10.0, "metadata.note": "x"})
+    config = load_config(
+        None,
+        {
+            "measure.burst": 3,
+            "specimen.width_mm": 10.0,
+            "specimen.modulus_between": [0.001, 0.002],
+            "metadata.note": "x",
+        },
+    )
     assert from_dict(config.as_dict(), {}, "a session") == config
 
 
@@ -51,6 +59,9 @@ def test_a_file_sets_only_what_it_says(tmp_path: Path) -> None:
         ("[measure]\nwindow = 'hann'\n", "one of 'gaussian', 'uniform', 'tukey', 'bi-triangular'"),
         ("[record]\nmode = 'every=0'\n", "every=K"),
         ("[specimen]\nwidth_mm = nan\n", "specimen.width_mm"),
+        ("[specimen]\nmodulus_between = [0.003, 0.001]\n", "0 <= from < to"),
+        ("[specimen]\nmodulus_between = 0.1\n", "two strains, from and to"),
+        ("[specimen]\nstandard = 'din'\n", "one of 'iso6892', 'iso527'"),
         ("[load]\nmax_gap_s = inf\n", "load.max_gap_s"),
         ("measure = 3\n", "must be a section"),
         ("[metadata]\nx = [1]\n", "metadata.x"),
