@@ -21,7 +21,16 @@ from live.outputs import About, Outputs, make_outputs
 from live.replay.material import Material, ReplayRequest
 from live.replay.pictures import picture_material, picture_of
 from live.replay.session import session_config, session_material, session_path
-from live.setup import Config, correction, grid_for, kernel_settings, load_config, make_folder, read_mask
+from live.setup import (
+    Config,
+    correction,
+    gauges_for,
+    grid_for,
+    kernel_settings,
+    load_config,
+    make_folder,
+    read_mask,
+)
 from live.tell import Books, Journal, Ledger, Screen
 
 
@@ -83,7 +92,7 @@ def _run(
     camera = material.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
     grid = grid_for(config, camera.width, camera.height, mask)
-    correct = correction(config, camera)
+    correct, gauges = correction(config, camera), gauges_for(config, grid)
     settings, stated = kernel_settings(config), config.measure.noise_GL
     what = f"the reference of {request.source}"
     kernel, noise_GL = prepare(material.reference, grid, settings, stated, correct, what)
@@ -99,6 +108,7 @@ def _run(
             material.loads,
             noise_GL=noise_GL,
             correct=correct,
+            gauges=gauges,
             renew_at=config.measure.renew_at,
             on_event=books.journal,
             timer=time.perf_counter,

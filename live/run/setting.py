@@ -20,6 +20,7 @@ from live.setup import (
     Config,
     Rig,
     correction,
+    gauges_for,
     grid_for,
     kernel_settings,
     make_folder,
@@ -31,6 +32,7 @@ from live.tell import Journal, Screen
 
 if TYPE_CHECKING:
     from analysis import KernelSettings, ZoiGrid
+    from analysis.evaluate import Gauge
 
 _WORTH_TELLING_S = 3.0
 
@@ -46,6 +48,7 @@ class Setting:
     rig : Rig
         Open, not yet entered.
     grid : ZoiGrid
+    gauges : tuple of Gauge
     settings : KernelSettings
     correct : callable
         Takes the fixed pattern of the sensor out of a burst.
@@ -60,6 +63,7 @@ class Setting:
     config: Config
     rig: Rig
     grid: ZoiGrid
+    gauges: tuple[Gauge, ...]
     settings: KernelSettings
     correct: Correction
     bursts: tuple[int, int]
@@ -78,13 +82,13 @@ def set_up(config: Config, rig: Rig, journal: Journal, screen: Screen) -> Settin
     camera = rig.camera.info
     mask = _mask(config, rig)
     grid = grid_for(config, camera.width, camera.height, mask)
-    settings = kernel_settings(config)
+    gauges, settings = gauges_for(config, grid), kernel_settings(config)
     correct = correction(config, camera)
     bursts = _burst_lengths(config, camera.live)
     _rehearse(rig, grid, settings, bursts, screen)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
     config = with_flat_field(with_mask(config, mask, folder), folder)
-    return Setting(config, rig, grid, settings, correct, bursts, folder, _time_zero(rig, journal))
+    return Setting(config, rig, grid, gauges, settings, correct, bursts, folder, _time_zero(rig, journal))
 
 
 def _mask(config: Config, rig: Rig) -> NDArray[np.bool_] | None:
