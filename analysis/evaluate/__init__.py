@@ -1,10 +1,54 @@
 """Figures from fields: what a test engineer or a map wants of them.
 
-``tensile`` has E, nu and the strengths of a stress-strain curve, ``deconvolution`` takes the blur of the
-ZOI off a map.
+``gauges`` are virtual gauges and extensometers on a field, by the ``extension`` of two ends. ``tensile``
+evaluates a test: a ``curve`` by one of the ``standards``, its ``elastic`` line and its ``strengths``, each a
+``figure`` with an interval, from ``series`` of noisy values. ``lag`` tells how late the
+load comes beside the frames. ``deconvolution`` takes the blur of the ZOI off a map.
 """
 
+from analysis.evaluate.curve import Curve, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
-from analysis.evaluate.tensile import Tensile, tensile_figures
+from analysis.evaluate.figure import CONFIDENCE, Figure
+from analysis.evaluate.gauges import (
+    AreaGauge,
+    Gauge,
+    GaugeValue,
+    LineGauge,
+    TransverseGauge,
+    ZoiGauge,
+    gauge_zois,
+    measure_gauge,
+)
+from analysis.evaluate.lag import Track, find_lag
+from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
+from analysis.evaluate.tensile import Options, Span, TensileFigures, Zero, ZeroBy, evaluate_test
 
-__all__ = ["Tensile", "deconvolved", "effect", "tensile_figures"]
+__all__ = [
+    "CONFIDENCE",
+    "STANDARDS",
+    "AreaGauge",
+    "Band",
+    "Curve",
+    "Figure",
+    "Gauge",
+    "GaugeValue",
+    "Interval",
+    "LineGauge",
+    "Options",
+    "Span",
+    "Standard",
+    "TensileFigures",
+    "Track",
+    "TransverseGauge",
+    "Zero",
+    "ZeroBy",
+    "ZoiGauge",
+    "deconvolved",
+    "effect",
+    "evaluate_test",
+    "find_lag",
+    "free",
+    "gauge_zois",
+    "measure_gauge",
+    "true_curve",
+]

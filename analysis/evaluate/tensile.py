@@ -1,141 +1,321 @@
-"""Figures of a tensile test from its stress-strain curve: E, nu, Rp0.2, Rm.
+"""A tensile test evaluated: modulus, Poisson's ratio, strengths, extensions and rates, each with its interval.
 
-Arrays in, one frozen result out. Loads are tension positive, strains dimensionless, stresses Pa.
-The elastic slope follows ISO 6892-1 (annex G) in spirit: a straight line through the part of the
-curve between two fractions of the proof stress, which is itself found with that line.
+``evaluate_test`` takes a ``Curve`` and a ``Standard``. The curve itself stays as it was measured; where its
+strain counts from is an option that the result tells of.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-LOW, HIGH = 0.1, 0.6  # of the proof stress (of the highest stress, where there is none)
-OFFSET = 0.002
-FEWEST = 5
+from analysis.evaluate.curve import Curve, Loading
+from analysis.evaluate.elastic import FEWEST, Line, between, chord, line_through, poisson
+from analysis.evaluate.figure import Figure
+from analysis.evaluate.series import first_crossing, reading
+from analysis.evaluate.standards import STANDARDS, Band, Standard
+from analysis.evaluate.strengths import (
+    Yield,
+    highest_stress,
+    proof_strength,
+    strain_at_break,
+    strain_at_top,
+    yield_point,
+)
 
-Array = NDArray[np.float64]
+ZeroBy = Literal["raw", "toe", "preload"]
+
+_ROUNDS = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
-    """A straight line through points: slope, its standard uncertainty, intercept, and how many points."""
+class Options:
+    """How a test is evaluated.
 
-    slope: float
-    sigma: float
-    intercept: float
+    Attributes
+    ----------
+    standard : Standard
+    zero : "raw", "toe" or "preload"
+        Strain counts as measured, from where the elastic line has no stress (toe compensation), or from
+        where the stress first reaches ``preload``.
+    preload : float, Pa
+    """
+
+    standard: Standard = STANDARDS["iso6892"]
+    zero: ZeroBy = "raw"
+    preload: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.zero not in ("raw", "toe", "preload"):
+            raise ValueError(f"unknown zero {self.zero!r}; known: raw, toe, preload")
+        if self.zero == "preload" and not self.preload > 0:
+            raise ValueError("a zero at a preload needs that preload, in Pa above 0")
+
+
+@dataclass(frozen=True, slots=True)
+class Zero:
+    """The measured strain that counts as none, and how it was found, in words."""
+
+    strain: float
+    how: str
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """The elastic interval that was used: its strains (from zero), its stresses (Pa), and how many points."""
+
+    strain: tuple[float, float]
+    stress: tuple[float, float]
     n: int
 
 
 @dataclass(frozen=True, slots=True)
-class Tensile:
-    """What a tensile test tells; NaN where it does not.
+class TensileFigures:
+    """What a tensile test tells; every figure has an interval, or says why it cannot be had.
 
     Attributes
     ----------
-    E, sigma_E : float, Pa
-        Young's modulus and its standard uncertainty from the scatter about the line.
-    nu, sigma_nu : float
-        Poisson's ratio over the same part of the curve.
-    Rp02 : float, Pa
-        Proof stress at 0.2 % plastic strain.
-    Rm : float, Pa
-        Highest stress.
-    n_elastic : int
-        Points on the line.
+    E, E_chord : Figure, Pa
+        By regression and by chord over ``span``.
+    r2 : float
+        Coefficient of determination of the regression; NaN without one.
+    nu : Figure
+    Rp01, Rp02, Rp1 : Figure, Pa
+        Proof strengths at 0.1, 0.2 and 1 % plastic strain.
+    ReH, ReL : Figure, Pa
+    Rm : Figure, Pa
+    Agt, Ag, At, A : Figure
+        Total and plastic strain at the highest stress, and at break; not in percent.
+    rate_elastic, rate_plastic : Figure, 1/s
+        Strain rate over ``span``, and over the second half of the strain from there to the highest
+        stress; ``why`` holds it against the standard.
+    seconds : Figure, s
+        From the start of the loading to the break, or to the highest stress.
+    span : Span or None
+    zero : Zero
+    standard : str
     """
 
-    E: float
-    sigma_E: float
-    nu: float
-    sigma_nu: float
-    Rp02: float
-    Rm: float
-    n_elastic: int
+    E: Figure
+    E_chord: Figure
+    r2: float
+    nu: Figure
+    Rp01: Figure
+    Rp02: Figure
+    Rp1: Figure
+    ReH: Figure
+    ReL: Figure
+    Rm: Figure
+    Agt: Figure
+    Ag: Figure
+    At: Figure
+    A: Figure
+    rate_elastic: Figure
+    rate_plastic: Figure
+    seconds: Figure
+    span: Span | None
+    zero: Zero
+    standard: str
 
 
-def straight_line(x: Array, y: Array) -> Line:
-    """Least-squares line of y over x; NaN with fewer than 3 points or no spread in x.
-
-    Parameters
-    ----------
-    x, y : (N,) float64
-    """
-    n = len(x)
-    if n < 3 or np.ptp(x) == 0:
-        return Line(math.nan, math.nan, math.nan, n)
-    dx, dy = x - x.mean(), y - y.mean()
-    sxx = float(dx @ dx)
-    slope = float(dx @ dy) / sxx
-    rest = dy - slope * dx
-    sigma = math.sqrt(float(rest @ rest) / (n - 2) / sxx)
-    return Line(slope, sigma, float(y.mean() - slope * x.mean()), n)
-
-
-def tensile_figures(axial: Array, transverse: Array, stress: Array) -> Tensile:
+def evaluate_test(curve: Curve, options: Options | None = None) -> TensileFigures:
     """Evaluate a test.
 
     Parameters
     ----------
-    axial, transverse : (N,) float64
-        Mean strain along and across the load; NaN where unknown.
-    stress : (N,) float64, Pa
-        Or any multiple of the force: E and the strengths come in the same unit.
+    curve : Curve
+        As measured, from before the load to the end.
+    options : Options, optional
 
     Returns
     -------
-    Tensile
+    TensileFigures
     """
-    good = np.isfinite(axial) & np.isfinite(transverse) & np.isfinite(stress)
-    axial, transverse, stress = axial[good], transverse[good], stress[good]
-    if len(stress) < FEWEST or stress.max() <= 0:
-        nothing = math.nan
-        return Tensile(nothing, nothing, nothing, nothing, nothing, nothing, 0)
-    top = int(np.argmax(stress)) + 1  # the loading part alone
-    elastic, proof = _elastic_line(axial[:top], stress[:top])
-    window = _window(stress[:top], proof if math.isfinite(proof) else float(stress.max()))
-    contraction = straight_line(axial[:top][window], -transverse[:top][window])
-    return Tensile(
-        E=elastic.slope,
-        sigma_E=elastic.sigma,
-        nu=contraction.slope,
-        sigma_nu=contraction.sigma,
-        Rp02=proof,
-        Rm=float(stress.max()),
-        n_elastic=elastic.n,
+    options = options or Options()
+    loading = Loading.of(curve)
+    if loading.n < FEWEST or loading.stress[loading.top] <= 0:
+        return _nothing(f"strain and a tensile stress are known together at {loading.n} points", options)
+    elastic = _elastic(loading, options)
+    if isinstance(elastic, str):
+        return _without_line(loading, options, elastic)
+    return _with_line(loading, options, elastic)
+
+
+@dataclass(frozen=True, slots=True)
+class _Elastic:
+    line: Line
+    flow: Yield
+    zero: Zero
+
+
+def _elastic(loading: Loading, options: Options) -> _Elastic | str:
+    """The elastic line and what its interval hangs on, found in turns until they agree; or why there is none."""
+    limit, zero = 0.5 * float(loading.stress[loading.top]), Zero(0.0, "as measured")
+    found: _Elastic | None = None
+    for _ in range(_ROUNDS):
+        first, last, words = _interval(loading, options.standard, limit, zero.strain)
+        if found and (first, last) == (found.line.first, found.line.last):
+            break
+        line = line_through(loading, first, last)
+        if line is None:
+            return f"{last - first} points {words}, and {FEWEST} that rise are needed"
+        zero = _zero(loading, options, line)
+        found = _Elastic(line, yield_point(loading, line), zero)
+        known = [f for f in (found.flow.upper, proof_strength(loading, line, 0.002)) if f.known]
+        limit = known[0].value if known else float(loading.stress[loading.top])
+    return found or "no points"
+
+
+def _interval(loading: Loading, standard: Standard, limit: float, zero: float) -> tuple[int, int, str]:
+    """First and last point of the elastic interval, and the interval in words."""
+    rule, course = standard.interval, loading.course[: loading.top + 1] - zero
+    low, high = rule.low, rule.high
+    if rule.by == "yield":
+        first, last = between(loading.level[: loading.top + 1], low * limit, high * limit)
+        return first, last, f"between {100 * low:g} % and {100 * high:g} % of the yield strength"
+    if standard.brittle and course[-1] < standard.brittle[0]:
+        low, high = (share * float(course[-1]) for share in standard.brittle[1:])
+    return *between(course, low, high), f"between the strains {100 * low:.3g} % and {100 * high:.3g} %"
+
+
+def _zero(loading: Loading, options: Options, line: Line) -> Zero:
+    if options.zero == "toe":
+        return Zero(line.strain0, "where the elastic line has no stress (toe compensation)")
+    if options.zero == "raw":
+        return Zero(0.0, "as measured")
+    at = first_crossing(loading.level, options.preload)
+    if math.isnan(at):
+        return Zero(
+            float(loading.strain[0]), "the first value; the preload was there from the beginning or never"
+        )
+    k = int(at)
+    value = reading(loading.strain, at, k - FEWEST, k + FEWEST, loading.noise_strain).value
+    return Zero(value, "where the stress first reached the preload")
+
+
+def _with_line(loading: Loading, options: Options, elastic: _Elastic) -> TensileFigures:
+    line, flow, zero = elastic.line, elastic.flow, elastic.zero.strain
+    rp01, rp02, rp1 = (proof_strength(loading, line, offset) for offset in (0.001, 0.002, 0.01))
+    agt, at = (_from_zero(f(loading), zero) for f in (strain_at_top, strain_at_break))
+    ends = [float(loading.stress[k]) for k in (loading.top, -1)]
+    figures = TensileFigures(
+        E=line.modulus,
+        E_chord=chord(loading, line),
+        r2=line.r2,
+        nu=poisson(loading, line),
+        Rp01=rp01,
+        Rp02=rp02,
+        Rp1=rp1,
+        ReH=flow.upper,
+        ReL=flow.lower,
+        Rm=_strength(loading),
+        Agt=agt,
+        Ag=_plastic(agt, ends[0], line),
+        At=at,
+        A=_plastic(at, ends[1], line),
+        rate_elastic=_rate(loading, line.first, line.last, options.standard.rates_elastic),
+        rate_plastic=_rate(loading, _midway(loading, line), loading.top + 1, options.standard.rates_plastic),
+        seconds=_seconds(loading, options.standard),
+        span=_span(loading, line, zero),
+        zero=elastic.zero,
+        standard=options.standard.name,
+    )
+    return figures if options.standard.flow else _without_flow(figures)
+
+
+def _without_flow(figures: TensileFigures) -> TensileFigures:
+    none = Figure.none(f"not a figure of {figures.standard}")
+    return replace(figures, Rp01=none, Rp02=none, Rp1=none, ReH=none, ReL=none, Ag=none, A=none)
+
+
+def _without_line(loading: Loading, options: Options, why: str) -> TensileFigures:
+    zero = 0.0 if options.zero != "preload" else float(loading.strain[0])
+    how = "as measured" if options.zero != "preload" else "the first value"
+    return replace(
+        _nothing(f"no elastic line: {why}", options),
+        Rm=_strength(loading),
+        Agt=_from_zero(strain_at_top(loading), zero),
+        At=_from_zero(strain_at_break(loading), zero),
+        seconds=_seconds(loading, options.standard),
+        zero=Zero(zero, how),
     )
 
 
-def _elastic_line(axial: Array, stress: Array) -> tuple[Line, float]:
-    """The line and the proof stress found with it, repeated until both agree."""
-    proof = math.nan
-    limit = 0.5 * float(stress.max())
-    line = straight_line(axial, stress)
-    for _ in range(6):
-        window = _window(stress, limit)
-        if window.sum() < FEWEST:
-            window = stress <= np.sort(stress)[min(FEWEST, len(stress)) - 1]
-        line = straight_line(axial[window], stress[window])
-        proof = _proof_stress(axial, stress, line)
-        limit = proof if math.isfinite(proof) else float(stress.max())
-    return line, proof
+def _nothing(why: str, options: Options) -> TensileFigures:
+    texts = {
+        "span": None,
+        "zero": Zero(0.0, "as measured"),
+        "standard": options.standard.name,
+        "r2": math.nan,
+    }
+    names = [f.name for f in fields(TensileFigures) if f.name not in texts]
+    return TensileFigures(**dict.fromkeys(names, Figure.none(why)), **texts)  # type: ignore[arg-type]
 
 
-def _window(stress: Array, limit: float) -> NDArray[np.bool_]:
-    return (stress >= LOW * limit) & (stress <= HIGH * limit)
+def _strength(loading: Loading) -> Figure:
+    found = highest_stress(loading, loading.top)
+    rises = not loading.broke and loading.level[-1] >= loading.level.max() - 3 * loading.noise_stress
+    return replace(found, why="so far: the test ended while the stress still rose") if rises else found
 
 
-def _proof_stress(axial: Array, stress: Array, line: Line) -> float:
-    """Where the curve crosses the elastic line moved by 0.2 % strain; NaN where it never does."""
-    if not line.slope > 0:
-        return math.nan
-    plastic = axial - (stress - line.intercept) / line.slope
-    beyond = np.flatnonzero(plastic >= OFFSET)
-    if not len(beyond) or beyond[0] == 0:
-        return math.nan
-    i = int(beyond[0])
-    part = (OFFSET - plastic[i - 1]) / (plastic[i] - plastic[i - 1])
-    return float(stress[i - 1] + part * (stress[i] - stress[i - 1]))
+def _from_zero(strain: Figure, zero: float) -> Figure:
+    return strain.minus(zero) if strain.known else strain
+
+
+def _plastic(total: Figure, stress: float, line: Line) -> Figure:
+    if not total.known:
+        return total
+    return total.minus(stress / line.slope, stress / line.slope * line.sigma / line.slope)
+
+
+def _span(loading: Loading, line: Line, zero: float) -> Span:
+    ends = [line.first, line.last - 1]
+    strain, stress = loading.course[ends] - zero, loading.level[ends]
+    return Span((float(strain[0]), float(strain[1])), (float(stress[0]), float(stress[1])), line.n)
+
+
+def _rate(loading: Loading, first: int, last: int, bands: tuple[Band, ...]) -> Figure:
+    """The slope of strain over time, held against the bands of a standard."""
+    t, strain = loading.t[first:last], loading.strain[first:last]
+    if len(t) < 3 or np.ptp(t) == 0:
+        return Figure.none(f"{len(t)} points of that part are known")
+    dt, de = t - t.mean(), strain - strain.mean()
+    stt = float(dt @ dt)
+    slope = float(dt @ de) / stt
+    rest = de - slope * dt
+    found = Figure.about(slope, math.sqrt(float(rest @ rest) / (len(t) - 2) / stt), len(t) - 2)
+    return replace(found, why=_against(slope, bands))
+
+
+def _midway(loading: Loading, line: Line) -> int:
+    """Where half the strain between the elastic interval and the highest stress has gone."""
+    first, last = line.last - 1, loading.top
+    if last <= first:
+        return last + 1
+    half = 0.5 * (loading.course[first] + loading.course[last])
+    return first + int(np.argmax(loading.course[first:] >= half))
+
+
+def _against(rate: float, bands: tuple[Band, ...]) -> str:
+    if not bands:
+        return ""
+    inside = [band for band in bands if band.low <= rate <= band.high]
+    if inside:
+        return f"within {inside[0].name}"
+    allowed = ", ".join(f"{band.name} {band.low:.2g} to {band.high:.2g} 1/s" for band in bands)
+    return f"outside the standard ({allowed})"
+
+
+def _seconds(loading: Loading, standard: Standard) -> Figure:
+    begins = first_crossing(loading.level, 0.02 * float(loading.stress[loading.top]))
+    start = loading.t[0] if math.isnan(begins) else np.interp(begins, np.arange(loading.n), loading.t)
+    last = loading.n - 1 if loading.broke else loading.top
+    value, step = float(loading.t[last] - start), float(np.median(np.diff(loading.t)))
+    wanted, words = standard.seconds_to_break, ""
+    if wanted and loading.broke:
+        inside = wanted[0] <= value <= wanted[1]
+        words = f"{'within' if inside else 'outside'} {wanted[0]:g} to {wanted[1]:g} s of the standard"
+    return Figure(value, value - step, value + step, words)

@@ -22,7 +22,7 @@ from live.measure import Measurement
 from live.outputs import Consumer
 from live.run import Outcome
 from live.setup import Config
-from live.tell import Screen, evaluate, quantity
+from live.tell import Screen, evaluate, interval
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid
@@ -177,8 +177,8 @@ def compare(outcome: Outcome, kept: Kept, config: Config, say: Callable[[str], N
     agreed = _say_strain(np.array(ratios), np.array(errors), say)
     _say_force(outcome, specimen, say)
     figures = evaluate(outcome.books.history, outcome.books.loads, config.specimen)
-    say(f"  E  {quantity(figures.E / 1e9, figures.sigma_E / 1e9, 'GPa')}, true {specimen.E / 1e9:g} GPa")
-    say(f"  nu {quantity(figures.nu, figures.sigma_nu, '')}, true {specimen.nu:g}")
+    say(f"  E  {interval(figures.E, 1e9, 'GPa')}, true {specimen.E / 1e9:g} GPa")
+    say(f"  nu {interval(figures.nu)}, true {specimen.nu:g}")
     return agreed
 
 

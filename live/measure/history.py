@@ -30,6 +30,16 @@ class History:
         return np.array([loads.force_at(instant.t) for instant in self.instants], np.float64)
 
     def along(self, axis: str) -> tuple[Array, Array]:
-        """Mean strain along and across the load."""
+        """Strain along and across the load: the gauges ``axial`` and ``transverse``, or else the means."""
         names = ("eyy", "exx") if axis == "y" else ("exx", "eyy")
-        return self.column(names[0]), self.column(names[1])
+        axial, transverse = self.gauge("axial"), self.gauge("transverse")
+        return (
+            self.column(names[0]) if axial is None else axial,
+            self.column(names[1]) if transverse is None else transverse,
+        )
+
+    def gauge(self, name: str) -> Array | None:
+        """A gauge over time, (N,) float64; None where there is none of that name."""
+        if not self.instants or name not in self.instants[0].gauges:
+            return None
+        return np.array([instant.gauges[name].value for instant in self.instants], np.float64)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 if TYPE_CHECKING:
     from acquire.frame import Burst
+    from analysis.evaluate import GaugeValue
     from analysis.field import StrainField
 
 
@@ -39,6 +41,8 @@ class Instant:
         Time the kernel took; 0.0 where nobody measured it.
     latency_s : float, s
         From the stamp of the burst's last frame to this result; NaN in a replay.
+    gauges : mapping of name to GaugeValue
+        In the order of the configuration.
     """
 
     t: float
@@ -59,6 +63,7 @@ class Instant:
     noise_GL: float
     measure_s: float
     latency_s: float = math.nan
+    gauges: Mapping[str, GaugeValue] = field(default_factory=dict)
 
 
 def instant_of(burst: Burst, field: StrainField, force: float, measure_s: float = 0.0) -> Instant:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from acquire.frame import Burst
+from analysis.evaluate import Gauge, measure_gauge
 from analysis.field import StrainField
 from live.measure.instant import Instant, instant_of
 
@@ -29,10 +31,15 @@ class Measurement:
 
     @classmethod
     def of(
-        cls, number: int, burst: Burst, field: StrainField, force: float, measure_s: float = 0.0
-    ) -> Measurement:
-        """The same with its means; ``force`` (N) is NaN where it is not known, ``measure_s`` the kernel's time."""
-        return cls(number, burst, field, instant_of(burst, field, force, measure_s))
+        cls, number: int, burst: Burst, field: StrainField, force: float, measure_s: float = 0.0,
+        gauges: Sequence[Gauge] = (),
+    ) -> Measurement:  # fmt: skip
+        """The same with its means and ``gauges``.
+
+        ``force`` (N) is NaN where it is not known, ``measure_s`` (s) the kernel's time.
+        """
+        read = {gauge.name: measure_gauge(gauge, field) for gauge in gauges}
+        return cls(number, burst, field, replace(instant_of(burst, field, force, measure_s), gauges=read))
 
     @property
     def t(self) -> float:

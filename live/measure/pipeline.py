@@ -6,7 +6,7 @@ threads, files, devices or clocks, so a replay of the same bursts is bit-equal t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,6 +19,7 @@ from live.measure.tracker import Tracker
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
+    from analysis.evaluate import Gauge
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +39,7 @@ def measure(
     *,
     noise_GL: float | None = None,
     correct: Correction = unchanged,
+    gauges: Sequence[Gauge] = (),
     renew_at: float = 1.0,
     on_event: EventSink = ignore_event,
     timer: Timer = lambda: 0.0,
@@ -55,6 +57,8 @@ def measure(
         Noise of one frame (``frame_noise``); None: estimated by the kernel from the residual.
     correct : callable
         Takes the fixed pattern of the sensor out of a burst.
+    gauges : sequence of Gauge
+        Read on every field.
     renew_at : float
         The reference is renewed when more than this share of the ZOIs is lost from one burst to
         the next, and renewing finds most of them again; 1 for never.
@@ -77,5 +81,5 @@ def measure(
         began = timer()
         field = tracker.measure(correct(item))
         took = timer() - began
-        yield Measurement.of(number, item, field, loads.force_at(item.t), took)
+        yield Measurement.of(number, item, field, loads.force_at(item.t), took, gauges)
         number += 1

@@ -14,7 +14,7 @@ from live.outputs.files import Files
 from live.outputs.outputs import Outputs
 from live.outputs.watching import CardWriter, Watching
 from live.results import Results, ResultsInfo
-from live.setup import Config, versions
+from live.setup import Config, describe, versions
 from live.tell import Books, Screen, StatusCard
 from live.view import RerunView, ViewSetup, spawn_viewer
 
@@ -61,6 +61,7 @@ def make_outputs(about: About, books: Books, screen: Screen, more: Sequence[Cons
         versions(),
         about.camera,
         area_m2=config.specimen.area_m2,
+        gauges={name: describe(table) for name, table in config.gauges.items()},
     )
     consumers: list[Consumer] = [Files(Results(about.folder, about.grid, info))]
     view = _view(about)

@@ -25,6 +25,7 @@ from live.setup import (
     Config,
     compile_ahead,
     correction,
+    gauges_for,
     grid_for,
     kernel_settings,
     kinds_of,
@@ -93,7 +94,7 @@ def _run(
     camera = material.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
     grid = grid_for(config, camera.width, camera.height, mask)
-    correct = correction(config, camera)
+    correct, gauges = correction(config, camera), gauges_for(config, grid)
     settings, stated = kernel_settings(config), config.measure.noise_GL
     compile_ahead(kinds_of(camera), phase=settings.estimator == "phase", say=screen.status)
     what = f"the reference of {request.source}"
@@ -110,6 +111,7 @@ def _run(
             material.loads,
             noise_GL=noise_GL,
             correct=correct,
+            gauges=gauges,
             renew_at=config.measure.renew_at,
             on_event=books.journal,
             timer=time.perf_counter,

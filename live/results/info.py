@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from live.results.row import StrainMeasure
@@ -30,6 +30,8 @@ class ResultsInfo:
     strain_measure : "small" | "green" | "hencky"
     area_m2 : float or None, m^2
         Cross-section of the specimen; with it the rows have a stress.
+    gauges : mapping of name to JSON values
+        The virtual gauges, each as it was described.
     """
 
     start_monotonic: float
@@ -40,3 +42,4 @@ class ResultsInfo:
     camera: CameraInfo | None
     strain_measure: StrainMeasure = "small"
     area_m2: float | None = None
+    gauges: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)

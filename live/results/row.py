@@ -53,6 +53,11 @@ class Row:
         return cls(maps, _values(measurement, maps, info))
 
 
+def gauge_columns(name: str) -> tuple[str, str]:
+    """The names that value and standard uncertainty of a virtual gauge have in files."""
+    return f"gauge_{name}", f"sigma_gauge_{name}"
+
+
 def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any]]:
     """The (R, C) arrays of a field by the names they have in files; strains in ``measure``."""
     plain = ("u", "v", *GRADIENTS, *STRAINS)
@@ -85,6 +90,8 @@ def _values(measurement: Measurement, maps: dict[str, NDArray[Any]], info: RowIn
         "u_px": instant.u,
         "v_px": instant.v,
     }
+    for name, gauge in instant.gauges.items():
+        values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma), strict=True))
     if info.area_m2 is not None:
         values["stress_Pa"] = instant.force / info.area_m2
     return values

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 
 from acquire.errors import DataError
-from live.results.row import Row
+from live.results.row import Row, gauge_columns
 
 COLUMNS = (
     *("frame", "time_s", "force_N", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy"),
     *("n_valid", "n_zoi", "noise_GL", "n_frames", "last_frame", "lost", "duration_s", "u_px", "v_px"),
 )
-"""Means over the valid ZOIs; strains are dimensionless. ``stress_Pa`` follows where it is known."""
+"""Means over the valid ZOIs; strains are dimensionless. ``stress_Pa`` follows where it is known, then value and
+sigma of each virtual gauge."""
 
 
 class CsvWriter:
@@ -23,9 +26,10 @@ class CsvWriter:
         The file exists, or cannot be written.
     """
 
-    def __init__(self, path: Path, *, with_stress: bool = False) -> None:
+    def __init__(self, path: Path, *, with_stress: bool = False, gauges: Iterable[str] = ()) -> None:
         self._path = path
-        self._columns = (*COLUMNS, "stress_Pa") if with_stress else COLUMNS
+        stress = ("stress_Pa",) if with_stress else ()
+        self._columns = (*COLUMNS, *stress, *chain.from_iterable(map(gauge_columns, gauges)))
         try:
             self._file = path.open("x", encoding="ascii", newline="\n")
         except OSError as error:

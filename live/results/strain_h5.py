@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +17,7 @@ import numpy as np
 from acquire.errors import DataError
 from acquire.hdf5 import let_go
 from live.results.info import FORMAT, FORMAT_VERSION
-from live.results.row import GRADIENTS, STRAINS, Row
+from live.results.row import GRADIENTS, STRAINS, Row, gauge_columns
 from live.results.strain_csv import COLUMNS
 
 if TYPE_CHECKING:
@@ -104,7 +105,8 @@ def _map_names() -> tuple[str, ...]:
 def _value_names(info: ResultsInfo) -> tuple[str, ...]:
     # The time comes last: a reader that sees it sees the whole row.
     names = tuple(name for name in COLUMNS if name != "time_s")
-    return (*names, "stress_Pa", "time_s") if info.area_m2 is not None else (*names, "time_s")
+    stress = ("stress_Pa",) if info.area_m2 is not None else ()
+    return (*names, *stress, *chain.from_iterable(map(gauge_columns, info.gauges)), "time_s")
 
 
 def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
@@ -127,6 +129,7 @@ def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
     entry["title"] = str(info.metadata.get("specimen", "") or "phasedic")
     _add_strain(entry, grid, info)
     _add_mean(entry, info)
+    _add_gauges(entry, info)
     _add_notes(entry, info)
     file.flush()
     file.swmr_mode = True
@@ -151,6 +154,19 @@ def _add_mean(entry: Any, info: ResultsInfo) -> None:
     entry["strain/time_s"] = mean["time_s"]
     for name in ("force_N", "frame", "last_frame", "n_frames", "noise_GL", "lost"):
         entry[f"strain/{name}"] = mean[name]
+
+
+def _add_gauges(entry: Any, info: ResultsInfo) -> None:
+    """The columns of the virtual gauges by their names, and what each of them is."""
+    if not info.gauges:
+        return
+    first = next(iter(info.gauges))
+    group = _group(entry, "gauges", "NXdata", signal=first, axes=["time_s"], title="Virtual gauges")
+    group["time_s"] = entry["mean/time_s"]
+    for name, described in info.gauges.items():
+        column, sigma = gauge_columns(name)
+        group[name], group[f"sigma_{name}"] = entry["mean"][column], entry["mean"][sigma]
+        entry["mean"][column].attrs.update(uncertainties=sigma, gauge=json.dumps(described))
 
 
 def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:

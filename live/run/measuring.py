@@ -97,6 +97,7 @@ class Measuring:
             self._books.loads,
             noise_GL=noise_GL,
             correct=self._setting.correct,
+            gauges=self._setting.gauges,
             renew_at=self._setting.config.measure.renew_at,
             on_event=journal.record,
             timer=time.perf_counter,

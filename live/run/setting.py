@@ -20,6 +20,7 @@ from live.setup import (
     Rig,
     compile_ahead,
     correction,
+    gauges_for,
     grid_for,
     kernel_settings,
     kinds_of,
@@ -32,6 +33,7 @@ from live.tell import Journal, Screen
 
 if TYPE_CHECKING:
     from analysis import KernelSettings, ZoiGrid
+    from analysis.evaluate import Gauge
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,6 +47,7 @@ class Setting:
     rig : Rig
         Open, not yet entered.
     grid : ZoiGrid
+    gauges : tuple of Gauge
     settings : KernelSettings
     correct : callable
         Takes the fixed pattern of the sensor out of a burst.
@@ -59,6 +62,7 @@ class Setting:
     config: Config
     rig: Rig
     grid: ZoiGrid
+    gauges: tuple[Gauge, ...]
     settings: KernelSettings
     correct: Correction
     bursts: tuple[int, int]
@@ -77,13 +81,13 @@ def set_up(config: Config, rig: Rig, journal: Journal, screen: Screen) -> Settin
     camera = rig.camera.info
     mask = _mask(config, rig)
     grid = grid_for(config, camera.width, camera.height, mask)
-    settings = kernel_settings(config)
+    gauges, settings = gauges_for(config, grid), kernel_settings(config)
     correct = correction(config, camera)
     bursts = _burst_lengths(config, camera.live)
     _rehearse(rig, grid, settings, bursts, screen)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
     config = with_flat_field(with_mask(config, mask, folder), folder)
-    return Setting(config, rig, grid, settings, correct, bursts, folder, _time_zero(rig, journal))
+    return Setting(config, rig, grid, gauges, settings, correct, bursts, folder, _time_zero(rig, journal))
 
 
 def _mask(config: Config, rig: Rig) -> NDArray[np.bool_] | None:

@@ -2,13 +2,14 @@
 
 ``sections`` are the keys of the configuration with their ``checks`` and options, ``config`` reads and
 overlays it, ``rig`` opens the devices (and is the one door to the simulated ones), ``grid`` lays the ZOIs,
-``pictures`` reads mask, dark and flat, ``compiling`` has the loops compiled ahead, ``folder`` makes the
-place for the files.
+``gauges`` the virtual gauges on it, ``pictures`` reads mask, dark and flat, ``compiling`` has the loops
+compiled ahead, ``folder`` makes the place for the files.
 """
 
 from live.setup.compiling import compile_ahead, kinds_of
 from live.setup.config import Config, from_dict, load_config, options, settings_in
 from live.setup.folder import FILES, make_folder, versions
+from live.setup.gauges import GaugeConfig, describe, gauges_for
 from live.setup.grid import grid_for, kernel_settings, whole_picture
 from live.setup.pictures import correction, read_mask, with_flat_field, with_mask
 from live.setup.rig import Rig, open_load, open_rig
@@ -19,11 +20,14 @@ __all__ = [
     "DEFAULT_REFERENCE_BURST",
     "FILES",
     "Config",
+    "GaugeConfig",
     "Rig",
     "SpecimenConfig",
     "compile_ahead",
     "correction",
+    "describe",
     "from_dict",
+    "gauges_for",
     "grid_for",
     "kernel_settings",
     "kinds_of",

@@ -129,8 +129,42 @@ def _record_mode(value: Any) -> str:
     raise Refused("'all', 'bursts' or 'every=K' with K from 1")
 
 
+def _point(value: Any) -> tuple[float, float]:
+    if not isinstance(value, list | tuple) or len(value) != 2 or not all(_finite(v) for v in value):
+        raise Refused("two numbers: x, y in px")
+    return float(value[0]), float(value[1])
+
+
+def _finite(value: Any) -> bool:
+    return type(value) in (int, float) and abs(value) < 1e6
+
+
+def _corners(value: Any) -> tuple[tuple[float, float], ...]:
+    if not isinstance(value, list | tuple) or not 3 <= len(value) <= 100:
+        raise Refused("3 to 100 corners [x, y], px")
+    return tuple(_point(corner) for corner in value)
+
+
+def _strains(value: Any) -> tuple[float, float]:
+    if (
+        not isinstance(value, list | tuple)
+        or len(value) != 2
+        or any(type(v) not in (int, float) for v in value)
+    ):
+        raise Refused("two strains, from and to, as [0.0005, 0.0025]")
+    low, high = float(value[0]), float(value[1])
+    if not 0 <= low < high <= 1:
+        raise Refused("two strains with 0 <= from < to <= 1")
+    return low, high
+
+
 TEXT = Check(_text)
 FLAG = Check(_flag)
 BOX = Check(_box, _read_box)
 """x, y, width, height in px."""
+STRAINS = Check(_strains)
+"""An interval of strains."""
+POINT = Check(_point)
+CORNERS = Check(_corners)
+"""x, y in px; of the corners of a polygon."""
 RECORD_MODE = Check(_record_mode)

@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 from acquire.errors import ConfigError
 from live.setup.checks import Option, Refused
+from live.setup.gauges import NAME, GaugeConfig
 from live.setup.sections import (
     CameraConfig,
     LoadConfig,
@@ -32,7 +33,7 @@ Section = TypeVar("Section")
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """All sections, and free metadata (specimen, operator, material, note ...)."""
+    """All sections, virtual gauges by name, and free metadata (specimen, operator, material, note ...)."""
 
     camera: CameraConfig = field(default_factory=CameraConfig)
     load: LoadConfig = field(default_factory=LoadConfig)
@@ -41,6 +42,7 @@ class Config:
     view: ViewConfig = field(default_factory=ViewConfig)
     specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
     output: OutputConfig = field(default_factory=OutputConfig)
+    gauges: Mapping[str, GaugeConfig] = field(default_factory=dict)
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
@@ -51,7 +53,7 @@ class Config:
 _SECTIONS: dict[str, type] = {
     f.name: f.default_factory  # type: ignore[misc]
     for f in dataclasses.fields(Config)
-    if f.name != "metadata"
+    if f.name not in ("metadata", "gauges")
 }
 
 
@@ -91,8 +93,9 @@ def settings_in(path: Path) -> dict[str, Any]:
 
 def _without_none(stored: Mapping[str, Any]) -> dict[str, Any]:
     return {
-        name: {k: v for k, v in section.items() if v is not None} if isinstance(section, Mapping) else section
+        name: _without_none(section) if isinstance(section, Mapping) else section
         for name, section in stored.items()
+        if section is not None
     }
 
 
@@ -118,14 +121,19 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 
 def _build(tree: Mapping[str, Any], where: str) -> Config:
-    known = [*_SECTIONS, "metadata"]
+    known = [*_SECTIONS, "gauges", "metadata"]
     parts: dict[str, Any] = {}
     for name, content in tree.items():
         if name not in known:
             raise ConfigError(f"{where}: unknown section [{name}]{_meant(name, known)}")
         if not isinstance(content, Mapping):
             raise ConfigError(f"{where}: {name} must be a section, [{name}] with keys below it")
-        parts[name] = dict(content) if name == "metadata" else _section(_SECTIONS[name], name, content, where)
+        if name == "metadata":
+            parts[name] = dict(content)
+        elif name == "gauges":
+            parts[name] = {gauge: _gauge(gauge, table, where) for gauge, table in content.items()}
+        else:
+            parts[name] = _section(_SECTIONS[name], name, content, where)
     _check_metadata(parts.get("metadata", {}), where)
     return Config(**parts)
 
@@ -143,6 +151,16 @@ def _section(kind: type[Section], name: str, content: Mapping[str, Any], where: 
                 f"{where}: {name}.{key} = {value!r} is not possible; allowed: {allowed}"
             ) from None
     return kind(**values)
+
+
+def _gauge(name: str, table: Any, where: str) -> GaugeConfig:
+    if not NAME.fullmatch(name):
+        raise ConfigError(
+            f"{where}: gauges.{name}: a name has up to 32 letters, digits and _, a letter first"
+        )
+    if not isinstance(table, Mapping):
+        raise ConfigError(f"{where}: gauges.{name} must be a table, [gauges.{name}] with keys below it")
+    return _section(GaugeConfig, f"gauges.{name}", table, where)
 
 
 def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from live.setup.checks import BOX, FLAG, RECORD_MODE, TEXT, Option, choice, integer, key, number
+from live.setup.checks import BOX, FLAG, RECORD_MODE, STRAINS, TEXT, Option, choice, integer, key, number
 
 DEFAULT_BURST, DEFAULT_REFERENCE_BURST = 4, 32
 """Frames of a live camera; of files, 1."""
@@ -147,16 +147,44 @@ class SpecimenConfig:
 
     width_mm: float | None = key(number(1e-3, 1e5), None, "width of the section", optional=True)
     thickness_mm: float | None = key(number(1e-4, 1e5), None, "thickness of the section", optional=True)
+    diameter_mm: float | None = key(number(1e-3, 1e5), None, "diameter of a round section", optional=True)
+    area_mm2: float | None = key(
+        number(1e-6, 1e9),
+        None,
+        "area of any section; goes before width, thickness and diameter",
+        optional=True,
+    )
+    gauge_length_mm: float | None = key(
+        number(1e-3, 1e6), None, "gauge length, told beside the extensions", optional=True
+    )
     axis: str = key(
         choice("x", "y"), "y", "direction of the load in the image", Option("axis", choices=("x", "y"))
     )
 
+    standard: str = key(
+        choice("iso6892", "iso527", "astm-d3039", "free"),
+        "iso6892",
+        "standard of the evaluation; free: modulus_between alone",
+        Option("standard", "NAME", choices=("iso6892", "iso527", "astm-d3039", "free")),
+    )
+    modulus_between: tuple[float, float] = key(
+        STRAINS, (0.0005, 0.0025), "strains between which a free evaluation takes the modulus"
+    )
+    zero: str = key(
+        choice("raw", "toe", "preload"),
+        "raw",
+        "strain counts as measured, from the foot of the elastic line, or from the preload",
+    )
+    preload_MPa: float = key(number(1e-3, 1e5), 1.0, "stress from which strain counts with zero = preload")
+
     @property
     def area_m2(self) -> float | None:
         """Section, m^2; None where it is not known."""
-        if self.width_mm is None or self.thickness_mm is None:
-            return None
-        return self.width_mm * self.thickness_mm * 1e-6
+        if self.area_mm2 is not None:
+            return self.area_mm2 * 1e-6
+        if self.width_mm is not None and self.thickness_mm is not None:
+            return self.width_mm * self.thickness_mm * 1e-6
+        return None if self.diameter_mm is None else math.pi / 4 * self.diameter_mm**2 * 1e-6
 
 
 @dataclass(frozen=True, slots=True)

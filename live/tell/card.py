@@ -7,8 +7,8 @@ import math
 from acquire.load_cell import LoadLog
 from live.measure import History
 from live.setup import SpecimenConfig
+from live.tell.figures import elastic_lines, evaluate
 from live.tell.ledger import Ledger
-from live.tell.summary import elastic_lines, evaluate
 
 EVERY_S = 1.0  # of the test
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from live.tell.ledger import Ledger
 
 _TERMINAL_EVERY_S, _FILE_EVERY_S = 0.25, 5.0
+_MOST_GAUGES = 4  # in the status line
 
 
 class Screen:
@@ -60,7 +61,7 @@ class Screen:
         lost = f"  LOST {ledger.lost + ledger.unrecorded}" if ledger.loss else ""
         late = "" if math.isnan(p95_s) else f"  latency {p95_s * 1e3:.0f} ms"
         self.status(
-            f"{fps:.0f} fps{force}  exx {i.exx * 1e6:+.0f}  eyy {i.eyy * 1e6:+.0f}  exy {i.exy * 1e6:+.0f} um/m"
+            f"{fps:.0f} fps{force}  {_strains(i)}"
             f"  {i.n_valid}/{i.n_zoi} ZOIs in {i.measure_s * 1e3:.0f} ms"
             f"  recorded {ledger.recorded}  skipped {ledger.skipped}{lost}{late}"
         )
@@ -81,3 +82,14 @@ class Screen:
             self._stream.flush()
         except (OSError, ValueError):
             self._quiet = True
+
+
+def _strains(i: Instant) -> str:
+    """The virtual gauges with their sigmas, or the means where there are none."""
+    if not i.gauges:
+        return f"exx {i.exx * 1e6:+.0f}  eyy {i.eyy * 1e6:+.0f}  exy {i.exy * 1e6:+.0f} um/m"
+    words = [
+        f"{name} lost" if gauge.reason else f"{name} {gauge.value * 1e6:+.0f} +- {gauge.sigma * 1e6:.0f}"
+        for name, gauge in list(i.gauges.items())[:_MOST_GAUGES]
+    ]
+    return "  ".join(words) + " um/m"

@@ -2,47 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import numpy as np
 
 from acquire.load_cell import LoadLog
-from analysis.evaluate import Tensile, tensile_figures
 from live.measure import History
 from live.setup import SpecimenConfig
-
-
-def quantity(value: float, sigma: float, unit: str) -> str:
-    """``value +- sigma unit`` with as many digits as the uncertainty deserves."""
-    if not math.isfinite(value):
-        return "not known"
-    if not math.isfinite(sigma) or sigma <= 0:
-        return f"{value:.4g} {unit}".rstrip()
-    digits = max(0, min(6, 1 - math.floor(math.log10(sigma))))
-    return f"{value:.{digits}f} +- {sigma:.{digits}f} {unit}".rstrip()
-
-
-def evaluate(history: History, loads: LoadLog, specimen: SpecimenConfig) -> Tensile:
-    """The tensile figures of the run; stresses are forces (N) where the section is not known."""
-    axial, transverse = history.along(specimen.axis)
-    return tensile_figures(axial, transverse, history.forces(loads) / (specimen.area_m2 or 1.0))
-
-
-def elastic_lines(figures: Tensile, specimen: SpecimenConfig) -> list[str]:
-    """E, nu, Rp0.2 and Rm in words; nothing where the curve told nothing."""
-    if not math.isfinite(figures.E):
-        return []
-    if specimen.area_m2 is None:
-        stiffness = quantity(figures.E / 1e3, figures.sigma_E / 1e3, "kN per unit strain")
-        strengths = [f"highest force {figures.Rm:.4g} N"]
-        first = [f"EA = {stiffness} (give [specimen] width_mm and thickness_mm for E)"]
-    else:
-        first = [f"E = {quantity(figures.E / 1e9, figures.sigma_E / 1e9, 'GPa')}"]
-        strengths = [f"Rp0.2 = {figures.Rp02 / 1e6:.4g} MPa"] * math.isfinite(figures.Rp02)
-        strengths += [f"highest stress {figures.Rm / 1e6:.4g} MPa"]
-    nu = f"nu = {quantity(figures.nu, figures.sigma_nu, '')}"
-    return ["  ".join([*first, nu]) + f"  ({figures.n_elastic} points)", "  ".join(strengths)]
+from live.tell.figures import evaluate, figure_lines, lag_line
 
 
 def noise_line(history: History) -> str:
@@ -83,7 +50,8 @@ def summary_lines(history: History, loads: LoadLog, specimen: SpecimenConfig) ->
         noise_line(history),
     ]
     lines += latency_lines(history)
-    return lines + elastic_lines(evaluate(history, loads, specimen), specimen)
+    figures = figure_lines(evaluate(history, loads, specimen), specimen)
+    return lines + figures + (lag_line(history, loads, specimen) if figures else [])
 
 
 def file_lines(folder: Path) -> list[str]:

@@ -19,6 +19,7 @@ import numpy as np
 from analysis import KernelSettings, NoiseModel, PhaseKernel
 from analysis.evaluate.deconvolution import effect
 from analysis.field.windows import profile
+from tests.accuracy import gauges as virtual
 from tests.accuracy import rejection
 from tests.accuracy.limit import NAMES, gaussian, l10, noise_limit
 from tests.accuracy.real import star, star_field, wave
@@ -235,6 +236,16 @@ def _gauges(shape: tuple[int, ...], side: int = 10) -> list[np.ndarray]:
     ]  # fmt: skip
 
 
+def gauges(quick: bool) -> Lines:
+    """Virtual gauges: scatter over pairs with 1 % noise in both pictures, over the predicted sigma
+
+    ZOI 32, r = 2 px, 12 bit, strain and rotation; largest and smallest at 0.2 % noise, where the peak stands out.
+    """
+    yield from _table("gauge", "ZOI", "step", "values", "scatter / sigma")
+    for *case, ratio in virtual.table(quick):
+        yield _row(*case, f"{ratio:.3f}")
+
+
 def rejected(quick: bool) -> Lines:
     """Pictures that cannot be right everywhere: who is rejected
 
@@ -327,7 +338,7 @@ def sample14(quick: bool) -> Lines:
 
 
 SECTIONS = (
-    shift, noise, resolution, strain, star_image, sample14, illumination, uncertainty, rejected,
+    shift, noise, resolution, strain, star_image, sample14, illumination, uncertainty, gauges, rejected,
 )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -30,8 +31,26 @@ def test_file_and_command_line(tmp_path: Path) -> None:
 
 
 def test_stored_configuration_comes_back() -> None:
-    config = load_config(None, {"measure.burst": 3, "specimen.width_mm": 10.0, "metadata.note": "x"})
+    config = load_config(
+        None,
+        {
+            "measure.burst": 3,
+            "specimen.width_mm": 10.0,
+            "specimen.modulus_between": [0.001, 0.002],
+            "metadata.note": "x",
+        },
+    )
     assert from_dict(config.as_dict(), {}, "a session") == config
+
+
+def test_gauges_come_back_and_are_added_to() -> None:
+    said = {"gauges.axial": {"start": [10, 20.5], "end": [10, 90]}}
+    config = load_config(None, said)
+    assert config.gauges["axial"].start == (10.0, 20.5)
+    stored = json.loads(json.dumps(config.as_dict()))
+    assert from_dict(stored, {}, "a session") == config
+    both = from_dict(stored, {"gauges.point": {"kind": "zoi", "at": [3, 4]}}, "a session")
+    assert list(both.gauges) == ["axial", "point"]
 
 
 def test_a_file_sets_only_what_it_says(tmp_path: Path) -> None:
@@ -51,6 +70,15 @@ def test_a_file_sets_only_what_it_says(tmp_path: Path) -> None:
         ("[measure]\nwindow = 'hann'\n", "one of 'gaussian', 'uniform', 'tukey', 'bi-triangular'"),
         ("[record]\nmode = 'every=0'\n", "every=K"),
         ("[specimen]\nwidth_mm = nan\n", "specimen.width_mm"),
+        ("[specimen]\nmodulus_between = [0.003, 0.001]\n", "0 <= from < to"),
+        ("[specimen]\nmodulus_between = 0.1\n", "two strains, from and to"),
+        ("[specimen]\nstandard = 'din'\n", "one of 'iso6892', 'iso527'"),
+        ("[gauges]\naxial = 3\n", "gauges.axial must be a table"),
+        ("[gauges.'a b']\nkind = 'line'\n", "a letter first"),
+        ("[gauges.axial]\nkind = 'lin'\n", "gauges.axial.kind = 'lin'"),
+        ("[gauges.axial]\nstart = [1, 'x']\n", "two numbers: x, y in px"),
+        ("[gauges.axial]\nstrat = [1, 2]\n", "gauges.axial.strat (did you mean start?)"),
+        ("[gauges.hole]\ncorners = [[1, 2], [3, 4]]\n", "3 to 100 corners"),
         ("[load]\nmax_gap_s = inf\n", "load.max_gap_s"),
         ("measure = 3\n", "must be a section"),
         ("[metadata]\nx = [1]\n", "metadata.x"),

@@ -8,10 +8,10 @@ import math
 import pytest
 
 from acquire.events import Event, EventKind
+from live.tell.figures import quantity
 from live.tell.journal import Journal
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen
-from live.tell.summary import quantity
 
 
 class Terminal(io.StringIO):

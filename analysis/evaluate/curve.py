@@ -1,0 +1,146 @@
+"""The stress-strain curve of a test: what is known of it, where it breaks, and its true stresses.
+
+Arrays in, arrays out; nothing is corrected here. Strain is dimensionless, stress in Pa (or any multiple of
+the force), tension positive.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.evaluate.series import noise, smoothed
+
+Floats = NDArray[np.float64]
+
+_BROKEN = 0.02  # of the highest stress: below it there is no specimen any more
+_FALL = 5.0  # times what is usual from one sample to the next
+_PARTS, _WIDEST = 60, 4  # of a loading: half the width of its running means, and the most, samples
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curve:
+    """A test as it was measured.
+
+    Attributes
+    ----------
+    t : (N,) float64, s
+    strain : (N,) float64
+        Along the load; NaN where unknown.
+    stress : (N,) float64, Pa
+        NaN where unknown.
+    transverse : (N,) float64 or None
+        Strain across the load.
+    """
+
+    t: Floats
+    strain: Floats
+    stress: Floats
+    transverse: Floats | None = None
+
+    def __post_init__(self) -> None:
+        n = len(self.t)
+        for values in (self.strain, self.stress, self.transverse):
+            if values is not None and values.shape != (n,):
+                raise ValueError(f"a curve needs arrays of one length, got {values.shape} beside {n} times")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Loading:
+    """The part of a curve that has strain and stress, up to the break.
+
+    Attributes
+    ----------
+    t, strain, stress, transverse : (M,) float64
+        ``transverse`` NaN where unknown.
+    level, course : (M,) float64
+        Running means of stress and strain, to find places by; never a figure.
+    noise_strain, noise_stress : float
+        Standard deviations of one value.
+    half : int
+        Of the samples of those running means, 2 half + 1.
+    top : int
+        The highest stress.
+    broke : bool
+        The test went on to the break.
+    """
+
+    t: Floats
+    strain: Floats
+    stress: Floats
+    transverse: Floats
+    level: Floats
+    course: Floats
+    noise_strain: float
+    noise_stress: float
+    half: int
+    top: int
+    broke: bool
+
+    @classmethod
+    def of(cls, curve: Curve) -> Loading:
+        """What can be evaluated of ``curve``; may be empty."""
+        end = broken_at(curve.stress)
+        stop = len(curve.t) if end is None else end + 1
+        known = np.isfinite(curve.strain[:stop]) & np.isfinite(curve.stress[:stop])
+        t, strain, stress = (a[:stop][known] for a in (curve.t, curve.strain, curve.stress))
+        across = curve.transverse[:stop][known] if curve.transverse is not None else np.full(len(t), math.nan)
+        top = int(np.argmax(stress)) if len(stress) else 0
+        half = min(top // _PARTS, _WIDEST)
+        return cls(
+            t, strain, stress, across, smoothed(stress, half), smoothed(strain, half),
+            noise(strain), noise(stress), half, top, end is not None,
+        )  # fmt: skip
+
+    @property
+    def n(self) -> int:
+        """Number of points."""
+        return len(self.t)
+
+
+def broken_at(stress: Floats) -> int | None:
+    """The last sample before the break, or None where there was none.
+
+    The specimen has broken when the stress falls below 2 % of the highest; the fall begins at the first
+    sample that loses more than five times what is usual there (ISO 6892-1:2019, annex A, on fracture).
+
+    Parameters
+    ----------
+    stress : (N,) float64
+    """
+    known = np.flatnonzero(np.isfinite(stress))
+    values = stress[known]
+    if len(values) < 3 or values.max() <= 0:
+        return None
+    top = int(np.argmax(values))
+    gone = np.flatnonzero(values[top:] < _BROKEN * values[top])
+    if not len(gone):
+        return None
+    k = top + int(gone[0])
+    usual = max(float(np.median(np.abs(np.diff(values[:k])))), 3 * noise(values[:k]))
+    while k > top and values[k - 1] - values[k] > _FALL * usual:
+        k -= 1
+    return int(known[k])
+
+
+def true_curve(strain: Floats, stress: Floats) -> tuple[Floats, Floats]:
+    """Logarithmic strain and true stress of engineering ones; NaN after the highest stress.
+
+    Volume is kept and strain is uniform, so they hold for plastic metals up to the neck.
+
+    Parameters
+    ----------
+    strain, stress : (N,) float64
+
+    Returns
+    -------
+    (N,) float64 each
+    """
+    if not np.isfinite(stress).any():
+        return np.full(len(strain), math.nan), np.full(len(strain), math.nan)
+    uniform = np.arange(len(stress)) <= int(np.nanargmax(stress))
+    stretch = np.where(uniform & (strain > -1), 1 + strain, math.nan)
+    return np.log(stretch), stress * stretch

@@ -1,0 +1,160 @@
+"""The elastic line of a stress-strain curve: modulus by regression and by chord, Poisson's ratio.
+
+The noise of an optical strain is no smaller than that of the force, so that a least-squares line of stress
+over strain would be too flat; the line here knows of both noises (W. E. Deming, Statistical Adjustment of
+Data, 1943; W. A. Fuller, Measurement Error Models, 1987, doi:10.1002/9780470316665, section 1.3).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.evaluate.curve import Loading
+from analysis.evaluate.figure import Figure
+from analysis.evaluate.series import Reading, first_crossing, reading
+
+Floats = NDArray[np.float64]
+
+FEWEST = 8
+"""Points that a line needs."""
+
+_END = 0.1  # of the points of the interval: read at each end of a chord
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """stress = slope (strain - strain0), from points of both noises.
+
+    Attributes
+    ----------
+    slope, sigma : float, Pa
+        And its standard uncertainty.
+    strain0 : float
+        Where the line has no stress.
+    r2 : float
+        Coefficient of determination.
+    n : int
+    middle : float, Pa
+        Mean stress of the points.
+    scatter : float
+        Standard deviation of the points about the line, in strain.
+    first, last : int
+        The points are ``first:last`` of the loading.
+    """
+
+    slope: float
+    sigma: float
+    strain0: float
+    r2: float
+    n: int
+    middle: float
+    scatter: float
+    first: int
+    last: int
+
+    def strain_at(self, stress: float | Floats) -> float | Floats:
+        """Strain of the line at a stress."""
+        return self.strain0 + stress / self.slope
+
+    def sigma_at(self, stress: float) -> float:
+        """Standard uncertainty of ``strain_at``."""
+        return math.hypot(
+            self.scatter / math.sqrt(self.n), (stress - self.middle) / self.slope * self.sigma / self.slope
+        )
+
+    @property
+    def modulus(self) -> Figure:
+        """The slope with its interval, Pa."""
+        return Figure.about(self.slope, self.sigma, self.n - 2)
+
+
+def line_through(loading: Loading, first: int, last: int) -> Line | None:
+    """The line through the points ``first:last``; None where they are too few or do not rise."""
+    x, y = loading.strain[first:last], loading.stress[first:last]
+    n = len(x)
+    if n < FEWEST:
+        return None
+    dx, dy = x - x.mean(), y - y.mean()
+    sxx, sxy, syy = float(dx @ dx), float(dx @ dy), float(dy @ dy)
+    if not (sxy > 0 and sxx > 0 and syy > 0):
+        return None
+    slope = _slope(sxx, sxy, syy, loading.noise_strain, loading.noise_stress)
+    rest = dx - dy / slope
+    scatter = math.sqrt(float(rest @ rest) / (n - 2))
+    sigma = slope * slope * scatter / math.sqrt(slope * sxy)
+    strain0 = float(x.mean() - y.mean() / slope)
+    return Line(slope, sigma, strain0, sxy**2 / sxx / syy, n, float(y.mean()), scatter, first, last)
+
+
+def _slope(sxx: float, sxy: float, syy: float, noise_x: float, noise_y: float) -> float:
+    """Deming's slope; without any noise that of strain over stress."""
+    if noise_x == 0 and noise_y > 0:
+        return sxy / sxx
+    if noise_x == 0 or noise_y / noise_x < 1e-6 * syy / sxy:
+        return syy / sxy
+    share = (noise_y / noise_x) ** 2
+    half = syy - share * sxx
+    root = math.hypot(half, 2 * math.sqrt(share) * sxy)
+    # Both are one number; the first loses its digits where half is negative.
+    return (half + root) / (2 * sxy) if half > 0 else 2 * share * sxy / (root - half)
+
+
+def between(course: Floats, low: float, high: float) -> tuple[int, int]:
+    """The points of the last rise from ``low`` to the first ``high``; (0, 0) where it is never reached."""
+    over = first_crossing(course, high)
+    if math.isnan(over):
+        return 0, 0
+    stop = math.floor(over) + 1
+    below = np.flatnonzero(course[:stop] < low)
+    return (int(below[-1]) + 1 if len(below) else 0), stop
+
+
+def chord(loading: Loading, line: Line) -> Figure:
+    """The modulus by the two ends of the interval of ``line``, each read from a tenth of its points."""
+    (e0, e1), (s0, s1) = (
+        _ends(values, line, sigma)
+        for values, sigma in (
+            (loading.strain, loading.noise_strain),
+            (loading.stress, loading.noise_stress),
+        )
+    )
+    rise, run = s1.value - s0.value, e1.value - e0.value
+    if not (rise > 0 and run > 0):
+        return Figure.none("the two ends of the interval do not differ")
+    share = math.hypot(math.hypot(e0.sigma, e1.sigma) / run, math.hypot(s0.sigma, s1.sigma) / rise)
+    return Figure.about(rise / run, rise / run * share)
+
+
+def poisson(loading: Loading, line: Line) -> Figure:
+    """Poisson's ratio over the interval of ``line``.
+
+    Both strains are fitted against the stress, whose noise is the least, and the slopes divided.
+    """
+    across, stress = loading.transverse[line.first : line.last], loading.stress[line.first : line.last]
+    known = np.isfinite(across)
+    n = int(known.sum())
+    if n < FEWEST:
+        return Figure.none(
+            f"the transverse strain is known at {n} points of the elastic part, {FEWEST} are needed"
+        )
+    ds, dt = stress[known] - stress[known].mean(), across[known] - across[known].mean()
+    sss = float(ds @ ds) - (n - 1) * loading.noise_stress**2
+    if not sss > 0:
+        return Figure.none("the stress does not rise above its noise in the elastic part")
+    slope = -float(ds @ dt) / sss
+    rest = dt + slope * ds
+    sigma = math.sqrt(float(rest @ rest) / (n - 2) / sss)
+    nu = slope * line.slope
+    return Figure.about(nu, math.hypot(sigma * line.slope, nu * line.sigma / line.slope), n - 2)
+
+
+def _ends(values: Floats, line: Line, least_sigma: float) -> tuple[Reading, Reading]:
+    reach = max(3, round(_END * line.n))
+    first, last = (
+        reading(values, k, k - reach, k + reach + 1, least_sigma) for k in (line.first, line.last - 1)
+    )
+    return first, last

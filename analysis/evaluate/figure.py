@@ -1,0 +1,68 @@
+"""A figure of a test: a number with the interval it lies in, or the reason why it cannot be had."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+CONFIDENCE = 0.95
+"""Of all intervals here; they hold the scatter of strain and force, not the section or the load cell's class."""
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """A number with its interval of confidence.
+
+    Attributes
+    ----------
+    value, low, high : float
+        NaN where it cannot be had.
+    why : str
+        Why it cannot be had; of a value, what to know about it, mostly nothing.
+    """
+
+    value: float
+    low: float
+    high: float
+    why: str = ""
+
+    @classmethod
+    def about(cls, value: float, sigma: float, dof: float = math.inf, why: str = "") -> Figure:
+        """``value`` with the interval that its standard uncertainty and the degrees of freedom give."""
+        half = quantile(dof) * sigma
+        return cls(value, value - half, value + half, why)
+
+    @classmethod
+    def none(cls, why: str) -> Figure:
+        """No value, and why."""
+        return cls(math.nan, math.nan, math.nan, why)
+
+    @property
+    def known(self) -> bool:
+        """Whether there is a value."""
+        return math.isfinite(self.value)
+
+    def over(self, other: float) -> Figure:
+        """The figure in another unit: divided by a positive number."""
+        return Figure(self.value / other, self.low / other, self.high / other, self.why)
+
+    def minus(self, other: float, sigma: float = 0.0) -> Figure:
+        """``other``, of standard uncertainty ``sigma``, taken away."""
+        half = quantile() * sigma
+        value = self.value - other
+        return Figure(
+            value,
+            value - math.hypot(self.value - self.low, half),
+            value + math.hypot(self.high - self.value, half),
+            self.why,
+        )
+
+
+def quantile(dof: float = math.inf) -> float:
+    """Half the width of the interval in standard uncertainties (Student's t); NaN without a degree of freedom."""
+    from scipy.special import ndtri, stdtrit
+
+    both = 0.5 + CONFIDENCE / 2
+    if dof <= 0:
+        return math.nan
+    return float(ndtri(both) if math.isinf(dof) else stdtrit(dof, both))

@@ -1,0 +1,145 @@
+"""Strengths and extensions of a loaded curve: Rp, ReH, ReL, Rm, Agt, At, after ISO 6892-1:2019.
+
+The interval of a highest stress holds the noise of one value and what may lie between two samples.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from analysis.evaluate.curve import Loading
+from analysis.evaluate.elastic import Line
+from analysis.evaluate.figure import Figure, quantile
+from analysis.evaluate.series import Floats, first_crossing, noise, reading, smoothed
+
+_DROP, _RANGE = (
+    0.005,
+    0.0005,
+)  # annex A: a yield point falls by 0.5 % and is not passed again for 0.05 % strain
+_TRANSIENT, _PLATEAU = (
+    0.0005,
+    0.0025,
+)  # strain after ReH: its undershoot, and where ReL is looked for (clause 12)
+_ABOUT = 0.25  # of a proof strain: the part of the curve that its stress is read from
+_BEFORE = 5  # samples whose rise tells what may lie between two of them
+_SURE = 4.0  # standard deviations that a fall must exceed
+
+
+@dataclass(frozen=True, slots=True)
+class Yield:
+    """Upper and lower yield strength (Pa), and the place of the upper one, -1 where there is none."""
+
+    upper: Figure
+    lower: Figure
+    at: int = -1
+
+
+def proof_strength(loading: Loading, line: Line, offset: float) -> Figure:
+    """Rp: the stress at which ``offset`` plastic strain is reached, parallel to ``line`` (3.10.3), Pa."""
+    plastic = loading.strain - line.strain_at(loading.stress)
+    course = smoothed(plastic, loading.half)
+    at = first_crossing(course, offset, line.first)
+    if math.isnan(at):
+        most = float(course[line.first :].max())
+        return Figure.none(f"the plastic strain reaches {100 * most:.2g} %, {100 * offset:g} % is needed")
+    first, last = _around(course, at, (1 - _ABOUT) * offset, (1 + _ABOUT) * offset)
+    strain = reading(plastic, at, first, last, noise(plastic[line.first : last]))
+    stress = reading(loading.stress, at, first, last, loading.noise_stress)
+    place = (offset - strain.value) / strain.slope if strain.slope > 0 else 0.0
+    hardening = abs(stress.slope / strain.slope) if strain.slope > 0 else 0.0
+    value = stress.value + stress.slope * float(np.clip(place, -2, 2))
+    doubt = math.hypot(strain.sigma, line.sigma_at(value))
+    return Figure.about(value, math.hypot(stress.sigma, hardening * doubt), max(last - first - 3, 4))
+
+
+def yield_point(loading: Loading, line: Line) -> Yield:
+    """ReH and ReL (3.10.2, annex A), or why the curve has none."""
+    highest = np.maximum.accumulate(loading.stress)
+    fallen = (loading.level < highest * (1 - _DROP)) & (
+        highest - loading.stress > _SURE * loading.noise_stress
+    )
+    for k in np.flatnonzero(fallen & (np.arange(loading.n) > line.last)):
+        at = int(np.argmax(loading.stress[: k + 1]))
+        end = _passed(loading, at)
+        lasts = loading.course[end] - loading.course[at] >= _RANGE
+        if lasts and (end < loading.n - 1 or _begins_to_flow(loading, line, at)):
+            return Yield(highest_stress(loading, at), _lower(loading, at, end), at)
+    why = "no yield point: nowhere does the stress fall by 0.5 % for 0.05 % strain, and rise again"
+    return Yield(Figure.none(why), Figure.none(why))
+
+
+def highest_stress(loading: Loading, at: int) -> Figure:
+    """The measured peak at ``at``, with what noise and the distance of the samples leave open, Pa."""
+    stress, sigma = loading.stress, loading.noise_stress
+    near = int(np.count_nonzero(stress >= stress[at] - 3 * sigma))
+    lifted = max(quantile(), math.sqrt(2 * math.log(max(near, 1))) + 1) * sigma
+    before = max(at - _BEFORE, 0)
+    rise = max(float(stress[at] - stress[before]), 0.0) / max(at - before, 1)
+    value = float(stress[at])
+    return Figure(value, value - lifted, value + quantile() * sigma + rise)
+
+
+def strain_at_top(loading: Loading) -> Figure:
+    """Agt without its zero: the strain at the highest stress; on a flat top, its middle (3.6.4)."""
+    doubt = _doubt(loading)
+    flat = np.flatnonzero(loading.level >= loading.level.max() - doubt)
+    first, last = int(flat[0]), int(flat[-1])
+    if last == loading.n - 1 and not loading.broke:
+        return Figure.none("the test ended before the stress fell")
+    low, high = float(loading.course[first]), float(loading.course[last])
+    half = quantile() * loading.noise_strain + _step(loading, last)
+    return Figure((low + high) / 2, low - half, high + half)
+
+
+def strain_at_break(loading: Loading) -> Figure:
+    """At without its zero: the last strain before the break."""
+    if not loading.broke:
+        return Figure.none("no break was seen: the stress did not fall below 2 % of the highest")
+    value, half = float(loading.strain[-1]), quantile() * loading.noise_strain
+    return Figure(value, value - half, value + half + 2 * _step(loading, loading.n - 1))
+
+
+def _passed(loading: Loading, at: int) -> int:
+    """Where the peak at ``at`` is passed again for good; the end where it never is."""
+    again = np.flatnonzero(loading.level[at + 1 :] > loading.stress[at])
+    return at + 1 + int(again[0]) if len(again) else loading.n - 1
+
+
+def _begins_to_flow(loading: Loading, line: Line, at: int) -> bool:
+    """Whether a peak that is never passed again is a yield point and not the beginning of a neck."""
+    plastic = loading.course[at] - line.strain_at(loading.level[at])
+    return bool(plastic < 4 * _RANGE and loading.course[-1] - loading.course[at] >= _PLATEAU)
+
+
+def _lower(loading: Loading, at: int, passed: int) -> Figure:
+    after = loading.course - loading.course[at]
+    part = np.arange(loading.n)
+    part = part[(part > at) & (part <= passed) & (after >= _TRANSIENT) & (after <= _PLATEAU)]
+    if not len(part):
+        return Figure.none("the plateau is too short to tell the lower yield strength")
+    value = float(loading.level[part].min())
+    doubt = _doubt(loading)
+    return Figure(value, value - doubt, value + doubt)
+
+
+def _doubt(loading: Loading) -> float:
+    """How far the lowest or highest of the running means may be from the truth, Pa."""
+    return _SURE * loading.noise_stress / math.sqrt(2 * loading.half + 1)
+
+
+def _step(loading: Loading, k: int) -> float:
+    """The strain from one sample to the next, about there."""
+    return max(float(loading.course[k] - loading.course[max(k - 1, 0)]), 0.0)
+
+
+def _around(course: Floats, at: float, low: float, high: float) -> tuple[int, int]:
+    """The samples next to ``at`` whose course stays between ``low`` and ``high``."""
+    first, last = math.floor(at), math.floor(at) + 1
+    while first > 0 and low <= course[first - 1]:
+        first -= 1
+    while last < len(course) and course[last] <= high:
+        last += 1
+    return first, last

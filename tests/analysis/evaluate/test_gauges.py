@@ -1,0 +1,133 @@
+"""Virtual gauges: what they take, what they say of known fields, and that their sigma is their scatter."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from analysis import Roi, Status, StrainField, ZoiGrid
+from analysis.evaluate import AreaGauge, LineGauge, TransverseGauge, ZoiGauge, gauge_zois, measure_gauge
+from tests.accuracy.gauges import line, point, ratio
+from tests.accuracy.truth import Speckle, affine
+
+GRID = ZoiGrid.cover(Roi(0, 0, 208, 176), 32, 16)
+LINE = LineGauge("axial", (90.0, 30.0), (90.0, 140.0))
+EVERY = (
+    ZoiGauge("point", 80, 80, "eyy"),
+    AreaGauge.rectangle("mean", (40, 40, 90, 60)),
+    AreaGauge("largest", ((40, 40), (150, 50), (90, 130)), statistic="largest"),
+    LINE,
+    LineGauge("skew", (40.0, 40.0), (150.0, 130.0), 20.0),
+    TransverseGauge("width", 30, 30, 130, 80, "x"),
+)
+
+
+def field(status: np.ndarray | None = None, **gradients: float) -> StrainField:
+    x, y = np.meshgrid(GRID.x, GRID.y)
+    g = {n: gradients.get(n, 0.0) for n in ("du_dx", "du_dy", "dv_dx", "dv_dy")}
+    values = {"u": 3 + g["du_dx"] * x + g["du_dy"] * y, "v": -2 + g["dv_dx"] * x + g["dv_dy"] * y, **g}
+    return StrainField.from_values(GRID, values, 1e-2, status)
+
+
+def test_a_uniform_strain_is_met_exactly() -> None:
+    found = {g.name: measure_gauge(g, field(du_dx=-3e-4, dv_dy=1e-3)) for g in EVERY}
+    for name in ("point", "mean", "largest", "axial"):
+        assert found[name].value == pytest.approx(1e-3, rel=1e-9), name
+    assert found["width"].value == pytest.approx(-3e-4, rel=1e-9)
+    assert all(one.sigma > 0 and not one.reason for one in found.values())
+
+
+def test_an_extensometer_does_not_see_a_rotation() -> None:
+    c, s = math.cos(0.2), math.sin(0.2)
+    turned = field(du_dx=c - 1, du_dy=-s, dv_dx=s, dv_dy=c - 1)
+    for gauge in EVERY[3:]:
+        assert measure_gauge(gauge, turned).value == pytest.approx(0, abs=1e-12)
+
+
+def test_what_a_gauge_takes() -> None:
+    (box,) = gauge_zois(AreaGauge.rectangle("", (40, 40, 32, 16)), GRID)
+    assert box.sum() == 2
+    (triangle,) = gauge_zois(AreaGauge("", ((0, 0), (208, 0), (0, 176))), GRID)
+    assert not triangle[-1, -1] and triangle[0, 0]
+    first, second = gauge_zois(LINE, GRID)
+    assert first.sum() >= 3 and not (first & second).any()
+    left, right = gauge_zois(TransverseGauge("", 0, 0, 207, 176, "y"), GRID)
+    assert np.flatnonzero(left.any(axis=1)).max() < np.flatnonzero(right.any(axis=1)).min()
+    # However small its radius, an end is at least the nearest ZOI.
+    assert [end.sum() for end in gauge_zois(LineGauge("", (50, 50), (90, 90), 0.1), GRID)] == [1, 1]
+
+
+def lost(*, share: float) -> np.ndarray:
+    """The upper part of the grid is lost."""
+    status = np.zeros(GRID.shape, int)
+    status[: round(share * GRID.shape[0])] = Status.LOST
+    return status
+
+
+def test_lost_zois_give_a_reason() -> None:
+    broken = field(lost(share=0.5), dv_dy=1e-3)
+    for gauge, says in (
+        (ZoiGauge("", 80, 20), "1 of 1 ZOIs have no value (1 LOST)"),
+        (AreaGauge.rectangle("", (0, 0, 200, 60)), "ZOIs have no value"),
+        (LINE, "end 1: "),
+        (TransverseGauge("", 0, 0, 200, 200, "y"), "end 1: "),
+    ):
+        found = measure_gauge(gauge, broken)
+        assert math.isnan(found.value) and math.isnan(found.sigma)
+        assert says in found.reason
+    some = lost(share=0.0)
+    some[3, 4] = Status.UNEVEN
+    assert measure_gauge(
+        AreaGauge.rectangle("", (0, 0, 200, 200)), field(some, dv_dy=1e-3)
+    ).value == pytest.approx(1e-3)
+
+
+def test_a_gauge_beside_the_grid_says_where_the_grid_is() -> None:
+    for gauge in (
+        ZoiGauge("", 500, 80),
+        AreaGauge.rectangle("", (500, 0, 9, 9)),
+        LineGauge("", (0, 0), (80, 500)),
+    ):
+        found = measure_gauge(gauge, field())
+        assert "no ZOI is there; their centres reach from 15.5, 15.5 to 191.5" in found.reason
+    same = measure_gauge(LineGauge("", (80, 80), (81, 80), 1), field())
+    assert "make the gauge longer" in same.reason
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (lambda: ZoiGauge("a", 0, 0, "ezz"), "gauge a: unknown value 'ezz'; known: u, v"),
+        (lambda: AreaGauge("a", ((0, 0), (1, 1))), "at least 3 corners"),
+        (lambda: AreaGauge.rectangle("a", (0, 0, 9, 9), statistic="median"), "known: mean, largest"),  # type: ignore[arg-type]
+        (lambda: LineGauge("a", (3, 3), (3, 3)), "one point"),
+        (lambda: LineGauge("a", (3, 3), (3, 9), 0), "radius must be positive"),
+        (lambda: TransverseGauge("a", 0, 0, 0, 5), "must be positive"),
+        (lambda: TransverseGauge("a", 0, 0, 5, 5, "z"), "along is x or y"),  # type: ignore[arg-type]
+    ],
+)
+def test_impossible_gauges_are_refused(make, says: str) -> None:
+    with pytest.raises(ValueError, match=says):
+        make()
+
+
+def test_far_ends_are_independent_and_near_ones_are_not() -> None:
+    one = 1e-2 * math.sqrt(2)
+    far = measure_gauge(LineGauge("", (15.5, 79.5), (175.5, 79.5), 1), field())
+    assert far.sigma == pytest.approx(one / 160, rel=1e-6)
+    near = measure_gauge(LineGauge("", (79.5, 79.5), (95.5, 79.5), 1), field())
+    assert near.sigma < 0.96 * one / 16
+
+
+def test_sigma_is_the_scatter() -> None:
+    pattern, shape = Speckle(2.0, 1, span=400), (176, 272)
+    zois = ZoiGrid.cover(Roi(8, 8, 256, 160), 32, 16)
+    kinds = {"point": point("eyy"), "line": line(100, 30), "long": line(160, 0)}
+    moved = pattern.at(*affine(shape, u=0.3, du_dx=1e-3))
+    gauges = [gauge for some in kinds.values() for gauge in some]
+    z = ratio(gauges, zois, (pattern.at(*affine(shape)), moved), pairs=16)
+    for name, part in zip(kinds, np.split(z, np.cumsum([len(some) for some in kinds.values()])[:-1], axis=1),
+                          strict=True):  # fmt: skip
+        assert np.sqrt(np.mean(part**2)) == pytest.approx(1, abs=0.15), name

@@ -1,0 +1,90 @@
+"""The figures of a test in words, by the standard that the configuration names."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquire.load_cell import LoadLog
+from acquire.load_sample import LoadSample
+from live.measure import History
+from live.setup import SpecimenConfig
+from live.tell.figures import elastic_lines, evaluate, figure_lines, lag_line
+from tests.analysis.evaluate.curves import Truth, composite, noisy, ramberg_osgood
+from tests.live.made_up import START, make_measurement
+
+AREA_M2 = 20e-6
+FLAT = SpecimenConfig(width_mm=10.0, thickness_mm=2.0)
+
+
+def kept(truth: Truth, lag: float = 0.0) -> tuple[History, LoadLog]:
+    """A run whose mean strains and loads follow a curve, the load ``lag`` late."""
+    curve, history, loads = noisy(truth, 1), History(), LoadLog()
+    assert curve.transverse is not None
+    one = make_measurement(0).instant
+    for t, axial, across in zip(curve.t, curve.strain, curve.transverse, strict=True):
+        history.add(replace(one, t=START + t, eyy=axial, exx=across))
+    true = truth.curve
+    for t in np.arange(0, true.t[-1] + 0.5, 1 / 80):
+        loads.append(LoadSample(START + t, AREA_M2 * float(np.interp(t - lag, true.t, true.stress))))
+    return history, loads
+
+
+def test_a_metal_by_its_standard() -> None:
+    history, loads = kept(ramberg_osgood())
+    lines = figure_lines(evaluate(history, loads, FLAT), FLAT)
+    assert lines[0].startswith("E = ") and "GPa  nu = 0.3" in lines[0]
+    assert "Rp0.2 = 249.8" in lines[1] and "Rm = " in lines[1]
+    text = "\n".join(lines)
+    assert "iso6892: strains" in text and "counts as measured" in text
+    assert "within range 2" in text
+    assert "not known: ReH, ReL (no yield point" in text
+
+
+def test_a_laminate_has_no_proof_strength() -> None:
+    specimen = replace(FLAT, standard="astm-d3039", gauge_length_mm=50.0)
+    history, loads = kept(composite())
+    text = "\n".join(figure_lines(evaluate(history, loads, specimen), specimen))
+    assert "Rp0.2" not in text
+    assert "At = 1.19" in text and "(gauge length 50 mm)" in text
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"standard": "free", "modulus_between": (0.0002, 0.001)}, "free: strains 0.02"),
+        ({"zero": "toe"}, "toe compensation"),
+        ({"zero": "preload", "preload_MPa": 20.0}, "first reached the preload"),
+    ],
+)
+def test_interval_and_zero_are_options(settings: dict, says: str) -> None:
+    specimen = replace(FLAT, **settings)
+    history, loads = kept(ramberg_osgood())
+    assert says in "\n".join(figure_lines(evaluate(history, loads, specimen), specimen))
+
+
+def test_without_a_section_forces_stand_for_stresses() -> None:
+    history, loads = kept(ramberg_osgood())
+    specimen = SpecimenConfig(zero="preload")
+    lines = elastic_lines(evaluate(history, loads, specimen), specimen)
+    assert lines[0].startswith("EA = 1") and "kN per unit strain" in lines[0]
+    assert "highest force" in lines[1]
+
+
+def test_the_lag_of_the_load_is_told() -> None:
+    history, loads = kept(ramberg_osgood(), lag=0.15)
+    (line,) = lag_line(history, loads, FLAT)
+    told = float(line.split(": ")[1].split(" +-")[0])
+    assert abs(told - 150) < 40
+    assert lag_line(history, LoadLog(), FLAT) == []
+    (refused,) = lag_line(History(), loads, FLAT)
+    assert "not known (0 frames have a strain" in refused
+
+
+def test_any_section_gives_an_area() -> None:
+    assert FLAT.area_m2 == pytest.approx(AREA_M2)
+    assert SpecimenConfig(diameter_mm=10.0).area_m2 == pytest.approx(np.pi / 4 * 1e-4)
+    assert SpecimenConfig(area_mm2=7.0, width_mm=1.0, thickness_mm=1.0).area_m2 == pytest.approx(7e-6)
+    assert SpecimenConfig(width_mm=1.0).area_m2 is None
