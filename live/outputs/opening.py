@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from acquire.clock import ClockPair
+from acquire.events import EventKind, Level
 from acquire.frame import CameraInfo
 from live.outputs.consumer import Consumer
 from live.outputs.files import Files
@@ -16,7 +17,7 @@ from live.outputs.watching import CardWriter, Watching
 from live.results import Results, ResultsInfo
 from live.setup import Config, describe, versions
 from live.tell import Books, Screen, StatusCard
-from live.view import RerunView, ViewSetup, spawn_viewer
+from live.view import View, ViewSetup, spawn_viewer
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid
@@ -64,15 +65,14 @@ def make_outputs(about: About, books: Books, screen: Screen, more: Sequence[Cons
         gauges={name: describe(table) for name, table in config.gauges.items()},
     )
     consumers: list[Consumer] = [Files(Results(about.folder, about.grid, info))]
-    view = _view(about)
+    view = _view(about, books, screen)
     if view is not None:
         card = StatusCard(config.specimen, books.loads)
-        consumers += [CardWriter(view, card, books.history, books.ledger), Watching(view)]
-        _announce(view, config.view.spawn, screen)
+        consumers += [CardWriter(view, card, books.ledger), Watching(view)]
     return Outputs([*consumers, *more], books.loads, books.journal, books.history)
 
 
-def _view(about: About) -> RerunView | None:
+def _view(about: About, books: Books, screen: Screen) -> View | None:
     v = about.config.view
     if not (v.enabled or v.rrd):
         return None
@@ -88,10 +88,17 @@ def _view(about: About) -> RerunView | None:
         strain_range=v.strain_range,
     )
     rrd = about.folder / "view.rrd" if v.rrd else None
-    return RerunView(setup, port=v.port if v.enabled else None, rrd=rrd)
+
+    def tell(text: str, level: Level) -> None:
+        books.journal.tell(EventKind.VIEW, "view", text, level)
+
+    def serving(view: View) -> None:
+        _announce(view, v.spawn, screen)
+
+    return View(setup, port=v.port if v.enabled else None, rrd=rrd, tell=tell, serving=serving)
 
 
-def _announce(view: RerunView, spawn: bool, screen: Screen) -> None:
+def _announce(view: View, spawn: bool, screen: Screen) -> None:
     """Open the viewer where there is a display; else say how to look."""
     if spawn and view.port is not None and spawn_viewer(view.port) is not None:
         screen.say("the viewer opens in a window of its own")

@@ -6,21 +6,25 @@ from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
-from live.measure import History, Measurement
+from live.measure import History, Instant, Measurement
 from live.outputs.consumer import Consumer
 from live.tell import Ledger, StatusCard
-from live.view import RerunView
+from live.view import Thinned, View
 
-CLOSE_S = 5.0
+CLOSE_S = 10.0
+"""For drawing what waits and closing the file at the end of a test."""
+
+CARD_INSTANTS = 2000
+"""The figures of the card are of so many instants at most, evenly thinned; those of the summary of all."""
 
 
 class Watching(Consumer):
-    """Shows everything; the view has queues and threads of its own, so nothing here blocks."""
+    """Shows everything. An offer is one append; the view's own thread and process do the rest."""
 
     name = "view"
     blocks = False
 
-    def __init__(self, view: RerunView) -> None:
+    def __init__(self, view: View) -> None:
         self._view = view
 
     def frame(self, frame: Frame) -> None:
@@ -28,7 +32,9 @@ class Watching(Consumer):
         self._view.picture(frame)
 
     def measurement(self, measurement: Measurement) -> None:
-        """Offer a measurement; the newest win."""
+        """Offer a measurement."""
+        if self._view.failed:
+            raise DataError(self._view.failed)
         self._view.show(measurement)
 
     def settled(self, measurement: Measurement) -> None:
@@ -48,19 +54,22 @@ class Watching(Consumer):
         self._view.close(CLOSE_S)
         if self._view.failed:
             raise DataError(self._view.failed)
-        return f"{self._view.skipped} measurements not drawn" * (self._view.skipped > 0)
+        return self._view.report
 
 
 class CardWriter(Consumer):
-    """Writes the status card of the view anew, once a second of the test."""
+    """Writes the status card of the view anew, once a second of the test, on a thread of its own."""
 
     name = "status card"
 
-    def __init__(self, view: RerunView, card: StatusCard, history: History, ledger: Ledger) -> None:
-        self._view, self._card, self._history, self._ledger = view, card, history, ledger
+    def __init__(self, view: View, card: StatusCard, ledger: Ledger) -> None:
+        self._view, self._card, self._ledger = view, card, ledger
+        self._instants: Thinned[Instant] = Thinned(CARD_INSTANTS)
 
     def measurement(self, measurement: Measurement) -> None:
-        """Write the card where the last one is old."""
-        card = self._card.due(measurement.t, self._history, self._ledger)
-        if card is not None:
-            self._view.status(card)
+        """Keep its means, and write the card where the last one is old."""
+        self._instants.append(measurement.instant)
+        if self._card.is_due(measurement.t):
+            history = History()
+            history.instants += self._instants.items()
+            self._view.status(self._card.written(history, self._ledger))

@@ -20,11 +20,15 @@ class StatusCard:
         self._specimen, self._loads = specimen, loads
         self._last = -math.inf
 
-    def due(self, now: float, history: History, ledger: Ledger) -> str | None:
-        """The card at ``now`` (s, monotonic), or None where the last one is fresh enough."""
+    def is_due(self, now: float) -> bool:
+        """Whether the last card is old at ``now`` (s, monotonic); then the next is not, for a while."""
         if now - self._last < EVERY_S:
-            return None
+            return False
         self._last = now
+        return True
+
+    def written(self, history: History, ledger: Ledger) -> str:
+        """The card, from the last instant and the figures of all of ``history``."""
         return "\n\n".join(self._lines(history, ledger))
 
     def _lines(self, history: History, ledger: Ledger) -> list[str]:

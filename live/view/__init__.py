@@ -1,12 +1,13 @@
-"""The view in rerun: maps, curves, pictures, events.
+"""The view in rerun: maps, curves, pictures, events, drawn by a process of its own.
 
-``rerun_view`` joins it: a ``publisher`` thread for each place that is drawn to, a ``scene`` that says what
-is drawn (``shapes``, ``marks``, ``curve``, ``curve_drawing``, ``thinned``) as ``setup`` and ``layout`` say;
-``viewer`` finds rerun's program.
+``view`` is what the test gives to; ``waiting`` keeps it, ``supply`` makes messages of it (the room ``exchange``),
+``keeper`` keeps a ``child`` alive and sends them to it. That child is the room ``drawing``: rerun is loaded
+there alone. ``viewer`` finds rerun's program.
 """
 
-from live.view.rerun_view import RerunView
-from live.view.setup import ViewSetup
+from live.view.exchange.setup import ViewSetup
+from live.view.exchange.thinned import Thinned
+from live.view.view import View
 from live.view.viewer import rerun_command, spawn_viewer
 
-__all__ = ["RerunView", "ViewSetup", "rerun_command", "spawn_viewer"]
+__all__ = ["Thinned", "View", "ViewSetup", "rerun_command", "spawn_viewer"]

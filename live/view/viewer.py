@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import logging
 import os
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -13,27 +12,6 @@ from pathlib import Path
 _log = logging.getLogger(__name__)
 
 HOST = "127.0.0.1"
-_TRIES = 50
-
-
-def free_port(wanted: int) -> int | None:
-    """``wanted`` or the next port nobody listens on; None where fifty in a row are taken.
-
-    rerun itself says nothing of a taken port.
-    """
-    last = min(wanted + _TRIES, 65536)
-    return next((port for port in range(wanted, last) if _is_free(port)), None)
-
-
-def _is_free(port: int) -> bool:
-    with socket.socket() as probe:
-        # As rerun binds: a port in TIME_WAIT is free.
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((HOST, port))
-        except OSError:
-            return False
-        return True
 
 
 def url(port: int) -> str:

@@ -37,8 +37,10 @@ ROOMS = {
     "live.maps": "acquire acquire.opencv analysis.field analysis.evaluate live.results",
     "live.check": "acquire analysis.picture live.measure live.setup",
     "live.operate": "acquire live.tell",
-    "live.view": "acquire analysis.field live.measure live.maps",
     "live.pace": "",
+    "live.view.exchange": "acquire analysis.field live.measure",
+    "live.view.drawing": "acquire analysis.field live.maps live.view.exchange",
+    "live.view": "acquire analysis.field live.measure live.pace live.view.exchange",
     "live.outputs": "acquire acquire.load_cell analysis live.measure live.pace live.setup live.tell live.results"
     " live.view",
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
@@ -76,7 +78,7 @@ LIBRARIES = {
     "fcntl": "acquire.v4l2",
     "h5py": "acquire.hdf5 acquire.session live.results",
     "llvmlite": "analysis.compiled",
-    "rerun": "live.view",
+    "rerun": "live.view.drawing",
     "serial": "acquire.serial_line",
 }
 # Room (and all in it) -> what it never imports.

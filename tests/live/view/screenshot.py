@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import socket
 import subprocess
 import sys
 import time
@@ -17,7 +18,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from live.view.viewer import free_port, viewer_binary
+from live.view.viewer import viewer_binary
 
 
 class ViewerGone(RuntimeError):
@@ -27,7 +28,9 @@ class ViewerGone(RuntimeError):
 @contextlib.contextmanager
 def headless_viewer(size: str = "1600x900") -> Iterator[Any]:
     """A viewer without a window, as a ``rerun.experimental.ViewerClient``; raises ``ViewerGone``."""
-    port = free_port(9990)
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
     command = [str(viewer_binary()), "--headless", "--port", str(port), "--window-size", size]
     with subprocess.Popen([*command, "--hide-welcome-screen"], stderr=subprocess.DEVNULL) as process:
         try:

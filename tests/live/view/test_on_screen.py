@@ -6,20 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from live.view.layout import blueprint
-from live.view.setup import STRAINS
+from live.view.drawing.places import Rates
+from live.view.exchange.setup import STRAINS
+from tests.live.view.drawing.test_scene import draw_a_test, make_setup, scene_into
 from tests.live.view.screenshot import ViewerGone, screenshot
-from tests.live.view.test_rerun_view import Rates, draw_a_test, make_setup, scene_into
 
 pytestmark = pytest.mark.slow
 
 
 def test_the_viewer_shows_every_view_without_complaint(tmp_path: Path) -> None:
-    setup = make_setup(area_m2=4e-5)
     path, shot = tmp_path / "view.rrd", tmp_path / "shot.png"
-    with scene_into(path, Rates(5.0, 5.0, 80, 1280), setup) as scene:
-        scene.stream.send_blueprint(blueprint(setup))
-        scene.status("**all is well**")
+    with scene_into({path: Rates(5.0, 5.0)}, make_setup(area_m2=4e-5)) as (scene, _):
         draw_a_test(scene)
     try:
         state = screenshot(str(path), shot, size="1200x800", settle_s=3.0)

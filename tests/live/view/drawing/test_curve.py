@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from live.view.curve import force_axis, strain_axis, stress_axis
+from live.view.drawing.curve import force_axis, strain_axis, stress_axis
 
 
 def test_axes_start_at_zero_and_leave_room() -> None:

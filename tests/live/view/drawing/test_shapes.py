@@ -7,7 +7,7 @@ import pytest
 
 from analysis.field.grid import Roi, ZoiGrid
 from analysis.field.strain_field import StrainField
-from live.view.shapes import ArrowScale, centres, mean_motion, sample_boxes, thinned
+from live.view.drawing.shapes import ArrowScale, centres, mean_motion, sample_boxes, thinned
 from tests.live.made_up import make_field, make_grid
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from live.view.setup import STRAINS, ViewSetup
+from live.view.exchange.setup import STRAINS, ViewSetup
 
 BAR_GAP, BAR_WIDTH, BAR_LABEL, BAR_ROOM = 0.03, 0.035, 0.16, 0.275
 """Colour bar, right of the picture: its left edge, width, middle and right end of its labels.

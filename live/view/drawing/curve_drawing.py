@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from live.maps import number
-from live.view.curve import Axis, force_axis, strain_axis, stress_axis
-from live.view.layout import CURVE_WIDTH
-from live.view.marks import DIM, GREY, ORANGE, lines, rounded, words
-from live.view.setup import ViewSetup
+from live.view.drawing.curve import Axis, force_axis, strain_axis, stress_axis
+from live.view.drawing.layout import CURVE_WIDTH
+from live.view.drawing.marks import DIM, GREY, ORANGE, lines, rounded, words
+from live.view.exchange.setup import ViewSetup
 
 
 class CurveDrawing:
@@ -22,11 +22,15 @@ class CurveDrawing:
     ----------
     log : callable
         Takes an entity path and what to show there.
+    log_change : callable
+        The same for what is drawn only where it changes.
     setup : ViewSetup
     """
 
-    def __init__(self, log: Callable[[str, Any], None], setup: ViewSetup) -> None:
-        self._log, self._setup = log, setup
+    def __init__(
+        self, log: Callable[[str, Any], None], log_change: Callable[[str, Any], None], setup: ViewSetup
+    ) -> None:
+        self._log, self._log_change, self._setup = log, log_change, setup
         self._axes: tuple[Axis, Axis] | None = None
 
     def forget(self) -> None:
@@ -62,13 +66,15 @@ class CurveDrawing:
         x = across.place(np.array(across.ticks)) * CURVE_WIDTH
         y = 1.0 - up.place(np.array(up.ticks))
         rules = [[[xk, 0.0], [xk, 1.0]] for xk in x] + [[[0.0, yk], [CURVE_WIDTH, yk]] for yk in y]
-        self._log("curve/grid", lines(rules, DIM, 0.5))
+        self._log_change("curve/grid", lines(rules, DIM, 0.5))
         x0, y0 = float(across.place(np.array(0.0))) * CURVE_WIDTH, 1.0 - float(up.place(np.array(0.0)))
-        self._log("curve/axes", lines([[[0.0, y0], [CURVE_WIDTH, y0]], [[x0, 0.0], [x0, 1.0]]], GREY, 0.75))
+        self._log_change(
+            "curve/axes", lines([[[0.0, y0], [CURVE_WIDTH, y0]], [[x0, 0.0], [x0, 1.0]]], GREY, 0.75)
+        )
         # rerun hangs a label below its place: a little higher puts it on the line.
         places = [*([xk, 1.03] for xk in x), *([-0.13, yk - 0.05] for yk in y)]
         labels = [number(v * across.factor) for v in across.ticks] + [number(v * up.factor) for v in up.ticks]
         what = "stress" if self._setup.area_m2 else "load"
         names = [f"strain e{self._setup.axis * 2} ({across.unit})", f"{what} ({up.unit})"]
         titles = [[CURVE_WIDTH / 2, 1.15], [0.0, -0.2]]
-        self._log("curve/ticks", words([*places, *titles], [*labels, *names]))
+        self._log_change("curve/ticks", words([*places, *titles], [*labels, *names]))

@@ -33,6 +33,11 @@ class Thinned(Generic[Item]):
             # The newest stays: it is the first of those that follow.
             self._kept, self._stride = self._kept[::-2][::-1], 2 * self._stride
 
+    @property
+    def newest(self) -> Item:
+        """The last one added."""
+        return (self._newest or self._kept)[-1]
+
     def items(self) -> list[Item]:
         """Oldest first."""
         return self._kept + self._newest

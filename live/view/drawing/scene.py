@@ -1,63 +1,61 @@
-"""Draws a test into one rerun stream: pictures, maps, curves, events, status.
+"""Draws a test: pictures, maps, curves, events, status; once, for all places.
 
-Knows rerun and the arrays; nothing of threads, queues or servers (``publisher``). Rates are
-per second of the test, so that a replay draws what the live run drew.
+Knows rerun and the arrays; nothing of threads, processes or servers. Rates are per second of the
+test (``places``).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from acquire.events import Event, EventKind
 from live.maps import MICROSTRAIN, AutoRange, Unit, colour, number, ramp, unit_for
-from live.view.curve import MAX_POINTS
-from live.view.curve_drawing import CurveDrawing
-from live.view.layout import BAR_GAP, BAR_HEIGHT, BAR_LABEL, BAR_TOP, BAR_WIDTH, LETTER, bar_unit
-from live.view.marks import CYAN, YELLOW, encode, reduced, words
-from live.view.setup import STRAINS, Rates, ViewSetup
-from live.view.shapes import ArrowScale, mean_motion, sample_boxes, thinned
-from live.view.thinned import Thinned
+from live.view.drawing.curve import MAX_POINTS
+from live.view.drawing.curve_drawing import CurveDrawing
+from live.view.drawing.layout import BAR_GAP, BAR_HEIGHT, BAR_LABEL, BAR_TOP, BAR_WIDTH, LETTER, bar_unit
+from live.view.drawing.marks import CYAN, YELLOW, encode, reduced, words
+from live.view.drawing.places import Place
+from live.view.drawing.shapes import ArrowScale, mean_motion, sample_boxes, thinned
+from live.view.exchange.messages import Picture, Row
+from live.view.exchange.setup import STRAINS, ViewSetup
+from live.view.exchange.thinned import Thinned
 
 if TYPE_CHECKING:
-    from acquire.frame import Frame
     from analysis.field import StrainField, ZoiGrid
-    from live.measure import Measurement
 
 COLOURS = {"exx": (255, 107, 107), "eyy": (81, 207, 102), "exy": (116, 163, 255)}
 RED = (255, 90, 60)
 MAP_ALPHA = 225
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
-_LOAD_STEP_S = 0.02
-_FLUSH_S = 10.0
 _RAMP = (8, 256)
 _STRAINS_KEPT, _FORCES_KEPT = 5000, 10_000
+QUALITY, LONGEST_PX = 80, 1280
+"""Of the JPEG, 1..100; larger pictures are reduced by a whole factor."""
 
 
 class Scene:
-    """Draws into ``stream``; every method may raise whatever rerun raises.
+    """Draws into ``places``; every method may raise whatever rerun raises.
 
     Parameters
     ----------
-    stream : rerun.RecordingStream
+    places : sequence of Place
     setup : ViewSetup
-    rates : Rates
     """
 
-    def __init__(self, stream: Any, setup: ViewSetup, rates: Rates) -> None:
-        self.stream, self._setup, self._rates = stream, setup, rates
+    def __init__(self, places: Sequence[Place], setup: ViewSetup) -> None:
+        self._places, self._setup = places, setup
+        self._due: Sequence[Place] = places
         self._ranges = {name: AutoRange(setup.strain_range) for name in STRAINS}
         self._limits: dict[str, float] = {}
-        self._curve: Thinned[tuple[float, float]] = Thinned(MAX_POINTS)
-        self._drawn_curve = CurveDrawing(self._log, setup)
+        self._curve: Thinned[Row] = Thinned(MAX_POINTS)
+        self._drawn_curve = CurveDrawing(self._log_due, self._log, setup)
         self._arrows = ArrowScale()
-        self._picture_t = self._map_t = self._load_t = -math.inf
-        self._strains: Thinned[tuple[float, ...]] = Thinned(_STRAINS_KEPT)
-        self._forces: Thinned[tuple[float, float]] = Thinned(_FORCES_KEPT)
-        self.drawn_bytes = self._repeated_at = 0
+        self._strains: Thinned[Row] = Thinned(_STRAINS_KEPT)
+        self._forces: Thinned[Row] = Thinned(_FORCES_KEPT)
 
     def begin(self) -> None:
         """All that does not change."""
@@ -72,38 +70,37 @@ class Scene:
         self._outlines(self._setup.grid)
 
     def end(self) -> None:
-        """All is drawn: let it reach its place, and close that."""
-        self.stream.flush(timeout_sec=_FLUSH_S)
-        self.stream.disconnect()
+        """All is drawn: let it reach its places, and close those."""
+        for place in self._places:
+            place.send_rows(_columns)
+            place.close()
+        self._places = []
 
     # -- pictures and maps ------------------------------------------------------------------
 
-    def picture(self, frame: Frame) -> None:
-        """The newest picture, as JPEG, no more often than the rates say."""
-        if not self._due(frame.t, self._picture_t, self._rates.picture_hz):
-            return
-        self._picture_t = frame.t
+    def picture(self, picture: Picture) -> None:
+        """A picture, as JPEG, no more often than the rates say."""
         import rerun as rr
 
-        image, factor = reduced(frame.image, frame.bits, self._rates.longest_px)
-        data = encode(".jpg", image, self._rates.quality)
-        self._at(frame.t)
-        self._log("camera/picture", rr.EncodedImage(contents=data, media_type="image/jpeg", draw_order=-10))
-        if factor > 1:
-            self._log("camera/picture", rr.Transform3D(scale=float(factor)))
-        self.drawn_bytes += len(data)
-
-    def measurement(self, measurement: Measurement) -> None:
-        """Curves always, maps no more often than the rates say."""
-        field, t = measurement.field, measurement.t
-        self._at(t)
-        i = measurement.instant
-        means = {name: (getattr(i, name), getattr(i, f"sigma_{name}")) for name in STRAINS}
-        self._mean_strain(t, means)
-        self._repeat()
-        if not self._due(t, self._map_t, self._rates.map_hz):
+        self._due = [place for place in self._places if place.takes("picture", picture.t)]
+        if not self._due:
             return
-        self._map_t = t
+        image, factor = reduced(picture.image, picture.bits, LONGEST_PX)
+        data = encode(".jpg", image, QUALITY)
+        self._at(picture.t)
+        self._log_due(
+            "camera/picture", rr.EncodedImage(contents=data, media_type="image/jpeg", draw_order=-10)
+        )
+        if factor * picture.step > 1:
+            self._log_due("camera/picture", rr.Transform3D(scale=float(factor * picture.step)))
+        self._count(data)
+
+    def field(self, t: float, field: StrainField) -> None:
+        """A strain field at ``t`` (s, monotonic) as maps, no more often than the rates say; and the curve."""
+        self._due = [place for place in self._places if place.takes("map", t)]
+        if not self._due:
+            return
+        self._at(t)
         self._specimen(field)
         for name in STRAINS:
             self._map(field, name)
@@ -137,9 +134,9 @@ class Scene:
         import rerun as rr
 
         matrix, shift = mean_motion(field)
-        self._log("specimen", rr.Transform3D(mat3x3=matrix, translation=shift))
+        self._log_due("specimen", rr.Transform3D(mat3x3=matrix, translation=shift))
         origins, vectors, factor = self._arrows.arrows(field)
-        self._log(
+        self._log_due(
             "zoi/displacement",
             rr.Arrows2D(
                 origins=origins, vectors=vectors, colors=CYAN, radii=rr.Radius.ui_points(1.0), draw_order=30
@@ -148,11 +145,11 @@ class Scene:
         total, outlined = field.grid.n_active, len(sample_boxes(field.grid))
         some = f"{outlined} of {number(total)}" if outlined < total else f"all {total}"
         text = f"displacement ×{number(factor)} · {some} ZOIs outlined"
-        self._log(
+        self._log_due(
             "zoi/words", words([[0.5 * self._setup.width, -0.08 * bar_unit(self._setup)]], [text], CYAN)
         )
         lost = thinned(field.grid, np.isnan(field.exx) & field.grid.active)
-        self._log(
+        self._log_due(
             "specimen/zoi/rejected",
             rr.Points2D(lost, colors=RED, radii=rr.Radius.ui_points(1.5), draw_order=25),
         )
@@ -164,8 +161,8 @@ class Scene:
         limit = self._ranges[name].update(values, getattr(field, f"sigma_{name}"))
         data = encode(".png", colour(values, limit, MAP_ALPHA)[..., [2, 1, 0, 3]], 1)
         picture = rr.EncodedImage(contents=data, media_type="image/png", draw_order=10)
-        self._log(f"specimen/map/{name}", picture)
-        self.drawn_bytes += len(data)
+        self._log_due(f"specimen/map/{name}", picture)
+        self._count(data)
 
     def _bar(self, name: str) -> None:
         import rerun as rr
@@ -194,57 +191,48 @@ class Scene:
         points = [*([x, yk] for yk in y), [x - 0.04 * length, top - 0.09 * length]]
         return words(points, [*(number(s * limit * unit.factor) for s in share), unit.name])
 
-    def points(self, points: Iterable[tuple[float, float]]) -> None:
-        """Points (strain, N) of the curve, drawn with the next maps."""
-        for strain, force in points:
-            if math.isfinite(strain) and math.isfinite(force):
-                self._curve.append((strain, force))
-
     # -- curves -------------------------------------------------------------------------------
 
-    def loads(self, samples: Iterable[tuple[float, float]]) -> None:
-        """Load samples (s, N), thinned to 50 a second."""
-        kept = []
+    def points(self, points: Iterable[Row]) -> None:
+        """Points (strain, N) of the curve, drawn with the next maps."""
+        for point in points:
+            self._curve.append(point)
+
+    def loads(self, samples: Iterable[Row]) -> None:
+        """Load samples (s, N)."""
         for t, force in samples:
-            if t - self._load_t >= _LOAD_STEP_S and math.isfinite(force):
-                kept.append((self._since_start(t), force))
-                self._forces.append(kept[-1])
-                self._load_t = t
-        self._send_loads(kept)
+            row = (self._since_start(t), force)
+            self._forces.append(row)
+            self._add(t, "load/force", row)
 
-    def _send_loads(self, samples: list[tuple[float, float]]) -> None:
-        import rerun as rr
+    def means(self, rows: Iterable[Row]) -> None:
+        """Time (s), and mean and sigma of each strain."""
+        for t, *values in rows:
+            if any(math.isfinite(value) for value in values[::2]):
+                self._strains.append((self._since_start(t), *values))
+                self._add_strains(t, self._strains.newest)
+        self._repeat()
 
-        if not samples:
-            return
-        times, forces = np.array(samples).T
-        index = [rr.TimeColumn("time", duration=times)]
-        self.stream.send_columns("load/force", index, rr.Scalars.columns(scalars=forces))
-
-    def _mean_strain(self, t: float, means: dict[str, tuple[float, float]]) -> None:
-        if any(math.isfinite(value) for value, _ in means.values()):
-            row = (self._since_start(t), *(x for name in STRAINS for x in means[name]))
-            self._strains.append(row)
-            self._send_strains([row])
-
-    def _send_strains(self, rows: list[tuple[float, ...]]) -> None:
-        import rerun as rr
-
-        table = np.array(rows)
-        index = [rr.TimeColumn("time", duration=table[:, 0])]
-        shown = table[:, 1:] * MICROSTRAIN.factor
+    def _add_strains(self, t: float, row: Row) -> None:
         for k, name in enumerate(STRAINS):
-            columns = rr.Measurements.columns(values=shown[:, 2 * k], variances=shown[:, 2 * k + 1] ** 2)
-            self.stream.send_columns(f"strain/{name}", index, columns)
+            self._add(t, f"strain/{name}", (row[0], *row[2 * k + 1 : 2 * k + 3]))
+
+    def _add(self, t: float, path: str, row: Row) -> None:
+        for place in self._places:
+            place.add_row(path, row)
+            if place.takes("rows", t):
+                place.send_rows(_columns)
 
     def _repeat(self) -> None:
-        if self.drawn_bytes - self._repeated_at < self._rates.repeat_bytes:
-            return
-        self._repeated_at = self.drawn_bytes
-        self._send_strains(self._strains.items())
-        self._send_loads(self._forces.items())
-        self._limits = {}
-        self._drawn_curve.forget()
+        forgetting = [place for place in self._places if place.forgets()]
+        for place in forgetting:
+            place.send("load/force", self._forces.items(), _columns)
+            for k, name in enumerate(STRAINS):
+                rows = [(row[0], *row[2 * k + 1 : 2 * k + 3]) for row in self._strains.items()]
+                place.send(f"strain/{name}", rows, _columns)
+        if forgetting:
+            self._limits = {}
+            self._drawn_curve.forget()
 
     # -- words --------------------------------------------------------------------------------
 
@@ -267,14 +255,32 @@ class Scene:
 
     # -- rerun --------------------------------------------------------------------------------
 
-    def _due(self, t: float, last: float, rate: float) -> bool:
-        return self.drawn_bytes < self._rates.limit_bytes and t - last >= 0.999 / rate
-
     def _since_start(self, t: float) -> float:
         return max(t - self._setup.start_monotonic, 0.0)
 
     def _at(self, t: float) -> None:
-        self.stream.set_time("time", duration=self._since_start(t))
+        for place in self._places:
+            place.stream.set_time("time", duration=self._since_start(t))
 
     def _log(self, path: str, what: Any, *, static: bool = False) -> None:
-        self.stream.log(path, what, static=static)
+        """To all places: what is drawn only where it changes."""
+        for place in self._places:
+            place.stream.log(path, what, static=static)
+
+    def _log_due(self, path: str, what: Any) -> None:
+        for place in self._due:
+            place.stream.log(path, what)
+
+    def _count(self, data: bytes) -> None:
+        for place in self._due:
+            place.count(data)
+
+
+def _columns(path: str, values: Sequence[Any]) -> Any:
+    """Rerun's columns of what is drawn over time."""
+    import rerun as rr
+
+    if path == "load/force":
+        return rr.Scalars.columns(scalars=values[0])
+    means, sigmas = (value * MICROSTRAIN.factor for value in values)
+    return rr.Measurements.columns(values=means, variances=sigmas**2)

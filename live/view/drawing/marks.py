@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from live.maps import number
-from live.view.curve import Axis
+from live.view.drawing.curve import Axis
 
 GREY, DIM = (170, 175, 185), (62, 66, 74)
 ORANGE, CYAN, YELLOW = (255, 169, 64), (64, 224, 255), (255, 212, 59)

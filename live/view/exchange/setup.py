@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
@@ -47,29 +46,3 @@ class ViewSetup:
     axis: Literal["x", "y"] = "y"
     strain_range: float | None = None
     picture_hz: float = 5.0
-
-
-@dataclass(frozen=True, slots=True)
-class Rates:
-    """How much goes to one place, per second of the test; and how much in all.
-
-    Attributes
-    ----------
-    picture_hz, map_hz : float, 1/s
-    quality : int
-        Of the JPEG, 1..100.
-    longest_px : int
-        Larger pictures are reduced by a whole factor.
-    limit_bytes : float
-        When the pictures and maps drawn come to this much they stop; the curves go on.
-    repeat_bytes : float
-        Each time that much was drawn, the curves are sent again from their beginning: a server
-        forgets the oldest, and a viewer that comes later is to see the whole test.
-    """
-
-    picture_hz: float
-    map_hz: float
-    quality: int
-    longest_px: int
-    limit_bytes: float = math.inf
-    repeat_bytes: float = math.inf

@@ -1,0 +1,180 @@
+"""What goes between a test and the process of its view: framed messages, checked as they come.
+
+A message is a header (magic, version, kind, two lengths; little endian), a JSON object, and the bytes
+of its arrays, each padded to 8. The object's "arrays" lists name, type and shape of each array. Nothing
+that is read is executed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import socket
+import struct
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import DataError
+
+MAGIC, VERSION = b"pdvw", 1
+MOST_META, MOST_BYTES = 2**23, 2**28
+"""Of one message: beyond these it is not one of ours."""
+
+_HEADER = struct.Struct("<4sHHIQ")
+_TYPES = ("|b1", "|u1", "<u2", "<f4", "<f8")
+_ALIGN = 8
+
+
+class Kind(IntEnum):
+    """What a message says; the last four come from the view's process."""
+
+    SETUP = 1
+    MEANS = 2
+    FIELD = 3
+    PICTURE = 4
+    LOADS = 5
+    POINTS = 6
+    EVENTS = 7
+    STATUS = 8
+    END = 9
+    SERVING = 20  # port (None: no server), rrd (None: no file)
+    TROUBLE = 21  # text, lasting: whether to start anew is of no use
+    FULL = 22  # memory_MiB: the process ends because it grew to this
+    ENDED = 23
+
+
+class WireError(DataError):
+    """What came is not a message of this version, or not what it says it is."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Message:
+    """One message.
+
+    Attributes
+    ----------
+    kind : Kind
+    meta : mapping of str to JSON value
+    arrays : mapping of str to array of bool, uint8, uint16, float32 or float64
+    """
+
+    kind: Kind
+    meta: Mapping[str, Any] = field(default_factory=dict)
+    arrays: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+
+
+def encoded(message: Message) -> list[memoryview]:
+    """The bytes of ``message``, in pieces; the arrays are not copied and must not change until they are sent.
+
+    Raises
+    ------
+    WireError
+        An array of another type.
+    """
+    arrays = {name: np.ascontiguousarray(array) for name, array in message.arrays.items()}
+    listed = [[name, array.dtype.str, array.shape] for name, array in arrays.items()]
+    if unknown := [kind for _, kind, _ in listed if kind not in _TYPES]:
+        raise WireError(f"arrays of {unknown[0]} are not sent to the view")
+    meta = json.dumps({**message.meta, "arrays": listed}).encode()
+    meta += b" " * _padding(len(meta))
+    total = sum(array.nbytes + _padding(array.nbytes) for array in arrays.values())
+    pieces = [_HEADER.pack(MAGIC, VERSION, message.kind, len(meta), total) + meta]
+    views = [memoryview(pieces[0])]
+    for array in arrays.values():
+        views += [array.reshape(-1).view(np.uint8).data, memoryview(b"\0" * _padding(array.nbytes))]
+    return [view for view in views if view.nbytes]
+
+
+def _padding(length: int) -> int:
+    return -length % _ALIGN
+
+
+class Reader:
+    """Takes messages from a stream socket, blocking or not.
+
+    Parameters
+    ----------
+    source : socket
+    """
+
+    def __init__(self, source: socket.socket) -> None:
+        self._source = source
+        self._head: tuple[Kind, int] | None = None
+        self._expect(_HEADER.size)
+
+    def next(self) -> Message:
+        """The next message.
+
+        Raises
+        ------
+        BlockingIOError
+            Not all of it has come yet; what came is kept.
+        EOFError
+            The other side has gone.
+        WireError
+        """
+        if self._head is None:
+            self._fill()
+            kind, meta, total = _checked_header(bytes(self._buffer))
+            self._head = kind, meta
+            self._expect(meta + total)
+        self._fill()
+        (kind, meta), body = self._head, self._buffer
+        self._head = None
+        self._expect(_HEADER.size)
+        return _message(kind, body, meta)
+
+    def _expect(self, length: int) -> None:
+        self._buffer, self._got = bytearray(length), 0
+
+    def _fill(self) -> None:
+        while self._got < len(self._buffer):
+            came = self._source.recv_into(memoryview(self._buffer)[self._got :])
+            if not came:
+                raise EOFError
+            self._got += came
+
+
+def _checked_header(header: bytes) -> tuple[Kind, int, int]:
+    magic, version, number, meta, total = _HEADER.unpack(header)
+    if (magic, version) != (MAGIC, VERSION):
+        raise WireError(f"not a message of version {VERSION} to or from the view: {header[:6]!r}")
+    if meta > MOST_META or total > MOST_BYTES:
+        raise WireError(f"a message of {meta} + {total} bytes is too long for the view")
+    try:
+        return Kind(number), meta, total
+    except ValueError as error:
+        raise WireError(f"the view knows no message {number}") from error
+
+
+def _message(kind: Kind, body: bytearray, length: int) -> Message:
+    try:
+        meta = json.loads(bytes(body[:length]))
+        listed = [(str(name), str(dtype), tuple(shape)) for name, dtype, shape in meta.pop("arrays")]
+    except (ValueError, TypeError, KeyError, AttributeError) as error:
+        raise WireError(f"a message {kind.name} to or from the view is damaged: {error}") from error
+    return Message(kind, meta, _arrays(kind, memoryview(body)[length:], listed))
+
+
+def _arrays(
+    kind: Kind, body: memoryview, listed: list[tuple[str, str, tuple[int, ...]]]
+) -> dict[str, NDArray[Any]]:
+    arrays, begin = {}, 0
+    for name, dtype, shape in listed:
+        if dtype not in _TYPES or any(type(n) is not int or n < 0 for n in shape):
+            raise WireError(f"a message {kind.name} to the view has an array of {dtype} {shape}")
+        count, length = math.prod(shape), math.prod(shape) * np.dtype(dtype).itemsize
+        if begin + length > len(body):
+            raise WireError(f"a message {kind.name} to the view is shorter than its arrays")
+        arrays[name] = (
+            np.frombuffer(body, dtype, count, begin).reshape(shape) if count else np.empty(shape, dtype)
+        )
+        begin += length + _padding(length)
+    if begin != len(body):
+        raise WireError(f"a message {kind.name} to the view is longer than its arrays")
+    return arrays

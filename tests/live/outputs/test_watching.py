@@ -1,0 +1,92 @@
+"""View and status card as consumers: an offer costs the test next to nothing, whatever the view does."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import pytest
+
+from acquire.events import Event, EventKind
+from acquire.load_sample import LoadSample
+from live.measure import History
+from live.outputs import Outputs
+from live.outputs.watching import CARD_INSTANTS, CardWriter, Watching
+from live.setup import SpecimenConfig
+from live.tell import Journal, Ledger, StatusCard
+from tests.live.made_up import START, make_frame, make_loads, make_measurement
+
+
+class KeptView:
+    """Keeps what it is given, as ``View`` would send it."""
+
+    failed = ""
+
+    def __init__(self) -> None:
+        self.given: list[tuple[str, Any]] = []
+        self.closed = False
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *what: self.given.append((name, what))
+
+    def close(self, seconds: float) -> None:
+        self.closed = True
+
+    report = "all drawn"
+
+
+def watched(*views: KeptView) -> tuple[Outputs, Journal]:
+    journal = Journal()
+    return Outputs([Watching(v) for v in views], make_loads(10.0, lambda t: t), journal, History()), journal  # type: ignore[arg-type]
+
+
+def test_everything_is_offered() -> None:
+    view = KeptView()
+    out, journal = watched(view)
+    out.add(make_measurement(0))
+    out.frame(make_frame(0, START))
+    out.load(LoadSample(START, 5.0))
+    journal.tell(EventKind.NOTE, "operator", "hello")
+    out.end()
+    assert {name for name, _ in view.given} == {"show", "settled", "picture", "load", "event"}
+    assert view.closed
+    assert out.reports[0].words == "all drawn"
+
+
+def test_a_view_that_has_failed_is_told_once_and_all_else_goes_on() -> None:
+    broken, sound = KeptView(), KeptView()
+    out, journal = watched(broken, sound)
+    broken.failed = "its process does not start (ended with 1)"
+    for number in range(5):
+        out.add(make_measurement(number))
+    out.end()
+    events: list[Event] = journal.events("warning")
+    assert [broken.failed in event.text for event in events] == [True]
+    assert len([name for name, _ in sound.given if name == "show"]) == 5
+    assert not out.failed
+
+
+def test_the_card_is_written_once_a_second_from_a_bounded_history(monkeypatch: pytest.MonkeyPatch) -> None:
+    view, seen = KeptView(), []
+    card = StatusCard(SpecimenConfig(), make_loads(1.0, lambda t: t))
+    monkeypatch.setattr(card, "written", lambda history, ledger: seen.append(history.instants) or "card")
+    writer = CardWriter(view, card, Ledger())  # type: ignore[arg-type]
+    last = make_measurement(0)
+    for number in range(3 * CARD_INSTANTS):
+        last = make_measurement(number) if number % 1000 == 0 else last
+        writer.measurement(last)
+    writer.measurement(newest := make_measurement(100_000))
+    assert [name for name, _ in view.given] == ["status"] * 7
+    assert max(len(instants) for instants in seen) <= CARD_INSTANTS + 2
+    assert seen[-1][-1] is newest.instant
+
+
+def test_the_card_says_where_the_test_stands() -> None:
+    view = KeptView()
+    writer = CardWriter(view, StatusCard(SpecimenConfig(), make_loads(10.0, lambda t: 1e3 * t)), Ledger())  # type: ignore[arg-type]
+    begin = time.perf_counter()
+    for number in range(100):
+        writer.measurement(make_measurement(number, 1e-5 * number))
+    assert time.perf_counter() - begin < 10.0
+    (_, (text,)) = view.given[-1]
+    assert "33 of 34" in text.replace("*", "") or "ZOIs valid" in text

@@ -1,0 +1,137 @@
+"""What is drawn stands where it was drawn to, as often as it should."""
+
+from __future__ import annotations
+
+import contextlib
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquire.events import Event, EventKind
+from analysis.field import StrainField
+from live.view import ViewSetup
+from live.view.drawing.layout import blueprint
+from live.view.drawing.marks import reduced
+from live.view.drawing.places import Place, Rates
+from live.view.drawing.scene import Scene
+from live.view.exchange.messages import Picture, row_of
+from tests.live.made_up import START, make_frame, make_grid, make_measurement
+
+chunk = pytest.importorskip("rerun.chunk")
+
+
+def make_setup(**more: Any) -> ViewSetup:
+    return ViewSetup("a test", 128, 96, 12, make_grid(), START, **more)
+
+
+def rows_in(path: Path) -> Counter[str]:
+    rows: Counter[str] = Counter()
+    for part in chunk.RrdReader(path).stream():
+        rows[str(part.entity_path)] += part.num_rows
+    return rows
+
+
+@contextlib.contextmanager
+def scene_into(places: dict[Path, Rates], setup: ViewSetup | None = None) -> Iterator[tuple[Scene, Place]]:
+    import rerun as rr
+
+    setup, made = setup or make_setup(), []
+    for path, rates in places.items():
+        stream = rr.RecordingStream("phasedic")
+        stream.set_sinks(rr.FileSink(str(path)))
+        stream.send_blueprint(blueprint(setup))
+        made.append(Place(stream, rates))
+    scene = Scene(made, setup)
+    scene.begin()
+    yield scene, made[0]
+    scene.end()
+
+
+def draw_a_test(scene: Scene, seconds: float = 3.0) -> None:
+    scene.event(Event(START, EventKind.START, "phasedic", "test started"))
+    scene.status("**all is well**")
+    for k in range(round(10 * seconds)):
+        frame, measurement = make_frame(k, START + 0.1 * k), make_measurement(k, 1e-4 * k)
+        scene.picture(Picture(frame.image, 12, frame.t, 1))
+        scene.loads([(START + 0.1 * k + 0.02 * j, 10.0 * k) for j in range(5)])
+        scene.points([(1e-4 * k, 10.0 * k)])
+        scene.means([row_of(measurement)])
+        scene.field(measurement.t, measurement.field)
+
+
+STATIC = 1
+
+
+def test_every_mean_is_drawn_and_pictures_and_maps_as_often_as_asked(tmp_path: Path) -> None:
+    fast, slow = tmp_path / "fast.rrd", tmp_path / "slow.rrd"
+    places = {fast: Rates(5.0, 10.0), slow: Rates(1.0, 2.0, 1.0)}
+    with scene_into(places, make_setup(area_m2=4e-5)) as (scene, _):
+        draw_a_test(scene)
+    for path, pictures, maps in ((fast, 15, 30), (slow, 3, 6)):
+        rows = rows_in(path)
+        assert rows["/strain/eyy"] == rows["/strain/exy"] == 30 + STATIC
+        assert rows["/load/force"] == 150 + STATIC
+        assert rows["/camera/picture"] == pictures
+        assert rows["/specimen/map/exx"] == maps + STATIC
+        assert rows["/curve/line"] == maps
+        assert rows["/curve/axes"] >= 1  # drawn where it changes, in both
+        assert rows["/specimen/zoi/boxes"] == STATIC
+        assert rows["/events"] == rows["/status"] == 1
+
+
+def test_beyond_the_limit_pictures_and_maps_stop_and_curves_go_on(tmp_path: Path) -> None:
+    path = tmp_path / "view.rrd"
+    with scene_into({path: Rates(10.0, 10.0, limit_bytes=20e3)}) as (scene, place):
+        draw_a_test(scene)
+        assert 20e3 <= place.drawn_bytes < 40e3
+    rows = rows_in(path)
+    assert rows["/strain/eyy"] == 31
+    assert 1 <= rows["/camera/picture"] < 30
+    assert 1 <= rows["/specimen/map/exx"] < 30
+
+
+def test_what_a_server_forgets_is_sent_again(tmp_path: Path) -> None:
+    path = tmp_path / "view.rrd"
+    with scene_into({path: Rates(10.0, 10.0, repeat_bytes=20e3)}) as (scene, _):
+        draw_a_test(scene)
+    times: Counter[int] = Counter()
+    for part in chunk.RrdReader(path).stream():
+        if str(part.entity_path) == "/strain/eyy" and not part.is_static:
+            times.update(part.to_record_batch().column("time").cast("int64").to_pylist())
+    assert len(times) == 30
+    assert max(times.values()) >= 2
+
+
+def test_a_thinned_picture_keeps_its_size_on_the_screen(tmp_path: Path) -> None:
+    path = tmp_path / "view.rrd"
+    with scene_into({path: Rates(5.0, 5.0)}) as (scene, _):
+        scene.picture(Picture(np.zeros((48, 64), np.uint8), 8, START, 2))
+    columns = {
+        name
+        for part in chunk.RrdReader(path).stream()
+        if str(part.entity_path) == "/camera/picture"
+        for name in part.to_record_batch().schema.names
+    }
+    assert "Transform3D:scale" in columns
+
+
+def test_a_field_without_one_valid_zoi_is_drawn(tmp_path: Path) -> None:
+    grid, path = make_grid(), tmp_path / "view.rrd"
+    field = StrainField.from_values(grid, {}, status=np.full(grid.shape, 5))
+    with scene_into({path: Rates(5.0, 5.0)}, make_setup(axis="x")) as (scene, _):
+        scene.field(START, field)
+    assert rows_in(path)["/specimen/map/eyy"] == 1 + STATIC
+
+
+@pytest.mark.parametrize("bits", [8, 12, 16])
+def test_large_pictures_are_reduced_to_eight_bits(bits: int) -> None:
+    top = 2**bits - 1
+    image = np.full((300, 500), top, np.uint8 if bits == 8 else np.uint16)
+    image[:, :250] = 0
+    small, factor = reduced(image, bits, 200)
+    assert (factor, small.shape, small.dtype) == (3, (100, 166), np.uint8)
+    assert (small[0, 0], small[0, -1]) == (0, 255)
