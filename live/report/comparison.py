@@ -10,6 +10,7 @@ from typing import TextIO
 import numpy as np
 
 from acquire.errors import ConfigError, DataError
+from analysis.evaluate import Figure as Evaluated
 from live.finished import RunFolder
 from live.report.curves import load_unit, strain_unit
 from live.report.evaluation import Curve
@@ -61,21 +62,26 @@ def quantities(tests: Sequence[Test]) -> dict[str, list[float]]:
     figures = [test.curve.figures for test in tests]
     if stress:
         return {
-            "E_GPa": [f.E / 1e9 for f in figures],
-            "sigma_E_GPa": [f.sigma_E / 1e9 for f in figures],
-            "nu": [f.nu for f in figures],
-            "sigma_nu": [f.sigma_nu for f in figures],
-            "Rp0.2_MPa": [f.Rp02 / 1e6 for f in figures],
-            "Rm_MPa": [f.Rm / 1e6 for f in figures],
+            "E_GPa": [f.E.value / 1e9 for f in figures],
+            "half_E_GPa": [_half(f.E) / 1e9 for f in figures],
+            "nu": [f.nu.value for f in figures],
+            "half_nu": [_half(f.nu) for f in figures],
+            "Rp0.2_MPa": [f.Rp02.value / 1e6 for f in figures],
+            "Rm_MPa": [f.Rm.value / 1e6 for f in figures],
         }
     return {
-        "EA_kN": [f.E / 1e3 for f in figures],
-        "sigma_EA_kN": [f.sigma_E / 1e3 for f in figures],
-        "nu": [f.nu for f in figures],
-        "sigma_nu": [f.sigma_nu for f in figures],
-        "Fp0.2_kN": [f.Rp02 / 1e3 for f in figures],
-        "Fm_kN": [f.Rm / 1e3 for f in figures],
+        "EA_kN": [f.E.value / 1e3 for f in figures],
+        "half_EA_kN": [_half(f.E) / 1e3 for f in figures],
+        "nu": [f.nu.value for f in figures],
+        "half_nu": [_half(f.nu) for f in figures],
+        "Fp0.2_kN": [f.Rp02.value / 1e3 for f in figures],
+        "Fm_kN": [f.Rm.value / 1e3 for f in figures],
     }
+
+
+def _half(figure: Evaluated) -> float:
+    """Half of the interval of confidence."""
+    return (figure.high - figure.low) / 2
 
 
 def summary(values: Sequence[float]) -> tuple[float, float, int]:

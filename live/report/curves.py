@@ -38,15 +38,15 @@ def stress_strain(curve: TestCurve) -> Figure:
     e, load, figures = strain_unit(curve.axial), load_unit(curve), curve.figures
     curves = [Curve("measured", curve.axial * e.factor, curve.load * load.factor)]
     marks = []
-    if math.isfinite(figures.E) and math.isfinite(curve.intercept):
+    if figures.E.known and math.isfinite(curve.intercept):
         label = "E" if curve.is_stress else "EA"
         curves.append(_straight(curve, label, 0.0, e, load))
-    if math.isfinite(figures.Rp02):
+    if figures.Rp02.known:
         curves.append(_straight(curve, "0.2 % offset", 0.002, e, load))
-        strain = 0.002 + (figures.Rp02 - curve.intercept) / figures.E
+        strain = 0.002 + (figures.Rp02.value - curve.intercept) / figures.E.value
         name = "Rp0.2" if curve.is_stress else "Fp0.2"
-        words = f"{name} = {figures.Rp02 * load.factor:.4g} {load.name}"
-        marks.append(Mark(strain * e.factor, figures.Rp02 * load.factor, words))
+        words = f"{name} = {figures.Rp02.value * load.factor:.4g} {load.name}"
+        marks.append(Mark(strain * e.factor, figures.Rp02.value * load.factor, words))
     what = "stress" if curve.is_stress else "force"
     title = f"{what.capitalize()} against strain"
     return Figure(
@@ -55,9 +55,9 @@ def stress_strain(curve: TestCurve) -> Figure:
 
 
 def _straight(curve: TestCurve, label: str, offset: float, e: Unit, load: Unit) -> Curve:
-    top = 1.05 * curve.figures.Rm
+    top = 1.05 * curve.figures.Rm.value
     y = np.array([0.0, top])
-    x = offset + (y - curve.intercept) / curve.figures.E
+    x = offset + (y - curve.intercept) / curve.figures.E.value
     return Curve(label, x * e.factor, y * load.factor, colour=1 if not offset else 3, dashed=True)
 
 

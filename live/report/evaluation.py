@@ -9,11 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate import Tensile, tensile_figures
+from analysis.evaluate import Curve as Measured
+from analysis.evaluate import TensileFigures, evaluate_test
 from live.finished import RunFolder
+from live.setup import from_dict
+from live.tell import options_of
 
 Array = NDArray[np.float64]
-_LOW, _HIGH = 0.1, 0.6  # the elastic part, of the proof stress, as ``analysis.evaluate`` takes it
 _STILL_FORCE, _STILL_SIGMAS = 0.01, 5.0
 STILL_LEAST = 3
 
@@ -29,7 +31,7 @@ class Curve:
     load : (T,) float64
         Stress, Pa, or force, N, where the section is not known; NaN where no force is known.
     is_stress : bool
-    figures : Tensile
+    figures : TensileFigures
         In the unit of ``load``.
     intercept : float
         Of the elastic line, in the unit of ``load``; NaN where there is none.
@@ -39,7 +41,7 @@ class Curve:
     transverse: Array
     load: Array
     is_stress: bool
-    figures: Tensile
+    figures: TensileFigures
     intercept: float
 
     @classmethod
@@ -48,7 +50,9 @@ class Curve:
         values, stress = run.strain.values, run.stress
         load = run.force if stress is None else stress
         axial, transverse = (np.asarray(values[n], np.float64) for n in (run.axial, run.transverse))
-        figures = tensile_figures(axial, transverse, load)
+        specimen = from_dict({"specimen": run.section("specimen")}, {}, str(run.path)).specimen
+        measured = Measured(np.asarray(run.strain.time_s, np.float64), axial, load, transverse)
+        figures = evaluate_test(measured, options_of(specimen))
         return cls(axial, transverse, load, stress is not None, figures, _intercept(axial, load, figures))
 
     @property
@@ -59,20 +63,21 @@ class Curve:
     @property
     def elastic(self) -> NDArray[np.bool_]:
         """Instants of the elastic part, (T,)."""
-        return _elastic(self.load, self.figures)
+        return _elastic(self.axial, self.load, self.figures)
 
 
-def _elastic(load: Array, figures: Tensile) -> NDArray[np.bool_]:
-    top = figures.Rp02 if math.isfinite(figures.Rp02) else figures.Rm
-    if not math.isfinite(top):
-        return np.zeros(len(load), bool)
+def _elastic(axial: Array, load: Array, figures: TensileFigures) -> NDArray[np.bool_]:
+    span = figures.span
+    if span is None or not np.isfinite(load).any():
+        return np.zeros(len(load), np.bool_)
     before = np.arange(len(load)) <= int(np.nanargmax(load))
-    return before & (load >= _LOW * top) & (load <= _HIGH * top)
+    strain = axial - figures.zero.strain
+    return np.asarray(before & (strain >= span.strain[0]) & (strain <= span.strain[1]), np.bool_)
 
 
-def _intercept(axial: Array, load: Array, figures: Tensile) -> float:
-    part = _elastic(load, figures) & np.isfinite(axial)
-    return float(np.mean(load[part]) - figures.E * np.mean(axial[part])) if part.any() else math.nan
+def _intercept(axial: Array, load: Array, figures: TensileFigures) -> float:
+    part = _elastic(axial, load, figures) & np.isfinite(load)
+    return float(np.mean(load[part]) - figures.E.value * np.mean(axial[part])) if part.any() else math.nan
 
 
 def instants(run: RunFolder, curve: Curve) -> dict[int, str]:
@@ -85,7 +90,7 @@ def instants(run: RunFolder, curve: Curve) -> dict[int, str]:
     elastic = np.flatnonzero(curve.elastic)
     if len(elastic):
         add(int(elastic[len(elastic) // 2]), "elastic")
-    if math.isfinite(curve.figures.Rp02):
+    if curve.figures.Rp02.known:
         add(_yield_row(curve), "yield (0.2 %)")
     if curve.has_load:
         add(int(np.nanargmax(curve.load)), "highest force")
@@ -96,8 +101,8 @@ def instants(run: RunFolder, curve: Curve) -> dict[int, str]:
 
 
 def _yield_row(curve: Curve) -> int:
-    plastic = curve.axial - (curve.load - curve.intercept) / curve.figures.E
-    beyond = np.flatnonzero((plastic >= 0.002) & (curve.load >= 0.98 * curve.figures.Rp02))
+    plastic = curve.axial - (curve.load - curve.intercept) / curve.figures.E.value
+    beyond = np.flatnonzero((plastic >= 0.002) & (curve.load >= 0.98 * curve.figures.Rp02.value))
     return int(beyond[0]) if len(beyond) else int(np.nanargmax(curve.load))
 
 

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import datetime
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
+from analysis.evaluate import CONFIDENCE
 from live.finished import RunFolder
 from live.report import curves
 from live.report.evaluation import (
@@ -26,7 +26,7 @@ from live.report.page import Part, captioned, element, facts, joined, page, para
 from live.report.practice import Known, reporting_table
 from live.report.record import definitions, events, hashes, ledger, version_table
 from live.report.svg import Figure, draw
-from live.tell import Screen, quantity
+from live.tell import Screen, interval
 
 MOST_BYTES = 5_000_000
 _SIDES = (720, 480, 320, 200)  # px, of the pictures: smaller ones where the page would be too large
@@ -142,22 +142,19 @@ def _head(run: RunFolder, curve: Curve) -> Part:
 def tensile(curve: Curve) -> dict[str, str]:
     """E, nu and the strengths by name, each with its uncertainty; what the curve does not tell is left out."""
     found, figures, load = {}, curve.figures, curves.load_unit(curve)
-    if math.isfinite(figures.E):
-        name, factor, unit = ("E", 1e-9, "GPa") if curve.is_stress else ("EA", 1e-3, "kN per unit strain")
-        found[name] = _estimate(figures.E * factor, figures.sigma_E * factor, unit)
-    if math.isfinite(figures.nu):
-        found["nu"] = _estimate(figures.nu, figures.sigma_nu, "")
-    if math.isfinite(figures.Rp02):
-        found["Rp0.2" if curve.is_stress else "Fp0.2"] = f"{figures.Rp02 * load.factor:.4g} {load.name}"
+    if figures.E.known:
+        name, one, unit = ("E", 1e9, "GPa") if curve.is_stress else ("EA", 1e3, "kN per unit strain")
+        found[name] = interval(figures.E, one, unit).replace("+-", "±")
+    if figures.nu.known:
+        found["nu"] = interval(figures.nu).replace("+-", "±")
+    if figures.Rp02.known:
+        proof = interval(figures.Rp02, 1 / load.factor, load.name).replace("+-", "±")
+        found["Rp0.2" if curve.is_stress else "Fp0.2"] = proof
     if curve.has_load:
         found["Rm" if curve.is_stress else "highest force"] = (
             f"{np.nanmax(curve.load) * load.factor:.4g} {load.name}"
         )
     return found
-
-
-def _estimate(value: float, sigma: float, unit: str) -> str:
-    return quantity(value, sigma, unit).replace("+-", "±")
 
 
 def _extent(run: RunFolder, curve: Curve) -> dict[str, str]:
@@ -207,9 +204,13 @@ def _about_curves(curve: Curve) -> Part:
     if not curve.has_load:
         return paragraph("No force is known at any instant, so there is no stress-strain curve.", "dim")
     words = "Bands are one standard uncertainty of the mean on either side."
-    if math.isfinite(curve.figures.E):
-        proof = "of the proof stress" if math.isfinite(curve.figures.Rp02) else "of the highest load"
-        words += f" The elastic line has {curve.figures.n_elastic} instants, from 10 % to 60 % {proof}."
+    figures = curve.figures
+    if figures.span is not None:
+        low, high = (100 * strain for strain in figures.span.strain)
+        words += (
+            f" The elastic line has {figures.span.n} instants between the strains {low:.3g} and {high:.3g} %"
+            f" ({figures.standard}, R^2 {figures.r2:.5f}); intervals of E, nu and Rp0.2 are of {CONFIDENCE:.0%}."
+        )
     return paragraph(words, "dim")
 
 

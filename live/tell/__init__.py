@@ -7,7 +7,7 @@
 
 from live.tell.books import Books
 from live.tell.card import StatusCard
-from live.tell.figures import elastic_lines, evaluate, interval, quantity
+from live.tell.figures import elastic_lines, evaluate, interval, options_of, quantity
 from live.tell.journal import Journal
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen
@@ -23,6 +23,7 @@ __all__ = [
     "evaluate",
     "file_lines",
     "interval",
+    "options_of",
     "quantity",
     "summary_lines",
 ]

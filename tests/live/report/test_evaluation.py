@@ -18,8 +18,8 @@ def test_the_line_and_the_instants(run_dir: Path) -> None:
     with open_run(run_dir) as run:
         curve = Curve.of(run)
         found = instants(run, curve)
-    assert pytest.approx(E_PA, rel=0.01) == curve.figures.E
-    assert curve.figures.Rp02 == pytest.approx(E_PA * YIELD, rel=3e-3)
+    assert pytest.approx(E_PA, rel=0.01) == curve.figures.E.value
+    assert curve.figures.Rp02.value == pytest.approx(E_PA * YIELD, rel=3e-3)
     # The line goes through the origin of a curve that does.
     assert abs(curve.intercept) < 0.005 * E_PA * YIELD
     words = {word: row for row, name in found.items() for word in name.split(", ")}
