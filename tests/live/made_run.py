@@ -22,7 +22,7 @@ from tests.live.made_up import CAMERA, START, make_field, make_frame, make_grid,
 
 E_PA, YIELD, HARDENING_PA, WIDTH_MM, THICKNESS_MM = 70e9, 0.003, 1e8, 10.0, 2.0
 UTC_START = datetime(2030, 1, 2, 3, 4, 5, tzinfo=UTC)
-PULLED = tuple(float(e) for e in [0.0] * 8 + list(np.linspace(2e-4, 8e-3, 40)))
+PULLED = tuple(float(e) for e in [0.0] * 8 + list(np.linspace(1e-4, 8e-3, 80)))
 """Mean axial strain by instant: still at first, then pulled beyond yield."""
 CONFIG: dict[str, Any] = {
     "camera": {"address": "sim:made-up"},
