@@ -1,12 +1,13 @@
-"""``strain.h5``: the strain maps of a test, crash-safe row by row and readable by NeXus viewers.
+"""``strain.h5``: the strain maps of a test, crash-safe and readable by NeXus viewers.
 
-Every dataset and attribute is made before SWMR mode is switched on, and every row is flushed:
-after a kill the finished rows are there (open with ``swmr=True``, as ``Strain.open`` does).
+Every dataset and attribute is made before SWMR mode is switched on, and rows are flushed four times a
+second: after a kill those are there (open with ``swmr=True``, as ``Strain.open`` does).
 """
 
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from itertools import chain
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import DataError
-from acquire.hdf5 import let_go
+from acquire.hdf5 import Pace, PictureStack, Table, let_go
 from live.results.info import FORMAT, FORMAT_VERSION
 from live.results.row import GRADIENTS, STRAINS, Row, gauge_columns
 from live.results.strain_csv import COLUMNS
@@ -24,10 +25,10 @@ if TYPE_CHECKING:
     from analysis.field import ZoiGrid
     from live.results.info import ResultsInfo
 
-
+FLUSH_S = 0.25  # a row waits for its flush no longer than this
 _WHOLE = {"frame", "last_frame", "n_frames", "lost", "n_valid", "n_zoi"}
 _UNITS = {"time_s": "s", "force_N": "N", "noise_GL": "GL", "duration_s": "s", "u_px": "px", "v_px": "px"}
-_UNITS["stress_Pa"] = "Pa"
+_UNITS |= {"stress_Pa": "Pa", "latency_s": "s", "kernel_s": "s"}
 _MAPS = ("u", "v", *GRADIENTS, *STRAINS)
 _WORDS = {
     "u": "displacement along x (right)",
@@ -48,6 +49,14 @@ _WORDS = {
 class StrainWriter:
     """Makes the file and appends rows to it.
 
+    Parameters
+    ----------
+    path : Path
+    grid : ZoiGrid
+    info : ResultsInfo
+    now : callable
+        Gives seconds; paces the flushes.
+
     Raises
     ------
     DataError
@@ -55,34 +64,55 @@ class StrainWriter:
         was flushed before stays readable.
     """
 
-    def __init__(self, path: Path, grid: ZoiGrid, info: ResultsInfo) -> None:
-        self._path, self.failed, self._rows = path, False, 0
+    def __init__(
+        self, path: Path, grid: ZoiGrid, info: ResultsInfo, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._path, self.failed = path, False
+        self._flushed = 0  # rows
+        self._pace = Pace(FLUSH_S, now)
         self._file = self._guard(lambda: _create(path, grid, info))
         entry = self._file["entry"]
-        self._maps = {n: entry["strain"][n] for n in _map_names()}
-        self._values = {n: entry["mean"][n] for n in _value_names(info)}
+        self._maps = {n: PictureStack(entry["strain"][n]) for n in _map_names()}
+        self._values = Table(entry["mean"], _value_names(info))
 
     def write(self, row: Row) -> None:
-        """Append one row and flush it."""
+        """Append one row."""
         self._guard(lambda: self._append(row))
+        self._pace.wrote()
+        self.flush_when_due()
+
+    def flush_when_due(self) -> float:
+        """Flush where a row has waited for ``FLUSH_S``; ``write`` does that too.
+
+        Returns
+        -------
+        float, s
+            Time after which this must be called again if no row comes; infinite where none waits.
+        """
+        if self._pace.left_s() == 0:
+            self._guard(self._flush)
+        return self._pace.left_s()
 
     def close(self) -> None:
         """Close the file; after a failed write it is let go as it stands on the disk."""
         if self.failed:
             let_go(self._file)
         else:
+            self._guard(self._flush)
             self._guard(self._file.close)
 
     def _append(self, row: Row) -> None:
-        k = self._rows
-        for name, dataset in self._maps.items():
-            dataset.resize(k + 1, axis=0)
-            dataset[k] = row.maps[name]
-        for name, dataset in self._values.items():
-            dataset.resize(k + 1, axis=0)
-            dataset[k] = row.values[name]
+        values = self._values.row(row.values)
+        for name, stack in self._maps.items():
+            stack.append(row.maps[name])
+        self._values.hold(values)
+
+    def _flush(self) -> None:
+        self._pace.began()
+        self._values.write()
         self._file.flush()
-        self._rows = k + 1
+        self._pace.done()
+        self._flushed = self._values.length
 
     def _guard(self, action: Callable[[], Any]) -> Any:
         try:
@@ -94,7 +124,7 @@ class StrainWriter:
     def _trouble(self, error: Exception) -> DataError:
         return DataError(
             f"{self._path}: cannot be written ({error}); make room on the disk or choose another --out. "
-            f"The {self._rows} rows before are safe"
+            f"The {self._flushed} rows before are safe"
         )
 
 
@@ -147,7 +177,7 @@ def _add_mean(entry: Any, info: ResultsInfo) -> None:
     mean.attrs["auxiliary_signals"] = ["exx", "exy"]
     for name in _value_names(info):
         kind = np.int64 if name in _WHOLE else np.float64
-        dataset = mean.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(256,))
+        dataset = mean.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(256,), fletcher32=True)
         dataset.attrs["units"] = _UNITS.get(name, "")
         if name in STRAINS:
             dataset.attrs["uncertainties"] = f"sigma_{name}"
@@ -193,8 +223,9 @@ def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
 def _add_map(strain: Any, name: str, shape: tuple[int, ...]) -> None:
     kind: Any = np.uint8 if name in ("status", "iterations") else np.float32
     dataset = strain.create_dataset(
-        name, (0, *shape), kind, maxshape=(None, *shape), chunks=(1, *shape), fillvalue=_fill(kind)
-    )
+        name, (0, *shape), kind, maxshape=(None, *shape), chunks=(1, *shape), fillvalue=_fill(kind),
+        fletcher32=True,
+    )  # fmt: skip
     plain = name.removeprefix("sigma_")
     unit = "px" if plain in ("u", "v") else ""
     words = _WORDS[plain] if plain == name else f"standard uncertainty of {_WORDS[plain]}"
