@@ -78,21 +78,19 @@ def _row(burst: Burst, start: float) -> Mapping[str, Any]:
     return times | {name: getattr(burst, name) for name in names}
 
 
-def read_burst(group: h5py.Group, columns: Mapping[str, NDArray[Any]], number: int, bits: int) -> Burst:
-    """The burst ``number`` of the group ``bursts``."""
-    total = group["sum"][number]
-    clipped = np.unpackbits(group["clipped"][number], count=total.size).reshape(total.shape)
-    row = {name: column[number].item() for name, column in columns.items()}
+def burst_from(total: NDArray[Any], clipped: NDArray[np.uint8], row: Mapping[str, Any], bits: int) -> Burst:
+    """The burst of a sum, its packed clipped pixels and a row of ``layout.BURST_COLUMNS``."""
+    flags = np.unpackbits(clipped, count=total.size).reshape(total.shape)
     return Burst(
         mean=frozen(mean_of(total, row["n"])),
         n=row["n"],
         noise=row["noise"],
-        clipped=frozen(clipped.astype(np.bool_)),
+        clipped=frozen(flags.astype(np.bool_)),
         bits=bits,
         t=row["monotonic_s"],
         duration=row["duration"],
         first_index=row["first_index"],
         last_index=row["last_index"],
         lost=row["lost"],
-        clock=layout.clock_word(row["clock"]),
+        clock=layout.CLOCKS[row["clock"]],
     )

@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Callable
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,19 +16,17 @@ import numpy as np
 
 from acquire.errors import DataError
 from acquire.hdf5 import Pace, PictureStack, Table, let_go
+from live.results import layout
 from live.results.info import FORMAT, FORMAT_VERSION
-from live.results.row import GRADIENTS, STRAINS, Row, gauge_columns
-from live.results.strain_csv import COLUMNS
+from live.results.row import STRAINS, Row, gauge_columns
 
 if TYPE_CHECKING:
     from analysis.field import ZoiGrid
     from live.results.info import ResultsInfo
 
 FLUSH_S = 0.25  # a row waits for its flush no longer than this
-_WHOLE = {"frame", "last_frame", "n_frames", "lost", "n_valid", "n_zoi"}
 _UNITS = {"time_s": "s", "force_N": "N", "noise_GL": "GL", "duration_s": "s", "u_px": "px", "v_px": "px"}
 _UNITS |= {"stress_Pa": "Pa", "latency_s": "s", "kernel_s": "s"}
-_MAPS = ("u", "v", *GRADIENTS, *STRAINS)
 _WORDS = {
     "u": "displacement along x (right)",
     "v": "displacement along y (down)",
@@ -72,7 +69,7 @@ class StrainWriter:
         self._pace = Pace(FLUSH_S, now)
         self._file = self._guard(lambda: _create(path, grid, info))
         entry = self._file["entry"]
-        self._maps = {n: PictureStack(entry["strain"][n]) for n in _map_names()}
+        self._maps = {n: PictureStack(entry["strain"][n]) for n in layout.MAPS}
         self._values = Table(entry["mean"], _value_names(info))
 
     def write(self, row: Row) -> None:
@@ -128,15 +125,8 @@ class StrainWriter:
         )
 
 
-def _map_names() -> tuple[str, ...]:
-    return (*_MAPS, *(f"sigma_{n}" for n in _MAPS), "residual", "status", "iterations")
-
-
 def _value_names(info: ResultsInfo) -> tuple[str, ...]:
-    # The time comes last: a reader that sees it sees the whole row.
-    names = tuple(name for name in COLUMNS if name != "time_s")
-    stress = ("stress_Pa",) if info.area_m2 is not None else ()
-    return (*names, *stress, *chain.from_iterable(map(gauge_columns, info.gauges)), "time_s")
+    return layout.column_names(info.gauges, with_stress=info.area_m2 is not None)
 
 
 def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
@@ -176,7 +166,7 @@ def _add_mean(entry: Any, info: ResultsInfo) -> None:
     mean = _group(entry, "mean", "NXdata", signal="eyy", axes=["time_s"], title="Means over the valid ZOIs")
     mean.attrs["auxiliary_signals"] = ["exx", "exy"]
     for name in _value_names(info):
-        kind = np.int64 if name in _WHOLE else np.float64
+        kind = layout.column_declared(name).dtype
         dataset = mean.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(256,), fletcher32=True)
         dataset.attrs["units"] = _UNITS.get(name, "")
         if name in STRAINS:
@@ -207,9 +197,8 @@ def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
         frame_of_reference="fields lie on the reference picture; x right, y down, px",
         auxiliary_signals=["exx", "exy"],
     )
-    shape = np.shape(grid.active)
-    for name in _map_names():
-        _add_map(strain, name, shape)
+    for name in layout.MAPS:
+        _add_map(strain, name, grid.shape)
     for name, values in (("x", grid.x), ("y", grid.y)):
         strain[name] = np.asarray(values, np.float64)
         strain[name].attrs.update(units="px", long_name=f"{name} of the centre of the ZOI (px)")
@@ -220,8 +209,8 @@ def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
         strain[name].attrs["units"] = "px"
 
 
-def _add_map(strain: Any, name: str, shape: tuple[int, ...]) -> None:
-    kind: Any = np.uint8 if name in ("status", "iterations") else np.float32
+def _add_map(strain: Any, name: str, shape: tuple[int, int]) -> None:
+    kind = layout.map_declared(name, shape).dtype
     dataset = strain.create_dataset(
         name, (0, *shape), kind, maxshape=(None, *shape), chunks=(1, *shape), fillvalue=_fill(kind),
         fletcher32=True,
@@ -234,8 +223,8 @@ def _add_map(strain: Any, name: str, shape: tuple[int, ...]) -> None:
         dataset.attrs["meaning"] = json.dumps(_status_words())
 
 
-def _fill(kind: Any) -> Any:
-    return np.nan if kind is np.float32 else 255
+def _fill(kind: str) -> float:
+    return np.nan if kind == "f4" else 255
 
 
 def _status_words() -> dict[str, str]:

@@ -111,7 +111,7 @@ def test_events_of_any_length(path: Path, length: int) -> None:
 
 def test_not_a_number_in_an_event_becomes_null(path: Path) -> None:
     with writer(path) as session:
-        session.write_event(Event(1001.0, EventKind.REFERENCE, "x", "y", data={"force_N": math.nan}))
+        session.write_event(Event(1001.0, EventKind.TARE, "x", "y", data={"force_N": math.nan}))
     with Session.open(path) as back:
         assert back.events()[0].data == {"force_N": None}
 
