@@ -34,6 +34,8 @@ def read_superblock(path: Path) -> Superblock:
     DataError
         No such file, unreadable, or not HDF5 of this kind.
     """
+    if path.exists() and not path.is_file():
+        raise DataError(f"{path} is no regular file; give a file that a run has written")
     if not path.is_file():
         raise DataError(f"{path}: no such file; give a session.h5 that a run has recorded")
     try:

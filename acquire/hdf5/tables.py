@@ -1,7 +1,7 @@
 """Growing HDF5 datasets row by row, without the cost of h5py's convenience layer.
 
-A session appends to some ten datasets at each frame; the low-level calls take a tenth of the
-time of ``dataset.resize`` and ``dataset[n] = ...``.
+A session has some twenty columns; the low-level calls take a tenth of the time of ``dataset.resize``
+and ``dataset[n] = ...``, and rows that are written together share that.
 """
 
 from __future__ import annotations
@@ -47,21 +47,45 @@ class GrowingDataset:
 
 
 class Table:
-    """The columns of one group, appended together.
+    """The columns of one group. Rows are held until they are written together.
 
     Parameters
     ----------
     group : h5py.Group
     names : sequence of str
         The columns.
+
+    Attributes
+    ----------
+    length : int
+        Rows, those that are held among them.
     """
 
     def __init__(self, group: h5py.Group, names: Sequence[str]) -> None:
         self._columns = {name: GrowingDataset(group[name]) for name in names}
+        self._row_type = np.dtype([(name, column.dtype) for name, column in self._columns.items()])
+        self._held: list[NDArray[Any]] = []
         self.length = 0
 
-    def append(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        """Add rows; each names every column."""
-        for name, column in self._columns.items():
-            column.append(np.array([row[name] for row in rows], column.dtype))
-        self.length += len(rows)
+    def row(self, values: Mapping[str, Any]) -> NDArray[Any]:
+        """A row for ``hold``; ``values`` names every column.
+
+        Raises
+        ------
+        OverflowError
+            A value does not fit its column.
+        """
+        return np.array(tuple(values[name] for name in self._columns), self._row_type)
+
+    def hold(self, row: NDArray[Any]) -> None:
+        """Take a row."""
+        self._held.append(row)
+        self.length += 1
+
+    def write(self) -> None:
+        """Append the rows that are held, column by column."""
+        held, self._held = self._held, []
+        if held:
+            rows = np.stack(held)
+            for name, column in self._columns.items():
+                column.append(rows[name])

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.frame import Burst, frozen
-from acquire.hdf5 import GrowingDataset, Table
+from acquire.hdf5 import GrowingDataset, PictureStack, Table
 from acquire.record_mode import RecordMode
 from acquire.session import layout
 
@@ -46,7 +46,7 @@ class BurstTable:
 
     def __init__(self, group: h5py.Group, mode: RecordMode) -> None:
         self._rows = Table(group, list(layout.BURST_COLUMNS))
-        self._sums, self._clipped = GrowingDataset(group["sum"]), GrowingDataset(group["clipped"])
+        self._sums, self._clipped = PictureStack(group["sum"]), GrowingDataset(group["clipped"])
         self._mode = mode
         self.row_bytes = self._sums.row_bytes + self._clipped.row_bytes
 
@@ -61,10 +61,15 @@ class BurstTable:
         total = sum_of(self._mode.cut(burst.mean), burst.n)
         if total.max(initial=0) > np.iinfo(self._sums.dtype).max:
             raise ValueError(f"the sum of {burst.n} frames does not fit into {self._sums.dtype}")
-        self._sums.append(total[np.newaxis].astype(self._sums.dtype))
+        row = self._rows.row(_row(burst, start))
+        self._sums.append(total)
         self._clipped.append(np.packbits(self._mode.cut(burst.clipped))[np.newaxis])
-        self._rows.append([_row(burst, start)])
+        self._rows.hold(row)
         return self._rows.length - 1
+
+    def write_rows(self) -> None:
+        """Write the rows that are held."""
+        self._rows.write()
 
 
 def _row(burst: Burst, start: float) -> Mapping[str, Any]:
@@ -73,21 +78,19 @@ def _row(burst: Burst, start: float) -> Mapping[str, Any]:
     return times | {name: getattr(burst, name) for name in names}
 
 
-def read_burst(group: h5py.Group, columns: Mapping[str, NDArray[Any]], number: int, bits: int) -> Burst:
-    """The burst ``number`` of the group ``bursts``."""
-    total = group["sum"][number]
-    clipped = np.unpackbits(group["clipped"][number], count=total.size).reshape(total.shape)
-    row = {name: column[number].item() for name, column in columns.items()}
+def burst_from(total: NDArray[Any], clipped: NDArray[np.uint8], row: Mapping[str, Any], bits: int) -> Burst:
+    """The burst of a sum, its packed clipped pixels and a row of ``layout.BURST_COLUMNS``."""
+    flags = np.unpackbits(clipped, count=total.size).reshape(total.shape)
     return Burst(
         mean=frozen(mean_of(total, row["n"])),
         n=row["n"],
         noise=row["noise"],
-        clipped=frozen(clipped.astype(np.bool_)),
+        clipped=frozen(flags.astype(np.bool_)),
         bits=bits,
         t=row["monotonic_s"],
         duration=row["duration"],
         first_index=row["first_index"],
         last_index=row["last_index"],
         lost=row["lost"],
-        clock=layout.clock_word(row["clock"]),
+        clock=layout.CLOCKS[row["clock"]],
     )

@@ -8,17 +8,18 @@ can only grow.
 from __future__ import annotations
 
 import json
-from typing import Any
+import math
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.events import Event, EventKind
+from acquire.events import Event
 from acquire.frame import CameraInfo, Clock
-from acquire.hdf5 import NO_UNIT, new_group, new_json, say, to_json
+from acquire.hdf5 import NO_UNIT, Declared, new_group, new_json, say, to_json
 from acquire.load_sample import LoadCellInfo, LoadFlag
-from acquire.session.info import SessionInfo
+from acquire.session.info import MOST_BURST_FRAMES, SessionInfo
 
 FORMAT = "phasedic-session"
 FORMAT_VERSION = 1
@@ -31,47 +32,81 @@ CLOCKS: tuple[Clock, ...] = ("device", "host", "nominal")
 STABLE = {None: -1, False: 0, True: 1}
 ROWS = 512  # of a chunk of a one-dimensional dataset
 
-Columns = dict[str, tuple[Any, Any, str, str]]  # name: (dtype, value of a missing row, unit, meaning)
+FURTHEST_S = 1e12  # no clock has gone so far
+MOST_FORCE_N = 1e12
+MOST_PIXELS = 1 << 28
+
+
+class Column(NamedTuple):
+    """A column of one value a row; ``missing`` is that of a row that is not written, the range that of others."""
+
+    dtype: str
+    missing: Any
+    unit: str
+    meaning: str
+    low: float = -math.inf
+    high: float = math.inf
+
+    def declared(self) -> Declared:
+        """What a reader demands of it."""
+        return Declared(self.dtype, (None,), self.low, self.high)
+
+
+def _time(meaning: str) -> Column:
+    return Column("f8", np.nan, "s", meaning, -FURTHEST_S, FURTHEST_S)
+
+
+def _count(meaning: str, high: float = math.inf, low: int = 0) -> Column:
+    return Column("u4", 0, NO_UNIT, meaning, low, high)
+
+
+def _sequence(meaning: str) -> Column:
+    return Column("i8", -1, NO_UNIT, meaning, 0)
+
+
+Columns = dict[str, Column]
 
 FRAME_COLUMNS: Columns = {
-    "time_s": ("f8", np.nan, "s", "time since the start of the session, mid-exposure where known"),
-    "monotonic_s": ("f8", np.nan, "s", "the same on the machine's monotonic clock"),
-    "raw_monotonic_s": ("f8", np.nan, "s", "the stamp as it came, monotonic clock"),
-    "index": ("i8", -1, NO_UNIT, "sequence number of the source"),
-    "lost_before": ("u4", 0, NO_UNIT, "frames known to be lost since the frame before"),
-    "damaged": ("u1", 0, NO_UNIT, "1: the device said that the content is not whole"),
-    "clock": ("u1", 0, NO_UNIT, "who stamped: 0 device, 1 host, 2 nobody (a given rate)"),
+    "time_s": _time("time since the start of the session, mid-exposure where known"),
+    "monotonic_s": _time("the same on the machine's monotonic clock"),
+    "raw_monotonic_s": _time("the stamp as it came, monotonic clock"),
+    "index": _sequence("sequence number of the source"),
+    "lost_before": _count("frames known to be lost since the frame before"),
+    "damaged": Column("u1", 0, NO_UNIT, "1: the device said that the content is not whole", 0, 1),
+    "clock": Column("u1", 0, NO_UNIT, "who stamped: 0 device, 1 host, 2 nobody (a given rate)", 0, 2),
 }
 LOAD_COLUMNS: Columns = {
-    "time_s": ("f8", np.nan, "s", "time since the start of the session"),
-    "monotonic_s": ("f8", np.nan, "s", "the same on the machine's monotonic clock"),
-    "force": ("f8", np.nan, "N", "tension positive; NaN where the line gave no valid value"),
-    "flags": ("u4", 0, NO_UNIT, "bits: see flag_names"),
-    "stable": ("i1", -1, NO_UNIT, "1 yes, 0 no, -1 not said"),
-    "device_ms": ("f8", np.nan, "ms", "the device's own time, where it sends one"),
-    "unit": ("S8", b"", NO_UNIT, "unit on the line, or as the user said"),
-    "line_end": ("u8", 0, NO_UNIT, "where in lines the line of this sample ends"),
+    "time_s": _time("time since the start of the session"),
+    "monotonic_s": _time("the same on the machine's monotonic clock"),
+    "force": Column(
+        "f8",
+        np.nan,
+        "N",
+        "tension positive; NaN where the line gave no valid value",
+        -MOST_FORCE_N,
+        MOST_FORCE_N,
+    ),
+    "flags": _count("bits: see flag_names", sum(flag.value for flag in LoadFlag)),
+    "stable": Column("i1", -1, NO_UNIT, "1 yes, 0 no, -1 not said", -1, 1),
+    "device_ms": Column("f8", np.nan, "ms", "the device's own time, where it sends one"),
+    "unit": Column("S8", b"", NO_UNIT, "unit on the line, or as the user said"),
+    "line_end": Column("u8", 0, NO_UNIT, "where in lines the line of this sample ends", 1),
 }
 BURST_COLUMNS: Columns = {
-    "time_s": ("f8", np.nan, "s", "mean time of the frames, since the start of the session"),
-    "monotonic_s": ("f8", np.nan, "s", "the same on the machine's monotonic clock"),
-    "n": ("u4", 0, NO_UNIT, "frames summed"),
-    "noise": ("f8", np.nan, "GL", "temporal standard deviation of one frame"),
-    "duration": ("f8", np.nan, "s", "time from the first frame to the last"),
-    "first_index": ("i8", -1, NO_UNIT, "sequence number of the first frame"),
-    "last_index": ("i8", -1, NO_UNIT, "sequence number of the last frame"),
-    "lost": ("u4", 0, NO_UNIT, "frames lost or left out since the burst before"),
-    "clock": ("u1", 0, NO_UNIT, "who stamped: 0 device, 1 host, 2 nobody (a given rate)"),
+    "time_s": _time("mean time of the frames, since the start of the session"),
+    "monotonic_s": _time("the same on the machine's monotonic clock"),
+    "n": _count("frames summed", MOST_BURST_FRAMES, 1),
+    "noise": Column("f8", np.nan, "GL", "temporal standard deviation of one frame", 0, 65535),
+    "duration": _time("time from the first frame to the last"),
+    "first_index": _sequence("sequence number of the first frame"),
+    "last_index": _sequence("sequence number of the last frame"),
+    "lost": _count("frames lost or left out since the burst before"),
+    "clock": Column("u1", 0, NO_UNIT, "who stamped: 0 device, 1 host, 2 nobody (a given rate)", 0, 2),
 }
 CLOCK_COLUMNS: Columns = {
-    "monotonic_s": ("f8", np.nan, "s", "monotonic clock"),
-    "utc": ("S27", b"", NO_UNIT, "the same instant in UTC, ISO 8601"),
+    "monotonic_s": _time("monotonic clock"),
+    "utc": Column("S27", b"", NO_UNIT, "the same instant in UTC, ISO 8601"),
 }
-
-
-def clock_word(code: int) -> Clock:
-    """The word for a stored clock code."""
-    return CLOCKS[code]
 
 
 def image_dtype(bits: int) -> np.dtype[Any]:
@@ -81,11 +116,11 @@ def image_dtype(bits: int) -> np.dtype[Any]:
 
 def new_columns(group: h5py.Group, columns: Columns, checksum: bool) -> None:
     """Empty one-dimensional datasets that can grow, each with its unit and meaning."""
-    for name, (dtype, missing, unit, meaning) in columns.items():
+    for name, c in columns.items():
         dataset = group.create_dataset(
-            name, (0,), dtype, maxshape=(None,), chunks=(ROWS,), fillvalue=missing, fletcher32=checksum
+            name, (0,), c.dtype, maxshape=(None,), chunks=(ROWS,), fillvalue=c.missing, fletcher32=checksum
         )
-        say(dataset, units=unit, long_name=meaning)
+        say(dataset, units=c.unit, long_name=c.meaning)
 
 
 def new_images(group: h5py.Group, name: str, shape: tuple[int, ...], dtype: Any, checksum: bool) -> None:
@@ -108,16 +143,6 @@ def describe_load(info: LoadCellInfo | None) -> dict[str, Any] | None:
         return None
     names = ("address", "name", "protocol", "clock", "sign", "capacity_N", "settings", "warnings")
     return {name: getattr(info, name) for name in names}
-
-
-def camera_from(text: dict[str, Any]) -> CameraInfo:
-    """What ``describe_camera`` described."""
-    return CameraInfo(**{**text, "warnings": tuple(text.get("warnings", ()))})
-
-
-def load_from(text: dict[str, Any] | None) -> LoadCellInfo | None:
-    """What ``describe_load`` described."""
-    return LoadCellInfo(**{**text, "warnings": tuple(text.get("warnings", ()))}) if text else None
 
 
 def create(file: h5py.File, about: SessionInfo, checksum: bool) -> None:
@@ -189,23 +214,3 @@ def event_rows(event: Event, start: float) -> NDArray[np.bytes_]:
     step = EVENT_BYTES - len(CONTINUED)
     rows += [CONTINUED + text[i : i + step] for i in range(EVENT_BYTES, len(text), step)]
     return np.array(rows, f"S{EVENT_BYTES}")
-
-
-def events_from(rows: NDArray[np.bytes_]) -> list[Event]:
-    """The events that ``event_rows`` wrote; one whose end is missing is left out."""
-    texts: list[bytearray] = []
-    for row in rows.tolist():
-        if row.startswith(CONTINUED) and texts:
-            texts[-1] += row[len(CONTINUED) :]
-        else:
-            texts.append(bytearray(row))
-    return [event for event in map(_event_from, texts) if event is not None]
-
-
-def _event_from(text: bytearray) -> Event | None:
-    try:
-        said = json.loads(bytes(text))
-        kind = EventKind(said["kind"])
-        return Event(said["monotonic_s"], kind, said["source"], said["text"], said["level"], said["data"])
-    except (ValueError, KeyError, TypeError):
-        return None

@@ -6,7 +6,6 @@ by itself and said. Foreign, newer and truncated files are refused in words.
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from pathlib import Path
@@ -14,19 +13,34 @@ from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
 from acquire.clock import ClockPair
 from acquire.closing import Closing
 from acquire.errors import DataError, PhasedicError
 from acquire.events import Event
 from acquire.frame import Burst, CameraInfo, Frame, frozen
-from acquire.hdf5 import check_size, probe, read_superblock, word
+from acquire.hdf5 import (
+    Declared,
+    check_links,
+    check_size,
+    open_dataset,
+    open_datasets,
+    open_group,
+    probe,
+    read_attribute,
+    read_object,
+    read_scalar,
+    read_superblock,
+    stored_rows,
+    word,
+)
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.record_mode import RecordMode
-from acquire.session import layout
-from acquire.session.bursts import read_burst
+from acquire.session import layout, stored
+from acquire.session.bursts import burst_from
+from acquire.session.stored import Rows, events_from, read_rows
 
+TEXT = Declared("S")
 _STABLE = {code: word for word, code in layout.STABLE.items()}
 # What HDF5, JSON and our own decoding raise on bytes that are not what they were.
 DAMAGE = (
@@ -53,16 +67,24 @@ class SessionPart(Closing):
     path : path
     probed : bool
         A child process has read it already, or this is the child.
+    salvage : bool
+        What is missing or beyond sense in the tables is left out, not refused.
+
+    Attributes
+    ----------
+    troubles : tuple of str
+        What is odd about its content, for a person.
 
     Raises
     ------
     DataError
-        Not there, not readable, foreign, newer than this program, or damaged.
+        Not there, not readable, foreign, newer than this program, damaged, or not as ``layout`` declares.
     """
 
-    def __init__(self, path: str | os.PathLike[str], *, probed: bool = False) -> None:
+    def __init__(self, path: str | os.PathLike[str], *, probed: bool = False, salvage: bool = False) -> None:
         self.path = Path(path)
         self.file, self.recovered = _open_file(self.path, probed)
+        self._whole = self.recovered is None and not salvage
         try:
             self._read()
         except DAMAGE as error:
@@ -73,35 +95,79 @@ class SessionPart(Closing):
             raise DataError(str(error)) from error
 
     def _read(self) -> None:
-        _check_format(self.path, self.file.attrs)
-        entry = self.file["entry"]
-        self.entry: h5py.Group = entry
-        self.config, self.metadata, self.versions = (
-            _json(entry[name]) for name in ("config", "metadata", "versions")
+        _check_format(self.path, self.file)
+        root = {name: read_attribute(self.file, name, what) for name, what in stored.ROOT.items()}
+        check_links(self.file)
+        entry = self.entry = open_group(self.file, "entry")
+        texts = {name: self._text(entry, name) for name in stored.TEXTS}
+        self.config = stored.config_from(texts["config"], f"{self.path}: config")
+        self.metadata, self.versions = (
+            read_object(texts[name], f"{self.path}: {name}") for name in ("metadata", "versions")
         )
-        self.camera: CameraInfo = layout.camera_from(_json(entry["instrument/camera/description"]))
-        self.load_cell: LoadCellInfo | None = layout.load_from(
-            _json(entry["instrument/load_cell/description"])
+        instrument = open_group(entry, "instrument")
+        camera, cell = (self._text(open_group(instrument, n), "description") for n in ("camera", "load_cell"))
+        self.camera: CameraInfo = stored.camera_from(camera, f"{self.path}: the camera")
+        self.load_cell: LoadCellInfo | None = stored.load_from(cell, f"{self.path}: the load cell")
+        self.mode = _mode({name: read_attribute(entry, name, what) for name, what in stored.ENTRY.items()})
+        set_id = word(root["set_id"])
+        self.set_id, self.part = "" if set_id == layout.NO_SET else set_id, int(root["part"])
+        utc, monotonic = (
+            read_scalar(item, stored.START[name]) for name, item in open_datasets(entry, stored.START).items()
         )
-        self.mode = _mode(entry.attrs)
-        set_id = word(self.file.attrs["set_id"])
-        self.set_id, self.part = "" if set_id == layout.NO_SET else set_id, int(self.file.attrs["part"])
-        self.start = ClockPair.from_iso(float(entry["start_monotonic_s"][()]), word(entry["start_time"][()]))
+        self.start = ClockPair.from_iso(float(monotonic), word(utc))
+        self._groups = {name: open_group(entry, name) for name in ("frames", "bursts", "load", "clock")}
         self.refresh()
+
+    def _text(self, group: h5py.Group, name: str) -> Any:
+        return read_scalar(open_dataset(group, name, TEXT), TEXT)
 
     def refresh(self) -> None:
         """Look for what the writer has added since."""
+        self._open_the_growing()
+        frames, bursts = self._groups["frames"], self._groups["bursts"]
+        self._frames = read_rows(frames, layout.FRAME_COLUMNS, [self._images], whole=self._whole)
+        self._bursts = read_rows(bursts, layout.BURST_COLUMNS, [self._sums, self._clipped], whole=self._whole)
+        self.columns, self.bursts = self._frames.columns, self._bursts.columns
+        self._check_order()
+        self.troubles = (*self._frames.troubles, *self._bursts.troubles, *self._troubles_of_the_load())
+
+    def _open_the_growing(self) -> None:
         if self.recovered:
-            for name in ("frames", "bursts", "load", "clock"):
-                for dataset in self.entry[name].values():
+            for group in self._groups.values():
+                for dataset in group.values():
                     dataset.id.refresh()
-            self.entry["events"].id.refresh()
-            self.entry["ledger"].id.refresh()
-        self.columns = _table(self.entry["frames"], layout.FRAME_COLUMNS, "image")
-        self.bursts = _table(self.entry["bursts"], layout.BURST_COLUMNS, "sum", "clipped")
+            for name in ("events", "ledger"):
+                self.entry[name].id.refresh()
+        pictures = stored.pictures_of(self.camera)
+        frames, bursts = self._groups["frames"], self._groups["bursts"]
+        self._images = open_datasets(frames, pictures["frames"])["image"]
+        self._clipped = open_datasets(bursts, pictures["bursts"])["clipped"]
+        self._sums = stored.open_sums(bursts, self.camera)
+        self._lines = open_dataset(self._groups["load"], "lines", stored.LINES)
+        self._events = open_dataset(self.entry, "events", stored.EVENTS)
+        self._ledger = open_dataset(self.entry, "ledger", stored.LEDGER)
+
+    def _check_order(self) -> None:
+        """Frames are found by their sequence numbers."""
+        for name, numbers in (("frames", self.columns["index"]), ("bursts", self.bursts["first_index"])):
+            if self._whole and np.any(wrong := np.diff(numbers) <= 0):
+                row = int(np.argmax(wrong)) + 1
+                raise DataError(
+                    f"{self.path}: the sequence numbers of {name} do not increase at row {row}; the file is damaged:"
+                    " 'phasedic recover' copies what can be read"
+                )
+
+    def _troubles_of_the_load(self) -> tuple[str, ...]:
+        try:
+            return self._samples().troubles
+        except (*DAMAGE, DataError):
+            return ()  # whoever asks for the samples is told
+
+    def _samples(self) -> Rows:
+        return read_rows(self._groups["load"], layout.LOAD_COLUMNS, whole=self._whole)
 
     def __len__(self) -> int:
-        return len(self.columns["index"])
+        return len(self._frames)
 
     def frame(self, number: int) -> Frame:
         """The frame ``number``, 0 .. len - 1.
@@ -113,12 +179,12 @@ class SessionPart(Closing):
         """
         row = {name: column[number].item() for name, column in self.columns.items()}
         with _reading(self.path, f"frame {number} cannot be read"):
-            image = self.entry["frames/image"][number]
+            image = self._images[int(self._frames.places[number])]
         return Frame(
             image=frozen(image),
             index=row["index"],
             t=row["monotonic_s"],
-            clock=layout.clock_word(row["clock"]),
+            clock=layout.CLOCKS[row["clock"]],
             lost_before=row["lost_before"],
             bits=self.camera.bits,
             raw_t=row["raw_monotonic_s"],
@@ -134,15 +200,16 @@ class SessionPart(Closing):
             Its bytes are damaged.
         """
         with _reading(self.path, f"burst {number} cannot be read"):
-            return read_burst(self.entry["bursts"], self.bursts, number, self.camera.bits)
+            place = int(self._bursts.places[number])
+            row = {name: column[number].item() for name, column in self.bursts.items()}
+            return burst_from(self._sums[place], self._clipped[place], row, self.camera.bits)
 
     def load_samples(self) -> list[LoadSample]:
         """All load samples with their raw lines."""
         with _reading(self.path, "the load samples cannot be read"):
-            columns = _table(self.entry["load"], layout.LOAD_COLUMNS)
-            lines = self.entry["load/lines"][:].tobytes()
-        ends = columns["line_end"].tolist()
-        starts = [0, *ends][: len(ends)]
+            samples = self._samples()
+            lines = self._raw_lines(samples)
+        columns = [samples.columns[name].tolist() for name in _SAMPLE]
         return [
             LoadSample(
                 t=t,
@@ -150,24 +217,35 @@ class SessionPart(Closing):
                 unit=unit.decode("ascii", "replace"),
                 stable=_STABLE[stable],
                 flags=LoadFlag(flags),
-                raw=lines[start : end - 1],
+                raw=line,
                 device_ms=None if np.isnan(device_ms) else device_ms,
             )
-            for t, force, unit, stable, flags, device_ms, start, end in zip(
-                *(columns[name].tolist() for name in _SAMPLE), starts, ends, strict=True
-            )
-            if end <= len(lines)
+            for t, force, unit, stable, flags, device_ms, line in zip(*columns, lines, strict=True)
+            if line is not None
         ]
+
+    def _raw_lines(self, samples: Rows) -> list[bytes | None]:
+        """The line of each sample; None where it is not in the file yet."""
+        content = self._lines[:].tobytes()
+        last = int(samples.places.max(initial=-1))
+        ends = self._groups["load"]["line_end"][: last + 1].astype(np.int64)
+        starts = np.concatenate([[0], ends])[samples.places]
+        ends = ends[samples.places]
+        if self._whole and (np.any(ends <= starts) or ends.max(initial=0) > stored_rows(self._lines)):
+            raise ValueError("the lines of the samples do not follow one another")
+        spans = zip(starts.tolist(), ends.tolist(), strict=True)
+        return [content[start : end - 1] if end <= len(content) else None for start, end in spans]
 
     def events(self) -> list[Event]:
         """All events."""
         with _reading(self.path, "the events cannot be read"):
-            return layout.events_from(self.entry["events"][:])
+            rows = self._events[: stored_rows(self._events)]
+            return events_from(rows, str(self.path), whole=self._whole)
 
     def clock_pairs(self) -> list[ClockPair]:
         """The pairs of clock readings."""
         with _reading(self.path, "the clock readings cannot be read"):
-            columns = _table(self.entry["clock"], layout.CLOCK_COLUMNS)
+            columns = read_rows(self._groups["clock"], layout.CLOCK_COLUMNS, whole=self._whole).columns
             return [
                 ClockPair.from_iso(float(t), utc.decode())
                 for t, utc in zip(columns["monotonic_s"], columns["utc"].tolist(), strict=True)
@@ -176,8 +254,7 @@ class SessionPart(Closing):
     def ledger(self) -> dict[str, Any] | None:
         """The final counts; None where the writer did not come to its end."""
         with _reading(self.path, "the ledger cannot be read"):
-            text = self.entry["ledger"][0]
-            return json.loads(text) if text else None
+            return stored.ledger_from(self._ledger[0], f"{self.path}: the ledger")
 
     def walk_pictures(self) -> None:
         """Go through the index of all pictures, without reading them.
@@ -188,8 +265,8 @@ class SessionPart(Closing):
             It is damaged.
         """
         with _reading(self.path, "the index of the pictures cannot be read"):
-            for name in ("frames/image", "bursts/sum", "bursts/clipped"):
-                self.entry[name].id.get_num_chunks()
+            for pictures in (self._images, self._sums, self._clipped):
+                pictures.id.get_num_chunks()
 
     def close(self) -> None:
         """Close the file; may be called again without effect."""
@@ -232,10 +309,10 @@ def _open_file(path: Path, probed: bool) -> tuple[h5py.File, str | None]:
         raise damaged(path, "it cannot be opened", error) from error
 
 
-def _check_format(path: Path, attributes: Mapping[str, Any]) -> None:
-    if word(attributes.get("format", "")) != layout.FORMAT:
+def _check_format(path: Path, file: h5py.File) -> None:
+    if not h5py.h5a.exists(file.id, b"format") or word(read_attribute(file, "format", TEXT)) != layout.FORMAT:
         raise DataError(f"{path} is an HDF5 file, but not a session of this program")
-    version = int(attributes["format_version"])
+    version = int(read_attribute(file, "format_version", stored.ROOT["format_version"]))
     if version > layout.FORMAT_VERSION:
         raise DataError(
             f"{path} has format version {version}, this program reads up to {layout.FORMAT_VERSION};"
@@ -243,19 +320,6 @@ def _check_format(path: Path, attributes: Mapping[str, Any]) -> None:
         )
 
 
-def _json(dataset: h5py.Dataset) -> Any:
-    return json.loads(word(dataset[()]))
-
-
 def _mode(attributes: Mapping[str, Any]) -> RecordMode:
     x, y, width, height = (int(value) for value in attributes["crop"])
     return RecordMode.parse(word(attributes["record"]), (x, y, width, height) if width else None)
-
-
-def _table(group: h5py.Group, columns: layout.Columns, *also: str) -> dict[str, NDArray[Any]]:
-    """The columns, cut to the rows that are complete in all of them and in the pictures ``also``."""
-    n = min(group[name].shape[0] for name in (*columns, *also))
-    table = {name: group[name][:n] for name in columns}
-    missing = np.isnan(table["monotonic_s"])
-    n = int(np.argmax(missing)) if missing.any() else n
-    return {name: column[:n] for name, column in table.items()}

@@ -35,7 +35,7 @@ class Session(Closing):
     ----------
     path : Path
     recovered : str or None
-        Says so where a file was not closed by its writer, or one of a set is missing.
+        Says so where a file was not closed by its writer, one of a set is missing, or what it holds is odd.
     camera : CameraInfo
         Of the pictures as they are recorded: with ``mode.crop``, that part of the camera's.
     load_cell : LoadCellInfo or None
@@ -51,6 +51,7 @@ class Session(Closing):
         first = parts[0]
         self.path: Path = first.path
         words = [f"{part.path} {part.recovered}" for part in parts if part.recovered]
+        words += [f"{part.path}: {trouble}" for part in parts for trouble in part.troubles]
         self.recovered: str | None = "; ".join([*words, missing] if missing else words) or None
         self.camera: CameraInfo = first.camera
         self.load_cell: LoadCellInfo | None = first.load_cell

@@ -70,7 +70,7 @@ def recover(source: str | os.PathLike[str], target: str | os.PathLike[str] | Non
     """
     path = Path(source)
     clean = Path(target) if target else path.with_name(f"{path.stem}.recovered{path.suffix}")
-    with SessionPart(path) as part, _writer(clean, part) as writer:
+    with SessionPart(path, salvage=True) as part, _writer(clean, part) as writer:
         return _copy(part, writer)
 
 
@@ -90,7 +90,7 @@ def _writer(path: Path, part: SessionPart) -> SessionWriter:
 
 
 def _copy(part: SessionPart, writer: SessionWriter) -> Recovered:
-    unreadable: list[str] = []
+    unreadable = list(part.troubles)
     frames = _copy_frames(part, writer, unreadable)
     bursts = 0
     for number in range(len(part.bursts["n"])):

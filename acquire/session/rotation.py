@@ -112,9 +112,18 @@ class RotatingWriter(Closing):
         """See ``SessionWriter``; it stands in the last file."""
         self._writer.write_ledger(ledger)
 
+    def flush_when_due(self) -> float:
+        """See ``SessionWriter``."""
+        return self._writer.flush_when_due()
+
     def flush(self) -> None:
         """See ``SessionWriter``."""
         self._writer.flush()
+
+    @property
+    def unflushed_frames(self) -> int:
+        """See ``SessionWriter``."""
+        return self._writer.unflushed_frames
 
     def close(self) -> None:
         """See ``SessionWriter``."""

@@ -1,7 +1,7 @@
-"""Writing a session: HDF5 in SWMR mode, one chunk a frame, flushed at every frame.
+"""Writing a session: HDF5 in SWMR mode, one chunk a frame, flushed twenty times a second.
 
-A process that is killed loses no finished frame (docs/session-format.md has the figures).
-Not thread-safe: one recorder thread owns the writer. What is not recorded is the caller's to
+A process that is killed loses at most what was written in its last ``FLUSH_S`` (docs/session-format.md has
+the figures). Not thread-safe: one recorder thread owns the writer. What is not recorded is the caller's to
 count; the writer never drops anything.
 """
 
@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-import math
 import os
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,7 @@ from acquire.closing import Closing
 from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Burst, Frame
-from acquire.hdf5 import GrowingDataset, Table, free_bytes, let_go, to_json
+from acquire.hdf5 import GrowingDataset, Pace, PictureStack, Table, free_bytes, let_go, to_json
 from acquire.load_sample import LoadSample
 from acquire.session import layout
 from acquire.session.bursts import BurstTable
@@ -32,7 +32,7 @@ from acquire.session.info import SessionInfo
 
 log = logging.getLogger(__name__)
 
-LOAD_HOLD_S = 0.02  # load samples are flushed no more often than this
+FLUSH_S = 0.05  # what was written is flushed no later and no more often than this
 
 
 class SessionWriter(Closing):
@@ -47,6 +47,14 @@ class SessionWriter(Closing):
         Fletcher-32 on everything that grows.
     cut_already : bool
         Pictures and camera are those of ``info.mode.crop`` already (a copy of a session).
+    now : callable
+        Gives seconds; paces the flushes.
+
+    Attributes
+    ----------
+    unflushed_frames : int
+        Frames, those of bursts among them, that were taken and are not flushed yet; after a failure, those
+        that are lost by it.
 
     Raises
     ------
@@ -63,14 +71,17 @@ class SessionWriter(Closing):
         *,
         checksum: bool = True,
         cut_already: bool = False,
+        now: Callable[[], float] = time.monotonic,
     ) -> None:
         recorded = info if cut_already else info.cropped()
         self.path = Path(path)
         self._camera, self._start = recorded.camera, info.start.monotonic
         self._mode = dataclasses.replace(info.mode, crop=None) if cut_already else info.mode
-        self._held: list[LoadSample] = []
-        self._last_load_t = -math.inf  # of the last sample that was flushed for its own sake
+        self._pace = Pace(FLUSH_S, now)
+        self._held_lines: list[bytes] = []
+        self._held_events: list[np.ndarray[Any, Any]] = []
         self._line_end = 0
+        self.unflushed_frames = 0
         self._written_bytes = 0
         self._file: h5py.File | None = _create(self.path)
         try:
@@ -85,7 +96,7 @@ class SessionWriter(Closing):
             raise
 
     def _find_datasets(self, entry: h5py.Group) -> None:
-        self._images = GrowingDataset(entry["frames/image"])
+        self._images = PictureStack(entry["frames/image"])
         self._frames = Table(entry["frames"], list(layout.FRAME_COLUMNS))
         self._load = Table(entry["load"], list(layout.LOAD_COLUMNS))
         self._lines = GrowingDataset(entry["load/lines"])
@@ -95,7 +106,7 @@ class SessionWriter(Closing):
         self._bursts = BurstTable(entry["bursts"], self._mode)
 
     def write_frame(self, frame: Frame) -> int:
-        """Append a frame, and the load samples held, and bring both to the file.
+        """Append a frame.
 
         Returns
         -------
@@ -106,14 +117,15 @@ class SessionWriter(Closing):
         ------
         DataError
             The picture does not fit the camera's description, or the disk takes no more. All
-            frames before stay readable.
+            frames that were flushed before stay readable.
+        OverflowError
+            Its index or its count of lost frames is beyond sense.
         """
-        image = self._fitting(frame)
-        with self._guarded():
-            self._images.append(image[np.newaxis])
-            self._frames.append([_frame_row(frame, self._start)])
-            self._written_bytes += image.nbytes
-        self.flush()
+        image, row = self._fitting(frame), self._frames.row(_frame_row(frame, self._start))
+        with self._guarded(keep_rows=True):
+            self._images.append(image)
+        self._frames.hold(row)
+        self._written(image.nbytes, frames=1)
         return self._frames.length - 1
 
     def _fitting(self, frame: Frame) -> np.ndarray[Any, Any]:
@@ -137,31 +149,27 @@ class SessionWriter(Closing):
         ValueError
             It has more frames than the session was made for.
         """
-        with self._guarded():
+        with self._guarded(keep_rows=True):
             number = self._bursts.append(burst, self._start)
-            self._written_bytes += self._bursts.row_bytes
-        self.flush()
+        self._written(self._bursts.row_bytes, frames=burst.n)
         return number
 
     def write_load(self, sample: LoadSample) -> None:
-        """Append a load sample; it reaches the file at once, or where one just did, with the next flush.
-
-        Call ``flush`` when nothing more comes for a while.
-        """
-        self._held.append(sample)
-        if sample.t - self._last_load_t >= LOAD_HOLD_S:
-            self._last_load_t = sample.t
-            self.flush()
+        """Append a load sample; raises as ``write_frame``."""
+        self._line_end += len(sample.raw) + 1
+        self._held_lines.append(sample.raw + b"\n")
+        self._load.hold(self._load.row(_load_row(sample, self._start, self._line_end)))
+        self._written(len(sample.raw) + 1)
 
     def write_event(self, event: Event) -> None:
-        """Append an event, of any length."""
-        with self._guarded():
-            self._events.append(layout.event_rows(event, self._start))
+        """Append an event, of any length; raises as ``write_frame``."""
+        self._held_events.append(layout.event_rows(event, self._start))
+        self._written(0)
 
     def write_clock(self, pair: ClockPair) -> None:
         """Append a pair of clock readings (at the start, each minute and at the end)."""
-        with self._guarded():
-            self._clock.append([{"monotonic_s": pair.monotonic, "utc": pair.iso().encode()}])
+        self._clock.hold(self._clock.row({"monotonic_s": pair.monotonic, "utc": pair.iso().encode()}))
+        self._written(0)
 
     def write_ledger(self, ledger: Mapping[str, Any]) -> None:
         """Store the final counts."""
@@ -170,34 +178,50 @@ class SessionWriter(Closing):
             raise ValueError(f"a ledger of {len(text)} bytes; there is room for {layout.LEDGER_BYTES}")
         with self._guarded():
             self._ledger[0] = text
+        self._written(0)
+
+    def _written(self, size: int, frames: int = 0) -> None:
+        self._open_file()
+        self._written_bytes += size
+        self.unflushed_frames += frames
+        self._pace.wrote()
+        try:
+            self.flush_when_due()
+        except DataError:
+            self.unflushed_frames -= frames  # refused, not lost
+            raise
+
+    def flush_when_due(self) -> float:
+        """Flush where something has waited for ``FLUSH_S``; every write does that too.
+
+        Returns
+        -------
+        float, s
+            Time after which this must be called again if nothing is written until then; infinite
+            where nothing waits.
+        """
+        if self._pace.left_s() == 0:
+            self.flush()
+        return self._pace.left_s()
 
     def flush(self) -> None:
-        """Bring everything to the file, so that it outlives a kill of this process."""
+        """Bring everything to the file now, so that it outlives a kill of this process."""
         with self._guarded() as file:
-            self._write_held()
-            file.flush()
+            self._bring(file)
 
-    def _write_held(self) -> None:
-        held, self._held = self._held, []
-        if not held:
-            return
-        lines = b"".join(sample.raw + b"\n" for sample in held)
-        self._lines.append(np.frombuffer(lines, np.uint8))
-        self._load.append([self._load_row(sample) for sample in held])
-        self._written_bytes += len(lines)
-
-    def _load_row(self, sample: LoadSample) -> dict[str, Any]:
-        self._line_end += len(sample.raw) + 1
-        return {
-            "time_s": sample.t - self._start,
-            "monotonic_s": sample.t,
-            "force": sample.force,
-            "flags": sample.flags.value,
-            "stable": layout.STABLE[sample.stable],
-            "device_ms": np.nan if sample.device_ms is None else sample.device_ms,
-            "unit": sample.unit.encode("ascii", "replace"),
-            "line_end": self._line_end,
-        }
+    def _bring(self, file: h5py.File) -> None:
+        self._pace.began()
+        for table in (self._frames, self._load, self._clock):
+            table.write()
+        self._bursts.write_rows()
+        if self._held_lines:
+            self._lines.append(np.frombuffer(b"".join(self._held_lines), np.uint8))
+        if self._held_events:
+            self._events.append(np.concatenate(self._held_events))
+        self._held_lines, self._held_events = [], []
+        file.flush()
+        self._pace.done()
+        self.unflushed_frames = 0
 
     @property
     def bytes_written(self) -> int:
@@ -228,13 +252,20 @@ class SessionWriter(Closing):
         if file is not None:
             let_go(file)
 
-    @contextmanager
-    def _guarded(self) -> Iterator[h5py.File]:
+    def _open_file(self) -> h5py.File:
         if self._file is None:
             raise DataError(f"{self.path}: the session is closed; start a new one to record on")
+        return self._file
+
+    @contextmanager
+    def _guarded(self, *, keep_rows: bool = False) -> Iterator[h5py.File]:
+        file = self._open_file()
         try:
-            yield self._file
+            yield file
         except (OSError, RuntimeError) as error:
+            if keep_rows:  # a disk that is full for a picture may still have room for the rows before it
+                with suppress(OSError, RuntimeError):
+                    self._bring(file)
             # Datasets may now differ in length; going on would put rows beside the wrong frames.
             self._abandon()
             raise DataError(_write_failure(self.path, error)) from error
@@ -251,6 +282,19 @@ def _create(path: Path) -> h5py.File:
         raise DataError(
             f"{path} cannot be created ({_reason(error)}); choose a folder that exists and is writable"
         ) from error
+
+
+def _load_row(sample: LoadSample, start: float, line_end: int) -> dict[str, Any]:
+    return {
+        "time_s": sample.t - start,
+        "monotonic_s": sample.t,
+        "force": sample.force,
+        "flags": sample.flags.value,
+        "stable": layout.STABLE[sample.stable],
+        "device_ms": np.nan if sample.device_ms is None else sample.device_ms,
+        "unit": sample.unit.encode("ascii", "replace"),
+        "line_end": line_end,
+    }
 
 
 def _frame_row(frame: Frame, start: float) -> dict[str, Any]:

@@ -6,7 +6,7 @@ with a ``tracker``, ``measurement`` is what comes out with its means (``instant`
 """
 
 from live.measure.history import History
-from live.measure.instant import Instant
+from live.measure.instant import Instant, ordered_mean
 from live.measure.measurement import Measurement
 from live.measure.pipeline import NewReference, measure
 from live.measure.preparation import (
@@ -39,6 +39,7 @@ __all__ = [
     "frame_noise",
     "measure",
     "motion_between",
+    "ordered_mean",
     "prepare",
     "rehearse",
     "unchanged",

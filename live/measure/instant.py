@@ -80,8 +80,8 @@ def instant_of(burst: Burst, field: StrainField, force: float, measure_s: float 
         sigma_exx=s_xx,
         sigma_eyy=s_yy,
         sigma_exy=s_xy,
-        u=_mean(field.u[valid]),
-        v=_mean(field.v[valid]),
+        u=ordered_mean(field.u[valid]),
+        v=ordered_mean(field.v[valid]),
         largest=float(values[np.argmax(np.abs(values))]) if values.size else math.nan,
         zoi_sigma=float(np.median(field.sigma_eyy[valid])) if values.size else math.nan,
         n_valid=int(valid.sum()),
@@ -92,5 +92,9 @@ def instant_of(burst: Burst, field: StrainField, force: float, measure_s: float 
     )
 
 
-def _mean(values: np.ndarray) -> float:
-    return float(values.mean(dtype=np.float64)) if values.size else math.nan
+def ordered_mean(values: np.ndarray) -> float:
+    """The mean of finite values, NaN of none: the same bits wherever they lie in memory.
+
+    numpy's own sum takes them in an order that depends on their alignment.
+    """
+    return float(np.cumsum(values, dtype=np.float64)[-1]) / values.size if values.size else math.nan

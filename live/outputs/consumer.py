@@ -6,6 +6,7 @@ Results, view, status card, strain out and report are all consumers. To write on
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -75,6 +76,16 @@ class Consumer:
 
     def event(self, event: Event) -> None:
         """An event of any part of the test."""
+
+    def idle(self) -> float:
+        """Nothing waits to be taken (only where ``blocks``): time to do what was put off.
+
+        Returns
+        -------
+        float, s
+            When to be asked again, should nothing come until then; infinite for never.
+        """
+        return math.inf
 
     def end(self) -> str:
         """Close everything; a few words for the ledger, empty where there is nothing to say."""

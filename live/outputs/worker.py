@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
+import time
 from collections import Counter, deque
 from collections.abc import Callable
 from typing import Any
@@ -41,6 +43,7 @@ class Worker:
         self._failed = self._words = ""
         self._changed = threading.Condition()
         self._ending = False
+        self._patience_s = math.inf
         self._thread = threading.Thread(target=self._work, name=consumer.name, daemon=True)
 
     def start(self) -> None:
@@ -110,13 +113,23 @@ class Worker:
         while (batch := self._next()) is not None:
             for kind, item in batch:
                 self._hand_over(kind, item)
+            self._guarded(self._idle)
         self._close()
 
+    def _idle(self) -> None:
+        self._patience_s = math.inf
+        if not self._failed:
+            self._patience_s = self._consumer.idle()
+
     def _next(self) -> list[tuple[str, Any]] | None:
-        """What waits, kind by kind; None at the end."""
+        """What waits, kind by kind; nothing where the consumer has something to do meanwhile; None at the end."""
         with self._changed:
+            until = time.monotonic() + self._patience_s
             while not any(self._waiting.values()) and not self._ending:
-                self._changed.wait(_NAP_S if "load" in self._wanted else None)
+                left = min(until - time.monotonic(), _NAP_S if "load" in self._wanted else math.inf)
+                if left <= 0:
+                    return []
+                self._changed.wait(left if left < math.inf else None)
             batch = [(kind, item) for kind in KINDS for item in self._waiting[kind]]
             for queue in self._waiting.values():
                 queue.clear()

@@ -9,7 +9,7 @@ from typing import Any
 from acquire.addresses import parse_address
 from acquire.burst import LIMIT_PX
 from acquire.clock import ClockPair
-from acquire.errors import DataError
+from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
@@ -41,7 +41,19 @@ def session_config(session: Session, request: ReplayRequest, extra: Mapping[str,
     for section, keys in (("measure", ("mask",)), ("camera", ("dark", "flat"))):
         stored[section] = _beside(stored.get(section, {}), keys, path)
     file = {} if request.config_file is None else settings_in(request.config_file)
-    return from_dict(stored, {**file, **extra, **request.overrides}, str(path))
+    try:
+        return from_dict(stored, {**file, **extra, **request.overrides}, str(path))
+    except ConfigError:
+        _check_stored(stored, str(path))
+        raise
+
+
+def _check_stored(stored: Mapping[str, Any], path: str) -> None:
+    """What is wrong may be what the session says, not what was asked for; raises DataError then."""
+    try:
+        from_dict(stored, {}, path)
+    except ConfigError as error:
+        raise DataError(f"{error} (it stands so in the session; the command line can set it anew)") from error
 
 
 def _beside(section: Mapping[str, Any], keys: Iterable[str], path: Path) -> dict[str, Any]:

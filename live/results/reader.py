@@ -2,13 +2,13 @@
 
 Maps are fetched from the file when asked for; per-row values are in memory. HDF5 may wait for ever
 on an unfinished file that was damaged too, so such a file is first read by a child process,
-``python -m live.results FILE``.
+``python -m live.results FILE``. A file that does not hold what ``layout`` declares is refused.
 """
 
 from __future__ import annotations
 
-import json
 import logging
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,29 @@ from numpy.typing import NDArray
 
 from acquire.closing import Closing
 from acquire.errors import DataError
-from acquire.hdf5 import check_size, probe, read_superblock
+from acquire.hdf5 import (
+    Declared,
+    Said,
+    check_links,
+    check_object,
+    check_size,
+    open_dataset,
+    open_datasets,
+    open_group,
+    probe,
+    read_attribute,
+    read_object,
+    read_scalar,
+    read_superblock,
+    stored_rows,
+    word,
+)
 from analysis.field import ZoiGrid
+from live.results import layout
 from live.results.info import FORMAT, FORMAT_VERSION
 
 _log = logging.getLogger(__name__)
+_LENGTH, _PLACE = Said(int, 1, layout.MOST_PIXELS), Said(int, 0, layout.MOST_PIXELS)
 
 
 class Strain(Closing):
@@ -49,20 +67,25 @@ class Strain(Closing):
 
     def __init__(self, path: Path, file: Any, *, unfinished: bool) -> None:
         self.path, self._file, self.unfinished = path, file, unfinished
-        entry, strain = file["entry"], file["entry/strain"]
-        self.start_utc = str(file.attrs["start_time"])
-        self.strain_measure = str(strain.attrs["strain_measure"])
-        self.grid = ZoiGrid.from_dict(json.loads(strain.attrs["grid"]), strain["active"][()].astype(bool))
+        root = _attributes(file, layout.ROOT)
+        check_links(file)
+        entry = open_group(file, "entry")
+        strain, mean = open_group(entry, "strain"), open_group(entry, "mean")
+        self.start_utc = word(root["start_time"])
+        said = _attributes(strain, layout.STRAIN)
+        self.strain_measure = word(said["strain_measure"])
+        self.grid = _grid(strain, said["grid"], path)
         self.config, self.metadata, self.versions = (
-            json.loads(entry[name].asstr()[()]) for name in ("config", "metadata", "versions")
+            read_object(item[()], f"{path}: {name}")
+            for name, item in open_datasets(entry, layout.TEXTS).items()
         )
-        self.names = tuple(name for name, item in strain.items() if item.ndim == 3)
-        # A kill may fall between two datasets of a row: only whole rows count.
-        self.n = min(
-            *(len(strain[name]) for name in self.names), *(len(item) for item in entry["mean"].values())
-        )
-        self.values: dict[str, NDArray[Any]] = {k: v[: self.n] for k, v in entry["mean"].items()}
+        self.names = layout.MAPS
+        self._maps = open_datasets(strain, {n: layout.map_declared(n, self.grid.shape) for n in self.names})
+        columns = _columns(mean)
+        self.n = _rows(path, [*self._maps.values(), *columns.values()], whole=not unfinished)
+        self.values: dict[str, NDArray[Any]] = {name: item[: self.n] for name, item in columns.items()}
         self.time_s: NDArray[np.float64] = self.values["time_s"]
+        _tell_of_times(path, self.time_s)
 
     @classmethod
     def open(cls, path: Path, *, probed: bool = False) -> Strain:
@@ -80,7 +103,15 @@ class Strain(Closing):
         except DataError:
             file.close()
             raise
-        except (KeyError, OSError, RuntimeError, ValueError) as error:
+        except (
+            LookupError,
+            OSError,
+            RuntimeError,
+            ValueError,
+            TypeError,
+            MemoryError,
+            OverflowError,
+        ) as error:
             file.close()
             raise DataError(f"{path}: is damaged ({error}); make it again with phasedic replay") from error
 
@@ -97,7 +128,7 @@ class Strain(Closing):
         if isinstance(row, int) and not -self.n <= row < self.n:
             raise DataError(f"{self.path}: no row {row}; there are {self.n}")
         rows = range(self.n)[row]
-        dataset = self._file["entry/strain"][name]
+        dataset = self._maps[name]
         try:
             if isinstance(rows, int):
                 return np.asarray(dataset[rows])
@@ -113,9 +144,9 @@ class Strain(Closing):
 def _open(path: Path, probed: bool) -> tuple[Any, bool]:
     import h5py
 
-    if not path.is_file():
+    if not path.exists():
         raise DataError(f"{path}: no such file; phasedic run and replay write a strain.h5 into --out")
-    if not h5py.is_hdf5(path):
+    if not path.is_file() or not h5py.is_hdf5(path):
         raise DataError(f"{path}: is not an HDF5 file; give a strain.h5 of phasedic")
     block = read_superblock(path)
     check_size(path, block)
@@ -131,10 +162,58 @@ def _open(path: Path, probed: bool) -> tuple[Any, bool]:
 
 
 def _check(path: Path, file: Any) -> None:
-    found, version = file.attrs.get("format"), file.attrs.get("format_version")
+    found = word(read_attribute(file, "format", layout.ROOT["format"])) if "format" in file.attrs else None
     if found != FORMAT:
-        raise DataError(f"{path}: holds {found or 'something else'}, not {FORMAT}; give a strain.h5")
-    if version is None or int(version) > FORMAT_VERSION:
+        shown = "something else" if found is None else repr(found[:40])
+        raise DataError(f"{path}: holds {shown}, not {FORMAT}; give a strain.h5")
+    version = read_attribute(file, "format_version", layout.ROOT["format_version"])
+    if int(version) > FORMAT_VERSION:
         raise DataError(
             f"{path}: format version {version}, this program reads up to {FORMAT_VERSION}; update phasedic"
         )
+
+
+def _attributes(item: Any, declared: Mapping[str, Declared]) -> dict[str, Any]:
+    return {name: read_attribute(item, name, what) for name, what in declared.items()}
+
+
+def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
+    """The grid, once its description and what stands in the file agree."""
+    where = f"{path}: the grid"
+    said = read_object(text, where)
+    check_object(said, {"roi": Said(dict), "size": _LENGTH, "step": _LENGTH}, where)
+    check_object(said["roi"], {"x": _PLACE, "y": _PLACE, "width": _LENGTH, "height": _LENGTH}, where)
+    active = open_dataset(strain, "active", Declared("u1", (None, None), 0, 1))
+    shape = tuple((said["roi"][name] - said["size"]) // said["step"] + 1 for name in ("height", "width"))
+    if active.shape != shape:
+        raise DataError(f"{where} is described as {shape} ZOIs, but {active.shape} are there; make it again")
+    grid = ZoiGrid.from_dict(said, read_scalar(active, Declared("u1", shape, 0, 1)).astype(bool))
+    for name, places in (("x", grid.x), ("y", grid.y)):
+        if not np.array_equal(open_dataset(strain, name, Declared("f8", places.shape))[()], places):
+            raise DataError(f"{where} has other centres {name} than its description says; make it again")
+    return grid
+
+
+def _columns(mean: Any) -> dict[str, Any]:
+    """All columns: those that every file has, and whatever another version has added."""
+    needed = {name: layout.column_declared(name) for name in layout.NEEDED}
+    return open_datasets(mean, dict.fromkeys(mean, layout.ANY_COLUMN) | needed)
+
+
+def _rows(path: Path, datasets: Sequence[Any], *, whole: bool) -> int:
+    """Whole rows; a kill may fall between two datasets of one."""
+    lengths = {stored_rows(item) for item in datasets}
+    if whole and lengths | {len(item) for item in datasets} != {min(lengths)}:
+        raise DataError(
+            f"{path}: its maps and columns are not of one length; make it again with phasedic replay"
+        )
+    return min(lengths)
+
+
+def _tell_of_times(path: Path, times: NDArray[np.float64]) -> None:
+    for count, what in (
+        (np.count_nonzero(np.isnan(times)), "rows have no time"),
+        (np.count_nonzero(np.diff(times) < 0), "times run backwards"),
+    ):
+        if count:
+            _log.warning("%s: %d %s; they are taken as they stand", path, count, what)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from live.measure import ordered_mean
 
 if TYPE_CHECKING:
     from analysis.field import StrainField
@@ -89,6 +92,8 @@ def _values(measurement: Measurement, maps: dict[str, NDArray[Any]], info: RowIn
         "duration_s": burst.duration,
         "u_px": instant.u,
         "v_px": instant.v,
+        "latency_s": instant.latency_s,
+        "kernel_s": instant.measure_s or math.nan,
     }
     for name, gauge in instant.gauges.items():
         values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma), strict=True))
@@ -98,9 +103,4 @@ def _values(measurement: Measurement, maps: dict[str, NDArray[Any]], info: RowIn
 
 
 def _mean(name: str, small: float, maps: dict[str, NDArray[Any]], measure: StrainMeasure) -> float:
-    return small if measure == "small" else _nanmean(maps[name])
-
-
-def _nanmean(values: NDArray[Any]) -> float:
-    valid = values[np.isfinite(values)]
-    return float(valid.mean(dtype=np.float64)) if valid.size else float("nan")
+    return small if measure == "small" else ordered_mean(maps[name][np.isfinite(maps[name])])

@@ -1,34 +1,32 @@
-"""``strain.h5``: the strain maps of a test, crash-safe row by row and readable by NeXus viewers.
+"""``strain.h5``: the strain maps of a test, crash-safe and readable by NeXus viewers.
 
-Every dataset and attribute is made before SWMR mode is switched on, and every row is flushed:
-after a kill the finished rows are there (open with ``swmr=True``, as ``Strain.open`` does).
+Every dataset and attribute is made before SWMR mode is switched on, and rows are flushed four times a
+second: after a kill those are there (open with ``swmr=True``, as ``Strain.open`` does).
 """
 
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
-from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from acquire.errors import DataError
-from acquire.hdf5 import let_go
+from acquire.hdf5 import Pace, PictureStack, Table, let_go
+from live.results import layout
 from live.results.info import FORMAT, FORMAT_VERSION
-from live.results.row import GRADIENTS, STRAINS, Row, gauge_columns
-from live.results.strain_csv import COLUMNS
+from live.results.row import STRAINS, Row, gauge_columns
 
 if TYPE_CHECKING:
     from analysis.field import ZoiGrid
     from live.results.info import ResultsInfo
 
-
-_WHOLE = {"frame", "last_frame", "n_frames", "lost", "n_valid", "n_zoi"}
+FLUSH_S = 0.25  # a row waits for its flush no longer than this
 _UNITS = {"time_s": "s", "force_N": "N", "noise_GL": "GL", "duration_s": "s", "u_px": "px", "v_px": "px"}
-_UNITS["stress_Pa"] = "Pa"
-_MAPS = ("u", "v", *GRADIENTS, *STRAINS)
+_UNITS |= {"stress_Pa": "Pa", "latency_s": "s", "kernel_s": "s"}
 _WORDS = {
     "u": "displacement along x (right)",
     "v": "displacement along y (down)",
@@ -48,6 +46,14 @@ _WORDS = {
 class StrainWriter:
     """Makes the file and appends rows to it.
 
+    Parameters
+    ----------
+    path : Path
+    grid : ZoiGrid
+    info : ResultsInfo
+    now : callable
+        Gives seconds; paces the flushes.
+
     Raises
     ------
     DataError
@@ -55,34 +61,55 @@ class StrainWriter:
         was flushed before stays readable.
     """
 
-    def __init__(self, path: Path, grid: ZoiGrid, info: ResultsInfo) -> None:
-        self._path, self.failed, self._rows = path, False, 0
+    def __init__(
+        self, path: Path, grid: ZoiGrid, info: ResultsInfo, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._path, self.failed = path, False
+        self._flushed = 0  # rows
+        self._pace = Pace(FLUSH_S, now)
         self._file = self._guard(lambda: _create(path, grid, info))
         entry = self._file["entry"]
-        self._maps = {n: entry["strain"][n] for n in _map_names()}
-        self._values = {n: entry["mean"][n] for n in _value_names(info)}
+        self._maps = {n: PictureStack(entry["strain"][n]) for n in layout.MAPS}
+        self._values = Table(entry["mean"], _value_names(info))
 
     def write(self, row: Row) -> None:
-        """Append one row and flush it."""
+        """Append one row."""
         self._guard(lambda: self._append(row))
+        self._pace.wrote()
+        self.flush_when_due()
+
+    def flush_when_due(self) -> float:
+        """Flush where a row has waited for ``FLUSH_S``; ``write`` does that too.
+
+        Returns
+        -------
+        float, s
+            Time after which this must be called again if no row comes; infinite where none waits.
+        """
+        if self._pace.left_s() == 0:
+            self._guard(self._flush)
+        return self._pace.left_s()
 
     def close(self) -> None:
         """Close the file; after a failed write it is let go as it stands on the disk."""
         if self.failed:
             let_go(self._file)
         else:
+            self._guard(self._flush)
             self._guard(self._file.close)
 
     def _append(self, row: Row) -> None:
-        k = self._rows
-        for name, dataset in self._maps.items():
-            dataset.resize(k + 1, axis=0)
-            dataset[k] = row.maps[name]
-        for name, dataset in self._values.items():
-            dataset.resize(k + 1, axis=0)
-            dataset[k] = row.values[name]
+        values = self._values.row(row.values)
+        for name, stack in self._maps.items():
+            stack.append(row.maps[name])
+        self._values.hold(values)
+
+    def _flush(self) -> None:
+        self._pace.began()
+        self._values.write()
         self._file.flush()
-        self._rows = k + 1
+        self._pace.done()
+        self._flushed = self._values.length
 
     def _guard(self, action: Callable[[], Any]) -> Any:
         try:
@@ -94,19 +121,12 @@ class StrainWriter:
     def _trouble(self, error: Exception) -> DataError:
         return DataError(
             f"{self._path}: cannot be written ({error}); make room on the disk or choose another --out. "
-            f"The {self._rows} rows before are safe"
+            f"The {self._flushed} rows before are safe"
         )
 
 
-def _map_names() -> tuple[str, ...]:
-    return (*_MAPS, *(f"sigma_{n}" for n in _MAPS), "residual", "status", "iterations")
-
-
 def _value_names(info: ResultsInfo) -> tuple[str, ...]:
-    # The time comes last: a reader that sees it sees the whole row.
-    names = tuple(name for name in COLUMNS if name != "time_s")
-    stress = ("stress_Pa",) if info.area_m2 is not None else ()
-    return (*names, *stress, *chain.from_iterable(map(gauge_columns, info.gauges)), "time_s")
+    return layout.column_names(info.gauges, with_stress=info.area_m2 is not None)
 
 
 def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
@@ -146,8 +166,8 @@ def _add_mean(entry: Any, info: ResultsInfo) -> None:
     mean = _group(entry, "mean", "NXdata", signal="eyy", axes=["time_s"], title="Means over the valid ZOIs")
     mean.attrs["auxiliary_signals"] = ["exx", "exy"]
     for name in _value_names(info):
-        kind = np.int64 if name in _WHOLE else np.float64
-        dataset = mean.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(256,))
+        kind = layout.column_declared(name).dtype
+        dataset = mean.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(256,), fletcher32=True)
         dataset.attrs["units"] = _UNITS.get(name, "")
         if name in STRAINS:
             dataset.attrs["uncertainties"] = f"sigma_{name}"
@@ -177,9 +197,8 @@ def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
         frame_of_reference="fields lie on the reference picture; x right, y down, px",
         auxiliary_signals=["exx", "exy"],
     )
-    shape = np.shape(grid.active)
-    for name in _map_names():
-        _add_map(strain, name, shape)
+    for name in layout.MAPS:
+        _add_map(strain, name, grid.shape)
     for name, values in (("x", grid.x), ("y", grid.y)):
         strain[name] = np.asarray(values, np.float64)
         strain[name].attrs.update(units="px", long_name=f"{name} of the centre of the ZOI (px)")
@@ -190,11 +209,12 @@ def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
         strain[name].attrs["units"] = "px"
 
 
-def _add_map(strain: Any, name: str, shape: tuple[int, ...]) -> None:
-    kind: Any = np.uint8 if name in ("status", "iterations") else np.float32
+def _add_map(strain: Any, name: str, shape: tuple[int, int]) -> None:
+    kind = layout.map_declared(name, shape).dtype
     dataset = strain.create_dataset(
-        name, (0, *shape), kind, maxshape=(None, *shape), chunks=(1, *shape), fillvalue=_fill(kind)
-    )
+        name, (0, *shape), kind, maxshape=(None, *shape), chunks=(1, *shape), fillvalue=_fill(kind),
+        fletcher32=True,
+    )  # fmt: skip
     plain = name.removeprefix("sigma_")
     unit = "px" if plain in ("u", "v") else ""
     words = _WORDS[plain] if plain == name else f"standard uncertainty of {_WORDS[plain]}"
@@ -203,8 +223,8 @@ def _add_map(strain: Any, name: str, shape: tuple[int, ...]) -> None:
         dataset.attrs["meaning"] = json.dumps(_status_words())
 
 
-def _fill(kind: Any) -> Any:
-    return np.nan if kind is np.float32 else 255
+def _fill(kind: str) -> float:
+    return np.nan if kind == "f4" else 255
 
 
 def _status_words() -> dict[str, str]:

@@ -71,6 +71,16 @@ class Results(Closing):
         self._csv.write(row)
         self.written += 1
 
+    def flush_when_due(self) -> float:
+        """Bring rows that have waited long enough to the file, as ``add`` does too; raises as that.
+
+        Returns
+        -------
+        float, s
+            Time after which this must be called again if no row comes; infinite where none waits.
+        """
+        return self._h5.flush_when_due()
+
     def close(self) -> None:
         """Close both files; again without effect."""
         if self._closed:

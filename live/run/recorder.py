@@ -29,8 +29,8 @@ from live.tell import Books, Journal, Ledger, Screen
 
 log = logging.getLogger(__name__)
 _SMALL = 512  # bytes counted for a sample or an event
+_PATIENCE_S = 0.5
 _CLOCK_EVERY_S = 60.0
-
 _DISK_EVERY_S = 5.0
 _DISK_WARN_S = 180.0
 
@@ -176,6 +176,7 @@ class Recorder:
         self._next_clock = self._began + _CLOCK_EVERY_S
         self._next_disk = self._began + _DISK_EVERY_S
         self._disk_told = False
+        self._patience_s = _PATIENCE_S
         self.failed: str | None = None
         self._thread = threading.Thread(target=self._work, name="record", daemon=True)
         self._thread.start()
@@ -242,13 +243,16 @@ class Recorder:
     def _work(self) -> None:
         self._guarded(lambda: self._writer.write_clock(ClockPair.now()))
         while not self._buffer.finished:
-            item = self._buffer.get(timeout_s=0.5)
+            item = self._buffer.get(self._patience_s)
             if item is not None:
                 self._write(item)
-            elif self.failed is None:
-                self._guarded(self._writer.flush)  # nothing more comes for a while
             if self.failed is None:
+                self._guarded(self._flush_when_due)
                 self._now_and_then(self._now())
+
+    def _flush_when_due(self) -> None:
+        """What is written last must not wait for an item that does not come."""
+        self._patience_s = min(_PATIENCE_S, self._writer.flush_when_due())
 
     def _now_and_then(self, now: float) -> None:
         if now > self._next_clock:
@@ -297,6 +301,8 @@ class Recorder:
         if self.failed is not None:
             return
         self.failed = why
+        lost = self._writer.unflushed_frames  # written, and gone with the file
+        self._ledger.add(recorded=-lost, unrecorded=lost)
         text = f"recording has stopped, measuring goes on: {why}"
         self._journal.tell(EventKind.RECORDER, "recorder", text, "error")
         self._on_failure()

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.clock import ClockPair
+from acquire.hdf5 import compile_loops
 from acquire.record_mode import RecordMode
 from live.measure import Correction, rehearse
 from live.setup import (
@@ -113,6 +114,7 @@ def _rehearse(
     took = compile_ahead(kinds_of(rig.camera.info), phase=phase, say=screen.status)
     if took > 0:
         screen.say(f"everything is compiled ({took:.0f} s)")
+    compile_loops()
     rehearse(rig.camera.info, grid, settings, bursts)
 
 

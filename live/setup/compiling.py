@@ -64,14 +64,15 @@ def compile_ahead(
 
 def main(part: str, kinds: str, phase: str) -> int:
     """One of the processes."""
-    from acquire.burst import compile_loops
+    from acquire import burst, hdf5
     from analysis.kernel import PARTS, warm_up
 
     if part not in PARTS:
         raise ConfigError(f"{part}: no part of the compilation; there are {', '.join(PARTS)}")
     warm_up(part, kinds.split(","))
     if part != PARTS[0]:
-        compile_loops()
+        burst.compile_loops()
+        hdf5.compile_loops()
         if phase == "phase":
             warm_up("phase")
     return 0

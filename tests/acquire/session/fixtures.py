@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import time
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -62,6 +64,8 @@ def info(camera: CameraInfo = CAMERA, **changes: Any) -> SessionInfo:
     return dataclasses.replace(about, **changes)
 
 
-def writer(path: Path, camera: CameraInfo = CAMERA, **changes: Any) -> SessionWriter:
+def writer(
+    path: Path, camera: CameraInfo = CAMERA, now: Callable[[], float] = time.monotonic, **changes: Any
+) -> SessionWriter:
     """A new session of the test camera."""
-    return SessionWriter(path, info(camera, **changes))
+    return SessionWriter(path, info(camera, **changes), now=now)

@@ -25,7 +25,7 @@ def test_a_damaged_unfinished_file_is_tried_in_a_child_with_a_time_limit(
 ) -> None:
     content = whole_session(tmp_path / "whole.h5", abandoned=True)
     path = tmp_path / "cut.h5"
-    path.write_bytes(content[: len(content) // 2])
+    path.write_bytes(content[: len(content) * 2 // 5])
     with pytest.raises(DataError, match="does not come to an end"):
         child.probe(path, "acquire.session", timeout_s=2.0)
     monkeypatch.setattr(child, "PROBE_S", 2.0)

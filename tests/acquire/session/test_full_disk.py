@@ -27,8 +27,10 @@ for number in range(10_000):
     try:
         session.write_load(sample(number))
         session.write_frame(frame(number))
+        if number % 4 == 3:
+            session.flush()
     except DataError as error:
-        print(number)
+        print(number - session.unflushed_frames)
         print(error)
         break
 try:
@@ -40,7 +42,7 @@ session.close()
 
 
 @pytest.mark.parametrize("limit", [150_000, 200_123, 299_999])
-def test_all_complete_frames_are_readable(tmp_path: Path, limit: int) -> None:
+def test_all_flushed_frames_are_readable(tmp_path: Path, limit: int) -> None:
     path = tmp_path / "session.h5"
     child = subprocess.run(
         [sys.executable, "-c", CHILD, str(path), str(limit)], capture_output=True, text=True, timeout=60

@@ -16,7 +16,9 @@ from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
 from acquire.session import Session
+from acquire.session.writer import FLUSH_S
 from tests.acquire.session.fixtures import CAMERA, LOAD, START, frame, sample, writer
+from tests.clock import Clock
 
 
 def assert_same_frame(a: Frame, b: Frame) -> None:
@@ -109,7 +111,7 @@ def test_events_of_any_length(path: Path, length: int) -> None:
 
 def test_not_a_number_in_an_event_becomes_null(path: Path) -> None:
     with writer(path) as session:
-        session.write_event(Event(1001.0, EventKind.REFERENCE, "x", "y", data={"force_N": math.nan}))
+        session.write_event(Event(1001.0, EventKind.TARE, "x", "y", data={"force_N": math.nan}))
     with Session.open(path) as back:
         assert back.events()[0].data == {"force_N": None}
 
@@ -150,40 +152,71 @@ def test_a_closed_session_takes_nothing_more(path: Path) -> None:
     session = writer(path)
     session.close()
     session.close()
-    with pytest.raises(DataError, match="closed"):
-        session.write_frame(frame(0))
+    for write in (
+        lambda: session.write_frame(frame(0)),
+        lambda: session.write_load(sample(0)),
+        lambda: session.write_clock(START),
+        lambda: session.write_event(Event(1001.0, EventKind.NOTE, "operator", "x")),
+    ):
+        with pytest.raises(DataError, match="closed"):
+            write()
 
 
 def test_a_file_still_being_written_can_be_followed(path: Path) -> None:
     with writer(path) as session:
         session.write_frame(frame(0))
+        session.flush()
         with Session.open(path) as back:
             assert back.recovered is not None and "still recording" in back.recovered
             assert len(back) == 1
             session.write_load(sample(1))
             session.write_frame(frame(1))
+            session.flush()
             back.refresh()
             assert len(back) == 2 and len(back.load_samples()) == 1
             assert_same_frame(frame(1), back.frame(1))
 
 
-def test_a_slow_load_cell_reaches_the_file_without_frames(path: Path) -> None:
-    with writer(path) as session:
+def test_what_comes_slowly_is_in_the_file_at_once(path: Path) -> None:
+    clock = Clock()
+    with writer(path, now=clock) as session:
         for number in range(3):
+            clock.now_s += 1.0
             session.write_load(LoadSample(START.monotonic + number, float(number)))
+            with Session.open(path) as back:
+                assert [s.force for s in back.load_samples()][-1] == number
+
+
+def test_what_comes_fast_is_flushed_together_and_on_time(path: Path) -> None:
+    clock = Clock()
+    with writer(path, now=clock) as session:
+        clock.now_s = 1.0
+        session.write_frame(frame(0))
+        clock.now_s += FLUSH_S / 2
+        session.write_frame(frame(1))
+        session.write_load(sample(0))
+        session.write_event(Event(1001.0, EventKind.NOTE, "operator", "x"))
+        assert session.flush_when_due() == pytest.approx(FLUSH_S / 2)
+        assert session.unflushed_frames == 1
         with Session.open(path) as back:
-            assert [s.force for s in back.load_samples()] == [0.0, 1.0, 2.0]
+            assert (len(back), back.load_samples(), back.events()) == (1, [], [])
+            clock.now_s += FLUSH_S
+            assert session.flush_when_due() == math.inf
+            assert session.unflushed_frames == 0
+            back.refresh()
+            assert (len(back), len(back.load_samples()), len(back.events())) == (2, 1, 1)
 
 
-def test_fast_load_samples_are_flushed_together(path: Path) -> None:
+def test_a_frame_that_cannot_be_told_leaves_the_rest(path: Path) -> None:
     with writer(path) as session:
-        for number in range(100):
-            session.write_load(LoadSample(START.monotonic + number * 1e-3, float(number)))
-        with Session.open(path) as back:
-            assert 80 <= len(back.load_samples()) < 100
-        session.flush()
-        with Session.open(path) as back:
-            assert len(back.load_samples()) == 100
+        session.write_frame(frame(0))
+        with pytest.raises(OverflowError):
+            session.write_frame(frame(1, lost_before=2**40))
+        session.write_frame(frame(2))
+    with Session.open(path) as back:
+        assert_same_frame(frame(0), back.frame(0))
+        assert_same_frame(frame(2), back.frame(1))
+        assert len(back) == 2
 
 
 def test_foreign_files(tmp_path: Path) -> None:

@@ -19,6 +19,7 @@ def abandoned(path: Path, frames: int = 6) -> Path:
         for k in range(frames):
             session.write_load(sample(k))
             session.write_frame(frame(k))
+        session.flush()
         path.write_bytes(session.path.read_bytes())
     return path
 

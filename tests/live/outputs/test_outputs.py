@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from collections.abc import Sequence
 from typing import Any
@@ -84,6 +85,31 @@ def test_one_that_falls_behind_is_served_as_its_policy_says(policy: Policy, kept
     out.end()
     assert keeper.rows == kept
     assert out.reports[0].line() == "consumer: 3 measurements, 7 passed over; kept"
+
+
+class Putting(Keeper):
+    """Puts something off, and asks to be asked again."""
+
+    asked = 0
+
+    def idle(self) -> float:
+        self.asked += 1
+        if self.asked == 3:
+            self.go.set()
+        return 0.01 if self.asked < 3 else math.inf
+
+
+def test_one_that_puts_things_off_is_asked_when_nothing_comes() -> None:
+    keeper = Putting(policy=Policy.WAIT)
+    out, _ = outputs(keeper)
+    keeper.go.clear()
+    out.add(make_measurement(0))
+    keeper.go.set()
+    assert keeper.busy.wait(10)
+    keeper.go.clear()
+    assert keeper.go.wait(10)  # it was asked, although nothing came
+    out.end()
+    assert keeper.rows == [0]
 
 
 def test_one_that_waits_holds_the_measurement_up_and_loses_nothing() -> None:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
+import math
 import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -18,21 +21,24 @@ import pytest
 from acquire.errors import DataError
 from acquire.hdf5 import child
 from live.results import Results, ResultsInfo, Strain
+from live.results.row import Row
 from live.results.strain_csv import COLUMNS
+from live.results.strain_h5 import FLUSH_S, StrainWriter
+from tests.clock import Clock
 from tests.live.made_up import CAMERA, START, make_grid, make_measurement
+
+INFO = ResultsInfo(
+    START,
+    "2030-01-02T03:04:05+00:00",
+    {"measure": {"zoi": 32}},
+    {"specimen": "S1"},
+    {"phasedic": "0.1.0"},
+    CAMERA,
+)
 
 
 def open_results(folder: Path, **more: Any) -> Results:
-    info = ResultsInfo(
-        START,
-        "2030-01-02T03:04:05+00:00",
-        {"measure": {"zoi": 32}},
-        {"specimen": "S1"},
-        {"phasedic": "0.1.0"},
-        CAMERA,
-        **more,
-    )
-    return Results(folder, make_grid(), info)
+    return Results(folder, make_grid(), dataclasses.replace(INFO, **more))
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -85,7 +91,9 @@ def test_table_and_maps_say_the_same(tmp_path: Path) -> None:
     with Strain.open(tmp_path / "strain.h5") as strain:
         for k, row in enumerate(rows_of(tmp_path / "strain.csv")):
             for column in (*COLUMNS, "stress_Pa"):
-                assert float(row[column]) == pytest.approx(float(strain.values[column][k]), rel=1e-9), column
+                assert float(row[column]) == pytest.approx(
+                    float(strain.values[column][k]), rel=1e-9, nan_ok=True
+                ), column
         np.testing.assert_allclose(strain.values["stress_Pa"], strain.values["force_N"] / 4e-5)
 
 
@@ -119,6 +127,8 @@ def test_a_disk_that_takes_no_more_is_told_and_spoils_nothing(
         patch.setattr(h5py.File, "flush", full)
         with pytest.raises(DataError, match=r"strain\.h5: cannot be written .*no space.* 1 rows"):
             results.add(make_measurement(1))
+            time.sleep(results.flush_when_due())
+            results.flush_when_due()
     results.close()
     results.close()
     with Strain.open(tmp_path / "strain.h5") as strain:
@@ -144,33 +154,71 @@ def test_nexus_viewers_find_the_default_plot(tmp_path: Path) -> None:
         assert words["0"].startswith("OK")
 
 
+def test_time_of_the_kernel_and_latency_are_columns(tmp_path: Path) -> None:
+    live = make_measurement(0)
+    instant = dataclasses.replace(live.instant, measure_s=0.012, latency_s=0.025)
+    with open_results(tmp_path) as results:
+        results.add(dataclasses.replace(live, instant=instant))
+        results.add(make_measurement(1))
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        np.testing.assert_array_equal(strain.values["kernel_s"], [0.012, math.nan])
+        np.testing.assert_array_equal(strain.values["latency_s"], [0.025, math.nan])
+    first, second = rows_of(tmp_path / "strain.csv")
+    assert (first["kernel_s"], first["latency_s"]) == ("0.012", "0.025")
+    assert (second["kernel_s"], second["latency_s"]) == ("nan", "nan")
+
+
+def test_rows_are_flushed_together_and_on_time(tmp_path: Path) -> None:
+    clock = Clock()
+    writer = StrainWriter(tmp_path / "strain.h5", make_grid(), INFO, now=clock)
+    rows = [Row.of(make_measurement(k, 1e-3 * k), INFO) for k in range(3)]
+    clock.now_s = 1.0
+    writer.write(rows[0])
+    clock.now_s += FLUSH_S / 2
+    writer.write(rows[1])
+    writer.write(rows[2])
+    assert writer.flush_when_due() == pytest.approx(FLUSH_S / 2)
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        assert strain.n == 1
+    clock.now_s += FLUSH_S
+    assert writer.flush_when_due() == math.inf
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        assert strain.n == 3
+        np.testing.assert_array_equal(strain.maps("v", 2), rows[2].maps["v"].astype(np.float32))
+    writer.close()
+
+
 WRITER = """
-import itertools, sys
+import itertools, sys, time
 from pathlib import Path
 from tests.live.made_up import make_measurement
 from tests.live.results.test_writer_and_reader import open_results
 results = open_results(Path(sys.argv[1]))
 for k in itertools.count():
     results.add(make_measurement(k, 1e-5 * k))
-    print(k, flush=True)
+    print(k, time.monotonic(), flush=True)
 """
 
 
-def test_a_killed_writer_leaves_all_its_rows(tmp_path: Path) -> None:
+def test_a_killed_writer_leaves_what_is_older_than_its_last_flush(tmp_path: Path) -> None:
     command = [sys.executable, "-c", WRITER, str(tmp_path)]
     with subprocess.Popen(
         command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[3]
     ) as writer:
         assert writer.stdout is not None
-        last = next(int(line) for line in writer.stdout if int(line) >= 20)
+        began = float(writer.stdout.readline().split()[1])
+        said = next(line for line in writer.stdout if float(line.split()[1]) > began + 0.6)
         os.kill(writer.pid, signal.SIGKILL)
-        last = max([last, *(int(line) for line in writer.stdout)])
+        killed = time.monotonic()
+        said += writer.stdout.read()
+    written = [(int(k), float(t)) for k, t in (line.split() for line in said.splitlines())]
     with Strain.open(tmp_path / "strain.h5") as strain:
         assert strain.unfinished
-        assert strain.n in (last + 1, last + 2)
+        # Half a second for a flush that waits for a core.
+        assert strain.n > max((k for k, t in written if t < killed - FLUSH_S - 0.5), default=1)
         np.testing.assert_allclose(strain.values["eyy"], 1e-5 * np.arange(strain.n), rtol=1e-6, atol=1e-12)
         assert np.isfinite(strain.maps("eyy")[:, 1, 1]).all()
-    assert len(rows_of(tmp_path / "strain.csv")) >= last + 1
+    assert len(rows_of(tmp_path / "strain.csv")) > written[-1][0]
 
 
 def test_what_is_not_ours_is_refused_in_words(tmp_path: Path) -> None:
@@ -187,7 +235,7 @@ def test_what_is_not_ours_is_refused_in_words(tmp_path: Path) -> None:
         Strain.open(foreign)
     with h5py.File(foreign, "a") as file:
         file.attrs["format"], file.attrs["format_version"] = "phasedic-strain", 1
-    with pytest.raises(DataError, match="damaged"):
+    with pytest.raises(DataError, match="start_time is missing"):
         Strain.open(foreign)
     with h5py.File(foreign, "a") as file:
         file.attrs["format_version"] = 2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from typing import Any
 
@@ -22,6 +23,7 @@ class FakeWriter:
         self.ledger: dict[str, Any] | None = None
         self.closed = False
         self._fails_at, self._error = fails_at, error or DataError("session.h5: the disk is full")
+        self.unflushed_frames = 0
         self.go = threading.Event()
         self.go.set()
 
@@ -30,6 +32,7 @@ class FakeWriter:
         if self._fails_at is not None and len(self.frames) >= self._fails_at:
             raise self._error
         self.frames.append(item.index)
+        self.unflushed_frames = len(self.frames) % 3
         return len(self.frames) - 1
 
     def write_load(self, sample: Any) -> None:
@@ -43,6 +46,9 @@ class FakeWriter:
 
     def write_ledger(self, ledger: dict[str, Any]) -> None:
         self.ledger = ledger
+
+    def flush_when_due(self) -> float:
+        return math.inf
 
     def close(self) -> None:
         self.closed = True
@@ -88,7 +94,8 @@ def test_a_full_buffer_leaves_a_counted_gap() -> None:
 def test_a_full_disk_stops_the_recording_alone() -> None:
     writer = FakeWriter(fails_at=7)
     ledger, journal = recorded(writer, 20)
-    assert (ledger.recorded, ledger.unrecorded) == (7, 13)
+    assert (ledger.recorded, ledger.unrecorded) == (6, 14)  # the seventh was not flushed
+    assert ledger.adds_up
     texts = [event.text for event in journal.events("error")]
     assert texts == ["recording has stopped, measuring goes on: session.h5: the disk is full"]
     assert writer.closed

@@ -1,0 +1,259 @@
+"""What stands in a session file, read as ``layout`` declares it: nothing else is believed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, get_args
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import DataError
+from acquire.events import Event, EventKind, Level
+from acquire.frame import CameraInfo
+from acquire.hdf5 import Declared, Said, check_object, open_dataset, open_datasets, read_object, stored_rows
+from acquire.load_sample import LoadCellInfo
+from acquire.session import layout
+
+ROOT = {
+    "format_version": Declared("int", (), 1),
+    "set_id": Declared("S"),
+    "part": Declared("int", (), 0, 999_999),
+}
+ENTRY = {"record": Declared("S"), "crop": Declared("i8", (4,), 0, 65_535)}
+START = {
+    "start_time": Declared("S"),
+    "start_monotonic_s": Declared("f8", (), -layout.FURTHEST_S, layout.FURTHEST_S),
+}
+TEXTS = dict.fromkeys(("config", "metadata", "versions"), Declared("S"))
+EVENTS = Declared(f"S{layout.EVENT_BYTES}", (None,))
+LEDGER = Declared(f"S{layout.LEDGER_BYTES}", (1,))
+LINES = Declared("u1", (None,))
+
+_CLOCK = Said(str, words=layout.CLOCKS)
+CAMERA_SAID = {
+    "address": Said(str),
+    "name": Said(str),
+    "width": Said(int, 1, 65_535),
+    "height": Said(int, 1, 65_535),
+    "bits": Said(int, 1, 16),
+    "live": Said(bool),
+    "clock": _CLOCK,
+    "fps": Said(float, 0, 1e9, missing=True),
+    "exposure_s": Said(float, 0, 1e9, missing=True),
+    "pixel_format": Said(str),
+    "controls": Said(dict),
+    "warnings": Said(list),
+}
+LOAD_SAID = {
+    "address": Said(str),
+    "name": Said(str),
+    "protocol": Said(str),
+    "clock": _CLOCK,
+    "sign": Said(int, -1, 1),
+    "capacity_N": Said(float, 0, layout.MOST_FORCE_N, missing=True),
+    "settings": Said(dict),
+    "warnings": Said(list),
+}
+EVENT_SAID = {
+    "monotonic_s": Said(float, -layout.FURTHEST_S, layout.FURTHEST_S),
+    "kind": Said(str),
+    "source": Said(str),
+    "text": Said(str),
+    "level": Said(str, words=get_args(Level)),
+    "data": Said(dict),
+}
+_FRAME = Said(int, 0, 2**63 - 1)
+BURST_SAID = {"first": _FRAME, "last": _FRAME, "n": Said(int, 1, 65_536)}
+_TELLS_OF_A_BURST = {EventKind.REFERENCE, EventKind.MEASURED}
+
+
+def camera_from(text: Any, where: str) -> CameraInfo:
+    """The camera whose description stands in ``text``; raises DataError where it is none."""
+    said = _described(text, CAMERA_SAID, where)
+    if said["width"] * said["height"] > layout.MOST_PIXELS:
+        raise DataError(f"{where}: pictures of {said['width']} x {said['height']} px are beyond sense")
+    return CameraInfo(**said)
+
+
+def load_from(text: Any, where: str) -> LoadCellInfo | None:
+    """The load cell, or None for "null"; raises DataError where it is neither."""
+    if bytes(text).strip() == b"null":
+        return None
+    return LoadCellInfo(**_described(text, LOAD_SAID, where))
+
+
+def _described(text: Any, form: Mapping[str, Said], where: str) -> dict[str, Any]:
+    said = read_object(text, where)
+    check_object(said, form, where)
+    return {name: said[name] for name in form if name in said} | {
+        "warnings": tuple(map(str, said["warnings"]))
+    }
+
+
+def pictures_of(camera: CameraInfo) -> dict[str, dict[str, Declared]]:
+    """The pictures that frames and bursts of ``camera`` have, by group and name; for sums see ``open_sums``."""
+    size = (None, camera.height, camera.width)
+    packed = (camera.height * camera.width + 7) // 8
+    return {
+        "frames": {"image": Declared(layout.image_dtype(camera.bits).str, size)},
+        "bursts": {"clipped": Declared("u1", (None, packed))},
+    }
+
+
+def open_sums(group: h5py.Group, camera: CameraInfo) -> h5py.Dataset:
+    """The sums of bursts: of 16 or of 32 bits."""
+    size = (None, camera.height, camera.width)
+    try:
+        return open_dataset(group, "sum", Declared("u2", size))
+    except DataError:
+        return open_dataset(group, "sum", Declared("u4", size))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """The rows of a table that can be used.
+
+    Attributes
+    ----------
+    columns : mapping of name to (N,) array
+    places : (N,) int
+        Which row of the file each of them is.
+    troubles : tuple of str
+        What was left out or is odd, for a person.
+    """
+
+    columns: Mapping[str, NDArray[Any]]
+    places: NDArray[np.intp]
+    troubles: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+
+def read_rows(
+    group: h5py.Group, columns: layout.Columns, pictures: Sequence[h5py.Dataset] = (), *, whole: bool
+) -> Rows:
+    """The rows of ``group`` that are complete in all columns and in the pictures.
+
+    A row without a time is left out, and told. Times that run backwards are told.
+
+    Parameters
+    ----------
+    whole : bool
+        Nothing may be missing or beyond its range; else what is so is left out.
+
+    Raises
+    ------
+    DataError
+        Columns are missing or of another kind; where ``whole``, also of another length or out of range.
+    """
+    declared = {name: column.declared() for name, column in columns.items()}
+    held = open_datasets(group, declared)
+    lengths = [stored_rows(item) for item in (*held.values(), *pictures)]
+    n = min(lengths)
+    extents = {len(item) for item in (*held.values(), *pictures)}
+    where = f"{group.file.filename}: {group.name}"
+    if whole and {*lengths, *extents} != {n}:
+        raise DataError(
+            f"{where} has {n} to {max(extents)} rows, not one number of them in all its columns; the file is"
+            " damaged: 'phasedic recover' saves the rows that are whole"
+        )
+    table = {name: item[:n] for name, item in held.items()}
+    outside = {name: what.outside(table[name]) for name, what in declared.items()}
+    beyond = np.logical_or.reduce([*outside.values()], axis=0)
+    if whole and beyond.any():
+        raise DataError(_beyond(where, table, outside, declared))
+    timeless = np.isnan(table["monotonic_s"])
+    return _chosen(table, ~(beyond | timeless), str(group.name).rpartition("/")[2], whole)
+
+
+def _beyond(where: str, table: Any, outside: Any, declared: Mapping[str, Declared]) -> str:
+    name = next(name for name, rows in outside.items() if rows.any())
+    row = int(np.argmax(outside[name]))
+    low, high = declared[name].low, declared[name].high
+    return (
+        f"{where}/{name} is {table[name][row]} in row {row}, beyond {low:g} to {high:g}; the file is damaged:"
+        " 'phasedic recover' saves the other rows"
+    )
+
+
+def _chosen(table: dict[str, NDArray[Any]], good: NDArray[np.bool_], what: str, whole: bool) -> Rows:
+    if not whole:  # the last rows may not be written yet
+        good = good[: len(good) - int(np.argmax(good[::-1]))] if good.any() else good[:0]
+    places = np.flatnonzero(good)
+    columns = {name: column[places] for name, column in table.items()}
+    troubles = []
+    if left_out := len(good) - len(places):
+        troubles.append(
+            f"{left_out} of {len(good)} {what} have no time, or values beyond sense, and are left out"
+        )
+        _count_as_lost(columns, table, good)
+    steps = np.diff(columns["monotonic_s"])
+    if backwards := int(np.count_nonzero(steps < 0)):
+        first = int(np.argmax(steps < 0))
+        troubles.append(f"the times of {what} run backwards at {backwards} places, first after row {first}")
+    return Rows(columns, places, tuple(troubles))
+
+
+def _count_as_lost(
+    columns: dict[str, NDArray[Any]], table: dict[str, NDArray[Any]], good: NDArray[np.bool_]
+) -> None:
+    """What is left out was lost before the next one that is not."""
+    name = next((name for name in ("lost_before", "lost") if name in table), None)
+    if name is None:
+        return
+    frames = table["n"][: len(good)] if "n" in table else np.ones(len(good))
+    gone = np.cumsum(np.where(good, 0, frames.astype(np.int64) + table[name][: len(good)]))
+    columns[name] = columns[name] + np.diff(gone[good], prepend=0)
+
+
+def events_from(rows: NDArray[np.bytes_], where: str, *, whole: bool) -> list[Event]:
+    """The events that ``layout.event_rows`` wrote.
+
+    Those of a kind that a newer program has added are left out.
+
+    Raises
+    ------
+    DataError
+        One is not as it was written; where not ``whole`` it is left out.
+    """
+    texts: list[bytearray] = []
+    for row in rows.tolist():
+        if row.startswith(layout.CONTINUED) and texts:
+            texts[-1] += row[len(layout.CONTINUED) :]
+        else:
+            texts.append(bytearray(row))
+    events = []
+    for number, text in enumerate(texts):
+        try:
+            events.append(_event_from(bytes(text), f"{where}: event {number}"))
+        except DataError:
+            if whole:
+                raise
+    return [event for event in events if event is not None]
+
+
+def _event_from(text: bytes, where: str) -> Event | None:
+    said = read_object(text, where)
+    check_object(said, EVENT_SAID, where)
+    if said["kind"] not in {*EventKind}:
+        return None
+    kind = EventKind(said["kind"])
+    if kind in _TELLS_OF_A_BURST:
+        check_object(said["data"], BURST_SAID, where)
+    return Event(said["monotonic_s"], kind, said["source"], said["text"], said["level"], said["data"])
+
+
+def config_from(text: Any, where: str) -> dict[str, Any]:
+    """The configuration: sections of keys."""
+    config = read_object(text, where)
+    check_object(config, dict.fromkeys(config, Said(dict)), where)
+    return config
+
+
+def ledger_from(text: bytes, where: str) -> dict[str, Any] | None:
+    """The final counts; None where they were not written."""
+    return read_object(text, where) if text else None
