@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquire.errors import ConfigError, DataError
+from live.tell import say
 
 if TYPE_CHECKING:
     from analysis.field import ZoiGrid
@@ -54,8 +55,8 @@ def command(arguments: argparse.Namespace) -> int:
     title = f"{Path(arguments.session).name}: {where}, frame {arguments.frame}"
     draw_spectrum(drawn, spectrum, title)
     drawn.savefig(out, dpi=DPI)
-    print(f"{title}\nu = {spectrum.u:.4f} px, v = {spectrum.v:.4f} px from {spectrum.used.sum()} frequencies")
-    print(f"figure: {out}")
+    say(f"{title}\nu = {spectrum.u:.4f} px, v = {spectrum.v:.4f} px from {spectrum.used.sum()} frequencies")
+    say(f"figure: {out}")
     return 0
 
 

@@ -9,6 +9,7 @@ from acquire.errors import ConfigError
 from acquire.opencv import read_image
 from live.maps import Picture, draw
 from live.results import Strain
+from live.tell import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -46,5 +47,5 @@ def command(arguments: argparse.Namespace) -> int:
         )
         figure = draw(strain, picture, background)
         figure.savefig(path, dpi=110)
-    print(path)
+    say(str(path))
     return 0
