@@ -65,10 +65,10 @@ class Picture:
     def check(self, grid: ZoiGrid) -> None:
         """Raises ConfigError where a number is impossible, or beyond what makes sense on ``grid``."""
         extent = max(grid.shape) * grid.step
-        limit, low_pass = self.limit, self.low_pass_px
+        limit, low_pass, odd = self.limit, self.low_pass_px, self.median in range(1, MOST_MEDIAN + 1, 2)
         for what, value, well, allowed in (
             ("limit", limit, limit is None or 0 < limit < math.inf, "a number above 0"),
-            ("median", self.median, self.median in range(1, MOST_MEDIAN + 1, 2), f"an odd number from 1 to {MOST_MEDIAN}"),
+            ("median", self.median, odd, f"an odd number from 1 to {MOST_MEDIAN}"),
             ("low-pass", low_pass, 0 <= low_pass <= extent, f"0 to {extent} px, the extent of the grid"),
             ("deconvolution", self.deconvolution, 0 <= self.deconvolution <= MOST_STEPS, f"0 to {MOST_STEPS} steps"),
         ):  # fmt: skip
