@@ -54,6 +54,9 @@ class Feed:
 
     def another_reference(self) -> Reference | None:
         """Have a reference taken from the next frames, and wait for it."""
+        if self._held is not None:
+            self._ledger.add(skipped=self._held.n)
+            self._held = None
         self._grabber.take_reference()
         return self.next_reference()
 

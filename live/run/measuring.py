@@ -77,7 +77,9 @@ class Measuring:
         yield_to_others(MEASURE)
         try:
             prepared = ReferenceStep(self._setting, self._books, self._feed).take()
-            if prepared is not None:
+            if prepared is None:
+                self._feed.let_pass()
+            else:
                 self._measure(*prepared)
         except PhasedicError as error:
             self._refused = error
