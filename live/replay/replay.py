@@ -63,6 +63,8 @@ def replay(request: ReplayRequest, screen: Screen, stopping: threading.Event) ->
     with Session.open(path) as session:
         if session.recovered:
             screen.say(f"note: {session.recovered}")
+        if session.mode.every > 1:
+            screen.say(f"note: one frame in {session.mode.every} was recorded; measured as a slower camera")
         overrides = {"camera.address": f"session:{path}", "load.address": f"session:{path}"}
         config = session_config(session, request, overrides, path)
         material = session_material(session, request, config, path)

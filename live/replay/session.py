@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,11 @@ def _beside(section: Mapping[str, Any], keys: Iterable[str], path: Path) -> dict
 
 
 def session_material(session: Session, request: ReplayRequest, config: Config, path: Path) -> Material:
+    if request.as_measured and session.mode.every > 1:
+        raise ConfigError(
+            f"{path} holds only one frame in {session.mode.every}, not the bursts that were measured; replay it"
+            " without --as-measured"
+        )
     if request.as_measured and request.reference is not None:
         raise ConfigError(
             "--as-measured takes the references of the run; leave --reference out, or --as-measured"
@@ -85,4 +91,7 @@ def _as_measured(stored: Store, events: Iterable[Event]) -> Iterator[Work]:
         if renewed and not event.data.get("automatic"):  # the pipeline does those again by itself
             yield NewReference(stored.burst(event.data))
         elif event.kind is EventKind.MEASURED:
-            yield stored.burst(event.data)
+            burst = stored.burst(event.data)
+            # Sessions of older programs do not say it; then it is what the burst itself knows.
+            lost = event.data.get("lost")
+            yield replace(burst, lost=lost) if isinstance(lost, int) else burst

@@ -127,6 +127,6 @@ class Measuring:
 
 
 def _measured(burst: Burst) -> Event:
-    data = {"first": burst.first_index, "last": burst.last_index, "n": burst.n}
+    data = {"first": burst.first_index, "last": burst.last_index, "n": burst.n, "lost": burst.lost}
     text = f"frames {burst.first_index} to {burst.last_index}"
     return Event(burst.t, EventKind.MEASURED, "measurement", text, "info", data)
