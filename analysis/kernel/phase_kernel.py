@@ -12,10 +12,10 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.compiled.forked import THREADS
 from analysis.field import Motion, StrainField, ZoiGrid
 from analysis.follow.renewal import taken
 from analysis.kernel.attempt import Attempt
-from analysis.kernel.forked import THREADS
 from analysis.kernel.images import as_image, as_recorded, clipped_pixels
 from analysis.kernel.noise import Noise, as_model
 from analysis.kernel.reference import Reference
