@@ -13,6 +13,7 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, cast
 
 from acquire.errors import ConfigError, DataError
 from acquire.events import EventKind
@@ -116,6 +117,7 @@ def _run(
             correct=correct,
             gauges=gauges,
             renew_at=config.measure.renew_at,
+            strain=cast(Any, config.measure.strain),
             on_event=books.journal,
             timer=time.perf_counter,
         ):

@@ -38,6 +38,7 @@ def session_config(session: Session, request: ReplayRequest, extra: Mapping[str,
     """The configuration in force when the session was recorded, overridden by file and command line."""
     stored = {k: v for k, v in session.config.items() if k not in ("output", "record")}
     stored["metadata"] = dict(session.metadata)
+    stored["measure"] = {"strain": "small", **stored.get("measure", {})}  # of those that could not choose
     for section, keys in (("measure", ("mask",)), ("camera", ("dark", "flat"))):
         stored[section] = _beside(stored.get(section, {}), keys, path)
     file = {} if request.config_file is None else settings_in(request.config_file)

@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind
@@ -101,6 +101,7 @@ class Measuring:
             correct=self._setting.correct,
             gauges=self._setting.gauges,
             renew_at=self._setting.config.measure.renew_at,
+            strain=cast(Any, self._setting.config.measure.strain),
             on_event=journal.record,
             timer=time.perf_counter,
         ):
