@@ -73,7 +73,7 @@ class Burst:
     first_index, last_index : int
         Sequence numbers of the first and last frame averaged.
     lost : int
-        Frames lost or damaged since the end of the burst before, and left out of this one.
+        Frames lost or damaged since the end of the burst before.
     clock : "device" | "host" | "nominal"
     motion_px : float, px
         Largest motion of any part of the picture during the burst, estimated; NaN when unknown.

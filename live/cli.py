@@ -10,16 +10,32 @@ import sys
 from collections.abc import Sequence
 
 from acquire.errors import PhasedicError
+from acquire.printable import printable
 from live.commands.arguments import Command, parse
+from live.unhurried import unhurried_streams
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
+    _replace_closed_streams()
     command, arguments = parse(sys.argv[1:] if argv is None else argv)
-    _set_up_logging(arguments)
-    code = _outcome(command, arguments)
+    with unhurried_streams():
+        _set_up_logging(arguments)
+        code = _outcome(command, arguments)
     _let_go_of_lost_streams()
     return code
+
+
+def _replace_closed_streams() -> None:
+    """Let a stream that was closed before we began lead nowhere, so that no file of ours gets its number."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number: this one
+        if getattr(sys, name) is None:
+            stream = os.fdopen(number, "w" if number else "r", encoding="utf-8", closefd=False)
+            setattr(sys, name, stream)
 
 
 def _let_go_of_lost_streams() -> None:
@@ -34,15 +50,19 @@ def _let_go_of_lost_streams() -> None:
 
 def _set_up_logging(arguments: argparse.Namespace) -> None:
     verbose = getattr(arguments, "verbose", False)
-    logging.basicConfig(
-        level=logging.DEBUG if verbose else logging.WARNING,
-        format="%(levelname)s %(message)s"
-        if not verbose
-        else "%(asctime)s %(levelname)s %(name)s: %(message)s",
-        stream=sys.stderr,
-    )
+    handler = logging.StreamHandler(sys.stderr)
+    long = "%(asctime)s %(levelname)s %(name)s: %(message)s"
+    handler.setFormatter(_Harmless(long if verbose else "%(levelname)s %(message)s"))
+    logging.basicConfig(level=logging.DEBUG if verbose else logging.WARNING, handlers=[handler])
     for name in ("acquire", "analysis", "live", "hw_mocks"):
         logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.INFO)
+
+
+class _Harmless(logging.Formatter):
+    """Messages may hold words out of a file or a device."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return printable(super().format(record))
 
 
 def _outcome(command: Command, arguments: argparse.Namespace) -> int:
@@ -50,7 +70,7 @@ def _outcome(command: Command, arguments: argparse.Namespace) -> int:
     try:
         return command(arguments)
     except PhasedicError as error:
-        print(f"phasedic: {error}", file=sys.stderr)
+        print(f"phasedic: {printable(error)}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
         print("phasedic: interrupted", file=sys.stderr)

@@ -55,8 +55,8 @@ def compile_loops() -> None:
 class BurstAccumulator:
     """Takes frames one by one and gives a burst after every n consecutive, undamaged ones.
 
-    A gap in the sequence or a damaged frame starts the burst anew. Whatever was left out is
-    counted in ``Burst.lost`` of the next burst.
+    A gap in the sequence or a damaged frame starts the burst anew. What was lost or damaged is
+    counted in ``Burst.lost`` of the next burst; whole frames that were left out are not.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class BurstAccumulator:
         self._lost += frame.lost_before
         if frame.damaged or frame.t < self._not_before:
             self._start_anew()
-            self._lost += 1
+            self._lost += frame.damaged
             return None
         if self.length == 1:
             return self._alone(frame)
@@ -128,7 +128,6 @@ class BurstAccumulator:
         return bool(self._times) and (frame.lost_before > 0 or frame.index != self._last + 1)
 
     def _start_anew(self) -> None:
-        self._lost += len(self._times)
         self._times, self._sums = [], None
 
     def _alone(self, frame: Frame) -> Burst:
@@ -245,7 +244,7 @@ def average_bursts(frames: Iterable[Frame], n: int, *, not_before: float = -math
     n : int
         Frames in a burst.
     not_before : float, s
-        Earlier frames are left out (and counted).
+        Earlier frames are left out.
 
     Raises
     ------

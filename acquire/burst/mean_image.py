@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
+from acquire.files import read_picture, write_picture
 
 Image = NDArray[np.float32]
 
@@ -23,17 +23,11 @@ def save_mean(mean: Image, path: Path) -> None:
     DataError
         It cannot be written.
     """
-    cv2 = load_cv2()
     if path.suffix.lower() not in (".tif", ".tiff"):
         raise ConfigError(f"{path}: dark and flat frames are kept as TIFF; choose a name that ends in .tif")
     if path.exists():
         raise ConfigError(f"{path} exists, and nothing is overwritten; choose another name")
-    try:
-        written = cv2.imwrite(str(path), mean.astype(np.float32))
-    except cv2.error:
-        written = False
-    if not written:
-        raise DataError(f"{path}: cannot be written; look at the folder and the disk")
+    write_picture(path, mean.astype(np.float32))
 
 
 def load_mean(path: str | None) -> Image | None:
@@ -46,13 +40,10 @@ def load_mean(path: str | None) -> Image | None:
     """
     if path is None:
         return None
-    cv2 = load_cv2()
-    if not Path(path).is_file():
+    file = Path(path)
+    if not file.exists():
         raise DataError(f"{path}: there is no such dark or flat frame; take one with phasedic average")
-    try:
-        image = cv2.imread(path, cv2.IMREAD_UNCHANGED)
-    except cv2.error:  # a header that asks for more than the limit
-        image = None
-    if image is None or image.ndim != 2 or not np.isfinite(image).all():
+    image = read_picture(file)
+    if image.ndim != 2 or not np.isfinite(image).all():
         raise DataError(f"{path}: is not a grey TIFF; take the frame anew with phasedic average")
     return np.asarray(image, np.float32)

@@ -8,7 +8,7 @@ from acquire.camera.base import CameraBase
 from acquire.camera.contract import Camera
 from acquire.camera.cropped import CroppedCamera
 from acquire.camera.guards import FailureGuard, RepeatGuard, missing_between
-from acquire.camera.opening import CAMERAS, open_camera
+from acquire.camera.opening import CAMERAS, open_camera, with_scheme
 
 __all__ = [
     "CAMERAS",
@@ -19,4 +19,5 @@ __all__ = [
     "RepeatGuard",
     "missing_between",
     "open_camera",
+    "with_scheme",
 ]

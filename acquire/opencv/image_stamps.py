@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from acquire.errors import DataError
+from acquire.files import read_bytes
 
 
 def read_stamps(path: Path, images: Sequence[Path]) -> list[float]:
@@ -43,8 +44,8 @@ def read_stamps(path: Path, images: Sequence[Path]) -> list[float]:
 
 def _rows(path: Path) -> list[list[str]]:
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+        text = read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
         raise DataError(f"{path}: the times cannot be read: {error}") from error
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     try:

@@ -7,7 +7,6 @@ TIFF one after the other. Nobody stamped them: ``clock`` is "nominal", or times 
 from __future__ import annotations
 
 import glob
-import logging
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -18,18 +17,15 @@ from numpy.typing import NDArray
 
 from acquire.addresses import Address, Options
 from acquire.camera import CameraBase
-from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
 from acquire.events import EventSink
+from acquire.files import LOSSY, check_regular, picture_source, read_picture_page
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, to_gray
 from acquire.opencv.image_stamps import read_stamps
 from acquire.opencv.tiff_pages import count_pages
 
-log = logging.getLogger(__name__)
-
 SUFFIXES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")
-_LOSSY = (".jpg", ".jpeg")
 _DIGITS = re.compile(r"(\d+)")
 
 
@@ -45,18 +41,20 @@ def find_images(target: str) -> list[Path]:
     Raises
     ------
     DataError
-        There is none.
+        There is none, or one is no regular file.
     """
     path = Path(target).expanduser()
     if path.is_dir():
         found = [item for item in path.iterdir() if item.suffix.lower() in SUFFIXES]
-    elif path.is_file():
+    elif path.exists():
         found = [path]
     else:
         names = glob.glob(str(path), recursive=True)  # noqa: PTH207 (absolute patterns too)
-        found = [Path(name) for name in names if Path(name).is_file()]
+        found = [Path(name) for name in names if not Path(name).is_dir()]
     if not found:
         raise DataError(f"files:{target}: no image there; looked in {Path.cwd()} for {', '.join(SUFFIXES)}")
+    for item in found:
+        check_regular(item)
     return sorted(found, key=natural_key)
 
 
@@ -74,38 +72,12 @@ def read_image(path: str | Path, gray: str | None = None, page: int = 0) -> NDAr
     Raises
     ------
     DataError
-        Missing, truncated, not an image, or not of 8 or 16 bits.
+        Missing, no regular file, truncated, damaged, not an image, or not of 8 or 16 bits.
     ConfigError
         A colour picture and ``gray`` not said.
     """
     path = Path(path)
-    try:
-        with path.open("rb") as file:
-            whole = path.suffix.lower() not in _LOSSY or _ends_like_a_jpeg(file.read())
-    except OSError as error:
-        raise DataError(f"{path}: cannot be read: {error.strerror}") from error
-    picture = _decode(path, page) if whole else None
-    if picture is None:
-        raise DataError(f"{path}: not an image, or cut off; copy it again or take it out of the list")
-    return to_gray(picture, gray, str(path))
-
-
-def _ends_like_a_jpeg(content: bytes) -> bool:
-    return content.rstrip(b"\0").endswith(b"\xff\xd9")
-
-
-def _decode(path: Path, page: int) -> NDArray[Any] | None:
-    cv2 = load_cv2()
-
-    try:
-        if page == 0:
-            picture: NDArray[Any] | None = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
-            return picture
-        well, pages = cv2.imreadmulti(str(path), page, 1, flags=cv2.IMREAD_UNCHANGED)
-        return pages[0] if well and pages else None
-    except cv2.error as error:
-        log.debug("%s: %s", path, error)
-        return None
+    return to_gray(read_picture_page(path, picture_source(path), page), gray, str(path))
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,16 +132,19 @@ class ImageFiles(CameraBase):
         )
 
     def __iter__(self) -> Iterator[Frame]:
-        for index, (path, page) in enumerate(self._pictures()):
+        for index, image in enumerate(self._pictures()):
+            t = self._time(index)
+            yield Frame(image, index, t, "nominal", 0, self._bits, t)
             if self.stopped.is_set():
                 return
-            t = self._time(index)
-            yield Frame(self._read(path, page), index, t, "nominal", 0, self._bits, t)
 
-    def _pictures(self) -> Iterator[tuple[Path, int]]:
+    def _pictures(self) -> Iterator[NDArray[Any]]:
         for path in self._paths:
+            if self.stopped.is_set():
+                return
+            source = picture_source(path)
             for page in range(count_pages(path)):
-                yield path, page
+                yield self._checked(read_picture_page(path, source, page), path)
 
     def _time(self, index: int) -> float:
         if self._stamps is None:
@@ -180,8 +155,8 @@ class ImageFiles(CameraBase):
             )
         return self._stamps[index]
 
-    def _read(self, path: Path, page: int) -> NDArray[Any]:
-        image = read_image(path, self._settings.gray, page)
+    def _checked(self, picture: NDArray[Any], path: Path) -> NDArray[Any]:
+        image = to_gray(picture, self._settings.gray, str(path))
         if image.shape != self._shape or image.dtype != self._dtype:
             raise DataError(
                 f"{path} is {_size(image.shape)} {image.dtype}, but {self._paths[0]} is "
@@ -199,7 +174,7 @@ class ImageFiles(CameraBase):
             )
 
     def _warnings(self, first: NDArray[Any]) -> Iterator[str]:
-        if any(path.suffix.lower() in _LOSSY for path in self._paths):
+        if any(path.suffix.lower() in LOSSY for path in self._paths):
             yield "JPEG is lossy: its artefacts (0.6 to 1.7 GL) do not average out; TIFF or PNG measure better"
         for bits in (10, 12, 14):
             if self._settings.bits is None and first.itemsize == 2 and 2**8 <= first.max() < 2**bits:

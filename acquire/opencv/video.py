@@ -16,6 +16,7 @@ from acquire.camera import CameraBase
 from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
 from acquire.events import EventSink, device_event
+from acquire.files import check_regular, is_utf8
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, WEBCAM_WARNING, to_gray
 
@@ -26,15 +27,18 @@ class VideoFile(CameraBase):
     Raises
     ------
     DataError
-        Missing, or not a video.
+        Missing, no regular file, not a video, or with a name that OpenCV cannot take.
     """
 
     def __init__(self, address: str, path: Path, gray: str, on_event: EventSink) -> None:
         super().__init__()
         cv2 = load_cv2()
 
-        if not path.is_file():
+        if not path.exists():
             raise DataError(f"{address}: there is no file {path}")
+        check_regular(path)
+        if not is_utf8(path):
+            raise DataError(f"{path}: OpenCV opens a video by its name, which must be UTF-8; rename it")
         self._address, self._path, self._gray_plane, self._on_event = address, path, gray, on_event
         self._capture = cv2.VideoCapture(str(path), cv2.CAP_FFMPEG)
         if not self._capture.isOpened():

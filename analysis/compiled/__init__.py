@@ -1,1 +1,3 @@
-"""How loops are compiled (``loops``), and the vector instructions they say outright (``vectors``): numba."""
+"""How loops are compiled (``loops``), the vector instructions they say outright (``vectors``), and in which
+process their threads are (``forked``): numba.
+"""

@@ -9,7 +9,7 @@ from analysis.field.grid import Roi, ZoiGrid
 from analysis.field.motion import Motion
 from analysis.field.status import Status
 from analysis.field.strain_field import StrainField
-from analysis.field.tensor import StrainTensor
+from analysis.field.tensor import Measure, StrainTensor
 from analysis.field.uncertainty import PAIR_INDEX, VALUES
 from analysis.field.windows import WINDOWS, Window, profile
 
@@ -17,6 +17,7 @@ __all__ = [
     "PAIR_INDEX",
     "VALUES",
     "WINDOWS",
+    "Measure",
     "Motion",
     "Roi",
     "Status",

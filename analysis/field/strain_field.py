@@ -18,7 +18,7 @@ from analysis.field.attributes import Sigma, Value
 from analysis.field.grid import ZoiGrid
 from analysis.field.motion import Motion
 from analysis.field.status import Status
-from analysis.field.tensor import Floats, Measure, StrainTensor, half_logarithm
+from analysis.field.tensor import Floats, Measure, StrainTensor, elongations, half_logarithm
 from analysis.field.uncertainty import PAIR_INDEX, combination, fixed_sum, products, variance_of_sum
 from analysis.field.windows import Window
 
@@ -49,6 +49,8 @@ class StrainField:
         The least-squares weight, which says how far neighbouring values are correlated.
     motion : Motion, optional
         For the start in the next frame.
+    measure : "small", "engineering", "green" or "hencky"
+        What ``exx``, ``eyy``, ``exy`` and their means are; the uncertainties are those of the small strains.
     """
 
     grid: ZoiGrid
@@ -62,6 +64,7 @@ class StrainField:
     noise: float = float("nan")
     window: Window = "gaussian"
     motion: Motion | None = None
+    measure: Measure = "small"
 
     def __post_init__(self) -> None:
         for name in ("parameters", "covariance", "covariance_reference", "residual", "status",
@@ -156,6 +159,9 @@ class StrainField:
         ValueError
             Unknown name.
         """
+        if self.measure != "small" and name in ("exx", "eyy", "exy", "gamma_xy"):
+            strain = self.strain(self.measure)
+            return 2 * strain.exy if name == "gamma_xy" else np.asarray(getattr(strain, name))
         half = len(self.parameters) // 2
         terms = [(c, self.parameters[i % 3 + half * (i // 3)]) for i, c in combination(name).items()]
         if len(terms) == 1 and terms[0][0] == 1:
@@ -206,7 +212,7 @@ class StrainField:
         return value, float(np.sqrt(max(variance, 0.0)) / count)
 
     def strain(self, measure: Measure = "small") -> StrainTensor:
-        """The strain tensor of a measure: "small", "green" (Green-Lagrange) or "hencky".
+        """The strain of a measure: "small", "engineering" (elongations), "green" (Green-Lagrange) or "hencky".
 
         Raises
         ------
@@ -214,15 +220,15 @@ class StrainField:
             Unknown measure.
         """
         if measure == "small":
-            return StrainTensor(measure, self.exx, self.eyy, self.exy)
-        if measure not in ("green", "hencky"):
-            raise ValueError(f"unknown strain measure {measure!r}; known: small, green, hencky")
+            return StrainTensor(measure, self.du_dx, self.dv_dy, (self.du_dy + self.dv_dx) / 2)
+        if measure not in ("engineering", "green", "hencky"):
+            raise ValueError(f"unknown strain measure {measure!r}; known: small, engineering, green, hencky")
         cxx = (1 + self.du_dx) ** 2 + self.dv_dx**2
         cyy = self.du_dy**2 + (1 + self.dv_dy) ** 2
         cxy = (1 + self.du_dx) * self.du_dy + self.dv_dx * (1 + self.dv_dy)
         if measure == "green":
             return StrainTensor(measure, (cxx - 1) / 2, (cyy - 1) / 2, cxy / 2)
-        return half_logarithm(cxx, cyy, cxy)
+        return elongations(cxx, cyy, cxy) if measure == "engineering" else half_logarithm(cxx, cyy, cxy)
 
     @property
     def rotation(self) -> Floats:

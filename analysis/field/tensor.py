@@ -1,4 +1,4 @@
-"""Strain tensors on the grid: small, Green-Lagrange, Hencky; principal values."""
+"""Strain on the grid: small, engineering, Green-Lagrange, Hencky; principal values."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-Measure = Literal["small", "green", "hencky"]
+Measure = Literal["small", "engineering", "green", "hencky"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StrainTensor:
-    """Components of a strain tensor on the grid, each (R, C), dimensionless; exy is the tensor one."""
+    """Components of strain on the grid, each (R, C), dimensionless; exy is half the shear angle or its like."""
 
     measure: Measure
     exx: Floats
@@ -28,6 +28,17 @@ class StrainTensor:
         radius = np.hypot((self.exx - self.eyy) / 2, self.exy)
         angle = 0.5 * np.arctan2(2 * self.exy, self.exx - self.eyy)
         return middle + radius, middle - radius, angle
+
+
+def elongations(cxx: Floats, cyy: Floats, cxy: Floats) -> StrainTensor:
+    """What an extensometer reads, from C = F^T F: the elongation of lines that lay along x and y, over their length.
+
+    exy is half of the change of the right angle between the two. No rotation changes any of it.
+    """
+    with np.errstate(invalid="ignore"):
+        along_x, along_y = np.sqrt(cxx), np.sqrt(cyy)
+        shear = np.arcsin(cxy / (along_x * along_y))
+    return StrainTensor("engineering", along_x - 1, along_y - 1, shear / 2)
 
 
 def half_logarithm(cxx: Floats, cyy: Floats, cxy: Floats) -> StrainTensor:

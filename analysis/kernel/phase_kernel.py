@@ -12,6 +12,7 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.compiled.forked import THREADS
 from analysis.field import Motion, StrainField, ZoiGrid
 from analysis.follow.renewal import taken
 from analysis.kernel.attempt import Attempt
@@ -29,7 +30,8 @@ class PhaseKernel:
     """Measures displacement and strain of every ZOI of a grid against one reference.
 
     For one thread at a time, whatever the number of kernels: their loops use all cores, and where
-    numba finds neither OpenMP nor TBB it ends a program in which two of them run at once.
+    numba finds neither OpenMP nor TBB it ends a program in which two of them run at once. A process
+    forked off after a kernel was made cannot measure (RuntimeError): start processes by "spawn".
 
     Parameters
     ----------
@@ -65,6 +67,7 @@ class PhaseKernel:
         noise: Noise | None = None,
         clipped: NDArray[np.bool_] | None = None,
     ) -> None:
+        THREADS.use()
         image = as_image(reference, "the reference")
         self.reference = Reference.first(image, grid, settings or KernelSettings(), noise, clipped)
 
@@ -149,6 +152,7 @@ class PhaseKernel:
         ValueError
             The image has another size than the reference, or the start another grid.
         """
+        THREADS.use()
         reference = self.reference
         image, shape = as_recorded(deformed, "the deformed image"), reference.prepared.shape
         if image.shape != shape:

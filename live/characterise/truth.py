@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from acquire.cv2_loader import load_cv2
-from acquire.errors import DataError
+from acquire.opencv import read_image
 from analysis import KernelSettings, PhaseKernel
 from analysis.field import Roi, StrainField, ZoiGrid
 from analysis.paper_estimator import PaperEstimator, PaperField, PaperSettings
@@ -227,16 +226,9 @@ def grey_picture(path: Path) -> Image:
     Raises
     ------
     DataError
-        Not there, or not a picture.
+        Not there, not a picture, or damaged.
     """
-    cv2 = load_cv2()
-
-    picture = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_ANYDEPTH)
-    if picture is None:
-        raise DataError(
-            f"{path} is not there or not a picture that can be read; give a TIFF, PNG or BMP file"
-        )
-    return np.asarray(picture)
+    return read_image(path, gray="luma")
 
 
 LENGTH_OF_C = 1 / math.sqrt(-math.log(0.9))

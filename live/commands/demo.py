@@ -83,6 +83,10 @@ class Instance:
     sigma: tuple[float, float, float]
 
 
+def _mean(values: Array) -> float:
+    return float(values[np.isfinite(values)].mean()) if np.isfinite(values).any() else math.nan
+
+
 class Kept(Consumer):
     """Collects what the comparison needs."""
 
@@ -93,14 +97,15 @@ class Kept(Consumer):
         self.measurements: list[Instance] = []
 
     def measurement(self, measurement: Measurement) -> None:
-        """Keep means, sigmas and which ZOIs they are over."""
+        """Keep means of the small strains, which the truth is, sigmas and which ZOIs they are over."""
         m, i = measurement, measurement.instant
+        small = m.field.strain("small")
         times = m.t + np.linspace(-0.5, 0.5, m.burst.n) * m.burst.duration
         self.measurements.append(
             Instance(
                 times,
                 np.isfinite(m.field.exx),
-                (i.exx, i.eyy, i.exy),
+                (_mean(small.exx), _mean(small.eyy), _mean(small.exy)),
                 (i.sigma_exx, i.sigma_eyy, i.sigma_exy),
             )
         )

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from live.tell import say
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """``phasedic devices`` has none."""
@@ -15,10 +17,10 @@ def command(arguments: argparse.Namespace) -> int:
     from acquire.v4l2 import list_cameras
 
     cameras, ports = list_cameras(), list_serial_ports()
-    print("cameras:" if cameras else "cameras: none found (V4L2 devices are /dev/video*)")
+    say("cameras:" if cameras else "cameras: none found (V4L2 devices are /dev/video*)")
     for camera in cameras:
-        print(camera.text())
-    print("serial ports:" if ports else "serial ports: none found")
+        say(camera.text())
+    say("serial ports:" if ports else "serial ports: none found")
     for port in ports:
-        print(port.text())
+        say(port.text())
     return 0

@@ -6,12 +6,12 @@ NOT_READY = 6
 
 EXIT_CODES = """exit codes:
   0 well   1 a defect of phasedic   2 usage or configuration   3 device   4 file or data
-  5 finished with loss   6 not ready (checks)   130 interrupted, everything closed cleanly
+  5 finished with loss, or nothing measured   6 not ready (checks)   130 interrupted, everything closed cleanly
 """
 
 EXIT_WORDS = {
     1: "a defect of phasedic, see the log",
     3: "the camera was lost before the end",
-    5: "finished with loss; the ledger and the events tell what is missing",
+    5: "finished with loss or nothing measured; the summary, the ledger and the events tell what is missing",
     130: "interrupted; everything was closed cleanly",
 }

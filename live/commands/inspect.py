@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquire.errors import ConfigError, DataError
+from live.tell import say
 
 if TYPE_CHECKING:
     from analysis.field import ZoiGrid
@@ -32,13 +33,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic inspect SESSION --zoi R,C --frame N``."""
     from acquire.session import Session
-    from live.characterise.outcome import DPI, figure
+    from live.characterise.outcome import figure
     from live.characterise.spectrum import draw_spectrum, zoi_spectrum
+    from live.maps import save
 
     row, column = _place(arguments.zoi)
     out = Path(arguments.out)
-    if out.exists():
-        raise ConfigError(f"{out} exists; nothing is overwritten: give another --out")
     drawn = figure(15, 4)
     with Session.open(arguments.session) as session:
         grid = _grid_of(session, arguments)
@@ -53,9 +53,9 @@ def command(arguments: argparse.Namespace) -> int:
     where = f"ZOI {row},{column} ({grid.size} px at x {left}, y {top})"
     title = f"{Path(arguments.session).name}: {where}, frame {arguments.frame}"
     draw_spectrum(drawn, spectrum, title)
-    drawn.savefig(out, dpi=DPI)
-    print(f"{title}\nu = {spectrum.u:.4f} px, v = {spectrum.v:.4f} px from {spectrum.used.sum()} frequencies")
-    print(f"figure: {out}")
+    save(drawn, out)
+    say(f"{title}\nu = {spectrum.u:.4f} px, v = {spectrum.v:.4f} px from {spectrum.used.sum()} frequencies")
+    say(f"figure: {out}")
     return 0
 
 
@@ -75,13 +75,13 @@ def _picture(session: Any, number: int) -> Any:
 def _grid_of(session: Any, arguments: argparse.Namespace) -> ZoiGrid:
     """The grid of the session's own configuration, or with the size and step asked for."""
     from analysis.field import Roi, ZoiGrid
-    from live.setup import whole_picture
+    from live.setup import from_dict, whole_picture
 
-    measure = dict(session.config.get("measure", {}))
+    measure = from_dict({"measure": session.config.get("measure", {})}, {}, str(session.path)).measure
     height, width = _picture(session, 0).shape
-    size = arguments.size or int(measure.get("zoi", 64))
-    step = arguments.step or int(measure.get("step", 16))
-    roi = measure.get("roi") or whole_picture(width, height, size)
+    size = measure.zoi if arguments.size is None else arguments.size
+    step = measure.step if arguments.step is None else arguments.step
+    roi = measure.roi or whole_picture(width, height, size)
     try:
         return ZoiGrid.cover(Roi(*roi), size, step)
     except ValueError as error:

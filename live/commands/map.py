@@ -5,16 +5,16 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from acquire.errors import ConfigError
 from acquire.opencv import read_image
-from live.maps import Picture, draw
+from live.maps import Picture, draw, save
 from live.results import Strain
+from live.tell import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic map``."""
     parser.add_argument("results", help="strain.h5")
-    parser.add_argument("png", help="the picture to write")
+    parser.add_argument("png", help="the picture to write (or an SVG or PDF)")
     parser.add_argument("--field", default="eyy", help="u, v, exx, eyy, exy, sigma_eyy, residual, status ...")
     parser.add_argument("--row", type=int, default=-1, help="which measured instant (default: the last)")
     parser.add_argument("--over", metavar="FILE", help="image to draw over")
@@ -32,8 +32,6 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic map``."""
     background = None if arguments.over is None else read_image(Path(arguments.over), gray="luma")
     path = Path(arguments.png)
-    if path.exists():
-        raise ConfigError(f"{path} exists and is not overwritten; choose another name")
     with Strain.open(Path(arguments.results)) as strain:
         picture = Picture(
             arguments.field,
@@ -44,7 +42,6 @@ def command(arguments: argparse.Namespace) -> int:
             arguments.low_pass,
             arguments.deconvolve,
         )
-        figure = draw(strain, picture, background)
-        figure.savefig(path, dpi=110)
-    print(path)
+        save(draw(strain, picture, background), path)
+    say(str(path))
     return 0

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
+from live.tell import say as told
+
 Say = Callable[[str], None]
 
 
@@ -14,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FILE", help="the copy (default: beside it)")
 
 
-def command(arguments: argparse.Namespace, say: Say = print) -> int:
+def command(arguments: argparse.Namespace, say: Say = told) -> int:
     """``phasedic recover SESSION [--out FILE]``; 5 when something could not be read."""
     from acquire.session import recover as copy
 

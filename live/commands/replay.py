@@ -6,6 +6,7 @@ import argparse
 import threading
 from pathlib import Path
 
+from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, overrides
 from live.commands.run import signals
 from live.tell import Screen, file_lines, summary_lines
@@ -38,9 +39,8 @@ def command(arguments: argparse.Namespace) -> int:
     with signals(stopping.set, screen.say):
         done = replay(request, screen, stopping)
     screen.say()
-    for line in [
-        *summary_lines(done.books.history, done.books.loads, done.config.specimen),
-        *file_lines(done.folder),
-    ]:
+    for line in [*summary_lines(done.books, done.config.specimen), *file_lines(done.folder)]:
         screen.say(line)
+    if done.exit_code in EXIT_WORDS:
+        screen.say(f"exit code {done.exit_code}: {EXIT_WORDS[done.exit_code]}")
     return done.exit_code

@@ -80,7 +80,7 @@ def conclude(outcome: Outcome, screen: Screen) -> None:
     """Print the summary, the ledger, the losses and the files."""
     screen.say()
     books = outcome.books
-    for line in summary_lines(books.history, books.loads, outcome.config.specimen):
+    for line in summary_lines(books, outcome.config.specimen):
         screen.say(line)
     screen.say(books.ledger.line())
     for report in outcome.outputs.reports:

@@ -21,6 +21,7 @@ _SAME_S = 1e-6  # times that were typed are rounded
 QUIET_S = 2.0  # what takes no longer shows no progress
 
 _MEASURES = {
+    "engineering": "engineering strain: elongation over length of lines along x and y; exy half the shear angle",
     "small": "small strain: exx = du/dx, eyy = dv/dy, exy = (du/dy + dv/dx)/2",
     "green": "Green-Lagrange strain: E = (F'F - 1)/2",
     "hencky": "Hencky (logarithmic) strain: ln(F'F)/2",

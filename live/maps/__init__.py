@@ -4,7 +4,7 @@ PNG.
 
 from live.maps.colours import MICROSTRAIN, AutoRange, Unit, colour, nice_above, number, ramp, ticks, unit_for
 from live.maps.display_filter import PAPER_LOW_PASS, for_display
-from live.maps.map import STATUS_COLOURS, Picture, draw
+from live.maps.map import STATUS_COLOURS, Picture, draw, save
 
 __all__ = [
     "MICROSTRAIN",
@@ -19,6 +19,7 @@ __all__ = [
     "nice_above",
     "number",
     "ramp",
+    "save",
     "ticks",
     "unit_for",
 ]

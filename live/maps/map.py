@@ -7,14 +7,16 @@ Needs matplotlib (``pip install phasedic[plots]``).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DataError
 from analysis.evaluate import deconvolved, effect
 from analysis.field import Status, ZoiGrid
 from live.maps.colours import diverging_table, unit_for
@@ -22,6 +24,8 @@ from live.maps.display_filter import for_display
 from live.results import Strain
 
 DISPLACEMENTS = ("u", "v")
+MOST_MEDIAN, MOST_STEPS = 51, 100
+FORMATS = (".png", ".svg", ".pdf")
 STATUS_COLOURS = (
     "#2a9d4b", "#00000000", "#7f7f7f", "#f2c80f", "#9467bd", "#d62728", "#ff7f0e", "#1f77b4",
     "#8c564b", "#e377c2", "#17becf", "#bcbd22",
@@ -58,6 +62,19 @@ class Picture:
     low_pass_px: float = 0.0
     deconvolution: int = 0
 
+    def check(self, grid: ZoiGrid) -> None:
+        """Raises ConfigError where a number is impossible, or beyond what makes sense on ``grid``."""
+        extent = max(grid.shape) * grid.step
+        limit, low_pass, odd = self.limit, self.low_pass_px, self.median in range(1, MOST_MEDIAN + 1, 2)
+        for what, value, well, allowed in (
+            ("limit", limit, limit is None or 0 < limit < math.inf, "a number above 0"),
+            ("median", self.median, odd, f"an odd number from 1 to {MOST_MEDIAN}"),
+            ("low-pass", low_pass, 0 <= low_pass <= extent, f"0 to {extent} px, the extent of the grid"),
+            ("deconvolution", self.deconvolution, 0 <= self.deconvolution <= MOST_STEPS, f"0 to {MOST_STEPS} steps"),
+        ):  # fmt: skip
+            if not well:
+                raise ConfigError(f"a {what} of {value} is not possible; allowed: {allowed}")
+
     def treatment(self, grid: ZoiGrid) -> str:
         """What was done to the map before it was drawn, in words; "" for nothing."""
         words = []
@@ -90,15 +107,17 @@ def draw(strain: Strain, picture: Picture, background: NDArray[Any] | None) -> A
     DataError
         There is no such map or row.
     ConfigError
-        matplotlib is not installed.
+        matplotlib is not installed, or ``picture`` asks for what is impossible.
     """
     plt = pyplot()
+    picture.check(strain.grid)
     values = _treated(strain, picture)
     x, y, step = strain.grid.x, strain.grid.y, strain.grid.step
     extent = (x[0] - step / 2, x[-1] + step / 2, y[-1] + step / 2, y[0] - step / 2)
     shape = background.shape if background is not None else (int(extent[2]) + 1, int(extent[1]) + 1)
     height = 7.0
-    figure, axes = plt.subplots(figsize=(height * shape[1] / shape[0] + 1.9, height), layout="constrained")
+    wide = min(max(shape[1] / shape[0], 0.1), 10)
+    figure, axes = plt.subplots(figsize=(height * wide + 1.9, height), layout="constrained")
     if background is not None:
         axes.imshow(background, cmap="gray", alpha=0.9)
     axes.set(xlim=(-0.5, shape[1] - 0.5), ylim=(shape[0] - 0.5, -0.5), xlabel="x, px", ylabel="y, px")
@@ -109,8 +128,31 @@ def draw(strain: Strain, picture: Picture, background: NDArray[Any] | None) -> A
     time = strain.time_s[picture.row]
     title = picture.title or f"{picture.field}, {time:.2f} s, ZOI {strain.grid.size} px"
     treatment = picture.treatment(strain.grid)
-    axes.set_title(f"{title}\n({treatment})" if treatment else title, fontsize=10)
+    axes.set_title(f"{title}\n({treatment})" if treatment else title, fontsize=10, parse_math=False)
     return figure
+
+
+def save(figure: Any, path: Path) -> None:
+    """Write the figure to a new file, in the format that its name ends in.
+
+    Raises
+    ------
+    ConfigError
+        The file exists, or has another ending than ``FORMATS``.
+    DataError
+        It cannot be written.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise ConfigError(f"{path}: choose a name that ends in {', '.join(FORMATS)}")
+    try:
+        with path.open("xb") as file:
+            figure.savefig(file, dpi=110, format=path.suffix.lower().lstrip("."))
+    except FileExistsError:
+        raise ConfigError(f"{path} exists and is not overwritten; choose another name") from None
+    except OSError as error:
+        raise DataError(
+            f"{path}: cannot be written: {error.strerror}; look at the folder and the disk"
+        ) from None
 
 
 def _treated(strain: Strain, picture: Picture) -> NDArray[np.float64]:

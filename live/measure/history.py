@@ -21,6 +21,11 @@ class History:
         """Keep ``instant``."""
         self.instants.append(instant)
 
+    @property
+    def told_something(self) -> bool:
+        """Whether any ZOI had a value at any instant."""
+        return any(instant.n_valid for instant in self.instants)
+
     def column(self, name: str) -> Array:
         """One quantity over time, (N,) float64."""
         return np.array([getattr(instant, name) for instant in self.instants], np.float64)

@@ -7,7 +7,7 @@ threads, files, devices or clocks, so a replay of the same bursts is bit-equal t
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from acquire.events import EventSink, ignore_event
@@ -15,11 +15,13 @@ from acquire.frame import Burst
 from acquire.load_cell import LoadLog
 from live.measure.measurement import Measurement
 from live.measure.preparation import Correction, unchanged
+from live.measure.strain_guard import StrainGuard
 from live.measure.tracker import Tracker
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
     from analysis.evaluate import Gauge
+    from analysis.field import Measure
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +43,7 @@ def measure(
     correct: Correction = unchanged,
     gauges: Sequence[Gauge] = (),
     renew_at: float = 1.0,
+    strain: Measure = "small",
     on_event: EventSink = ignore_event,
     timer: Timer = lambda: 0.0,
 ) -> Iterator[Measurement]:
@@ -62,6 +65,8 @@ def measure(
     renew_at : float
         The reference is renewed when more than this share of the ZOIs is lost from one burst to
         the next, and renewing finds most of them again; 1 for never.
+    strain : "small", "engineering", "green" or "hencky"
+        The measure of strain of the fields and means.
     on_event : callable taking an Event
         Told when the reference is renewed.
     timer : callable
@@ -72,14 +77,15 @@ def measure(
     Measurement
         One a burst, in order.
     """
-    tracker = Tracker(kernel, noise_GL, renew_at, on_event)
+    tracker, guard = Tracker(kernel, noise_GL, renew_at, on_event), StrainGuard(strain, on_event)
     number = 0
     for item in bursts:
         if isinstance(item, NewReference):
             tracker.renew_on_demand(correct(item.burst))
             continue
         began = timer()
-        field = tracker.measure(correct(item))
+        field = replace(tracker.measure(correct(item)), measure=strain)
         took = timer() - began
+        guard.look(field, item.t)
         yield Measurement.of(number, item, field, loads.force_at(item.t), took, gauges)
         number += 1

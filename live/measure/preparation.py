@@ -11,10 +11,12 @@ import numpy as np
 
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.frame import Burst
+from analysis.field import Status
 
 if TYPE_CHECKING:
     from analysis import KernelSettings, PhaseKernel, ZoiGrid
 log = logging.getLogger(__name__)
+LEAST_FOUND = 0.2  # a background of noise may be the larger part of the picture
 
 
 def usable(error: ValueError, what: str) -> PhasedicError:
@@ -80,9 +82,12 @@ def motion_between(
 ) -> float:
     """How far the picture moved from one half of the reference burst to the other, px.
 
-    The median over the ZOIs of the displacement between the two; NaN where none can be measured.
+    The median over the ZOIs of the displacement between the two; NaN where it cannot be told, since
+    no more than ``LEAST_FOUND`` of the ZOIs with a pattern are found in both.
     """
-    a = kernel.measure(correct(first).mean)
-    b = kernel.measure(correct(second).mean, start=a)
+    first, second = correct(first), correct(second)
+    a = kernel.measure(first.mean, clipped=first.clipped)
+    b = kernel.measure(second.mean, start=a, clipped=second.clipped)
     moved = np.hypot(b.u - a.u, b.v - a.v)
-    return float(np.median(moved[np.isfinite(moved)])) if np.isfinite(moved).any() else math.nan
+    found, wanted = np.isfinite(moved), ~np.isin(a.status, (Status.NOT_MEASURED, Status.NO_PATTERN))
+    return float(np.median(moved[found])) if found.sum() > LEAST_FOUND * wanted.sum() else math.nan

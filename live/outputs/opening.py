@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from acquire.clock import ClockPair
 from acquire.events import EventKind, Level
@@ -61,6 +61,7 @@ def make_outputs(about: About, books: Books, screen: Screen, more: Sequence[Cons
         dict(config.metadata),
         versions(),
         about.camera,
+        strain_measure=cast(Any, config.measure.strain),
         area_m2=config.specimen.area_m2,
         gauges={name: describe(table) for name, table in config.gauges.items()},
     )

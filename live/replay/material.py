@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.clock import ClockPair
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DataError
 from acquire.events import Event
 from acquire.frame import Burst, CameraInfo
 from acquire.load_cell import LoadLog
@@ -29,7 +29,7 @@ class ReplayRequest:
     start_s, end_s : float or None, s
         Part of the session, in seconds since its start.
     reference : str or None
-        An image file as the reference, where the source is a folder of pictures.
+        An image file as the reference, in place of the first pictures.
     config_file : Path or None
     overrides : mapping of "section.key" to value
     """
@@ -43,26 +43,58 @@ class ReplayRequest:
     overrides: Mapping[str, Any]
 
 
+Work = Burst | NewReference
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
     """A source taken apart: what the reference is, and the bursts to measure."""
 
     camera: CameraInfo
     reference: Burst
-    bursts: Iterable[Burst | NewReference]
+    bursts: Iterable[Work]
     loads: LoadLog
     start: ClockPair
     events: tuple[Event, ...] = ()
     samples: tuple[LoadSample, ...] = ()
 
 
-def window_of(request: ReplayRequest, origin: float) -> tuple[float, float]:
-    low = -math.inf if request.start_s is None else origin + request.start_s
-    high = math.inf if request.end_s is None else origin + request.end_s
-    if low >= high:
-        raise ConfigError("--from must be before --to")
-    return low, high
+def check_window(request: ReplayRequest) -> None:
+    """Raises ConfigError where --from and --to leave nothing, whatever the source."""
+    for name, value in (("from", request.start_s), ("to", request.end_s)):
+        if value is not None and not (math.isfinite(value) and value >= 0):
+            raise ConfigError(f"--{name} {value} is not possible; allowed: seconds since the start, from 0")
+    if request.start_s is not None and request.end_s is not None and request.start_s >= request.end_s:
+        raise ConfigError(f"--from {request.start_s} must be before --to {request.end_s}")
 
 
-def within(bursts: Iterable[Burst], window: tuple[float, float]) -> Iterator[Burst]:
-    return (burst for burst in bursts if window[0] <= burst.t <= window[1])
+@dataclass(frozen=True, slots=True)
+class Window:
+    """The part of a source that is measured, monotonic s; ``origin`` is its start."""
+
+    low: float
+    high: float
+    origin: float
+
+    @classmethod
+    def of(cls, request: ReplayRequest, origin: float) -> Window:
+        """As ``request`` says."""
+        low = -math.inf if request.start_s is None else origin + request.start_s
+        high = math.inf if request.end_s is None else origin + request.end_s
+        return cls(low, high, origin)
+
+    def part(self, bursts: Iterable[Work]) -> Iterator[Work]:
+        """Those within; raises DataError at the end where there was a burst, but none within."""
+        last, found = math.nan, False
+        for item in bursts:
+            if isinstance(item, NewReference):
+                yield item
+                continue
+            last = item.t
+            if self.low <= last <= self.high:
+                found = True
+                yield item
+        if not found and not math.isnan(last):
+            raise DataError(
+                f"no burst lies between --from and --to; the last one is at {last - self.origin:.3f} s"
+            )

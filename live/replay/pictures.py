@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import datetime
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
@@ -14,19 +13,19 @@ from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
-from live.replay.material import Material, ReplayRequest, window_of, within
+from live.replay.material import Material, ReplayRequest, Window
 from live.setup import Config
 
 
 def picture_material(camera: Camera, request: ReplayRequest, config: Config) -> Material:
     frames = iter(camera)
     if request.reference is not None:
-        reference = burst_of([_reference_frame(Path(request.reference), camera.info)])
+        reference = reference_from(request.reference, camera.info)
     else:
         reference = _leading_burst(frames, config.measure.reference_burst or 1, request.source)
     loads = LoadLog(config.load.max_gap_s)
     loads.close()
-    bursts = within(average_bursts(frames, config.measure.burst or 1), window_of(request, 0.0))
+    bursts = Window.of(request, 0.0).part(average_bursts(frames, config.measure.burst or 1))
     return Material(
         camera.info, reference, bursts, loads, ClockPair(0.0, datetime.datetime.now(datetime.UTC))
     )
@@ -38,16 +37,28 @@ def _leading_burst(frames: Iterator[Frame], n: int, source: str) -> Burst:
     raise DataError(f"{source}: fewer than {n} pictures for the reference; give a smaller --reference-burst")
 
 
-def _reference_frame(path: Path, camera: CameraInfo) -> Frame:
+def reference_from(path: str, camera: CameraInfo) -> Burst:
+    """A picture file as the reference of what ``camera`` gave.
+
+    Raises
+    ------
+    DataError
+        Missing, not a picture, or not of the size and bits of the pictures.
+    """
     from acquire.opencv import read_image
 
-    image = read_image(path)
+    image = read_image(path, camera.controls.get("gray"))
     if image.shape != (camera.height, camera.width):
         raise DataError(
             f"{path}: the reference has {image.shape[1]} x {image.shape[0]} px,"
             f" the pictures {camera.width} x {camera.height}; they must be the same"
         )
-    return Frame(image, 0, 0.0, "nominal", 0, camera.bits, 0.0)
+    if image.itemsize != (1 if camera.bits <= 8 else 2) or int(image.max()) >= 2**camera.bits:
+        raise DataError(
+            f"{path}: the reference has {8 * image.itemsize}-bit samples up to {image.max()}, the pictures have"
+            f" {camera.bits} bits; they must be the same"
+        )
+    return burst_of([Frame(frozen(image), 0, 0.0, "nominal", 0, camera.bits, 0.0)])
 
 
 def picture_of(burst: Burst) -> Frame:

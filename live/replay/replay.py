@@ -7,18 +7,20 @@ with the references it took, and is then bit-equal to it on the same machine.
 from __future__ import annotations
 
 import datetime
+import itertools
 import threading
 import time
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any, cast
 
-from acquire.camera import open_camera
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DataError
 from acquire.events import EventKind
 from acquire.session import Session
 from live.measure import History, measure, prepare
 from live.outputs import About, Outputs, make_outputs
-from live.replay.material import Material, ReplayRequest
+from live.replay.material import Material, ReplayRequest, Work, check_window
 from live.replay.pictures import picture_material, picture_of
 from live.replay.session import session_config, session_material, session_path
 from live.setup import (
@@ -31,6 +33,7 @@ from live.setup import (
     kinds_of,
     load_config,
     make_folder,
+    open_rig,
     read_mask,
 )
 from live.tell import Books, Journal, Ledger, Screen
@@ -55,18 +58,18 @@ def replay(request: ReplayRequest, screen: Screen, stopping: threading.Event) ->
         As for a run; also where --as-measured finds frames missing.
     """
     path = session_path(request.source)
+    check_window(request)
     if path is None:
         return _replay_pictures(request, screen, stopping)
     with Session.open(path) as session:
         if session.recovered:
             screen.say(f"note: {session.recovered}")
+        if session.mode.every > 1:
+            screen.say(f"note: one frame in {session.mode.every} was recorded; measured as a slower camera")
         overrides = {"camera.address": f"session:{path}", "load.address": f"session:{path}"}
         config = session_config(session, request, overrides, path)
         material = session_material(session, request, config, path)
         return _run(material, config, request, screen, stopping)
-
-
-# -- a session ----------------------------------------------------------------------------------
 
 
 # -- pictures -----------------------------------------------------------------------------------
@@ -77,12 +80,12 @@ def _replay_pictures(request: ReplayRequest, screen: Screen, stopping: threading
         raise ConfigError(f"{request.source}: --as-measured needs a session; pictures have none")
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
     config = replace(config, load=replace(config.load, address="none:"))
-    camera = open_camera(request.source)
+    rig = open_rig(config.camera.address, "none:", crop=config.camera.crop)
     try:
-        with camera:
+        with rig.camera as camera:
             return _run(picture_material(camera, request, config), config, request, screen, stopping)
     finally:
-        camera.close()
+        rig.close()
 
 
 # -- the run ------------------------------------------------------------------------------------
@@ -99,6 +102,7 @@ def _run(
     compile_ahead(kinds_of(camera), phase=settings.estimator == "phase", say=screen.status)
     what = f"the reference of {request.source}"
     kernel, noise_GL = prepare(material.reference, grid, settings, stated, correct, what)
+    bursts = _not_empty(material.bursts, request.source)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
     books = Books(Journal(), Ledger(), material.loads, History())
     screen.say(f"replaying {request.source} into {folder}")
@@ -106,13 +110,14 @@ def _run(
     try:
         _give_past(material, outputs)
         for m in measure(
-            material.bursts,
+            bursts,
             kernel,
             material.loads,
             noise_GL=noise_GL,
             correct=correct,
             gauges=gauges,
             renew_at=config.measure.renew_at,
+            strain=cast(Any, config.measure.strain),
             on_event=books.journal,
             timer=time.perf_counter,
         ):
@@ -123,8 +128,19 @@ def _run(
                 break
     finally:
         outputs.end()
-    code = 130 if stopping.is_set() else 5 if outputs.failed else 0
-    return Replayed(folder, books, config, code)
+    lossy = outputs.failed or not books.history.told_something
+    return Replayed(folder, books, config, 130 if stopping.is_set() else 5 if lossy else 0)
+
+
+def _not_empty(bursts: Iterable[Work], source: str) -> Iterator[Work]:
+    """The same; nothing is written where there is nothing to measure."""
+    rest = iter(bursts)
+    first = next(rest, None)
+    if first is None:
+        raise DataError(
+            f"{source}: no whole burst after the reference, nothing to measure; give a smaller --burst"
+        )
+    return itertools.chain([first], rest)
 
 
 def _give_past(material: Material, outputs: Outputs) -> None:

@@ -3,32 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from acquire.addresses import parse_address
 from acquire.burst import LIMIT_PX
+from acquire.camera import CAMERAS, with_scheme
 from acquire.clock import ClockPair
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind
-from acquire.frame import Burst
 from acquire.load_cell import LoadLog
 from acquire.session import Session
 from live.measure import NewReference
-from live.replay.material import Material, ReplayRequest, window_of, within
+from live.replay.material import Material, ReplayRequest, Window, Work
+from live.replay.pictures import reference_from
 from live.replay.store import Store, open_store
 from live.setup import Config, from_dict, settings_in
 
 
 def session_path(source: str) -> Path | None:
     """The session's path, or None where ``source`` is an address of pictures."""
-    address = parse_address(source)
+    address = parse_address(with_scheme(source))
     if address.scheme == "session":
-        return Path(address.target)
-    if address.scheme and address.scheme in ("files", "video", "sim", "opencv"):
+        return Path(address.target).expanduser()
+    if address.scheme and address.scheme in (*CAMERAS.schemes(), "sim"):
         return None
-    if Path(source).suffix.lower() in (".h5", ".hdf5") or Path(source).is_file():
-        return Path(source)
     raise DataError(
         f"{source}: no such session; give a session.h5, or pictures as 'files:folder/*.tif' or 'video:file.mp4'"
     )
@@ -38,6 +38,7 @@ def session_config(session: Session, request: ReplayRequest, extra: Mapping[str,
     """The configuration in force when the session was recorded, overridden by file and command line."""
     stored = {k: v for k, v in session.config.items() if k not in ("output", "record")}
     stored["metadata"] = dict(session.metadata)
+    stored["measure"] = {"strain": "small", **stored.get("measure", {})}  # of those that could not choose
     for section, keys in (("measure", ("mask",)), ("camera", ("dark", "flat"))):
         stored[section] = _beside(stored.get(section, {}), keys, path)
     file = {} if request.config_file is None else settings_in(request.config_file)
@@ -63,6 +64,15 @@ def _beside(section: Mapping[str, Any], keys: Iterable[str], path: Path) -> dict
 
 
 def session_material(session: Session, request: ReplayRequest, config: Config, path: Path) -> Material:
+    if request.as_measured and session.mode.every > 1:
+        raise ConfigError(
+            f"{path} holds only one frame in {session.mode.every}, not the bursts that were measured; replay it"
+            " without --as-measured"
+        )
+    if request.as_measured and request.reference is not None:
+        raise ConfigError(
+            "--as-measured takes the references of the run; leave --reference out, or --as-measured"
+        )
     loads = LoadLog(config.load.max_gap_s)
     samples = tuple(session.load_samples())
     for sample in samples:
@@ -71,31 +81,30 @@ def session_material(session: Session, request: ReplayRequest, config: Config, p
     events = tuple(session.events())
     told = [e for e in events if e.kind is EventKind.REFERENCE and not e.data.get("renewed")]
     stored = open_store(session, path)
-    if told and "measure.reference_burst" not in request.overrides:
+    if request.reference is not None:
+        reference, after = reference_from(request.reference, session.camera), -1
+    elif told and "measure.reference_burst" not in request.overrides:
         reference, after = stored.burst(told[-1].data), int(told[-1].data["last"])
     else:
         reference, after = stored.first_burst(config.measure.reference_burst or 1)
-    window = window_of(request, session.start_monotonic)
+    window = Window.of(request, session.start_monotonic)
     if request.as_measured:
-        bursts = _as_measured(stored, events, window)
+        bursts: Iterable[Work] = _as_measured(stored, events)
     else:
         whole = session.mode.kind == "all"
         n = config.measure.burst if whole else request.overrides.get("measure.burst")
-        bursts = within(
-            stored.bursts_after(after, n, LIMIT_PX if config.measure.shorten_bursts else None), window
-        )
+        bursts = stored.bursts_after(after, n, LIMIT_PX if config.measure.shorten_bursts else None)
     start = ClockPair(session.start_monotonic, session.start_utc)
-    return Material(session.camera, reference, bursts, loads, start, events, samples)
+    return Material(session.camera, reference, window.part(bursts), loads, start, events, samples)
 
 
-def _as_measured(
-    stored: Store, events: Iterable[Event], window: tuple[float, float]
-) -> Iterator[Burst | NewReference]:
+def _as_measured(stored: Store, events: Iterable[Event]) -> Iterator[Work]:
     for event in events:
         renewed = event.kind is EventKind.REFERENCE and event.data.get("renewed")
         if renewed and not event.data.get("automatic"):  # the pipeline does those again by itself
             yield NewReference(stored.burst(event.data))
         elif event.kind is EventKind.MEASURED:
             burst = stored.burst(event.data)
-            if window[0] <= burst.t <= window[1]:
-                yield burst
+            # Sessions of older programs do not say it; then it is what the burst itself knows.
+            lost = event.data.get("lost")
+            yield replace(burst, lost=lost) if isinstance(lost, int) else burst

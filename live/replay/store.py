@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
@@ -84,13 +84,22 @@ class _EveryKth(_Frames):
 
     def burst(self, told: Mapping[str, Any]) -> Burst:
         """What was recorded of a burst; where that is nothing, the recorded frame next to it."""
-        frames = [f for f in self._between(int(told["first"]), int(told["last"])) if not f.damaged]
-        return burst_of(frames or [next(self._between(int(told["first"]), self._indices[-1]))])
+        first, last = int(told["first"]), int(told["last"])
+        frames = [frame for frame in self._between(first, last) if not frame.damaged]
+        frames = (
+            frames or [frame for frame in self._between(first, self._indices[-1]) if not frame.damaged][:1]
+        )
+        if not frames:
+            raise DataError(
+                f"{self._path}: of the frames {first} to {last}, and after them, none is recorded"
+            )
+        return _averaged(frames)
 
     def first_burst(self, n: int) -> tuple[Burst, int]:
-        for burst in average_bursts(self._between(self._indices[0], self._indices[-1]), n):
-            return burst, self._indices[burst.last_index]
-        raise DataError(f"{self._path}: fewer than {n} frames; give a smaller --reference-burst")
+        frames = [frame for frame in self._session.frames(0, n) if not frame.damaged]
+        if len(frames) < n:
+            raise DataError(f"{self._path}: fewer than {n} whole frames; give a smaller --reference-burst")
+        return _averaged(frames), frames[-1].index
 
     def bursts_after(
         self, last: int, n: int | None, shorten_above_px: float | None = None
@@ -102,10 +111,11 @@ class _EveryKth(_Frames):
             )
         return average_bursts(self._between(last + 1, self._indices[-1]), 1)
 
-    def _between(self, first: int, last: int) -> Iterator[Frame]:
-        start, stop = bisect_left(self._indices, first), bisect_right(self._indices, last)
-        for number in range(start, stop):
-            yield replace(self._session.frame(number), index=number, lost_before=0)
+
+def _averaged(frames: Sequence[Frame]) -> Burst:
+    """The mean of frames that do not follow one another; numbered as they are at the source."""
+    rows = [replace(frame, index=row, lost_before=0) for row, frame in enumerate(frames)]
+    return replace(burst_of(rows), first_index=frames[0].index, last_index=frames[-1].index)
 
 
 class _Bursts:

@@ -27,7 +27,7 @@ class ResultsInfo:
     config, metadata, versions : mapping to JSON values
         In force, free words of the user, and of the programs.
     camera : CameraInfo or None
-    strain_measure : "small" | "green" | "hencky"
+    strain_measure : "small" | "engineering" | "green" | "hencky"
     area_m2 : float or None, m^2
         Cross-section of the specimen; with it the rows have a stress.
     gauges : mapping of name to JSON values

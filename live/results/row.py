@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from analysis.field import StrainField
     from live.measure import Measurement
 
-StrainMeasure = Literal["small", "green", "hencky"]
+StrainMeasure = Literal["small", "engineering", "green", "hencky"]
 STRAINS = ("exx", "eyy", "exy")
 GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 
 from acquire.frame import Burst
 from live.measure import NewReference, Reference
@@ -27,6 +28,7 @@ class Feed:
     def __init__(self, grabber: Grabber, ledger: Ledger, idle: Callable[[str], None]) -> None:
         self._grabber, self._ledger, self._idle = grabber, ledger, idle
         self._held: Burst | None = None
+        self._reference_end = self._lost = 0
         self.paused = False
 
     @property
@@ -42,18 +44,23 @@ class Feed:
         while True:
             ended = not self._grabber.running
             burst = self._grabber.bursts.get(POLL_S)
-            self.count_skipped()
             reference = None if self._grabber.references.empty() else self._grabber.references.get()
+            if reference is not None:
+                self._reference_end, self._lost = reference.burst.last_index, 0
+            self.count_skipped()
             if burst is not None and reference and burst.first_index > reference.burst.last_index:
                 self._held = burst
             elif burst is not None:
-                self._ledger.add(skipped=burst.n)
+                self._skip(burst)
             if reference is not None or ended:
                 return reference
             self._idle("taking the reference")
 
     def another_reference(self) -> Reference | None:
         """Have a reference taken from the next frames, and wait for it."""
+        if self._held is not None:
+            self._skip(self._held)
+            self._held = None
         self._grabber.take_reference()
         return self.next_reference()
 
@@ -65,9 +72,9 @@ class Feed:
             if burst is None:
                 self._idle("waiting for frames")
             elif self.paused:
-                self._ledger.add(skipped=burst.n)
+                self._skip(burst)
             elif self._grabber.references.empty():
-                yield burst
+                yield self._with_all_lost(burst)
             else:
                 yield NewReference(self._reference_before(burst))
             self._idle("")
@@ -79,7 +86,8 @@ class Feed:
         if burst.first_index > reference.last_index:
             self._held = burst
         else:
-            self._ledger.add(skipped=burst.n)
+            self._skip(burst)
+        self._lost += reference.lost
         return reference
 
     def let_pass(self) -> None:
@@ -91,4 +99,14 @@ class Feed:
     def count_skipped(self) -> None:
         """Account for bursts that newer ones replaced."""
         for burst in self._grabber.bursts.take_skipped():
-            self._ledger.add(skipped=burst.n)
+            self._skip(burst)
+
+    def _skip(self, burst: Burst) -> None:
+        self._ledger.add(skipped=burst.n)
+        if burst.first_index > self._reference_end:
+            self._lost += burst.lost
+
+    def _with_all_lost(self, burst: Burst) -> Burst:
+        """What was lost since the burst that was measured before, whatever was skipped in between."""
+        lost, self._lost = burst.lost + self._lost, 0
+        return replace(burst, lost=lost)

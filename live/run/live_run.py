@@ -144,7 +144,7 @@ class LiveRun:
             return 130
         ledger = self._books.ledger
         lossy = ledger.loss or self._outputs.failed or self._recording.failed is not None
-        return 5 if lossy or not ledger.adds_up else 0
+        return 5 if lossy or not ledger.adds_up or not self._books.history.told_something else 0
 
     def _take(self, frame: Frame) -> None:
         self._recording.frame(frame)

@@ -7,7 +7,7 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind
@@ -77,7 +77,9 @@ class Measuring:
         yield_to_others(MEASURE)
         try:
             prepared = ReferenceStep(self._setting, self._books, self._feed).take()
-            if prepared is not None:
+            if prepared is None:
+                self._feed.let_pass()
+            else:
                 self._measure(*prepared)
         except PhasedicError as error:
             self._refused = error
@@ -99,6 +101,7 @@ class Measuring:
             correct=self._setting.correct,
             gauges=self._setting.gauges,
             renew_at=self._setting.config.measure.renew_at,
+            strain=cast(Any, self._setting.config.measure.strain),
             on_event=journal.record,
             timer=time.perf_counter,
         ):
@@ -125,6 +128,6 @@ class Measuring:
 
 
 def _measured(burst: Burst) -> Event:
-    data = {"first": burst.first_index, "last": burst.last_index, "n": burst.n}
+    data = {"first": burst.first_index, "last": burst.last_index, "n": burst.n, "lost": burst.lost}
     text = f"frames {burst.first_index} to {burst.last_index}"
     return Event(burst.t, EventKind.MEASURED, "measurement", text, "info", data)

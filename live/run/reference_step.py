@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from typing import TYPE_CHECKING
 
@@ -32,7 +33,7 @@ class ReferenceStep:
         self._setting, self._books, self._feed = setting, books, feed
 
     def take(self) -> tuple[PhaseKernel, float | None] | None:
-        """A kernel and the noise of one frame, GL; None where the run ended before a reference was complete.
+        """A kernel and the noise of one frame, GL; None where the run ended before there was a reference.
 
         Raises
         ------
@@ -46,14 +47,16 @@ class ReferenceStep:
             text = f"the camera ended before the reference was complete ({self._books.ledger.grabbed} frames)"
             self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "error")
             return None
-        for attempt in range(1, TRIES + 1):
+        for attempt in itertools.count(1):
             kernel, noise_GL = self._kernel(reference)
-            moved = (
-                motion_between(kernel, *reference.halves, self._setting.correct) if reference.halves else 0.0
-            )
-            if not moved > self._setting.config.measure.reference_shift_px:
+            moved = self._moved(kernel, reference)
+            if moved <= self._setting.config.measure.reference_shift_px:
                 break
-            again = self._another(moved) if attempt < TRIES else None
+            again = self._another(moved, attempt)
+            if again is None and math.isnan(moved):
+                text = "no reference could be measured; keep the specimen still, look at light and focus"
+                self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "error")
+                return None
             if again is None:
                 text = f"the reference moved by {moved:.3f} px; keep the specimen still when strains must be absolute"
                 self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "warning")
@@ -63,14 +66,32 @@ class ReferenceStep:
         self._tell(reference.burst, moved)
         return kernel, noise_GL
 
+    def _moved(self, kernel: PhaseKernel, reference: Reference) -> float:
+        """How far it moved within the burst, px; NaN where it cannot be measured, which is not still."""
+        if reference.halves is None:
+            return 0.0
+        return motion_between(kernel, *reference.halves, self._setting.correct)
+
     def _kernel(self, reference: Reference) -> tuple[PhaseKernel, float | None]:
         s = self._setting
         what = f"the reference from {s.config.camera.address}"
         return prepare(reference.burst, s.grid, s.settings, s.config.measure.noise_GL, s.correct, what)
 
-    def _another(self, moved: float) -> Reference | None:
-        text = f"the picture moved by {moved:.3f} px during the reference burst; taking another"
-        self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "warning")
+    def _another(self, moved: float, attempt: int) -> Reference | None:
+        """The next one; None where the run ends, or where a reference that moved has to do.
+
+        With one that cannot be measured nothing can be: until there is a better one, it is tried again.
+        """
+        if attempt >= TRIES and not math.isnan(moved):
+            return None
+        what = f"the picture moved by {moved:.3f} px during the reference burst"
+        if math.isnan(moved):
+            what = "the reference burst cannot be measured (fast motion, glare, no focus?)"
+        if attempt < TRIES:
+            self._books.journal.tell(EventKind.MEASUREMENT, "reference", f"{what}; taking another", "warning")
+        elif attempt == TRIES:
+            text = f"{what}; tried again until the picture is still"
+            self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "error")
         return self._feed.another_reference()
 
     def _tell(self, burst: Burst, moved: float) -> None:

@@ -6,6 +6,7 @@ A check that refuses says what is allowed; whoever asks adds the key and the val
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -66,7 +67,10 @@ def number(low: float = -math.inf, high: float = math.inf) -> Check:
     def accept(value: Any) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
             raise Refused(f"a number{bounds}")
-        return float(value)
+        try:
+            return float(value)
+        except OverflowError:
+            raise Refused(f"a number{bounds} of fewer digits") from None
 
     return Check(accept, float)
 
@@ -94,8 +98,8 @@ def choice(*allowed: str) -> Check:
 
 
 def _text(value: Any) -> str:
-    if not isinstance(value, str):
-        raise Refused("a text in quotes")
+    if not isinstance(value, str) or "\0" in value:
+        raise Refused("a text in quotes, without a zero byte")
     return value
 
 
@@ -121,10 +125,13 @@ def _read_box(word: str) -> list[int]:
     return values
 
 
+_EVERY = re.compile("[1-9][0-9]{0,8}")
+
+
 def _record_mode(value: Any) -> str:
     text = _text(value)
     every = text.removeprefix("every=")
-    if text in ("all", "bursts") or (every != text and every.isdigit() and int(every) >= 1):
+    if text in ("all", "bursts") or (every != text and _EVERY.fullmatch(every)):
         return text
     raise Refused("'all', 'bursts' or 'every=K' with K from 1")
 

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import math
+import reprlib
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DataError
+from acquire.files import read_bytes
 from live.setup.checks import Option, Refused
 from live.setup.gauges import NAME, GaugeConfig
 from live.setup.sections import (
@@ -29,6 +32,7 @@ from live.setup.sections import (
 )
 
 Section = TypeVar("Section")
+MOST_BYTES = 10**6  # of a configuration file
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,13 +114,15 @@ def _overlaid(tree: Mapping[str, Any], overrides: Mapping[str, Any], where: str)
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
+    if not path.exists():
+        raise ConfigError(f"{path}: there is no such configuration file")
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise ConfigError(f"{path}: there is no such configuration file") from None
-    except (OSError, UnicodeDecodeError) as error:
+        return tomllib.loads(read_bytes(path, MOST_BYTES).decode("utf-8-sig"))
+    except (DataError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read ({error}); give a text file in TOML") from None
-    except tomllib.TOMLDecodeError as error:
+    except RecursionError:
+        raise ConfigError(f"{path}: not valid TOML: too many brackets within brackets") from None
+    except ValueError as error:  # of TOML, and a number with thousands of digits
         raise ConfigError(f"{path}: not valid TOML: {error}") from None
 
 
@@ -148,7 +154,7 @@ def _section(kind: type[Section], name: str, content: Mapping[str, Any], where: 
             values[key] = fields[key].metadata["check"].accept(value)
         except Refused as allowed:
             raise ConfigError(
-                f"{where}: {name}.{key} = {value!r} is not possible; allowed: {allowed}"
+                f"{where}: {name}.{key} = {_shown(value)} is not possible; allowed: {allowed}"
             ) from None
     return kind(**values)
 
@@ -165,8 +171,19 @@ def _gauge(name: str, table: Any, where: str) -> GaugeConfig:
 
 def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:
     for key, value in metadata.items():
-        if not isinstance(value, str | int | float | bool):
+        if (
+            not isinstance(value, str | int | float | bool)
+            or value in (math.inf, -math.inf)
+            or value != value
+        ):
             raise ConfigError(f"{where}: metadata.{key} must be a text or a number, in one line")
+
+
+def _shown(value: Any) -> str:
+    try:
+        return reprlib.repr(value)
+    except ValueError:  # thousands of digits
+        return "this number"
 
 
 def _meant(word: str, known: list[str]) -> str:

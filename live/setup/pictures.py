@@ -5,20 +5,16 @@ from __future__ import annotations
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquire.burst import FlatField, load_mean
-from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
+from acquire.files import write_picture
 from acquire.frame import CameraInfo
 from live.measure import Correction, unchanged
 from live.setup.config import Config
-
-if TYPE_CHECKING:
-    pass
 
 
 def read_mask(path: str | None, width: int, height: int) -> NDArray[np.bool_] | None:
@@ -47,10 +43,8 @@ def with_mask(config: Config, mask: NDArray[np.bool_] | None, folder: Path) -> C
     """Keep the mask in the folder of the run, so that a replay finds it there."""
     if mask is None:
         return config
-    cv2 = load_cv2()
-
     path = folder / "mask.png"
-    cv2.imwrite(str(path), mask.astype(np.uint8) * 255)
+    write_picture(path, mask.astype(np.uint8) * 255)
     return replace(config, measure=replace(config.measure, mask=str(path)))
 
 

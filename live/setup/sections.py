@@ -89,6 +89,12 @@ class MeasureConfig:
         choice("spectral", "phase"), "spectral", "spectral, or phase alone", Option("estimator", "NAME")
     )
     order: int = key(integer(1, 2), 1, "order of the shape of a ZOI: 1 is affine", Option("order", "N"))
+    strain: str = key(
+        choice("engineering", "small", "green", "hencky"),
+        "engineering",
+        "measure of strain: engineering (elongation over length, as an extensometer reads it), small, green or hencky",
+        Option("strain", "MEASURE"),
+    )
     bending_px: float = key(
         number(0, math.inf),
         0.05,

@@ -10,7 +10,7 @@ from live.tell.card import StatusCard
 from live.tell.figures import elastic_lines, evaluate, interval, options_of, quantity
 from live.tell.journal import Journal
 from live.tell.ledger import Ledger
-from live.tell.screen import Screen
+from live.tell.screen import Screen, say
 from live.tell.summary import file_lines, summary_lines
 
 __all__ = [
@@ -25,5 +25,6 @@ __all__ = [
     "interval",
     "options_of",
     "quantity",
+    "say",
     "summary_lines",
 ]

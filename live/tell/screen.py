@@ -1,6 +1,7 @@
 """The screen: plain sentences, and one status line that is renewed in place on a terminal.
 
-A terminal that has gone away must not end a recording: what cannot be printed is let go.
+A terminal that has gone away must not end a recording: what cannot be printed is let go. What was read
+from a file or a device may hold anything, and is made harmless.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
+from acquire.printable import printable
+
 if TYPE_CHECKING:
     from live.measure import Instant
     from live.setup import Rig
@@ -19,6 +22,11 @@ if TYPE_CHECKING:
 
 _TERMINAL_EVERY_S, _FILE_EVERY_S = 0.25, 5.0
 _MOST_GAUGES = 4  # in the status line
+
+
+def say(text: str = "") -> None:
+    """A line on standard output, made harmless; for commands that need no status line."""
+    Screen().say(text)
 
 
 class Screen:
@@ -37,7 +45,7 @@ class Screen:
     def say(self, text: str = "") -> None:
         """A line that stays."""
         if not self._quiet:
-            self._write(" " * self._width + "\r" * (self._width > 0) + text + "\n")
+            self._write(" " * self._width + "\r" * (self._width > 0) + printable(text) + "\n")
             self._width = 0
 
     def status(self, text: str) -> None:
@@ -45,6 +53,7 @@ class Screen:
         if self._quiet or self._now() - self._last < self._every:
             return
         self._last = self._now()
+        text = printable(text)
         if self._terminal:
             self._write(text.ljust(self._width) + "\r")
             self._width = len(text)
@@ -77,8 +86,9 @@ class Screen:
         self.say(f"files: {folder}")
 
     def _write(self, text: str) -> None:
+        coding = getattr(self._stream, "encoding", None) or "utf-8"
         try:
-            self._stream.write(text)
+            self._stream.write(text.encode(coding, "backslashreplace").decode(coding))
             self._stream.flush()
         except (OSError, ValueError):
             self._quiet = True

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from acquire.load_cell import LoadLog
 from live.measure import History
 from live.setup import SpecimenConfig
+from live.tell.books import Books
 from live.tell.figures import evaluate, figure_lines, lag_line
 
 
@@ -35,11 +35,22 @@ def latency_lines(history: History) -> list[str]:
     return [f"{words}, largest {np.nanmax(late):.0f} ms; the kernel took {kernel:.1f} ms"]
 
 
-def summary_lines(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
+def why_nothing(books: Books) -> str:
+    """Why no ZOI has a value, in a sentence."""
+    instants, troubles = books.history.instants, books.journal.events("warning", "error")
+    if instants:
+        return f"nothing was measured: no ZOI has a value ({instants[-1].refused or 'none was asked for'})"
+    if troubles:
+        return f"nothing was measured: {troubles[-1].text}"
+    return f"nothing was measured: {books.ledger.grabbed} frames gave no burst after the reference; take shorter ones"
+
+
+def summary_lines(books: Books, specimen: SpecimenConfig) -> list[str]:
     """The summary, a line each."""
+    history = books.history
     valid = [instant for instant in history.instants if instant.n_valid]
     if not valid:
-        return ["no ZOI could be measured; see the events above"]
+        return [why_nothing(books)]
     last = valid[-1]
     largest = max(valid, key=lambda instant: abs(instant.largest)).largest
     refused = f" ({last.refused})" if last.refused else ""
@@ -50,8 +61,8 @@ def summary_lines(history: History, loads: LoadLog, specimen: SpecimenConfig) ->
         noise_line(history),
     ]
     lines += latency_lines(history)
-    figures = figure_lines(evaluate(history, loads, specimen), specimen)
-    return lines + figures + (lag_line(history, loads, specimen) if figures else [])
+    figures = figure_lines(evaluate(history, books.loads, specimen), specimen)
+    return lines + figures + (lag_line(history, books.loads, specimen) if figures else [])
 
 
 def file_lines(folder: Path) -> list[str]:

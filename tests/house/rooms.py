@@ -10,11 +10,12 @@ PACKAGES = ("acquire", "analysis", "hw_mocks", "live")
 ROOMS = {
     "acquire": "",
     "acquire.hdf5": "acquire",
-    "acquire.burst": "acquire",
+    "acquire.files": "acquire",
+    "acquire.burst": "acquire acquire.files",
     "acquire.camera": "acquire",
     "acquire.load_cell": "acquire",
     "acquire.protocols": "acquire",
-    "acquire.opencv": "acquire acquire.camera",
+    "acquire.opencv": "acquire acquire.camera acquire.files",
     "acquire.v4l2": "acquire acquire.camera acquire.opencv",
     "acquire.serial_line": "acquire acquire.load_cell acquire.protocols",
     "acquire.session": "acquire acquire.hdf5",
@@ -30,8 +31,8 @@ ROOMS = {
     "hw_mocks": "acquire acquire.camera acquire.load_cell",
     "live": "",
     "live.measure": "acquire acquire.burst acquire.load_cell analysis analysis.field analysis.evaluate",
-    "live.setup": "acquire acquire.burst acquire.hdf5 acquire.camera acquire.load_cell acquire.opencv analysis analysis.evaluate"
-    " live.measure",
+    "live.setup": "acquire acquire.burst acquire.camera acquire.files acquire.hdf5 acquire.load_cell acquire.opencv"
+    " analysis analysis.evaluate live.measure",
     "live.results": "acquire acquire.hdf5 analysis.field live.measure",
     "live.tell": "acquire acquire.load_cell analysis.evaluate live.measure live.setup",
     "live.maps": "acquire acquire.opencv analysis.field analysis.evaluate live.results",
@@ -47,11 +48,12 @@ ROOMS = {
     " live.measure live.operate live.pace live.setup live.tell live.outputs",
     "live.replay": "acquire acquire.burst acquire.camera acquire.load_cell acquire.opencv acquire.session analysis"
     " live.measure live.setup live.tell live.outputs",
-    "live.characterise": "acquire analysis analysis.field analysis.picture analysis.paper_estimator hw_mocks live.maps",
+    "live.characterise": "acquire acquire.opencv analysis analysis.field analysis.picture analysis.paper_estimator"
+    " hw_mocks live.maps",
     "live.characterise.experiments": "acquire analysis analysis.field analysis.picture analysis.paper_estimator"
     " hw_mocks live.maps live.characterise",
     "live.commands": "*",
-    "live.cli": "acquire.errors live.commands.arguments",
+    "live.cli": "acquire.errors acquire.printable live.commands.arguments live.unhurried",
     # A finished run is its results and its recording, or the images it measured.
     "live.finished": "acquire acquire.camera acquire.session analysis.field live.results live.setup",
     "live.export": "acquire analysis.field live.results live.maps live.tell live.finished",

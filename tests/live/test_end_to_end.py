@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,7 +12,9 @@ import h5py
 import numpy as np
 import pytest
 
+from acquire.camera import Camera, CroppedCamera
 from acquire.events import EventKind
+from acquire.frame import Frame
 from acquire.session.reader import Session
 from live.cli import main
 from live.measure.measurement import Measurement
@@ -187,6 +189,60 @@ def test_replay_with_forced_skips_is_bit_equal(tmp_path: Path, monkeypatch: pyte
     assert_bit_equal(strains(folder), strains(out))
 
 
+class Lossy(CroppedCamera):
+    """Loses two frames before every fifth one and damages every seventh."""
+
+    def __init__(self, camera: Camera) -> None:
+        super().__init__(camera, (0, 0, camera.info.width, camera.info.height))
+
+    def __iter__(self) -> Iterator[Frame]:
+        for number, frame in enumerate(super().__iter__()):
+            lost = 2 * (number // 5)
+            yield replace(
+                frame,
+                index=number + lost,
+                lost_before=2 * (number > 0 and number % 5 == 0),
+                damaged=number % 7 == 6,
+            )
+
+
+@pytest.mark.parametrize("skips", [False, True])
+def test_losses_are_the_same_live_and_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, skips: bool
+) -> None:
+    folder, out = tmp_path / "run", tmp_path / "again"
+    open_rig = live_module.open_rig
+
+    def lossy(*arguments: Any, **named: Any) -> Rig:
+        rig = open_rig(*arguments, **named)
+        camera = Lossy(rig.camera)
+        camera.info = replace(camera.info, live=skips)
+        return replace(rig, camera=camera)
+
+    def slow(live: LiveRun, m: Measurement) -> None:
+        if skips and m.number < 2:
+            live.grabber.join()
+
+    monkeypatch.setattr(live_module, "open_rig", lossy)
+    outcome = live_run(folder, each=slow, **{"measure.burst": 2})
+    ledger = outcome.books.ledger
+    assert ledger.adds_up
+    assert (ledger.skipped > 0) is skips
+    session = str(folder / "session.h5")
+    assert main(["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]) == 0
+    for name in ("lost", "frame", "last_frame", "n_frames"):
+        np.testing.assert_array_equal(mean(folder, name), mean(out, name), err_msg=name)
+    reference_end = 3
+    with Session.open(session) as recorded:
+        between = [f for f in recorded.frames() if reference_end < f.index <= mean(folder, "last_frame")[-1]]
+    assert sum(mean(folder, "lost")) == sum(f.lost_before + f.damaged for f in between) > 5
+
+
+def mean(folder: Path, name: str) -> np.ndarray:
+    with h5py.File(folder / "strain.h5") as file:
+        return np.asarray(file["entry/mean"][name][()])
+
+
 def test_a_new_reference_is_composed_and_replayed(tmp_path: Path) -> None:
     folder = tmp_path / "run"
 
@@ -275,6 +331,13 @@ def test_every_third_frame_is_a_slower_camera(tmp_path: Path, capsys: pytest.Cap
     bad = ["replay", session, "--burst", "3", "--out", str(tmp_path / "x"), "--no-view", "--no-rrd"]
     assert main(bad) == 2
     assert "holds only one frame in 3" in capsys.readouterr().err
+    with h5py.File(out / "strain.h5") as file:
+        assert list(file["entry/mean/frame"]) == [6 + 3 * k for k in range(14)]  # as the source counts
+        assert list(file["entry/mean/last_frame"]) == [6 + 3 * k for k in range(14)]
+    as_measured = ["replay", session, "--as-measured", "--out", str(tmp_path / "y"), "--no-view", "--no-rrd"]
+    assert main(as_measured) == 2
+    assert "not the bursts that were measured" in capsys.readouterr().err
+    assert not (tmp_path / "y").exists()
 
 
 def test_nothing_is_overwritten(recorded: tuple[Path, Outcome], capsys: pytest.CaptureFixture[str]) -> None:

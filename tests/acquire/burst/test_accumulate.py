@@ -63,18 +63,18 @@ def test_a_gap_restarts_the_burst_and_is_counted() -> None:
     indices = [0, 1, 2, 5, 6, 7, 8, 9, 10]
     lost = {5: 2}
     bursts = list(average_bursts((small(i, lost=lost.get(i, 0)) for i in indices), 4))
-    assert [(b.first_index, b.last_index, b.lost) for b in bursts] == [(5, 8, 3 + 2)]
+    assert [(b.first_index, b.last_index, b.lost) for b in bursts] == [(5, 8, 2)]
 
 
 def test_a_loss_told_without_a_step_in_the_index_is_a_gap_too() -> None:
     bursts = list(average_bursts([small(0), small(1, lost=4), small(2)], 2))
-    assert [(b.first_index, b.lost) for b in bursts] == [(1, 1 + 4)]
+    assert [(b.first_index, b.lost) for b in bursts] == [(1, 4)]
 
 
 def test_a_damaged_frame_is_left_out() -> None:
     frames = [small(0), small(1, damaged=True), small(2), small(3)]
     bursts = list(average_bursts(frames, 2))
-    assert [(b.first_index, b.lost) for b in bursts] == [(2, 2)]
+    assert [(b.first_index, b.lost) for b in bursts] == [(2, 1)]
 
 
 def test_loss_between_bursts_belongs_to_the_next_one() -> None:
@@ -84,7 +84,7 @@ def test_loss_between_bursts_belongs_to_the_next_one() -> None:
 
 def test_frames_older_than_the_command_are_left_out() -> None:
     bursts = list(average_bursts([small(i) for i in range(6)], 2, not_before=100.25))
-    assert [(b.first_index, b.lost) for b in bursts] == [(3, 3)]
+    assert [(b.first_index, b.lost) for b in bursts] == [(3, 0)]
 
 
 @pytest.mark.parametrize("n", [0, -1, 65537])
@@ -111,7 +111,7 @@ def test_frames_of_another_kind_are_refused_by_name() -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.sampled_from(["good", "damaged", "gap"]), max_size=60), st.integers(1, 5))
-def test_every_frame_is_in_a_burst_or_counted_or_pending(kinds: list[str], n: int) -> None:
+def test_what_is_lost_or_damaged_is_counted_once(kinds: list[str], n: int) -> None:
     frames = list(_stream(kinds))
     accumulator = BurstAccumulator(n)
     bursts = [burst for burst in map(accumulator.add, frames) if burst]
@@ -119,7 +119,8 @@ def test_every_frame_is_in_a_burst_or_counted_or_pending(kinds: list[str], n: in
     tail = accumulator.add(small(10_000, damaged=True))
     assert tail is None
     rest = [b for b in map(accumulator.add, (small(20_000 + i) for i in range(n))) if b]
-    assert n * len(bursts) + sum(b.lost for b in bursts + rest) == len(frames) + told_lost + 1
+    damaged = sum(f.damaged for f in frames) + 1
+    assert sum(b.lost for b in bursts + rest) == told_lost + damaged
     indices = {f.index for f in frames if not f.damaged}
     assert all(set(range(b.first_index, b.last_index + 1)) <= indices for b in bursts)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import FrozenInstanceError
+from dataclasses import FrozenInstanceError, replace
 
 import numpy as np
 import pytest
@@ -26,13 +26,29 @@ def test_small_strain_is_the_symmetric_part() -> None:
     assert np.allclose(field.omega, -0.001)
 
 
-@pytest.mark.parametrize("measure", ["green", "hencky"])
+@pytest.mark.parametrize("measure", ["engineering", "green", "hencky"])
 def test_finite_measures_do_not_see_a_rotation(measure: str) -> None:
     c, s = np.cos(0.4), np.sin(0.4)
     field = uniform(du_dx=c - 1, du_dy=-s, dv_dx=s, dv_dy=c - 1)
     strain = field.strain(measure)  # type: ignore[arg-type]
     assert np.allclose([strain.exx, strain.eyy, strain.exy], 0, atol=1e-12)
     assert np.allclose(field.rotation, 0.4)
+    in_it = replace(field, measure=measure)
+    assert np.allclose([in_it.mean(name)[0] for name in ("exx", "eyy", "exy", "gamma_xy")], 0, atol=1e-12)
+    assert np.allclose(in_it.du_dx, c - 1)
+
+
+def test_the_engineering_strain_is_that_of_an_extensometer() -> None:
+    """Gauge marks on lines along x and y, turned by 0.3 rad and sheared: lengths and angle as measured with a ruler."""
+    turn = np.array([[np.cos(0.3), -np.sin(0.3)], [np.sin(0.3), np.cos(0.3)]])
+    F = turn @ np.array([[0.97, 0.02], [0.0, 1.1]])
+    field = uniform(du_dx=F[0, 0] - 1, du_dy=F[0, 1], dv_dx=F[1, 0], dv_dy=F[1, 1] - 1)
+    along_x, along_y = F @ [100, 0], F @ [0, 100]
+    angle = np.arccos(along_x @ along_y / np.linalg.norm(along_x) / np.linalg.norm(along_y))
+    strain = field.strain("engineering")
+    assert np.allclose(strain.exx, np.linalg.norm(along_x) / 100 - 1)
+    assert np.allclose(strain.eyy, np.linalg.norm(along_y) / 100 - 1)
+    assert np.allclose(strain.exy, (np.pi / 2 - angle) / 2)
 
 
 def test_known_values_of_the_measures() -> None:
@@ -42,7 +58,7 @@ def test_known_values_of_the_measures() -> None:
     first, second, angle = field.principal
     assert np.allclose(first, 0.1) and np.allclose(second, 0) and np.allclose(angle, 0)
     with pytest.raises(ValueError, match="unknown strain measure"):
-        field.strain("engineering")  # type: ignore[arg-type]
+        field.strain("true")  # type: ignore[arg-type]
 
 
 def test_mean_leaves_out_rejected_zois() -> None:

@@ -72,7 +72,18 @@ def test_only_a_known_blur_is_taken_off(results: Path, key: str, value: object) 
         (["--field", "ezz"], 4, "no map 'ezz'"),
         (["--row", "7"], 4, "no row 7"),
         (["--field", "status", "--median", "3"], 2, "neither filtered nor deconvolved"),
-        (["--deconvolve", "-1"], 2, "must not be negative"),
+        (["--deconvolve", "-1"], 2, "allowed: 0 to 100 steps"),
+        (["--deconvolve", "100000000"], 2, "allowed: 0 to 100 steps"),
+        (["--limit", "nan"], 2, "a limit of nan"),
+        (["--limit", "inf"], 2, "a limit of inf"),
+        (["--limit", "0"], 2, "a limit of 0.0"),
+        (["--limit", "-1"], 2, "a limit of -1.0"),
+        (["--median", "4"], 2, "an odd number from 1 to 51"),
+        (["--median", "-3"], 2, "an odd number"),
+        (["--median", "1000001"], 2, "an odd number"),
+        (["--low-pass", "1e9"], 2, "the extent of the grid"),
+        (["--low-pass", "nan"], 2, "a low-pass of nan"),
+        (["--low-pass", "-1"], 2, "a low-pass of -1"),
         (["--field", "sigma_eyy", "--deconvolve", "3"], 2, "has no blur"),
     ],
 )
@@ -82,3 +93,27 @@ def test_refusals(
     assert main(["map", str(results / "out" / "strain.h5"), str(tmp_path / "x.png"), *more]) == code
     assert says in capsys.readouterr().err
     assert not (tmp_path / "x.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "code", "says"),
+    [
+        ("nowhere/x.png", 4, "cannot be written: No such file"),
+        ("x.xyz", 2, "ends in .png"),
+        ("x", 2, "ends in .png"),
+        ("taken.png", 2, "is not overwritten"),
+    ],
+)
+def test_places_that_cannot_be_written(
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, code: int, says: str
+) -> None:
+    (tmp_path / "taken.png").touch()
+    assert main(["map", str(results / "out" / "strain.h5"), str(tmp_path / name)]) == code
+    assert says in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["taken.png"]
+
+
+def test_a_title_is_no_formula(results: Path, tmp_path: Path) -> None:
+    arguments = [str(results / "out" / "strain.h5"), str(tmp_path / "x.svg"), "--title", r"$\frac$"]
+    assert main(["map", *arguments]) == 0
+    assert (tmp_path / "x.svg").stat().st_size > 1000

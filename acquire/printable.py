@@ -1,0 +1,26 @@
+"""Words of others made harmless for a terminal: what is read from a file or a device may hold anything."""
+
+from __future__ import annotations
+
+import re
+
+# Control characters of both kinds (but for line feed and tab), halves of surrogate pairs, marks that turn the
+# direction of writing or are not seen, and separators that some terminals take for an end of line.
+_HARMFUL = re.compile(
+    "[\x00-\x08\x0b-\x1f\x7f-\x9f\u00ad\u061c\u200b-\u200f\u2028-\u202e\u2060-\u206f\ufeff\ufff9-\ufffb\ud800-\udfff]"
+)
+
+
+def printable(text: object) -> str:
+    """``text`` with everything that could command a terminal written as an escape, ``\\x1b`` for one.
+
+    Bytes of a file name that are no UTF-8 are shown as those bytes.
+    """
+    return _HARMFUL.sub(_escaped, str(text))
+
+
+def _escaped(found: re.Match[str]) -> str:
+    code = ord(found[0])
+    if 0xDC80 <= code <= 0xDCFF:  # a byte that Python could not decode
+        code -= 0xDC00
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
