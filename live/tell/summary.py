@@ -9,7 +9,7 @@ import numpy as np
 from acquire.load_cell import LoadLog
 from live.measure import History
 from live.setup import SpecimenConfig
-from live.tell.figures import evaluate, figure_lines, lag_line
+from live.tell.figures import alignment_line, evaluate, figure_lines, lag_line
 
 
 def noise_line(history: History) -> str:
@@ -51,7 +51,9 @@ def summary_lines(history: History, loads: LoadLog, specimen: SpecimenConfig) ->
     ]
     lines += latency_lines(history)
     figures = figure_lines(evaluate(history, loads, specimen), specimen)
-    return lines + figures + (lag_line(history, loads, specimen) if figures else [])
+    if figures:
+        figures += alignment_line(history, specimen) + lag_line(history, loads, specimen)
+    return lines + figures
 
 
 def file_lines(folder: Path) -> list[str]:
