@@ -8,6 +8,7 @@ load comes beside the frames. ``deconvolution`` takes the blur of the ZOI off a 
 
 from analysis.evaluate.curve import Curve, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
+from analysis.evaluate.elastic import principal_direction
 from analysis.evaluate.figure import CONFIDENCE, Figure
 from analysis.evaluate.gauges import (
     AreaGauge,
@@ -50,5 +51,6 @@ __all__ = [
     "free",
     "gauge_zois",
     "measure_gauge",
+    "principal_direction",
     "true_curve",
 ]

@@ -1,4 +1,4 @@
-"""The elastic line of a stress-strain curve: modulus by regression and by chord, Poisson's ratio.
+"""The elastic line of a stress-strain curve: modulus by regression and by chord, Poisson's ratio, direction.
 
 The noise of an optical strain is no smaller than that of the force, so that a least-squares line of stress
 over strain would be too flat; the line here knows of both noises (W. E. Deming, Statistical Adjustment of
@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from analysis.evaluate.curve import Loading
 from analysis.evaluate.figure import Figure
-from analysis.evaluate.series import Reading, first_crossing, reading
+from analysis.evaluate.series import Reading, first_crossing, noise, reading
 
 Floats = NDArray[np.float64]
 
 FEWEST = 8
 """Points that a line needs."""
 
+_CLEAR = 20.0  # standard deviations of the noise that strains must move to have a direction
 _END = 0.1  # of the points of the interval: read at each end of a chord
 
 
@@ -150,6 +151,36 @@ def poisson(loading: Loading, line: Line) -> Figure:
     sigma = math.sqrt(float(rest @ rest) / (n - 2) / sss)
     nu = slope * line.slope
     return Figure.about(nu, math.hypot(sigma * line.slope, nu * line.sigma / line.slope), n - 2)
+
+
+def principal_direction(exx: Floats, eyy: Floats, exy: Floats) -> Figure:
+    """The angle of the largest principal strain to x, rad, positive clockwise on the screen (y points down).
+
+    Of the strains that come with the load: the line through the points (exx - eyy, 2 exy) of all instants has
+    twice the angle, and what is common to them (the noise of the reference) does not turn it.
+
+    Parameters
+    ----------
+    exx, eyy, exy : (N,) float64
+        Means of a test that pulls; NaN where unknown.
+    """
+    known = np.isfinite(exx) & np.isfinite(eyy) & np.isfinite(exy)
+    n = int(known.sum())
+    if n < FEWEST:
+        return Figure.none(f"strains are known at {n} instants, {FEWEST} are needed")
+    cloud = np.stack([exx[known] - eyy[known], 2 * exy[known]])
+    moved = cloud - cloud.mean(axis=1, keepdims=True)
+    away = np.hypot(cloud[0] - cloud[0, 0], cloud[1] - cloud[1, 0])
+    if away.max() <= _CLEAR * math.hypot(noise(cloud[0]), noise(cloud[1])):
+        return Figure.none("the strains hardly change")
+    xx, xy, yy = float(moved[0] @ moved[0]), float(moved[0] @ moved[1]), float(moved[1] @ moved[1])
+    turn = 0.5 * math.atan2(2 * xy, xx - yy)
+    line = np.array([math.cos(turn), math.sin(turn)])
+    if line @ (cloud[:, int(np.argmax(away))] - cloud[:, 0]) < 0:
+        turn += math.pi
+    along, beside = line @ moved, line[0] * moved[1] - line[1] * moved[0]
+    sigma = math.sqrt(float(beside @ beside) / (n - 2) / max(float(along @ along), 1e-300))
+    return Figure.about(0.5 * math.remainder(turn, 2 * math.pi), 0.5 * sigma, n - 2)
 
 
 def _ends(values: Floats, line: Line, least_sigma: float) -> tuple[Reading, Reading]:

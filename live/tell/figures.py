@@ -17,6 +17,7 @@ from analysis.evaluate import (
     evaluate_test,
     find_lag,
     free,
+    principal_direction,
 )
 from live.measure import History
 from live.setup import SpecimenConfig
@@ -72,6 +73,18 @@ def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list
     if not lag.known:
         return [f"lag of the load beside the frames: not known ({lag.why})"]
     return [f"lag of the load beside the frames: {interval(lag, 1e-3, 'ms')} ({CONFIDENCE:.0%}; not applied)"]
+
+
+def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
+    """How far the largest strain lies off the axis of the load; nothing where the strains do not tell."""
+    angle = principal_direction(*(history.column(name) for name in ("exx", "eyy", "exy")))
+    if not angle.known:
+        return []
+    off = angle.minus(math.pi / 2 if specimen.axis == "y" else 0.0)
+    off = off.minus(math.pi * round(off.value / math.pi))
+    words = f"largest strain {interval(off, math.pi / 180, 'degrees')} off {specimen.axis} (clockwise)"
+    wrong = abs(off.value) > math.pi / 4
+    return [words + (f"; is specimen.axis = {specimen.axis!r} right?" if wrong else "")]
 
 
 def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]:

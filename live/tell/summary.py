@@ -9,7 +9,7 @@ import numpy as np
 from live.measure import History
 from live.setup import SpecimenConfig
 from live.tell.books import Books
-from live.tell.figures import evaluate, figure_lines, lag_line
+from live.tell.figures import alignment_line, evaluate, figure_lines, lag_line
 
 
 def noise_line(history: History) -> str:
@@ -62,7 +62,9 @@ def summary_lines(books: Books, specimen: SpecimenConfig) -> list[str]:
     ]
     lines += latency_lines(history)
     figures = figure_lines(evaluate(history, books.loads, specimen), specimen)
-    return lines + figures + (lag_line(history, books.loads, specimen) if figures else [])
+    if figures:
+        figures += alignment_line(history, specimen) + lag_line(history, books.loads, specimen)
+    return lines + figures
 
 
 def file_lines(folder: Path) -> list[str]:

@@ -8,7 +8,17 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from analysis.evaluate import STANDARDS, Curve, Figure, Interval, Options, TensileFigures, evaluate_test, free
+from analysis.evaluate import (
+    STANDARDS,
+    Curve,
+    Figure,
+    Interval,
+    Options,
+    TensileFigures,
+    evaluate_test,
+    free,
+    principal_direction,
+)
 from tests.analysis.evaluate.curves import Truth, composite, linear, lueders, noisy, ramberg_osgood
 
 SEEDS = 60
@@ -155,3 +165,16 @@ def test_a_neck_is_no_yield_point() -> None:
 def test_impossible_options_are_refused(make) -> None:
     with pytest.raises(ValueError, match=r"known: raw|needs that preload|0 <= low < high"):
         make()
+
+
+@pytest.mark.parametrize("degrees", [0.0, 2.5, 88.0, -40.0])
+def test_the_direction_of_the_load_is_found(degrees: float) -> None:
+    rng, c, s = np.random.default_rng(3), math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    along = np.linspace(0, 2e-3, 100)
+    across = -0.3 * along
+    true = (along * c * c + across * s * s, along * s * s + across * c * c, (along - across) * s * c)
+    found = [principal_direction(*(e + 3e-5 + rng.normal(0, 1e-5, 100) for e in true)) for _ in range(SEEDS)]
+    inside = sum(f.low <= math.radians(degrees) <= f.high for f in found)
+    assert inside >= 0.85 * SEEDS
+    assert found[0].high - found[0].low < math.radians(0.5)
+    assert not principal_direction(np.zeros(20), np.zeros(20), np.zeros(20)).known

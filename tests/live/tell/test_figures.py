@@ -11,7 +11,8 @@ from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from live.measure import History
 from live.setup import SpecimenConfig
-from live.tell.figures import elastic_lines, evaluate, figure_lines, lag_line
+from live.tell.figures import alignment_line, elastic_lines, evaluate, figure_lines, lag_line
+from live.tell.summary import summary_lines
 from tests.analysis.evaluate.curves import Truth, composite, noisy, ramberg_osgood
 from tests.live.made_up import START, make_measurement
 
@@ -81,6 +82,14 @@ def test_the_lag_of_the_load_is_told() -> None:
     assert lag_line(history, LoadLog(), FLAT) == []
     (refused,) = lag_line(History(), loads, FLAT)
     assert "not known (0 frames have a strain" in refused
+
+
+def test_the_direction_of_the_load_is_told() -> None:
+    history, loads = kept(ramberg_osgood())
+    assert "off y (clockwise)" in alignment_line(history, FLAT)[0]
+    assert "is specimen.axis = 'x' right?" in alignment_line(history, replace(FLAT, axis="x"))[0]
+    assert alignment_line(History(), FLAT) == []
+    assert any("off y" in line for line in summary_lines(history, loads, FLAT))
 
 
 def test_any_section_gives_an_area() -> None:
