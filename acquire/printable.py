@@ -19,6 +19,15 @@ def printable(text: object) -> str:
     return _HARMFUL.sub(_escaped, str(text))
 
 
+# A device or file by its address at the beginning of a sentence, with its settings.
+_ADDRESS = re.compile(r"^([^\s?]+)\?[A-Za-z_]\w*=\S*(?=: |$)")
+
+
+def brief(text: object) -> str:
+    """A sentence that begins with an address, without the settings of that address."""
+    return _ADDRESS.sub(r"\1", str(text))
+
+
 def _escaped(found: re.Match[str]) -> str:
     code = ord(found[0])
     if 0xDC80 <= code <= 0xDCFF:  # a byte that Python could not decode

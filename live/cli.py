@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from acquire.errors import PhasedicError
-from acquire.printable import printable
+from acquire.printable import brief, printable
 from live.commands.arguments import Command, parse
 from live.unhurried import unhurried_streams
 
@@ -70,7 +70,7 @@ def _outcome(command: Command, arguments: argparse.Namespace) -> int:
     try:
         return command(arguments)
     except PhasedicError as error:
-        print(f"phasedic: {printable(error)}", file=sys.stderr)
+        print(f"phasedic: {printable(brief(error))}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
         print("phasedic: interrupted", file=sys.stderr)

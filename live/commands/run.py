@@ -15,7 +15,7 @@ from live.operate import listen
 from live.outputs import Consumer
 from live.run import INTERRUPTED, Outcome, Stop, run_live
 from live.setup import Config
-from live.tell import Screen, file_lines, summary_lines
+from live.tell import Screen, file_lines, sentence, summary_lines
 from live.view import rerun_command
 
 
@@ -87,9 +87,7 @@ def conclude(outcome: Outcome, screen: Screen) -> None:
         screen.say(f"  {report.line()}")
     troubles = books.journal.events("warning", "error")
     if troubles:
-        screen.say(
-            f"{len(troubles)} warnings and errors, the last: {troubles[-1].source}: {troubles[-1].text}"
-        )
+        screen.say(f"{len(troubles)} warnings and errors, the last: {sentence(troubles[-1])}")
     for line in file_lines(outcome.folder):
         screen.say(line)
     rrd = outcome.folder / "view.rrd"

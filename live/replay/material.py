@@ -48,7 +48,13 @@ Work = Burst | NewReference
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
-    """A source taken apart: what the reference is, and the bursts to measure."""
+    """A source taken apart: what the reference is, and the bursts to measure.
+
+    Attributes
+    ----------
+    expected : int or None
+        How many bursts there will be at most, where that is known.
+    """
 
     camera: CameraInfo
     reference: Burst
@@ -57,6 +63,7 @@ class Material:
     start: ClockPair
     events: tuple[Event, ...] = ()
     samples: tuple[LoadSample, ...] = ()
+    expected: int | None = None
 
 
 def check_window(request: ReplayRequest) -> None:

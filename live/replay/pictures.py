@@ -26,8 +26,16 @@ def picture_material(camera: Camera, request: ReplayRequest, config: Config) -> 
     loads = LoadLog(config.load.max_gap_s)
     loads.close()
     bursts = Window.of(request, 0.0).part(average_bursts(frames, config.measure.burst or 1))
-    return Material(
-        camera.info, reference, bursts, loads, ClockPair(0.0, datetime.datetime.now(datetime.UTC))
+    start = ClockPair(0.0, datetime.datetime.now(datetime.UTC))
+    expected = _expected(camera.info, 0 if request.reference is not None else reference.n, config)
+    return Material(camera.info, reference, bursts, loads, start, expected=expected)
+
+
+def _expected(camera: CameraInfo, taken: int, config: Config) -> int | None:
+    """Bursts in the files or frames that there are, but for those ``taken`` for the reference."""
+    there = camera.controls.get("files") or camera.controls.get("frames")
+    return (
+        (there - taken) // (config.measure.burst or 1) if isinstance(there, int) and there > taken else None
     )
 
 

@@ -107,6 +107,7 @@ def _run(
     books = Books(Journal(), Ledger(), material.loads, History())
     screen.say(f"replaying {request.source} into {folder}")
     outputs = make_outputs(About(config, folder, camera, grid, material.start), books, screen)
+    began = time.perf_counter()
     try:
         _give_past(material, outputs)
         for m in measure(
@@ -123,7 +124,7 @@ def _run(
         ):
             books.ledger.add(measured=m.burst.n, grabbed=m.burst.n)
             outputs.frame(picture_of(m.burst))
-            screen.instant(outputs.add(m), books.ledger, 0.0)
+            screen.progress(outputs.add(m), m.number + 1, material.expected, time.perf_counter() - began)
             if stopping.is_set():
                 break
     finally:

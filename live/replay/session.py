@@ -18,7 +18,7 @@ from acquire.session import Session
 from live.measure import NewReference
 from live.replay.material import Material, ReplayRequest, Window, Work
 from live.replay.pictures import reference_from
-from live.replay.store import Store, open_store
+from live.replay.store import DEFAULT_BURST, Store, open_store
 from live.setup import Config, from_dict, settings_in
 
 
@@ -95,7 +95,16 @@ def session_material(session: Session, request: ReplayRequest, config: Config, p
         n = config.measure.burst if whole else request.overrides.get("measure.burst")
         bursts = stored.bursts_after(after, n, LIMIT_PX if config.measure.shorten_bursts else None)
     start = ClockPair(session.start_monotonic, session.start_utc)
-    return Material(session.camera, reference, window.part(bursts), loads, start, events, samples)
+    expected = _expected(session, events, config) if request.as_measured else _expected(session, (), config)
+    return Material(session.camera, reference, window.part(bursts), loads, start, events, samples, expected)
+
+
+def _expected(session: Session, measured: Iterable[Event], config: Config) -> int | None:
+    """How many bursts there will be at most: those ``measured``, else what the frames are enough for."""
+    told = sum(event.kind is EventKind.MEASURED for event in measured)
+    if told or session.mode.kind == "bursts" or config.measure.shorten_bursts:
+        return told or None
+    return len(session) // (1 if session.mode.every > 1 else config.measure.burst or DEFAULT_BURST)
 
 
 def _as_measured(stored: Store, events: Iterable[Event]) -> Iterator[Work]:

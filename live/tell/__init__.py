@@ -8,7 +8,7 @@
 from live.tell.books import Books
 from live.tell.card import StatusCard
 from live.tell.figures import elastic_lines, evaluate, interval, options_of, quantity
-from live.tell.journal import Journal
+from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen, say
 from live.tell.summary import file_lines, summary_lines
@@ -26,5 +26,6 @@ __all__ = [
     "options_of",
     "quantity",
     "say",
+    "sentence",
     "summary_lines",
 ]

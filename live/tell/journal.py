@@ -14,10 +14,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from acquire.events import Event, EventKind, EventSink, Level
+from acquire.printable import brief
 
 log = logging.getLogger(__name__)
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
 _QUIET = {EventKind.MEASURED}  # one a burst: for the session, not for a person
+
+
+def sentence(event: Event) -> str:
+    """Who says what, an address without its settings and only once."""
+    source, text = brief(event.source), brief(event.text)
+    return text if text.startswith(f"{source}: ") else f"{source}: {text}"
 
 
 class Journal:
@@ -47,7 +54,7 @@ class Journal:
                 self._events.append(event)
             listeners = list(self._listeners)
         if event.kind not in _QUIET:
-            log.log(_LEVELS[event.level], "%s: %s", event.source, event.text)
+            log.log(_LEVELS[event.level], "%s", sentence(event))
         for listener in listeners:
             listener(event)
 

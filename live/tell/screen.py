@@ -66,14 +66,22 @@ class Screen:
 
     def instant(self, i: Instant, ledger: Ledger, fps: float, p95_s: float = math.nan) -> None:
         """Where the test stands."""
-        force = "" if math.isnan(i.force) else f"  {i.force:.1f} N"
         lost = f"  LOST {ledger.lost + ledger.unrecorded}" if ledger.loss else ""
         late = "" if math.isnan(p95_s) else f"  latency {p95_s * 1e3:.0f} ms"
         self.status(
-            f"{fps:.0f} fps{force}  {_strains(i)}"
+            f"{fps:.0f} fps{_force(i)}  {_strains(i)}"
             f"  {i.n_valid}/{i.n_zoi} ZOIs in {i.measure_s * 1e3:.0f} ms"
             f"  recorded {ledger.recorded}  skipped {ledger.skipped}{lost}{late}"
         )
+
+    def progress(self, i: Instant, done: int, expected: int | None, elapsed_s: float) -> None:
+        """Where a replay stands: ``done`` bursts of the ``expected``, ZOIs a second, the time that is left."""
+        of = left = rate = ""
+        if expected is not None and done <= expected:
+            of, left = f" of {expected}", f"  {_duration(elapsed_s / done * (expected - done))} left"
+        if elapsed_s > 0:
+            rate = f"  {done * i.n_zoi / elapsed_s:.0f} ZOI/s"
+        self.status(f"{done}{of} bursts{_force(i)}  {_strains(i)}  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}")
 
     def announce(self, rig: Rig, folder: Path) -> None:
         """What is about to happen."""
@@ -92,6 +100,16 @@ class Screen:
             self._stream.flush()
         except (OSError, ValueError):
             self._quiet = True
+
+
+def _force(i: Instant) -> str:
+    return "" if math.isnan(i.force) else f"  {i.force:.1f} N"
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
 def _strains(i: Instant) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from acquire.printable import brief
 from live.measure import History
 from live.setup import SpecimenConfig
 from live.tell.books import Books
@@ -41,7 +42,7 @@ def why_nothing(books: Books) -> str:
     if instants:
         return f"nothing was measured: no ZOI has a value ({instants[-1].refused or 'none was asked for'})"
     if troubles:
-        return f"nothing was measured: {troubles[-1].text}"
+        return f"nothing was measured: {brief(troubles[-1].text)}"
     return f"nothing was measured: {books.ledger.grabbed} frames gave no burst after the reference; take shorter ones"
 
 
