@@ -5,7 +5,15 @@ taps; the compiled ``prefilter``, ``cutting`` and ``warp`` bring a deformed pict
 are imported by their own names: this face loads no numba.
 """
 
-from analysis.picture.pattern import PatternReport, describe_pattern, predicted_sigma, resolution_length
+from analysis.picture.pattern import (
+    PatternReport,
+    autocorrelation_fwhm,
+    describe_pattern,
+    noise_of_picture,
+    predicted_sigma,
+    resolution_length,
+    sssig,
+)
 from analysis.picture.spectrum import Pattern, filtered_pattern
 from analysis.picture.splines import LINE, PAD, prefilter_taps, tap_table
 
@@ -14,10 +22,13 @@ __all__ = [
     "PAD",
     "Pattern",
     "PatternReport",
+    "autocorrelation_fwhm",
     "describe_pattern",
     "filtered_pattern",
+    "noise_of_picture",
     "predicted_sigma",
     "prefilter_taps",
     "resolution_length",
+    "sssig",
     "tap_table",
 ]

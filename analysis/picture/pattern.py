@@ -106,25 +106,45 @@ def describe_pattern(image: ArrayLike, bits: int | None = None, noise: float | N
     )
 
 
-def autocorrelation_fwhm(image: ArrayLike, noise: float = 0.0) -> float:
+def autocorrelation_fwhm(
+    image: ArrayLike, noise: float = 0.0, mask: NDArray[np.bool_] | None = None
+) -> float:
     """Full width at half height of the autocorrelation, mean of x and y, px; NaN where it never falls.
+
+    Of the pixels in ``mask`` (H, W) alone, where it is given.
 
     The variance of the noise is taken out of the value at zero lag. Between lags the logarithm is
     interpolated over the square of the lag, which is exact for Gaussian speckle. What varies over more
     than a twelfth of the shorter side is light or background, not speckle, and taken out first.
     """
-    from scipy.fft import irfft2, rfft2
+    picture = _picture(image)
+    inside = np.ones(picture.shape) if mask is None else np.asarray(mask, np.float64)
+    wide = min(picture.shape) / SLOW_SHARE
+    zero = (picture - _slow(picture, inside, wide)) * inside
+    zero -= inside * (zero.sum() / max(inside.sum(), 1))
+    along_x, along_y = (
+        product / np.maximum(pairs, 1)
+        for product, pairs in zip(_autocorrelation(zero), _autocorrelation(inside), strict=True)
+    )
+    return 2 * float(np.mean([_half_width(line, noise) for line in (along_x, along_y)]))
+
+
+def _slow(picture: Floats, inside: Floats, px: float) -> Floats:
+    """The light and what else varies over ``px``, from the pixels inside alone."""
     from scipy.ndimage import gaussian_filter
 
-    picture = _picture(image)
-    zero = picture - gaussian_filter(picture, min(picture.shape) / SLOW_SHARE, mode="nearest")
-    zero -= zero.mean()
-    shape = (2 * zero.shape[0], 2 * zero.shape[1])
-    product = irfft2(np.abs(rfft2(zero, shape, workers=2)) ** 2, shape, workers=2)
-    rows, columns = zero.shape
-    along_x = product[0, : columns // 2] / (rows * (columns - np.arange(columns // 2)))
-    along_y = product[: rows // 2, 0] / (columns * (rows - np.arange(rows // 2)))
-    return 2 * float(np.mean([_half_width(line, noise) for line in (along_x, along_y)]))
+    total, weight = (gaussian_filter(values, px, mode="nearest") for values in (picture * inside, inside))
+    return np.asarray(total / np.maximum(weight, 1e-9))
+
+
+def _autocorrelation(values: Floats) -> tuple[Floats, Floats]:
+    """Sums of products at lags along x and along y, up to half the picture."""
+    from scipy.fft import irfft2, rfft2
+
+    rows, columns = values.shape
+    shape = (2 * rows, 2 * columns)
+    product = irfft2(np.abs(rfft2(values, shape, workers=2)) ** 2, shape, workers=2)
+    return product[0, : columns // 2], product[: rows // 2, 0]
 
 
 def _half_width(line: Floats, noise: float) -> float:

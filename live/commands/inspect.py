@@ -81,7 +81,7 @@ def _grid_of(session: Any, arguments: argparse.Namespace) -> ZoiGrid:
     height, width = _picture(session, 0).shape
     size = measure.zoi if arguments.size is None else arguments.size
     step = measure.step if arguments.step is None else arguments.step
-    roi = measure.roi or whole_picture(width, height, size)
+    roi = measure.roi if isinstance(measure.roi, tuple) else whole_picture(width, height, size)
     try:
         return ZoiGrid.cover(Roi(*roi), size, step)
     except ValueError as error:

@@ -15,6 +15,7 @@ from live.operate import listen
 from live.outputs import Consumer
 from live.run import INTERRUPTED, Outcome, Stop, run_live
 from live.setup import Config
+from live.specimen import searched
 from live.tell import Screen, file_lines, sentence, summary_lines
 from live.view import rerun_command
 
@@ -61,8 +62,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
-    config, screen = configured(arguments), Screen()
-    outcome = run_to_the_end(config, screen)
+    screen = Screen()
+    with searched(configured(arguments), screen.say) as config:
+        outcome = run_to_the_end(config, screen)
     conclude(outcome, screen)
     return outcome.exit_code
 

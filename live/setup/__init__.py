@@ -6,6 +6,7 @@ overlays it, ``rig`` opens the devices (and is the one door to the simulated one
 compiled ahead, ``folder`` makes the place for the files.
 """
 
+from live.setup.checks import ALL, AUTO
 from live.setup.compiling import compile_ahead, kinds_of
 from live.setup.config import Config, from_dict, load_config, options, settings_in
 from live.setup.folder import FILES, make_folder, versions
@@ -16,6 +17,8 @@ from live.setup.rig import Rig, open_load, open_rig
 from live.setup.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST, SpecimenConfig
 
 __all__ = [
+    "ALL",
+    "AUTO",
     "DEFAULT_BURST",
     "DEFAULT_REFERENCE_BURST",
     "FILES",

@@ -128,6 +128,19 @@ def _read_box(word: str) -> list[int]:
 _EVERY = re.compile("[1-9][0-9]{0,8}")
 
 
+def _region(value: Any) -> tuple[int, int, int, int] | str:
+    if value in REGIONS:
+        return str(value)
+    try:
+        return _box(value)
+    except Refused as allowed:
+        raise Refused(f"{allowed}; or {' or '.join(map(repr, REGIONS))}") from None
+
+
+def _read_region(word: str) -> list[int] | str:
+    return word if word in REGIONS else _read_box(word)
+
+
 def _record_mode(value: Any) -> str:
     text = _text(value)
     every = text.removeprefix("every=")
@@ -174,4 +187,8 @@ STRAINS = Check(_strains)
 POINT = Check(_point)
 CORNERS = Check(_corners)
 """x, y in px; of the corners of a polygon."""
+AUTO, ALL = REGIONS = ("auto", "all")
+"""Regions in words: the specimen that is found, or the picture but for a rim."""
+REGION = Check(_region, _read_region)
+"""A box, or one of the words."""
 RECORD_MODE = Check(_record_mode)

@@ -26,7 +26,7 @@ def grid_for(config: Config, width: int, height: int, mask: NDArray[np.bool_] | 
     from analysis import Roi, ZoiGrid
 
     m = config.measure
-    x, y, w, h = m.roi or whole_picture(width, height, m.zoi)
+    x, y, w, h = m.roi if isinstance(m.roi, tuple) else whole_picture(width, height, m.zoi)
     if x + w > width or y + h > height:
         raise ConfigError(
             f"measure.roi = {x},{y},{w},{h} leaves the picture of {width} x {height} px;"

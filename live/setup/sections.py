@@ -5,7 +5,19 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from live.setup.checks import BOX, FLAG, RECORD_MODE, STRAINS, TEXT, Option, choice, integer, key, number
+from live.setup.checks import (
+    BOX,
+    FLAG,
+    RECORD_MODE,
+    REGION,
+    STRAINS,
+    TEXT,
+    Option,
+    choice,
+    integer,
+    key,
+    number,
+)
 
 DEFAULT_BURST, DEFAULT_REFERENCE_BURST = 4, 32
 """Frames of a live camera; of files, 1."""
@@ -53,11 +65,12 @@ class LoadConfig:
 class MeasureConfig:
     """[measure]"""
 
-    roi: tuple[int, int, int, int] | None = key(
-        BOX,
+    roi: tuple[int, int, int, int] | str | None = key(
+        REGION,
         None,
-        "x, y, width, height of the measured region, px (without: all but a rim)",
-        Option("roi", "X,Y,W,H"),
+        "x, y, width, height of the measured region, px; auto: the specimen that is found (live, the default);"
+        " all: all but a rim",
+        Option("roi", "X,Y,W,H|auto|all"),
         optional=True,
     )
     zoi: int = key(integer(8, 1024), 64, "side of a ZOI, px", Option("zoi", "PX"))

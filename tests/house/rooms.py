@@ -25,6 +25,7 @@ ROOMS = {
     "analysis.follow": "analysis.field analysis.compiled",
     "analysis.evaluate": "analysis.field",
     "analysis.paper_estimator": "analysis.field",
+    "analysis.quality": "analysis.field analysis.picture",
     "analysis.fit": "analysis.field analysis.compiled analysis.picture",
     "analysis.kernel": "analysis.field analysis.compiled analysis.picture analysis.fit analysis.follow",
     "analysis": "analysis.field analysis.kernel",
@@ -36,7 +37,10 @@ ROOMS = {
     "live.results": "acquire acquire.hdf5 analysis.field live.measure",
     "live.tell": "acquire acquire.load_cell analysis.evaluate live.measure live.setup",
     "live.maps": "acquire acquire.opencv analysis.field analysis.evaluate live.results",
-    "live.check": "acquire analysis.picture live.measure live.setup",
+    "live.specimen": "acquire acquire.burst acquire.files acquire.opencv analysis analysis.field analysis.quality"
+    " live.measure live.setup",
+    "live.check": "acquire acquire.load_cell analysis analysis.field analysis.picture analysis.quality live.measure"
+    " live.setup live.specimen",
     "live.operate": "acquire live.tell",
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",

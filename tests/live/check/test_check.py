@@ -19,7 +19,8 @@ def test_a_good_picture_is_ready(capsys: pytest.CaptureFixture[str]) -> None:
     code, said = checked(capsys, "")
     assert code == 0, said
     assert "LOOK" not in said
-    assert said.rstrip().endswith("ready")
+    assert said.rstrip().endswith("GO: ready")
+    assert "\n*  48     1       105      33" in said
 
 
 @pytest.mark.parametrize(
@@ -27,8 +28,11 @@ def test_a_good_picture_is_ready(capsys: pytest.CaptureFixture[str]) -> None:
     [
         ("&radius=12", (), "LOOK  speckle radius"),
         ("&contrast=3", (), "LOOK  contrast"),
-        ("", ("--target", "5"), "more than the 5.0 um/m asked for"),
-        ("&hold=0.01&end=0.1&drift_x=40", (), "LOOK  motion"),
+        ("&brightness=1.6", (), "LOOK  saturated"),
+        ("&brightness=0.25", (), "LOOK  light"),
+        ("&noise=0", (), "LOOK  noise"),
+        ("", ("--target", "5"), "more than the 5.0 um/m asked for: "),
+        ("&hold=0.01&end=0.1&drift_x=40", (), "LOOK  drift"),
     ],
 )
 def test_a_bad_picture_is_not(
@@ -43,3 +47,14 @@ def test_too_short(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", "--camera", STILL, "--reference-burst", "4"]) == 2
     assert "too short for a check" in capsys.readouterr().err
     assert main(["check"]) == 2
+    assert main(["check", "--camera", STILL.replace("seconds=20", "seconds=0.1")]) == 4
+    assert "6 whole frames, a check needs 8" in capsys.readouterr().err
+
+
+def test_the_load_cell_is_listened_to(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("live.commands.check.LISTEN_S", 0.5)
+    _, said = checked(capsys, "", "--load", "sim:?rate=50")
+    assert "load cell" in said
+    assert "1/s, noise" in said

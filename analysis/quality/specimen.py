@@ -1,0 +1,226 @@
+"""Where the speckled specimen is in a picture: by what could be measured there, not by grey level.
+
+The figure is the smaller eigenvalue of the structure tensor, the noise taken out: what is left of the
+gradient in the worst direction, from which the uncertainty of a displacement follows. An edge, a brushed
+grip, a blurred background have none of it. Single strong edges (letters, screws) are capped at the strength
+of the speckle, so that they count for no more than one. The rest is a matter of size: what no ZOI fits
+into is left out, and of several speckled places the largest is the specimen.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.field import Roi
+from analysis.picture import noise_of_picture
+
+Cells = NDArray[np.float32]
+Bools = NDArray[np.bool_]
+
+CELL = 4
+"""Side of a cell, px: the gradient is taken on pixels, judged in cells."""
+QUANTISATION = 12**-0.5  # GL: the least noise there is
+OVER_NOISE = 2.0  # times the variance that noise alone gives a gradient
+OF_ALL, OF_AROUND = 0.06, 0.4  # least share of the specimen's own quality, overall and within some speckles
+CAP = 1.5  # times the rms gradient of the speckle: no edge counts for more
+NARROWEST = 32.0  # px: what is narrower takes no ZOI
+SPECKLES = 3.0  # radii: std of the window that judges
+WINDOW = (5.0, 24.0)  # px
+SMALLEST_SHARE = 0.005  # of the picture
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Specimen:
+    """The speckled specimen in a picture.
+
+    Attributes
+    ----------
+    mask : (H, W) bool
+        Read-only; holes are left out.
+    box : Roi
+        Around the mask.
+    radius : float, px
+        Of its speckle, roughly; ``describe_pattern`` has it to the point.
+    """
+
+    mask: Bools
+    box: Roi
+    radius: float
+
+    @property
+    def share(self) -> float:
+        """Part of the picture that it covers."""
+        return float(self.mask.mean())
+
+
+def find_specimen(image: ArrayLike, noise: float | None = None) -> Specimen | None:
+    """The largest place of a picture with a pattern that can be measured; None where there is none.
+
+    Parameters
+    ----------
+    image : (H, W), GL
+    noise : float, GL, optional
+        Of this picture; None: from the corners of its spectrum.
+
+    Raises
+    ------
+    ValueError
+        Not a grey picture, or smaller than 16 px.
+    """
+    picture = np.asarray(image, np.float32)
+    sigma = max(noise_of_picture(picture) if noise is None else noise, QUANTISATION)
+    gradient = _Gradient.of(picture, sigma)
+    window, cap, radius, core = WINDOW[0] + 1, math.inf, 2.0, None
+    for _ in range(3):
+        quality = gradient.quality(window, cap)
+        core = _core(quality, gradient.variance)
+        if core is None:
+            return None
+        inner = _inner(core, window)
+        cap = CAP * math.sqrt(2 * float(np.median(quality[inner])))
+        radius = _speckle_radius(picture, gradient, sigma, inner)
+        window = float(np.clip(SPECKLES * radius, *WINDOW))
+    assert core is not None
+    for _ in range(2):
+        core = _outlined(quality, core, gradient.variance, window)
+        if core is None:
+            return None
+    return _specimen(core, picture.shape, radius)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Gradient:
+    """Slightly smoothed gradients of a picture, and the variance that its noise gives them."""
+
+    x: NDArray[np.float32]
+    y: NDArray[np.float32]
+    variance: float
+
+    @classmethod
+    def of(cls, picture: NDArray[np.float32], sigma: float) -> _Gradient:
+        from scipy.ndimage import gaussian_filter
+
+        x, y = (gaussian_filter(picture, 1.0, order=order, mode="nearest") for order in ((0, 1), (1, 0)))
+        return cls(x, y, sigma**2 / (8 * math.pi))
+
+    def quality(self, window: float, cap: float) -> Cells:
+        """Smaller eigenvalue of the structure tensor in a Gaussian of std ``window`` px, GL^2/px^2."""
+        gx, gy = self.x, self.y
+        if math.isfinite(cap):
+            factor = np.minimum(np.float32(1), np.float32(cap) / np.maximum(np.hypot(gx, gy), 1e-9))
+            gx, gy = gx * factor, gy * factor
+        xx, yy, xy = (_blurred(_cells(product), window) for product in (gx * gx, gy * gy, gx * gy))
+        smaller = (xx + yy) / 2 - np.hypot((xx - yy) / 2, xy)
+        return np.asarray(smaller - self.variance, np.float32)
+
+    def power(self) -> Cells:
+        """Mean square of one component, the noise taken out, GL^2/px^2."""
+        return np.asarray(_cells(self.x**2 + self.y**2) / 2 - self.variance, np.float32)
+
+
+def _cells(values: NDArray[np.float32]) -> Cells:
+    """Means over cells; what is left over at the right and below is left out."""
+    rows, columns = values.shape[0] // CELL, values.shape[1] // CELL
+    whole = values[: rows * CELL, : columns * CELL].reshape(rows, CELL, columns, CELL)
+    return np.asarray(whole.mean(axis=(1, 3)), np.float32)
+
+
+def _blurred(cells: NDArray[np.float32], px: float) -> Cells:
+    from scipy.ndimage import gaussian_filter
+
+    return np.asarray(gaussian_filter(cells, px / CELL, mode="reflect"), np.float32)
+
+
+def _core(quality: Cells, variance: float) -> Bools | None:
+    """The largest piece of what is good, against the noise and against the better part of all that is."""
+    seen = quality > OVER_NOISE * variance
+    if not seen.any():
+        return None
+    typical = float(np.percentile(quality[seen], 70))
+    return _largest(quality > max(OVER_NOISE * variance, OF_ALL * typical))
+
+
+def _inner(piece: Bools, px: float) -> Bools:
+    """What lies deeper inside than ``px``; all of a piece that is nowhere so deep."""
+    from scipy.ndimage import distance_transform_edt
+
+    inner = np.asarray(distance_transform_edt(piece) > px / CELL)
+    return inner if inner.any() else piece
+
+
+def _speckle_radius(picture: NDArray[np.float32], gradient: _Gradient, sigma: float, inner: Bools) -> float:
+    """r from contrast over gradient: a blob of radius r has C^2 = 2 r^2 g^2, smoothed 1 px beforehand."""
+    from scipy.ndimage import gaussian_filter
+
+    slow = gaussian_filter(picture, 4 * WINDOW[0], mode="nearest")
+    contrast = _blurred(_cells((picture - slow) ** 2), WINDOW[0])
+    power = _blurred(gradient.power(), WINDOW[0])
+    ratio = (float(np.median(contrast[inner])) - sigma**2) / max(float(np.median(power[inner])), 1e-9)
+    return math.sqrt(max(ratio / 2 - 0.5, 0.5))
+
+
+def _outlined(quality: Cells, core: Bools, variance: float, window: float) -> Bools | None:
+    """The piece with its edge where the quality falls below a share of what is usual just inside."""
+    inner = _inner(core, window).astype(np.float32)
+    near = _blurred(inner, 4 * window)
+    usual = _blurred(np.maximum(quality, 0) * inner, 4 * window) / np.maximum(near, 1e-6)
+    usual[near < 1e-3] = usual[inner > 0].mean()
+    good = quality > np.maximum(OF_AROUND * usual, OVER_NOISE * variance)
+    piece = _largest(_smooth(good, window))
+    return None if piece is None else _without_pinholes(piece, 2 * window)
+
+
+def _smooth(good: Bools, window: float) -> Bools:
+    """Gaps between speckles closed, what is too narrow for a ZOI opened; the picture's edge is no edge."""
+    gap, narrow = 0.6 * window / CELL, max(2 * window, NARROWEST / 2) / CELL
+    pad = math.ceil(2 * narrow)
+    padded = np.pad(good, pad, mode="edge")
+    closed = ~_grown(~_grown(padded, gap), gap)
+    opened = _grown(~_grown(~closed, narrow), narrow)
+    return opened[pad:-pad, pad:-pad]
+
+
+def _grown(piece: Bools, cells: float) -> Bools:
+    from scipy.ndimage import distance_transform_edt
+
+    if not piece.any():
+        return piece
+    return np.asarray(distance_transform_edt(~piece) <= cells)
+
+
+def _largest(good: Bools) -> Bools | None:
+    from scipy.ndimage import label
+
+    labels, n = label(good)
+    if n == 0:
+        return None
+    largest = np.asarray(labels == 1 + np.argmax(np.bincount(labels.ravel())[1:]))
+    return largest if largest.mean() >= SMALLEST_SHARE else None
+
+
+def _without_pinholes(piece: Bools, px: float) -> Bools:
+    """Holes smaller than a square of side ``px`` filled: gaps between speckles, not holes of a specimen."""
+    from scipy.ndimage import label
+
+    labels, _ = label(~piece)
+    sizes = np.bincount(labels.ravel())
+    small = sizes < (px / CELL) ** 2
+    small[0] = False
+    return np.asarray(piece | small[labels])
+
+
+def _specimen(piece: Bools, shape: tuple[int, ...], radius: float) -> Specimen:
+    # The edge came out a few pixels too far as a rule: half the window reaches over it.
+    inner = ~_grown(np.pad(~piece, 1, mode="edge"), 1.0)[1:-1, 1:-1]
+    piece = inner if inner.any() else piece
+    mask = np.repeat(np.repeat(piece, CELL, axis=0), CELL, axis=1)
+    height, width = shape
+    mask = np.pad(mask, ((0, height - mask.shape[0]), (0, width - mask.shape[1])), mode="edge")
+    mask.flags.writeable = False
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    x, y = int(columns[0]), int(rows[0])
+    return Specimen(mask, Roi(x, y, int(columns[-1]) + 1 - x, int(rows[-1]) + 1 - y), radius)

@@ -1,0 +1,228 @@
+"""The strain noise of one ZOI, predicted and measured on the still specimen, for several ZOIs and bursts.
+
+One half of the frames is the reference, as in the test; bursts from the other half are measured against
+it. What comes out is noise: the scatter over ZOIs is *measured*, the kernel's own uncertainty *predicted*.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import DataError
+from acquire.frame import Burst
+from analysis.quality import gauge_length, l10_displacement, l10_strain
+from live.check.shots import Shots
+from live.measure import Correction, averaged, prepare, unchanged
+
+if TYPE_CHECKING:
+    from analysis import KernelSettings, PhaseKernel, StrainField, ZoiGrid
+
+SIZES, ORDERS, BURSTS = (32, 48, 64, 96), (1, 2), (1, 2, 4, 8, 16)
+MOST_BURSTS, MOST_ZOIS, FEWEST_ZOIS = 4, 200, 3
+MARGIN = 24  # px around the region: a spline reaches so far
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Strain noise of one ZOI of a burst of ``burst`` frames, dimensionless; NaN: not measured."""
+
+    burst: int
+    predicted: float
+    measured: float
+
+    @property
+    def known(self) -> float:
+        """As measured, else as predicted."""
+        return self.measured if math.isfinite(self.measured) else self.predicted
+
+
+@dataclass(frozen=True, slots=True)
+class Floor:
+    """One size and order of ZOIs.
+
+    Attributes
+    ----------
+    zoi : int, px
+    order : int
+    l10, l10_u, vsg : float, px
+        l_10% of the strain and of the displacement; side of the virtual strain gauge.
+    zois : int
+        ZOIs that were measured; 0: none fits, or none has pattern.
+    noises : tuple of Noise
+        By growing burst; empty where ``zois`` is 0.
+    reference : int
+        Frames of the reference that the figures hold for.
+    """
+
+    zoi: int
+    order: int
+    l10: float
+    l10_u: float
+    vsg: float
+    zois: int
+    noises: tuple[Noise, ...]
+    reference: int
+
+    def of(self, burst: int) -> Noise | None:
+        """The noise for a burst."""
+        return next((noise for noise in self.noises if noise.burst == burst), None)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Bench:
+    """What is measured, cut to the region, and how.
+
+    Attributes
+    ----------
+    shots : Shots
+    inside : (H, W) bool
+        The region.
+    at_zois : (H, W) bool
+        The inner halves of its ZOIs: where light and noise are judged.
+    settings : KernelSettings
+    noise : float, GL
+        Of one frame.
+    reference : int
+        Frames of the reference of the test.
+    correct : callable
+    """
+
+    shots: Shots
+    inside: NDArray[np.bool_]
+    at_zois: NDArray[np.bool_]
+    settings: KernelSettings
+    noise: float
+    reference: int
+    correct: Correction = unchanged
+
+    @property
+    def half(self) -> int:
+        """Frames of the reference here."""
+        return len(self.shots) // 2
+
+    def burst(self, first: int, count: int) -> Burst:
+        """A corrected burst, cut to the region."""
+        burst = self.correct(self.shots.mean(first, count))
+        rows, columns = self.cut
+        return replace(burst, mean=burst.mean[rows, columns], clipped=burst.clipped[rows, columns])
+
+    @property
+    def cut(self) -> tuple[slice, slice]:
+        """Rows and columns of the region with a margin."""
+        spans = (np.flatnonzero(self.inside.any(axis=axis)) for axis in (1, 0))
+        rows, columns = (slice(max(int(s[0]) - MARGIN, 0), int(s[-1]) + 1 + MARGIN) for s in spans)
+        return rows, columns
+
+
+def noise_floors(
+    bench: Bench,
+    sizes: Sequence[int] = SIZES,
+    orders: Sequence[int] = ORDERS,
+    bursts: Sequence[int] = BURSTS,
+) -> tuple[Floor, ...]:
+    """The table, by size and order."""
+    lengths = sorted(set(bursts))
+    bench_bursts = {n: list(_bursts(bench, n)) for n in lengths}
+    reference = bench.burst(0, bench.half)
+    return tuple(
+        _floor(bench, size, order, reference, bench_bursts)
+        for size in sorted(set(sizes))
+        for order in sorted(set(orders))
+        if not (order > 1 and bench.settings.estimator == "phase")
+    )
+
+
+def _bursts(bench: Bench, n: int) -> Iterator[Burst]:
+    """Bursts of n frames from the second half, from its whole length."""
+    room = len(bench.shots) - bench.half
+    count = min(room // n, MOST_BURSTS)
+    for k in range(count):
+        yield bench.burst(bench.half + k * (room // count), n)
+
+
+def _floor(bench: Bench, size: int, order: int, reference: Burst, bursts: dict[int, list[Burst]]) -> Floor:
+    window = bench.settings.window
+    lengths = l10_strain(size, window), l10_displacement(size, window, order), gauge_length(size, window)
+    nothing = Floor(size, order, *lengths, 0, (), bench.reference)
+    grid = _grid(bench, size)
+    if grid is None:
+        return nothing
+    settings = replace(bench.settings, order=order)
+    try:
+        kernel, _ = prepare(reference, grid, settings, bench.noise)
+    except DataError:
+        return nothing
+    start: StrainField | None = None
+    noises, zois = [], 0
+    for n, taken in bursts.items():
+        fields = [_measured(kernel, burst, bench.noise, start) for burst in taken]
+        start = fields[-1] if fields else start
+        zois = max([zois, *(field.n_valid for field in fields)])
+        noises.append(_noise(fields, n, bench))
+    known = tuple(_filled(noises, bench))
+    return replace(nothing, zois=zois, noises=known) if zois >= FEWEST_ZOIS else nothing
+
+
+def _measured(kernel: PhaseKernel, burst: Burst, noise: float, start: StrainField | None) -> StrainField:
+    return kernel.measure(burst.mean, start=start, noise=averaged(noise, burst.n))
+
+
+def _grid(bench: Bench, size: int) -> ZoiGrid | None:
+    """ZOIs all over the region, half overlapping at most, not more than are needed."""
+    from analysis import Roi, ZoiGrid
+
+    rows, columns = bench.cut
+    inside = bench.inside[rows, columns]
+    y, x = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
+    roi = Roi(int(x[0]), int(y[0]), int(x[-1] - x[0]) + 1, int(y[-1] - y[0]) + 1)
+    if min(roi.width, roi.height) < size:
+        return None
+    step = size // 2
+    grid = ZoiGrid.cover(roi, size, step, mask=inside)
+    if grid.n_active > MOST_ZOIS:
+        step = math.ceil(step * math.sqrt(grid.n_active / MOST_ZOIS))
+        grid = ZoiGrid.cover(roi, size, step, mask=inside)
+    return grid if grid.n_active >= FEWEST_ZOIS else None
+
+
+def _noise(fields: list[StrainField], n: int, bench: Bench) -> Noise:
+    """Predicted and measured, brought to the reference of the test."""
+    useful = [field for field in fields if field.n_valid >= FEWEST_ZOIS]
+    if not useful:
+        return Noise(n, math.nan, math.nan)
+    scale = math.sqrt(_share(bench.reference, n) / _share(bench.half, n))
+    predicted = _rms([field.sigma(name)[field.ok] for field in useful for name in ("exx", "eyy")])
+    measured = math.sqrt(float(np.mean([_scatter(f, name) for f in useful for name in ("exx", "eyy")])))
+    return Noise(n, scale * predicted, scale * measured)
+
+
+def _share(reference: int, burst: int) -> float:
+    return 1 / reference + 1 / burst
+
+
+def _scatter(field: StrainField, name: str) -> float:
+    """Variance over ZOIs about their mean, and the variance that the mean itself takes away."""
+    values = field.value(name)[field.ok]
+    return float(values.var()) + field.mean(name)[1] ** 2
+
+
+def _rms(parts: list[NDArray[Any]]) -> float:
+    return math.sqrt(float(np.mean(np.concatenate(parts) ** 2)))
+
+
+def _filled(noises: list[Noise], bench: Bench) -> Iterator[Noise]:
+    """Bursts longer than the half that is there are predicted from the longest that was measured."""
+    seen: Noise | None = None
+    for noise in noises:
+        if math.isfinite(noise.predicted):
+            seen = noise
+            yield noise
+        elif seen is not None:
+            ratio = _share(bench.reference, noise.burst) / _share(bench.reference, seen.burst)
+            yield Noise(noise.burst, seen.predicted * math.sqrt(ratio), math.nan)

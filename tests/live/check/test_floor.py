@@ -1,0 +1,187 @@
+"""Predicted and measured strain noise on simulated frames, for noises, radii and contrasts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquire.events import ignore_event
+from live.check import Figures, Floor, Noise, Shots, advice, examine, judge, reaching, table_lines, take
+from live.check.figures import automatic_controls
+from live.check.floor import BURSTS
+from live.setup import Config, load_config
+
+STILL = "sim:uniform?fps=50&seconds=20&hold=10&width=320&height=256&lockstep=yes"
+
+
+def figures(settings: str, zoi: int = 32, table: bool = False) -> Figures:
+    config = load_config(
+        None, {"camera.address": STILL + settings, "measure.zoi": zoi, "measure.reference_burst": 32}
+    )
+    return examine(take(config), config, table=table)
+
+
+TRIALS = [
+    # bits, noise %, radius px, contrast %, ZOI
+    "8 0.5 2 18 32",
+    "8 2 2 18 32",
+    "8 4 2 18 48",
+    "12 0.2 1.5 18 32",
+    "12 1 1.2 18 32",
+    "12 1 4 18 48",
+    "12 0.5 3 6 48",
+    "12 2 2 10 48",
+]
+
+
+@pytest.mark.parametrize("trial", TRIALS)
+def test_predicted_and_measured_agree(trial: str) -> None:
+    bits, noise, radius, contrast, zoi = trial.split()
+    found = figures(f"&bits={bits}&noise={noise}&radius={radius}&contrast={contrast}", int(zoi)).floor
+    assert found is not None
+    for one in found.noises:
+        assert one.measured == pytest.approx(one.predicted, rel=0.2), (trial, one)
+
+
+def test_the_table_has_every_zoi_order_and_burst() -> None:
+    found = figures("&bits=12&noise=1", 64, table=True)
+    rows = {(f.zoi, f.order): f for f in found.floors}
+    assert set(rows) == {(zoi, order) for zoi in (32, 48, 64, 96) for order in (1, 2)}
+    for floor in found.floors:
+        assert [n.burst for n in floor.noises] == list(BURSTS), floor
+        known = [n.known for n in floor.noises]
+        assert known == sorted(known, reverse=True)
+    for noise in rows[32, 2].noises:
+        assert noise.measured == pytest.approx(noise.predicted, rel=0.2)
+    # A quadratic term is even: it widens the band of a displacement, not of a strain.
+    assert rows[64, 2].l10 == rows[64, 1].l10 == pytest.approx(140, rel=0.01)
+    assert rows[64, 2].l10_u == pytest.approx(61, rel=0.02)
+    lines = table_lines(replace(found, px_per_mm=20.0))
+    assert "l_10% mm" in lines[1]
+    assert any(line.startswith("*  64     1      7.01    2.19") for line in lines), lines
+
+
+def test_a_reference_of_another_length_than_was_tried() -> None:
+    """16 and 16 frames taken, 8 wanted: the figures hold for 8."""
+    config = load_config(None, {"camera.address": STILL + "&bits=12&noise=1", "measure.zoi": 32})
+    shots = take(config)
+    short = replace(config, measure=replace(config.measure, reference_burst=8))
+    long, few = (examine(shots, c, table=False).floor for c in (config, short))
+    assert long is not None
+    assert few is not None
+    ratio = few.noises[0].predicted / long.noises[0].predicted
+    assert ratio == pytest.approx(math.sqrt((1 / 8 + 1 / 4) / (1 / 32 + 1 / 4)), rel=0.01)
+
+
+def floor(zoi: int, *values: float) -> Floor:
+    noises = tuple(Noise(n, v * 1e-6, v * 1e-6) for n, v in zip(BURSTS, values, strict=True))
+    return Floor(zoi, 1, 2.2 * zoi, 2.2 * zoi, 0.7 * zoi, 50, noises, 32)
+
+
+FLOORS = (floor(32, 800, 560, 400, 290, 220), floor(64, 200, 140, 100, 70, 49), floor(96, 90, 64, 45, 33, 24))
+
+
+def asked(target_um_m: float, high: float) -> str:
+    made_up: Any = SimpleNamespace(
+        floors=FLOORS, floor=FLOORS[1], zoi=64, order=1, burst=4, exposure=SimpleNamespace(high=high)
+    )
+    return advice(made_up, target_um_m * 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("target", "high", "says"),
+    [
+        (50, 0.2, "burst 16, or ZOI 96, or 4.0 times the light or exposure"),
+        (71, 0.4, "burst 8, or ZOI 96, or twice the light or exposure"),
+        (50, 0.9, "burst 16, or ZOI 96, or 1.9 times the contrast (light helps 1.1 times, then it saturates)"),
+        (30, 0.5, "ZOI 96 and burst 16, or burst 80 and a reference of 80 with ZOI 64"),
+    ],
+)  # fmt: skip
+def test_what_reaches_a_target(target: float, high: float, says: str) -> None:
+    assert asked(target, high).startswith(says), asked(target, high)
+
+
+def test_the_shortest_burst_of_each_zoi() -> None:
+    assert [(f.zoi, n) for f, n in reaching(FLOORS, 70e-6)] == [(64, 8), (96, 2)]
+    assert reaching(FLOORS, 1e-6) == []
+
+
+def shots_of(frames: np.ndarray, bits: int, fps: float = 30.0) -> Shots:
+    from live.setup import open_rig
+
+    rig = open_rig(STILL, "none:", ignore_event)
+    rig.close()
+    height, width = frames.shape[1:]
+    camera = replace(rig.camera.info, width=width, height=height, bits=bits, fps=fps)
+    return Shots(frames, np.arange(len(frames)) / fps, 0, camera)
+
+
+@pytest.fixture(scope="module")
+def taken() -> Shots:
+    return take(load_config(None, {"camera.address": STILL + "&bits=8&noise=1"}))
+
+
+def said(shots: Shots, what: str) -> str:
+    config = Config()
+    lines = judge(examine(shots, replace(config, measure=replace(config.measure, zoi=48)), table=False))
+    return next(line.text() for line in lines if line.what == what)
+
+
+def test_lamps_on_the_mains_are_named(taken: Shots) -> None:
+    t = np.arange(len(taken)) / 30
+    bright = 1 + 0.05 * np.sin(2 * np.pi * 100 * t)
+    frames = np.clip(np.rint(taken.frames * bright[:, None, None]), 0, 255).astype(np.uint8)
+    text = said(shots_of(frames, 8), "flicker")
+    assert text.startswith("LOOK")
+    assert "lamps on 50 Hz mains (100 Hz, seen at 10.0 Hz)" in text
+    assert "multiple of 10.0 ms" in text
+
+
+def test_a_shaking_camera_is_seen_with_its_frequency(taken: Shots) -> None:
+    t = np.arange(len(taken)) / 30
+    moved = np.rint(1.0 * np.sin(2 * np.pi * 7.0 * t)).astype(int)
+    frames = np.stack([np.roll(f, k, axis=0)[8:-8] for f, k in zip(taken.frames, moved, strict=True)])
+    text = said(shots_of(frames, 8), "vibration")
+    assert text.startswith("LOOK")
+    assert "mainly at 7.0 Hz" in text
+
+
+def test_bits_that_never_change(taken: Shots) -> None:
+    coarse = (taken.frames.astype(np.uint16) & 0xF0) << 4
+    assert "4 of 12 change" in said(shots_of(coarse, 12), "bits")
+    deep = taken.frames.astype(np.uint16)
+    text = said(shots_of(deep, 16), "bits")
+    assert "the highest 8 are never used" in text
+    assert "saturation is not seen" in text
+
+
+def test_what_surrounds_the_specimen_decides_nothing(taken: Shots) -> None:
+    """A saturated, flickering background beside a good specimen."""
+    height, width = taken.frames.shape[1:]
+    frames = np.full((len(taken), height + 100, width + 400), 255, np.uint8)
+    frames[::2, :, :] = 200
+    frames[:, 50 : 50 + height, 200 : 200 + width] = taken.frames
+    config = load_config(None, {"measure.zoi": 48})
+    found = examine(shots_of(frames, 8), config, table=False)
+    assert found.region.found
+    bad = [line.text() for line in judge(found) if not line.good]
+    assert bad == []
+    assert found.noise == pytest.approx(examine(taken, config, table=False).noise, rel=0.05)
+
+
+def test_automatic_controls_by_name_and_value() -> None:
+    controls = {
+        "auto_exposure": "Aperture Priority Mode",
+        "white_balance_automatic": 1,
+        "focus_automatic_continuous": 0,
+        "exposure_auto": "Manual Mode",
+        "exposure_dynamic_framerate": 1,
+        "gain": 7,
+    }
+    found = automatic_controls(controls)
+    assert found == ("auto_exposure", "white_balance_automatic", "exposure_dynamic_framerate")
