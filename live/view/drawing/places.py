@@ -16,7 +16,7 @@ from live.view.exchange.messages import Where
 from live.view.exchange.setup import ViewSetup
 
 APPLICATION = "phasedic"
-SERVER_MIB = 192
+SERVER_MIB = 128
 """What a viewer that comes late can still be shown; beyond, the oldest pictures and maps go."""
 
 RRD_LIMIT_BYTES = 1e9
@@ -31,6 +31,9 @@ class Rates:
     ----------
     picture_hz, map_hz, row_hz : float, 1/s
         Pictures, maps; and how often what came of means and loads (all of it) is drawn.
+    gather_s : float, s
+        What is drawn of one thing in so long goes out together; rerun's memory grows with each parcel
+        (of a file: for good).
     limit_bytes : float
         When the pictures and maps drawn come to this much they stop; the curves go on.
     repeat_bytes : float
@@ -41,6 +44,7 @@ class Rates:
     picture_hz: float
     map_hz: float
     row_hz: float = 10.0
+    gather_s: float = 0.1
     limit_bytes: float = math.inf
     repeat_bytes: float = math.inf
 
@@ -148,7 +152,7 @@ def write(setup: ViewSetup, where: Where) -> Place:
     path = Path(where.rrd or "")
     with path.open("xb"):  # rerun overwrites
         pass
-    rates = Rates(1.0, 2.0, 1.0, limit_bytes=RRD_LIMIT_BYTES)
+    rates = Rates(1.0, 2.0, 1.0, gather_s=5.0, limit_bytes=RRD_LIMIT_BYTES)
     # Two streams of one name in a process would be one stream.
     return _place(rr.FileSink(str(path)), setup, f"{where.recording}-file", rates)
 
@@ -162,7 +166,8 @@ def _place(
 ) -> Place:
     import rerun as rr
 
-    stream = rr.RecordingStream(APPLICATION, recording_id=recording)
+    parcels = rr.ChunkBatcherConfig(flush_tick=rates.gather_s)
+    stream = rr.RecordingStream(APPLICATION, recording_id=recording, batcher_config=parcels)
     stream.set_sinks(sink)
     stream.send_recording_name(setup.title)
     stream.send_blueprint(blueprint(setup))
