@@ -30,8 +30,8 @@ ROOMS = {
     "hw_mocks": "acquire acquire.camera acquire.load_cell",
     "live": "",
     "live.measure": "acquire acquire.burst acquire.load_cell analysis analysis.field analysis.evaluate",
-    "live.setup": "acquire acquire.burst acquire.hdf5 acquire.camera acquire.load_cell acquire.opencv analysis analysis.evaluate"
-    " live.measure",
+    "live.setup": "acquire acquire.burst acquire.hdf5 acquire.camera acquire.load_cell acquire.opencv analysis"
+    " analysis.evaluate live.measure",
     "live.results": "acquire acquire.hdf5 analysis.field live.measure",
     "live.tell": "acquire acquire.load_cell analysis.evaluate live.measure live.setup",
     "live.maps": "acquire acquire.opencv analysis.field analysis.evaluate live.results",
