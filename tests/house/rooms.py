@@ -49,7 +49,7 @@ ROOMS = {
     "live.outputs": "acquire acquire.load_cell analysis live.measure live.pace live.setup live.tell live.results"
     " live.view",
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
-    " live.measure live.operate live.pace live.setup live.tell live.outputs",
+    " analysis.evaluate live.measure live.operate live.pace live.setup live.tell live.outputs",
     "live.replay": "acquire acquire.burst acquire.camera acquire.load_cell acquire.opencv acquire.session analysis"
     " live.measure live.setup live.tell live.outputs",
     "live.characterise": "acquire acquire.opencv analysis analysis.field analysis.picture analysis.paper_estimator"
