@@ -73,12 +73,14 @@ _INSTANTS = (
     Quantity("n_frames", UNITLESS, "frames averaged"),
     Quantity("lost", UNITLESS, "frames lost or damaged since the burst before"),
     Quantity("duration", "s", "time of the last frame of the burst minus that of the first"),
+    Quantity("kernel", "s", "time that the kernel took; nan where nobody measured it"),
+    Quantity("latency", "s", "from the stamp of the last frame of the burst to the result; nan in a replay"),
 )
 _KNOWN = {q.name: q for q in (*_FIELDS, *_PLACES, *_INSTANTS)}
 
 MEANS = {
     "time_s": "time", "force_N": "force", "stress_Pa": "stress", "noise_GL": "noise",
-    "duration_s": "duration", "u_px": "u", "v_px": "v",
+    "duration_s": "duration", "kernel_s": "kernel", "latency_s": "latency", "u_px": "u", "v_px": "v",
 }  # fmt: skip
 """Columns of ``Strain.values`` whose name carries the unit, and the quantity each is; others have its name."""
 

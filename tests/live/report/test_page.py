@@ -19,7 +19,7 @@ from live.report import Wanted, find_browser, make_report
 from live.report.page import Part, safe
 from live.report.svg import MOST_POINTS, Curve, Figure, draw
 from live.tell import Screen
-from tests.live.made_run import CONFIG, make_run
+from tests.live.made_run import CONFIG, PULLED, make_run
 
 VOID = {"meta", "img", "br", "line", "path", "rect", "circle", "polygon"}
 
@@ -89,7 +89,7 @@ def test_it_holds_what_a_report_must(text: str, run_dir: Path) -> None:
     for words in (
         "Rp0.2 = 210.2 MPa",  # drawn on the curve
         "first: t =", "elastic: t =", "yield (0.2 %)", "highest force", "last: t =",
-        "Noise floor", "POOR_MATCH", "grabbed", "384", "reference: 8 frames",
+        "Noise floor", "POOR_MATCH", "grabbed", str(8 * len(PULLED)), "reference: 8 frames",
         "not recorded (phasedic run --meta aperture=...)", "50 mm", "6.4 x 4.8 mm", "0.05 mm/px",
         "half of the engineering shear", "numpy",
     ):  # fmt: skip
@@ -154,7 +154,7 @@ def test_without_a_browser_it_says_so(
 
 
 def test_comparison(run_dir: Path, tmp_path: Path) -> None:
-    stiffer = make_run(tmp_path / "b", [0.9 * e for e in np.linspace(0, 8e-3, 40)])
+    stiffer = make_run(tmp_path / "b", [0.9 * e for e in PULLED])
     out = tmp_path / "c.html"
     assert main(["report", "--compare", str(run_dir), str(stiffer), "--out", str(out)]) == 0
     page = Reader(out.read_text(encoding="utf-8"))
