@@ -24,6 +24,7 @@ from live.replay.material import Material, ReplayRequest, Work, check_window
 from live.replay.pictures import picture_material, picture_of
 from live.replay.session import session_config, session_material, session_path
 from live.setup import (
+    AUTO,
     Config,
     compile_ahead,
     correction,
@@ -94,6 +95,10 @@ def _replay_pictures(request: ReplayRequest, screen: Screen, stopping: threading
 def _run(
     material: Material, config: Config, request: ReplayRequest, screen: Screen, stopping: threading.Event
 ) -> Replayed:
+    if config.measure.roi == AUTO:
+        raise ConfigError(
+            "--roi auto is looked for on a live camera; a replay takes --roi X,Y,W,H or all, and --mask"
+        )
     camera = material.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
     grid = grid_for(config, camera.width, camera.height, mask)

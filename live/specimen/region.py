@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import parse_address
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
 from acquire.events import ignore_event
@@ -169,13 +168,11 @@ def _mean_and_noise(images: list[NDArray[Any]]) -> tuple[NDArray[Any], float | N
 
 @contextmanager
 def searched(config: Config, say: Callable[[str], None]) -> Iterator[Config]:
-    """The configuration of a test, with the specimen found where no region is given.
+    """The configuration of a test, with the specimen found where ``--roi auto`` asks for it.
 
-    A simulated specimen knows where it is, and is looked for on demand alone. The mask lies in a folder
-    that is gone afterwards: a run has its own copy by then.
+    The mask lies in a folder that is gone afterwards: a run has its own copy by then.
     """
-    simulated = parse_address(config.camera.address or "none:").scheme in ("sim", "bench")
-    if not config.camera.address or not is_sought(config) or (simulated and config.measure.roi != AUTO):
+    if not config.camera.address or not is_sought(config) or config.measure.roi != AUTO:
         yield config
         return
     seen = look(config)
