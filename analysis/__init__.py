@@ -10,9 +10,21 @@ the first ``PhaseKernel`` is made; ``warm_up`` does that ahead of a test.
 """
 
 from analysis.field import Roi, Status, StrainField, ZoiGrid
-from analysis.kernel import Estimator, KernelSettings, NoiseModel, PatternError, PhaseKernel, warm_up
+from analysis.kernel import (
+    COMPILE_PARTS,
+    PICTURE_KINDS,
+    Estimator,
+    KernelSettings,
+    NoiseModel,
+    PatternError,
+    PhaseKernel,
+    not_compiled,
+    warm_up,
+)
 
 __all__ = [
+    "COMPILE_PARTS",
+    "PICTURE_KINDS",
     "Estimator",
     "KernelSettings",
     "NoiseModel",
@@ -22,5 +34,6 @@ __all__ = [
     "Status",
     "StrainField",
     "ZoiGrid",
+    "not_compiled",
     "warm_up",
 ]

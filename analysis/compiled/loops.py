@@ -19,7 +19,7 @@ import numba
 log = logging.getLogger("analysis")
 
 _PACKAGE = Path(__file__).parents[1]
-_COMPILED = re.compile(r"^(?:from|import) (?:numba|analysis\.compiled)\b", re.MULTILINE)
+_COMPILED = re.compile(r"^(?:from|import) (?:numba|analysis\.compiled\.(?:loops|vectors))\b", re.MULTILINE)
 # Sums may be reordered for the vector unit, but NaN and infinity keep their meaning.
 FAST = {"contract", "reassoc", "nsz", "arcp", "afn"}
 

@@ -9,16 +9,16 @@ from analysis.kernel.noise import NoiseModel
 from analysis.kernel.phase_kernel import PhaseKernel
 from analysis.kernel.prepared import PatternError
 from analysis.kernel.settings import Estimator, KernelSettings
-from analysis.kernel.warm_up import KINDS, PARTS, missing, warm_up
+from analysis.kernel.warm_up import PICTURE_KINDS, COMPILE_PARTS, not_compiled, warm_up
 
 __all__ = [
-    "KINDS",
-    "PARTS",
+    "PICTURE_KINDS",
+    "COMPILE_PARTS",
     "Estimator",
     "KernelSettings",
     "NoiseModel",
     "PatternError",
     "PhaseKernel",
-    "missing",
+    "not_compiled",
     "warm_up",
 ]

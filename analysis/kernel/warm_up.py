@@ -19,12 +19,12 @@ log = logging.getLogger("analysis")
 COMPILE_SECONDS = 80
 """About how long one process takes for everything; said in the announcement."""
 ITERATION, REST, PHASE, ALL = "iteration", "rest", "phase", "all"
-PARTS = (ITERATION, REST)
-KINDS = ("uint8", "uint16", "float32")
+COMPILE_PARTS = (ITERATION, REST)
+PICTURE_KINDS = ("uint8", "uint16", "float32")
 """Of pictures: frames of up to 8 and 16 bits, means of bursts."""
 
 
-def missing(kinds: Sequence[str] = KINDS, *, phase: bool = True) -> bool:
+def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) -> bool:
     """Whether numba's cache lacks a loop that pictures of these kinds (and the estimator by phases) need."""
     from analysis.compiled.loops import is_cached
     from analysis.fit import assembly, clipping, iteration, sensitivity, verdict
@@ -39,7 +39,7 @@ def missing(kinds: Sequence[str] = KINDS, *, phase: bool = True) -> bool:
     return not (all(map(is_cached, loops)) and all(is_cached(prefilter.coefficients, kind) for kind in kinds))
 
 
-def warm_up(part: str = ALL, kinds: Sequence[str] = KINDS, *, phase: bool = True) -> None:
+def warm_up(part: str = ALL, kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) -> None:
     """Compile, or load from numba's cache, every loop that a kernel can need.
 
     The first time on a machine this takes a minute or two and says so in the log.
@@ -61,7 +61,7 @@ def warm_up(part: str = ALL, kinds: Sequence[str] = KINDS, *, phase: bool = True
     if part == PHASE:
         _phase()
         return
-    if missing(kinds, phase=phase):
+    if not_compiled(kinds, phase=phase):
         log.info("compiling the kernel for this machine, once, about %d s", COMPILE_SECONDS)
     _everything(kinds, phase)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from analysis.kernel import KINDS
+from analysis import PICTURE_KINDS
 from live.setup import compile_ahead
 from live.tell import Screen
 
@@ -16,6 +16,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """0 once all is there."""
     screen = Screen()
-    took = compile_ahead(KINDS, phase=True, say=screen.status)
+    took = compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
     screen.say(f"everything is compiled ({took:.0f} s)" if took else "everything was compiled already")
     return 0

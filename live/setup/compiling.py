@@ -32,19 +32,19 @@ def compile_ahead(
     Parameters
     ----------
     kinds : sequence of str
-        Of ``analysis.kernel.KINDS``.
+        Of ``analysis.PICTURE_KINDS``.
     phase : bool
         Also for the estimator by phases.
     say : callable taking a text, optional
         Told again and again how far it is.
     """
-    from analysis.kernel import PARTS, missing
+    from analysis import COMPILE_PARTS, not_compiled
 
-    if not missing(kinds, phase=phase):
+    if not not_compiled(kinds, phase=phase):
         return 0.0
     began = time.monotonic()
     words = [",".join(kinds), "phase" if phase else "-"]
-    commands = [[sys.executable, "-m", "live.setup", part, *words] for part in PARTS]
+    commands = [[sys.executable, "-m", "live.setup", part, *words] for part in COMPILE_PARTS]
     processes = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]
     try:
         while any(process.poll() is None for process in processes):
@@ -57,7 +57,7 @@ def compile_ahead(
             if process.poll() is None:
                 process.terminate()
             process.wait()
-    if missing(kinds, phase=phase):
+    if not_compiled(kinds, phase=phase):
         log.warning("what was compiled could not be kept; make numba's cache writable (NUMBA_CACHE_DIR)")
     return time.monotonic() - began
 
@@ -65,12 +65,12 @@ def compile_ahead(
 def main(part: str, kinds: str, phase: str) -> int:
     """One of the processes."""
     from acquire import burst, hdf5
-    from analysis.kernel import PARTS, warm_up
+    from analysis import COMPILE_PARTS, warm_up
 
-    if part not in PARTS:
-        raise ConfigError(f"{part}: no part of the compilation; there are {', '.join(PARTS)}")
+    if part not in COMPILE_PARTS:
+        raise ConfigError(f"{part}: no part of the compilation; there are {', '.join(COMPILE_PARTS)}")
     warm_up(part, kinds.split(","))
-    if part != PARTS[0]:
+    if part != COMPILE_PARTS[0]:
         burst.compile_loops()
         hdf5.compile_loops()
         if phase == "phase":

@@ -41,7 +41,7 @@ def made_up(chance: random.Random) -> str:
         head = chance.choice(["[{}]", "[{}]", "[{}]", "[[{}]]", "{} = 3", "[{}.more]"])
         lines.append(head.format(section))
         kind: Any = FIELDS.get(section)
-        known = [part.name for part in dataclasses.fields(kind)] if kind else NAMES
+        known = [part.name for part in dataclasses.fields(kind)] if dataclasses.is_dataclass(kind) else NAMES
         for _ in range(chance.randint(0, 3)):
             key = chance.choice(known if chance.random() < 0.9 else NAMES)
             lines.append(f"{key} = {chance.choice(VALUES)}")

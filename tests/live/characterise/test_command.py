@@ -189,7 +189,7 @@ def test_inspect_draws_one_zoi(session: Path, tmp_path: Path, capsys: pytest.Cap
     assert "ZOI 1,2 (32 px at x 36, y 20)" in said
     assert "u = 0.3" in said or "u = 0.4" in said
     assert out.stat().st_size > 10_000
-    with pytest.raises(ConfigError, match="nothing is overwritten"):
+    with pytest.raises(ConfigError, match="is not overwritten"):
         inspect(inspected(*words))
 
 
@@ -203,7 +203,7 @@ def test_inspect_refuses(session: Path, tmp_path: Path, words: list[str], said: 
 
 
 def test_the_committed_page_links_to_what_is_there() -> None:
-    docs = Path(__file__).parents[2] / "docs"
+    docs = Path(__file__).parents[3] / "docs"
     text = (docs / "characterisation.md").read_text(encoding="utf-8")
     targets = re.findall(r"\]\(([^)]+)\)", text)
     assert len(targets) > 20

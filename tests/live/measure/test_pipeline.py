@@ -81,8 +81,9 @@ def test_a_renewed_reference_stays_composed(speckle: Speckle, on_demand: bool) -
         mixed = [w * picture(speckle, **g) + (1 - w) * picture(other, **g) for w, g in fading]
         steps = [burst(image, i) for i, image in enumerate(mixed, 1)]
     found = list(measure(steps, kernel, LoadLog(), noise_GL=noise, renew_at=0.2, on_event=told.append))
-    assert [event.kind for event in told] == [EventKind.REFERENCE]
-    assert told[0].data["automatic"] is not on_demand
+    renewals = [event for event in told if event.kind is EventKind.REFERENCE]
+    assert len(renewals) == 1
+    assert renewals[0].data["automatic"] is not on_demand
     last = found[-1].field
     assert np.isfinite(last.exx).mean() > (0.99 if on_demand else 0.7)
     assert last.mean("exx")[0] == pytest.approx(0.03, abs=2e-5 if on_demand else 2e-3)

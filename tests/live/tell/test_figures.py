@@ -12,6 +12,7 @@ from acquire.load_sample import LoadSample
 from live.measure import History
 from live.setup import SpecimenConfig
 from live.tell.figures import alignment_line, elastic_lines, evaluate, figure_lines, lag_line
+from live.tell import Books, Journal, Ledger
 from live.tell.summary import summary_lines
 from tests.analysis.evaluate.curves import Truth, composite, noisy, ramberg_osgood
 from tests.live.made_up import START, make_measurement
@@ -89,7 +90,8 @@ def test_the_direction_of_the_load_is_told() -> None:
     assert "off y (clockwise)" in alignment_line(history, FLAT)[0]
     assert "is specimen.axis = 'x' right?" in alignment_line(history, replace(FLAT, axis="x"))[0]
     assert alignment_line(History(), FLAT) == []
-    assert any("off y" in line for line in summary_lines(history, loads, FLAT))
+    books = Books(Journal(), Ledger(), loads, history)
+    assert any("off y" in line for line in summary_lines(books, FLAT))
 
 
 def test_any_section_gives_an_area() -> None:
