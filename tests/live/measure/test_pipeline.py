@@ -81,6 +81,7 @@ def test_a_renewed_reference_stays_composed(speckle: Speckle, on_demand: bool) -
         mixed = [w * picture(speckle, **g) + (1 - w) * picture(other, **g) for w, g in fading]
         steps = [burst(image, i) for i, image in enumerate(mixed, 1)]
     found = list(measure(steps, kernel, LoadLog(), noise_GL=noise, renew_at=0.2, on_event=told.append))
+    told = [event for event in told if event.source != "strain"]  # 2 and 3 % of small strain are told too
     assert [event.kind for event in told] == [EventKind.REFERENCE]
     assert told[0].data["automatic"] is not on_demand
     last = found[-1].field
