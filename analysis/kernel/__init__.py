@@ -9,11 +9,11 @@ from analysis.kernel.noise import NoiseModel
 from analysis.kernel.phase_kernel import PhaseKernel
 from analysis.kernel.prepared import PatternError
 from analysis.kernel.settings import Estimator, KernelSettings
-from analysis.kernel.warm_up import PICTURE_KINDS, COMPILE_PARTS, not_compiled, warm_up
+from analysis.kernel.warm_up import COMPILE_PARTS, PICTURE_KINDS, not_compiled, warm_up
 
 __all__ = [
-    "PICTURE_KINDS",
     "COMPILE_PARTS",
+    "PICTURE_KINDS",
     "Estimator",
     "KernelSettings",
     "NoiseModel",

@@ -11,8 +11,8 @@ from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from live.measure import History
 from live.setup import SpecimenConfig
-from live.tell.figures import alignment_line, elastic_lines, evaluate, figure_lines, lag_line
 from live.tell import Books, Journal, Ledger
+from live.tell.figures import alignment_line, elastic_lines, evaluate, figure_lines, lag_line
 from live.tell.summary import summary_lines
 from tests.analysis.evaluate.curves import Truth, composite, noisy, ramberg_osgood
 from tests.live.made_up import START, make_measurement
