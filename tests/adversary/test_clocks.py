@@ -142,7 +142,11 @@ def test_twelve_hours_at_one_frame_a_second(run: Callable[..., Outcome], tmp_pat
 def test_twenty_megapixels(tmp_path: Path) -> None:
     shape = (3648, 5472)
     part = 20 + 200 * Speckle((512, 512), radius=2.0, seed=3).render(Affine(), (512, 512))
-    tile = np.rint(np.tile(part, (8, 11))[: shape[0], : shape[1]]).astype(np.uint8)
+    # A slow change of the light, so that no place looks like another.
+    light = cv2.resize(
+        np.random.default_rng(0).uniform(0.6, 1.0, (57, 86)), shape[::-1], interpolation=cv2.INTER_CUBIC
+    )
+    tile = np.rint(np.tile(part, (8, 11))[: shape[0], : shape[1]] * np.clip(light, 0.5, 1.1)).astype(np.uint8)
     for k in range(2):
         cv2.imwrite(str(tmp_path / f"a{k}.tif"), np.roll(tile, k, axis=1))
     more = ["--zoi", "128", "--step", "512", "--no-view", "--no-rrd", "--out", str(tmp_path / "out")]

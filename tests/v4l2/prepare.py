@@ -37,10 +37,12 @@ def compile_loops() -> None:
     """Every loop a run needs, for both sample types, by a small run of the measuring path."""
     from acquire.burst.accumulate import burst_of
     from acquire.frame import Frame, frozen
+    from acquire.hdf5 import compile_loops as compile_recording
     from analysis import KernelSettings, PhaseKernel, Roi, ZoiGrid
     from analysis.kernel import warm_up
 
     warm_up()
+    compile_recording()
     grid = ZoiGrid.cover(Roi(0, 0, 640, 480), size=64, step=64)
     for bits in (8, 12):
         image = frozen(picture(bits))
