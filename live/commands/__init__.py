@@ -1,1 +1,1 @@
-"""The commands, one file each; ``arguments`` is what can be said, ``overrides`` what it sets."""
+"""The commands, one file each; ``arguments`` lists them, ``options`` says the keys of the configuration."""
