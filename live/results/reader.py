@@ -196,8 +196,9 @@ def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
 
 def _columns(mean: Any) -> dict[str, Any]:
     """All columns: those that every file has, and whatever another version has added."""
-    needed = {name: layout.column_declared(name) for name in layout.NEEDED}
-    return open_datasets(mean, dict.fromkeys(mean, layout.ANY_COLUMN) | needed)
+    ours = {*layout.NEEDED, *(name for name in mean if name in layout.KNOWN)}
+    known = {name: layout.column_declared(name) for name in ours}
+    return open_datasets(mean, dict.fromkeys(mean, layout.ANY_COLUMN) | known)
 
 
 def _rows(path: Path, datasets: Sequence[Any], *, whole: bool) -> int:

@@ -17,12 +17,15 @@ from analysis.compiled.loops import stamp
 PACKAGE = Path(analysis.__file__).parent
 
 
+COMPILING = ("analysis.compiled.loops", "analysis.compiled.vectors")
+
+
 def imports_numba(module: Path) -> bool:
     """Whether a module imports numba, or what compiles with it, when it is imported itself."""
     nodes = ast.parse(module.read_text(encoding="utf-8")).body
     names = [n.module or "" for n in nodes if isinstance(n, ast.ImportFrom)]
     names += [alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names]
-    return any(name.split(".")[0] == "numba" or name.startswith("analysis.compiled") for name in names)
+    return any(name.split(".")[0] == "numba" or name.startswith(COMPILING) for name in names)
 
 
 COMPILED = sorted(m.relative_to(PACKAGE).as_posix() for m in PACKAGE.rglob("*.py") if imports_numba(m))
