@@ -24,6 +24,8 @@ from hw_mocks.speckle import Speckle
 
 STILL = 1.0
 """Seconds without motion at the start, for the reference."""
+SPOT_PX = 6
+"""Radius of a spot of glare."""
 SHIFT_PX, STRAIN = (0.11, -0.07), (-3e-5, 1e-4)
 """Motion of the middle (x, y), and strain (exx, eyy), from one picture to the next."""
 
@@ -44,7 +46,7 @@ class MemorySettings:
     buffers : int
         Of the ring.
     saturated : float
-        Share of the pixels that are at saturation.
+        Share of the pixels that are at saturation, in spots.
     """
 
     width: int = 1280
@@ -122,8 +124,7 @@ def render(settings: MemorySettings) -> list[NDArray[np.uint8] | NDArray[np.uint
     shape = (settings.height, settings.width)
     speckle = Speckle(shape, 2.0, margin=16, seed=1)
     exposer = Exposer(Sensor.with_noise(settings.bits, 0.01), shape, seed=1)
-    rng = np.random.default_rng(2)
-    bright = rng.random(shape) < settings.saturated
+    bright = glare(shape, settings.saturated)
     pictures = []
     for k in (0, *range(settings.pictures)):
         pulled = Affine(
@@ -134,6 +135,17 @@ def render(settings: MemorySettings) -> list[NDArray[np.uint8] | NDArray[np.uint
         image[bright] = 2**settings.bits - 1
         pictures.append(frozen(image))
     return pictures
+
+
+def glare(shape: tuple[int, int], share: float) -> NDArray[np.bool_]:
+    """Spots that reflect the lamp, (H, W): about ``share`` of the picture."""
+    rng, bright = np.random.default_rng(2), np.zeros(shape, np.bool_)
+    y, x = np.ogrid[-SPOT_PX : SPOT_PX + 1, -SPOT_PX : SPOT_PX + 1]
+    spot = x**2 + y**2 <= SPOT_PX**2
+    for _ in range(round(share * bright.size / spot.sum())):
+        top, left = (int(rng.integers(0, n - len(spot))) for n in shape)
+        bright[top : top + len(spot), left : left + len(spot)] |= spot
+    return bright
 
 
 def open_memory_camera(address: Address) -> MemoryCamera:
