@@ -49,13 +49,15 @@ class Pace:
     def __init__(self, backlog: Callable[[], float], use: Callable[[], Use | None] = used) -> None:
         self._backlog, self._use = backlog, use
         self._lags: deque[Lag] = deque()
-        self._began = use()
+        self._before: Use | None = (
+            None  # when the pace was first found lost: nothing is read while all is well
+        )
         self._told = -math.inf
         self._judged = -math.inf
         self.p95_s = math.nan
 
     def look(self, lag: Lag, period_s: float) -> str:
-        """Take note of a measurement; a warning where the pace is lost, else empty.
+        """Take note of a measurement; a warning where the pace has been lost for a second, else empty.
 
         Parameters
         ----------
@@ -70,11 +72,14 @@ class Pace:
             return ""
         self._judged = lag.t
         self.p95_s = float(np.percentile([one.latency_s for one in self._lags], 95))
-        now = self._use()
-        before, self._began = self._began, now
         if not self.p95_s > LATE_PERIODS * period_s or lag.t - self._told < EVERY_S:
+            self._before = None
             return ""
-        self._told = lag.t
+        now, before = self._use(), self._before
+        if before is None and now is not None:
+            self._before = now
+            return ""
+        self._told, self._before = lag.t, None
         late, period = self.p95_s * 1e3, period_s * 1e3
         cause = self._cause(before, now, period_s)
         return f"results come up to {late:.0f} ms late (p95), bursts every {period:.0f} ms: {cause}"
