@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
 from live.measure import usable
+from live.setup.checks import AUTO
 from live.setup.config import Config
 
 if TYPE_CHECKING:
@@ -21,11 +22,15 @@ def grid_for(config: Config, width: int, height: int, mask: NDArray[np.bool_] | 
     Raises
     ------
     ConfigError
-        The ROI leaves the picture, or no ZOI fits into it.
+        The ROI leaves the picture, was not looked for, or no ZOI fits into it.
     """
     from analysis import Roi, ZoiGrid
 
     m = config.measure
+    if m.roi == AUTO and m.mask is None:
+        raise ConfigError(
+            "measure.roi = 'auto' is looked for on a live camera, by run and check; here give x,y,width,height or 'all'"
+        )
     x, y, w, h = m.roi if isinstance(m.roi, tuple) else whole_picture(width, height, m.zoi)
     if x + w > width or y + h > height:
         raise ConfigError(

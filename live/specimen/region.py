@@ -172,7 +172,7 @@ def searched(config: Config, say: Callable[[str], None]) -> Iterator[Config]:
 
     The mask lies in a folder that is gone afterwards: a run has its own copy by then.
     """
-    if not config.camera.address or not is_sought(config) or config.measure.roi != AUTO:
+    if not config.camera.address or config.measure.roi != AUTO or not is_sought(config):
         yield config
         return
     seen = look(config)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 from acquire.errors import ConfigError
 from live.setup.config import Config, from_dict, load_config, settings_in
+from live.setup.grid import grid_for
 
 
 def written(folder: Path, text: str) -> Path:
@@ -126,3 +127,9 @@ def test_any_value_of_a_stored_key_is_taken_or_refused(value: Any) -> None:
             from_dict({"measure": {key: value}}, {}, "a session")
         except ConfigError as error:
             assert f"measure.{key}" in str(error)
+
+
+def test_a_region_that_nobody_has_looked_for_is_refused() -> None:
+    config = load_config(None, {"measure.roi": "auto"})
+    with pytest.raises(ConfigError, match="looked for on a live camera"):
+        grid_for(config, 640, 480, None)
