@@ -19,7 +19,7 @@ from live.measure.preparation import (
     usable,
 )
 from live.measure.reference import Reference, ReferenceTaker
-from live.measure.rehearsal import rehearse
+from live.measure.rehearsal import kinds_of, rehearse
 from live.measure.settling import HOLD_S, Loads, Settling
 from live.measure.smear_guard import SmearGuard
 
@@ -37,6 +37,7 @@ __all__ = [
     "SmearGuard",
     "averaged",
     "frame_noise",
+    "kinds_of",
     "measure",
     "motion_between",
     "ordered_mean",

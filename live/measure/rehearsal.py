@@ -21,6 +21,11 @@ if TYPE_CHECKING:
     from analysis import KernelSettings, ZoiGrid
 
 
+def kinds_of(camera: CameraInfo) -> tuple[str, ...]:
+    """The kinds of pictures that a camera's frames and bursts are (of ``analysis.PICTURE_KINDS``)."""
+    return ("uint8" if camera.bits <= 8 else "uint16", "float32")
+
+
 def rehearse(camera: CameraInfo, grid: ZoiGrid, settings: KernelSettings, bursts: tuple[int, int]) -> None:
     """Average, prepare, measure and evaluate made-up frames as the test will.
 
@@ -34,8 +39,7 @@ def rehearse(camera: CameraInfo, grid: ZoiGrid, settings: KernelSettings, bursts
     """
     from analysis import warm_up
 
-    phase = settings.estimator == "phase"
-    warm_up(kinds=("uint8" if camera.bits <= 8 else "uint16", "float32"), phase=phase)
+    warm_up(kinds=kinds_of(camera), phase=settings.estimator == "phase")
     images = [_image(camera, seed) for seed in (1, 2)]
     reference, *_ = [_averaged(camera, images, n) for n in bursts]
     kernel, noise_GL = prepare(reference.burst, grid, settings, None, what="measure")

@@ -18,20 +18,18 @@ from typing import Any, cast
 from acquire.errors import ConfigError, DataError
 from acquire.events import EventKind
 from acquire.session import Session
-from live.measure import History, measure, prepare
+from live.measure import History, kinds_of, measure, prepare
 from live.outputs import About, Outputs, make_outputs
 from live.replay.material import Material, ReplayRequest, Work, check_window
 from live.replay.pictures import picture_material, picture_of
 from live.replay.session import session_config, session_material, session_path
 from live.setup import (
-    AUTO,
     Config,
     compile_ahead,
     correction,
     gauges_for,
     grid_for,
     kernel_settings,
-    kinds_of,
     load_config,
     make_folder,
     open_rig,
@@ -95,10 +93,6 @@ def _replay_pictures(request: ReplayRequest, screen: Screen, stopping: threading
 def _run(
     material: Material, config: Config, request: ReplayRequest, screen: Screen, stopping: threading.Event
 ) -> Replayed:
-    if config.measure.roi == AUTO:
-        raise ConfigError(
-            "--roi auto is looked for on a live camera; a replay takes --roi X,Y,W,H or all, and --mask"
-        )
     camera = material.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
     grid = grid_for(config, camera.width, camera.height, mask)

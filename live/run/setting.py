@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acquire.clock import ClockPair
 from acquire.hdf5 import compile_loops
 from acquire.record_mode import RecordMode
-from live.measure import Correction, rehearse
+from live.measure import Correction, kinds_of, rehearse
 from live.setup import (
     DEFAULT_BURST,
     DEFAULT_REFERENCE_BURST,
@@ -24,7 +24,6 @@ from live.setup import (
     gauges_for,
     grid_for,
     kernel_settings,
-    kinds_of,
     make_folder,
     read_mask,
     with_flat_field,

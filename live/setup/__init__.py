@@ -7,7 +7,7 @@ compiled ahead, ``folder`` makes the place for the files.
 """
 
 from live.setup.checks import ALL, AUTO
-from live.setup.compiling import compile_ahead, kinds_of
+from live.setup.compiling import compile_ahead
 from live.setup.config import Config, from_dict, load_config, options, settings_in
 from live.setup.folder import FILES, make_folder, versions
 from live.setup.gauges import GaugeConfig, describe, gauges_for
@@ -33,7 +33,6 @@ __all__ = [
     "gauges_for",
     "grid_for",
     "kernel_settings",
-    "kinds_of",
     "load_config",
     "make_folder",
     "open_load",

@@ -1,7 +1,8 @@
 """Compiling ahead of a test, by processes of its own; a test itself only loads what is compiled.
 
 ``python -m live.setup PART KINDS PHASE`` is one of the two processes. The process that compiles a loop
-may sum in another order than one that loads it, so the program never measures with what it has compiled itself.
+may sum in another order than one that loads it, so a run or a replay does not measure with what it has compiled
+itself, unless numba's cache cannot be written.
 """
 
 from __future__ import annotations
@@ -13,15 +14,9 @@ import time
 from collections.abc import Callable, Sequence
 
 from acquire.errors import ConfigError
-from acquire.frame import CameraInfo
 
 log = logging.getLogger(__name__)
 _POLL_S = 0.25
-
-
-def kinds_of(camera: CameraInfo) -> tuple[str, ...]:
-    """The kinds of pictures that a camera's frames and bursts are."""
-    return ("uint8" if camera.bits <= 8 else "uint16", "float32")
 
 
 def compile_ahead(
