@@ -10,26 +10,42 @@ from collections import deque
 from typing import Generic, TypeVar
 
 Item = TypeVar("Item")
+Stored = TypeVar("Stored")
 
 
-class Mailbox(Generic[Item]):
+class _Channel(Generic[Stored]):
+    """What lies between two threads, and the end of it."""
+
+    def __init__(self) -> None:
+        self._items: deque[Stored] = deque()
+        self._change = threading.Condition()
+        self._closed = False
+
+    def close(self) -> None:
+        """No more items; what lies there can still be taken."""
+        with self._change:
+            self._closed = True
+            self._change.notify_all()
+
+    @property
+    def finished(self) -> bool:
+        """Closed and empty."""
+        with self._change:
+            return self._closed and not self._items
+
+
+class Mailbox(_Channel[Item]):
     """One place, newest wins: the measuring path never waits for old bursts.
 
     With ``waits=True`` ``put`` waits until the place is free, so that nothing is skipped: for
-    sources that wait for their reader.
-
-    Attributes
-    ----------
-    skipped : list of Item
-        What was replaced before anybody took it, until ``take_skipped`` fetches it.
+    sources that wait for their reader. What was replaced before anybody took it is kept until
+    ``take_skipped`` fetches it.
     """
 
     def __init__(self, *, waits: bool = False) -> None:
+        super().__init__()
         self._waits = waits
-        self._items: deque[Item] = deque()
         self._skipped: list[Item] = []
-        self._change = threading.Condition()
-        self._closed = False
 
     def put(self, item: Item) -> None:
         """Place ``item``; what lay there untaken is counted as skipped. Ignored after ``close``."""
@@ -58,20 +74,8 @@ class Mailbox(Generic[Item]):
             skipped, self._skipped = self._skipped, []
             return skipped
 
-    def close(self) -> None:
-        """No more items; what lies there can still be taken."""
-        with self._change:
-            self._closed = True
-            self._change.notify_all()
 
-    @property
-    def finished(self) -> bool:
-        """Closed and empty."""
-        with self._change:
-            return self._closed and not self._items
-
-
-class ByteBuffer(Generic[Item]):
+class ByteBuffer(_Channel[tuple[Item, int]], Generic[Item]):
     """A queue bounded in bytes; a put beyond the bound is refused and counted by the caller.
 
     Parameters
@@ -82,11 +86,9 @@ class ByteBuffer(Generic[Item]):
     """
 
     def __init__(self, limit: int, *, waits: bool = False) -> None:
+        super().__init__()
         self._limit, self._waits = limit, waits
-        self._items: deque[tuple[Item, int]] = deque()
         self._bytes = 0
-        self._change = threading.Condition()
-        self._closed = False
 
     def put(self, item: Item, size: int, *, always: bool = False) -> bool:
         """Queue ``item`` of ``size`` bytes; False where there is no room, or after ``close``.
@@ -116,18 +118,6 @@ class ByteBuffer(Generic[Item]):
             self._bytes -= size
             self._change.notify_all()
             return item
-
-    def close(self) -> None:
-        """No more items; what is queued can still be taken."""
-        with self._change:
-            self._closed = True
-            self._change.notify_all()
-
-    @property
-    def finished(self) -> bool:
-        """Closed and empty."""
-        with self._change:
-            return self._closed and not self._items
 
     @property
     def waiting_bytes(self) -> int:
