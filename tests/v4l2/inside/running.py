@@ -72,6 +72,8 @@ class Run:
         self._words = out.with_suffix(".txt")
         argv = [
             sys.executable,
+            "-X",
+            "faulthandler",  # one that does not end says where it stands
             "-m",
             "live.cli",
             "run",
@@ -118,7 +120,12 @@ class Run:
     def end(self) -> int:
         """Interrupt it as Ctrl-C does, and give its exit code."""
         self._process.send_signal(signal.SIGINT)
-        return self._process.wait(60)
+        try:
+            return self._process.wait(60)
+        except subprocess.TimeoutExpired:
+            self._process.send_signal(signal.SIGABRT)
+            self._process.wait(10)
+            raise AssertionError(f"still running 60 s after Ctrl-C:\n{self.words()}") from None
 
     def __enter__(self) -> Self:
         return self
