@@ -118,14 +118,17 @@ class Run:
             raise AssertionError(f"{error}; {len(self.rows())} rows\n{self.words()[-3000:]}") from error
 
     def end(self) -> int:
-        """Interrupt it as Ctrl-C does, and give its exit code."""
+        """Interrupt it as Ctrl-C does, and give its exit code.
+
+        An emulated machine records more slowly than its camera goes: what waits is written first.
+        """
         self._process.send_signal(signal.SIGINT)
         try:
-            return self._process.wait(60)
+            return self._process.wait(300)
         except subprocess.TimeoutExpired:
             self._process.send_signal(signal.SIGABRT)
             self._process.wait(10)
-            raise AssertionError(f"still running 60 s after Ctrl-C:\n{self.words()}") from None
+            raise AssertionError(f"still running 300 s after Ctrl-C:\n{self.words()}") from None
 
     def __enter__(self) -> Self:
         return self
