@@ -14,6 +14,7 @@ from tests.house import importing, shape
 from tests.house.rooms import (
     COMPILED,
     DOORS,
+    EXCEPT,
     LIBRARIES,
     MANY_FILES,
     MAY_START,
@@ -74,7 +75,7 @@ def test_libraries_have_a_home(house: House) -> None:
 
 def test_what_rooms_do_without(house: House) -> None:
     """Numerics and the measuring path: no thread, file, device or clock. Nothing from a file is executed."""
-    none_of(importing.never(house, NEVER))
+    none_of(importing.never(house, NEVER, EXCEPT))
 
 
 def test_numba_is_loaded_by_compiled_loops_alone(house: House) -> None:

@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numba
@@ -37,7 +38,25 @@ def helper(function: Callable[..., Any]) -> Any:
 def parallel(function: Callable[..., Any]) -> Any:
     """A loop over ZOIs or rows, shared among the threads; each item is done by one of them."""
     options = {"error_model": "numpy", "fastmath": FAST, "cache": True, "nogil": True, "parallel": True}
-    return _stamped(numba.njit(function, **options))
+    return InTurn(_stamped(numba.njit(function, **options)))
+
+
+class InTurn:
+    """A loop that all threads of the program take in turn.
+
+    Each uses all cores, so that two at once gain nothing, and where numba finds neither OpenMP nor TBB they
+    end the program.
+    """
+
+    _turn = Lock()
+
+    def __init__(self, dispatcher: Any) -> None:
+        self.dispatcher = dispatcher
+
+    def __call__(self, *arguments: Any) -> Any:
+        """Run the loop, once no other one runs."""
+        with InTurn._turn:
+            return self.dispatcher(*arguments)
 
 
 def _stamped(dispatcher: Any) -> Any:
@@ -68,7 +87,8 @@ def _own_stamp() -> tuple[tuple[str, float, int], ...]:
 
 
 def is_cached(function: Any, kind: str = "") -> bool:
-    """Whether a dispatcher has compiled code, in this process or on disk, for a first argument of type ``kind``."""
+    """Whether a loop has compiled code, in this process or on disk, for a first argument of type ``kind``."""
+    function = getattr(function, "dispatcher", function)
     if any(kind in str(signature[0]) for signature in function.signatures):
         return True
     try:

@@ -12,7 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.picture import TAPS, Box
+
 Floats = NDArray[np.float64]
+
+RUNNING, CONVERGED, LEFT_IMAGE, DIVERGED = 0, 1, 2, 3
+"""What became of the iteration of a ZOI (``Out.state``)."""
 
 
 class Picture(NamedTuple):
@@ -21,16 +26,32 @@ class Picture(NamedTuple):
     Attributes
     ----------
     c : flat float32
-        Coefficients (``prefilter.coefficients``).
-    width, height : int, px
-    over : float, px
-        How far a ZOI may stick out of the image.
+        Coefficients (``prefilter.coefficients``), of a part of the image or of all.
+    width : int, px
+        Of the image.
+    left, right, top, bottom : float, px
+        Where the corners of a ZOI may lie.
     """
 
     c: NDArray[np.float32]
     width: int
-    height: int
-    over: float
+    left: float
+    right: float
+    top: float
+    bottom: float
+
+    @classmethod
+    def within(cls, c: NDArray[np.float32], shape: tuple[int, int], box: Box, over: float) -> Picture:
+        """With the coefficients of ``box``; a ZOI may stick ``over`` px out where that ends with the image."""
+        columns = _ends((box.left, box.right), shape[1], over)
+        return cls(c, shape[1], *columns, *_ends((box.top, box.bottom), shape[0], over))
+
+
+def _ends(ends: tuple[int, int], length: int, over: float) -> tuple[float, float]:
+    first, last = ends
+    return (-over if first == 0 else first + TAPS / 2), (
+        last - 1 + over if last == length else last - 1 - TAPS / 2
+    )
 
 
 class Fit(NamedTuple):

@@ -13,7 +13,7 @@ from numba import prange
 
 from analysis.compiled.loops import helper, inlined, parallel
 from analysis.compiled.vectors import LANES, fetch
-from analysis.fit.bundles import Fit, Out, Picture, Stop
+from analysis.fit.bundles import CONVERGED, DIVERGED, LEFT_IMAGE, RUNNING, Fit, Out, Picture, Stop
 from analysis.fit.moments import (
     CHANNELS,
     DEGREES,
@@ -29,7 +29,6 @@ from analysis.picture.warp import warp_cut_rows, warp_rows
 
 f4 = np.float32
 
-RUNNING, CONVERGED, LEFT_IMAGE, DIVERGED = 0, 1, 2, 3
 GAIN_RANGE = (0.15, 6.0)
 """A step is divided by the estimated gain only within this range."""
 LEFT_BY_NOISE = 1.15
@@ -40,21 +39,20 @@ LEFT_BY_LENGTH = 0.03
 """The same per px of the step, the next order of the expansion (measured: 0.004-0.03)."""
 LONGEST_STEP = 3.0
 """Pixels; a longer step at the edge of the ZOI is shortened to this."""
+CHUNK = 32
+"""ZOIs that a thread takes at a time."""
 AHEAD, BEYOND = 16, 3
 """ZOIs ahead of the present one whose pixels are asked for; taps beyond the pixel that they make."""
 
 
 @helper
 def _within(picture: Any, p: Any, order: int, cx: Any, cy: Any, reach: Any) -> bool:
-    """Whether the corners of the warped ZOI stay in the image, or at most ``over`` px beyond it."""
-    over = picture.over
+    """Whether the corners of the warped ZOI stay where they may lie."""
     for corner in range(4):
         x = reach if corner & 1 else -reach
         y = reach if corner & 2 else -reach
         u, v = displacement(p, order, x, y)
-        if not inside(
-            cx + x + u, cy + y + v, -over, picture.width - 1 + over, -over, picture.height - 1 + over
-        ):
+        if not inside(cx + x + u, cy + y + v, picture.left, picture.right, picture.top, picture.bottom):
             return False
     return True
 
@@ -190,8 +188,13 @@ def track(picture: Picture, table: Any, fit: Fit, stop: Stop, out: Out) -> None:
     ``table`` (18,) has the weights of the taps (``splines.tap_table``). It is no part of the picture, since
     read from a tuple it lets the compiler sum in another order, and the last digit of float32 changes.
     """
-    # What is written to needs a name of its own: in a parallel loop numba leaves out writes through a tuple
-    # (https://github.com/numba/numba/issues/10338).
+    for chunk in prange((len(fit.origins) + CHUNK - 1) // CHUNK):
+        _track_some(picture, table, fit, stop, out, chunk * CHUNK)
+
+
+@helper
+def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: int) -> None:
+    """``track`` for CHUNK ZOIs; a function of its own, since numba takes long over the body of a parallel loop."""
     p, left, bending, nuisance = out.p, out.left, out.bending, out.nuisance
     state, iterations = out.state, out.iterations
     count = fit.inverse.shape[1]
@@ -200,52 +203,50 @@ def track(picture: Picture, table: Any, fit: Fit, stop: Stop, out: Out) -> None:
     reach = (fit.size - 1) / 2
     lever = fit.size / 6.0
     line = fit.rows.shape[1]
-    chunks = (len(fit.origins) + 31) // 32
-    for chunk in prange(chunks):
-        g = np.zeros(ROWS * line + LANES, np.float32)
-        ramp = np.arange(line).astype(np.float32)
-        plan = new_plan(fit.size)
-        columns = np.empty((DIFFERENCE_ROWS, line), np.float32)
-        sums = np.empty((CHANNELS, DEGREES, DEGREES))
-        room = plan, ramp, g, columns, sums
-        m = np.empty(count)
-        step = np.empty(count)
-        solved = np.empty(count + LANES, np.float32)
-        bent_by = np.empty(2 * N_SHAPES)
-        for z in range(chunk * 32, min(chunk * 32 + 32, len(fit.origins))):
-            top, first = fit.origins[z]
-            q = p[z]
-            _fetch(picture, fit, z, q)
-            _fetch_all(fit.inverse, z + 2)
-            _fetch_all(fit.cross, z + 2)
-            state[z], iterations[z] = RUNNING, 0
-            left[z] = bending[z] = nuisance[z, 0] = nuisance[z, 1] = np.nan
-            for iteration in range(stop.max_iterations):
-                if not _within(picture, q, fit.order, first + reach, top + reach, reach):
-                    state[z] = LEFT_IMAGE
-                    break
-                energy = _moments(picture, table, fit, top, first, q, room, m, bent_by)
-                left[z] = _solve(fit.inverse, z, m, step, energy, solved)
-                gain: Any = 1 + step[modes]
-                nuisance[z, 0] = gain
-                nuisance[z, 1] = step[modes + 3]
-                gain = min(max(gain, GAIN_RANGE[0]), GAIN_RANGE[1])
-                bends = bent(bent_by, fit.cross, z, step, fit.squares[z, 0], fit.squares[z, 1], solved)
-                bending[z] = bends / gain**2
-                longest = 0.0
-                for i in range(modes):
-                    longest = max(longest, abs(step[i]) / gain)
-                if not longest < 1e3:
-                    state[z] = DIVERGED
-                    break
-                brake = min(1.0, LONGEST_STEP / longest) if longest > 0 else 1.0
-                for i in range(modes):
-                    step[i] *= fit.units[i] / gain * brake
-                compose(q, fit.order, step)
-                iterations[z] = iteration + 1
-                if brake == 1.0 and _settled(step, half, lever, stop.length[z], stop.slope[z], stop.trust[z]):
-                    state[z] = CONVERGED
-                    break
+    g = np.zeros(ROWS * line + LANES, np.float32)
+    ramp = np.arange(line).astype(np.float32)
+    plan = new_plan(fit.size)
+    columns = np.empty((DIFFERENCE_ROWS, line), np.float32)
+    sums = np.empty((CHANNELS, DEGREES, DEGREES))
+    room = plan, ramp, g, columns, sums
+    m = np.empty(count)
+    step = np.empty(count)
+    solved = np.empty(count + LANES, np.float32)
+    bent_by = np.empty(2 * N_SHAPES)
+    for z in range(start, min(start + CHUNK, len(fit.origins))):
+        top, first = fit.origins[z]
+        q = p[z]
+        _fetch(picture, fit, z, q)
+        _fetch_all(fit.inverse, z + 2)
+        _fetch_all(fit.cross, z + 2)
+        state[z], iterations[z] = RUNNING, 0
+        left[z] = bending[z] = nuisance[z, 0] = nuisance[z, 1] = np.nan
+        for iteration in range(stop.max_iterations):
+            if not _within(picture, q, fit.order, first + reach, top + reach, reach):
+                state[z] = LEFT_IMAGE
+                break
+            energy = _moments(picture, table, fit, top, first, q, room, m, bent_by)
+            left[z] = _solve(fit.inverse, z, m, step, energy, solved)
+            gain: Any = 1 + step[modes]
+            nuisance[z, 0] = gain
+            nuisance[z, 1] = step[modes + 3]
+            gain = min(max(gain, GAIN_RANGE[0]), GAIN_RANGE[1])
+            bends = bent(bent_by, fit.cross, z, step, fit.squares[z, 0], fit.squares[z, 1], solved)
+            bending[z] = bends / gain**2
+            longest = 0.0
+            for i in range(modes):
+                longest = max(longest, abs(step[i]) / gain)
+            if not longest < 1e3:
+                state[z] = DIVERGED
+                break
+            brake = min(1.0, LONGEST_STEP / longest) if longest > 0 else 1.0
+            for i in range(modes):
+                step[i] *= fit.units[i] / gain * brake
+            compose(q, fit.order, step)
+            iterations[z] = iteration + 1
+            if brake == 1.0 and _settled(step, half, lever, stop.length[z], stop.slope[z], stop.trust[z]):
+                state[z] = CONVERGED
+                break
 
 
 @helper

@@ -21,6 +21,8 @@ from analysis.fit.bundles import Images, Normal, WindowRows
 from analysis.fit.moments import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, product_moments
 from analysis.fit.shapes import cross_moments
 
+CHUNK = 32
+"""ZOIs that a thread takes at a time."""
 RIDGE = 1e-7
 """Added to the unit diagonal of the scaled normal matrix."""
 
@@ -133,57 +135,65 @@ def prepare(
     table : (P, 3), units : (6,)
     out : Normal, written
     """
-    inverse, cross, covariance, covariance_level = (
-        out.inverse,
-        out.cross,
-        out.covariance,
-        out.covariance_level,
-    )
-    freedom, energy = out.freedom, out.energy
+    for chunk in prange((len(origins) + CHUNK - 1) // CHUNK):
+        _prepare_some(images, origins, chunk * CHUNK, size, rows, table, units, out)
+
+
+@helper
+def _prepare_some(
+    images: Any, origins: Any, first: int, size: int, rows: Any, table: Any, units: Any, out: Any
+) -> None:
+    """``prepare`` for CHUNK ZOIs; a function of its own, since numba takes long over the body of a parallel loop."""
     count = len(table)
     order = 1 if count == 12 else 2
     affine = np.array([0, 1, 2, (count - 6) // 2, (count - 6) // 2 + 1, (count - 6) // 2 + 2])
     down, end, o = np.uintp(images.pitch), np.uintp(3 * images.samples), np.uintp(0)
     one = np.ones(rows.powers.shape[1], np.float32)
-    chunks = (len(origins) + 31) // 32
-    for chunk in prange(chunks):
-        columns = np.empty((PRODUCT_ROWS + SQUARE_ROWS, rows.powers.shape[1]), np.float32)
-        normal = np.empty((count, count))
-        middle = np.empty((count, count))
-        inv = np.empty((count, count))
-        low = np.empty((count, count))
-        of_w = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
-        of_q = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
-        for z in range(chunk * 32, min(chunk * 32 + 32, len(origins))):
-            at = np.uintp(origins[z, 0] * images.pitch + origins[z, 1])
+    columns = np.empty((PRODUCT_ROWS + SQUARE_ROWS, rows.powers.shape[1]), np.float32)
+    normal = np.empty((count, count))
+    middle = np.empty((count, count))
+    inv = np.empty((count, count))
+    low = np.empty((count, count))
+    of_w = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
+    of_q = np.zeros((N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
+    energy = out.energy
+    for z in range(first, min(first + CHUNK, len(origins))):
+        at = np.uintp(origins[z, 0] * images.pitch + origins[z, 1])
+        product_moments(
+            images.plain, images.plain, one, o, o, one, np.uintp(images.samples), at, down, size,
+            rows.powers, rows.squares, order, columns, of_w, of_q,
+        )  # fmt: skip
+        _assemble(of_w, table, normal)
+        total = of_w[6, 0, 0]
+        energy[z, 0] = of_w[0, 0, 0] / total
+        energy[z, 1] = of_w[2, 0, 0] / total
+        energy[z, 3] = of_w[9, 0, 0] / total
+        energy[z, 2] = of_w[5, 0, 0] / total - (of_w[9, 0, 0] / total) ** 2
+        if not _invert(normal, low, inv):
+            out.inverse[z].fill(0)
+            out.cross[z].fill(0)
+            out.covariance[z].fill(0)
+            out.freedom[z] = 0
+            continue
+        _copy(inv, out.inverse[z])
+        cross_moments(of_w, table, rows.mix, out.cross[z])
+        _assemble(of_q, table, middle)
+        _sandwich(inv, middle, affine, units, out.covariance[z])
+        out.freedom[z] = total - _taken(inv, middle)
+        if images.by_level.size:
             product_moments(
-                images.plain, images.plain, one, o, o, one, np.uintp(images.samples), at, down, size,
-                rows.powers, rows.squares, order, columns, of_w, of_q,
+                images.by_level, images.plain, images.by_level, end + at, down, one, np.uintp(images.samples),
+                at, down, size, rows.powers, rows.squares, order, columns, of_w, of_q,
             )  # fmt: skip
-            _assemble(of_w, table, normal)
-            total = of_w[6, 0, 0]
-            energy[z, 0] = of_w[0, 0, 0] / total
-            energy[z, 1] = of_w[2, 0, 0] / total
-            energy[z, 3] = of_w[9, 0, 0] / total
-            energy[z, 2] = of_w[5, 0, 0] / total - (of_w[9, 0, 0] / total) ** 2
-            if not _invert(normal, low, inv):
-                inverse[z] = 0
-                cross[z] = 0
-                covariance[z] = 0
-                freedom[z] = 0
-                continue
-            inverse[z] = inv
-            cross_moments(of_w, table, rows.mix, cross[z])
             _assemble(of_q, table, middle)
-            _sandwich(inv, middle, affine, units, covariance[z])
-            freedom[z] = total - _taken(inv, middle)
-            if images.by_level.size:
-                product_moments(
-                    images.by_level, images.plain, images.by_level, end + at, down, one, np.uintp(images.samples),
-                    at, down, size, rows.powers, rows.squares, order, columns, of_w, of_q,
-                )  # fmt: skip
-                _assemble(of_q, table, middle)
-                _sandwich(inv, middle, affine, units, covariance_level[z])
+            _sandwich(inv, middle, affine, units, out.covariance_level[z])
+
+
+@helper
+def _copy(matrix: Any, to: Any) -> None:
+    for i in range(matrix.shape[0]):
+        for j in range(matrix.shape[1]):
+            to[i, j] = matrix[i, j]
 
 
 @helper

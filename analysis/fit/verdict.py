@@ -12,8 +12,7 @@ from numba import prange
 
 from analysis.compiled.loops import helper, parallel
 from analysis.field import Status
-from analysis.fit.bundles import Known, Out, Rule
-from analysis.fit.iteration import CONVERGED, LEFT_IMAGE
+from analysis.fit.bundles import CONVERGED, LEFT_IMAGE, Known, Out, Rule
 from analysis.fit.validity import (
     BENDING_CHANCE,
     BENDING_SHARE,

@@ -44,6 +44,15 @@ class Placement:
     covariance: Floats
     status: NDArray[np.uint8]
 
+    def at(self, places: NDArray[np.intp] | slice) -> Placement:
+        """That of some of the ZOIs."""
+        if isinstance(places, slice) and places == slice(None):
+            return self
+        return Placement(
+            self.base[places], self.offset[places], self.origins[places], self.covariance[places],
+            self.status[places],
+        )  # fmt: skip
+
     def compose(self, local: Floats) -> Floats:
         """Parameters against the original reference, (A, modes), from those against the renewed one."""
         out = local + self.base

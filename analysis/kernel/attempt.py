@@ -10,16 +10,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.field import Status
-from analysis.fit.bundles import Fit, Known, Out, Picture, Rule
+from analysis.field import Status, profile
+from analysis.fit.bundles import LEFT_IMAGE, Fit, Known, Out, Picture, Rule
+from analysis.fit.validity import CLIPPED_SHARE
 from analysis.kernel.noise import NoiseModel
 from analysis.kernel.quadrature import Sensors
-from analysis.kernel.reference import SPILL_PX, Reference
-from analysis.picture import prefilter_taps, tap_table
+from analysis.kernel.reference import SPILL_PX, Places, Reference
+from analysis.picture import Box, prefilter_taps, tap_table
 
 Floats = NDArray[np.float64]
-Places = NDArray[np.intp] | slice
-"""Which of the active ZOIs."""
 
 
 class Attempt:
@@ -46,17 +45,13 @@ class Attempt:
     def __init__(
         self, reference: Reference, image: NDArray[Any], noise: NoiseModel | None, guess: Floats
     ) -> None:
-        from analysis.picture.prefilter import coefficients
-
-        prepared, degree = reference.prepared, reference.settings.interpolant
+        prepared = reference.prepared
         self.reference = reference
         self.image = image
         self.noise = noise
         self.guess = guess
-        height, width = prepared.shape
-        flat = coefficients(image, np.float32(prepared.pattern.mean), prefilter_taps(degree))
-        self.picture = Picture(flat, width, height, SPILL_PX)
-        self.table = tap_table(degree)
+        self.picture = self._picture(reference.reached(guess))
+        self.table = tap_table(reference.settings.interpolant)
         self.tolerance = reference.tolerance(self._current_std())
         able = prepared.status == Status.OK
         known = np.isfinite(guess.sum()) or np.isfinite(guess @ np.ones(guess.shape[1]))  # as a rule all
@@ -69,6 +64,14 @@ class Attempt:
         if len(which):
             self.keep(which, *self.tried(which, guess[which]))
 
+    def _picture(self, box: Box) -> Picture:
+        from analysis.picture.prefilter import coefficients
+
+        self._box, prepared = box, self.reference.prepared
+        taps = prefilter_taps(self.reference.settings.interpolant)
+        flat = coefficients(self.image, np.float32(prepared.pattern.mean), taps, box)
+        return Picture.within(flat, prepared.shape, box, SPILL_PX)
+
     def _current_std(self) -> float:
         if self.noise is None:
             return self.reference.noise
@@ -78,16 +81,35 @@ class Attempt:
         """What comes of the B ZOIs ``which`` from their guesses (B, modes), and their status; kept by ``keep``."""
         reference = self.reference
         places: Places = which if len(which) < len(reference.index) else np.s_[:]
-        if reference.sensors is None:
-            found = self._iterated(places, guess)
-        else:
-            found = self._by_phases(reference.sensors, places, guess)
+        found = self._found(places, guess)
+        if (
+            self._box != reference.whole and (found.state == LEFT_IMAGE).any()
+        ):  # it may have left the box alone
+            self.picture = self._picture(reference.whole)
+            found = self._found(places, guess)
         return found, self._judged(places, found)
+
+    def _found(self, places: Places, guess: Floats) -> Out:
+        if self.reference.sensors is None:
+            return self._iterated(places, guess)
+        return self._by_phases(self.reference.sensors, places, guess)
 
     def keep(self, which: NDArray[np.intp], found: Out, status: NDArray[np.uint8]) -> None:
         """Take over what was found of the ZOIs ``which``."""
         self.status[which] = status
         self.found.put(which, found)
+
+    def refuse_clipped(self, clipped: NDArray[np.bool_]) -> None:
+        """The status CLIPPED where too much of a ZOI lies on saturated pixels (H, W), found or as guessed."""
+        from analysis.fit.clipping import clipped_share
+
+        reference, grid = self.reference, self.reference.grid
+        ok = self.status == Status.OK
+        at = np.where(ok[:, None], self.found.p, self.guess)[:, [reference.modes // 2, 0]]
+        which = np.flatnonzero((reference.prepared.status == Status.OK) & np.isfinite(at).all(axis=1))
+        first = reference.prepared.origins[which] + np.rint(np.clip(at[which], -1e6, 1e6)).astype(np.int64)
+        share = clipped_share(clipped, first, profile(reference.settings.window, grid.size))
+        self.status[which[share > CLIPPED_SHARE]] = Status.CLIPPED
 
     def _iterated(self, which: Places, guess: Floats, max_iterations: int | None = None) -> Out:
         from analysis.fit.iteration import track
@@ -105,7 +127,7 @@ class Attempt:
         padded = which if isinstance(which, slice) else np.append(which, -1)
         return Fit(
             ready.images.ravel(), ready.images[0].size, ready.images.shape[2],
-            ready.origins[which], grid.size, grid.step, order, ready.shapes.rows, ready.shapes.mix,
+            ready.origins[which], grid.size, self.reference.spacing, order, ready.shapes.rows, ready.shapes.mix,
             ready.inverse[padded], ready.cross[padded],
             ready.weight * ready.energy[which], parameter_scale(order, grid.size),
         )  # fmt: skip

@@ -164,13 +164,13 @@ class PhaseKernel:
         saturated = clipped_pixels(image, clipped, model)
         if start is None:
             attempt = Attempt(reference, image, model, reference.searched(image))
-            rescue(attempt, None)
-            return field_of(attempt, saturated)
+            rescue(attempt, None, saturated)
+            return field_of(attempt)
         before, carried = self._before(start), self._carried_motion(start)
         predicted = before + carried.ahead
         attempt = Attempt(reference, image, model, reference.local(predicted))
-        rescue(attempt, reference.local(before))
-        return field_of(attempt, saturated, Expected(predicted, carried))
+        rescue(attempt, reference.local(before), saturated)
+        return field_of(attempt, Expected(predicted, carried))
 
     def _before(self, start: StrainField) -> Floats:
         """Parameters of the field before, (A, modes); NaN for a ZOI without."""

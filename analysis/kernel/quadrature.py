@@ -193,7 +193,8 @@ def iterate(
     -------
     parameters (A, 6), state (A,) and iterations (A,), as ``iteration.track`` gives them.
     """
-    from analysis.fit.iteration import CONVERGED, LEFT_IMAGE, RUNNING, compose_all, warp_zois, within_image
+    from analysis.fit.bundles import CONVERGED, LEFT_IMAGE, RUNNING
+    from analysis.fit.iteration import compose_all, warp_zois, within_image
 
     size = sensors.shape[-1]
     p = guess.copy()

@@ -19,13 +19,19 @@ from analysis.kernel.noise import Noise, NoiseModel, as_model
 from analysis.kernel.prepared import PatternError, Prepared, prepare_reference
 from analysis.kernel.quadrature import Sensors, make_sensors
 from analysis.kernel.settings import KernelSettings
+from analysis.picture import Box
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.float32]
+Places = NDArray[np.intp] | slice
+"""Which of the active ZOIs."""
+ALL = slice(None)
 
 SPILL_PX = 0.5
 """How far a ZOI may stick out of the image. Farther, what is missing counts: two rows less of a 64 px
 Gaussian ZOI gave 270 um/m, many times the predicted uncertainty."""
+REACHED_PX, REACHED_SHARE = 12.0, 0.15
+"""How far beyond the guess, in px and shares of a ZOI, an image is made ready; what goes farther asks for all."""
 _AFFINE = ((0, 15), (6, 11, 18, 20))
 """Variances of u and v, and of the four gradients, among the 21 pairs."""
 
@@ -50,6 +56,8 @@ class Reference:
         For the estimator by phases.
     placement : Placement or None
         Of a renewed reference on the first.
+    spacing : int, px
+        Between ZOIs that follow each other in a row.
     sharpness : float
         Independent pixels a ZOI would have without a window, over the sum of its weights squared.
     unit_covariance : (21, R, C) float32
@@ -69,6 +77,7 @@ class Reference:
     prepared: Prepared
     sensors: Sensors | None
     placement: Placement | None
+    spacing: int
     sharpness: float
     unit_covariance: NDArray[np.float32]
     unit_sigma: Floats
@@ -138,13 +147,31 @@ class Reference:
             max_iterations=settings.max_iterations,
         )
 
-    def local(self, total: Floats) -> Floats:
-        """Parameters against this reference from those against the original one, (A, modes)."""
-        return total if self.placement is None else self.placement.locate(total)
+    @property
+    def whole(self) -> Box:
+        """All of the image."""
+        height, width = self.prepared.shape
+        return Box(0, height, 0, width)
 
-    def total(self, local: Floats) -> Floats:
-        """Parameters against the original reference from those against this one, (A, modes)."""
-        return local if self.placement is None else self.placement.compose(local)
+    def reached(self, guess: Floats) -> Box:
+        """The part of a deformed image that ZOIs with a guess (A, modes) will need, as a rule."""
+        origins, half, size = self.prepared.origins, self.modes // 2, self.grid.size
+        if len(guess) == 0:
+            return self.whole
+        more = REACHED_PX + REACHED_SHARE * size
+        ends = [
+            (np.fmin.reduce(at) - more, np.fmax.reduce(at) + size + more)
+            for at in (origins[:, 0] + guess[:, half], origins[:, 1] + guess[:, 0])
+        ]
+        return Box.of(self.prepared.shape, *ends) if np.isfinite(ends).all() else self.whole
+
+    def local(self, total: Floats, places: Places = ALL) -> Floats:
+        """Parameters against this reference from those against the original one, (B, modes), of some ZOIs."""
+        return total if self.placement is None else self.placement.at(places).locate(total)
+
+    def total(self, local: Floats, places: Places = ALL) -> Floats:
+        """Parameters against the original reference from those against this one, (B, modes), of some ZOIs."""
+        return local if self.placement is None else self.placement.at(places).compose(local)
 
     def all_modes(self, affine: Floats) -> Floats:
         """Parameters (A, modes) from the six affine ones, (A, 6); the others are zero."""
@@ -192,11 +219,19 @@ def _laid_out(
         prepared=prepared,
         sensors=sensors,
         placement=placement,
+        spacing=_spacing(prepared.origins, grid.step),
         sharpness=sharpness,
         unit_covariance=np.ascontiguousarray(_spread(prepared.covariance, index, grid.shape, 0)),
         unit_sigma=np.stack([lengths.min(1), slopes.min(1), lengths.max(1)]),
         share_variance=1 / np.maximum(prepared.weight * sharpness * prepared.energy, 1e-12),
     )
+
+
+def _spacing(origins: NDArray[np.int64], step: int) -> int:
+    """The smallest distance in a row of ZOIs that follow each other; ``step`` where no two do."""
+    beside = np.diff(origins, axis=0)
+    gaps = beside[(beside[:, 0] == 0) & (beside[:, 1] > 0), 1]
+    return int(gaps.min()) if len(gaps) else step
 
 
 def _spread(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Status
 from analysis.kernel.attempt import Attempt
+from analysis.kernel.reference import Reference
 
 Floats = NDArray[np.float64]
 
@@ -19,7 +22,7 @@ _WORTH_RETRYING = np.isin(
 """By status."""
 
 
-def rescue(attempt: Attempt, before: Floats | None) -> None:
+def rescue(attempt: Attempt, before: Floats | None, clipped: NDArray[np.bool_] | None = None) -> None:
     """Try lost ZOIs again from other guesses; a worse outcome does not replace a better one.
 
     Parameters
@@ -27,9 +30,19 @@ def rescue(attempt: Attempt, before: Floats | None) -> None:
     attempt : Attempt
     before : (A, modes), or None
         Parameters of the frame before; None: the guess of the attempt was searched for.
+    clipped : (H, W) bool, or None
+        Saturated pixels: a ZOI on them is refused, before it is tried again and after.
     """
+    if clipped is not None:
+        attempt.refuse_clipped(clipped)
     if not _lost(attempt).any():
         return
+    _rescue(attempt, before)
+    if clipped is not None:
+        attempt.refuse_clipped(clipped)
+
+
+def _rescue(attempt: Attempt, before: Floats | None) -> None:
     reference = attempt.reference
     # Without its gradients a guess is right for ZOIs beside a discontinuity.
     displacements = np.arange(reference.modes) % (reference.modes // 2) == 0
@@ -47,9 +60,12 @@ def _lost(attempt: Attempt) -> NDArray[np.bool_]:
 
 def _retry(attempt: Attempt, guess: Floats) -> None:
     which = np.flatnonzero(_lost(attempt) & np.isfinite(guess).all(axis=1))
-    if len(which) == 0:
-        return
-    found, status = attempt.tried(which, guess[which])
+    if len(which):
+        _retry_some(attempt, which, guess[which])
+
+
+def _retry_some(attempt: Attempt, which: NDArray[np.intp], guess: Floats) -> None:
+    found, status = attempt.tried(which, guess)
     good = np.flatnonzero(status == Status.OK)
     attempt.keep(which[good], found.at(good), status[good])
 
@@ -57,43 +73,58 @@ def _retry(attempt: Attempt, guess: Floats) -> None:
 def _retry_from_neighbours(attempt: Attempt) -> None:
     """Let good ZOIs lend their shape to lost neighbours, round by round."""
     tried = np.zeros(len(attempt.status), np.uint8)
+    places = _Places.of(attempt.reference)
     for _ in range(RESCUE_ROUNDS):
-        guess, lenders = _lent(attempt)
-        fresh = np.isfinite(guess[:, 0]) & _lost(attempt) & (lenders > tried)
+        lost = np.flatnonzero(_lost(attempt))
+        guess, lenders = _lent(attempt, places, lost)
+        fresh = np.isfinite(guess[:, 0]) & (lenders > tried[lost])
         if not fresh.any():
             return
-        tried = lenders
-        _retry(attempt, np.where(fresh[:, None], guess, np.nan))
+        tried[lost] = lenders
+        _retry_some(attempt, lost[fresh], guess[fresh])
 
 
-def _lent(attempt: Attempt) -> tuple[Floats, NDArray[np.uint8]]:
-    """For each ZOI the mean of what its good neighbours predict there, and their number."""
-    reference = attempt.reference
-    good = attempt.status == Status.OK
-    shape = np.where(good[:, None], reference.total(attempt.found.p)[:, reference.affine], 0)
-    total, number = _around(
-        reference.spread(shape, 0.0), reference.spread(good[:, None].astype(float), 0.0)[0], reference.grid.step
-    )  # fmt: skip
-    with np.errstate(invalid="ignore"):
-        mean = np.where(number > 0, total / np.maximum(number, 1), np.nan)
-    guess = reference.all_modes(mean.reshape(6, -1)[:, reference.index].T)
-    return reference.local(guess), number.ravel()[reference.index].astype(np.uint8)
+class _Places(NamedTuple):
+    """Where the ZOIs lie on the grid.
 
-
-def _around(shape: Floats, valid: Floats, step: int) -> tuple[Floats, Floats]:
-    """Sum over the valid ones of a ZOI and its eight neighbours of what their shapes say of it, and their number.
-
-    ``shape`` (6, R, C) are u, du_dx, du_dy, v, dv_dx, dv_dy, ``valid`` (R, C) is 0 or 1.
+    Attributes
+    ----------
+    zoi : (R + 2, C + 2)
+        Which of the active ZOIs, -1 for none; the grid begins at (1, 1).
+    row, column : (A,)
+        Of each active ZOI in ``zoi``.
     """
-    rows, columns = valid.shape
-    total, number = np.zeros((6, rows, columns)), np.zeros((rows, columns))
-    padded, there = np.pad(shape, ((0, 0), (1, 1), (1, 1))), np.pad(valid, 1)
+
+    zoi: NDArray[np.intp]
+    row: NDArray[np.intp]
+    column: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, reference: Reference) -> _Places:
+        rows, columns = reference.grid.shape
+        row, column = np.unravel_index(reference.index, (rows, columns))
+        zoi = np.full((rows + 2, columns + 2), -1, np.intp)
+        zoi[row + 1, column + 1] = np.arange(len(reference.index))
+        return cls(zoi, row + 1, column + 1)
+
+
+def _lent(attempt: Attempt, places: _Places, lost: NDArray[np.intp]) -> tuple[Floats, NDArray[np.uint8]]:
+    """For each of the lost ZOIs (L,) the mean of what its good neighbours predict there, (L, modes), and their number.
+
+    Of a ZOI's shape u, du_dx, du_dy, v, dv_dx, dv_dy count, moved by the step to the neighbour.
+    """
+    reference, step = attempt.reference, attempt.reference.grid.step
+    good = np.append(attempt.status == Status.OK, False)  # the last for "none"
+    total, number = np.zeros((6, len(lost))), np.zeros(len(lost))
     for dy in (-1, 0, 1):
         for dx in (-1, 0, 1):
-            beside = np.s_[1 + dy : 1 + dy + rows, 1 + dx : 1 + dx + columns]
-            part = padded[:, *beside].copy()
+            zoi = places.zoi[places.row[lost] + dy, places.column[lost] + dx]
+            here = np.flatnonzero(good[zoi])
+            part = reference.total(attempt.found.p[zoi[here]], zoi[here])[:, reference.affine].T
             for r in (0, 3):
                 part[r] -= step * (dx * part[r + 1] + dy * part[r + 2])
-            total += part * there[beside]
-            number += there[beside]
-    return total, number
+            total[:, here] += part
+            number[here] += 1
+    with np.errstate(invalid="ignore"):
+        mean = np.where(number > 0, total / np.maximum(number, 1), np.nan)
+    return reference.local(reference.all_modes(mean.T), lost), number.astype(np.uint8)

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.field import Motion, Status, StrainField, profile
-from analysis.fit.validity import CLIPPED_SHARE
+from analysis.field import Motion, Status, StrainField
 from analysis.follow.renewal import UNSHARED, Placement
 from analysis.kernel.attempt import Attempt
 
@@ -30,24 +29,19 @@ class _Noise(NamedTuple):
     current: Floats
 
 
-def field_of(
-    attempt: Attempt, clipped: NDArray[np.bool_] | None, expected: Expected | None = None
-) -> StrainField:
+def field_of(attempt: Attempt, expected: Expected | None = None) -> StrainField:
     """The field that an attempt has found.
 
     Parameters
     ----------
     attempt : Attempt
-    clipped : (H, W) bool, or None
-        Saturated pixels of the image.
     expected : Expected, optional
         None: the field says nothing of the motion.
     """
     from analysis.fit.assembly import weigh
 
     reference, found = attempt.reference, attempt.found
-    states = attempt.status if clipped is None else _without_clipped(attempt, clipped)
-    ok = states == Status.OK
+    ok = attempt.status == Status.OK
     gain = found.nuisance[:, 0]
     noise = _noise_parts(attempt, ok)
     residual, first, whole = np.empty((3, len(ok)), np.float32)
@@ -62,7 +56,7 @@ def field_of(
         covariance=covariance,
         covariance_reference=covariance_reference,
         residual=reference.spread(residual[:, None])[0],
-        status=reference.spread(states[:, None], Status.NOT_MEASURED)[0],
+        status=reference.spread(attempt.status[:, None], Status.NOT_MEASURED)[0],
         iterations=reference.spread(found.iterations[:, None], 0)[0],
         gain=reference.spread(gain[:, None].astype(np.float32))[0],
         noise=_noise_found(attempt, ok, noise.current),
@@ -76,19 +70,6 @@ def _motion(attempt: Attempt, values: Floats, expected: Expected) -> Motion:
 
     lever = attempt.reference.grid.size / 6
     return motion_after(expected.motion, values, expected.values, attempt.tolerance.trust, lever)
-
-
-def _without_clipped(attempt: Attempt, clipped: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """The status of all ZOIs, CLIPPED where too much of one lies on saturated pixels."""
-    from analysis.fit.clipping import clipped_share
-
-    reference, status = attempt.reference, attempt.status.copy()
-    good = np.flatnonzero(status == Status.OK)
-    shift = np.rint(attempt.found.p[good][:, [reference.modes // 2, 0]]).astype(np.int64)
-    line = profile(reference.settings.window, reference.grid.size)
-    share = clipped_share(clipped, reference.prepared.origins[good] + shift, line)
-    status[good[share > CLIPPED_SHARE]] = Status.CLIPPED
-    return status
 
 
 def _noise_found(attempt: Attempt, ok: NDArray[np.bool_], current: Floats) -> float:

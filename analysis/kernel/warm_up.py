@@ -8,11 +8,16 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Motion, Roi, ZoiGrid, profile
+from analysis.picture import Box
+
+if TYPE_CHECKING:
+    from analysis.fit.bundles import Picture
 
 log = logging.getLogger("analysis")
 
@@ -54,9 +59,10 @@ def warm_up(part: str = ALL, kinds: Sequence[str] = PICTURE_KINDS, *, phase: boo
     """
     if part == ITERATION:
         _iteration()
+        _prefilter(kinds)
         return
     if part == REST:
-        _rest(kinds)
+        _rest()
         return
     if part == PHASE:
         _phase()
@@ -92,7 +98,7 @@ def _small() -> tuple[NDArray[np.float32], ZoiGrid]:
 
 def _iteration() -> None:
     """The iteration alone: called for no ZOI at all, it is compiled all the same."""
-    from analysis.fit.bundles import Fit, Out, Picture, Stop
+    from analysis.fit.bundles import Fit, Out, Stop
     from analysis.fit.iteration import track
 
     none, no_images = np.empty(0), np.empty((0, 6, 6), np.float32)
@@ -100,40 +106,54 @@ def _iteration() -> None:
         np.empty(0, np.float32), 0, 0, np.empty((0, 2), np.int64), 32, 16, 1,
         np.empty((4, 32), np.float32), np.empty((4, 4)), no_images, no_images, np.empty((0, 2)), np.empty(6),
     )  # fmt: skip
-    picture = Picture(np.empty(0, np.float32), 0, 0, 0.5)
-    track(picture, np.empty(18, np.float32), fit, Stop(none, none, none, 12), Out.starting(np.empty((0, 6))))
+    track(
+        _no_picture(),
+        np.empty(18, np.float32),
+        fit,
+        Stop(none, none, none, 12),
+        Out.starting(np.empty((0, 6))),
+    )
+
+
+def _no_picture() -> Picture:
+    from analysis.fit.bundles import Picture
+
+    return Picture.within(np.empty(0, np.float32), (0, 0), Box.of((0, 0), (0, 0), (0, 0)), 0.5)
 
 
 def _phase() -> None:
     """What only the estimator by phases needs, again for no ZOI at all."""
-    from analysis.fit.bundles import Picture
     from analysis.fit.iteration import compose_all, warp_zois, within_image
 
-    picture = Picture(np.empty(0, np.float32), 0, 0, 0.5)
-    origins, p = np.empty((0, 2), np.int64), np.empty((0, 6))
+    picture, origins, p = _no_picture(), np.empty((0, 2), np.int64), np.empty((0, 6))
     within_image(picture, origins, 32, p, np.empty(0, np.bool_))
     warp_zois(picture, np.empty(18, np.float32), origins, 32, p, np.empty((0, 32, 32), np.float32))
     compose_all(p, p)
 
 
-def _rest(kinds: Sequence[str]) -> None:
-    """All but the iteration and what only the estimator by phases needs."""
+def _prefilter(kinds: Sequence[str]) -> None:
+    """What every deformed image goes through first, for each kind of picture."""
+    from analysis.picture import prefilter_taps
+    from analysis.picture.prefilter import coefficients
+
+    for kind in kinds:
+        picture = _small()[0].astype(kind)
+        picture.flags.writeable = False
+        coefficients(picture, np.float32(100), prefilter_taps(5), Box(0, 96, 0, 96))
+
+
+def _rest() -> None:
+    """All but the iteration, the prefilter and what only the estimator by phases needs."""
     from analysis.fit.assembly import scale, weigh
     from analysis.fit.bundles import Known, Out, Rule
     from analysis.fit.clipping import clipped_share
     from analysis.fit.verdict import judge
     from analysis.follow.prediction import motion_after
     from analysis.kernel.phase_kernel import PhaseKernel
-    from analysis.picture import prefilter_taps
-    from analysis.picture.prefilter import coefficients
 
     image, grid = _small()
     kernel = PhaseKernel(image, grid)
     kernel.reference.searched(image)
-    for kind in kinds:
-        picture = image.astype(kind)
-        picture.flags.writeable = False
-        coefficients(picture, np.float32(100), prefilter_taps(5))
     line = profile("gaussian", 32)
     clipped_share(np.zeros((32, 32), np.bool_), np.zeros((1, 2), np.int64), line)
     none, pairs, single = np.empty(0), np.empty((0, 2)), np.empty(0, np.float32)

@@ -15,11 +15,13 @@ from analysis.picture.pattern import (
     sssig,
 )
 from analysis.picture.spectrum import Pattern, filtered_pattern
-from analysis.picture.splines import LINE, PAD, prefilter_taps, tap_table
+from analysis.picture.splines import LINE, PAD, TAPS, Box, prefilter_taps, tap_table
 
 __all__ = [
     "LINE",
     "PAD",
+    "TAPS",
+    "Box",
     "Pattern",
     "PatternReport",
     "autocorrelation_fwhm",

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper, inlined, parallel
 from analysis.compiled.vectors import LANES, load, spread, store
-from analysis.picture.splines import LINE, PAD, PREFILTER_REACH
+from analysis.picture.splines import LINE, PAD, PREFILTER_REACH, Box
 
 f4 = np.float32
+
 GROUP = 4 * LANES
 """Samples that are filtered at a time: one sum after the other would wait for each product."""
 BAND, STRIP = 16, 2 * GROUP
@@ -34,59 +35,78 @@ def _mirror(i: int, n: int) -> int:
 
 
 @parallel
-def coefficients(image: NDArray[Any], offset: Any, taps: NDArray[np.float32]) -> Any:
+def coefficients(image: NDArray[Any], offset: Any, taps: NDArray[np.float32], box: Box) -> Any:
     """Spline coefficients of ``image - offset`` (uint8, uint16 or float32), mirrored PAD pixels beyond each edge.
 
-    Returns flat float32: (H + 2 PAD) rows of W + 2 PAD, and a vector more than that. ``taps`` is one
-    side of the symmetric prefilter. A part of the image is filtered along x and y in one go, so that
-    what lies between stays in the cache.
+    Returns flat float32: (H + 2 PAD) rows of W + 2 PAD, and a vector more than that; outside ``box``
+    they are not computed. ``taps`` is one side of the symmetric prefilter.
     """
     height, width = image.shape
     stride = width + 2 * PAD
-    across = (width + GROUP - 1) // GROUP * GROUP
     out = np.empty((height + 2 * PAD) * stride + LANES, np.float32)
-    out[out.size - LANES :] = 0
-    for part in prange((height + PART - 1) // PART):
-        line = np.zeros(across + 2 * PREFILTER_REACH, np.float32)
-        # An odd number of cache lines a row, or the rows would displace each other.
-        ring = np.empty((RING, across + LINE), np.float32)
-        band = np.empty((BAND, across), np.float32)
-        beside, starts = np.arange(2 * PREFILTER_REACH + 1), np.empty(RING, np.intp)
-        ahead = part * PART - PREFILTER_REACH
-        last = min(part * PART + PART, height)
-        for first in range(part * PART, last, BAND):
-            count = min(BAND, last - first)
-            for y in range(ahead, first + count + PREFILTER_REACH):
-                _mirrored_line(image[_mirror(y, height)], offset, line)
-                _filter(line, beside, 0, across, taps, ring[(y + PREFILTER_REACH) % RING])
-            ahead = first + count + PREFILTER_REACH
-            for i in range(RING):
-                starts[i] = (first + i) % RING * ring.shape[1]
-            for x in range(0, across, STRIP):
-                for y in range(count):
-                    _filter(ring, starts[y:], x, min(x + STRIP, across), taps, band[y])
-            for y in range(count):
-                row = out[(first + y + PAD) * stride : (first + y + PAD + 1) * stride]
-                row[PAD : PAD + width] = band[y, :width]
-                for x in range(PAD):
-                    row[x] = band[y, _mirror(x - PAD, width)]
-                    row[PAD + width + x] = band[y, _mirror(width + x, width)]
+    for n in range(out.size - LANES, out.size):
+        out[n] = 0
+    for part in prange((box.bottom - box.top + PART - 1) // PART):
+        first = box.top + part * PART
+        _filter_part(image, offset, taps, box, first, min(first + PART, box.bottom), out)
     for y in range(PAD):
-        for to, source in ((y, _mirror(y - PAD, height)), (PAD + height + y, _mirror(height + y, height))):
-            source += PAD
-            out[to * stride : (to + 1) * stride] = out[source * stride : (source + 1) * stride]
+        if box.top == 0:
+            _copy_row(out, _mirror(y - PAD, height) + PAD, stride, y)
+        if box.bottom == height:
+            _copy_row(out, _mirror(height + y, height) + PAD, stride, PAD + height + y)
     return out
 
 
 @helper
-def _mirrored_line(row: Any, offset: Any, line: Any) -> None:
-    """A row of an image less ``offset`` with ``PREFILTER_REACH`` mirrored samples before and behind it."""
-    width = row.size
-    for x in range(width):
-        line[x + PREFILTER_REACH] = f4(row[x]) - offset
-    for x in range(PREFILTER_REACH):
-        line[x] = line[_mirror(x - PREFILTER_REACH, width) + PREFILTER_REACH]
-        line[width + PREFILTER_REACH + x] = line[_mirror(width + x, width) + PREFILTER_REACH]
+def _filter_part(image: Any, offset: Any, taps: Any, box: Any, top: int, bottom: int, out: Any) -> None:
+    """Rows ``top`` .. of the coefficients, along x and y in one go, so that what lies between stays in the cache."""
+    height, width = image.shape
+    stride = width + 2 * PAD
+    left = box.left // GROUP * GROUP
+    right = (box.right + GROUP - 1) // GROUP * GROUP
+    line = np.zeros((width + GROUP - 1) // GROUP * GROUP + 2 * PREFILTER_REACH, np.float32)
+    # An odd number of cache lines a row, or the rows would displace each other.
+    ring = np.empty((RING, line.size - 2 * PREFILTER_REACH + LINE), np.float32)
+    band = np.empty((BAND, line.size), np.float32)
+    beside, starts = np.arange(2 * PREFILTER_REACH + 1), np.empty(RING, np.intp)
+    ahead = top - PREFILTER_REACH
+    for first in range(top, bottom, BAND):
+        count = min(BAND, bottom - first)
+        for y in range(ahead, first + count + PREFILTER_REACH):
+            _mirrored_line(image[_mirror(y, height)], offset, left, right, line)
+            _filter(line, beside, left, right, taps, ring[(y + PREFILTER_REACH) % RING])
+        ahead = first + count + PREFILTER_REACH
+        for i in range(RING):
+            starts[i] = (first + i) % RING * ring.shape[1]
+        for x in range(left, right, STRIP):
+            for y in range(count):
+                _filter(ring, starts[y:], x, min(x + STRIP, right), taps, band[y])
+        for y in range(count):
+            row = out[(first + y + PAD) * stride : (first + y + PAD + 1) * stride]
+            for x in range(left, min(right, width)):
+                row[PAD + x] = band[y, x]
+            for x in range(PAD if left == 0 else 0):
+                row[x] = band[y, _mirror(x - PAD, width)]
+            for x in range(PAD if right >= width else 0):
+                row[PAD + width + x] = band[y, _mirror(width + x, width)]
+
+
+@helper
+def _copy_row(out: Any, source: int, stride: int, to: int) -> None:
+    for x in range(stride):
+        out[to * stride + x] = out[source * stride + x]
+
+
+@helper
+def _mirrored_line(row: Any, offset: Any, left: int, right: int, line: Any) -> None:
+    """Columns ``left`` .. ``right`` of a row less ``offset``, ``PREFILTER_REACH`` more beside, mirrored beyond it."""
+    width, reach = row.size, PREFILTER_REACH
+    for x in range(max(left - reach, 0), min(right + reach, width)):
+        line[x + reach] = f4(row[x]) - offset
+    for x in range(reach if left < reach else 0):
+        line[x] = line[_mirror(x - reach, width) + reach]
+    for x in range(reach if right + reach > width else 0):
+        line[width + reach + x] = line[_mirror(width + x, width) + reach]
 
 
 @helper

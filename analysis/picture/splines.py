@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import comb, factorial
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,28 @@ LINE = 16
 """Samples of a cache line."""
 PAD = 8
 """Pixels of mirrored surroundings that the coefficients of an image are given."""
+LEAST = 2 * PAD
+"""Pixels from an edge of the image within which a box ends there: what is mirrored lies in it."""
+
+
+class Box(NamedTuple):
+    """A part of an image: rows ``top`` .. ``bottom`` and columns ``left`` .. ``right``, the last ones not in it."""
+
+    top: int
+    bottom: int
+    left: int
+    right: int
+
+    @classmethod
+    def of(cls, shape: tuple[int, int], rows: tuple[float, float], columns: tuple[float, float]) -> Box:
+        """What of an image of ``shape`` lies between two rows and two columns."""
+        return cls(*_between(rows, shape[0]), *_between(columns, shape[1]))
+
+
+def _between(ends: tuple[float, float], length: int) -> tuple[int, int]:
+    first = int(min(max(ends[0], 0), max(length - LEAST, 0)))
+    last = int(min(max(ends[1] + 1, first + LEAST), length))
+    return (0 if first < LEAST else first), (length if last > length - LEAST else last)
 
 
 def basis(degree: int, x: NDArray[np.floating]) -> NDArray[np.float64]:

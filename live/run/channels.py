@@ -40,12 +40,25 @@ class Mailbox(_Channel[Item]):
     With ``waits=True`` ``put`` waits until the place is free, so that nothing is skipped: for
     sources that wait for their reader. What was replaced before anybody took it is kept until
     ``take_skipped`` fetches it.
+
+    Parameters
+    ----------
+    waits : bool
+    at_first : int
+        Places until the reader, who has things to prepare, has caught up; one who has not after twice
+        as many items never will, and goes on with the newest.
     """
 
-    def __init__(self, *, waits: bool = False) -> None:
+    def __init__(self, *, waits: bool = False, at_first: int = 1) -> None:
         super().__init__()
         self._waits = waits
+        self._places, self._patience = at_first, 2 * at_first
+        self._reading = False
         self._skipped: list[Item] = []
+
+    def begin(self) -> None:
+        """The reader is ready: from now on it is behind, or has caught up."""
+        self._reading = True
 
     def put(self, item: Item) -> None:
         """Place ``item``; what lay there untaken is counted as skipped. Ignored after ``close``."""
@@ -55,7 +68,7 @@ class Mailbox(_Channel[Item]):
             if self._closed:
                 self._skipped.append(item)
                 return
-            while self._items:
+            while len(self._items) >= self._places:
                 self._skipped.append(self._items.popleft())
             self._items.append(item)
             self._change.notify_all()
@@ -63,10 +76,16 @@ class Mailbox(_Channel[Item]):
     def get(self, timeout_s: float | None = None) -> Item | None:
         """Take what is there, waiting up to ``timeout_s``; None where nothing came or all is over."""
         with self._change:
+            self._look_how_far()
             self._change.wait_for(lambda: self._items or self._closed, timeout_s)
             item = self._items.popleft() if self._items else None
             self._change.notify_all()
             return item
+
+    def _look_how_far(self) -> None:
+        self._patience -= self._reading
+        if self._reading and (not self._items or self._patience <= 0):
+            self._places = 1
 
     def take_skipped(self) -> list[Item]:
         """What was skipped since the last call."""

@@ -65,13 +65,17 @@ class Feed:
         return self.next_reference()
 
     def bursts(self) -> Iterator[Burst | NewReference]:
-        """The newest burst each time, and a new reference before the bursts that come after it."""
+        """The newest burst each time, and a new reference before the bursts that come after it.
+
+        Those that came while the first reference was prepared come too, until it has caught up.
+        """
+        self._grabber.bursts.begin()
         while self._held is not None or not self._grabber.bursts.finished:
             burst, self._held = self._held or self._grabber.bursts.get(POLL_S), None
             self.count_skipped()
             if burst is None:
                 self._idle("waiting for frames")
-            elif self.paused:
+            elif self.paused or burst.first_index <= self._reference_end:
                 self._skip(burst)
             elif self._grabber.references.empty():
                 yield self._with_all_lost(burst)

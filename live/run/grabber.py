@@ -17,13 +17,15 @@ from acquire.burst import LIMIT_PX, BurstAccumulator
 from acquire.camera import Camera
 from acquire.errors import PhasedicError
 from acquire.events import EventKind, Muffler
-from acquire.frame import Burst, Frame
+from acquire.frame import Burst, CameraInfo, Frame
 from live.measure import Reference, ReferenceTaker
 from live.run.channels import Mailbox
 from live.setup import Config
 from live.tell import Books
 
 log = logging.getLogger(__name__)
+HELD_BYTES, HELD_S = 256_000_000, 1.0
+"""What may wait for the first measurement: bytes of means, seconds of frames."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +53,13 @@ class GrabPlan:
         reference, burst = bursts
         seconds = math.inf if config.output.seconds is None else config.output.seconds
         return cls(burst, reference, seconds, LIMIT_PX if config.measure.shorten_bursts else None)
+
+
+def _held_at_first(camera: CameraInfo) -> int:
+    """Bursts that may wait while the reference is prepared, for about as long as that takes."""
+    return int(
+        min(max(HELD_BYTES // (4 * camera.width * camera.height), 1), max(HELD_S * (camera.fps or 0), 1))
+    )
 
 
 class Grabber:
@@ -85,7 +94,9 @@ class Grabber:
         self._camera, self._journal, self._ledger = camera, books.journal, books.ledger
         self._plan, self._on_frame, self._on_burst = plan, on_frame, on_burst
         self.references: queue.SimpleQueue[Reference] = queue.SimpleQueue()
-        self.bursts: Mailbox[Burst] = Mailbox(waits=not camera.info.live)
+        self.bursts: Mailbox[Burst] = Mailbox(
+            waits=not camera.info.live, at_first=_held_at_first(camera.info)
+        )
         self.error: Exception | None = None
         self.fps = 0.0
         self._taker: ReferenceTaker | None = ReferenceTaker(plan.reference_burst)

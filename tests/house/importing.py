@@ -78,12 +78,13 @@ def libraries(house: House, rooms: Collection[str], homes: Mapping[str, str]) ->
                 )
 
 
-def never(house: House, rules: Mapping[str, str]) -> Iterator[str]:
-    """Imports that a room, and all rooms in it, must do without."""
+def never(house: House, rules: Mapping[str, str], unless: Mapping[str, str]) -> Iterator[str]:
+    """Imports that a room, and all rooms in it, must do without; ``unless`` says what a room may have all the same."""
     for room, words in rules.items():
         for module in _within(house, room):
             for found in module.imports:
-                if _top(found) in words.split():
+                allowed = unless.get(module.name.rpartition(".")[0], "").split()
+                if _top(found) in words.split() and _top(found) not in allowed:
                     yield breach(
                         module, found.line, f"{room} does without {_top(found)}; let the caller bring it"
                     )

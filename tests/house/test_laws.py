@@ -111,8 +111,9 @@ def test_libraries_numba_and_what_rooms_do_without(tmp_path: Path) -> None:
     assert not list(importing.libraries(house, ROOMS, {"h5py": "live.down live.up"}))
     only(importing.numba_at_import(house, ()), "live/up/one.py:2: loads numba")
     assert not list(importing.numba_at_import(house, ("live.up",)))
-    only(importing.never(house, {"live": "time queue"}), "live/up/one.py:4: live does without time")
-    assert not list(importing.never(house, {"live.down": "time"}))
+    only(importing.never(house, {"live": "time queue"}, {}), "live/up/one.py:4: live does without time")
+    assert not list(importing.never(house, {"live.down": "time"}, {}))
+    assert not list(importing.never(house, {"live": "time queue"}, {"live.up": "time"}))
 
 
 @pytest.mark.parametrize(

@@ -69,6 +69,7 @@ def test_a_second_process_compiles_nothing() -> None:
         "kernel = PhaseKernel(image, ZoiGrid.cover(Roi(8, 8, 80, 80), 32, 16), noise=1.0)\n"
         "kernel.measure(image, start=kernel.measure(image))\n"
         "for loop in (iteration.track, sensitivity.prepare, verdict.judge):\n"
+        "    loop = loop.dispatcher\n"
         "    assert len(loop.signatures) == 1, loop\n"
         "    print(sum(loop.stats.cache_hits.values()), sum(loop.stats.cache_misses.values()))\n"
     )

@@ -11,7 +11,7 @@ from analysis.fit.bundles import Picture
 from analysis.fit.iteration import compose, warp_zois
 from analysis.picture.cutting import cut_bent_row, cut_leaning_row, cut_row, displacement
 from analysis.picture.prefilter import GROUP, PART, coefficients
-from analysis.picture.splines import PAD, basis, prefilter_taps, tap_table
+from analysis.picture.splines import PAD, Box, basis, prefilter_taps, tap_table
 
 RNG = np.random.default_rng(0)
 IMAGE = ndimage.gaussian_filter(RNG.normal(0, 1, (70, 90)), 1.0).astype(np.float32) * 100
@@ -36,7 +36,7 @@ def test_tap_weights_are_the_spline(degree: int) -> None:
 @pytest.mark.parametrize("degree", [3, 5])
 def test_prefilter_is_that_of_scipy(degree: int, kind: type, shape: tuple[int, int]) -> None:
     image = np.random.default_rng(1).integers(0, 256, shape).astype(kind)
-    found = coefficients(image, np.float32(100), prefilter_taps(degree))
+    found = coefficients(image, np.float32(100), prefilter_taps(degree), Box(0, shape[0], 0, shape[1]))
     expected = ndimage.spline_filter(image.astype(float) - 100, degree, mode="mirror")
     expected = np.pad(expected, PAD, mode="reflect")
     found = found[: expected.size].reshape(expected.shape)
@@ -59,8 +59,10 @@ def test_prefilter_is_that_of_scipy(degree: int, kind: type, shape: tuple[int, i
 def test_warp_is_the_interpolated_image(motion: tuple, size: int) -> None:
     origin = np.array([[24, 30]])
     out = np.empty((1, size, size), np.float32)
-    flat = coefficients(IMAGE, np.float32(0), prefilter_taps(5))
-    picture = Picture(flat, IMAGE.shape[1], IMAGE.shape[0], 0.5)
+    box = Box(0, IMAGE.shape[0], 0, IMAGE.shape[1])
+    picture = Picture.within(
+        coefficients(IMAGE, np.float32(0), prefilter_taps(5), box), IMAGE.shape, box, 0.5
+    )
     warp_zois(picture, tap_table(5), origin, size, np.array([motion], float), out)
     x = np.arange(size) - (size - 1) / 2
     u = motion[0] + motion[1] * x + motion[2] * x[:, None]
@@ -156,3 +158,22 @@ def test_composition_undoes_the_step(order: int) -> None:
     cu, cv = displacement(composed, order, x + du, y + dv)
     assert x + du + cu == pytest.approx(x + u, abs=1e-9 if order == 1 else 2e-5)
     assert y + dv + cv == pytest.approx(y + v, abs=1e-9 if order == 1 else 2e-5)
+
+
+@pytest.mark.parametrize("rows", [(0, 200), (40, 70), (3, 90), (150, 230), (-50, -20), (250, 300)])
+@pytest.mark.parametrize("columns", [(0, 300), (61, 130), (270, 290)])
+def test_in_a_box_the_coefficients_are_those_of_the_whole(rows: tuple, columns: tuple) -> None:
+    image = np.random.default_rng(2).integers(0, 256, (200, 300)).astype(np.uint8)
+    box, everything = Box.of(image.shape, rows, columns), Box(0, 200, 0, 300)
+    whole = coefficients(image, np.float32(100), prefilter_taps(5), everything)
+    part = coefficients(image, np.float32(100), prefilter_taps(5), box)
+    width = image.shape[1] + 2 * PAD
+    top = box.top + PAD if box.top else 0
+    bottom = box.bottom + PAD + (PAD if box.bottom == 200 else 0)
+    left = box.left + PAD if box.left else 0
+    right = box.right + PAD + (PAD if box.right == 300 else 0)
+    assert 0 <= box.top < box.bottom <= 200 and 0 <= box.left < box.right <= 300
+    for y in range(top, bottom):
+        assert np.array_equal(
+            part[y * width + left : y * width + right], whole[y * width + left : y * width + right]
+        )

@@ -49,6 +49,33 @@ def test_a_waiting_mailbox_skips_nothing() -> None:
     assert box.take_skipped() == []
 
 
+def test_what_comes_while_the_reader_prepares_waits_for_it() -> None:
+    box: Mailbox[int] = Mailbox(at_first=3)
+    for i in range(5):
+        box.put(i)
+    assert box.take_skipped() == [0, 1]  # no more than three may wait
+    box.begin()
+    assert [box.get(0), box.get(0)] == [2, 3]
+    box.put(5)
+    assert [box.get(0), box.get(0), box.get(0)] == [4, 5, None]  # caught up: from now on the newest
+    box.put(6)
+    box.put(7)
+    assert box.get(0) == 7
+    assert box.take_skipped() == [6]
+
+
+def test_a_reader_who_never_catches_up_goes_on_with_the_newest() -> None:
+    box: Mailbox[int] = Mailbox(at_first=2)
+    box.begin()
+    taken = []
+    for i in range(0, 40, 2):
+        box.put(i)
+        box.put(i + 1)
+        taken.append(box.get(0))
+    assert taken[:2] == [0, 2]
+    assert taken[5:] == list(range(11, 40, 2))
+
+
 def test_closing_frees_a_waiting_producer() -> None:
     box: Mailbox[int] = Mailbox(waits=True)
     box.put(1)
