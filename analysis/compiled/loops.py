@@ -8,12 +8,17 @@ rest of the package does that only when a kernel is made.
 from __future__ import annotations
 
 import logging
+import os
 import re
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from threading import Lock
 from typing import Any
+
+# Threads that wait by spinning keep the other threads of a live test, and other programs, from their cores:
+# with two cores and another program at work frames took twice as long. Read when OpenMP is loaded.
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import numba
 

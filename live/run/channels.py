@@ -45,14 +45,14 @@ class Mailbox(_Channel[Item]):
     ----------
     waits : bool
     at_first : int
-        Places until the reader, who has things to prepare, has caught up; one who has not after twice
-        as many items never will, and goes on with the newest.
+        Places until the reader, who has things to prepare, has caught up; one who has not after as many
+        items goes on with the newest.
     """
 
     def __init__(self, *, waits: bool = False, at_first: int = 1) -> None:
         super().__init__()
         self._waits = waits
-        self._places, self._patience = at_first, 2 * at_first
+        self._places = self._patience = at_first
         self._reading = False
         self._skipped: list[Item] = []
 
