@@ -86,6 +86,7 @@ LIBRARIES = {
     "llvmlite": "analysis.compiled",
     "rerun": "live.view.drawing",
     "serial": "acquire.serial_line",
+    "tomlkit": "live.setup",
 }
 # Room (and all in it) -> what it never imports.
 NEVER = {
