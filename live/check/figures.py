@@ -23,7 +23,6 @@ from live.setup import (
     DEFAULT_REFERENCE_BURST,
     Config,
     correction,
-    grid_for,
     kernel_settings,
 )
 from live.specimen import Region, region_of
@@ -156,7 +155,7 @@ def examine(
     whole = correct(raw)
     region = region_of(config, whole.mean, averaged(shots.noise() or None, len(shots)))
     inside = region.inside(camera.width, camera.height, m.zoi)
-    grid = grid_for(region.config(config), camera.width, camera.height, region.mask)
+    grid = region.grid(config, camera.width, camera.height)
     at_zois = _inner_halves(grid, inside)
     noise = m.noise_GL if m.noise_GL is not None else shots.noise(at_zois)
     reference, burst = m.reference_burst or DEFAULT_REFERENCE_BURST, m.burst or DEFAULT_BURST

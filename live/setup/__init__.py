@@ -6,7 +6,7 @@ overlays it, ``rig`` opens the devices (and is the one door to the simulated one
 configuration, ``compiling`` has the loops compiled ahead, ``folder`` makes the place for the files.
 """
 
-from live.setup.checks import ALL, AUTO
+from live.setup.checks import ALL, AUTO, GIVEN
 from live.setup.compiling import compile_ahead
 from live.setup.config import Config, from_dict, load_config, options, settings_in
 from live.setup.folder import FILES, make_folder, versions
@@ -23,6 +23,7 @@ __all__ = [
     "DEFAULT_BURST",
     "DEFAULT_REFERENCE_BURST",
     "FILES",
+    "GIVEN",
     "Config",
     "GaugeConfig",
     "Rig",
