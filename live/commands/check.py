@@ -22,7 +22,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--target", type=float, metavar="UM_M", help="strain noise of one ZOI that is needed, um/m"
     )
-    parser.add_argument("--px-per-mm", type=float, metavar="N", help="the scale, for lengths in mm")
     add_measure(parser)
 
 
@@ -32,7 +31,7 @@ def command(arguments: argparse.Namespace) -> int:
     config = configured(arguments)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")
-    figures = examine(take(config), config, _load(config), arguments.px_per_mm)
+    figures = examine(take(config), config, _load(config), config.scale.px_per_mm)
     target = None if arguments.target is None else arguments.target * 1e-6
     lines = judge(figures, target, config.measure.reference_shift_px)
     for line in [*(line.text() for line in lines), "", *table_lines(figures)]:

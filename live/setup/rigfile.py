@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from tomlkit import TOMLDocument
 
 
-def new_rig(path: Path, text: str) -> Config:
-    """Write ``text`` as a new rig file; the configuration that it makes.
+def new_rig(path: Path, text: str, changes: Mapping[str, Any] | None = None) -> Config:
+    """Write ``text``, with ``changes`` as in ``write_rig``, as a new rig file; the configuration that it makes.
 
     Raises
     ------
@@ -31,7 +31,7 @@ def new_rig(path: Path, text: str) -> Config:
     """
     if path.exists() or path.is_symlink():
         raise ConfigError(f"{path} exists; nothing is overwritten, choose another name")
-    return _put(path, text)
+    return _put(path, _changed(_parsed(text, path), changes or {}, path))
 
 
 def write_rig(path: Path, changes: Mapping[str, Any]) -> Config:
@@ -50,25 +50,33 @@ def write_rig(path: Path, changes: Mapping[str, Any]) -> Config:
         The file is no TOML, or would not be a configuration; then nothing is changed.
     """
     path = path.resolve()  # a link stays one
-    document = _read(path)
+    return _put(path, _changed(_read(path), changes, path))
+
+
+def _changed(document: TOMLDocument, changes: Mapping[str, Any], path: Path) -> str:
     for dotted, value in changes.items():
         section, _, key = dotted.partition(".")
         if not key:
             raise ConfigError(f"{path}: {dotted}: a change names a section and a key, as measure.zoi")
         _change(document, section, key, value, path)
-    return _put(path, document.as_string())
+    return document.as_string()
 
 
 def _read(path: Path) -> TOMLDocument:
+    if not path.exists():
+        return _parsed("", path)
+    try:
+        return _parsed(read_bytes(path, MOST_BYTES).decode("utf-8-sig"), path)
+    except (DataError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read ({error}); give a text file in TOML") from None
+
+
+def _parsed(text: str, path: Path) -> TOMLDocument:
     import tomlkit
     from tomlkit.exceptions import TOMLKitError
 
-    if not path.exists():
-        return tomlkit.document()
     try:
-        return tomlkit.parse(read_bytes(path, MOST_BYTES).decode("utf-8-sig"))
-    except (DataError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read ({error}); give a text file in TOML") from None
+        return tomlkit.parse(text)
     except RecursionError:
         raise ConfigError(f"{path}: not valid TOML: too many brackets within brackets") from None
     except (TOMLKitError, ValueError) as error:

@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
 from acquire.events import ignore_event
+from acquire.files import write_picture
 from acquire.frame import CameraInfo
 from live.setup import ALL, AUTO, Config, grid_for, open_rig, read_mask, whole_picture
 from live.specimen.placing import with_auto_gauges
@@ -204,5 +204,10 @@ def with_region(config: Config, region: Region, path: Path) -> Config:
     config = region.config(config)
     if region.mask is None:
         return config
-    load_cv2().imwrite(str(path), region.mask.astype(np.uint8) * 255)
+    write_picture(path, mask_picture(region.mask))
     return replace(config, measure=replace(config.measure, mask=str(path)))
+
+
+def mask_picture(mask: Bools) -> NDArray[np.uint8]:
+    """A mask (H, W) as the picture that is read again: black where nothing is measured."""
+    return np.where(mask, np.uint8(255), np.uint8(0))
