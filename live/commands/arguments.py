@@ -39,6 +39,7 @@ COMMANDS = {
     "init": Entry(
         "live.commands.init", "from camera and specimen to a rig.toml: devices, region, ZOIs, gauges"
     ),
+    "scale": Entry("live.commands.scale", "mm per px from two points, a board, or the width of the specimen"),
     "check": Entry(
         "live.commands.check", "is the picture good enough? measured before the test; go or no-go"
     ),

@@ -143,6 +143,7 @@ def _head(path: Path) -> Iterator[str]:
     name = _quoted(str(path))
     yield f"# The rig, as phasedic init found it on {datetime.datetime.now(datetime.UTC):%Y-%m-%d %H:%M} UTC."
     yield f"# Next: phasedic check --config {name}, then phasedic run --config {name}"
+    yield f"# For lengths in mm: phasedic scale --config {name} --points X1,Y1,X2,Y2 --length MM"
 
 
 def _devices(p: Proposal) -> Iterator[str]:
