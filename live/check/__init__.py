@@ -6,16 +6,18 @@ change, ``table`` what each ZOI and burst would give. All but ``shots`` are free
 """
 
 from live.check.advice import advice, reaching
-from live.check.figures import Figures, Zois, examine
+from live.check.figures import Figures, GaugeNoise, Zois, examine
 from live.check.floor import Floor, Noise
-from live.check.judge import Line, judge
+from live.check.judge import WITHOUT_TARGET, Line, judge
 from live.check.shots import Shots, take
 from live.check.stillness import Stillness
 from live.check.table import table_lines
 
 __all__ = [
+    "WITHOUT_TARGET",
     "Figures",
     "Floor",
+    "GaugeNoise",
     "Line",
     "Noise",
     "Shots",

@@ -58,6 +58,7 @@ def judge(figures: Figures, target: float | None = None, most_shift_px: float = 
         *_motion(figures, most_shift_px),
         *_load(figures),
         _floor(figures, target),
+        *_gauges(figures),
     ]
 
 
@@ -216,3 +217,11 @@ def _floor(f: Figures, target: float | None) -> Line:
     enough = noise.known <= wanted
     words = f"more than the {wanted * 1e6:.1f} um/m {asked}: {'' if enough else advice(f, wanted)}"
     return Line(what, value, enough, words)
+
+
+def _gauges(f: Figures) -> Iterator[Line]:
+    """What is reported in the end is a gauge or a mean, not one ZOI."""
+    for gauge in f.gauges:
+        name = f"noise of {gauge.name}" if gauge.name else "noise of the mean"
+        value = f"{gauge.sigma * 1e6:.1f} um/m predicted (burst of {f.burst})"
+        yield Line(name, gauge.reason or value, not gauge.reason, "move it, or take smaller ZOIs")
