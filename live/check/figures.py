@@ -143,6 +143,7 @@ def examine(
     config: Config,
     load: LoadReport | None = None,
     table: bool = True,
+    region: Region | None = None,
 ) -> Figures:
     """Judge frames of a still specimen.
 
@@ -153,6 +154,8 @@ def examine(
     load : LoadReport, optional
     table : bool
         Whether all ZOIs, orders and bursts of the table are tried, or those of the test alone.
+    region : Region, optional
+        Where it is known already; then no noise is measured either, only predicted: for a glance.
 
     Raises
     ------
@@ -163,7 +166,8 @@ def examine(
     correct = correction(config, camera)
     raw = shots.mean()
     whole = correct(raw)
-    region = region_of(config, whole.mean, averaged(shots.noise() or None, len(shots)))
+    glance = region is not None
+    region = region or region_of(config, whole.mean, averaged(shots.noise() or None, len(shots)))
     inside = region.inside(camera.width, camera.height, m.zoi)
     grid = region.grid(config, camera.width, camera.height)
     at_zois = _inner_halves(grid, inside)
@@ -183,7 +187,7 @@ def examine(
         radius=_radius(whole.mean, noise, len(shots), at_zois),
         zois=_zois(bench, grid, whole.mean, _sigma(field, grid, factor)),
         still=_still(bench, grid),
-        floors=noise_floors(bench, (*sizes, m.zoi), (*orders, m.order), (*bursts, burst)),
+        floors=() if glance else noise_floors(bench, (*sizes, m.zoi), (*orders, m.order), (*bursts, burst)),
         zoi=m.zoi,
         order=m.order,
         burst=burst,

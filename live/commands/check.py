@@ -15,6 +15,7 @@ from acquire.load_cell.check import LoadReport
 from live.check import WITHOUT_TARGET, Figures, examine, judge, table_lines, take
 from live.commands.exit_codes import NOT_READY
 from live.commands.options import add_measure, add_options, configured
+from live.commands.watching import interrupts, watch
 from live.setup import Config, open_load
 from live.specimen import Overlay, snapshot, with_auto_gauges
 from live.tell import Screen
@@ -33,6 +34,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="a new PNG: picture with ruler, region, gauges, quality of the ZOIs",
     )
+    parser.add_argument(
+        "--watch",
+        action="store_true",
+        help="three times a second until Ctrl-C, with the peak of the sharpness",
+    )
     add_measure(parser)
 
 
@@ -44,8 +50,12 @@ def command(arguments: argparse.Namespace) -> int:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")
     if arguments.snapshot and Path(arguments.snapshot).exists():
         raise ConfigError(f"{arguments.snapshot} exists; nothing is overwritten, choose another name")
-    figures = examine(take(config), config, _load(config))
     target = None if arguments.target is None else arguments.target * 1e-6
+    if arguments.watch:
+        with interrupts() as stop:
+            figures = watch(config, target, screen, stop.is_set)
+    else:
+        figures = examine(take(config), config, _load(config))
     if arguments.snapshot:
         write_picture(Path(arguments.snapshot), _drawn(figures, config, target))
         screen.say(f"written: {arguments.snapshot}")

@@ -39,7 +39,7 @@ ROOMS = {
     "live.maps": "acquire acquire.opencv analysis.field analysis.evaluate live.results",
     "live.specimen": "acquire acquire.burst acquire.files acquire.opencv analysis analysis.field analysis.quality"
     " live.measure live.setup",
-    "live.check": "acquire acquire.load_cell analysis analysis.evaluate analysis.field analysis.picture"
+    "live.check": "acquire acquire.camera acquire.load_cell analysis analysis.evaluate analysis.field analysis.picture"
     " analysis.quality live.measure live.setup live.specimen",
     "live.operate": "acquire live.tell",
     "live.pace": "",
