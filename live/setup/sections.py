@@ -71,7 +71,7 @@ class MeasureConfig:
     roi: tuple[int, int, int, int] | str | None = key(
         REGION,
         None,
-        "x, y, width, height of the measured region, px; auto: the specimen that is found (live, the default);"
+        "x, y, width, height of the measured region, px; auto: the specimen that is found (the default);"
         " all: all but a rim",
         Option("roi", "X,Y,W,H|auto|all"),
         optional=True,

@@ -14,9 +14,10 @@ from live.specimen.region import (
     is_sought,
     look,
     mask_picture,
+    placed_on,
     region_of,
     searched,
-    with_region,
+    with_mask_at,
 )
 from live.specimen.scale import OUT_OF_PLANE_MM, Scale, false_strain, from_points, from_width
 
@@ -37,11 +38,12 @@ __all__ = [
     "look",
     "mask_picture",
     "outline",
+    "placed_on",
     "propose",
     "region_of",
     "rig_text",
     "searched",
     "snapshot",
     "with_auto_gauges",
-    "with_region",
+    "with_mask_at",
 ]

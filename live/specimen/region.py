@@ -182,29 +182,38 @@ def _mean_and_noise(images: list[NDArray[Any]]) -> tuple[NDArray[Any], float | N
 
 @contextmanager
 def searched(config: Config, say: Callable[[str], None]) -> Iterator[Config]:
-    """The configuration of a test, with the specimen found and gauges placed where it asks for it.
+    """The configuration of a test, with the specimen found where nothing is given, and gauges placed where asked.
 
     The mask lies in a folder that is gone afterwards: a run has its own copy by then.
     """
-    sought = config.measure.roi == AUTO and is_sought(config)
-    if not config.camera.address or not (sought or config.measure.gauges == AUTO):
+    if not config.camera.address or not (is_sought(config) or config.measure.gauges == AUTO):
         yield config
         return
-    seen = look(config)
-    region = region_of(config, seen.picture, seen.noise)
-    if sought:
-        say(region.words + " (--roi all or --roi X,Y,W,H say otherwise)")
-    config = with_auto_gauges(config, region.grid(config, *seen.size))
+    sought = is_sought(config)
+    config, mask = placed_on(config, look(config), say)
     with TemporaryDirectory(prefix="phasedic-") as folder:
-        yield with_region(config, region, Path(folder) / "mask.png") if sought else config
+        yield with_mask_at(config, mask if sought else None, Path(folder) / "mask.png")
 
 
-def with_region(config: Config, region: Region, path: Path) -> Config:
-    """The configuration that says this region; its mask, where it has one, is written to ``path``."""
-    config = region.config(config)
-    if region.mask is None:
+def placed_on(config: Config, seen: Look, say: Callable[[str], None]) -> tuple[Config, Bools | None]:
+    """The configuration with region and gauges in px, as far as they are sought, and the mask (H, W).
+
+    Raises
+    ------
+    ConfigError, DataError
+        As ``region_of``; no ZOI fits, or too few for gauges.
+    """
+    region = region_of(config, seen.picture, seen.noise)
+    if is_sought(config):
+        say(f"{region.words} (--roi all or --roi X,Y,W,H say otherwise)")
+    return with_auto_gauges(region.config(config), region.grid(config, *seen.size)), region.mask
+
+
+def with_mask_at(config: Config, mask: Bools | None, path: Path) -> Config:
+    """The configuration with a mask, which is written to ``path``; as it is without one."""
+    if mask is None:
         return config
-    write_picture(path, mask_picture(region.mask))
+    write_picture(path, mask_picture(mask))
     return replace(config, measure=replace(config.measure, mask=str(path)))
 
 

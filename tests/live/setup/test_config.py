@@ -132,7 +132,7 @@ def test_any_value_of_a_stored_key_is_taken_or_refused(value: Any) -> None:
 
 def test_a_region_that_nobody_has_looked_for_is_refused() -> None:
     config = load_config(None, {"measure.roi": "auto"})
-    with pytest.raises(ConfigError, match="looked for on a live camera"):
+    with pytest.raises(ConfigError, match="looked for by run, check and replay"):
         grid_for(config, 640, 480, None)
 
 
