@@ -28,6 +28,8 @@ def advice(figures: Figures, target: float) -> str:
     ways = list(_ways(figures, target))
     if ways:
         return ", or ".join(ways)
+    if not figures.floors:
+        return "the table of the whole check says what reaches it"
     return "nothing here reaches it: more contrast, a finer pattern, a closer or quieter camera, more light"
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -23,13 +23,13 @@ from live.setup import (
     DEFAULT_REFERENCE_BURST,
     Config,
     correction,
-    grid_for,
+    gauges_for,
     kernel_settings,
 )
-from live.specimen import Region, region_of
+from live.specimen import Region, region_of, with_auto_gauges
 
 if TYPE_CHECKING:
-    from analysis import ZoiGrid
+    from analysis import StrainField, ZoiGrid
 
 Floats = NDArray[np.float64]
 
@@ -68,6 +68,15 @@ class Zois:
         return 1 - float(np.isfinite(self.sigma[active]).mean()) if active.any() else 1.0
 
 
+@dataclass(frozen=True, slots=True)
+class GaugeNoise:
+    """Predicted strain noise of a gauge for one burst of the test; NaN with the reason."""
+
+    name: str
+    sigma: float
+    reason: str = ""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Figures:
     """What a check has found.
@@ -89,6 +98,8 @@ class Figures:
         Of the test.
     removed : float or None, GL
         Standard deviation of what dark and flat frame took out; None without them.
+    gauges : tuple of GaugeNoise
+        Those of the test, and the mean of all ZOIs along the load.
     load : LoadReport or None
     px_per_mm : float or None
     """
@@ -106,6 +117,7 @@ class Figures:
     order: int
     burst: int
     removed: float | None = None
+    gauges: tuple[GaugeNoise, ...] = ()
     load: LoadReport | None = None
     px_per_mm: float | None = None
 
@@ -130,8 +142,8 @@ def examine(
     shots: Shots,
     config: Config,
     load: LoadReport | None = None,
-    px_per_mm: float | None = None,
     table: bool = True,
+    region: Region | None = None,
 ) -> Figures:
     """Judge frames of a still specimen.
 
@@ -140,10 +152,10 @@ def examine(
     shots : Shots
     config : Config
     load : LoadReport, optional
-    px_per_mm : float, optional
-        The scale, where it is known.
     table : bool
         Whether all ZOIs, orders and bursts of the table are tried, or those of the test alone.
+    region : Region, optional
+        Where it is known already; then no noise is measured either, only predicted: for a glance.
 
     Raises
     ------
@@ -154,14 +166,17 @@ def examine(
     correct = correction(config, camera)
     raw = shots.mean()
     whole = correct(raw)
-    region = region_of(config, whole.mean, averaged(shots.noise() or None, len(shots)))
+    glance = region is not None
+    region = region or region_of(config, whole.mean, averaged(shots.noise() or None, len(shots)))
     inside = region.inside(camera.width, camera.height, m.zoi)
-    grid = grid_for(region.config(config), camera.width, camera.height, region.mask)
+    grid = region.grid(config, camera.width, camera.height)
     at_zois = _inner_halves(grid, inside)
     noise = m.noise_GL if m.noise_GL is not None else shots.noise(at_zois)
     reference, burst = m.reference_burst or DEFAULT_REFERENCE_BURST, m.burst or DEFAULT_BURST
     bench = Bench(shots, inside, at_zois, kernel_settings(config), noise, reference, correct)
     pixels = _pixels(shots, at_zois)
+    field = _half_on_half(bench, grid)
+    factor = math.sqrt((1 / reference + 1 / burst) / (2 / bench.half))
     sizes, orders, bursts = (SIZES, ORDERS, BURSTS) if table else ((), (), ())
     return Figures(
         region=region,
@@ -170,15 +185,16 @@ def examine(
         exposure=exposure(pixels, camera.bits),
         depth=depth(pixels, camera.bits),
         radius=_radius(whole.mean, noise, len(shots), at_zois),
-        zois=_zois(bench, grid, whole.mean, burst),
+        zois=_zois(bench, grid, whole.mean, _sigma(field, grid, factor)),
         still=_still(bench, grid),
-        floors=noise_floors(bench, (*sizes, m.zoi), (*orders, m.order), (*bursts, burst)),
+        floors=() if glance else noise_floors(bench, (*sizes, m.zoi), (*orders, m.order), (*bursts, burst)),
         zoi=m.zoi,
         order=m.order,
         burst=burst,
         removed=None if whole is raw else float((whole.mean - raw.mean)[inside].std()),
+        gauges=tuple(_gauges(config, grid, field, factor)),
         load=load,
-        px_per_mm=px_per_mm,
+        px_per_mm=config.scale.px_per_mm,
     )
 
 
@@ -225,7 +241,7 @@ def _radius(picture: NDArray[Any], noise: float, n: int, inside: NDArray[np.bool
     return autocorrelation_fwhm(picture[cut], noise / math.sqrt(n), inside[cut]) / FWHM_OF_RADIUS
 
 
-def _zois(bench: Bench, grid: ZoiGrid, picture: NDArray[Any], burst: int) -> Zois:
+def _zois(bench: Bench, grid: ZoiGrid, picture: NDArray[Any], sigma: Floats) -> Zois:
     """Pattern of each ZOI, and what the kernel makes of it."""
     noise = bench.noise / math.sqrt(len(bench.shots))
     along_x, along_y = sssig(picture, grid, noise)
@@ -237,7 +253,7 @@ def _zois(bench: Bench, grid: ZoiGrid, picture: NDArray[Any], burst: int) -> Zoi
     contrast, weaker = np.sqrt(variance), np.minimum(along_x, along_y)
     for values in (contrast, weaker, sharpness):
         values[off] = np.nan
-    return Zois(grid, _sigma(bench, grid, burst), contrast, weaker, sharpness)
+    return Zois(grid, sigma, contrast, weaker, sharpness)
 
 
 def _variance(picture: NDArray[Any], grid: ZoiGrid) -> Floats:
@@ -254,17 +270,34 @@ def _box_means(values: Floats, grid: ZoiGrid) -> Floats:
     return np.asarray((corners + total[top, left]) / size**2)
 
 
-def _sigma(bench: Bench, grid: ZoiGrid, burst: int) -> Floats:
-    """Predicted strain noise of each ZOI, exx and eyy in the mean, for a burst of the test."""
+def _half_on_half(bench: Bench, grid: ZoiGrid) -> StrainField | None:
+    """The second half of the frames against the first; None where there is no pattern."""
     first, second = (bench.correct(bench.shots.mean(k, bench.half)) for k in (0, bench.half))
     try:
         kernel, _ = prepare(first, grid, bench.settings, bench.noise)
     except DataError:
+        return None
+    return kernel.measure(second.mean, noise=averaged(bench.noise, bench.half))
+
+
+def _sigma(field: StrainField | None, grid: ZoiGrid, factor: float) -> Floats:
+    """Predicted strain noise of each ZOI, exx and eyy in the mean, for a burst of the test."""
+    if field is None:
         return np.full(grid.shape, np.nan)
-    field = kernel.measure(second.mean, noise=averaged(bench.noise, bench.half))
-    scale = math.sqrt((1 / bench.reference + 1 / burst) / (2 / bench.half))
     both = np.sqrt((field.sigma_exx**2 + field.sigma_eyy**2) / 2)
-    return np.where(field.ok, scale * both, np.nan)
+    return np.where(field.ok, factor * both, np.nan)
+
+
+def _gauges(config: Config, grid: ZoiGrid, field: StrainField | None, factor: float) -> Iterator[GaugeNoise]:
+    from analysis.evaluate import measure_gauge
+
+    if field is None or not field.n_valid:
+        return
+    along = "exx" if config.specimen.axis == "x" else "eyy"
+    yield GaugeNoise("", factor * field.mean(along)[1])
+    for gauge in gauges_for(with_auto_gauges(config, grid), grid):
+        value = measure_gauge(gauge, field)
+        yield GaugeNoise(gauge.name, factor * value.sigma, value.reason)
 
 
 def _still(bench: Bench, grid: ZoiGrid) -> Stillness:

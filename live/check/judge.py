@@ -58,6 +58,7 @@ def judge(figures: Figures, target: float | None = None, most_shift_px: float = 
         *_motion(figures, most_shift_px),
         *_load(figures),
         _floor(figures, target),
+        *_gauges(figures),
     ]
 
 
@@ -204,15 +205,27 @@ def _load(f: Figures) -> Iterator[Line]:
 def _floor(f: Figures, target: float | None) -> Line:
     what = "strain noise"
     noise = None if f.floor is None else f.floor.of(f.burst)
-    if f.floor is None or noise is None:
+    typical = median(f.zois.sigma)
+    if noise is None and not math.isfinite(typical):
         words = "a larger region, smaller ZOIs, or a pattern"
         return Line(what, f"not measured: too few ZOIs of {f.zoi} px", False, words)
-    value = f"{noise.known * 1e6:.0f} um/m measured, {noise.predicted * 1e6:.0f} predicted"
-    value += f" (one ZOI of {f.zoi} px, burst of {f.burst})"
-    if noise.measured > HONEST * noise.predicted:
+    known = typical if noise is None else noise.known
+    told = f"{known * 1e6:.0f} um/m predicted"
+    if noise is not None:
+        told = f"{noise.known * 1e6:.0f} um/m measured, {noise.predicted * 1e6:.0f} predicted"
+    value = f"{told} (one ZOI of {f.zoi} px, burst of {f.burst})"
+    if noise is not None and noise.measured > HONEST * noise.predicted:
         return Line(what, value, False, "something moves or flickers: vibration, air, lamp")
     wanted = WITHOUT_TARGET if target is None else target
     asked = "asked for" if target is not None else "that are judged against where no --target is given"
-    enough = noise.known <= wanted
+    enough = known <= wanted
     words = f"more than the {wanted * 1e6:.1f} um/m {asked}: {'' if enough else advice(f, wanted)}"
     return Line(what, value, enough, words)
+
+
+def _gauges(f: Figures) -> Iterator[Line]:
+    """What is reported in the end is a gauge or a mean, not one ZOI."""
+    for gauge in f.gauges:
+        name = f"noise of {gauge.name}" if gauge.name else "noise of the mean"
+        value = f"{gauge.sigma * 1e6:.1f} um/m predicted (burst of {f.burst})"
+        yield Line(name, gauge.reason or value, not gauge.reason, "move it, or take smaller ZOIs")

@@ -36,6 +36,10 @@ COMMANDS = {
         "how well this measures: the paper reproduced, peers, or your own pattern",
     ),
     "inspect": Entry("live.commands.inspect", "one ZOI of a session: its spectrum and its phases"),
+    "init": Entry(
+        "live.commands.init", "from camera and specimen to a rig.toml: devices, region, ZOIs, gauges"
+    ),
+    "scale": Entry("live.commands.scale", "mm per px from two points, a board, or the width of the specimen"),
     "check": Entry(
         "live.commands.check", "is the picture good enough? measured before the test; go or no-go"
     ),

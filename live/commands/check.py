@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
+from acquire.files import write_picture
 from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
-from live.check import examine, judge, table_lines, take
+from live.check import WITHOUT_TARGET, Figures, examine, judge, table_lines, take
 from live.commands.exit_codes import NOT_READY
 from live.commands.options import add_measure, add_options, configured
+from live.commands.watching import interrupts, watch
 from live.setup import Config, open_load
+from live.specimen import Overlay, snapshot, with_auto_gauges
 from live.tell import Screen
 
 LISTEN_S = 3.0
@@ -22,7 +29,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--target", type=float, metavar="UM_M", help="strain noise of one ZOI that is needed, um/m"
     )
-    parser.add_argument("--px-per-mm", type=float, metavar="N", help="the scale, for lengths in mm")
+    parser.add_argument(
+        "--snapshot",
+        metavar="FILE",
+        help="a new PNG: picture with ruler, region, gauges, quality of the ZOIs",
+    )
+    parser.add_argument(
+        "--watch",
+        action="store_true",
+        help="three times a second until Ctrl-C, with the peak of the sharpness",
+    )
     add_measure(parser)
 
 
@@ -32,14 +48,32 @@ def command(arguments: argparse.Namespace) -> int:
     config = configured(arguments)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")
-    figures = examine(take(config), config, _load(config), arguments.px_per_mm)
+    if arguments.snapshot and Path(arguments.snapshot).exists():
+        raise ConfigError(f"{arguments.snapshot} exists; nothing is overwritten, choose another name")
     target = None if arguments.target is None else arguments.target * 1e-6
+    if arguments.watch:
+        with interrupts() as stop:
+            figures = watch(config, target, screen, stop.is_set)
+    else:
+        figures = examine(take(config), config, _load(config))
+    if arguments.snapshot:
+        write_picture(Path(arguments.snapshot), _drawn(figures, config, target))
+        screen.say(f"written: {arguments.snapshot}")
     lines = judge(figures, target, config.measure.reference_shift_px)
     for line in [*(line.text() for line in lines), "", *table_lines(figures)]:
         screen.say(line)
     ready = all(line.good for line in lines)
     screen.say("GO: ready" if ready else "NO-GO: not ready, see what to look at above")
     return 0 if ready else NOT_READY
+
+
+def _drawn(figures: Figures, config: Config, target: float | None) -> NDArray[np.uint8]:
+    """The picture with what was judged over it."""
+    zois = figures.zois
+    gauges = with_auto_gauges(config, zois.grid).gauges
+    wanted = WITHOUT_TARGET if target is None else target
+    overlay = Overlay(figures.region, zois.grid, gauges, zois.sigma, wanted, figures.px_per_mm)
+    return snapshot(figures.shots.mean().mean, overlay)
 
 
 def _load(config: Config) -> LoadReport | None:

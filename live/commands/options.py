@@ -14,8 +14,8 @@ from acquire.errors import ConfigError
 from live.setup import Config, load_config, options
 
 MEASURE = (
-    "roi", "mask", "zoi", "step", "burst", "reference-burst", "window", "estimator", "strain", "order", "bending",
-    "noise",
+    "roi", "mask", "zoi", "step", "gauges", "scale", "burst", "reference-burst", "window", "estimator", "strain",
+    "order", "bending", "noise",
 )  # fmt: skip
 OUTPUT = ("out", "no-view", "no-rrd", "axis")
 

@@ -17,13 +17,15 @@ from typing import Any, cast
 
 from acquire.errors import ConfigError, DataError
 from acquire.events import EventKind
+from acquire.frame import Burst
 from acquire.session import Session
-from live.measure import History, kinds_of, measure, prepare
+from live.measure import History, averaged, kinds_of, measure, prepare
 from live.outputs import About, Outputs, make_outputs
 from live.replay.material import Material, ReplayRequest, Work, check_window
 from live.replay.pictures import picture_material, picture_of
 from live.replay.session import session_config, session_material, session_path
 from live.setup import (
+    AUTO,
     Config,
     compile_ahead,
     correction,
@@ -34,7 +36,9 @@ from live.setup import (
     make_folder,
     open_rig,
     read_mask,
+    with_mask,
 )
+from live.specimen import Look, is_sought, placed_on
 from live.tell import Books, Journal, Ledger, Screen
 
 
@@ -67,6 +71,8 @@ def replay(request: ReplayRequest, screen: Screen, stopping: threading.Event) ->
             screen.say(f"note: one frame in {session.mode.every} was recorded; measured as a slower camera")
         overrides = {"camera.address": f"session:{path}", "load.address": f"session:{path}"}
         config = session_config(session, request, overrides, path)
+        if request.overrides.get("measure.roi") == AUTO and "measure.mask" not in request.overrides:
+            config = replace(config, measure=replace(config.measure, mask=None))  # the one it found then
         material = session_material(session, request, config, path)
         return _run(material, config, request, screen, stopping)
 
@@ -78,7 +84,12 @@ def _replay_pictures(request: ReplayRequest, screen: Screen, stopping: threading
     if request.as_measured:
         raise ConfigError(f"{request.source}: --as-measured needs a session; pictures have none")
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
-    config = replace(config, load=replace(config.load, address="none:"))
+    region = AUTO if is_sought(config) else config.measure.roi
+    config = replace(
+        config,
+        load=replace(config.load, address="none:"),
+        measure=replace(config.measure, roi=region),
+    )
     rig = open_rig(config.camera.address, "none:", crop=config.camera.crop)
     try:
         with rig.camera as camera:
@@ -95,6 +106,9 @@ def _run(
 ) -> Replayed:
     camera = material.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
+    if AUTO in (config.measure.roi, config.measure.gauges):
+        seen = Look(material.reference.mean, _noise_of(material.reference), camera)
+        config, mask = placed_on(config, seen, screen.say)
     grid = grid_for(config, camera.width, camera.height, mask)
     correct, gauges = correction(config, camera), gauges_for(config, grid)
     settings, stated = kernel_settings(config), config.measure.noise_GL
@@ -103,6 +117,7 @@ def _run(
     kernel, noise_GL = prepare(material.reference, grid, settings, stated, correct, what)
     bursts = _not_empty(material.bursts, request.source)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
+    config = with_mask(config, mask, folder)
     books = Books(Journal(), Ledger(), material.loads, History())
     screen.say(f"replaying {request.source} into {folder}")
     outputs = make_outputs(About(config, folder, camera, grid, material.start), books, screen)
@@ -130,6 +145,11 @@ def _run(
         outputs.end()
     lossy = outputs.failed or not books.history.told_something
     return Replayed(folder, books, config, 130 if stopping.is_set() else 5 if lossy else 0)
+
+
+def _noise_of(reference: Burst) -> float | None:
+    """Of the mean, GL; None where one frame tells nothing."""
+    return averaged(reference.noise, reference.n) if reference.noise > 0 else None
 
 
 def _not_empty(bursts: Iterable[Work], source: str) -> Iterator[Work]:

@@ -2,11 +2,11 @@
 
 ``sections`` are the keys of the configuration with their ``checks`` and options, ``config`` reads and
 overlays it, ``rig`` opens the devices (and is the one door to the simulated ones), ``grid`` lays the ZOIs,
-``gauges`` the virtual gauges on it, ``pictures`` reads mask, dark and flat, ``compiling`` has the loops
-compiled ahead, ``folder`` makes the place for the files.
+``gauges`` the virtual gauges on it, ``pictures`` reads mask, dark and flat, ``rigfile`` writes a
+configuration, ``compiling`` has the loops compiled ahead, ``folder`` makes the place for the files.
 """
 
-from live.setup.checks import ALL, AUTO
+from live.setup.checks import ALL, AUTO, GIVEN
 from live.setup.compiling import compile_ahead
 from live.setup.config import Config, from_dict, load_config, options, settings_in
 from live.setup.folder import FILES, make_folder, versions
@@ -14,6 +14,7 @@ from live.setup.gauges import GaugeConfig, describe, gauges_for
 from live.setup.grid import grid_for, kernel_settings, whole_picture
 from live.setup.pictures import correction, read_mask, with_flat_field, with_mask
 from live.setup.rig import Rig, open_load, open_rig
+from live.setup.rigfile import new_rig, write_rig
 from live.setup.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST, SpecimenConfig
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "DEFAULT_BURST",
     "DEFAULT_REFERENCE_BURST",
     "FILES",
+    "GIVEN",
     "Config",
     "GaugeConfig",
     "Rig",
@@ -35,6 +37,7 @@ __all__ = [
     "kernel_settings",
     "load_config",
     "make_folder",
+    "new_rig",
     "open_load",
     "open_rig",
     "options",
@@ -44,4 +47,5 @@ __all__ = [
     "whole_picture",
     "with_flat_field",
     "with_mask",
+    "write_rig",
 ]

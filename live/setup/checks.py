@@ -26,10 +26,13 @@ class Check:
         The value as it is used; raises ``Refused``.
     read : callable
         From a word of the command line to what ``accept`` takes; raises ValueError.
+    length : "", "px" or "whole px"
+        Whether it is a length in the picture, which may be said in mm; whole ones are rounded.
     """
 
     accept: Callable[[Any], Any]
     read: Callable[[str], Any] = str
+    length: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +89,41 @@ def integer(low: int, high: int) -> Check:
     return Check(accept, int)
 
 
+_NUMBER = r"[-+]?(?:[0-9]+[.]?[0-9]*|[.][0-9]+)"
+_IN_MM = re.compile(rf"\s*({_NUMBER}(?:\s*,\s*{_NUMBER})*)\s*mm\s*")
+
+
+def length(check: Check, *, whole: bool = False) -> Check:
+    """The same for a length in the picture: px, or mm as "6 mm" and "10, 20 mm" where the scale is known."""
+
+    def read(word: str) -> Any:
+        if _IN_MM.fullmatch(word):
+            return word
+        try:
+            return check.read(word)
+        except ValueError as error:
+            kind = {int: "a whole number of px", float: "a number of px"}.get(check.read)  # type: ignore[call-overload]
+            raise ValueError(f"give {kind}, or mm as 6mm" if kind else str(error)) from None
+
+    return Check(check.accept, read, "whole px" if whole else "px")
+
+
+def in_px(value: Any, check: Check, px_per_mm: float | None) -> Any:
+    """What was said in mm in px, all else as it is; raises ``Refused`` where the scale is not known."""
+    if isinstance(value, list | tuple):
+        return [in_px(v, check, px_per_mm) for v in value]
+    found = _IN_MM.fullmatch(value) if check.length and isinstance(value, str) else None
+    if found is None:
+        return value
+    if px_per_mm is None:
+        raise Refused("px; for mm the scale must be known: phasedic scale, or mm_per_px in [scale]")
+    lengths = [float(number) * px_per_mm for number in found[1].split(",")]
+    if not all(abs(px) < 1e9 for px in lengths):
+        raise Refused("a length within the picture")
+    said = [round(px) if check.length == "whole px" else px for px in lengths]
+    return said if len(said) > 1 else said[0]
+
+
 def choice(*allowed: str) -> Check:
     """One of a few words."""
 
@@ -123,6 +161,15 @@ def _read_box(word: str) -> list[int]:
     if len(values) != 4:
         raise ValueError("give four whole numbers x,y,width,height")
     return values
+
+
+def _rectangle(value: Any) -> tuple[float, float, float, float]:
+    if not isinstance(value, list | tuple) or len(value) != 4 or not all(_finite(v) for v in value):
+        raise Refused("four numbers: x, y, width, height in px")
+    x, y, width, height = (float(v) for v in value)
+    if x < 0 or y < 0 or width <= 0 or height <= 0:
+        raise Refused("x and y from 0, width and height above 0 (px)")
+    return x, y, width, height
 
 
 _EVERY = re.compile("[1-9][0-9]{0,8}")
@@ -180,15 +227,19 @@ def _strains(value: Any) -> tuple[float, float]:
 
 TEXT = Check(_text)
 FLAG = Check(_flag)
-BOX = Check(_box, _read_box)
-"""x, y, width, height in px."""
+BOX = length(Check(_box, _read_box), whole=True)
+"""x, y, width, height in whole px."""
+RECTANGLE = length(Check(_rectangle))
+"""The same in any px."""
 STRAINS = Check(_strains)
 """An interval of strains."""
-POINT = Check(_point)
-CORNERS = Check(_corners)
+POINT = length(Check(_point))
+CORNERS = length(Check(_corners))
 """x, y in px; of the corners of a polygon."""
 AUTO, ALL = REGIONS = ("auto", "all")
 """Regions in words: the specimen that is found, or the picture but for a rim."""
-REGION = Check(_region, _read_region)
+GIVEN = "given"
+"""Gauges that are not placed by themselves (``AUTO``)."""
+REGION = length(Check(_region, _read_region), whole=True)
 """A box, or one of the words."""
 RECORD_MODE = Check(_record_mode)

@@ -19,7 +19,7 @@ from typing import Any, TypeVar
 
 from acquire.errors import ConfigError, DataError
 from acquire.files import read_bytes
-from live.setup.checks import Option, Refused
+from live.setup.checks import Option, Refused, in_px
 from live.setup.gauges import NAME, GaugeConfig
 from live.setup.sections import (
     CameraConfig,
@@ -27,6 +27,7 @@ from live.setup.sections import (
     MeasureConfig,
     OutputConfig,
     RecordConfig,
+    ScaleConfig,
     SpecimenConfig,
     ViewConfig,
 )
@@ -42,6 +43,7 @@ class Config:
     camera: CameraConfig = field(default_factory=CameraConfig)
     load: LoadConfig = field(default_factory=LoadConfig)
     measure: MeasureConfig = field(default_factory=MeasureConfig)
+    scale: ScaleConfig = field(default_factory=ScaleConfig)
     record: RecordConfig = field(default_factory=RecordConfig)
     view: ViewConfig = field(default_factory=ViewConfig)
     specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
@@ -129,6 +131,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
 def _build(tree: Mapping[str, Any], where: str) -> Config:
     known = [*_SECTIONS, "gauges", "metadata"]
     parts: dict[str, Any] = {}
+    px_per_mm = _px_per_mm(tree, where)
     for name, content in tree.items():
         if name not in known:
             raise ConfigError(f"{where}: unknown section [{name}]{_meant(name, known)}")
@@ -137,21 +140,35 @@ def _build(tree: Mapping[str, Any], where: str) -> Config:
         if name == "metadata":
             parts[name] = dict(content)
         elif name == "gauges":
-            parts[name] = {gauge: _gauge(gauge, table, where) for gauge, table in content.items()}
+            parts[name] = {gauge: _gauge(gauge, table, where, px_per_mm) for gauge, table in content.items()}
         else:
-            parts[name] = _section(_SECTIONS[name], name, content, where)
+            parts[name] = _section(_SECTIONS[name], name, content, where, px_per_mm)
     _check_metadata(parts.get("metadata", {}), where)
     return Config(**parts)
 
 
-def _section(kind: type[Section], name: str, content: Mapping[str, Any], where: str) -> Section:
+def _px_per_mm(tree: Mapping[str, Any], where: str) -> float | None:
+    content = tree.get("scale")
+    if not isinstance(content, Mapping):
+        return None
+    return _section(ScaleConfig, "scale", content, where).px_per_mm
+
+
+def _section(
+    kind: type[Section],
+    name: str,
+    content: Mapping[str, Any],
+    where: str,
+    px_per_mm: float | None = None,
+) -> Section:
     fields = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
     values = {}
     for key, value in content.items():
         if key not in fields:
             raise ConfigError(f"{where}: unknown key {name}.{key}{_meant(key, list(fields))}")
         try:
-            values[key] = fields[key].metadata["check"].accept(value)
+            check = fields[key].metadata["check"]
+            values[key] = check.accept(in_px(value, check, px_per_mm))
         except Refused as allowed:
             raise ConfigError(
                 f"{where}: {name}.{key} = {_shown(value)} is not possible; allowed: {allowed}"
@@ -159,14 +176,14 @@ def _section(kind: type[Section], name: str, content: Mapping[str, Any], where: 
     return kind(**values)
 
 
-def _gauge(name: str, table: Any, where: str) -> GaugeConfig:
+def _gauge(name: str, table: Any, where: str, px_per_mm: float | None) -> GaugeConfig:
     if not NAME.fullmatch(name):
         raise ConfigError(
             f"{where}: gauges.{name}: a name has up to 32 letters, digits and _, a letter first"
         )
     if not isinstance(table, Mapping):
         raise ConfigError(f"{where}: gauges.{name} must be a table, [gauges.{name}] with keys below it")
-    return _section(GaugeConfig, f"gauges.{name}", table, where)
+    return _section(GaugeConfig, f"gauges.{name}", table, where, px_per_mm)
 
 
 def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
 from acquire.errors import ConfigError
-from live.setup.checks import BOX, CORNERS, POINT, choice, key, number
+from live.setup.checks import CORNERS, POINT, RECTANGLE, choice, key, length, number
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid
@@ -28,10 +28,10 @@ class GaugeConfig:
     start: tuple[float, float] | None = key(POINT, None, "x, y of one end of a line, px", optional=True)
     end: tuple[float, float] | None = key(POINT, None, "x, y of the other", optional=True)
     radius_px: float | None = key(
-        number(0.1, 1e5), None, "ZOIs this far around an end of a line (half a ZOI)", optional=True
+        length(number(0.1, 1e5)), None, "ZOIs this far around an end of a line (half a ZOI)", optional=True
     )
-    box: tuple[int, int, int, int] | None = key(
-        BOX, None, "x, y, width, height of an area or transverse gauge, px", optional=True
+    box: tuple[float, float, float, float] | None = key(
+        RECTANGLE, None, "x, y, width, height of an area or transverse gauge, px", optional=True
     )
     corners: tuple[tuple[float, float], ...] | None = key(
         CORNERS, None, "x, y of the corners of an area, px", optional=True

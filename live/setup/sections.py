@@ -6,8 +6,10 @@ import math
 from dataclasses import dataclass
 
 from live.setup.checks import (
+    AUTO,
     BOX,
     FLAG,
+    GIVEN,
     RECORD_MODE,
     REGION,
     STRAINS,
@@ -16,6 +18,7 @@ from live.setup.checks import (
     choice,
     integer,
     key,
+    length,
     number,
 )
 
@@ -68,13 +71,15 @@ class MeasureConfig:
     roi: tuple[int, int, int, int] | str | None = key(
         REGION,
         None,
-        "x, y, width, height of the measured region, px; auto: the specimen that is found (live, the default);"
+        "x, y, width, height of the measured region, px; auto: the specimen that is found (the default);"
         " all: all but a rim",
         Option("roi", "X,Y,W,H|auto|all"),
         optional=True,
     )
-    zoi: int = key(integer(8, 1024), 64, "side of a ZOI, px", Option("zoi", "PX"))
-    step: int = key(integer(1, 1024), 16, "distance of neighbouring ZOIs, px", Option("step", "PX"))
+    zoi: int = key(length(integer(8, 1024), whole=True), 64, "side of a ZOI, px", Option("zoi", "PX"))
+    step: int = key(
+        length(integer(1, 1024), whole=True), 16, "distance of neighbouring ZOIs, px", Option("step", "PX")
+    )
     burst: int | None = key(
         integer(1, 10000),
         None,
@@ -91,6 +96,12 @@ class MeasureConfig:
     )
     mask: str | None = key(
         TEXT, None, "image; ZOIs where it is black are not measured", Option("mask", "FILE"), optional=True
+    )
+    gauges: str = key(
+        choice(GIVEN, AUTO),
+        GIVEN,
+        "gauges: as given, or auto: axial, transverse and area on the specimen",
+        Option("gauges", choices=(GIVEN, AUTO)),
     )
     window: str = key(
         choice("gaussian", "uniform", "tukey", "bi-triangular"),
@@ -128,6 +139,30 @@ class MeasureConfig:
     reference_shift_px: float = key(
         number(0, 10), 0.05, "motion during the reference burst that is accepted, px"
     )
+
+
+@dataclass(frozen=True, slots=True)
+class ScaleConfig:
+    """[scale]"""
+
+    mm_per_px: float | None = key(
+        number(1e-6, 1e3),
+        None,
+        "length of a pixel on the specimen; lengths may then be given in mm",
+        Option("scale", "MM_PER_PX"),
+        optional=True,
+    )
+    sigma_mm_per_px: float | None = key(number(0, 1e3), None, "its standard uncertainty", optional=True)
+    date: str | None = key(TEXT, None, "when it was taken", optional=True)
+    method: str | None = key(TEXT, None, "how it was taken", optional=True)
+    stand_off_mm: float | None = key(
+        number(1, 1e6), None, "distance from the camera to the specimen", optional=True
+    )
+
+    @property
+    def px_per_mm(self) -> float | None:
+        """None where it is not known."""
+        return None if self.mm_per_px is None else 1 / self.mm_per_px
 
 
 @dataclass(frozen=True, slots=True)

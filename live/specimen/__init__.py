@@ -1,5 +1,49 @@
-"""Where the specimen is in the picture, before a test: ``region``."""
+"""The specimen before a test, free of terminal and page.
 
-from live.specimen.region import Look, Region, is_sought, look, region_of, searched, with_region
+``region`` finds it in the picture, ``placing`` puts gauges on it, ``drawing`` shows it, ``proposal`` writes
+the rig down. ``scale`` and ``board`` take the scale of the picture.
+"""
 
-__all__ = ["Look", "Region", "is_sought", "look", "region_of", "searched", "with_region"]
+from live.specimen.board import Board, from_board
+from live.specimen.drawing import Overlay, outline, snapshot
+from live.specimen.placing import auto_gauges, with_auto_gauges
+from live.specimen.proposal import Proposal, propose, rig_text
+from live.specimen.region import (
+    Look,
+    Region,
+    is_sought,
+    look,
+    mask_picture,
+    placed_on,
+    region_of,
+    searched,
+    with_mask_at,
+)
+from live.specimen.scale import OUT_OF_PLANE_MM, Scale, false_strain, from_points, from_width
+
+__all__ = [
+    "OUT_OF_PLANE_MM",
+    "Board",
+    "Look",
+    "Overlay",
+    "Proposal",
+    "Region",
+    "Scale",
+    "auto_gauges",
+    "false_strain",
+    "from_board",
+    "from_points",
+    "from_width",
+    "is_sought",
+    "look",
+    "mask_picture",
+    "outline",
+    "placed_on",
+    "propose",
+    "region_of",
+    "rig_text",
+    "searched",
+    "snapshot",
+    "with_auto_gauges",
+    "with_mask_at",
+]

@@ -11,16 +11,20 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
 from acquire.events import ignore_event
+from acquire.files import write_picture
 from acquire.frame import CameraInfo
-from live.setup import AUTO, Config, grid_for, open_rig, read_mask, whole_picture
+from live.setup import ALL, AUTO, Config, grid_for, open_rig, read_mask, whole_picture
+from live.specimen.placing import with_auto_gauges
+
+if TYPE_CHECKING:
+    from analysis import ZoiGrid
 
 Box = tuple[int, int, int, int]
 Bools = NDArray[np.bool_]
@@ -52,7 +56,11 @@ class Region:
 
     def config(self, config: Config) -> Config:
         """The configuration with this box (the mask is a file and comes apart)."""
-        return replace(config, measure=replace(config.measure, roi=self.box))
+        return replace(config, measure=replace(config.measure, roi=self.box or ALL))
+
+    def grid(self, config: Config, width: int, height: int) -> ZoiGrid:
+        """The ZOIs of the test in it; raises ConfigError where none fits."""
+        return grid_for(self.config(config), width, height, self.mask)
 
     def inside(self, width: int, height: int, zoi: int) -> Bools:
         """(H, W) bool: the pixels that are measured."""
@@ -99,7 +107,7 @@ def _found(config: Config, picture: NDArray[Any], noise: float | None) -> Region
     words = f"the specimen was found: {share}, within x,y,width,height = {','.join(map(str, box))}"
     region = Region(box, specimen.mask, words, found=True)
     try:
-        zois = grid_for(region.config(config), width, height, specimen.mask).n_active
+        zois = region.grid(config, width, height).n_active
     except ConfigError:
         zois = 0
     if zois == 0:
@@ -132,6 +140,12 @@ class Look:
     picture: NDArray[Any]
     noise: float | None
     camera: CameraInfo
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, px."""
+        height, width = self.picture.shape
+        return width, height
 
 
 def look(config: Config) -> Look:
@@ -168,24 +182,41 @@ def _mean_and_noise(images: list[NDArray[Any]]) -> tuple[NDArray[Any], float | N
 
 @contextmanager
 def searched(config: Config, say: Callable[[str], None]) -> Iterator[Config]:
-    """The configuration of a test, with the specimen found where ``--roi auto`` asks for it.
+    """The configuration of a test, with the specimen found where nothing is given, and gauges placed where asked.
 
     The mask lies in a folder that is gone afterwards: a run has its own copy by then.
     """
-    if not config.camera.address or config.measure.roi != AUTO or not is_sought(config):
+    if not config.camera.address or not (is_sought(config) or config.measure.gauges == AUTO):
         yield config
         return
-    seen = look(config)
-    region = region_of(config, seen.picture, seen.noise)
-    say(region.words + " (--roi all or --roi X,Y,W,H say otherwise)")
+    sought = is_sought(config)
+    config, mask = placed_on(config, look(config), say)
     with TemporaryDirectory(prefix="phasedic-") as folder:
-        yield with_region(config, region, Path(folder) / "mask.png")
+        yield with_mask_at(config, mask if sought else None, Path(folder) / "mask.png")
 
 
-def with_region(config: Config, region: Region, path: Path) -> Config:
-    """The configuration that says this region; its mask, where it has one, is written to ``path``."""
-    config = region.config(config)
-    if region.mask is None:
+def placed_on(config: Config, seen: Look, say: Callable[[str], None]) -> tuple[Config, Bools | None]:
+    """The configuration with region and gauges in px, as far as they are sought, and the mask (H, W).
+
+    Raises
+    ------
+    ConfigError, DataError
+        As ``region_of``; no ZOI fits, or too few for gauges.
+    """
+    region = region_of(config, seen.picture, seen.noise)
+    if is_sought(config):
+        say(f"{region.words} (--roi all or --roi X,Y,W,H say otherwise)")
+    return with_auto_gauges(region.config(config), region.grid(config, *seen.size)), region.mask
+
+
+def with_mask_at(config: Config, mask: Bools | None, path: Path) -> Config:
+    """The configuration with a mask, which is written to ``path``; as it is without one."""
+    if mask is None:
         return config
-    load_cv2().imwrite(str(path), region.mask.astype(np.uint8) * 255)
+    write_picture(path, mask_picture(mask))
     return replace(config, measure=replace(config.measure, mask=str(path)))
+
+
+def mask_picture(mask: Bools) -> NDArray[np.uint8]:
+    """A mask (H, W) as the picture that is read again: black where nothing is measured."""
+    return np.where(mask, np.uint8(255), np.uint8(0))

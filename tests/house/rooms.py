@@ -39,8 +39,8 @@ ROOMS = {
     "live.maps": "acquire acquire.opencv analysis.field analysis.evaluate live.results",
     "live.specimen": "acquire acquire.burst acquire.files acquire.opencv analysis analysis.field analysis.quality"
     " live.measure live.setup",
-    "live.check": "acquire acquire.load_cell analysis analysis.field analysis.picture analysis.quality live.measure"
-    " live.setup live.specimen",
+    "live.check": "acquire acquire.camera acquire.load_cell analysis analysis.evaluate analysis.field analysis.picture"
+    " analysis.quality live.measure live.setup live.specimen",
     "live.operate": "acquire live.tell",
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",
@@ -51,7 +51,7 @@ ROOMS = {
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
     " analysis.evaluate live.measure live.operate live.pace live.setup live.tell live.outputs",
     "live.replay": "acquire acquire.burst acquire.camera acquire.load_cell acquire.opencv acquire.session analysis"
-    " live.measure live.setup live.tell live.outputs",
+    " live.measure live.setup live.specimen live.tell live.outputs",
     "live.characterise": "acquire acquire.opencv analysis analysis.field analysis.picture analysis.paper_estimator"
     " hw_mocks live.maps",
     "live.characterise.experiments": "acquire analysis analysis.field analysis.picture analysis.paper_estimator"
@@ -86,6 +86,7 @@ LIBRARIES = {
     "llvmlite": "analysis.compiled",
     "rerun": "live.view.drawing",
     "serial": "acquire.serial_line",
+    "tomlkit": "live.setup",
 }
 # Room (and all in it) -> what it never imports.
 NEVER = {

@@ -19,7 +19,7 @@ from live.view.drawing.curve_drawing import CurveDrawing
 from live.view.drawing.layout import BAR_GAP, BAR_HEIGHT, BAR_LABEL, BAR_TOP, BAR_WIDTH, LETTER, bar_unit
 from live.view.drawing.marks import CYAN, YELLOW, encode, reduced, words
 from live.view.drawing.places import Place
-from live.view.drawing.shapes import ArrowScale, mean_motion, sample_boxes, thinned
+from live.view.drawing.shapes import ArrowScale, mean_motion, region_edges, sample_boxes, thinned
 from live.view.exchange.messages import Picture, Row
 from live.view.exchange.setup import STRAINS, ViewSetup
 from live.view.exchange.thinned import Thinned
@@ -68,6 +68,7 @@ class Scene:
             self._log(f"strain/{name}", style, static=True)
         self._log("load/force", rr.SeriesLines(colors=YELLOW, names="load", widths=2.0), static=True)
         self._outlines(self._setup.grid)
+        self._region(self._setup.grid)
 
     def end(self) -> None:
         """All is drawn: let it reach its places, and close those."""
@@ -129,6 +130,15 @@ class Scene:
             ),
             static=True,
         )
+
+    def _region(self, grid: ZoiGrid) -> None:
+        """The edge of what is measured."""
+        import rerun as rr
+
+        edge = rr.LineStrips2D(
+            region_edges(grid), colors=(*CYAN, 255), radii=rr.Radius.ui_points(1.0), draw_order=18
+        )
+        self._log("specimen/zoi/region", edge, static=True)
 
     def _specimen(self, field: StrainField) -> None:
         import rerun as rr

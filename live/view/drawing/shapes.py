@@ -42,6 +42,28 @@ def sample_boxes(grid: ZoiGrid) -> Points:
     return np.asarray(centres(grid)[pick][grid.active[pick]])
 
 
+def region_edges(grid: ZoiGrid) -> NDArray[np.float64]:
+    """(N, 2, 2) straight pieces, from and to, of the edge of all that the active ZOIs cover, px."""
+    unit = math.gcd(grid.size, grid.step)
+    side, step = grid.size // unit, grid.step // unit
+    rows, columns = grid.shape
+    cover = np.zeros(((rows - 1) * step + side + 2, (columns - 1) * step + side + 2), np.int8)
+    for row, column in np.argwhere(grid.active):
+        top, left = row * step + 1, column * step + 1
+        cover[top : top + side, left : left + side] = 1
+    flat = _runs(np.diff(cover, axis=0) != 0)
+    upright = _runs(np.diff(cover, axis=1).T != 0)[:, :, ::-1]
+    # One cell of rim lies around what is covered.
+    return unit * (np.concatenate([flat, upright]) - 1.0) + [grid.roi.x, grid.roi.y]
+
+
+def _runs(edges: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(N, 2, 2) from and to, (along, across) cells, of what is True without a gap in each row."""
+    turns = np.diff(np.pad(edges, ((0, 0), (1, 1))).astype(np.int8))
+    ends = [np.argwhere(turns == turn)[:, ::-1] + [0, 1] for turn in (1, -1)]
+    return np.stack(ends, axis=1).astype(np.float64)
+
+
 def thinned(grid: ZoiGrid, wanted: NDArray[np.bool_]) -> Points:
     """(N, 2) centres of the wanted ZOIs; every second, third ... where there are very many."""
     found = centres(grid)[wanted]

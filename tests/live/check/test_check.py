@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
 import pytest
 
 from live.cli import main
+from live.specimen.drawing import GOOD, POOR
 
 STILL = "sim:uniform?bits=8&fps=50&seconds=20&width=224&height=192&lockstep=yes"
 
@@ -58,3 +64,32 @@ def test_the_load_cell_is_listened_to(
     _, said = checked(capsys, "", "--load", "sim:?rate=50")
     assert "load cell" in said
     assert "1/s, noise" in said
+
+
+def test_the_snapshot_and_the_gauges(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """ZOIs are green where their noise is low enough, red where it is not; that of the gauges is told."""
+    shot = tmp_path / "shot.png"
+    code, said = checked(capsys, "", "--gauges", "auto", "--snapshot", str(shot), "--scale", "0.05")
+    assert code == 0, said
+    assert "l_10% mm" in said
+    noise = {
+        name: float(re.search(rf"noise of {name} +([0-9.]+) um/m", said)[1])  # type: ignore[index]
+        for name in ("the mean", "axial", "transverse", "area")
+    }
+    one = float(re.search(r"strain noise +(\d+) um/m measured", said)[1])  # type: ignore[index]
+    assert noise["the mean"] < one
+    assert noise["area"] < one
+    drawn = cv2.imread(str(shot))
+    assert (drawn == np.array(GOOD)).all(axis=2).sum() > 500
+    assert not (drawn == np.array(POOR)).all(axis=2).any()
+    code, said = checked(capsys, "", "--target", "1", "--snapshot", str(tmp_path / "red.png"))
+    assert code == 6
+    assert (cv2.imread(str(tmp_path / "red.png")) == np.array(POOR)).all(axis=2).sum() > 500
+    assert main(["check", "--camera", STILL, "--snapshot", str(shot)]) == 2
+    assert "nothing is overwritten" in capsys.readouterr().err
+
+
+def test_a_gauge_beside_the_specimen_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text("[gauges.far]\nkind = 'zoi'\nat = [900, 20]\n")
+    assert checked(capsys, "", "--config", str(rig))[0] == 2

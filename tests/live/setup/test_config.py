@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -131,5 +132,44 @@ def test_any_value_of_a_stored_key_is_taken_or_refused(value: Any) -> None:
 
 def test_a_region_that_nobody_has_looked_for_is_refused() -> None:
     config = load_config(None, {"measure.roi": "auto"})
-    with pytest.raises(ConfigError, match="looked for on a live camera"):
+    with pytest.raises(ConfigError, match="looked for by run, check and replay"):
         grid_for(config, 640, 480, None)
+
+
+def test_lengths_in_mm() -> None:
+    config = load_config(
+        None,
+        {
+            "scale.mm_per_px": 0.05,
+            "measure.zoi": "3.2 mm",
+            "measure.roi": "5, 4.99, 20,30mm",
+            "gauges.axial": {"start": "10.01, 5 mm", "end": ["10 mm", 400]},
+            "gauges.area": {"kind": "area", "corners": ["1,1 mm", "2,1 mm", [40, 50.5]]},
+            "gauges.box": {"kind": "area", "box": "1, 2, 3.01, 4 mm"},
+        },
+    )
+    assert (config.measure.zoi, config.measure.roi) == (64, (100, 100, 400, 600))
+    assert config.gauges["axial"].start == pytest.approx((200.2, 100))
+    assert config.gauges["axial"].end == pytest.approx((200, 400))
+    assert config.gauges["area"].corners == ((20, 20), (40, 20), (40, 50.5))
+    assert config.gauges["box"].box == pytest.approx((20, 40, 60.2, 80))
+    assert from_dict(config.as_dict(), {"measure.step": "0.8mm"}, "a session").measure.step == 16
+
+
+@pytest.mark.parametrize(
+    ("said", "says"),
+    [
+        ({"measure.zoi": "3 mm"}, "measure.zoi = '3 mm' is not possible; allowed: px; for mm the scale"),
+        ({"measure.zoi": "3 mm", "scale.mm_per_px": 1}, "a whole number from 8"),
+        ({"measure.zoi": "3, 3 mm", "scale.mm_per_px": 0.05}, "a whole number from 8"),
+        ({"measure.roi": "1,2 mm", "scale.mm_per_px": 0.05}, "four whole numbers"),
+        ({"measure.burst": "3 mm", "scale.mm_per_px": 0.05}, "a whole number from 1"),
+        ({"measure.zoi": "9e99mm", "scale.mm_per_px": 0.05}, "a whole number from 8"),
+        ({"measure.zoi": "9" * 300 + "mm", "scale.mm_per_px": 0.05}, "within the picture"),
+        ({"scale.mm_per_px": 0}, "a number from 1e-06"),
+        ({"scale": 3}, "scale must be a section"),
+    ],
+)
+def test_lengths_in_mm_that_cannot_be(said: dict[str, Any], says: str) -> None:
+    with pytest.raises(ConfigError, match=re.escape(says)):
+        from_dict(said if "scale" in said else {}, {} if "scale" in said else said, "here")

@@ -7,7 +7,7 @@ import pytest
 
 from analysis.field.grid import Roi, ZoiGrid
 from analysis.field.strain_field import StrainField
-from live.view.drawing.shapes import ArrowScale, centres, mean_motion, sample_boxes, thinned
+from live.view.drawing.shapes import ArrowScale, centres, mean_motion, region_edges, sample_boxes, thinned
 from tests.live.made_up import make_field, make_grid
 
 
@@ -74,3 +74,22 @@ def test_the_magnification_does_not_flicker() -> None:
     scale = ArrowScale()
     factors = {scale.arrows(make_field(grid, strain))[2] for strain in (1e-3, 1.01e-3, 0.98e-3, 0.7e-3)}
     assert len(factors) == 1
+
+
+def test_the_edge_of_the_region() -> None:
+    """Of a square ring of ZOIs: the outer square and the hole that no ZOI covers."""
+    grid = ZoiGrid.cover(Roi(10, 20, 70, 70), size=20, step=10)
+    active = np.ones(grid.shape, bool)
+    active[1:-1, 1:-1] = False
+    edges = region_edges(grid.subset(active=active))
+    squares = {(10, 20, 80, 90): 4, (30, 40, 60, 70): 4}
+    for (left, top, right, bottom), count in squares.items():
+        corners = {(left, top), (right, top), (right, bottom), (left, bottom)}
+        found = [e for e in edges.astype(int).tolist() if {tuple(e[0]), tuple(e[1])} <= corners]
+        assert len(found) == count
+    assert len(edges) == 8
+
+
+def test_no_region_has_no_edge() -> None:
+    grid = ZoiGrid.cover(Roi(10, 20, 70, 70), size=20, step=7)
+    assert region_edges(grid.subset(active=np.zeros(grid.shape, bool))).shape == (0, 2, 2)

@@ -1,0 +1,165 @@
+"""``phasedic init``: from devices and a first picture to a rig file; asks nothing."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from acquire.addresses import parse_address
+from acquire.errors import ConfigError, DeviceError
+from acquire.files import write_picture
+from acquire.printable import printable
+from live.commands.options import add_options, add_verbose, overrides
+from live.setup import load_config, new_rig
+from live.specimen import Overlay, Proposal, look, mask_picture, propose, rig_text, snapshot
+from live.tell import Screen
+
+RECORDED = ("files", "video", "session")
+OWN = ("measure.roi", "measure.mask", "measure.zoi", "measure.step", "measure.gauges", "camera.address",
+       "load.address", "specimen.axis")  # fmt: skip
+"""Keys that the text of a proposal has; others that are given are added to it."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic init``."""
+    parser.add_argument(
+        "file", nargs="?", default="rig.toml", help="the rig file to write (rig.toml); never overwritten"
+    )
+    parser.add_argument(
+        "--fixed", action="store_true", help="write region, mask and gauges as they are now, in px"
+    )
+    parser.add_argument("--snapshot", metavar="FILE", help="the picture (default: beside the rig file, .png)")
+    add_options(
+        parser, "devices, looked for where they are not given", "camera", "crop", "load", "dark", "flat"
+    )
+    add_options(parser, "measurement", "roi", "mask", "zoi", "step", "gauges", "burst", "scale", "axis")
+    parser.add_argument("--section", metavar="W,T", help="width,thickness of the section in mm, for stresses")
+    add_verbose(parser)
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic init``."""
+    screen = Screen()
+    rig = Path(arguments.file)
+    png = Path(arguments.snapshot) if arguments.snapshot else rig.with_suffix(".png")
+    mask = rig.with_name(f"{rig.stem}-mask.png") if arguments.fixed else None
+    _nothing_there(rig, png, mask)
+    said = overrides(arguments)
+    found = _devices(said, screen)
+    config = load_config(None, {**said, "camera.address": found.camera, "load.address": found.load})
+    seen = look(config)
+    words = found.camera_words or printable(seen.camera.name), found.load_words
+    proposal = propose(seen, config, said, words, found.others)
+    if mask is not None and proposal.region.mask is not None:
+        write_picture(mask, mask_picture(proposal.region.mask))
+    changes = {
+        key: value for key, value in said.items() if key not in OWN or key in _kept(said, arguments.fixed)
+    }
+    new_rig(rig, rig_text(proposal, rig, mask), changes)
+    _show(proposal, png)
+    _tell(proposal, rig, png, screen)
+    return 0
+
+
+def _kept(said: dict[str, object], fixed: bool) -> set[str]:
+    """What stands in the file as it was given, in place of what was found."""
+    return set() if fixed else {"measure.roi", "measure.mask", "measure.gauges"} & set(said)
+
+
+def _nothing_there(*paths: Path | None) -> None:
+    for path in paths:
+        if path is not None and (path.exists() or path.is_symlink()):
+            raise ConfigError(f"{path} exists; nothing is overwritten, choose another name")
+
+
+# -- devices ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Camera and load cell of the rig, and what else there is."""
+
+    camera: str
+    camera_words: str
+    load: str
+    load_words: str
+    others: tuple[str, ...] = ()
+
+
+def _devices(said: dict[str, object], screen: Screen) -> Found:
+    camera, words, others = str(said.get("camera.address") or ""), "", tuple[str, ...]()
+    if not camera:
+        camera, words, others = _camera()
+        screen.say(f"camera: {camera}  {words}")
+    load, load_words = str(said.get("load.address") or ""), ""
+    if not load:
+        load, load_words = _load(camera, screen)
+        screen.say(f"load cell: {load}  {load_words}".rstrip())
+    return Found(camera, printable(words), load, printable(load_words), others)
+
+
+def _camera() -> tuple[str, str, tuple[str, ...]]:
+    """The first camera that can be opened, its name, and the others."""
+    from acquire.v4l2 import list_cameras
+
+    cameras = list_cameras()
+    usable = [camera for camera in cameras if not camera.trouble]
+    if not usable:
+        why = "; ".join(f"{camera.address}: {camera.trouble}" for camera in cameras) or "none is plugged in"
+        raise DeviceError(
+            f"no camera can be used ({why}); plug one in, or give --camera ADDRESS (files:shots, sim:)"
+        )
+    first, *others = usable
+    return _stable(first.address, first.stable_address), first.name, tuple(c.address for c in others)
+
+
+def _stable(address: str, stable: str) -> str:
+    """The name that plugging does not change, with the settings of the address."""
+    _, mark, settings = address.partition("?")
+    return f"{stable}{mark}{settings}" if stable and "?" not in stable else stable or address
+
+
+def _load(camera: str, screen: Screen) -> tuple[str, str]:
+    """The load cell that goes with a camera: a simulated one, none with pictures, else one that is heard."""
+    from acquire.camera import with_scheme
+
+    scheme = parse_address(with_scheme(camera)).scheme
+    if scheme in ("sim", *RECORDED):
+        return ("sim:", "simulated") if scheme == "sim" else ("none:", "pictures have none")
+    return next(_heard(screen), ("none:", "none was heard; say it with --load, see phasedic identify"))
+
+
+def _heard(screen: Screen) -> Iterator[tuple[str, str]]:
+    """What talks on the serial ports; a device that must be asked is silent here."""
+    from acquire.serial_line import identify, list_serial_ports
+
+    for port in list_serial_ports():
+        if not port.accessible:
+            screen.say(port.text().strip())
+            continue
+        screen.say(f"listening on {port.device} (--load ADDRESS or --load none: saves this)")
+        for _, _, finding in identify.listen(port.device):
+            if finding is not None:
+                yield finding.address, finding.remark or finding.protocol
+
+
+# -- what is told -------------------------------------------------------------------------------
+
+
+def _show(p: Proposal, png: Path) -> None:
+    grid = p.region.grid(p.config, *p.seen.size)
+    overlay = Overlay(p.region, grid, p.config.gauges, px_per_mm=p.config.scale.px_per_mm)
+    write_picture(png, snapshot(p.seen.picture, overlay))
+
+
+def _tell(p: Proposal, rig: Path, png: Path, screen: Screen) -> None:
+    grid = p.region.grid(p.config, *p.seen.size)
+    screen.say(p.region.words)
+    screen.say(
+        f"{grid.n_active} ZOIs of {grid.size} px, {grid.step} px apart; load along {p.config.specimen.axis}"
+    )
+    screen.say(f"gauges: {', '.join(p.config.gauges) or 'none'}")
+    screen.say(f"written: {rig}, and {png} to look at")
+    screen.say(f"next: phasedic check --config {rig}, then phasedic run --config {rig}")

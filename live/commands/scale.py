@@ -1,0 +1,154 @@
+"""``phasedic scale``: mm per px from two points, a board, or the specimen's width; into the rig file."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+from acquire.errors import ConfigError
+from live.commands.options import add_options, add_verbose, configured
+from live.setup import AUTO, Config, write_rig
+from live.specimen import (
+    OUT_OF_PLANE_MM,
+    Board,
+    Scale,
+    false_strain,
+    from_board,
+    from_points,
+    from_width,
+    look,
+    region_of,
+)
+from live.tell import Screen
+
+Number = TypeVar("Number", int, float)
+OF_THE_RIG = -1.0  # --width without a number
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic scale``."""
+    parser.add_argument(
+        "--config", metavar="FILE", help="the rig file the scale is written to; without, it is told"
+    )
+    add_options(parser, "picture", "camera", "crop", "roi", "mask", "axis")
+    how = parser.add_argument_group("how, one of these")
+    how.add_argument("--points", metavar="X1,Y1,X2,Y2", help="two points in px, --length apart")
+    how.add_argument("--length", type=float, metavar="MM", help="between the two points")
+    how.add_argument("--checkerboard", metavar="CxR", help="so many inner corners, with --square")
+    how.add_argument(
+        "--charuco", metavar="CxR", help="so many squares, with --square, --marker, --dictionary"
+    )
+    how.add_argument("--square", type=float, metavar="MM", help="side of a square of the board")
+    how.add_argument("--marker", type=float, metavar="MM", help="side of a marker of a ChArUco board")
+    how.add_argument("--dictionary", default="4X4_50", metavar="NAME", help="of its markers (4X4_50)")
+    how.add_argument(
+        "--width", type=float, nargs="?", const=OF_THE_RIG, metavar="MM",
+        help="the specimen is found and so wide; without a number width_mm of the rig file",
+    )  # fmt: skip
+    parser.add_argument(
+        "--sigma",
+        type=float,
+        default=0.0,
+        metavar="MM",
+        help="standard uncertainty of the length, width or board",
+    )
+    parser.add_argument(
+        "--stand-off", type=float, metavar="MM", help="distance from the camera to the specimen"
+    )
+    add_verbose(parser)
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic scale``."""
+    screen = Screen()
+    _check(arguments)
+    config = configured(arguments)
+    stand_off = arguments.stand_off or config.scale.stand_off_mm
+    scale = _scale(arguments, config, stand_off)
+    screen.say(
+        f"scale: {scale.mm_per_px:.6g} +- {scale.sigma:.2g} mm/px ({scale.relative:.2%}), {scale.method}"
+    )
+    for remark in scale.remarks:
+        screen.say(f"LOOK  {remark}")
+    _tell_out_of_plane(stand_off, screen)
+    if arguments.config:
+        write_rig(Path(arguments.config), scale.changes(arguments.stand_off))
+        screen.say(f"written to {arguments.config}; what it was before: {arguments.config}.bak")
+    return 0
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    ways = ("points", "checkerboard", "charuco", "width")
+    given = [way for way in ways if getattr(arguments, way) is not None]
+    if len(given) != 1:
+        raise ConfigError(f"give one of {', '.join(f'--{way}' for way in ways)}, not {len(given)} of them")
+    for name, low in (
+        ("length", 0.0),
+        ("square", 0.0),
+        ("marker", 0.0),
+        ("stand_off", 0.0),
+        ("sigma", -1e-300),
+    ):
+        value = getattr(arguments, name)
+        if value is not None and not low < value < math.inf:
+            raise ConfigError(f"--{name.replace('_', '-')} {value:g} is not possible; give mm above 0")
+
+
+def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | None) -> Scale:
+    if arguments.points is not None:
+        x1, y1, x2, y2 = _numbers(arguments.points, ",", 4, float, "--points", "12,30,840,32")
+        return from_points((x1, y1, x2, y2), _needed(arguments, "length"), arguments.sigma)
+    if not config.camera.address:
+        raise ConfigError("no camera is given; use --camera ADDRESS or --config rig.toml")
+    seen = look(config)
+    if arguments.width is None:
+        return from_board(seen.picture, _board(arguments), arguments.sigma, stand_off)
+    width = config.specimen.width_mm if arguments.width == OF_THE_RIG else arguments.width
+    if width is None or not 0 < width < math.inf:
+        raise ConfigError(
+            "--width: give the width of the specimen in mm, or specimen.width_mm in the rig file"
+        )
+    sought = replace(config, measure=replace(config.measure, roi=AUTO, mask=None))
+    region = region_of(sought, seen.picture, seen.noise)
+    return from_width(seen.picture, region, config.specimen.axis, width, arguments.sigma)
+
+
+def _board(arguments: argparse.Namespace) -> Board:
+    option = "--charuco" if arguments.charuco else "--checkerboard"
+    columns, rows = _numbers(arguments.charuco or arguments.checkerboard, "x", 2, int, option, "9x6")
+    marker = _needed(arguments, "marker") if arguments.charuco else 0.0
+    return Board(columns, rows, _needed(arguments, "square"), marker, arguments.dictionary)
+
+
+def _needed(arguments: argparse.Namespace, name: str) -> float:
+    value: float | None = getattr(arguments, name)
+    if value is None:
+        raise ConfigError(f"--{name} MM is needed with this")
+    return value
+
+
+def _numbers(
+    text: str, mark: str, count: int, kind: Callable[[str], Number], option: str, example: str
+) -> list[Number]:
+    try:
+        values = [kind(part) for part in text.lower().split(mark)]
+    except ValueError:
+        values = []
+    if len(values) != count or not all(math.isfinite(value) for value in values):
+        raise ConfigError(f"{option} {text}: give {count} numbers, as {example}")
+    return values
+
+
+def _tell_out_of_plane(stand_off: float | None, screen: Screen) -> None:
+    moved = f"{OUT_OF_PLANE_MM:g} mm toward the camera"
+    if stand_off is None:
+        screen.say(f"with --stand-off MM the false strain of {moved} is told")
+        return
+    feigned = false_strain(stand_off) * 1e6
+    screen.say(
+        f"{moved} at a stand-off of {stand_off:g} mm feigns a strain of {feigned:.0f} um/m (exx and eyy)"
+    )

@@ -1,0 +1,177 @@
+"""``phasedic check --watch``: the figures in the terminal and in the view, three times a second."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import TYPE_CHECKING, TextIO
+
+from acquire.events import ignore_event
+from acquire.printable import printable
+from live.check import GLANCE, Figures, Glance, Rolling, Watch, judge
+from live.check.judge import Line
+from live.setup import DEFAULT_REFERENCE_BURST, Config, open_rig
+from live.tell import Screen
+from live.view import View, ViewSetup, spawn_viewer
+
+if TYPE_CHECKING:
+    from analysis import ZoiGrid
+
+EVERY_S = 1 / 3
+BAR = 30
+CLOSE_S = 5.0
+
+
+def watch(config: Config, target: float | None, screen: Screen, stopped: Callable[[], bool]) -> Figures:
+    """Show figure after figure until ``stopped`` or the camera ends; the figures of the last frames.
+
+    Raises
+    ------
+    ConfigError, DataError, DeviceError
+        As a check, or whatever ended the camera.
+    """
+    frames = 2 * (config.measure.reference_burst or DEFAULT_REFERENCE_BURST)
+    watch, show, notes = Watch(config), Display(screen), list[str]()
+    rig = open_rig(config.camera.address, "none:", ignore_event, crop=config.camera.crop)
+    try:
+        with Rolling(rig.camera, frames) as rolling, _viewed(config, notes) as view:
+            due = time.monotonic()
+            while not (stopped() or rolling.over):
+                shots = rolling.newest(GLANCE)
+                if shots is not None:
+                    glance = watch.glance(shots)
+                    lines = judge(glance.figures, target, config.measure.reference_shift_px)
+                    told = [*notes, peak_line(glance), *(line.text() for line in lines)]
+                    show.lines(told, short(glance, lines))
+                    view(rolling, glance, lines)
+                due = max(due + EVERY_S, time.monotonic())
+                while not (stopped() or rolling.over) and time.monotonic() < due:
+                    time.sleep(0.02)
+            last = rolling.newest(frames)
+    finally:
+        rig.close()
+    show.end()
+    return watch.last(last)
+
+
+def peak_line(glance: Glance) -> str:
+    """The sharpness as a bar, the peak as its end."""
+    if not math.isfinite(glance.of_peak):
+        return "sharpness: no pattern is seen"
+    full = round(BAR * min(glance.of_peak, 1.0))
+    bar = "#" * full + "." * (BAR - full)
+    return (
+        f"sharpness {glance.figures.sharpness:.3f} [{bar}] {glance.of_peak:.0%} of the peak {glance.peak:.3f}"
+    )
+
+
+def short(glance: Glance, lines: list[Line]) -> str:
+    """One line, for what is no terminal."""
+    wrong = ", ".join(line.what for line in lines if not line.good)
+    return f"sharpness {glance.figures.sharpness:.3f}, peak {glance.peak:.3f}; " + (
+        f"LOOK: {wrong}" if wrong else "all well"
+    )
+
+
+class Display:
+    """Lines that are renewed in place on a terminal; elsewhere a short one every few seconds."""
+
+    def __init__(self, screen: Screen, stream: TextIO | None = None) -> None:
+        self._screen, self._stream = screen, stream or sys.stdout
+        self._terminal = self._stream.isatty()
+        self._up = 0
+
+    def lines(self, lines: list[str], short: str) -> None:
+        """Show these in the place of the last ones."""
+        if not self._terminal:
+            self._screen.status(short)
+            return
+        width, height = shutil.get_terminal_size()
+        shown = [printable(part)[: width - 1] for line in lines for part in line.split("\n")][: height - 2]
+        rest = "\x1b[0J"  # what is left of more lines than these
+        text = "".join(f"\x1b[2K{line}\n" for line in shown)
+        self._stream.write((f"\x1b[{self._up}A" if self._up else "") + text + rest)
+        self._stream.flush()
+        self._up = len(shown)
+
+    def end(self) -> None:
+        """The next lines stand below."""
+        if self._terminal:
+            self._stream.write("\n")
+
+
+@contextmanager
+def interrupts() -> Iterator[threading.Event]:
+    """Set by the first Ctrl-C or SIGTERM; the second ends the program."""
+    stop = threading.Event()
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+
+    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        yield stop
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+Shown = Callable[[Rolling, Glance, list[Line]], None]
+
+
+@contextmanager
+def _viewed(config: Config, notes: list[str]) -> Iterator[Shown]:
+    """What shows a glance in the view: the picture, and the lines as its status card; ``notes`` tell of it."""
+    views: list[View] = []
+
+    def show(rolling: Rolling, glance: Glance, lines: list[Line]) -> None:
+        if not config.view.enabled:
+            return
+        if not views:
+            views.append(_view(config, glance.figures, glance.figures.zois.grid, notes))
+        frame = rolling.frame()
+        if frame is not None:
+            views[0].picture(frame)
+        views[0].status(card(glance, lines))
+
+    try:
+        yield show
+    finally:
+        for view in views:
+            view.close(CLOSE_S)
+
+
+def _view(config: Config, figures: Figures, grid: ZoiGrid, notes: list[str]) -> View:
+    camera = figures.shots.camera
+    start = float(figures.shots.times[-1])
+    setup = ViewSetup("phasedic check", camera.width, camera.height, camera.bits, grid, start)
+
+    def serving(view: View) -> None:
+        if not (config.view.spawn and view.port is not None and spawn_viewer(view.port) is not None):
+            notes.extend(view.address.splitlines())
+
+    def tell(text: str, level: str) -> None:
+        notes.append(text)
+
+    return View(setup, port=config.view.port, rrd=None, tell=tell, serving=serving)
+
+
+def card(glance: Glance, lines: list[Line]) -> str:
+    """The glance as Markdown."""
+    rows = [
+        f"| {'' if line.good else '**LOOK**'} | {_cell(line.what)} | {_cell(line.value)} |" for line in lines
+    ]
+    return "\n".join([f"`{peak_line(glance)}`", "", "| | | |", "|---|---|---|", *rows])
+
+
+def _cell(text: str) -> str:
+    return printable(text).replace("|", "/")

@@ -1,0 +1,124 @@
+"""The check that goes on: the peak of the sharpness is held, Ctrl-C leaves the last table."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import threading
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from live.check import Watch, take
+from live.check.judge import Line
+from live.cli import main
+from live.commands import watching
+from live.commands.watching import Display, card, peak_line
+from live.setup import load_config
+from live.tell import Screen
+
+STILL = "sim:uniform?bits=8&fps=50&width=224&height=192"
+SMALL = ["--zoi", "48", "--reference-burst", "8"]
+
+
+def test_the_peak_is_held() -> None:
+    said = {
+        "camera.address": STILL + "&seconds=5&lockstep=yes",
+        "measure.zoi": 48,
+        "measure.reference_burst": 8,
+    }
+    config = load_config(None, said)
+    sharp, watch, found = take(config), Watch(config), []
+    for blur in (2.0, 1.0, 0.0, 1.5):
+        frames = np.stack([gaussian_filter(f.astype(np.float32), blur) for f in sharp.frames[:8]])
+        glance = watch.glance(replace(sharp, frames=np.round(frames).astype(np.uint8), times=sharp.times[:8]))
+        found.append(glance)
+    values = [glance.figures.sharpness for glance in found]
+    assert values[0] < values[1] < values[2] > values[3]
+    assert [glance.of_peak for glance in found[:3]] == [1.0, 1.0, 1.0]
+    assert found[3].peak == values[2]
+    assert f"{values[3] / values[2]:.0%} of the peak" in peak_line(found[3])
+    assert peak_line(found[3]).count("#") == round(30 * values[3] / values[2])
+    assert found[0].figures.floors == ()
+
+
+class FakeView:
+    """Keeps what it is shown."""
+
+    made: list[FakeView]
+
+    def __init__(self, setup: Any, **how: Any) -> None:
+        self.cards, self.pictures, self.closed = [], [], False
+        FakeView.made.append(self)
+
+    def picture(self, frame: Any) -> None:
+        self.pictures.append(frame)
+
+    def status(self, text: str) -> None:
+        self.cards.append(text)
+
+    def close(self, seconds: float) -> None:
+        self.closed = True
+
+
+def test_ctrl_c_leaves_the_table(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    FakeView.made = []
+    monkeypatch.setattr(watching, "View", FakeView)
+    glances = []
+
+    def seen(glance: Any) -> str:
+        glances.append(glance)
+        if len(glances) == 3:
+            threading.Thread(target=os.kill, args=(os.getpid(), signal.SIGINT)).start()
+        return peak_line(glance)
+
+    monkeypatch.setattr(watching, "peak_line", seen)
+    before = signal.getsignal(signal.SIGINT)
+    assert main(["check", "--watch", "--camera", STILL + "&seconds=100&hold=90", *SMALL]) == 0
+    assert signal.getsignal(signal.SIGINT) is before
+    said = capsys.readouterr().out
+    assert "sharpness 0." in said
+    assert "\n*  48     1       105      33" in said
+    assert said.rstrip().endswith("GO: ready")
+    (view,) = FakeView.made
+    assert view.closed
+    assert view.pictures
+    assert "| light |" in view.cards[0]
+
+
+def test_a_camera_that_ends(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--camera", STILL + "&seconds=4&lockstep=yes", "--no-view", *SMALL]
+    assert main(["check", "--watch", *arguments]) == 0
+    assert "strain noise of one ZOI" in capsys.readouterr().out
+    short = ["--camera", STILL + "&seconds=0.1&lockstep=yes", "--no-view", *SMALL]
+    assert main(["check", "--watch", *short]) == 4
+    assert "fewer than 8 whole frames" in capsys.readouterr().err
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is one."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_lines_are_renewed_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.get_terminal_size", lambda: (20, 24))
+    stream = Terminal()
+    show = Display(Screen(), stream)
+    show.lines(["one", "z" * 50, "bad\x1b[31m"], "")
+    show.lines(["two"], "")
+    assert stream.getvalue().count("z") == 19
+    assert "\x1b[31m" not in stream.getvalue()
+    assert stream.getvalue().endswith("\x1b[3A\x1b[2Ktwo\n\x1b[0J")
+
+
+def test_the_card_is_a_table() -> None:
+    glance: Any = type("G", (), {"of_peak": float("nan")})()
+    text = card(glance, [Line("a|b", "1"), Line("c", "2", False)])
+    assert "| a/b | 1 |" in text
+    assert "| **LOOK** | c | 2 |" in text

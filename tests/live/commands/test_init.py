@@ -1,0 +1,144 @@
+"""``phasedic init``: a rig file that run accepts as it is, from simulated, recorded and found devices."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from types import SimpleNamespace
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+
+from acquire.v4l2.listing import CameraListing
+from live.cli import main
+from live.setup import load_config
+
+SIM = "sim:hole?seconds=3&fps=20&width=320&height=320&hole=30&lockstep=yes"
+
+
+def made(tmp_path: Path, *arguments: str) -> Path:
+    path = tmp_path / "rig.toml"
+    assert main(["init", str(path), *arguments]) == 0
+    return path
+
+
+def gauges_of_run(rig: Path, out: Path, *arguments: str) -> dict[str, np.ndarray]:
+    quick = ["--out", str(out), "--no-view", "--no-rrd", "--reference-burst", "4", *arguments]
+    assert main(["run", "--config", str(rig), *quick]) == 0
+    with h5py.File(out / "strain.h5") as file:
+        return {name: dataset[()] for name, dataset in file["entry/gauges"].items()}
+
+
+def test_a_simulated_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rig = made(tmp_path, "--camera", SIM, "--section", "10,2", "--zoi", "32", "--burst", "2")
+    said = capsys.readouterr().out
+    assert "load cell: sim:" in said
+    assert "the specimen was found" in said
+    config = load_config(rig, {})
+    assert (config.measure.roi, config.measure.gauges, config.measure.zoi) == ("auto", "auto", 32)
+    assert config.specimen.area_m2 == pytest.approx(20e-6)
+    assert "# [gauges.transverse]" in rig.read_text()
+    shown = cv2.imread(str(tmp_path / "rig.png"))
+    assert shown is not None
+    found = gauges_of_run(rig, tmp_path / "run")
+    for name in ("axial", "transverse", "area"):
+        assert np.isfinite(found[name]).all()
+    assert found["axial"][-1] > 1e-3 > found["transverse"][-1]
+
+
+def test_what_is_commented_out_is_right(tmp_path: Path) -> None:
+    """Taking the # away pins region and gauges where they are."""
+    rig = made(tmp_path, "--camera", SIM)
+    text = rig.read_text().replace('roi = "auto"', "# before:").replace('gauges = "auto"', "# before:")
+    for key in ("roi", "kind", "start", "end", "box", "["):
+        text = text.replace(f"\n# {key}", f"\n{key}")
+    rig.write_text(text)
+    config = load_config(rig, {})
+    assert isinstance(config.measure.roi, tuple)
+    assert list(config.gauges) == ["axial", "transverse", "area"]
+
+
+def test_fixed(tmp_path: Path) -> None:
+    rig = made(tmp_path, "--camera", SIM, "--fixed", "--scale", "0.05")
+    config = load_config(rig, {})
+    assert config.measure.mask == str(tmp_path / "rig-mask.png")
+    assert list(config.gauges) == ["axial", "transverse", "area"]
+    assert config.scale.mm_per_px == 0.05
+    assert not cv2.imread(config.measure.mask, cv2.IMREAD_GRAYSCALE)[160, 160]
+
+
+def test_what_is_given_is_kept(tmp_path: Path) -> None:
+    given = ["--roi", "2,4,10,8mm", "--scale", "0.05", "--gauges", "given", "--axis", "x", "--step", "7"]
+    rig = made(tmp_path, "--camera", SIM, *given)
+    config = load_config(rig, {})
+    assert config.measure.roi == (40, 80, 200, 160)
+    assert (config.measure.gauges, config.measure.step, config.specimen.axis) == ("given", 7, "x")
+    assert tomllib.loads(rig.read_text())["measure"]["roi"] == "2,4,10,8mm"
+
+
+def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for taken in ("rig.toml", "rig.png", "rig-mask.png"):
+        (tmp_path / taken).write_text("mine")
+        assert main(["init", str(tmp_path / "rig.toml"), "--camera", SIM, "--fixed"]) == 2
+        assert f"{taken} exists; nothing is overwritten" in capsys.readouterr().err
+        assert [p.name for p in tmp_path.iterdir()] == [taken]
+        (tmp_path / taken).unlink()
+
+
+@pytest.mark.parametrize("wide", [True, False])
+def test_pictures(tmp_path: Path, wide: bool) -> None:
+    """A slender specimen lying or standing in the picture; no load cell is looked for."""
+    rng = np.random.default_rng(1)
+    pattern = cv2.GaussianBlur(rng.normal(size=(80, 500)).astype(np.float32), (0, 0), 1.6)
+    picture = np.full((240, 560), 90.0, np.float32)
+    picture[80:160, 30:530] = 120 + 250 * pattern
+    picture = np.clip(picture + rng.normal(0, 1, picture.shape), 0, 255).astype(np.uint8)
+    for k in range(3):
+        cv2.imwrite(str(tmp_path / f"shot{k}.png"), picture if wide else picture.T)
+    rig = made(tmp_path, "--camera", f"files:{tmp_path}/shot*.png")
+    config = load_config(rig, {})
+    assert config.specimen.axis == ("x" if wide else "y")
+    assert (config.measure.zoi, config.load.address) == (16, "none:")
+    found = gauges_of_run(rig, tmp_path / "run", "--reference-burst", "1")
+    assert np.abs(found["axial"]).max() < 1e-4
+
+
+def test_devices_are_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first camera without trouble, under the name that plugging does not change; a cell that talks."""
+    from live.commands import init
+
+    cameras = [
+        CameraListing("/dev/video0", "", trouble="no permission"),
+        CameraListing("/dev/video2?format=Y12", "Cam\na", stable_address="/dev/v4l/by-id/usb-Cam"),
+        CameraListing("/dev/video4", "Cam b"),
+    ]
+    finding = SimpleNamespace(address="/dev/ttyUSB0?protocol=ascii", remark="say the unit", protocol="ascii")
+    port = SimpleNamespace(device="/dev/ttyUSB0", accessible=True)
+    monkeypatch.setattr("acquire.v4l2.list_cameras", lambda: cameras)
+    monkeypatch.setattr("acquire.serial_line.list_serial_ports", lambda: [port])
+    monkeypatch.setattr("acquire.serial_line.identify.listen", lambda device: [(9600, b"1 N", finding)])
+    look = init.look
+    opened = []
+
+    def first_look(config):
+        opened.append(config.camera.address)
+        return look(load_config(None, {"camera.address": SIM}))
+
+    monkeypatch.setattr(init, "look", first_look)
+    rig = made(tmp_path)
+    assert opened == ["/dev/v4l/by-id/usb-Cam?format=Y12"]
+    config = load_config(rig, {})
+    assert (config.camera.address, config.load.address) == (opened[0], "/dev/ttyUSB0?protocol=ascii")
+    assert '# also found: "/dev/video4"' in rig.read_text()
+
+
+def test_no_camera_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    denied = CameraListing("/dev/video0", "", trouble="this user may not open it")
+    monkeypatch.setattr("acquire.v4l2.list_cameras", lambda: [denied])
+    assert main(["init", str(tmp_path / "rig.toml")]) == 3
+    assert "/dev/video0: this user may not open it" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []

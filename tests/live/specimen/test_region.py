@@ -1,0 +1,103 @@
+"""The region of a test: found where nothing is given, stored, the same in a replay."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+
+from live.cli import main
+from live.results import Strain
+from live.setup import load_config
+from live.specimen import Look, placed_on, region_of
+
+SIM = "sim:hole?seconds=2&fps=20&width=320&height=320&hole=40&lockstep=yes"
+QUICK = ["--zoi", "32", "--step", "16", "--no-view", "--no-rrd"]
+
+
+def config_of(folder: Path) -> dict:
+    found: dict = json.loads((folder / "config.json").read_text())
+    return found
+
+
+def test_a_run_without_a_region_finds_the_specimen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    live, again = tmp_path / "live", tmp_path / "again"
+    reference = ["--reference-burst", "4", "--burst", "2"]
+    assert main(["run", "--camera", SIM, "--gauges", "auto", *reference, "--out", str(live), *QUICK]) == 0
+    assert "the specimen was found" in capsys.readouterr().out
+    stored = config_of(live)["measure"]
+    assert stored["mask"] == str(live / "mask.png")
+    assert stored["gauges"] == "given"
+    mask = cv2.imread(stored["mask"], cv2.IMREAD_GRAYSCALE)
+    assert not mask[160, 160]
+    assert mask[100, 40]
+    assert main(["replay", str(live / "session.h5"), "--as-measured", "--out", str(again), *QUICK[-2:]]) == 0
+    with Strain.open(live / "strain.h5") as one, Strain.open(again / "strain.h5") as two:
+        assert not one.grid.active.all()
+        np.testing.assert_array_equal(one.maps("eyy", -1), two.maps("eyy", -1))
+    # A replay may look for itself: in the reference, with gauges that are placed anew.
+    third = tmp_path / "third"
+    said = ["--roi", "auto", "--gauges", "auto", "--zoi", "48", "--out", str(third), *QUICK[-2:]]
+    assert main(["replay", str(live / "session.h5"), *said]) == 0
+    assert "the specimen was found" in capsys.readouterr().out
+    with h5py.File(third / "strain.h5") as file:
+        assert set(file["entry/gauges"]) >= {"axial", "transverse", "area"}
+
+
+def pictures(folder: Path) -> str:
+    """Speckle on a disc, on grey; the disc moves by two pixels."""
+    rng = np.random.default_rng(3)
+    y, x = np.mgrid[:300, :340]
+    pattern = cv2.GaussianBlur(rng.normal(size=x.shape).astype(np.float32), (0, 0), 1.6)
+    disc = np.hypot(x - 170, y - 150) < 110
+    one = np.where(disc, 120 + 250 * pattern, 120) + rng.normal(0, 1, x.shape)
+    for k in range(2):
+        moved = np.roll(one, 2 * k, axis=1) + rng.normal(0, 0.5, x.shape)
+        cv2.imwrite(str(folder / f"p{k}.png"), np.clip(moved, 0, 255).astype(np.uint8))
+    return f"files:{folder}/p*.png"
+
+
+def test_pictures_are_replayed_on_the_specimen_alone(tmp_path: Path) -> None:
+    source = pictures(tmp_path)
+    assert main(["replay", source, "--out", str(tmp_path / "found"), *QUICK]) == 0
+    with Strain.open(tmp_path / "found" / "strain.h5") as strain:
+        x, y = np.meshgrid(strain.grid.x, strain.grid.y)
+        far = np.hypot(x - 169.5, y - 149.5)
+        assert not strain.grid.active[far > 110].any()
+        assert strain.grid.active[far < 75].all()
+        np.testing.assert_allclose(strain.maps("u", -1)[strain.grid.active], 2, atol=0.05)
+    assert (tmp_path / "found" / "mask.png").exists()
+    assert main(["replay", source, "--roi", "all", "--out", str(tmp_path / "all"), *QUICK]) == 0
+    with Strain.open(tmp_path / "all" / "strain.h5") as strain:
+        assert strain.grid.active.all()
+
+
+def test_the_edge_is_followed_to_half_a_zoi(tmp_path: Path) -> None:
+    """Of a disc whose edge is known, for several radii of the speckle and noises."""
+    pictures(tmp_path)
+    picture = cv2.imread(str(tmp_path / "p0.png"), cv2.IMREAD_GRAYSCALE)
+    region = region_of(load_config(None, {"measure.zoi": 32}), picture)
+    assert region.mask is not None
+    y, x = np.mgrid[:300, :340]
+    distance = np.hypot(x - 170, y - 150) - 110
+    assert not region.mask[distance > 16].any()
+    assert region.mask[distance < -16].all()
+
+
+def test_nothing_that_stands_out_is_told() -> None:
+    """Noise alone is no specimen: all but a rim is measured, and a line says so."""
+    from acquire.frame import CameraInfo
+
+    picture = np.random.default_rng(0).normal(100, 2, (200, 200)).astype(np.float32)
+    camera = CameraInfo("none", "none", 200, 200, 8, False, "nominal")
+    said: list[str] = []
+    config, mask = placed_on(load_config(None, {"measure.zoi": 32}), Look(picture, 2.0, camera), said.append)
+    assert mask is None
+    assert config.measure.roi == "all"
+    assert said[0].startswith("no specimen was found that stands out")
