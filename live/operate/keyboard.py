@@ -1,12 +1,17 @@
-"""The keyboard during a run: one letter and Enter (``orders`` has what they mean)."""
+"""The keyboard during a run: one line, one order (``orders`` has the words and their letters)."""
 
 from __future__ import annotations
 
 import threading
 from typing import TextIO
 
-from live.operate.orders import HELP, Orders, carry_out
+from live.operate.orders import Orders, answer
 from live.tell import Screen
+
+HELP = (
+    "keys (with Enter): r new reference, t tare (t! whatever the load does, u undo it), p pause/go on,"
+    " n TEXT note, a alarm off, q quit; or the words: ? lists them"
+)
 
 
 def listen(orders: Orders, stream: TextIO | None, screen: Screen) -> threading.Thread | None:
@@ -17,12 +22,12 @@ def listen(orders: Orders, stream: TextIO | None, screen: Screen) -> threading.T
     def work() -> None:
         try:
             for text in stream:
-                if not carry_out(text, orders):
-                    screen.say(HELP)
+                if text.strip() and (said := answer(text, orders)) != "ok":
+                    screen.say(said)
         except (OSError, ValueError):
             return
 
     thread = threading.Thread(target=work, name="keyboard", daemon=True)
-    thread.start()
     screen.say(HELP)
+    thread.start()
     return thread

@@ -17,6 +17,7 @@ from acquire.errors import ConfigError, PhasedicError
 from acquire.events import EventKind
 from acquire.frame import Frame
 from live.measure import Instant
+from live.operate import OrderRefused
 from live.outputs import About, Consumer, Outputs, make_outputs
 from live.pace import Pace
 from live.run.feed import Feed
@@ -83,21 +84,32 @@ class LiveRun:
         """End the run cleanly, soon."""
         self._stop.ask(reason)
 
-    def command(self, kind: EventKind, note: str = "") -> None:
-        """Carry out a command of the operator and write it down."""
+    def command(self, kind: EventKind, note: str = "") -> str:
+        """Carry out a command of the operator and write it down; raises OrderRefused where it cannot be."""
         if kind is EventKind.TARE:
             self._tares.order(note)
-            return
-        texts = {
-            EventKind.PAUSE: "measuring is paused, recording goes on",
-            EventKind.RESUME: "measuring goes on",
-            EventKind.NEW_REFERENCE: "a new reference is taken from the next frames",
-        }
-        self._books.journal.tell(kind, "operator", texts.get(kind, note))
-        if kind in (EventKind.PAUSE, EventKind.RESUME):
-            self._feed.paused = kind is EventKind.PAUSE
+        elif kind in (EventKind.PAUSE, EventKind.RESUME):
+            self._pause(kind is EventKind.PAUSE)
         elif kind is EventKind.NEW_REFERENCE:
+            self._told(kind, "a new reference is taken from the next frames")
             self.grabber.take_reference()
+        elif kind is EventKind.NOTE:
+            self._told(kind, note)
+        elif kind is EventKind.ALARM:
+            raise OrderRefused("no alarm is on")
+        else:
+            raise OrderRefused("recording begins and ends with the run")
+        return ""
+
+    def _pause(self, wanted: bool) -> None:
+        if wanted is self._feed.paused:
+            raise OrderRefused("measuring is paused already" if wanted else "measuring is not paused")
+        kind = EventKind.PAUSE if wanted else EventKind.RESUME
+        self._told(kind, "measuring is paused, recording goes on" if wanted else "measuring goes on")
+        self._feed.paused = wanted
+
+    def _told(self, kind: EventKind, text: str) -> None:
+        self._books.journal.tell(kind, "operator", text)
 
     # -- the run ------------------------------------------------------------------------------
 

@@ -1,15 +1,12 @@
-"""The operator's keys: one line, one order."""
+"""The operator's keys: a line is an order, what is refused is told."""
 
 from __future__ import annotations
 
 import io
-from typing import Any
 
-import pytest
-
-from acquire.events import EventKind
-from live.operate import FORCED, UNDO, carry_out, listen
+from live.operate import ENDED, listen
 from live.tell import Screen
+from tests.live.operate.test_orders import FakeLive
 
 
 class Terminal(io.StringIO):
@@ -17,55 +14,15 @@ class Terminal(io.StringIO):
         return True
 
 
-class FakeLive:
-    """Notes what it is asked."""
-
-    def __init__(self) -> None:
-        self.calls: list[Any] = []
-        self.paused = False
-
-    def stop(self, reason: str) -> None:
-        self.calls.append(("stop", reason))
-
-    def command(self, kind: EventKind, note: str = "") -> None:
-        self.paused = kind is EventKind.PAUSE
-        self.calls.append((kind, note))
-
-
-@pytest.mark.parametrize(
-    ("typed", "call"),
-    [
-        ("r\n", (EventKind.NEW_REFERENCE, "")),
-        ("t", (EventKind.TARE, "")),
-        ("t!", (EventKind.TARE, FORCED)),
-        ("u", (EventKind.TARE, UNDO)),
-        ("p", (EventKind.PAUSE, "")),
-        ("n slipped in the grip", (EventKind.NOTE, "slipped in the grip")),
-        ("q", ("stop", "ended by the operator")),
-    ],
-)
-def test_the_keys(typed: str, call: tuple[Any, str]) -> None:
-    live = FakeLive()
-    assert carry_out(typed, live)
-    assert live.calls == [call]
-
-
-def test_a_second_p_goes_on() -> None:
-    live = FakeLive()
-    for _ in range(3):
-        carry_out("p", live)
-    assert [call[0] for call in live.calls] == [EventKind.PAUSE, EventKind.RESUME, EventKind.PAUSE]
-
-
-def test_what_nobody_knows_is_answered_with_the_keys() -> None:
+def test_what_nobody_knows_is_answered_with_the_orders() -> None:
     live, screen = FakeLive(), io.StringIO()
-    assert carry_out("", live)
-    assert not carry_out("x", live)
-    thread = listen(live, Terminal("x\nn\n"), Screen(screen))
+    thread = listen(live, Terminal("\nx\nn\n?\n"), Screen(screen))
     assert thread is not None
     thread.join(5)
     assert live.calls == []
-    assert screen.getvalue().count("keys (with Enter)") == 3
+    lines = screen.getvalue().splitlines()
+    assert lines[0].startswith("keys (with Enter)")
+    assert [line.partition(":")[0] for line in lines[1:]] == ["no", "no", "ok"]
 
 
 def test_only_a_terminal_is_listened_to() -> None:
@@ -75,4 +32,4 @@ def test_only_a_terminal_is_listened_to() -> None:
     thread = listen(live, Terminal("q\n"), Screen(io.StringIO()))
     assert thread is not None
     thread.join(5)
-    assert live.calls == [("stop", "ended by the operator")]
+    assert live.calls == [("stop", ENDED)]
