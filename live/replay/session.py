@@ -36,7 +36,7 @@ def session_path(source: str) -> Path | None:
 
 def session_config(session: Session, request: ReplayRequest, extra: Mapping[str, Any], path: Path) -> Config:
     """The configuration in force when the session was recorded, overridden by file and command line."""
-    stored = {k: v for k, v in session.config.items() if k not in ("output", "record")}
+    stored = {k: v for k, v in session.config.items() if k not in ("output", "record", "operate")}
     stored["metadata"] = dict(session.metadata)
     stored["measure"] = {"strain": "small", **stored.get("measure", {})}  # of those that could not choose
     for section, keys in (("measure", ("mask",)), ("camera", ("dark", "flat"))):

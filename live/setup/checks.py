@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from live.lines import Place
+
 
 class Refused(ValueError):
     """Says what is allowed."""
@@ -103,6 +105,14 @@ def _text(value: Any) -> str:
     return value
 
 
+def _place(value: Any) -> str:
+    try:
+        Place.parse(_text(value))
+    except ValueError as allowed:
+        raise Refused(str(allowed)) from None
+    return str(value)
+
+
 def _flag(value: Any) -> bool:
     if not isinstance(value, bool):
         raise Refused("true or false")
@@ -179,6 +189,8 @@ def _strains(value: Any) -> tuple[float, float]:
 
 
 TEXT = Check(_text)
+PLACE = Check(_place)
+"""Where something listens: PORT or HOST:PORT."""
 FLAG = Check(_flag)
 BOX = Check(_box, _read_box)
 """x, y, width, height in px."""

@@ -25,6 +25,7 @@ from live.setup.sections import (
     CameraConfig,
     LoadConfig,
     MeasureConfig,
+    OperateConfig,
     OutputConfig,
     RecordConfig,
     SpecimenConfig,
@@ -43,6 +44,7 @@ class Config:
     load: LoadConfig = field(default_factory=LoadConfig)
     measure: MeasureConfig = field(default_factory=MeasureConfig)
     record: RecordConfig = field(default_factory=RecordConfig)
+    operate: OperateConfig = field(default_factory=OperateConfig)
     view: ViewConfig = field(default_factory=ViewConfig)
     specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
     output: OutputConfig = field(default_factory=OutputConfig)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from live.setup.checks import (
     BOX,
     FLAG,
+    PLACE,
     RECORD_MODE,
     REGION,
     STRAINS,
@@ -144,6 +145,26 @@ class RecordConfig:
     buffer_MB: float = key(number(1, 1e6), 512.0, "frames waiting for the disk, at most")
     when_full: str = key(
         choice("gap", "stop"), "gap", "a full buffer or disk leaves a counted gap, or ends the run"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class OperateConfig:
+    """[operate]"""
+
+    orders: str | None = key(
+        PLACE,
+        None,
+        "take orders as lines over TCP at this port (of 127.0.0.1 unless an address is given)",
+        Option("orders", "[HOST:]PORT"),
+        optional=True,
+    )
+    token_file: str | None = key(
+        TEXT,
+        None,
+        "file with the word that clients of a port say first; needed beyond 127.0.0.1",
+        Option("token-file", "FILE"),
+        optional=True,
     )
 
 

@@ -31,9 +31,10 @@ ROOMS = {
     "analysis": "analysis.field analysis.kernel",
     "hw_mocks": "acquire acquire.camera acquire.load_cell",
     "live": "",
+    "live.lines": "acquire",
     "live.measure": "acquire acquire.burst acquire.load_cell analysis analysis.field analysis.evaluate",
     "live.setup": "acquire acquire.burst acquire.camera acquire.files acquire.hdf5 acquire.load_cell acquire.opencv"
-    " analysis analysis.evaluate live.measure",
+    " analysis analysis.evaluate live.measure live.lines",
     "live.results": "acquire acquire.hdf5 analysis.field live.measure",
     "live.tell": "acquire acquire.load_cell analysis.evaluate live.measure live.setup",
     "live.maps": "acquire acquire.opencv analysis.field analysis.evaluate live.results",
@@ -41,7 +42,7 @@ ROOMS = {
     " live.measure live.setup",
     "live.check": "acquire acquire.load_cell analysis analysis.field analysis.picture analysis.quality live.measure"
     " live.setup live.specimen",
-    "live.operate": "acquire live.tell",
+    "live.operate": "acquire live.lines live.tell",
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",
     "live.view.drawing": "acquire analysis.field live.maps live.view.exchange",
