@@ -52,6 +52,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "load",
         "no-record",
         "record",
+        "armed",
+        "start-above",
         "dark",
         "flat",
         "crop",

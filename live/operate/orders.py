@@ -54,6 +54,11 @@ class Orders(Protocol):
         """Whether measuring is paused."""
         ...
 
+    @property
+    def recording(self) -> bool:
+        """Whether frames are recorded."""
+        ...
+
     def stop(self, reason: str) -> None:
         """End the test cleanly, soon."""
         ...

@@ -15,7 +15,7 @@ from contextlib import ExitStack
 
 from acquire.errors import ConfigError, PhasedicError
 from acquire.events import EventKind
-from acquire.frame import Frame
+from acquire.frame import Burst, Frame
 from live.measure import Instant
 from live.operate import OrderRefused
 from live.outputs import About, Consumer, Outputs, make_outputs
@@ -31,6 +31,7 @@ from live.run.stopping import Stop
 from live.setup import Config, open_rig
 from live.tell import Books, Screen
 
+_ARMED = "; nothing is recorded until start is ordered"
 _GRACE_S = 5.0  # a timed run without frames ends this much later
 INTERRUPTED = "interrupted"
 """The reason that makes exit code 130."""
@@ -66,7 +67,7 @@ class LiveRun:
         seconds = setting.config.output.seconds
         self._deadline = math.inf if seconds is None else time.monotonic() + seconds + _GRACE_S
         plan = GrabPlan.of(setting.config, setting.bursts)
-        self.grabber = Grabber(self._rig.camera, plan, books, self._take, recording.burst)
+        self.grabber = Grabber(self._rig.camera, plan, books, self._take, self._averaged)
         self._feed = Feed(self.grabber, books.ledger, self._idle)
         self._load = LoadThread(self._rig.load, books, outputs, recording)
         self._tares = tare_orders(self._rig.load, books)
@@ -79,6 +80,11 @@ class LiveRun:
     def paused(self) -> bool:
         """Whether measuring is paused."""
         return self._feed.paused
+
+    @property
+    def recording(self) -> bool:
+        """Whether frames are recorded."""
+        return self._recording.on
 
     def stop(self, reason: str) -> None:
         """End the run cleanly, soon."""
@@ -97,8 +103,8 @@ class LiveRun:
             self._told(kind, note)
         elif kind is EventKind.ALARM:
             raise OrderRefused("no alarm is on")
-        else:
-            raise OrderRefused("recording begins and ends with the run")
+        elif kind is EventKind.RECORD:
+            return self._recording.order(note)
         return ""
 
     def _pause(self, wanted: bool) -> None:
@@ -118,7 +124,8 @@ class LiveRun:
             stack.enter_context(self._rig.camera)
             stack.enter_context(self._rig.load)
             self._stop.then(self._rig.camera.stop)
-            self._books.journal.tell(EventKind.START, "phasedic", "the test begins")
+            waits = "" if self._recording.on or not self._setting.config.record.enabled else _ARMED
+            self._books.journal.tell(EventKind.START, "phasedic", f"the test begins{waits}")
             self._load.start()
             self.grabber.start()
             stack.pop_all()
@@ -159,8 +166,11 @@ class LiveRun:
         return 5 if lossy or not ledger.adds_up or not self._books.history.told_something else 0
 
     def _take(self, frame: Frame) -> None:
-        self._recording.frame(frame)
+        self._recording.frame(frame, needed=self.grabber.taking_reference)
         self._outputs.frame(frame)
+
+    def _averaged(self, burst: Burst) -> None:
+        self._recording.burst(burst, needed=self.grabber.taking_reference)
 
     def _idle(self, words: str) -> None:
         """Between bursts; a camera that gives nothing must not keep a timed run alive for ever."""

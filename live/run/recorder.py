@@ -7,6 +7,7 @@ so, and the measurement goes on.
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -21,6 +22,8 @@ from acquire.hdf5 import forecast, network_share
 from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import RotatingWriter, SessionInfo, SessionWriter
+from live.operate import OrderRefused
+from live.recording import Gate, Keep
 from live.run.channels import ByteBuffer
 from live.run.setting import Setting
 from live.run.stopping import Stop
@@ -41,6 +44,11 @@ class Recording(Protocol):
     """What a run gives to its recording, from any thread; nothing here waits for the disk."""
 
     @property
+    def on(self) -> bool:
+        """Whether what comes is recorded."""
+        ...
+
+    @property
     def failed(self) -> str | None:
         """Why nothing more is written; None while all is well."""
         ...
@@ -50,11 +58,13 @@ class Recording(Protocol):
         """Share of the buffer that waits for the disk."""
         ...
 
-    def frame(self, frame: Frame) -> None: ...
+    def frame(self, frame: Frame, *, needed: bool) -> None: ...
 
-    def burst(self, burst: Burst) -> None: ...
+    def burst(self, burst: Burst, *, needed: bool) -> None: ...
 
     def sample(self, sample: LoadSample) -> None: ...
+
+    def order(self, what: str) -> str: ...
 
     def close(self, ledger: dict[str, Any]) -> None: ...
 
@@ -62,17 +72,22 @@ class Recording(Protocol):
 class NoRecording:
     """The recording of a run that wants none."""
 
+    on = False
     failed: str | None = None
     backlog = 0.0
 
-    def frame(self, frame: Frame) -> None:
+    def frame(self, frame: Frame, *, needed: bool) -> None:
         """Let it go."""
 
-    def burst(self, burst: Burst) -> None:
+    def burst(self, burst: Burst, *, needed: bool) -> None:
         """Let it go."""
 
     def sample(self, sample: LoadSample) -> None:
         """Let it go."""
+
+    def order(self, what: str) -> str:
+        """Refuse it."""
+        raise OrderRefused("this run records nothing, as it was asked (--no-record)")
 
     def close(self, ledger: dict[str, Any]) -> None:
         """Nothing is open."""
@@ -101,8 +116,12 @@ def open_recording(setting: Setting, books: Books, screen: Screen, stop: Stop) -
         waits=not camera.live,
         on_failure=lambda: stop.ask("recording failed") if record.when_full == "stop" else None,
     )
-    books.journal.add_listener(recorder.event)
-    return recorder
+    keep = Keep(
+        record.keep_s, int(record.buffer_MB * 5e5), record.start_above_N or math.inf, mode.kind == "bursts"
+    )
+    gate = Gate(recorder, books.ledger, books.journal, keep, on=not record.armed)
+    books.journal.add_listener(gate.event)
+    return gate
 
 
 def _open_writer(path: Path, setting: Setting, mode: RecordMode) -> SessionWriter | RotatingWriter:

@@ -139,6 +139,19 @@ class RecordConfig:
     mode: str = key(
         RECORD_MODE, "all", "all frames, only bursts (sums), or every=K frames", Option("record", "MODE")
     )
+    armed: bool = key(
+        FLAG, False, "measure, and record nothing until start is ordered", Option("armed", on=True)
+    )
+    keep_s: float = key(
+        number(0, 60), 2.0, "what came in this time before recording began is recorded too, s"
+    )
+    start_above_N: float | None = key(
+        number(1e-6, 1e9),
+        None,
+        "armed: a force of this magnitude begins recording too, N",
+        Option("start-above", "N"),
+        optional=True,
+    )
     rotate_MB: float | None = key(
         number(10, 1e9), None, "begin another file after this much; the set is one session", optional=True
     )

@@ -43,6 +43,7 @@ ROOMS = {
     "live.check": "acquire acquire.load_cell analysis analysis.field analysis.picture analysis.quality live.measure"
     " live.setup live.specimen",
     "live.operate": "acquire live.lines live.tell",
+    "live.recording": "acquire live.operate live.tell",
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",
     "live.view.drawing": "acquire analysis.field live.maps live.view.exchange",
@@ -50,7 +51,8 @@ ROOMS = {
     "live.outputs": "acquire acquire.load_cell analysis live.measure live.pace live.setup live.tell live.results"
     " live.view",
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
-    " analysis.evaluate live.measure live.operate live.pace live.setup live.tell live.outputs",
+    " analysis.evaluate live.measure live.operate live.pace live.recording live.setup live.tell"
+    " live.outputs",
     "live.replay": "acquire acquire.burst acquire.camera acquire.load_cell acquire.opencv acquire.session analysis"
     " live.measure live.setup live.tell live.outputs",
     "live.characterise": "acquire acquire.opencv analysis analysis.field analysis.picture analysis.paper_estimator"

@@ -17,7 +17,7 @@ class FakeLive:
 
     def __init__(self, refuses: str = "", says: str = "") -> None:
         self.calls: list[Any] = []
-        self.paused = False
+        self.paused, self.recording = False, True
         self._refuses, self._says = refuses, says
 
     def stop(self, reason: str) -> None:
