@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
 from acquire.errors import ConfigError, PhasedicError
-from acquire.events import EventKind
+from acquire.events import Event, EventKind
 from acquire.frame import Burst, Frame
 from live.measure import Instant
 from live.operate import OrderRefused
@@ -29,6 +29,7 @@ from live.run.recorder import Recording, open_recording
 from live.run.setting import Setting, set_up
 from live.run.stopping import Stop
 from live.setup import Config, open_rig
+from live.signals import signals_of
 from live.tell import Books, Screen
 
 _ARMED = "; nothing is recorded until start is ordered"
@@ -72,6 +73,7 @@ class LiveRun:
         self._load = LoadThread(self._rig.load, books, outputs, recording)
         self._tares = tare_orders(self._rig.load, books)
         self._pace = Pace(lambda: recording.backlog)
+        books.journal.add_listener(self._heard)
         self._measuring = Measuring(setting, books, outputs, self._feed, self._pace, self._show)
 
     # -- what may be called from other threads ------------------------------------------------
@@ -102,7 +104,7 @@ class LiveRun:
         elif kind is EventKind.NOTE:
             self._told(kind, note)
         elif kind is EventKind.ALARM:
-            raise OrderRefused("no alarm is on")
+            self._silence()
         elif kind is EventKind.RECORD:
             return self._recording.order(note)
         return ""
@@ -113,6 +115,19 @@ class LiveRun:
         kind = EventKind.PAUSE if wanted else EventKind.RESUME
         self._told(kind, "measuring is paused, recording goes on" if wanted else "measuring goes on")
         self._feed.paused = wanted
+
+    def _silence(self) -> None:
+        names = self._books.alarms.silence()
+        if not names:
+            raise OrderRefused("no alarm is on")
+        self._told(EventKind.ALARM, f"silenced: {', '.join(names)}")
+
+    def _heard(self, event: Event) -> None:
+        """An alarm may end the run, and rings the bell."""
+        if event.kind is EventKind.ALARM and event.data.get("on"):
+            self._screen.bell()
+            if event.data.get("end"):
+                self.stop(event.text)
 
     def _told(self, kind: EventKind, text: str) -> None:
         self._books.journal.tell(kind, "operator", text)
@@ -166,6 +181,7 @@ class LiveRun:
         return 5 if lossy or not ledger.adds_up or not self._books.history.told_something else 0
 
     def _take(self, frame: Frame) -> None:
+        self._books.vitals.frame_t = time.monotonic()
         self._recording.frame(frame, needed=self.grabber.taking_reference)
         self._outputs.frame(frame)
 
@@ -218,7 +234,7 @@ def run_live(
         setting = set_up(config, rig, books.journal, screen)
         screen.announce(rig, setting.folder)
         about = About(setting.config, setting.folder, rig.camera.info, setting.grid, setting.start)
-        outputs = make_outputs(about, books, screen, consumers)
+        outputs = make_outputs(about, books, screen, [*consumers, *signals_of(about, books)])
         code = _with_outputs(setting, books, outputs, screen, stop, hands)
     finally:
         rig.close()

@@ -28,7 +28,7 @@ from live.run.channels import ByteBuffer
 from live.run.setting import Setting
 from live.run.stopping import Stop
 from live.setup import versions
-from live.tell import Books, Journal, Ledger, Screen
+from live.tell import Books, Journal, Ledger, Screen, Vitals
 
 log = logging.getLogger(__name__)
 _SMALL = 512  # bytes counted for a sample or an event
@@ -106,7 +106,7 @@ def open_recording(setting: Setting, books: Books, screen: Screen, stop: Stop) -
         return NoRecording()
     path, mode = setting.folder / "session.h5", RecordMode.parse(record.mode)
     writer = _open_writer(path, setting, mode)
-    _tell_room(path, camera, mode, screen)
+    books.vitals.disk_s = _tell_room(path, camera, mode, screen)
     recorder = Recorder(
         writer,
         books.ledger,
@@ -115,6 +115,7 @@ def open_recording(setting: Setting, books: Books, screen: Screen, stop: Stop) -
         mode=mode,
         waits=not camera.live,
         on_failure=lambda: stop.ask("recording failed") if record.when_full == "stop" else None,
+        vitals=books.vitals,
     )
     keep = Keep(
         record.keep_s, int(record.buffer_MB * 5e5), record.start_above_N or math.inf, mode.kind == "bursts"
@@ -141,14 +142,15 @@ def _open_writer(path: Path, setting: Setting, mode: RecordMode) -> SessionWrite
     return RotatingWriter(path, info, int(rotate_MB * 1e6))
 
 
-def _tell_room(path: Path, camera: CameraInfo, mode: RecordMode, screen: Screen) -> None:
-    """Say how long the disk lasts, and that a network share is a risk."""
+def _tell_room(path: Path, camera: CameraInfo, mode: RecordMode, screen: Screen) -> float:
+    """Say how long the disk lasts (s), and that a network share is a risk."""
     rate = camera.width * camera.height * (2 if camera.bits > 8 else 1) * (camera.fps or 30.0) / mode.every
     minutes = forecast(path, rate) / 60
     where = f"recording about {rate / 1e6:.0f} MB/s at most, room for {minutes:.0f} minutes"
     screen.say(f"warning: {where}" if minutes < 30 else where)
     if share := network_share(path):
         screen.say(f"warning: {path.parent} is on a network share ({share}); a local disk is safer")
+    return minutes * 60
 
 
 class Recorder:
@@ -169,6 +171,8 @@ class Recorder:
         Wait for room instead of leaving a gap (sources that wait for their reader).
     on_failure : callable
         Called once when nothing more can be written.
+    vitals : Vitals, optional
+        Told how long the disk lasts.
     now : callable
         The clock, s.
     """
@@ -183,6 +187,7 @@ class Recorder:
         mode: RecordMode | None = None,
         waits: bool = False,
         on_failure: Callable[[], None] = lambda: None,
+        vitals: Vitals | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._writer, self._ledger, self._journal = writer, ledger, journal
@@ -190,7 +195,7 @@ class Recorder:
         self._limit, self._on_failure = limit, on_failure
         self._mode = mode or RecordMode()
         self._number = self._gap = 0
-        self._now = now
+        self._vitals, self._now = vitals or Vitals(), now
         self._began = now()
         self._next_clock = self._began + _CLOCK_EVERY_S
         self._next_disk = self._began + _DISK_EVERY_S
@@ -283,7 +288,7 @@ class Recorder:
 
     def _look_at_the_disk(self, elapsed_s: float) -> None:
         rate = self._writer.bytes_written / elapsed_s
-        left = forecast(self._writer.path, rate)
+        left = self._vitals.disk_s = forecast(self._writer.path, rate)
         if left < _DISK_WARN_S and not self._disk_told:
             text = f"the disk is full in {left:.0f} s at this rate; free some space, the recording goes on"
             self._journal.tell(EventKind.RECORDER, str(self._writer.path), text, "warning", {"seconds": left})

@@ -14,7 +14,7 @@ from live.setup.gauges import GaugeConfig, describe, gauges_for
 from live.setup.grid import grid_for, kernel_settings, whole_picture
 from live.setup.pictures import correction, read_mask, with_flat_field, with_mask
 from live.setup.rig import Rig, open_load, open_rig
-from live.setup.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST, SpecimenConfig
+from live.setup.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST, AlarmConfig, SpecimenConfig
 
 __all__ = [
     "ALL",
@@ -22,6 +22,7 @@ __all__ = [
     "DEFAULT_BURST",
     "DEFAULT_REFERENCE_BURST",
     "FILES",
+    "AlarmConfig",
     "Config",
     "GaugeConfig",
     "Rig",

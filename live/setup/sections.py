@@ -182,6 +182,19 @@ class OperateConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class AlarmConfig:
+    """[[alarm]]: any number of them; exactly one of above and below."""
+
+    channel: str = key(TEXT, "", "what is looked at: a channel (docs/signals.md)")
+    above: float | None = key(number(), None, "the alarm is on above this", optional=True)
+    below: float | None = key(number(), None, "the alarm is on below this", optional=True)
+    hysteresis: float = key(number(0), 0.0, "it goes when the channel is back by this much")
+    name: str = key(TEXT, "", "its name in messages")
+    end: bool = key(FLAG, False, "it ends the run")
+    line: str = key(TEXT, "", "sent as a line on all strain outputs when it comes")
+
+
+@dataclass(frozen=True, slots=True)
 class ViewConfig:
     """[view]"""
 

@@ -1,10 +1,11 @@
 """What is told to a person and kept for the record.
 
 ``books`` holds what is kept of a test: ``journal`` has every event, ``ledger`` the fate of every frame,
-``screen`` the terminal, ``card`` the status in the view, ``figures`` those of a tensile test in words,
-``summary`` all that is said at the end.
+``board`` the alarms that are on, ``screen`` the terminal, ``card`` the status in the view, ``figures`` those
+of a tensile test in words, ``summary`` all that is said at the end.
 """
 
+from live.tell.board import AlarmBoard, Vitals
 from live.tell.books import Books
 from live.tell.card import StatusCard
 from live.tell.figures import elastic_lines, evaluate, interval, options_of, quantity
@@ -14,11 +15,13 @@ from live.tell.screen import Screen, say
 from live.tell.summary import file_lines, summary_lines
 
 __all__ = [
+    "AlarmBoard",
     "Books",
     "Journal",
     "Ledger",
     "Screen",
     "StatusCard",
+    "Vitals",
     "elastic_lines",
     "evaluate",
     "file_lines",

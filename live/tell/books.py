@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from acquire.load_cell import LoadLog
 from live.measure import History
+from live.tell.board import AlarmBoard, Vitals
 from live.tell.journal import Journal
 from live.tell.ledger import Ledger
 
@@ -20,12 +21,16 @@ class Books:
     ledger : Ledger
     loads : LoadLog
     history : History
+    alarms : AlarmBoard
+    vitals : Vitals
     """
 
     journal: Journal
     ledger: Ledger
     loads: LoadLog
     history: History
+    alarms: AlarmBoard = field(default_factory=AlarmBoard)
+    vitals: Vitals = field(default_factory=Vitals)
 
     @classmethod
     def new(cls, max_gap_s: float) -> Books:

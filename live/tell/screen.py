@@ -48,6 +48,11 @@ class Screen:
             self._write(" " * self._width + "\r" * (self._width > 0) + printable(text) + "\n")
             self._width = 0
 
+    def bell(self) -> None:
+        """Ring, where it is a terminal."""
+        if self._terminal and not self._quiet:
+            self._write("\a")
+
     def status(self, text: str) -> None:
         """The status line, renewed in place on a terminal."""
         if self._quiet or self._now() - self._last < self._every:

@@ -33,8 +33,9 @@ ROOMS = {
     "live": "",
     "live.lines": "acquire",
     "live.measure": "acquire acquire.burst acquire.load_cell analysis analysis.field analysis.evaluate",
+    "live.channels": "acquire live.measure",
     "live.setup": "acquire acquire.burst acquire.camera acquire.files acquire.hdf5 acquire.load_cell acquire.opencv"
-    " analysis analysis.evaluate live.measure live.lines",
+    " analysis analysis.evaluate live.channels live.measure live.lines",
     "live.results": "acquire acquire.hdf5 analysis.field live.measure",
     "live.tell": "acquire acquire.load_cell analysis.evaluate live.measure live.setup",
     "live.maps": "acquire acquire.opencv analysis.field analysis.evaluate live.results",
@@ -50,9 +51,10 @@ ROOMS = {
     "live.view": "acquire analysis.field live.measure live.pace live.view.exchange",
     "live.outputs": "acquire acquire.load_cell analysis live.measure live.pace live.setup live.tell live.results"
     " live.view",
+    "live.signals": "acquire live.channels live.measure live.outputs live.setup live.tell",
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
-    " analysis.evaluate live.measure live.operate live.pace live.recording live.setup live.tell"
-    " live.outputs",
+    " analysis.evaluate live.signals live.channels live.measure live.operate live.pace live.recording live.setup"
+    " live.tell live.outputs",
     "live.replay": "acquire acquire.burst acquire.camera acquire.load_cell acquire.opencv acquire.session analysis"
     " live.measure live.setup live.tell live.outputs",
     "live.characterise": "acquire acquire.opencv analysis analysis.field analysis.picture analysis.paper_estimator"
