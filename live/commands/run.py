@@ -59,7 +59,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "crop",
         "seconds",
     )
-    add_options(parser, "orders from other programs", "orders", "token-file")
+    add_options(
+        parser, "other programs", "orders", "strain-out", "strain-format", "strain-channels", "token-file"
+    )
     add_measure(parser)
 
 

@@ -234,7 +234,7 @@ def run_live(
         setting = set_up(config, rig, books.journal, screen)
         screen.announce(rig, setting.folder)
         about = About(setting.config, setting.folder, rig.camera.info, setting.grid, setting.start)
-        outputs = make_outputs(about, books, screen, [*consumers, *signals_of(about, books)])
+        outputs = make_outputs(about, books, screen, [*consumers, *signals_of(about, books, screen)])
         code = _with_outputs(setting, books, outputs, screen, stop, hands)
     finally:
         rig.close()

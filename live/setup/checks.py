@@ -189,7 +189,15 @@ def _strains(value: Any) -> tuple[float, float]:
     return low, high
 
 
+def _names(value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple) or not 1 <= len(value) <= 64:
+        raise Refused("1 to 64 names in brackets")
+    return tuple(_text(name) for name in value)
+
+
 TEXT = Check(_text)
+NAMES = Check(_names, lambda word: word.split(","))
+"""Names, on the command line with commas between."""
 PLACE = Check(_place)
 """Where something listens: PORT or HOST:PORT."""
 FLAG = Check(_flag)

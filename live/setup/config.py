@@ -31,6 +31,7 @@ from live.setup.sections import (
     OutputConfig,
     RecordConfig,
     SpecimenConfig,
+    StrainOutConfig,
     ViewConfig,
 )
 
@@ -47,6 +48,7 @@ class Config:
     measure: MeasureConfig = field(default_factory=MeasureConfig)
     record: RecordConfig = field(default_factory=RecordConfig)
     operate: OperateConfig = field(default_factory=OperateConfig)
+    strain_out: StrainOutConfig = field(default_factory=StrainOutConfig)
     view: ViewConfig = field(default_factory=ViewConfig)
     specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
     output: OutputConfig = field(default_factory=OutputConfig)
@@ -204,12 +206,13 @@ def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
 
 
 def _check_channels(config: Config, where: str) -> None:
-    known = list(channel_names(config.gauges, machine=True))
-    for number, alarm in enumerate(config.alarm, 1):
-        if alarm.channel not in known:
-            raise ConfigError(
-                f"{where}: alarm {number}: unknown channel {alarm.channel!r}{_meant(alarm.channel, known)}"
-            )
+    measured = channel_names(config.gauges)
+    known = channel_names(config.gauges, machine=True)
+    asked = [("strain_out", channel, measured) for channel in config.strain_out.channels or ()]
+    asked += [(f"alarm {number}", alarm.channel, known) for number, alarm in enumerate(config.alarm, 1)]
+    for whose, channel, names in asked:
+        if channel not in names:
+            raise ConfigError(f"{where}: {whose}: unknown channel {channel!r}{_meant(channel, list(names))}")
 
 
 def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from live.setup.checks import (
     BOX,
     FLAG,
+    NAMES,
     PLACE,
     RECORD_MODE,
     REGION,
@@ -177,6 +178,34 @@ class OperateConfig:
         None,
         "file with the word that clients of a port say first; needed beyond 127.0.0.1",
         Option("token-file", "FILE"),
+        optional=True,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class StrainOutConfig:
+    """[strain_out]"""
+
+    tcp: str | None = key(
+        PLACE,
+        None,
+        "tell every measurement as a line to TCP clients of this port (of 127.0.0.1 unless an address is given)",
+        Option("strain-out", "[HOST:]PORT"),
+        optional=True,
+    )
+    udp: str | None = key(PLACE, None, "send it by UDP to this HOST:PORT", optional=True)
+    serial: str | None = key(TEXT, None, "write it to this port: /dev/ttyUSB1?baud=115200", optional=True)
+    format: str = key(
+        choice("json", "csv"),
+        "json",
+        "of a line; csv begins with the names",
+        Option("strain-format", choices=("json", "csv")),
+    )
+    channels: tuple[str, ...] | None = key(
+        NAMES,
+        None,
+        "what is told (docs/signals.md); without, the axial strain, load, gauges and what belongs to them",
+        Option("strain-channels", "NAME,NAME"),
         optional=True,
     )
 

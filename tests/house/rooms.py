@@ -51,7 +51,8 @@ ROOMS = {
     "live.view": "acquire analysis.field live.measure live.pace live.view.exchange",
     "live.outputs": "acquire acquire.load_cell analysis live.measure live.pace live.setup live.tell live.results"
     " live.view",
-    "live.signals": "acquire live.channels live.measure live.outputs live.setup live.tell",
+    "live.signals": "acquire acquire.serial_line live.channels live.lines live.measure live.outputs live.setup"
+    " live.tell",
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
     " analysis.evaluate live.signals live.channels live.measure live.operate live.pace live.recording live.setup"
     " live.tell live.outputs",
