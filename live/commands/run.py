@@ -81,7 +81,9 @@ def run_to_the_end(config: Config, screen: Screen, consumers: Sequence[Consumer]
         port = OrderPort(operate.orders, operate.token_file, screen) if operate.orders else None
 
         def hands(live: LiveRun) -> None:
-            listen(live, sys.stdin, screen)
+            keyboard = listen(live, sys.stdin, screen)
+            if keyboard is not None:
+                stack.callback(keyboard.close)
             if port is not None:
                 port.open(live)
 
@@ -102,7 +104,9 @@ def conclude(outcome: Outcome, screen: Screen) -> None:
         screen.say(f"  {report.line()}")
     troubles = books.journal.events("warning", "error")
     if troubles:
-        screen.say(f"{len(troubles)} warnings and errors, the last: {sentence(troubles[-1])}")
+        screen.say(
+            f"{len(troubles)} warnings and errors, the last: {sentence(troubles[-1], books.journal.names)}"
+        )
     for line in file_lines(outcome.folder):
         screen.say(line)
     rrd = outcome.folder / "view.rrd"

@@ -1,5 +1,5 @@
-"""The operator's hand: ``orders`` are what can be asked of a run in one line, ``keyboard`` gives them from a terminal,
-``port`` from other programs.
+"""The operator's hand: ``orders`` are what can be asked of a run in one line, ``keyboard`` gives them from a terminal
+(``keys`` are single ones), ``port`` from other programs.
 
 ``tare`` says when a tare needs to be ordered twice, ``refusal`` why an order is not carried out.
 """

@@ -30,9 +30,10 @@ from live.run.setting import Setting, set_up
 from live.run.stopping import Stop
 from live.setup import Config, open_rig
 from live.signals import signals_of
-from live.tell import Books, Screen
+from live.tell import Books, Screen, Standing
 
 _ARMED = "; nothing is recorded until start is ordered"
+_SILENT_S = 1.0
 _GRACE_S = 5.0  # a timed run without frames ends this much later
 INTERRUPTED = "interrupted"
 """The reason that makes exit code 130."""
@@ -69,6 +70,9 @@ class LiveRun:
         self._deadline = math.inf if seconds is None else time.monotonic() + seconds + _GRACE_S
         plan = GrabPlan.of(setting.config, setting.bursts)
         self.grabber = Grabber(self._rig.camera, plan, books, self._take, self._averaged)
+        self._last: Instant | None = None
+        self._began = time.monotonic()
+        self._has_recorded = recording.on
         self._feed = Feed(self.grabber, books.ledger, self._idle)
         self._load = LoadThread(self._rig.load, books, outputs, recording)
         self._tares = tare_orders(self._rig.load, books)
@@ -106,14 +110,16 @@ class LiveRun:
         elif kind is EventKind.ALARM:
             self._silence()
         elif kind is EventKind.RECORD:
-            return self._recording.order(note)
+            said = self._recording.order(note)
+            self._has_recorded = True
+            return said
         return ""
 
     def _pause(self, wanted: bool) -> None:
         if wanted is self._feed.paused:
             raise OrderRefused("measuring is paused already" if wanted else "measuring is not paused")
         kind = EventKind.PAUSE if wanted else EventKind.RESUME
-        self._told(kind, "measuring is paused, recording goes on" if wanted else "measuring goes on")
+        self._told(kind, "measuring is paused" if wanted else "measuring goes on")
         self._feed.paused = wanted
 
     def _silence(self) -> None:
@@ -190,13 +196,45 @@ class LiveRun:
 
     def _idle(self, words: str) -> None:
         """Between bursts; a camera that gives nothing must not keep a timed run alive for ever."""
-        if words:
-            self._screen.waiting(self._books.ledger, words)
+        if words or self.paused:
+            silent = self._last is None or not time.monotonic() - self._books.vitals.frame_t < _SILENT_S
+            self._show(self._last, words if silent else "")
         if time.monotonic() > self._deadline and not self._stop.asked:
             self.stop("the time is over")
 
-    def _show(self, instant: Instant) -> None:
-        self._screen.instant(instant, self._books.ledger, self.grabber.fps, self._pace.p95_s)
+    def _show(self, instant: Instant | None, words: str = "") -> None:
+        """Renew the status line; called with every measurement."""
+        self._last = instant
+        if self._screen.is_due:
+            self._screen.standing(self._standing(words))
+
+    def _standing(self, words: str) -> Standing:
+        books, specimen = self._books, self._setting.config.specimen
+        latest = books.loads.latest
+        return Standing(
+            ledger=books.ledger,
+            state=self.state,
+            elapsed_s=time.monotonic() - self._began,
+            fps=self.grabber.fps,
+            force_N=math.nan if latest is None else latest.force,
+            area_m2=specimen.area_m2,
+            instant=self._last,
+            p95_s=self._pace.p95_s,
+            disk_s=books.vitals.disk_s if self.recording else math.inf,
+            alarms=books.alarms.texts,
+            words=words,
+        )
+
+    @property
+    def state(self) -> str:
+        """What is done with the frames, in a word or two."""
+        if self.recording:
+            state = "REC"
+        elif self._setting.config.record.enabled:
+            state = "NOT RECORDING" if self._has_recorded else "ARMED"
+        else:
+            state = "not recorded"
+        return f"{state}, PAUSED" if self.paused else state
 
 
 def run_live(
@@ -228,6 +266,7 @@ def run_live(
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (phasedic devices lists what is there)")
     stop, books = stop or Stop(), Books.new(config.load.max_gap_s)
+    books.journal.names |= device_names(config)
     screen.say(f"opening {config.camera.address}")
     rig = open_rig(config.camera.address, config.load.address, books.journal, crop=config.camera.crop)
     try:
@@ -239,6 +278,12 @@ def run_live(
     finally:
         rig.close()
     return Outcome(setting.folder, setting.config, books, outputs, rig, setting.grid, code)
+
+
+def device_names(config: Config) -> dict[str, str]:
+    """What camera and load cell are called on the screen; nothing where both have one address."""
+    names = {config.load.address: "load cell", config.camera.address: "camera"}
+    return names if len(names) == 2 else {}
 
 
 def _with_outputs(

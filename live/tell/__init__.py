@@ -1,8 +1,8 @@
 """What is told to a person and kept for the record.
 
 ``books`` holds what is kept of a test: ``journal`` has every event, ``ledger`` the fate of every frame,
-``board`` the alarms that are on, ``screen`` the terminal, ``card`` the status in the view, ``figures`` those
-of a tensile test in words, ``summary`` all that is said at the end.
+``board`` the alarms that are on, ``screen`` the terminal, ``status_line`` its last line, ``card`` the status in
+the view, ``figures`` those of a tensile test in words, ``summary`` all that is said at the end.
 """
 
 from live.tell.board import AlarmBoard, Vitals
@@ -12,6 +12,7 @@ from live.tell.figures import elastic_lines, evaluate, interval, options_of, qua
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen, say
+from live.tell.status_line import Standing
 from live.tell.summary import file_lines, summary_lines
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "Journal",
     "Ledger",
     "Screen",
+    "Standing",
     "StatusCard",
     "Vitals",
     "elastic_lines",
