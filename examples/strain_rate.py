@@ -62,8 +62,8 @@ class Pid:
     """A PID on the strain, which shall be on a ramp of ``rate`` (1/s); gives the speed."""
 
     rate: float
-    p: float = 2.5
-    i: float = 2.0
+    p: float = 5.0
+    i: float = 6.0
     d: float = 0.1
     _began: tuple[float, float] | None = None
     _last: tuple[float, float] = (0.0, 0.0)

@@ -14,7 +14,7 @@ RATE, UNTIL = 5e-4, 4e-3
 
 
 def test_the_strain_rate_is_held_through_yield(tmp_path: Path) -> None:
-    """Within 10 % over a second where the machine alone would be 40 % off; ISO 6892-1 allows 20 %."""
+    """Within 15 % over a second where the machine alone would be 40 % off; ISO 6892-1 allows 20 %."""
     outcome = main(str(tmp_path / "run"), RATE, UNTIL)
     assert outcome.exit_code == 0
     instants, specimen = outcome.books.history.instants, outcome.rig.specimen
@@ -26,7 +26,7 @@ def test_the_strain_rate_is_held_through_yield(tmp_path: Path) -> None:
     grid = np.arange(pulled[0] + 1.0, pulled[-1] - 1.0, 0.25)
     rates = specimen.axial_strain(grid + 1.0) - specimen.axial_strain(grid)
     settled = (specimen.axial_strain(grid) > 2.6e-3) | (specimen.axial_strain(grid + 1.0) < 2e-3)
-    assert np.abs(rates[settled] / RATE - 1).max() < 0.1
+    assert np.abs(rates[settled] / RATE - 1).max() < 0.15
     assert np.abs(rates / RATE - 1).max() < 0.4
     notes = [e.text for e in outcome.books.journal.events() if e.kind is EventKind.NOTE]
     assert notes == ["strain rate 0.0005 1/s"]
