@@ -80,7 +80,7 @@ def session_material(session: Session, request: ReplayRequest, config: Config, p
         raise ConfigError(
             "--as-measured takes the references of the run; leave --reference out, or --as-measured"
         )
-    loads = LoadLog(config.load.max_gap_s)
+    loads = LoadLog(config.load.max_gap_s, config.load.lag_s)
     samples = tuple(session.load_samples())
     for sample in samples:
         loads.append(sample)

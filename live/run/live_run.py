@@ -265,7 +265,7 @@ def run_live(
     """
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (phasedic devices lists what is there)")
-    stop, books = stop or Stop(), Books.new(config.load.max_gap_s)
+    stop, books = stop or Stop(), Books.new(config.load.max_gap_s, config.load.lag_s)
     books.journal.names |= device_names(config)
     screen.say(f"opening {config.camera.address}")
     rig = open_rig(config.camera.address, config.load.address, books.journal, crop=config.camera.crop)

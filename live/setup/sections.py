@@ -61,6 +61,12 @@ class LoadConfig:
         Option("load", "ADDRESS"),
     )
     max_gap_s: float = key(number(0.001, 3600), 0.5, "samples further apart than this leave a gap, s")
+    lag_s: float = key(
+        number(-10, 10),
+        0.0,
+        "the load is stamped this much later than the frames it belongs to, s; as the summary tells it",
+        Option("lag", "S"),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,6 +275,7 @@ class SpecimenConfig:
         choice("raw", "toe", "preload"),
         "raw",
         "strain counts as measured, from the foot of the elastic line, or from the preload",
+        Option("zero", choices=("raw", "toe", "preload")),
     )
     preload_MPa: float = key(number(1e-3, 1e5), 1.0, "stress from which strain counts with zero = preload")
 

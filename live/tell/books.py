@@ -33,6 +33,6 @@ class Books:
     vitals: Vitals = field(default_factory=Vitals)
 
     @classmethod
-    def new(cls, max_gap_s: float) -> Books:
-        """Empty ones; ``max_gap_s`` (s) as for ``LoadLog``."""
-        return cls(Journal(), Ledger(), LoadLog(max_gap_s), History())
+    def new(cls, max_gap_s: float, lag_s: float = 0.0) -> Books:
+        """Empty ones; ``max_gap_s`` and ``lag_s`` (s) as for ``LoadLog``."""
+        return cls(Journal(), Ledger(), LoadLog(max_gap_s, lag_s), History())

@@ -318,6 +318,21 @@ def test_what_is_recorded_in_part_replays_bit_equal(tmp_path: Path, how: dict[st
         assert_bit_equal(strains(folder), strains(out / str(len(extra))))
 
 
+def test_a_lag_is_taken_off_on_request_and_both_forces_are_stored(
+    tmp_path: Path, recorded: tuple[Path, Outcome]
+) -> None:
+    folder, outcome = recorded
+    session, out, lag = str(folder / "session.h5"), tmp_path / "again", 0.15
+    replay = ["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]
+    assert main([*replay, "--lag", str(lag)]) == 0
+    before, forces, raw = mean(folder, "force_N"), mean(out, "force_N"), mean(out, "force_raw_N")
+    np.testing.assert_array_equal(raw, before)
+    loads, start = outcome.books.loads, outcome.books.history.instants[0].t - mean(folder, "time_s")[0]
+    expected = [loads.force_at(t + lag) for t in mean(folder, "time_s") + start]
+    np.testing.assert_allclose(forces, expected, rtol=1e-6)
+    assert np.nanmax(np.abs(forces - raw)) > 50  # a ramp
+
+
 def test_dark_and_flat_frames_take_the_fixed_pattern_out(tmp_path: Path) -> None:
     """A fixed pattern pulls displacement towards zero; corrected, a moved folder still replays bit-equal."""
     camera = "sim:uniform?lockstep=yes&seconds=2&fps=15&width=224&height=192&bits=12&fpn=6&drift_x=0.5"
