@@ -26,6 +26,8 @@ class EventKind(StrEnum):
     TARE = "tare"  # command; data: offset_N
     PAUSE = "pause"  # command
     RESUME = "resume"  # command
+    RECORD = "record"  # command: recording begins or ends; data: on
+    ALARM = "alarm"  # an alarm comes, goes or is silenced; data: alarm, on
     NOTE = "note"  # the operator's own words
     LOST = "lost"  # data: count, where
     DEVICE = "device"  # a fault or recovery of a camera or load cell

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hw_mocks.machine import Machine
+
 Array = NDArray[np.float64]
 
 
@@ -31,6 +33,8 @@ class Programme:
         Axial strain where the rate changes, and at the end of the ramp.
     knee : float
         Part of the ramp's time spent up to ``knee_strain``.
+    machine : Machine or None
+        Driven from outside; then it alone says the strain, and the times are those of the test.
     """
 
     hold_s: float = 2.0
@@ -39,6 +43,7 @@ class Programme:
     knee_strain: float = 2e-3
     max_strain: float = 8e-3
     knee: float = 0.6
+    machine: Machine | None = None
 
     @property
     def duration_s(self) -> float:
@@ -52,6 +57,8 @@ class Programme:
 
     def strain(self, t: ArrayLike) -> Array:
         """Axial strain at ``t`` seconds since the start; 0 before."""
+        if self.machine is not None:
+            return self.machine.strain(t)
         times = (self.hold_s, self.knee_s, self.hold_s + self.ramp_s)
         return np.asarray(np.interp(np.asarray(t, float), times, (0.0, self.knee_strain, self.max_strain)))
 

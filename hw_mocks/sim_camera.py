@@ -213,6 +213,7 @@ class SimCamera(Closing):
         self.stop()
         if self._thread is not None:
             self._thread.join()
+        self.specimen.close()
 
     def _start(self) -> float:
         return self.specimen.clock.start or 0.0
@@ -303,7 +304,7 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
 
     Keys, beside those of the specimen (width, height, seconds, hold, end, max_strain, E_GPa, nu,
     yield_MPa, section_mm2, px_per_mm, axis, hole, cell, overstrain, drift_x, drift_y,
-    rotation_deg, lockstep): fps (a number, or auto: what this machine renders with ease), bits, noise
+    rotation_deg, lockstep, machine): fps (a number, or auto: what this machine renders with ease), bits, noise
     (% of full scale at mid-grey), fpn (%), brightness, exposure_us, radius (px), contrast (%), seed,
     buffers, offset (s), faults.
 

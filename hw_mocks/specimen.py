@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from acquire.addresses import Address, Options
 from acquire.errors import ConfigError
 from hw_mocks.deformation import Gradient, SpecimenDeformation
+from hw_mocks.machine import Machine
 from hw_mocks.material import Material
 from hw_mocks.programme import Programme, TestClock
 from hw_mocks.strain_modes import Axis, Kind, StrainModes
@@ -44,6 +45,7 @@ SPECIMEN_KEYS = frozenset(
         "drift_y",
         "rotation_deg",
         "lockstep",
+        "machine",
     }
 )
 
@@ -161,6 +163,11 @@ class VirtualSpecimen:
         """(du_dx, du_dy, dv_dx, dv_dy) at reference pixels (x, y)."""
         return self.at(t).gradient(x, y)
 
+    def close(self) -> None:
+        """Let go the port of the machine, where it is driven from outside."""
+        if self.programme.machine is not None:
+            self.programme.machine.close()
+
     def mask(self) -> NDArray[np.bool_]:
         """(H, W) bool: where there is material in the reference image.
 
@@ -184,19 +191,22 @@ def specimen_from(address: Address) -> VirtualSpecimen:
     ConfigError
         An unknown kind or an impossible value.
     """
-    return take_specimen(Options(address))
+    specimen = take_specimen(Options(address))
+    if specimen.programme.machine is not None:
+        specimen.programme.machine.listen()
+    return specimen
 
 
 def take_specimen(options: Options) -> VirtualSpecimen:
     """Take the keys of the specimen out of an address's settings; raises as ``specimen_from``."""
     kind = _kind(options.address)
-    material = _take_material(options)
+    material, clock = _take_material(options), TestClock()
     return VirtualSpecimen(
         kind=kind,
         width=options.integer("width", 640, minimum=32, maximum=8192),
         height=options.integer("height", 512, minimum=32, maximum=8192),
         material=material,
-        programme=_take_programme(options, material),
+        programme=_take_programme(options, material, clock),
         axis="x" if options.choice("axis", ("y", "x"), "y") == "x" else "y",
         area_m2=options.number("section_mm2", 40.0, minimum=1e-3) * 1e-6,
         px_per_m=options.number("px_per_mm", 20.0, minimum=1e-3) * 1e3,
@@ -206,6 +216,7 @@ def take_specimen(options: Options) -> VirtualSpecimen:
         drift_px=(options.number("drift_x", 0.0), options.number("drift_y", 0.0)),
         rotation_rad=math.radians(options.number("rotation_deg", 0.0, minimum=-45, maximum=45)),
         nominal=options.flag("lockstep"),
+        clock=clock,
     )
 
 
@@ -225,7 +236,7 @@ def _take_material(options: Options) -> Material:
     )
 
 
-def _take_programme(options: Options, material: Material) -> Programme:
+def _take_programme(options: Options, material: Material, clock: TestClock) -> Programme:
     seconds = options.number("seconds", 20.0, minimum=0.1)
     # A short test keeps its parts in proportion unless they are given.
     hold = options.number("hold", min(2.0, 0.1 * seconds), minimum=0)
@@ -237,4 +248,12 @@ def _take_programme(options: Options, material: Material) -> Programme:
         )
     plastic = top > material.yield_strain
     knee_strain, knee = (material.yield_strain, 0.6) if plastic else (top / 2, 0.5)
-    return Programme(hold, seconds - hold - end, end, knee_strain, top, knee)
+    return Programme(
+        hold, seconds - hold - end, end, knee_strain, top, knee, _machine(options, material, clock)
+    )
+
+
+def _machine(options: Options, material: Material, clock: TestClock) -> Machine | None:
+    """The machine that another program drives over this port, where there is one."""
+    port = options.integer("machine", minimum=0, maximum=65535)
+    return None if port is None else Machine(port, material.yield_strain, clock.elapsed)

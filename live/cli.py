@@ -8,6 +8,7 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
+from typing import TextIO
 
 from acquire.errors import PhasedicError
 from acquire.printable import brief, printable
@@ -50,12 +51,21 @@ def _let_go_of_lost_streams() -> None:
 
 def _set_up_logging(arguments: argparse.Namespace) -> None:
     verbose = getattr(arguments, "verbose", False)
-    handler = logging.StreamHandler(sys.stderr)
+    handler = _OverTheStatusLine(sys.stderr)
     long = "%(asctime)s %(levelname)s %(name)s: %(message)s"
-    handler.setFormatter(_Harmless(long if verbose else "%(levelname)s %(message)s"))
+    handler.setFormatter(_Harmless(long if verbose else "%(asctime)s %(levelname)s %(message)s", "%H:%M:%S"))
     logging.basicConfig(level=logging.DEBUG if verbose else logging.WARNING, handlers=[handler])
     for name in ("acquire", "analysis", "live", "hw_mocks"):
         logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.INFO)
+
+
+class _OverTheStatusLine(logging.StreamHandler[TextIO]):
+    """On a terminal a message takes the place of the status line, which comes again below it."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if self.stream.isatty():
+            self.stream.write("\r\x1b[K")
+        super().emit(record)
 
 
 class _Harmless(logging.Formatter):

@@ -28,10 +28,12 @@ class LoadLog:
     ----------
     max_gap_s : float, s
         Between samples further apart than this the force is not known.
+    lag_s : float, s
+        By which samples are stamped later than what they tell of; taken off by ``force_at``.
     """
 
-    def __init__(self, max_gap_s: float = 0.25) -> None:
-        self._max_gap_s = max_gap_s
+    def __init__(self, max_gap_s: float = 0.25, lag_s: float = 0.0) -> None:
+        self._max_gap_s, self.lag_s = max_gap_s, lag_s
         self._t = array("d")
         self._force = array("d")
         self._zeros: list[tuple[float, float]] = []
@@ -76,7 +78,7 @@ class LoadLog:
     def covers(self, t: float) -> bool:
         """Whether waiting longer cannot change ``force_at(t)``."""
         with self._lock:
-            return self._closed or bool(self._t and self._t[-1] >= t)
+            return self._closed or bool(self._t and self._t[-1] >= t + max(self.lag_s, 0.0))
 
     def force_at(self, t: float) -> float:
         """The force at an instant, N.
@@ -92,6 +94,13 @@ class LoadLog:
             Linear between the samples before and after; NaN before the first and after the
             last sample, across a gap longer than ``max_gap_s`` and beside a NaN sample.
         """
+        return self._at(t + self.lag_s)
+
+    def raw_force_at(self, t: float) -> float:
+        """The same with the samples as they are stamped; NaN where no lag is taken off."""
+        return self._at(t) if self.lag_s else math.nan
+
+    def _at(self, t: float) -> float:
         with self._lock:
             after = bisect_left(self._t, t)
             if after == len(self._t):

@@ -8,6 +8,6 @@ is plugged in, ``identify`` finds out what talks.
 
 from acquire.serial_line import identify
 from acquire.serial_line.cell import open_serial
-from acquire.serial_line.ports import list_serial_ports
+from acquire.serial_line.ports import LineSettings, list_serial_ports, open_port
 
-__all__ = ["identify", "list_serial_ports", "open_serial"]
+__all__ = ["LineSettings", "identify", "list_serial_ports", "open_port", "open_serial"]

@@ -11,9 +11,9 @@ from types import FrameType
 
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, add_options, configured
-from live.operate import listen
+from live.operate import OrderPort, listen
 from live.outputs import Consumer
-from live.run import INTERRUPTED, Outcome, Stop, run_live
+from live.run import INTERRUPTED, LiveRun, Outcome, Stop, run_live
 from live.setup import Config
 from live.specimen import searched
 from live.tell import Screen, file_lines, sentence, summary_lines
@@ -52,10 +52,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "load",
         "no-record",
         "record",
+        "armed",
+        "start-above",
         "dark",
         "flat",
         "crop",
         "seconds",
+    )
+    add_options(
+        parser, "other programs", "orders", "strain-out", "strain-format", "strain-channels", "token-file"
     )
     add_measure(parser)
 
@@ -70,12 +75,22 @@ def command(arguments: argparse.Namespace) -> int:
 
 
 def run_to_the_end(config: Config, screen: Screen, consumers: Sequence[Consumer] = ()) -> Outcome:
-    """Run with signals, keyboard and viewer attached."""
-    stop = Stop()
-    with signals(lambda: stop.ask(INTERRUPTED), screen.say):
-        return run_live(
-            config, screen, stop=stop, consumers=consumers, hands=lambda live: listen(live, sys.stdin, screen)
-        )
+    """Run with signals, keyboard, port for orders and viewer attached."""
+    stop, operate = Stop(), config.operate
+    with contextlib.ExitStack() as stack:
+        port = OrderPort(operate.orders, operate.token_file, screen) if operate.orders else None
+
+        def hands(live: LiveRun) -> None:
+            keyboard = listen(live, sys.stdin, screen)
+            if keyboard is not None:
+                stack.callback(keyboard.close)
+            if port is not None:
+                port.open(live)
+
+        if port is not None:
+            stack.callback(port.close)
+        stack.enter_context(signals(lambda: stop.ask(INTERRUPTED), screen.say))
+        return run_live(config, screen, stop=stop, consumers=consumers, hands=hands)
 
 
 def conclude(outcome: Outcome, screen: Screen) -> None:
@@ -89,7 +104,9 @@ def conclude(outcome: Outcome, screen: Screen) -> None:
         screen.say(f"  {report.line()}")
     troubles = books.journal.events("warning", "error")
     if troubles:
-        screen.say(f"{len(troubles)} warnings and errors, the last: {sentence(troubles[-1])}")
+        screen.say(
+            f"{len(troubles)} warnings and errors, the last: {sentence(troubles[-1], books.journal.names)}"
+        )
     for line in file_lines(outcome.folder):
         screen.say(line)
     rrd = outcome.folder / "view.rrd"

@@ -43,6 +43,8 @@ class Instant:
         From the stamp of the burst's last frame to this result; NaN in a replay.
     gauges : mapping of name to GaugeValue
         In the order of the configuration.
+    force_raw : float, N
+        As stamped, where a lag of the load was taken off ``force``; else NaN.
     """
 
     t: float
@@ -64,6 +66,7 @@ class Instant:
     measure_s: float
     latency_s: float = math.nan
     gauges: Mapping[str, GaugeValue] = field(default_factory=dict)
+    force_raw: float = math.nan
 
 
 def instant_of(burst: Burst, field: StrainField, force: float, measure_s: float = 0.0) -> Instant:

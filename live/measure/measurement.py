@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -55,6 +56,6 @@ class Measurement:
         """The same once it is known how long it took, from the stamp of the last frame."""
         return replace(self, instant=replace(self.instant, latency_s=latency_s))
 
-    def with_force(self, force: float) -> Measurement:
-        """The same once the force is known."""
-        return replace(self, instant=replace(self.instant, force=force))
+    def with_force(self, force: float, raw: float = math.nan) -> Measurement:
+        """The same once the force is known; ``raw`` as stamped, where a lag was taken off."""
+        return replace(self, instant=replace(self.instant, force=force, force_raw=raw))

@@ -20,6 +20,8 @@ class Loads(Protocol):
 
     def force_at(self, t: float) -> float: ...
 
+    def raw_force_at(self, t: float) -> float: ...
+
     def covers(self, t: float) -> bool: ...
 
 
@@ -57,4 +59,5 @@ class Settling:
         return self._loads.covers(measurement.t) or newest_t - measurement.t > self._hold_s
 
     def _with_force(self, measurement: Measurement) -> Measurement:
-        return measurement.with_force(self._loads.force_at(measurement.t))
+        t = measurement.t
+        return measurement.with_force(self._loads.force_at(t), self._loads.raw_force_at(t))

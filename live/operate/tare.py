@@ -12,6 +12,7 @@ from typing import Protocol
 
 from acquire.events import EventKind, Level
 from acquire.load_sample import LoadCellInfo, LoadSample
+from live.operate.refusal import OrderRefused
 
 FORCED, UNDO = "force", "undo"
 """What an order of ``EventKind.TARE`` may say besides nothing."""
@@ -59,7 +60,15 @@ class TareOrders:
         self._asked = -math.inf  # when a confirmation was asked for
 
     def order(self, how: str = "") -> None:
-        """Tare; FORCED: whatever the load does; UNDO: let zero be where it was before the last tare."""
+        """Tare; FORCED: whatever the load does; UNDO: let zero be where it was before the last tare.
+
+        Raises
+        ------
+        OrderRefused
+            There is nothing to tare, or it has to be ordered again.
+        """
+        if self._cell.info.protocol == "none":
+            raise OrderRefused("there is no load cell")
         asked, self._asked = self._asked, -math.inf
         risk = "" if how else self._risk()
         if how == UNDO:
@@ -70,8 +79,7 @@ class TareOrders:
             text = (
                 f"{risk}: forces before and after a tare have different zeros, and so have modulus and stress"
             )
-            text += f"; order it again within {CONFIRM_S:g} s to do it"
-            self._tell(EventKind.DEVICE, "operator", text, "warning")
+            raise OrderRefused(f"{text}; order it again within {CONFIRM_S:g} s to do it")
         else:
             self._tell(EventKind.TARE, "operator", "tare" + (", forced" if how else ""), "info")
             self._cell.tare(force=how == FORCED)

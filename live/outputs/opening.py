@@ -64,6 +64,8 @@ def make_outputs(about: About, books: Books, screen: Screen, more: Sequence[Cons
         strain_measure=cast(Any, config.measure.strain),
         area_m2=config.specimen.area_m2,
         gauges={name: describe(table) for name, table in config.gauges.items()},
+        axis=config.specimen.axis,
+        lagged=config.load.lag_s != 0,
     )
     consumers: list[Consumer] = [Files(Results(about.folder, about.grid, info))]
     view = _view(about, books, screen)

@@ -23,7 +23,7 @@ def picture_material(camera: Camera, request: ReplayRequest, config: Config) -> 
         reference = reference_from(request.reference, camera.info)
     else:
         reference = _leading_burst(frames, config.measure.reference_burst or 1, request.source)
-    loads = LoadLog(config.load.max_gap_s)
+    loads = LoadLog(config.load.max_gap_s, config.load.lag_s)
     loads.close()
     bursts = Window.of(request, 0.0).part(average_bursts(frames, config.measure.burst or 1))
     start = ClockPair(0.0, datetime.datetime.now(datetime.UTC))

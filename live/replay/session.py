@@ -21,6 +21,9 @@ from live.replay.pictures import reference_from
 from live.replay.store import DEFAULT_BURST, Store, open_store
 from live.setup import Config, from_dict, settings_in
 
+LIVE_ONLY = ("output", "record", "operate", "strain_out", "alarm")
+"""Sections of the configuration that a replay does not take over."""
+
 
 def session_path(source: str) -> Path | None:
     """The session's path, or None where ``source`` is an address of pictures."""
@@ -36,7 +39,11 @@ def session_path(source: str) -> Path | None:
 
 def session_config(session: Session, request: ReplayRequest, extra: Mapping[str, Any], path: Path) -> Config:
     """The configuration in force when the session was recorded, overridden by file and command line."""
-    stored = {k: v for k, v in session.config.items() if k not in ("output", "record")}
+    stored = {
+        k: v
+        for k, v in session.config.items()
+        if k not in ("output", "record", "operate", "strain_out", "alarm")
+    }
     stored["metadata"] = dict(session.metadata)
     stored["measure"] = {"strain": "small", **stored.get("measure", {})}  # of those that could not choose
     for section, keys in (("measure", ("mask",)), ("camera", ("dark", "flat"))):
@@ -73,7 +80,7 @@ def session_material(session: Session, request: ReplayRequest, config: Config, p
         raise ConfigError(
             "--as-measured takes the references of the run; leave --reference out, or --as-measured"
         )
-    loads = LoadLog(config.load.max_gap_s)
+    loads = LoadLog(config.load.max_gap_s, config.load.lag_s)
     samples = tuple(session.load_samples())
     for sample in samples:
         loads.append(sample)

@@ -32,6 +32,10 @@ class ResultsInfo:
         Cross-section of the specimen; with it the rows have a stress.
     gauges : mapping of name to JSON values
         The virtual gauges, each as it was described.
+    axis : "x" or "y"
+        Of the load.
+    lagged : bool
+        A lag of the load was taken off, so that rows have the force without it too.
     """
 
     start_monotonic: float
@@ -43,3 +47,11 @@ class ResultsInfo:
     strain_measure: StrainMeasure = "small"
     area_m2: float | None = None
     gauges: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    axis: str = "y"
+    lagged: bool = False
+
+    @property
+    def extras(self) -> tuple[str, ...]:
+        """The columns that not every test has, but for those of gauges."""
+        stress = ("stress_Pa", "true_strain", "true_stress_Pa") if self.area_m2 is not None else ()
+        return (*stress, *(("force_raw_N",) if self.lagged else ()))

@@ -30,7 +30,13 @@ NEEDED = {
     ),
     *("noise_GL", "n_frames", "last_frame", "lost", "duration_s", "u_px", "v_px"),
 }  # columns that every file of this version has
-KNOWN = {*COLUMNS, "stress_Pa"}  # columns whose type is declared where they are there
+KNOWN = {
+    *COLUMNS,
+    "stress_Pa",
+    "true_strain",
+    "true_stress_Pa",
+    "force_raw_N",
+}  # columns whose type is declared where they are there
 MOST_PIXELS = 65_535
 
 ROOT = {"format": Declared("text"), "format_version": Declared("int", (), 1), "start_time": Declared("text")}
@@ -49,8 +55,7 @@ def column_declared(name: str) -> Declared:
     return Declared(kind, (None,))
 
 
-def column_names(gauges: Iterable[str] = (), *, with_stress: bool = False) -> tuple[str, ...]:
+def column_names(gauges: Iterable[str] = (), extras: Iterable[str] = ()) -> tuple[str, ...]:
     """The columns in the order in which they are written: a reader that sees the time sees the whole row."""
     names = tuple(name for name in COLUMNS if name != "time_s")
-    stress = ("stress_Pa",) if with_stress else ()
-    return (*names, *stress, *chain.from_iterable(map(gauge_columns, gauges)), "time_s")
+    return (*names, *extras, *chain.from_iterable(map(gauge_columns, gauges)), "time_s")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
@@ -31,6 +32,12 @@ class RowInfo(Protocol):
 
     @property
     def area_m2(self) -> float | None: ...
+
+    @property
+    def axis(self) -> str: ...
+
+    @property
+    def lagged(self) -> bool: ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,8 +105,29 @@ def _values(measurement: Measurement, maps: dict[str, NDArray[Any]], info: RowIn
     for name, gauge in instant.gauges.items():
         values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma), strict=True))
     if info.area_m2 is not None:
-        values["stress_Pa"] = instant.force / info.area_m2
+        values["stress_Pa"] = stress = instant.force / info.area_m2
+        stretch = _stretch(measurement, values, info)
+        values |= {"true_strain": math.log(stretch), "true_stress_Pa": stress * stretch}
+    if info.lagged:
+        values["force_raw_N"] = instant.force_raw
     return values
+
+
+def _stretch(measurement: Measurement, values: Mapping[str, float], info: RowInfo) -> float:
+    """Length over first length along the load: of the gauge ``axial``, or else of the mean strain."""
+    gauge = measurement.instant.gauges.get("axial")
+    if gauge is not None:
+        stretch = 1 + gauge.value
+    else:
+        strain = values["eyy" if info.axis == "y" else "exx"]
+        stretch = _stretched(strain, info.strain_measure)
+    return stretch if stretch > 0 else math.nan
+
+
+def _stretched(strain: float, measure: StrainMeasure) -> float:
+    if measure == "hencky":
+        return math.exp(strain)
+    return math.sqrt(max(1 + 2 * strain, 0.0)) if measure == "green" else 1 + strain
 
 
 def _mean(name: str, small: float, maps: dict[str, NDArray[Any]], measure: StrainMeasure) -> float:

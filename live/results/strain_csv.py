@@ -14,7 +14,7 @@ COLUMNS = (
     *("n_valid", "n_zoi", "noise_GL", "n_frames", "last_frame", "lost", "duration_s", "u_px", "v_px"),
     *("latency_s", "kernel_s"),
 )
-"""Means over the valid ZOIs; strains are dimensionless. ``stress_Pa`` follows where it is known, then value and
+"""Means over the valid ZOIs; strains are dimensionless. Then come those of ``ResultsInfo.extras``, and value and
 sigma of each virtual gauge."""
 
 
@@ -27,10 +27,9 @@ class CsvWriter:
         The file exists, or cannot be written.
     """
 
-    def __init__(self, path: Path, *, with_stress: bool = False, gauges: Iterable[str] = ()) -> None:
+    def __init__(self, path: Path, *, extras: Iterable[str] = (), gauges: Iterable[str] = ()) -> None:
         self._path = path
-        stress = ("stress_Pa",) if with_stress else ()
-        self._columns = (*COLUMNS, *stress, *chain.from_iterable(map(gauge_columns, gauges)))
+        self._columns = (*COLUMNS, *extras, *chain.from_iterable(map(gauge_columns, gauges)))
         try:
             self._file = path.open("x", encoding="ascii", newline="\n")
         except OSError as error:

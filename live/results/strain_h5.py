@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 FLUSH_S = 0.25  # a row waits for its flush no longer than this
 _UNITS = {"time_s": "s", "force_N": "N", "noise_GL": "GL", "duration_s": "s", "u_px": "px", "v_px": "px"}
-_UNITS |= {"stress_Pa": "Pa", "latency_s": "s", "kernel_s": "s"}
+_UNITS |= {"stress_Pa": "Pa", "true_stress_Pa": "Pa", "force_raw_N": "N", "latency_s": "s", "kernel_s": "s"}
 _WORDS = {
     "u": "displacement along x (right)",
     "v": "displacement along y (down)",
@@ -126,7 +126,7 @@ class StrainWriter:
 
 
 def _value_names(info: ResultsInfo) -> tuple[str, ...]:
-    return layout.column_names(info.gauges, with_stress=info.area_m2 is not None)
+    return layout.column_names(info.gauges, info.extras)
 
 
 def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:

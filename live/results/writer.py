@@ -52,7 +52,7 @@ class Results(Closing):
             raise DataError(f"{folder}: cannot be made ({error.strerror}); choose another --out") from error
         self._h5 = StrainWriter(self.h5_path, grid, info)
         try:
-            self._csv = CsvWriter(self.csv_path, with_stress=info.area_m2 is not None, gauges=info.gauges)
+            self._csv = CsvWriter(self.csv_path, extras=info.extras, gauges=info.gauges)
         except DataError:
             self._h5.close()
             raise

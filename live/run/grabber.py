@@ -119,6 +119,11 @@ class Grabber:
         """Make the next frames a reference burst."""
         self._retake.set()
 
+    @property
+    def taking_reference(self) -> bool:
+        """Whether the next frame is one of a reference."""
+        return self._taker is not None or self._retake.is_set()
+
     def join(self) -> None:
         """Wait for the end."""
         self._thread.join()

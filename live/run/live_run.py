@@ -14,9 +14,10 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
 from acquire.errors import ConfigError, PhasedicError
-from acquire.events import EventKind
-from acquire.frame import Frame
+from acquire.events import Event, EventKind
+from acquire.frame import Burst, Frame
 from live.measure import Instant
+from live.operate import OrderRefused
 from live.outputs import About, Consumer, Outputs, make_outputs
 from live.pace import Pace
 from live.run.feed import Feed
@@ -28,8 +29,11 @@ from live.run.recorder import Recording, open_recording
 from live.run.setting import Setting, set_up
 from live.run.stopping import Stop
 from live.setup import Config, open_rig
-from live.tell import Books, Screen
+from live.signals import signals_of
+from live.tell import Books, Screen, Standing
 
+_ARMED = "; nothing is recorded until start is ordered"
+_SILENT_S = 1.0
 _GRACE_S = 5.0  # a timed run without frames ends this much later
 INTERRUPTED = "interrupted"
 """The reason that makes exit code 130."""
@@ -65,11 +69,15 @@ class LiveRun:
         seconds = setting.config.output.seconds
         self._deadline = math.inf if seconds is None else time.monotonic() + seconds + _GRACE_S
         plan = GrabPlan.of(setting.config, setting.bursts)
-        self.grabber = Grabber(self._rig.camera, plan, books, self._take, recording.burst)
+        self.grabber = Grabber(self._rig.camera, plan, books, self._take, self._averaged)
+        self._last: Instant | None = None
+        self._began = time.monotonic()
+        self._has_recorded = recording.on
         self._feed = Feed(self.grabber, books.ledger, self._idle)
         self._load = LoadThread(self._rig.load, books, outputs, recording)
         self._tares = tare_orders(self._rig.load, books)
         self._pace = Pace(lambda: recording.backlog)
+        books.journal.add_listener(self._heard)
         self._measuring = Measuring(setting, books, outputs, self._feed, self._pace, self._show)
 
     # -- what may be called from other threads ------------------------------------------------
@@ -79,25 +87,56 @@ class LiveRun:
         """Whether measuring is paused."""
         return self._feed.paused
 
+    @property
+    def recording(self) -> bool:
+        """Whether frames are recorded."""
+        return self._recording.on
+
     def stop(self, reason: str) -> None:
         """End the run cleanly, soon."""
         self._stop.ask(reason)
 
-    def command(self, kind: EventKind, note: str = "") -> None:
-        """Carry out a command of the operator and write it down."""
+    def command(self, kind: EventKind, note: str = "") -> str:
+        """Carry out a command of the operator and write it down; raises OrderRefused where it cannot be."""
         if kind is EventKind.TARE:
             self._tares.order(note)
-            return
-        texts = {
-            EventKind.PAUSE: "measuring is paused, recording goes on",
-            EventKind.RESUME: "measuring goes on",
-            EventKind.NEW_REFERENCE: "a new reference is taken from the next frames",
-        }
-        self._books.journal.tell(kind, "operator", texts.get(kind, note))
-        if kind in (EventKind.PAUSE, EventKind.RESUME):
-            self._feed.paused = kind is EventKind.PAUSE
+        elif kind in (EventKind.PAUSE, EventKind.RESUME):
+            self._pause(kind is EventKind.PAUSE)
         elif kind is EventKind.NEW_REFERENCE:
+            self._told(kind, "a new reference is taken from the next frames")
             self.grabber.take_reference()
+        elif kind is EventKind.NOTE:
+            self._told(kind, note)
+        elif kind is EventKind.ALARM:
+            self._silence()
+        elif kind is EventKind.RECORD:
+            said = self._recording.order(note)
+            self._has_recorded = True
+            return said
+        return ""
+
+    def _pause(self, wanted: bool) -> None:
+        if wanted is self._feed.paused:
+            raise OrderRefused("measuring is paused already" if wanted else "measuring is not paused")
+        kind = EventKind.PAUSE if wanted else EventKind.RESUME
+        self._told(kind, "measuring is paused" if wanted else "measuring goes on")
+        self._feed.paused = wanted
+
+    def _silence(self) -> None:
+        names = self._books.alarms.silence()
+        if not names:
+            raise OrderRefused("no alarm is on")
+        self._told(EventKind.ALARM, f"silenced: {', '.join(names)}")
+
+    def _heard(self, event: Event) -> None:
+        """An alarm may end the run, and rings the bell."""
+        if event.kind is EventKind.ALARM and event.data.get("on"):
+            self._screen.bell()
+            if event.data.get("end"):
+                self.stop(event.text)
+
+    def _told(self, kind: EventKind, text: str) -> None:
+        self._books.journal.tell(kind, "operator", text)
 
     # -- the run ------------------------------------------------------------------------------
 
@@ -106,7 +145,8 @@ class LiveRun:
             stack.enter_context(self._rig.camera)
             stack.enter_context(self._rig.load)
             self._stop.then(self._rig.camera.stop)
-            self._books.journal.tell(EventKind.START, "phasedic", "the test begins")
+            waits = "" if self._recording.on or not self._setting.config.record.enabled else _ARMED
+            self._books.journal.tell(EventKind.START, "phasedic", f"the test begins{waits}")
             self._load.start()
             self.grabber.start()
             stack.pop_all()
@@ -147,18 +187,54 @@ class LiveRun:
         return 5 if lossy or not ledger.adds_up or not self._books.history.told_something else 0
 
     def _take(self, frame: Frame) -> None:
-        self._recording.frame(frame)
+        self._books.vitals.frame_t = time.monotonic()
+        self._recording.frame(frame, needed=self.grabber.taking_reference)
         self._outputs.frame(frame)
+
+    def _averaged(self, burst: Burst) -> None:
+        self._recording.burst(burst, needed=self.grabber.taking_reference)
 
     def _idle(self, words: str) -> None:
         """Between bursts; a camera that gives nothing must not keep a timed run alive for ever."""
-        if words:
-            self._screen.waiting(self._books.ledger, words)
+        if words or self.paused:
+            silent = self._last is None or not time.monotonic() - self._books.vitals.frame_t < _SILENT_S
+            self._show(self._last, words if silent else "")
         if time.monotonic() > self._deadline and not self._stop.asked:
             self.stop("the time is over")
 
-    def _show(self, instant: Instant) -> None:
-        self._screen.instant(instant, self._books.ledger, self.grabber.fps, self._pace.p95_s)
+    def _show(self, instant: Instant | None, words: str = "") -> None:
+        """Renew the status line; called with every measurement."""
+        self._last = instant
+        if self._screen.is_due:
+            self._screen.standing(self._standing(words))
+
+    def _standing(self, words: str) -> Standing:
+        books, specimen = self._books, self._setting.config.specimen
+        latest = books.loads.latest
+        return Standing(
+            ledger=books.ledger,
+            state=self.state,
+            elapsed_s=time.monotonic() - self._began,
+            fps=self.grabber.fps,
+            force_N=math.nan if latest is None else latest.force,
+            area_m2=specimen.area_m2,
+            instant=self._last,
+            p95_s=self._pace.p95_s,
+            disk_s=books.vitals.disk_s if self.recording else math.inf,
+            alarms=books.alarms.texts,
+            words=words,
+        )
+
+    @property
+    def state(self) -> str:
+        """What is done with the frames, in a word or two."""
+        if self.recording:
+            state = "REC"
+        elif self._setting.config.record.enabled:
+            state = "NOT RECORDING" if self._has_recorded else "ARMED"
+        else:
+            state = "not recorded"
+        return f"{state}, PAUSED" if self.paused else state
 
 
 def run_live(
@@ -189,18 +265,25 @@ def run_live(
     """
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (phasedic devices lists what is there)")
-    stop, books = stop or Stop(), Books.new(config.load.max_gap_s)
+    stop, books = stop or Stop(), Books.new(config.load.max_gap_s, config.load.lag_s)
+    books.journal.names |= device_names(config)
     screen.say(f"opening {config.camera.address}")
     rig = open_rig(config.camera.address, config.load.address, books.journal, crop=config.camera.crop)
     try:
         setting = set_up(config, rig, books.journal, screen)
         screen.announce(rig, setting.folder)
         about = About(setting.config, setting.folder, rig.camera.info, setting.grid, setting.start)
-        outputs = make_outputs(about, books, screen, consumers)
+        outputs = make_outputs(about, books, screen, [*consumers, *signals_of(about, books, screen)])
         code = _with_outputs(setting, books, outputs, screen, stop, hands)
     finally:
         rig.close()
     return Outcome(setting.folder, setting.config, books, outputs, rig, setting.grid, code)
+
+
+def device_names(config: Config) -> dict[str, str]:
+    """What camera and load cell are called on the screen; nothing where both have one address."""
+    names = {config.load.address: "load cell", config.camera.address: "camera"}
+    return names if len(names) == 2 else {}
 
 
 def _with_outputs(

@@ -7,6 +7,7 @@ so, and the measurement goes on.
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -21,11 +22,13 @@ from acquire.hdf5 import forecast, network_share
 from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import RotatingWriter, SessionInfo, SessionWriter
+from live.operate import OrderRefused
+from live.recording import Gate, Keep
 from live.run.channels import ByteBuffer
 from live.run.setting import Setting
 from live.run.stopping import Stop
 from live.setup import versions
-from live.tell import Books, Journal, Ledger, Screen
+from live.tell import Books, Journal, Ledger, Screen, Vitals
 
 log = logging.getLogger(__name__)
 _SMALL = 512  # bytes counted for a sample or an event
@@ -41,6 +44,11 @@ class Recording(Protocol):
     """What a run gives to its recording, from any thread; nothing here waits for the disk."""
 
     @property
+    def on(self) -> bool:
+        """Whether what comes is recorded."""
+        ...
+
+    @property
     def failed(self) -> str | None:
         """Why nothing more is written; None while all is well."""
         ...
@@ -50,11 +58,13 @@ class Recording(Protocol):
         """Share of the buffer that waits for the disk."""
         ...
 
-    def frame(self, frame: Frame) -> None: ...
+    def frame(self, frame: Frame, *, needed: bool) -> None: ...
 
-    def burst(self, burst: Burst) -> None: ...
+    def burst(self, burst: Burst, *, needed: bool) -> None: ...
 
     def sample(self, sample: LoadSample) -> None: ...
+
+    def order(self, what: str) -> str: ...
 
     def close(self, ledger: dict[str, Any]) -> None: ...
 
@@ -62,17 +72,22 @@ class Recording(Protocol):
 class NoRecording:
     """The recording of a run that wants none."""
 
+    on = False
     failed: str | None = None
     backlog = 0.0
 
-    def frame(self, frame: Frame) -> None:
+    def frame(self, frame: Frame, *, needed: bool) -> None:
         """Let it go."""
 
-    def burst(self, burst: Burst) -> None:
+    def burst(self, burst: Burst, *, needed: bool) -> None:
         """Let it go."""
 
     def sample(self, sample: LoadSample) -> None:
         """Let it go."""
+
+    def order(self, what: str) -> str:
+        """Refuse it."""
+        raise OrderRefused("this run records nothing, as it was asked (--no-record)")
 
     def close(self, ledger: dict[str, Any]) -> None:
         """Nothing is open."""
@@ -91,7 +106,7 @@ def open_recording(setting: Setting, books: Books, screen: Screen, stop: Stop) -
         return NoRecording()
     path, mode = setting.folder / "session.h5", RecordMode.parse(record.mode)
     writer = _open_writer(path, setting, mode)
-    _tell_room(path, camera, mode, screen)
+    books.vitals.disk_s = _tell_room(path, camera, mode, screen)
     recorder = Recorder(
         writer,
         books.ledger,
@@ -100,9 +115,14 @@ def open_recording(setting: Setting, books: Books, screen: Screen, stop: Stop) -
         mode=mode,
         waits=not camera.live,
         on_failure=lambda: stop.ask("recording failed") if record.when_full == "stop" else None,
+        vitals=books.vitals,
     )
-    books.journal.add_listener(recorder.event)
-    return recorder
+    keep = Keep(
+        record.keep_s, int(record.buffer_MB * 5e5), record.start_above_N or math.inf, mode.kind == "bursts"
+    )
+    gate = Gate(recorder, books.ledger, books.journal, keep, on=not record.armed)
+    books.journal.add_listener(gate.event)
+    return gate
 
 
 def _open_writer(path: Path, setting: Setting, mode: RecordMode) -> SessionWriter | RotatingWriter:
@@ -122,14 +142,15 @@ def _open_writer(path: Path, setting: Setting, mode: RecordMode) -> SessionWrite
     return RotatingWriter(path, info, int(rotate_MB * 1e6))
 
 
-def _tell_room(path: Path, camera: CameraInfo, mode: RecordMode, screen: Screen) -> None:
-    """Say how long the disk lasts, and that a network share is a risk."""
+def _tell_room(path: Path, camera: CameraInfo, mode: RecordMode, screen: Screen) -> float:
+    """Say how long the disk lasts (s), and that a network share is a risk."""
     rate = camera.width * camera.height * (2 if camera.bits > 8 else 1) * (camera.fps or 30.0) / mode.every
     minutes = forecast(path, rate) / 60
     where = f"recording about {rate / 1e6:.0f} MB/s at most, room for {minutes:.0f} minutes"
     screen.say(f"warning: {where}" if minutes < 30 else where)
     if share := network_share(path):
         screen.say(f"warning: {path.parent} is on a network share ({share}); a local disk is safer")
+    return minutes * 60
 
 
 class Recorder:
@@ -150,6 +171,8 @@ class Recorder:
         Wait for room instead of leaving a gap (sources that wait for their reader).
     on_failure : callable
         Called once when nothing more can be written.
+    vitals : Vitals, optional
+        Told how long the disk lasts.
     now : callable
         The clock, s.
     """
@@ -164,6 +187,7 @@ class Recorder:
         mode: RecordMode | None = None,
         waits: bool = False,
         on_failure: Callable[[], None] = lambda: None,
+        vitals: Vitals | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._writer, self._ledger, self._journal = writer, ledger, journal
@@ -171,7 +195,7 @@ class Recorder:
         self._limit, self._on_failure = limit, on_failure
         self._mode = mode or RecordMode()
         self._number = self._gap = 0
-        self._now = now
+        self._vitals, self._now = vitals or Vitals(), now
         self._began = now()
         self._next_clock = self._began + _CLOCK_EVERY_S
         self._next_disk = self._began + _DISK_EVERY_S
@@ -264,7 +288,7 @@ class Recorder:
 
     def _look_at_the_disk(self, elapsed_s: float) -> None:
         rate = self._writer.bytes_written / elapsed_s
-        left = forecast(self._writer.path, rate)
+        left = self._vitals.disk_s = forecast(self._writer.path, rate)
         if left < _DISK_WARN_S and not self._disk_told:
             text = f"the disk is full in {left:.0f} s at this rate; free some space, the recording goes on"
             self._journal.tell(EventKind.RECORDER, str(self._writer.path), text, "warning", {"seconds": left})

@@ -15,7 +15,7 @@ from live.setup.grid import grid_for, kernel_settings, whole_picture
 from live.setup.pictures import correction, read_mask, with_flat_field, with_mask
 from live.setup.rig import Rig, open_load, open_rig
 from live.setup.rigfile import new_rig, write_rig
-from live.setup.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST, SpecimenConfig
+from live.setup.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST, AlarmConfig, SpecimenConfig
 
 __all__ = [
     "ALL",
@@ -24,6 +24,7 @@ __all__ = [
     "DEFAULT_REFERENCE_BURST",
     "FILES",
     "GIVEN",
+    "AlarmConfig",
     "Config",
     "GaugeConfig",
     "Rig",

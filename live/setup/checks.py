@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from live.lines import Place
+
 
 class Refused(ValueError):
     """Says what is allowed."""
@@ -45,14 +47,15 @@ class Option:
         Without its dashes.
     metavar : str
     choices : tuple of str
-    off : bool
-        A switch that turns the key off.
+    off, on : bool
+        A switch that turns the key off, or on.
     """
 
     name: str
     metavar: str = ""
     choices: tuple[str, ...] = ()
     off: bool = False
+    on: bool = False
 
 
 def key(
@@ -141,6 +144,14 @@ def _text(value: Any) -> str:
     return value
 
 
+def _place(value: Any) -> str:
+    try:
+        Place.parse(_text(value))
+    except ValueError as allowed:
+        raise Refused(str(allowed)) from None
+    return str(value)
+
+
 def _flag(value: Any) -> bool:
     if not isinstance(value, bool):
         raise Refused("true or false")
@@ -225,7 +236,17 @@ def _strains(value: Any) -> tuple[float, float]:
     return low, high
 
 
+def _names(value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple) or not 1 <= len(value) <= 64:
+        raise Refused("1 to 64 names in brackets")
+    return tuple(_text(name) for name in value)
+
+
 TEXT = Check(_text)
+NAMES = Check(_names, lambda word: word.split(","))
+"""Names, on the command line with commas between."""
+PLACE = Check(_place)
+"""Where something listens: PORT or HOST:PORT."""
 FLAG = Check(_flag)
 BOX = length(Check(_box, _read_box), whole=True)
 """x, y, width, height in whole px."""

@@ -19,16 +19,20 @@ from typing import Any, TypeVar
 
 from acquire.errors import ConfigError, DataError
 from acquire.files import read_bytes
+from live.channels import channel_names
 from live.setup.checks import Option, Refused, in_px
 from live.setup.gauges import NAME, GaugeConfig
 from live.setup.sections import (
+    AlarmConfig,
     CameraConfig,
     LoadConfig,
     MeasureConfig,
+    OperateConfig,
     OutputConfig,
     RecordConfig,
     ScaleConfig,
     SpecimenConfig,
+    StrainOutConfig,
     ViewConfig,
 )
 
@@ -45,21 +49,25 @@ class Config:
     measure: MeasureConfig = field(default_factory=MeasureConfig)
     scale: ScaleConfig = field(default_factory=ScaleConfig)
     record: RecordConfig = field(default_factory=RecordConfig)
+    operate: OperateConfig = field(default_factory=OperateConfig)
+    strain_out: StrainOutConfig = field(default_factory=StrainOutConfig)
     view: ViewConfig = field(default_factory=ViewConfig)
     specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
     output: OutputConfig = field(default_factory=OutputConfig)
+    alarm: tuple[AlarmConfig, ...] = ()
     gauges: Mapping[str, GaugeConfig] = field(default_factory=dict)
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
-        """Nested plain values, fit for JSON."""
-        return dataclasses.asdict(self)
+        """Nested plain values, fit for JSON; sections of keys, alarms by their number."""
+        plain = dataclasses.asdict(self)
+        return plain | {"alarm": {str(n): alarm for n, alarm in enumerate(plain["alarm"], 1)}}
 
 
 _SECTIONS: dict[str, type] = {
     f.name: f.default_factory  # type: ignore[misc]
     for f in dataclasses.fields(Config)
-    if f.name not in ("metadata", "gauges")
+    if f.name not in ("metadata", "gauges", "alarm")
 }
 
 
@@ -94,21 +102,31 @@ def settings_in(path: Path) -> dict[str, Any]:
     """What ``path`` sets, as "section.key" -> value, once it has been checked; raises ConfigError."""
     load_config(path, {})
     tree = _read_toml(path)
-    return {f"{name}.{key}": value for name, section in tree.items() for key, value in section.items()}
+    return {
+        f"{name}.{key}": value
+        for name, section in tree.items()
+        if isinstance(section, Mapping)
+        for key, value in section.items()
+    }
 
 
 def _without_none(stored: Mapping[str, Any]) -> dict[str, Any]:
-    return {
-        name: _without_none(section) if isinstance(section, Mapping) else section
-        for name, section in stored.items()
-        if section is not None
-    }
+    return {name: _without_none_in(section) for name, section in stored.items() if section is not None}
+
+
+def _without_none_in(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return _without_none(value)
+    return [_without_none_in(one) for one in value] if isinstance(value, list | tuple) else value
 
 
 def _overlaid(tree: Mapping[str, Any], overrides: Mapping[str, Any], where: str) -> Config:
     merged: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in tree.items()}
     for dotted, value in overrides.items():
         name, _, key = dotted.partition(".")
+        if not key:
+            merged[name] = value
+            continue
         section = merged.setdefault(name, {})
         if isinstance(section, dict):
             section[key] = value
@@ -129,22 +147,26 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 
 def _build(tree: Mapping[str, Any], where: str) -> Config:
-    known = [*_SECTIONS, "gauges", "metadata"]
+    known = [*_SECTIONS, "alarm", "gauges", "metadata"]
     parts: dict[str, Any] = {}
     px_per_mm = _px_per_mm(tree, where)
     for name, content in tree.items():
         if name not in known:
             raise ConfigError(f"{where}: unknown section [{name}]{_meant(name, known)}")
-        if not isinstance(content, Mapping):
+        if name == "alarm":
+            parts[name] = _alarms(content, where)
+        elif not isinstance(content, Mapping):
             raise ConfigError(f"{where}: {name} must be a section, [{name}] with keys below it")
-        if name == "metadata":
+        elif name == "metadata":
             parts[name] = dict(content)
         elif name == "gauges":
             parts[name] = {gauge: _gauge(gauge, table, where, px_per_mm) for gauge, table in content.items()}
         else:
             parts[name] = _section(_SECTIONS[name], name, content, where, px_per_mm)
     _check_metadata(parts.get("metadata", {}), where)
-    return Config(**parts)
+    config = Config(**parts)
+    _check_channels(config, where)
+    return config
 
 
 def _px_per_mm(tree: Mapping[str, Any], where: str) -> float | None:
@@ -184,6 +206,30 @@ def _gauge(name: str, table: Any, where: str, px_per_mm: float | None) -> GaugeC
     if not isinstance(table, Mapping):
         raise ConfigError(f"{where}: gauges.{name} must be a table, [gauges.{name}] with keys below it")
     return _section(GaugeConfig, f"gauges.{name}", table, where, px_per_mm)
+
+
+def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
+    if isinstance(content, Mapping):  # by their number, as files have them
+        content = list(content.values())
+    if not isinstance(content, list | tuple) or not all(isinstance(table, Mapping) for table in content):
+        raise ConfigError(f"{where}: alarm must be tables, [[alarm]] with keys below it")
+    alarms = tuple(
+        _section(AlarmConfig, f"alarm {number}", table, where) for number, table in enumerate(content, 1)
+    )
+    for number, alarm in enumerate(alarms, 1):
+        if (alarm.above is None) is (alarm.below is None):
+            raise ConfigError(f"{where}: alarm {number}: give one of above and below")
+    return alarms
+
+
+def _check_channels(config: Config, where: str) -> None:
+    measured = channel_names(config.gauges)
+    known = channel_names(config.gauges, machine=True)
+    asked = [("strain_out", channel, measured) for channel in config.strain_out.channels or ()]
+    asked += [(f"alarm {number}", alarm.channel, known) for number, alarm in enumerate(config.alarm, 1)]
+    for whose, channel, names in asked:
+        if channel not in names:
+            raise ConfigError(f"{where}: {whose}: unknown channel {channel!r}{_meant(channel, list(names))}")
 
 
 def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:

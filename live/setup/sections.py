@@ -10,6 +10,8 @@ from live.setup.checks import (
     BOX,
     FLAG,
     GIVEN,
+    NAMES,
+    PLACE,
     RECORD_MODE,
     REGION,
     STRAINS,
@@ -62,6 +64,12 @@ class LoadConfig:
         Option("load", "ADDRESS"),
     )
     max_gap_s: float = key(number(0.001, 3600), 0.5, "samples further apart than this leave a gap, s")
+    lag_s: float = key(
+        number(-10, 10),
+        0.0,
+        "the load is stamped this much later than the frames it belongs to, s; as the summary tells it",
+        Option("lag", "S"),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,6 +181,19 @@ class RecordConfig:
     mode: str = key(
         RECORD_MODE, "all", "all frames, only bursts (sums), or every=K frames", Option("record", "MODE")
     )
+    armed: bool = key(
+        FLAG, False, "measure, and record nothing until start is ordered", Option("armed", on=True)
+    )
+    keep_s: float = key(
+        number(0, 60), 2.0, "what came in this time before recording began is recorded too, s"
+    )
+    start_above_N: float | None = key(
+        number(1e-6, 1e9),
+        None,
+        "armed: a force of this magnitude begins recording too, N",
+        Option("start-above", "N"),
+        optional=True,
+    )
     rotate_MB: float | None = key(
         number(10, 1e9), None, "begin another file after this much; the set is one session", optional=True
     )
@@ -180,6 +201,67 @@ class RecordConfig:
     when_full: str = key(
         choice("gap", "stop"), "gap", "a full buffer or disk leaves a counted gap, or ends the run"
     )
+
+
+@dataclass(frozen=True, slots=True)
+class OperateConfig:
+    """[operate]"""
+
+    orders: str | None = key(
+        PLACE,
+        None,
+        "take orders as lines over TCP at this port (of 127.0.0.1 unless an address is given)",
+        Option("orders", "[HOST:]PORT"),
+        optional=True,
+    )
+    token_file: str | None = key(
+        TEXT,
+        None,
+        "file with the word that clients of a port say first; needed beyond 127.0.0.1",
+        Option("token-file", "FILE"),
+        optional=True,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class StrainOutConfig:
+    """[strain_out]"""
+
+    tcp: str | None = key(
+        PLACE,
+        None,
+        "tell every measurement as a line to TCP clients of this port (of 127.0.0.1 unless an address is given)",
+        Option("strain-out", "[HOST:]PORT"),
+        optional=True,
+    )
+    udp: str | None = key(PLACE, None, "send it by UDP to this HOST:PORT", optional=True)
+    serial: str | None = key(TEXT, None, "write it to this port: /dev/ttyUSB1?baud=115200", optional=True)
+    format: str = key(
+        choice("json", "csv"),
+        "json",
+        "of a line; csv begins with the names",
+        Option("strain-format", choices=("json", "csv")),
+    )
+    channels: tuple[str, ...] | None = key(
+        NAMES,
+        None,
+        "what is told (docs/signals.md); without, the axial strain, load, gauges and what belongs to them",
+        Option("strain-channels", "NAME,NAME"),
+        optional=True,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class AlarmConfig:
+    """[[alarm]]: any number of them; exactly one of above and below."""
+
+    channel: str = key(TEXT, "", "what is looked at: a channel (docs/signals.md)")
+    above: float | None = key(number(), None, "the alarm is on above this", optional=True)
+    below: float | None = key(number(), None, "the alarm is on below this", optional=True)
+    hysteresis: float = key(number(0), 0.0, "it goes when the channel is back by this much")
+    name: str = key(TEXT, "", "its name in messages")
+    end: bool = key(FLAG, False, "it ends the run")
+    line: str = key(TEXT, "", "sent as a line on all strain outputs when it comes")
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,6 +310,7 @@ class SpecimenConfig:
         choice("raw", "toe", "preload"),
         "raw",
         "strain counts as measured, from the foot of the elastic line, or from the preload",
+        Option("zero", choices=("raw", "toe", "preload")),
     )
     preload_MPa: float = key(number(1e-3, 1e5), 1.0, "stress from which strain counts with zero = preload")
 

@@ -1,24 +1,29 @@
 """What is told to a person and kept for the record.
 
 ``books`` holds what is kept of a test: ``journal`` has every event, ``ledger`` the fate of every frame,
-``screen`` the terminal, ``card`` the status in the view, ``figures`` those of a tensile test in words,
-``summary`` all that is said at the end.
+``board`` the alarms that are on, ``screen`` the terminal, ``status_line`` its last line, ``card`` the status in
+the view, ``figures`` those of a tensile test in words, ``summary`` all that is said at the end.
 """
 
+from live.tell.board import AlarmBoard, Vitals
 from live.tell.books import Books
 from live.tell.card import StatusCard
 from live.tell.figures import elastic_lines, evaluate, interval, options_of, quantity
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen, say
+from live.tell.status_line import Standing
 from live.tell.summary import file_lines, summary_lines
 
 __all__ = [
+    "AlarmBoard",
     "Books",
     "Journal",
     "Ledger",
     "Screen",
+    "Standing",
     "StatusCard",
+    "Vitals",
     "elastic_lines",
     "evaluate",
     "file_lines",

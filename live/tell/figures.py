@@ -72,7 +72,8 @@ def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list
     lag = find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
     if not lag.known:
         return [f"lag of the load beside the frames: not known ({lag.why})"]
-    return [f"lag of the load beside the frames: {interval(lag, 1e-3, 'ms')} ({CONFIDENCE:.0%}; not applied)"]
+    how = f"{loads.lag_s * 1e3:g} ms taken off" if loads.lag_s else f"not applied; --lag {lag.value:.3f} does"
+    return [f"lag of the load beside the frames: {interval(lag, 1e-3, 'ms')} ({CONFIDENCE:.0%}; {how})"]
 
 
 def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:

@@ -21,10 +21,11 @@ _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ER
 _QUIET = {EventKind.MEASURED}  # one a burst: for the session, not for a person
 
 
-def sentence(event: Event) -> str:
-    """Who says what, an address without its settings and only once."""
+def sentence(event: Event, names: Mapping[str, str] | None = None) -> str:
+    """Who says what: a device by its name of ``names``, else by its address without settings, and only once."""
     source, text = brief(event.source), brief(event.text)
-    return text if text.startswith(f"{source}: ") else f"{source}: {text}"
+    text = text.removeprefix(f"{source}: ")
+    return f"{(names or {}).get(event.source, source)}: {text}"
 
 
 class Journal:
@@ -35,10 +36,13 @@ class Journal:
     origin : float, s
         Taken off the stamps of devices and of ``tell``; not 0 where the pictures come with nominal
         times from 0, so that events and pictures share one time.
+    names : dict of str to str
+        What devices are called on the screen, by their addresses.
     """
 
     def __init__(self) -> None:
         self.origin = 0.0
+        self.names: dict[str, str] = {}
         self._events: list[Event] = []
         self._listeners: list[EventSink] = []
         self._lock = threading.RLock()
@@ -54,7 +58,7 @@ class Journal:
                 self._events.append(event)
             listeners = list(self._listeners)
         if event.kind not in _QUIET:
-            log.log(_LEVELS[event.level], "%s", sentence(event))
+            log.log(_LEVELS[event.level], "%s", sentence(event, self.names))
         for listener in listeners:
             listener(event)
 

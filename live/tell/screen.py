@@ -7,6 +7,7 @@ from a file or a device may hold anything, and is made harmless.
 from __future__ import annotations
 
 import math
+import os
 import sys
 import time
 from collections.abc import Callable
@@ -14,14 +15,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from acquire.printable import printable
+from live.tell.status_line import GAP, Standing, duration, force, gauge_words, status_line
 
 if TYPE_CHECKING:
     from live.measure import Instant
     from live.setup import Rig
-    from live.tell.ledger import Ledger
 
 _TERMINAL_EVERY_S, _FILE_EVERY_S = 0.25, 5.0
-_MOST_GAUGES = 4  # in the status line
+_UNKNOWN_WIDTH, _FILE_WIDTH = 119, 1000
 
 
 def say(text: str = "") -> None:
@@ -41,47 +42,69 @@ class Screen:
         self._every = _TERMINAL_EVERY_S if self._terminal else _FILE_EVERY_S
         self._last = -math.inf
         self._width = 0
+        self._prompt: str | None = None
 
     def say(self, text: str = "") -> None:
         """A line that stays."""
         if not self._quiet:
             self._write(" " * self._width + "\r" * (self._width > 0) + printable(text) + "\n")
             self._width = 0
+            if self._prompt is not None:
+                self._renew(self._prompt)
+
+    def bell(self) -> None:
+        """Ring, where it is a terminal."""
+        if self._terminal and not self._quiet:
+            self._write("\a")
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the status line may be renewed by now."""
+        return not self._quiet and self._prompt is None and self._now() - self._last >= self._every
 
     def status(self, text: str) -> None:
         """The status line, renewed in place on a terminal."""
-        if self._quiet or self._now() - self._last < self._every:
+        if not self.is_due:
             return
         self._last = self._now()
-        text = printable(text)
         if self._terminal:
-            self._write(text.ljust(self._width) + "\r")
-            self._width = len(text)
+            self._renew(text)
         else:
-            self._write(text + "\n")
+            self._write(printable(text) + "\n")
 
-    def waiting(self, ledger: Ledger, what: str) -> None:
-        """Nothing to show yet."""
-        self.status(f"{what} ... {ledger.grabbed} frames")
+    def _renew(self, text: str) -> None:
+        """The last line of a terminal; never wider than that, since a line that wraps cannot be renewed."""
+        text = printable(text)[: self._columns()]
+        self._write(text.ljust(self._width) + "\r")
+        self._width = len(text)
 
-    def instant(self, i: Instant, ledger: Ledger, fps: float, p95_s: float = math.nan) -> None:
-        """Where the test stands."""
-        lost = f"  LOST {ledger.lost + ledger.unrecorded}" if ledger.loss else ""
-        late = "" if math.isnan(p95_s) else f"  latency {p95_s * 1e3:.0f} ms"
-        self.status(
-            f"{fps:.0f} fps{_force(i)}  {_strains(i)}"
-            f"  {i.n_valid}/{i.n_zoi} ZOIs in {i.measure_s * 1e3:.0f} ms"
-            f"  recorded {ledger.recorded}  skipped {ledger.skipped}{lost}{late}"
-        )
+    def _columns(self) -> int:
+        """One less than the terminal has: the last may wrap."""
+        try:
+            return os.get_terminal_size(self._stream.fileno()).columns - 1
+        except (OSError, ValueError):
+            return _UNKNOWN_WIDTH
+
+    def standing(self, standing: Standing) -> None:
+        """Where a live run stands."""
+        self.status(status_line(standing, self._columns() if self._terminal else _FILE_WIDTH))
+
+    def prompt(self, text: str | None) -> None:
+        """What the operator types, in the place of the status line; None: no more."""
+        self._prompt = text
+        if self._terminal and not self._quiet:
+            self._renew(text or "")
 
     def progress(self, i: Instant, done: int, expected: int | None, elapsed_s: float) -> None:
         """Where a replay stands: ``done`` bursts of the ``expected``, ZOIs a second, the time that is left."""
         of = left = rate = ""
         if expected is not None and done <= expected:
-            of, left = f" of {expected}", f"  {_duration(elapsed_s / done * (expected - done))} left"
+            of, left = f" of {expected}", f"  {duration(elapsed_s / done * (expected - done))} left"
         if elapsed_s > 0:
             rate = f"  {done * i.n_zoi / elapsed_s:.0f} ZOI/s"
-        self.status(f"{done}{of} bursts{_force(i)}  {_strains(i)}  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}")
+        self.status(
+            f"{done}{of} bursts{_load(i)}  {GAP.join(gauge_words(i))} um/m  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}"
+        )
 
     def announce(self, rig: Rig, folder: Path) -> None:
         """What is about to happen."""
@@ -102,22 +125,5 @@ class Screen:
             self._quiet = True
 
 
-def _force(i: Instant) -> str:
-    return "" if math.isnan(i.force) else f"  {i.force:.1f} N"
-
-
-def _duration(seconds: float) -> str:
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
-
-
-def _strains(i: Instant) -> str:
-    """The virtual gauges with their sigmas, or the means where there are none."""
-    if not i.gauges:
-        return f"exx {i.exx * 1e6:+.0f}  eyy {i.eyy * 1e6:+.0f}  exy {i.exy * 1e6:+.0f} um/m"
-    words = [
-        f"{name} lost" if gauge.reason else f"{name} {gauge.value * 1e6:+.0f} +- {gauge.sigma * 1e6:.0f}"
-        for name, gauge in list(i.gauges.items())[:_MOST_GAUGES]
-    ]
-    return "  ".join(words) + " um/m"
+def _load(i: Instant) -> str:
+    return "" if math.isnan(i.force) else f"  {force(i.force)}"

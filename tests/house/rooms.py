@@ -31,9 +31,11 @@ ROOMS = {
     "analysis": "analysis.field analysis.kernel",
     "hw_mocks": "acquire acquire.camera acquire.load_cell",
     "live": "",
+    "live.lines": "acquire",
     "live.measure": "acquire acquire.burst acquire.load_cell analysis analysis.field analysis.evaluate",
+    "live.channels": "acquire live.measure",
     "live.setup": "acquire acquire.burst acquire.camera acquire.files acquire.hdf5 acquire.load_cell acquire.opencv"
-    " analysis analysis.evaluate live.measure",
+    " analysis analysis.evaluate live.channels live.measure live.lines",
     "live.results": "acquire acquire.hdf5 analysis.field live.measure",
     "live.tell": "acquire acquire.load_cell analysis.evaluate live.measure live.setup",
     "live.maps": "acquire acquire.opencv analysis.field analysis.evaluate live.results",
@@ -41,15 +43,19 @@ ROOMS = {
     " live.measure live.setup",
     "live.check": "acquire acquire.camera acquire.load_cell analysis analysis.evaluate analysis.field analysis.picture"
     " analysis.quality live.measure live.setup live.specimen",
-    "live.operate": "acquire live.tell",
+    "live.operate": "acquire live.lines live.tell",
+    "live.recording": "acquire live.operate live.tell",
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",
     "live.view.drawing": "acquire analysis.field live.maps live.view.exchange",
     "live.view": "acquire analysis.field live.measure live.pace live.view.exchange",
     "live.outputs": "acquire acquire.load_cell analysis live.measure live.pace live.setup live.tell live.results"
     " live.view",
+    "live.signals": "acquire acquire.serial_line live.channels live.lines live.measure live.outputs live.setup"
+    " live.tell",
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
-    " analysis.evaluate live.measure live.operate live.pace live.setup live.tell live.outputs",
+    " analysis.evaluate live.signals live.channels live.measure live.operate live.pace live.recording live.setup"
+    " live.tell live.outputs",
     "live.replay": "acquire acquire.burst acquire.camera acquire.load_cell acquire.opencv acquire.session analysis"
     " live.measure live.setup live.specimen live.tell live.outputs",
     "live.characterise": "acquire acquire.opencv analysis analysis.field analysis.picture analysis.paper_estimator"

@@ -18,6 +18,7 @@ from acquire.frame import Frame
 from acquire.session.reader import Session
 from live.cli import main
 from live.measure.measurement import Measurement
+from live.operate import answer
 from live.outputs import Consumer
 from live.run import LiveRun, run_live
 from live.run import live_run as live_module
@@ -263,6 +264,38 @@ def test_a_new_reference_is_composed_and_replayed(tmp_path: Path) -> None:
     assert_bit_equal(strains(folder), strains(out))
 
 
+@pytest.mark.parametrize("mode", ["all", "bursts"])
+def test_an_armed_run_records_from_a_little_before_the_order_to_the_end_of_it(
+    tmp_path: Path, mode: str
+) -> None:
+    """Nothing but the reference before; the list of measured bursts is that of recorded ones, and replays."""
+    folder, out = tmp_path / "run", tmp_path / "again"
+    orders = {4: "start", 5: "start", 8: "stop", 9: "stop"}
+    answers: dict[int, str] = {}
+
+    def order(live: LiveRun, m: Measurement) -> None:
+        if m.number in orders:
+            answers[m.number] = answer(orders[m.number], live)
+
+    more = {"record.armed": True, "record.keep_s": 0.6, "record.mode": mode}
+    outcome = live_run(folder, each=order, **more)
+    assert answers[4].startswith("ok: with ") and answers[8] == "ok"
+    assert (answers[5], answers[9]) == ("no: recording already", "no: not recording")
+    ledger = outcome.books.ledger
+    assert ledger.adds_up and ledger.measured == 14 * 3 and 4 < ledger.recorded < 32 and not ledger.loss
+    session = str(folder / "session.h5")
+    for extra in ([], ["--as-measured"]):
+        again = out / str(len(extra))
+        assert main(["replay", session, *extra, "--out", str(again), "--no-view", "--no-rrd"]) == 0
+    live, replayed = strains(folder), strains(again)
+    rows = [list(live["time_s"]).index(t) for t in replayed["time_s"]]
+    assert 4 in rows and rows == list(range(rows[0], rows[-1] + 1)) and rows[0] >= 1 and 7 <= rows[-1] <= 10
+    np.testing.assert_allclose(
+        replayed["eyy"], live["eyy"][rows], atol=2e-5
+    )  # sigma is 2e-4; the start is another
+    np.testing.assert_array_equal(replayed["force_N"], live["force_N"][rows])
+
+
 @pytest.mark.parametrize(
     "how",
     [
@@ -283,6 +316,21 @@ def test_what_is_recorded_in_part_replays_bit_equal(tmp_path: Path, how: dict[st
             == 0
         )
         assert_bit_equal(strains(folder), strains(out / str(len(extra))))
+
+
+def test_a_lag_is_taken_off_on_request_and_both_forces_are_stored(
+    tmp_path: Path, recorded: tuple[Path, Outcome]
+) -> None:
+    folder, outcome = recorded
+    session, out, lag = str(folder / "session.h5"), tmp_path / "again", 0.15
+    replay = ["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]
+    assert main([*replay, "--lag", str(lag)]) == 0
+    before, forces, raw = mean(folder, "force_N"), mean(out, "force_N"), mean(out, "force_raw_N")
+    np.testing.assert_array_equal(raw, before)
+    loads, start = outcome.books.loads, outcome.books.history.instants[0].t - mean(folder, "time_s")[0]
+    expected = [loads.force_at(t + lag) for t in mean(folder, "time_s") + start]
+    np.testing.assert_allclose(forces, expected, rtol=1e-6)
+    assert np.nanmax(np.abs(forces - raw)) > 50  # a ramp
 
 
 def test_dark_and_flat_frames_take_the_fixed_pattern_out(tmp_path: Path) -> None:

@@ -1,15 +1,20 @@
-"""The operator's keys: one line, one order."""
+"""The operator's keys: a line is an order, what is refused is told."""
 
 from __future__ import annotations
 
 import io
+import os
+import pty
+import select
+import sys
+import time
 from typing import Any
 
-import pytest
-
 from acquire.events import EventKind
-from live.operate import FORCED, UNDO, carry_out, listen
+from live.operate import ENDED, FORCED, UNDO, listen
+from live.operate.keys import Keys
 from live.tell import Screen
+from tests.live.operate.test_orders import FakeLive
 
 
 class Terminal(io.StringIO):
@@ -17,55 +22,15 @@ class Terminal(io.StringIO):
         return True
 
 
-class FakeLive:
-    """Notes what it is asked."""
-
-    def __init__(self) -> None:
-        self.calls: list[Any] = []
-        self.paused = False
-
-    def stop(self, reason: str) -> None:
-        self.calls.append(("stop", reason))
-
-    def command(self, kind: EventKind, note: str = "") -> None:
-        self.paused = kind is EventKind.PAUSE
-        self.calls.append((kind, note))
-
-
-@pytest.mark.parametrize(
-    ("typed", "call"),
-    [
-        ("r\n", (EventKind.NEW_REFERENCE, "")),
-        ("t", (EventKind.TARE, "")),
-        ("t!", (EventKind.TARE, FORCED)),
-        ("u", (EventKind.TARE, UNDO)),
-        ("p", (EventKind.PAUSE, "")),
-        ("n slipped in the grip", (EventKind.NOTE, "slipped in the grip")),
-        ("q", ("stop", "ended by the operator")),
-    ],
-)
-def test_the_keys(typed: str, call: tuple[Any, str]) -> None:
-    live = FakeLive()
-    assert carry_out(typed, live)
-    assert live.calls == [call]
-
-
-def test_a_second_p_goes_on() -> None:
-    live = FakeLive()
-    for _ in range(3):
-        carry_out("p", live)
-    assert [call[0] for call in live.calls] == [EventKind.PAUSE, EventKind.RESUME, EventKind.PAUSE]
-
-
-def test_what_nobody_knows_is_answered_with_the_keys() -> None:
+def test_what_nobody_knows_is_answered_with_the_orders() -> None:
     live, screen = FakeLive(), io.StringIO()
-    assert carry_out("", live)
-    assert not carry_out("x", live)
-    thread = listen(live, Terminal("x\nn\n"), Screen(screen))
+    thread = listen(live, Terminal("\nx\nn\n?\n"), Screen(screen))
     assert thread is not None
     thread.join(5)
     assert live.calls == []
-    assert screen.getvalue().count("keys (with Enter)") == 3
+    lines = screen.getvalue().splitlines()
+    assert lines[0].startswith("keys (with Enter)")
+    assert [line.partition(":")[0] for line in lines[1:]] == ["no", "no", "ok"]
 
 
 def test_only_a_terminal_is_listened_to() -> None:
@@ -75,4 +40,79 @@ def test_only_a_terminal_is_listened_to() -> None:
     thread = listen(live, Terminal("q\n"), Screen(io.StringIO()))
     assert thread is not None
     thread.join(5)
-    assert live.calls == [("stop", "ended by the operator")]
+    assert live.calls == [("stop", ENDED)]
+
+
+class Typed:
+    """Keys on made-up time, and what the screen then shows."""
+
+    def __init__(self) -> None:
+        self.live, self.now, self.stream = FakeLive(), 0.0, io.StringIO()
+        self.keys = Keys(self.live, Screen(self.stream), lambda: self.now)
+
+    def type(self, *texts: str) -> list[Any]:
+        for text in texts:
+            self.keys.type(text)
+        return self.live.calls
+
+
+def test_single_keys_are_orders_at_once() -> None:
+    calls = Typed().type("rp", "T")
+    assert calls == [(EventKind.NEW_REFERENCE, ""), (EventKind.PAUSE, ""), (EventKind.TARE, FORCED)]
+
+
+def test_a_note_is_typed_to_its_end_and_no_key_in_it_is_an_order() -> None:
+    typed = Typed()
+    assert typed.type("n", "a qx", "\x7f", "\n") == [(EventKind.NOTE, "a q")]
+    assert typed.type("n", "half a word", "\x1b", "n", "\r") == [(EventKind.NOTE, "a q")]
+    assert typed.type(":", "tare  undo", "\r")[1:] == [(EventKind.TARE, UNDO)]
+
+
+def test_one_q_alone_ends_no_test() -> None:
+    typed = Typed()
+    assert typed.type("q") == [] and "q again" in typed.stream.getvalue()
+    typed.now = 3.5
+    assert typed.type("q") == []
+    typed.now = 5.0
+    assert typed.type("q") == [("stop", ENDED)]
+
+
+def test_other_keys_are_answered_with_the_keys_and_arrows_with_nothing() -> None:
+    typed = Typed()
+    typed.type("\x1b[A", "\n")
+    assert typed.stream.getvalue() == ""
+    typed.type("x")
+    assert typed.stream.getvalue().startswith("keys: ")
+
+
+def test_a_true_terminal_gives_single_keys_and_is_put_back_as_it_was() -> None:
+    """In a program of its own, since a terminal has one foreground."""
+    program = (
+        "import sys, termios; from live.operate import listen; from live.tell import Screen;"
+        "from tests.live.operate.test_orders import FakeLive; live = FakeLive();"
+        "before = termios.tcgetattr(0); k = listen(live, sys.stdin, Screen());"
+        "during = termios.tcgetattr(0)\n"
+        "import time\n"
+        "while not live.calls: time.sleep(0.01)\n"
+        "k.close()\n"
+        "print('CALLS', live.calls[0][0], bool(during[3] & termios.ICANON), termios.tcgetattr(0) == before)"
+    )
+    child, master = pty.fork()
+    if child == 0:
+        os.execv(sys.executable, [sys.executable, "-c", program])
+    got, until = b"", time.monotonic() + 30
+    sent = False
+    while b"CALLS" not in got or not got.endswith(b"\n"):
+        assert time.monotonic() < until, got
+        if not select.select([master], [], [], 0.2)[0]:
+            continue
+        try:
+            got += os.read(master, 4096)
+        except OSError:
+            break
+        if b"keys: " in got and not sent:
+            sent = True
+            os.write(master, b"r")
+    os.waitpid(child, 0)
+    os.close(master)
+    assert b"CALLS new-reference False True" in got

@@ -90,11 +90,15 @@ def test_table_and_maps_say_the_same(tmp_path: Path) -> None:
             results.add(make_measurement(k, 1e-4 + 1e-3 * k, force=7.0 * k))
     with Strain.open(tmp_path / "strain.h5") as strain:
         for k, row in enumerate(rows_of(tmp_path / "strain.csv")):
-            for column in (*COLUMNS, "stress_Pa"):
+            for column in (*COLUMNS, "stress_Pa", "true_strain", "true_stress_Pa"):
                 assert float(row[column]) == pytest.approx(
                     float(strain.values[column][k]), rel=1e-9, nan_ok=True
                 ), column
-        np.testing.assert_allclose(strain.values["stress_Pa"], strain.values["force_N"] / 4e-5)
+        stress, eyy = strain.values["force_N"] / 4e-5, strain.values["eyy"]
+        np.testing.assert_allclose(strain.values["stress_Pa"], stress)
+        np.testing.assert_allclose(strain.values["true_stress_Pa"], stress * (1 + eyy))
+        np.testing.assert_allclose(strain.values["true_strain"], np.log1p(eyy))
+        assert "force_raw_N" not in strain.values
 
 
 def test_another_measure_of_strain(tmp_path: Path) -> None:

@@ -15,6 +15,7 @@ from live.tell.figures import quantity
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen
+from live.tell.status_line import Standing, status_line
 
 
 class Terminal(io.StringIO):
@@ -48,10 +49,10 @@ def test_the_progress_of_a_replay_is_one_line() -> None:
     screen.progress(instant(), 21, 20, 2.5)
     screen.progress(instant(), 1, 100_000, 1.0)
     assert stream.getvalue().splitlines() == [
-        "5 of 20 bursts  7.0 N  exx +100  eyy -200  exy +0 um/m  8/10 ZOIs  20 ZOI/s  0:08 left",
-        "5 bursts  7.0 N  exx +100  eyy -200  exy +0 um/m  8/10 ZOIs",
-        "21 bursts  7.0 N  exx +100  eyy -200  exy +0 um/m  8/10 ZOIs  84 ZOI/s",
-        "1 of 100000 bursts  7.0 N  exx +100  eyy -200  exy +0 um/m  8/10 ZOIs  10 ZOI/s  27:46:39 left",
+        "5 of 20 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs  20 ZOI/s  0:08 left",
+        "5 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs",
+        "21 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs  84 ZOI/s",
+        "1 of 100000 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs  10 ZOI/s  27:46:39 left",
     ]
 
 
@@ -59,6 +60,56 @@ def instant() -> Instant:
     numbers = {f.name: 0.0 for f in dataclasses.fields(Instant) if f.default is dataclasses.MISSING}
     told: Any = {**numbers, "force": 7.0, "exx": 1e-4, "eyy": -2e-4, "n_valid": 8, "n_zoi": 10}
     return Instant(**told)
+
+
+def standing(**more: Any) -> Standing:
+    ledger = Ledger()
+    ledger.add(grabbed=200, measured=120, skipped=8)
+    return Standing(ledger, "REC", 75.0, 29.9, 1234.5, 40e-6, instant(), 0.0421, 7200.0, **more)
+
+
+def test_the_status_line_has_everything_where_there_is_room() -> None:
+    assert status_line(standing(), 200) == (
+        "REC  1:15  1234.5 N  30.9 MPa  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs  30 fps"
+        "  measured 120  skipped 8  lost 0  p95 42 ms  disk 120 min"
+    )
+
+
+@pytest.mark.parametrize("width", [0, 3, 20, 40, 80, 100, 120])
+def test_the_status_line_fits_any_width_and_force_and_alarm_go_last(width: int) -> None:
+    line = status_line(standing(alarms=("axial: axial is 0.021",)), width)
+    assert len(line) <= width
+    assert width < 40 or line.startswith("ALARM axial: axial is 0.021")
+    assert width < 40 or "1234.5 N" in line
+    assert "eyy -200" in line or width < 80
+
+
+def test_what_is_typed_is_not_overwritten() -> None:
+    now = [0.0]
+    stream = Terminal()
+    screen = Screen(stream, now=lambda: now[0])
+    screen.status("status")
+    screen.prompt(": note sl_")
+    now[0] = 9.0
+    screen.status("hidden")
+    screen.say("stays")
+    screen.prompt(None)
+    screen.status("again")
+    assert stream.getvalue().split("\r") == [
+        "status",
+        ": note sl_",
+        "          ",
+        "stays\n: note sl_",
+        "          ",
+        "again",
+        "",
+    ]
+
+
+def test_a_device_is_told_by_its_name() -> None:
+    address = "sim:woven?bits=12&fps=60"
+    event = Event(1.0, EventKind.DEVICE, address, f"{address}: the stream stalls")
+    assert sentence(event, {address: "camera"}) == "camera: the stream stalls"
 
 
 def test_an_address_is_told_once_and_without_its_settings() -> None:

@@ -1,0 +1,130 @@
+"""A controller of one's own: holds the strain rate of a machine with the strain that phasedic tells over TCP.
+
+It reads lines of JSON from the strain output, drives the machine with a PID on the strain, and orders the end of
+the test. ``python -m examples.strain_rate`` runs it with a simulated machine, soft as machines are: the share of
+the crosshead's way that reaches the specimen jumps at yield. For a machine of yours, write ``Machine.drive`` anew.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+import sys
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from live.operate import OrderPort
+from live.run import LiveRun, Outcome, run_live
+from live.setup import load_config
+from live.tell import Screen
+
+STRAIN, ORDERS, MACHINE = 5610, 5611, 5612
+
+
+class Lines:
+    """A TCP connection of lines."""
+
+    def __init__(self, port: int) -> None:
+        self._socket = socket.create_connection(("127.0.0.1", port), 10)
+        self._lines = self._socket.makefile("rw", encoding="utf-8", newline="\n")
+
+    def ask(self, line: str) -> str:
+        """Say a line; the answer."""
+        self._lines.write(line + "\n")
+        self._lines.flush()
+        return self._lines.readline().strip()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._lines)
+
+    def close(self) -> None:
+        self._lines.close()
+        self._socket.close()
+
+
+class Machine:
+    """The machine: a speed, 1/s of the free length."""
+
+    def __init__(self, port: int) -> None:
+        self._lines = Lines(port)
+
+    def drive(self, speed: float) -> None:
+        if self._lines.ask(f"speed {speed:.6g}") != "ok":
+            raise RuntimeError("the machine does not take the speed")
+
+    def close(self) -> None:
+        self._lines.close()
+
+
+@dataclass
+class Pid:
+    """A PID on the strain, which shall be on a ramp of ``rate`` (1/s); gives the speed."""
+
+    rate: float
+    p: float = 5.0
+    i: float = 6.0
+    d: float = 0.1
+    _began: tuple[float, float] | None = None
+    _last: tuple[float, float] = (0.0, 0.0)
+    _sum: float = 0.0
+
+    def speed(self, t: float, strain: float) -> float:
+        """The speed after a measurement at ``t`` s."""
+        if self._began is None:
+            self._began, self._last = (t, strain), (t, 0.0)
+            return self.rate
+        error = self._began[1] + self.rate * (t - self._began[0]) - strain
+        step = max(t - self._last[0], 1e-3)
+        self._sum += error * step
+        slope = (error - self._last[1]) / step
+        self._last = t, error
+        return max(0.0, self.rate + self.p * error + self.i * self._sum + self.d * slope)
+
+
+def control(rate: float, until: float) -> None:
+    """Pull with a strain rate (1/s) until the strain is reached, then end the test."""
+    strains, machine, orders, pid = Lines(STRAIN), Machine(MACHINE), Lines(ORDERS), Pid(rate)
+    orders.ask(f"note strain rate {rate:g} 1/s")
+    for line in strains:
+        now = json.loads(line)
+        if now["axial"] is None:
+            continue
+        if now["axial"] > until:
+            break
+        machine.drive(pid.speed(now["time_s"], now["axial"]))
+    machine.drive(0.0)
+    orders.ask("quit")
+    for one in (strains, machine, orders):
+        one.close()
+
+
+def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> Outcome:
+    """A run with the controller beside it."""
+    settings = {
+        "camera.address": f"sim:uniform?seconds=60&fps=40&width=224&height=192&machine={MACHINE}",
+        "load.address": "sim:",
+        "measure.burst": 2,
+        "measure.zoi": 48,
+        "view.enabled": False,
+        "view.rrd": False,
+        "strain_out.tcp": str(STRAIN),
+        "strain_out.channels": ["time_s", "axial"],
+        "output.dir": folder,
+    }
+    config = load_config(None, {key: value for key, value in settings.items() if value is not None})
+    screen = Screen()
+    port = OrderPort(str(ORDERS), None, screen)
+
+    def hands(live: LiveRun) -> None:
+        port.open(live)
+        threading.Thread(target=control, args=(rate, until), daemon=True).start()
+
+    try:
+        return run_live(config, screen, hands=hands)
+    finally:
+        port.close()
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:2]).exit_code)

@@ -1,0 +1,153 @@
+"""Strain out: every measurement as a line to TCP clients, by UDP, or to a serial port.
+
+Each way has a thread of its own and takes the newest measurement: one that stalls skips and counts, and
+neither the measurement nor another way feels it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import time
+from typing import Any
+
+from acquire.errors import DeviceError, PhasedicError
+from acquire.events import Event, EventKind
+from acquire.serial_line import LineSettings, open_port
+from live.lines import LineServer
+from live.measure import Measurement
+from live.outputs import Consumer, Policy
+from live.signals.lines import Lines
+
+AGAIN_S = 1.0
+"""A serial port that was lost is opened again so often."""
+
+
+class StrainOut(Consumer):
+    """One way out; ``send`` takes a line without its end."""
+
+    policy = Policy.NEWEST
+    room = 2
+    patience_s = 2.0
+
+    def __init__(self, name: str, lines: Lines) -> None:
+        self.name, self._lines = name, lines
+
+    def measurement(self, measurement: Measurement) -> None:
+        """Send its line."""
+        self.send(self._lines.of(measurement))
+
+    def event(self, event: Event) -> None:
+        """Send the line of an alarm that has one."""
+        if event.kind is EventKind.ALARM and event.data.get("line"):
+            self.send(str(event.data["line"]))
+
+    def send(self, line: str) -> None:
+        """Send a line."""
+        raise NotImplementedError
+
+
+class TcpOut(StrainOut):
+    """To any number of TCP clients."""
+
+    def __init__(self, listening: socket.socket, token: str, lines: Lines) -> None:
+        self._server = LineServer(listening, token, greeting=lines.heading)
+        super().__init__(f"strain out (port {self._server.port})", lines)
+        self.port = self._server.port
+
+    def begin(self) -> None:
+        """Listen."""
+        self._server.start()
+
+    def send(self, line: str) -> None:
+        """To all clients; those that do not read are passed over."""
+        self._server.tell(line)
+
+    def end(self) -> str:
+        """Let the clients go."""
+        self._server.close()
+        skipped = f", {self._server.skipped} skipped by clients that did not read" * (
+            self._server.skipped > 0
+        )
+        return f"{self._server.served} clients, {self._server.taken} lines{skipped}"
+
+
+class UdpOut(StrainOut):
+    """To one address by UDP, which nobody confirms."""
+
+    def __init__(self, host: str, port: int, lines: Lines) -> None:
+        super().__init__(f"strain out (udp {host}:{port})", lines)
+        self._to = (host, port)
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._sent = self._skipped = 0
+
+    def send(self, line: str) -> None:
+        """Send a datagram; where nobody listens, or there is no room, it is counted."""
+        try:
+            self._socket.sendto(line.encode() + b"\n", self._to)
+            self._sent += 1
+        except OSError:
+            self._skipped += 1
+
+    def end(self) -> str:
+        """Close the socket."""
+        self._socket.close()
+        return f"{self._sent} lines" + f", {self._skipped} refused" * (self._skipped > 0)
+
+
+class SerialOut(StrainOut):
+    """To a serial port, opened again where it is lost.
+
+    Raises
+    ------
+    ConfigError, DeviceError
+        The port cannot be opened at the start.
+    """
+
+    def __init__(self, line: LineSettings, lines: Lines) -> None:
+        super().__init__(f"strain out ({line.url})", lines)
+        self._settings = line
+        self._port: Any = open_port(line)
+        self._lost = -float("inf")
+        self._sent = self._skipped = 0
+        self._told_heading = False
+
+    def send(self, line: str) -> None:
+        """Write; a port that takes nothing for half a second is lost, and tried again a second later."""
+        if not self._told_heading and self._lines.heading:
+            line = f"{self._lines.heading}\n{line}"
+        if self._port is None and time.monotonic() - self._lost > AGAIN_S:
+            self._open_again()
+        if self._port is not None and self._written(line.encode() + b"\n"):
+            self._told_heading = True
+            self._sent += 1
+        else:
+            self._skipped += 1
+
+    def _written(self, data: bytes) -> bool:
+        try:
+            self._port.write(data)
+        except Exception:  # pyserial's time-out, an unplugged port: termios.error is no OSError
+            self._close()
+            self._lost = time.monotonic()
+            return False
+        return True
+
+    def _open_again(self) -> None:
+        self._lost = time.monotonic()
+        with contextlib.suppress(PhasedicError, DeviceError):
+            self._port = open_port(self._settings)
+
+    def _close(self) -> None:
+        if self._port is not None:
+            with contextlib.suppress(Exception):
+                self._port.close()
+            self._port = None
+
+    def end(self) -> str:
+        """Close the port."""
+        self._close()
+        return f"{self._sent} lines" + f", {self._skipped} skipped, the port took nothing" * (
+            self._skipped > 0
+        )

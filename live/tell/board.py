@@ -1,0 +1,62 @@
+"""The alarms that are on, and the vital signs of the machine: for whoever shows or asks."""
+
+from __future__ import annotations
+
+import math
+import threading
+from dataclasses import dataclass
+
+
+@dataclass(slots=True)
+class Vitals:
+    """Written by whoever knows, in one assignment.
+
+    Attributes
+    ----------
+    frame_t, load_t : float, s
+        When the last frame and the last load sample came, monotonic; NaN before the first.
+    disk_s : float, s
+        Until the disk is full; infinite where nothing is written.
+    """
+
+    frame_t: float = math.nan
+    load_t: float = math.nan
+    disk_s: float = math.inf
+
+    def channels(self, now: float) -> dict[str, float]:
+        """The channels of the machine (``live.channels``) at ``now``, monotonic s."""
+        return {
+            "silent_s": now - self.frame_t,
+            "load_silent_s": now - self.load_t,
+            "disk_min": self.disk_s / 60,
+        }
+
+
+class AlarmBoard:
+    """The alarms that are on, with their words, until they go or are silenced; for any thread."""
+
+    def __init__(self) -> None:
+        self._on: dict[str, str] = {}
+        self._lock = threading.Lock()
+
+    def put(self, name: str, text: str) -> None:
+        """An alarm comes, or has new words."""
+        with self._lock:
+            self._on[name] = text
+
+    def take_off(self, name: str) -> None:
+        """An alarm goes."""
+        with self._lock:
+            self._on.pop(name, None)
+
+    def silence(self) -> tuple[str, ...]:
+        """Take all off; their names. Each comes again only when it has gone in between."""
+        with self._lock:
+            names, self._on = tuple(self._on), {}
+            return names
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The words of the alarms that are on, the oldest first."""
+        with self._lock:
+            return tuple(self._on.values())

@@ -1,0 +1,130 @@
+"""The status line of a live run: what matters most, as much of it as the terminal is wide."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from live.measure import Instant
+    from live.tell.ledger import Ledger
+
+GAP = "  "
+MOST_GAUGES = 4
+Part = tuple[int, str]
+"""How soon it has to go where the line is too long (the highest first), and its words."""
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """Where a test stands.
+
+    Attributes
+    ----------
+    ledger : Ledger
+    state : str
+        What is done with frames and bursts: "REC", "ARMED", "PAUSED" ...
+    elapsed_s : float, s
+    fps : float
+    force_N : float, N
+        The newest; NaN where there is none.
+    area_m2 : float or None, m^2
+    instant : Instant or None
+        The last that was measured.
+    p95_s : float, s
+        Latency; NaN where it is not known.
+    disk_s : float, s
+        Until the disk is full.
+    alarms : sequence of str
+        Words of those that are on.
+    words : str
+        What is waited for.
+    """
+
+    ledger: Ledger
+    state: str
+    elapsed_s: float
+    fps: float = 0.0
+    force_N: float = math.nan
+    area_m2: float | None = None
+    instant: Instant | None = None
+    p95_s: float = math.nan
+    disk_s: float = math.inf
+    alarms: Sequence[str] = ()
+    words: str = ""
+
+
+def status_line(s: Standing, width: int) -> str:
+    """The line, at most ``width`` letters."""
+    return fitted([*_test(s), *_strain(s.instant), *_machine(s)], width)
+
+
+def fitted(parts: Sequence[Part], width: int) -> str:
+    """The parts in their order, without as many as do not fit; the last one left is cut."""
+    left = [part for part in parts if part[1]]
+    while len(left) > 1 and len(GAP.join(text for _, text in left)) > width:
+        left.remove(max(left, key=lambda part: part[0]))
+    return GAP.join(text for _, text in left)[: max(width, 0)]
+
+
+def _test(s: Standing) -> list[Part]:
+    alarm = " ".join(f"ALARM {text}" for text in s.alarms)
+    stress = f"{s.force_N / s.area_m2 * 1e-6:.1f} MPa" if s.area_m2 and not math.isnan(s.force_N) else ""
+    return [
+        (1, alarm),
+        (2, s.state),
+        (7, duration(s.elapsed_s)),
+        (0, force(s.force_N)),
+        (4, stress),
+        (3, s.words),
+    ]
+
+
+def _strain(i: Instant | None) -> list[Part]:
+    if i is None:
+        return []
+    parts = [(5 if number == 0 else 10, text) for number, text in enumerate(gauge_words(i))]
+    parts[-1] = parts[-1][0], f"{parts[-1][1]} um/m"
+    return [*parts, (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
+
+
+def _machine(s: Standing) -> list[Part]:
+    ledger = s.ledger
+    lost = ledger.lost + ledger.unrecorded
+    late = "" if math.isnan(s.p95_s) else f"p95 {s.p95_s * 1e3:.0f} ms"
+    measured = f"measured {ledger.measured}" if s.instant is not None else f"{ledger.grabbed} frames"
+    return [
+        (9, f"{s.fps:.0f} fps"),
+        (12, measured),
+        (11, f"skipped {ledger.skipped}"),
+        (6, f"LOST {lost}") if lost else (13, "lost 0"),
+        (12, late),
+        (14, "" if math.isinf(s.disk_s) else f"disk {s.disk_s / 60:.0f} min"),
+    ]
+
+
+def force(value: float) -> str:
+    """A force in words; nothing where it is not known."""
+    return "" if math.isnan(value) else f"{value:.1f} N"
+
+
+def duration(seconds: float) -> str:
+    """As 1:23 or 1:02:03."""
+    minutes, rest = divmod(max(0, round(seconds)), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
+
+
+def gauge_words(i: Instant) -> list[str]:
+    """The virtual gauges with their sigmas in um/m, or the means where there are none."""
+    if not i.gauges:
+        return [
+            f"{name} {getattr(i, name) * 1e6:+.0f} +- {getattr(i, f'sigma_{name}') * 1e6:.0f}"
+            for name in ("eyy", "exx", "exy")
+        ]
+    return [
+        f"{name} lost" if gauge.reason else f"{name} {gauge.value * 1e6:+.0f} +- {gauge.sigma * 1e6:.0f}"
+        for name, gauge in list(i.gauges.items())[:MOST_GAUGES]
+    ]

@@ -1,0 +1,140 @@
+"""Alarms: when they come and go, what they do, and how soon."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquire.errors import ConfigError
+from acquire.events import Event, EventKind
+from acquire.session import Session
+from live.operate import answer
+from live.setup import AlarmConfig, from_dict, load_config
+from live.signals import Alarm, AlarmWatch
+from live.tell import AlarmBoard, Vitals
+from tests.live.test_end_to_end import live_run
+
+
+def changes(alarm: Alarm, *values: float) -> list[bool]:
+    return [alarm.on for value in values if alarm.look(value)]
+
+
+def test_on_beyond_the_limit_and_off_when_back_by_the_hysteresis() -> None:
+    alarm = Alarm(AlarmConfig(channel="force_N", above=100.0, hysteresis=10.0))
+    assert changes(alarm, 99, 101, 95, math.nan, 91, 90, 100, 101) == [True, False, True]
+    alarm = Alarm(AlarmConfig(channel="disk_min", below=5.0, hysteresis=1.0))
+    assert changes(alarm, 6, 5, 4.9, 5.5, 6.1) == [True, False]
+
+
+def test_without_hysteresis_the_limit_itself_is_off() -> None:
+    assert changes(Alarm(AlarmConfig(channel="x", above=1.0)), 1.0, 1.1, 1.0, 0.9) == [True, False]
+
+
+class Bench:
+    """A watch with readings and a machine that say what they are told."""
+
+    def __init__(self, *alarms: AlarmConfig) -> None:
+        self.events: list[Event] = []
+        self.board, self.values, self.now = AlarmBoard(), dict[str, float](), 100.0
+        self.watch = AlarmWatch(
+            alarms,
+            None,
+            self._machine,
+            self.board,
+            self.events.append,
+            lambda: self.now,  # type: ignore[arg-type]
+        )
+
+    def _machine(self, now: float) -> Mapping[str, float]:
+        return self.values
+
+    def look(self, **values: float) -> list[dict[str, Any]]:
+        self.values = values
+        before = len(self.events)
+        self.watch.idle()
+        return [dict(event.data) for event in self.events[before:]]
+
+
+def test_what_comes_is_told_stands_on_the_board_and_goes() -> None:
+    bench = Bench(AlarmConfig(channel="silent_s", above=2.0, name="camera", line="HALT", end=True))
+    assert bench.look(silent_s=1.0) == []
+    assert bench.look(silent_s=2.5) == [
+        {"alarm": "camera", "on": True, "value": 2.5, "line": "HALT", "end": True}
+    ]
+    assert bench.look(silent_s=3.0) == []
+    assert bench.board.texts == ("camera: silent_s is 2.5",)
+    assert bench.look(silent_s=0.1) == [{"alarm": "camera", "on": False, "value": 0.1}]
+    assert bench.board.texts == ()
+    assert [event.level for event in bench.events] == ["warning", "info"]
+    assert bench.watch.end() == "1 came"
+
+
+def test_a_silenced_alarm_comes_again_only_after_it_has_gone() -> None:
+    bench = Bench(AlarmConfig(channel="silent_s", above=2.0))
+    bench.look(silent_s=3.0)
+    assert bench.board.silence() == ("silent_s above 2",)
+    bench.look(silent_s=4.0)
+    assert bench.board.texts == ()
+    bench.look(silent_s=1.0)
+    bench.look(silent_s=3.0)
+    assert len(bench.board.texts) == 1
+
+
+def test_the_vital_signs() -> None:
+    vitals = Vitals()
+    assert math.isnan(vitals.channels(5.0)["silent_s"])
+    vitals.frame_t, vitals.disk_s = 3.0, 120.0
+    assert vitals.channels(5.0)["silent_s"] == 2.0 and vitals.channels(5.0)["disk_min"] == 2.0
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[alarm]\nchannel = 'force_N'\n", r"\[\[alarm\]\]"),
+        ("[[alarm]]\nchannel = 'forse_N'\nabove = 1\n", "did you mean force_N"),
+        ("[[alarm]]\nchannel = 'force_N'\n", "one of above and below"),
+        ("[[alarm]]\nchannel = 'force_N'\nabove = 1\nbelow = 0\n", "one of above and below"),
+        ("[[alarm]]\nchannel = 'force_N'\nover = 1\n", "unknown key alarm 1.over"),
+        ("[[alarm]]\nchannel = 'gauge_axial'\nabove = 1\n", "unknown channel 'gauge_axial'"),
+        ("alarm = 3\n", r"\[\[alarm\]\]"),
+    ],
+)
+def test_alarms_that_cannot_be(tmp_path: Path, text: str, says: str) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=says):
+        load_config(path, {})
+
+
+def test_alarms_come_back_from_a_file_as_they_were() -> None:
+    alarms = [{"channel": "force_N", "above": 1.0}, {"channel": "axial", "below": 0.0, "end": True}]
+    config = load_config(None, {"alarm": alarms})
+    assert from_dict(json.loads(json.dumps(config.as_dict())), {}, "a file") == config
+
+
+REAL = "sim:uniform?seconds=4&fps=20&width=224&height=192&bits=12"
+
+
+def test_from_the_stamp_of_the_frame_to_the_action_within_two_measurement_periods(tmp_path: Path) -> None:
+    """In real time; the alarm ends the run, stands in the session, and is silenced by an order."""
+    alarms = ({"channel": "axial", "above": 0.0005}, {"channel": "force_N", "above": 3000.0, "end": True})
+    said: list[str] = []
+
+    def silence(live: Any, measurement: Any) -> None:
+        if measurement.instant.eyy > 0.001 and not said:
+            said.extend(answer("alarm off", live) for _ in range(2))
+
+    outcome = live_run(tmp_path / "run", REAL, each=silence, alarm=alarms, **{"measure.burst": 2})
+    period_s = 2 / 20
+    with Session.open(tmp_path / "run" / "session.h5") as session:
+        told = [event for event in session.events() if event.kind is EventKind.ALARM]
+    came = [event for event in told if event.data.get("on")]
+    assert [event.data["alarm"] for event in came] == ["axial above 0.0005", "force_N above 3000"]
+    assert all(0 < event.data["after_s"] < 2 * period_s for event in came)
+    assert said == ["ok", "no: no alarm is on"]
+    assert outcome.books.history.instants[-1].force < 5000  # it ended there
