@@ -17,7 +17,7 @@ MEASURE = (
     "roi", "mask", "zoi", "step", "burst", "reference-burst", "window", "estimator", "strain", "order", "bending",
     "noise",
 )  # fmt: skip
-OUTPUT = ("out", "no-view", "no-rrd", "axis")
+OUTPUT = ("out", "no-view", "no-rrd", "axis", "report")
 
 
 def add_options(parser: argparse.ArgumentParser, title: str, *names: str) -> None:
@@ -27,9 +27,9 @@ def add_options(parser: argparse.ArgumentParser, title: str, *names: str) -> Non
         key, field = known[name]
         option, check = field.metadata["option"], field.metadata["check"]
         words = field.metadata["help"]
-        if option.off:
-            words = f"do not {words}"
-            group.add_argument(f"--{name}", dest=key, action="store_const", const=False, help=words)
+        if option.off or option.on:
+            words = f"do not {words}" if option.off else words
+            group.add_argument(f"--{name}", dest=key, action="store_const", const=option.on, help=words)
             continue
         if field.default not in (None, ""):
             words += f" (default {field.default})"

@@ -41,6 +41,10 @@ def command(arguments: argparse.Namespace) -> int:
     screen.say()
     for line in [*summary_lines(done.books, done.config.specimen), *file_lines(done.folder)]:
         screen.say(line)
+    if done.config.output.report:
+        from live.commands.report import write_report
+
+        write_report(done.folder, screen)
     if done.exit_code in EXIT_WORDS:
         screen.say(f"exit code {done.exit_code}: {EXIT_WORDS[done.exit_code]}")
     return done.exit_code

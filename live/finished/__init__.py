@@ -8,6 +8,16 @@ are asked for.
 from live.finished.display import Display
 from live.finished.pictures import Pictures
 from live.finished.quantities import MEANS, UNITLESS, Quantity, quantity_of
-from live.finished.run_folder import RunFolder, open_run
+from live.finished.run_folder import GaugeTrack, RunFolder, open_run
 
-__all__ = ["MEANS", "UNITLESS", "Display", "Pictures", "Quantity", "RunFolder", "open_run", "quantity_of"]
+__all__ = [
+    "MEANS",
+    "UNITLESS",
+    "Display",
+    "GaugeTrack",
+    "Pictures",
+    "Quantity",
+    "RunFolder",
+    "open_run",
+    "quantity_of",
+]

@@ -7,6 +7,7 @@ a child process.
 
 from live.results.info import ResultsInfo
 from live.results.reader import Strain
+from live.results.row import gauge_columns
 from live.results.writer import Results
 
-__all__ = ["Results", "ResultsInfo", "Strain"]
+__all__ = ["Results", "ResultsInfo", "Strain", "gauge_columns"]

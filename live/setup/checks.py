@@ -42,14 +42,15 @@ class Option:
         Without its dashes.
     metavar : str
     choices : tuple of str
-    off : bool
-        A switch that turns the key off.
+    off, on : bool
+        A switch that turns the key off, or on.
     """
 
     name: str
     metavar: str = ""
     choices: tuple[str, ...] = ()
     off: bool = False
+    on: bool = False
 
 
 def key(
