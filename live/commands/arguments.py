@@ -27,6 +27,7 @@ COMMANDS = {
     "demo": Entry("live.commands.demo", "the same on a simulated tensile test, compared with its truth"),
     "replay": Entry("live.commands.replay", "measure a recorded session, or any folder of pictures"),
     "map": Entry("live.commands.map", "draw a map of the results over a picture, as a PNG"),
+    "show": Entry("live.commands.show", "a finished run in the view, with a slider in time"),
     "export": Entry(
         "live.commands.export", "a finished run as csv, npz, mat, vtk, tiff, png, mp4, gif, r3xa"
     ),

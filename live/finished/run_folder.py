@@ -19,6 +19,8 @@ from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event, EventKind
 from acquire.session import Session
+from analysis.field import StrainField
+from live.finished.fields import read_field
 from live.finished.pictures import Pictures, of_images, of_session
 from live.results import Strain, gauge_columns
 from live.setup import SpecimenConfig, from_dict
@@ -167,6 +169,16 @@ class RunFolder(Closing):
     def _along(self, gauge: str, mean: str) -> NDArray[np.float64]:
         found = self.gauges.get(gauge)
         return np.asarray(self.strain.values[mean], np.float64) if found is None else found.value
+
+    def field(self, row: int) -> StrainField:
+        """The strain field of one instant, as ``strain.h5`` holds it.
+
+        Raises
+        ------
+        DataError
+            There is no such instant, or it cannot be read.
+        """
+        return read_field(self.strain, row)
 
     @property
     def force(self) -> NDArray[np.float64]:

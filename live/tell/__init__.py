@@ -7,7 +7,7 @@
 
 from live.tell.books import Books
 from live.tell.card import StatusCard
-from live.tell.figures import elastic_lines, evaluate, interval, options_of, quantity
+from live.tell.figures import elastic_lines, evaluate, figure_lines, interval, options_of, quantity
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen, say
@@ -21,6 +21,7 @@ __all__ = [
     "StatusCard",
     "elastic_lines",
     "evaluate",
+    "figure_lines",
     "file_lines",
     "interval",
     "options_of",
