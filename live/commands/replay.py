@@ -39,7 +39,8 @@ def command(arguments: argparse.Namespace) -> int:
     with signals(stopping.set, screen.say):
         done = replay(request, screen, stopping)
     screen.say()
-    for line in [*summary_lines(done.books, done.config.specimen), *file_lines(done.folder)]:
+    summary = summary_lines(done.books, done.config.specimen)
+    for line in [*summary, *done.lines, *file_lines(done.folder)]:
         screen.say(line)
     if done.config.output.report:
         from live.commands.report import write_report

@@ -11,7 +11,7 @@ from typing import Any
 from acquire.clock import ClockPair
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event
-from acquire.frame import Burst, CameraInfo
+from acquire.frame import Burst, CameraInfo, Frame
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from live.measure import NewReference
@@ -46,6 +46,26 @@ class ReplayRequest:
 Work = Burst | NewReference
 
 
+class Seen:
+    """Counts the pictures that pass.
+
+    Attributes
+    ----------
+    pictures, left_out, reference : int
+        All of them; those that cannot be read or are not like the first; those of the reference.
+    """
+
+    def __init__(self) -> None:
+        self.pictures = self.left_out = self.reference = 0
+
+    def passing(self, frames: Iterable[Frame]) -> Iterator[Frame]:
+        """The same frames."""
+        for frame in frames:
+            self.pictures += 1
+            self.left_out += frame.damaged
+            yield frame
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
     """A source taken apart: what the reference is, and the bursts to measure.
@@ -54,6 +74,8 @@ class Material:
     ----------
     expected : int or None
         How many bursts there will be at most, where that is known.
+    seen : Seen or None
+        The pictures so far; None for a session, whose bursts say what was lost.
     """
 
     camera: CameraInfo
@@ -64,6 +86,7 @@ class Material:
     events: tuple[Event, ...] = ()
     samples: tuple[LoadSample, ...] = ()
     expected: int | None = None
+    seen: Seen | None = None
 
 
 def check_window(request: ReplayRequest) -> None:
