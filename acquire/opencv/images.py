@@ -153,11 +153,7 @@ class ImageFiles(CameraBase):
     def _pages(self) -> Iterator[tuple[Path, Callable[[], NDArray[Any]]]]:
         for path in self._paths:
             source = cache(partial(picture_source, path))
-            try:
-                count = count_pages(path)
-            except PhasedicError:
-                count = 1  # reading it says why
-            for page in range(count):
+            for page in range(_count(path)):
                 yield path, partial(_read_page, path, source, page)
 
     def _frame(self, index: int, path: Path, read: Callable[[], NDArray[Any]]) -> Frame:
@@ -217,12 +213,40 @@ class ImageFiles(CameraBase):
                 return
 
 
+def _count(path: Path) -> int:
+    """Pages; one where the file is broken: reading it says why."""
+    try:
+        return count_pages(path)
+    except PhasedicError:
+        return 1
+
+
 def _read_page(path: Path, source: Callable[[], Source], page: int) -> NDArray[Any]:
     return read_picture_page(path, source(), page)
 
 
 def _size(shape: tuple[int, ...]) -> str:
     return f"{shape[1]}x{shape[0]}"
+
+
+def picture_times(address: Address) -> dict[str, float]:
+    """Name -> time (s) of each picture of ``files:...``, as ``open_files`` would stamp them.
+
+    Raises
+    ------
+    ConfigError
+        Two have the same name, or one has several pages.
+    DataError
+        No picture, or stamps that do not fit.
+    """
+    paths, settings = find_images(address.target), _settings(address)
+    stamps = read_stamps(Path(settings.stamps), paths) if settings.stamps else None
+    times = {path.name: stamps[k] if stamps else k / settings.fps for k, path in enumerate(paths)}
+    if len(times) < len(paths) or any(_count(path) > 1 for path in paths):
+        raise ConfigError(
+            f"{address.text}: pictures are not told apart by their names; give times in their place"
+        )
+    return times
 
 
 def open_files(address: Address, on_event: EventSink) -> ImageFiles:
@@ -233,6 +257,10 @@ def open_files(address: Address, on_event: EventSink) -> ImageFiles:
     ConfigError, DataError
         See ``acquire.camera.open_camera``.
     """
+    return ImageFiles(address.text, find_images(address.target), _settings(address), on_event)
+
+
+def _settings(address: Address) -> FileSettings:
     options = Options(address)
     gray = options.text("gray")
     if gray is not None and gray not in GRAYS:
@@ -244,4 +272,4 @@ def open_files(address: Address, on_event: EventSink) -> ImageFiles:
         stamps=options.text("stamps"),
     )
     options.done()
-    return ImageFiles(address.text, find_images(address.target), settings, on_event)
+    return settings

@@ -30,6 +30,8 @@ class ReplayRequest:
         Part of the session, in seconds since its start.
     reference : str or None
         An image file as the reference, in place of the first pictures.
+    forces : Path or None
+        A CSV with the forces (``live.replay.forces``).
     config_file : Path or None
     overrides : mapping of "section.key" to value
     """
@@ -41,6 +43,7 @@ class ReplayRequest:
     reference: str | None
     config_file: Path | None
     overrides: Mapping[str, Any]
+    forces: Path | None = None
 
 
 Work = Burst | NewReference

@@ -15,12 +15,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
+from acquire.addresses import parse_address
+from acquire.camera import with_scheme
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
+from acquire.opencv import picture_times
 from acquire.session import Session
 from live.measure import History, kinds_of, measure, prepare
 from live.outputs import About, Outputs, make_outputs
 from live.replay.ahead import ahead
+from live.replay.forces import read_forces
 from live.replay.material import Material, ReplayRequest, Work, check_window
 from live.replay.pictures import picture_material, picture_of
 from live.replay.session import session_config, session_material, session_path
@@ -81,7 +85,7 @@ def replay(request: ReplayRequest, screen: Screen, stopping: threading.Event) ->
             screen.say(f"note: one frame in {session.mode.every} was recorded; measured as a slower camera")
         overrides = {"camera.address": f"session:{path}", "load.address": f"session:{path}"}
         config = session_config(session, request, overrides, path)
-        material = session_material(session, request, config, path)
+        material = _with_forces(session_material(session, request, config, path), request, config)
         return _run(material, config, request, screen, stopping, Journal())
 
 
@@ -97,10 +101,20 @@ def _replay_pictures(request: ReplayRequest, screen: Screen, stopping: threading
     rig = open_rig(config.camera.address, "none:", _in_test_time(journal), crop=config.camera.crop)
     try:
         with rig.camera as camera:
-            material = picture_material(camera, request, config)
+            material = _with_forces(picture_material(camera, request, config), request, config)
             return _run(material, config, request, screen, stopping, journal)
     finally:
         rig.close()
+
+
+def _with_forces(material: Material, request: ReplayRequest, config: Config) -> Material:
+    """The same with the forces of the CSV that was given."""
+    if request.forces is None:
+        return material
+    address, table = parse_address(with_scheme(request.source)), read_forces(request.forces)
+    names = picture_times(address) if table.names and address.scheme == "files" else None
+    samples = table.samples(names, material.start.monotonic)
+    return replace(material, samples=tuple(samples), loads=table.log(samples, config.load.max_gap_s))
 
 
 def _in_test_time(journal: Journal) -> EventSink:

@@ -50,7 +50,8 @@ ROOMS = {
     " live.view",
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
     " analysis.evaluate live.measure live.operate live.pace live.setup live.tell live.outputs",
-    "live.replay": "acquire acquire.burst acquire.camera acquire.load_cell acquire.opencv acquire.session analysis"
+    "live.replay": "acquire acquire.burst acquire.camera acquire.files acquire.load_cell acquire.opencv"
+    " acquire.protocols acquire.session analysis"
     " live.measure live.setup live.tell live.outputs",
     "live.characterise": "acquire acquire.opencv analysis analysis.field analysis.picture analysis.paper_estimator"
     " hw_mocks live.maps",
