@@ -203,6 +203,9 @@ class RunFolder(Closing):
         """Time zero of the results on the clock of the recording's events, s."""
         return 0.0 if self.session is None else self.session.start_monotonic
 
+    def __repr__(self) -> str:
+        return f"<RunFolder {self.path}: {self.strain.n} instants>"
+
     def close(self) -> None:
         """Close the files; again without effect."""
         self.strain.close()

@@ -31,6 +31,7 @@ NEEDED = {
     *("noise_GL", "n_frames", "last_frame", "lost", "duration_s", "u_px", "v_px"),
 }  # columns that every file of this version has
 KNOWN = {*COLUMNS, "stress_Pa"}  # columns whose type is declared where they are there
+ERRORS = "_errors"  # NeXus' second name of the uncertainty of what stands before it
 MOST_PIXELS = 65_535
 
 ROOT = {"format": Declared("text"), "format_version": Declared("int", (), 1), "start_time": Declared("text")}
