@@ -4,6 +4,7 @@
 complaints heard.
 """
 
+from acquire.files.decoder import Source
 from acquire.files.picture import (
     LOSSY,
     is_utf8,
@@ -16,6 +17,7 @@ from acquire.files.regular import check_regular, read_bytes
 
 __all__ = [
     "LOSSY",
+    "Source",
     "check_regular",
     "is_utf8",
     "picture_source",

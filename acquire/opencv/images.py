@@ -1,31 +1,35 @@
 """A folder, a glob or a single image as a camera: ``files:shots/*.tif?fps=5&gray=luma&bits=12``.
 
 Pictures are read when they are asked for, in natural order (2 before 10), pages of a multi-page
-TIFF one after the other. Nobody stamped them: ``clock`` is "nominal", or times come from a CSV.
+TIFF one after the other. Nobody stamped them: ``clock`` is "nominal", or times come from a CSV. A picture
+that cannot be read, or is not like the first, is a damaged frame and an event; the others come all the same.
 """
 
 from __future__ import annotations
 
 import glob
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from acquire.addresses import Address, Options
 from acquire.camera import CameraBase
-from acquire.errors import ConfigError, DataError
-from acquire.events import EventSink
-from acquire.files import LOSSY, check_regular, picture_source, read_picture_page
+from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.events import EventSink, device_event, ignore_event
+from acquire.files import LOSSY, Source, check_regular, picture_source, read_picture_page
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, to_gray
 from acquire.opencv.image_stamps import read_stamps
 from acquire.opencv.tiff_pages import count_pages
 
 SUFFIXES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")
+MOST_TOLD = 20  # pictures that are left out, one by one
 _DIGITS = re.compile(r"(\d+)")
 
 
@@ -103,15 +107,21 @@ class FileSettings:
 class ImageFiles(CameraBase):
     """Image files as a camera; see ``acquire.camera.Camera``.
 
+    Each picture that is left out is told as an event whose data names the ``file`` and the time ``t`` of the
+    picture, s; after ``MOST_TOLD`` only their number.
+
     Raises
     ------
     DataError, ConfigError
         No image, an unreadable first one, or stamps that do not fit.
     """
 
-    def __init__(self, address: str, paths: list[Path], settings: FileSettings) -> None:
+    def __init__(
+        self, address: str, paths: list[Path], settings: FileSettings, on_event: EventSink = ignore_event
+    ) -> None:
         super().__init__()
-        self._paths, self._settings = paths, settings
+        self._paths, self._settings, self._on_event = paths, settings, on_event
+        self._left_out = 0
         self._stamps = read_stamps(Path(settings.stamps), paths) if settings.stamps else None
         first = read_image(paths[0], settings.gray)
         self._bits = settings.bits or 8 * first.itemsize
@@ -132,19 +142,37 @@ class ImageFiles(CameraBase):
         )
 
     def __iter__(self) -> Iterator[Frame]:
-        for index, image in enumerate(self._pictures()):
-            t = self._time(index)
-            yield Frame(image, index, t, "nominal", 0, self._bits, t)
+        self._left_out = 0
+        for index, (path, read) in enumerate(self._pages()):
             if self.stopped.is_set():
                 return
+            yield self._frame(index, path, read)
+        if self._left_out > MOST_TOLD:
+            self._tell(f"{self._left_out} pictures were left out in all", self._time(index))
 
-    def _pictures(self) -> Iterator[NDArray[Any]]:
+    def _pages(self) -> Iterator[tuple[Path, Callable[[], NDArray[Any]]]]:
         for path in self._paths:
-            if self.stopped.is_set():
-                return
-            source = picture_source(path)
-            for page in range(count_pages(path)):
-                yield self._checked(read_picture_page(path, source, page), path)
+            source = cache(partial(picture_source, path))
+            for page in range(_count(path)):
+                yield path, partial(_read_page, path, source, page)
+
+    def _frame(self, index: int, path: Path, read: Callable[[], NDArray[Any]]) -> Frame:
+        t = self._time(index)
+        try:
+            image = self._checked(read(), path)
+        except PhasedicError as error:
+            self._leave_out(path, t, str(error))
+            black = frozen(np.zeros(self._shape, self._dtype))
+            return Frame(black, index, t, "nominal", 0, self._bits, t, damaged=True)
+        return Frame(image, index, t, "nominal", 0, self._bits, t)
+
+    def _leave_out(self, path: Path, t: float, why: str) -> None:
+        self._left_out += 1
+        if self._left_out <= MOST_TOLD:
+            self._tell(f"{why}; this picture is left out", t, file=path.name)
+
+    def _tell(self, text: str, t: float, **data: Any) -> None:
+        device_event(self._on_event, self.info.address, text, t=t, **data)
 
     def _time(self, index: int) -> float:
         if self._stamps is None:
@@ -185,8 +213,40 @@ class ImageFiles(CameraBase):
                 return
 
 
+def _count(path: Path) -> int:
+    """Pages; one where the file is broken: reading it says why."""
+    try:
+        return count_pages(path)
+    except PhasedicError:
+        return 1
+
+
+def _read_page(path: Path, source: Callable[[], Source], page: int) -> NDArray[Any]:
+    return read_picture_page(path, source(), page)
+
+
 def _size(shape: tuple[int, ...]) -> str:
     return f"{shape[1]}x{shape[0]}"
+
+
+def picture_times(address: Address) -> dict[str, float]:
+    """Name -> time (s) of each picture of ``files:...``, as ``open_files`` would stamp them.
+
+    Raises
+    ------
+    ConfigError
+        Two have the same name, or one has several pages.
+    DataError
+        No picture, or stamps that do not fit.
+    """
+    paths, settings = find_images(address.target), _settings(address)
+    stamps = read_stamps(Path(settings.stamps), paths) if settings.stamps else None
+    times = {path.name: stamps[k] if stamps else k / settings.fps for k, path in enumerate(paths)}
+    if len(times) < len(paths) or any(_count(path) > 1 for path in paths):
+        raise ConfigError(
+            f"{address.text}: pictures are not told apart by their names; give times in their place"
+        )
+    return times
 
 
 def open_files(address: Address, on_event: EventSink) -> ImageFiles:
@@ -197,6 +257,10 @@ def open_files(address: Address, on_event: EventSink) -> ImageFiles:
     ConfigError, DataError
         See ``acquire.camera.open_camera``.
     """
+    return ImageFiles(address.text, find_images(address.target), _settings(address), on_event)
+
+
+def _settings(address: Address) -> FileSettings:
     options = Options(address)
     gray = options.text("gray")
     if gray is not None and gray not in GRAYS:
@@ -208,4 +272,4 @@ def open_files(address: Address, on_event: EventSink) -> ImageFiles:
         stamps=options.text("stamps"),
     )
     options.done()
-    return ImageFiles(address.text, find_images(address.target), settings)
+    return settings

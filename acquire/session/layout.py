@@ -32,6 +32,9 @@ CLOCKS: tuple[Clock, ...] = ("device", "host", "nominal")
 STABLE = {None: -1, False: 0, True: 1}
 ROWS = 512  # of a chunk of a one-dimensional dataset
 
+_FIRST = ["0", ".", "."]
+"""``default_slice`` of pictures: viewers begin with the first."""
+
 FURTHEST_S = 1e12  # no clock has gone so far
 MOST_FORCE_N = 1e12
 MOST_PIXELS = 1 << 28
@@ -171,9 +174,17 @@ def create(file: h5py.File, about: SessionInfo, checksum: bool) -> None:
     say(entry["ledger"], units=NO_UNIT)
 
 
+def _add_title(group: h5py.Group, words: str) -> None:
+    """As a dataset of fixed length and UTF-8: viewers show what is marked as ASCII as bytes."""
+    data = np.array(words.encode(), h5py.string_dtype("utf-8", len(words)))
+    say(group.create_dataset("title", data=data), units=NO_UNIT)
+
+
 def _create_frames(entry: h5py.Group, camera: CameraInfo, checksum: bool) -> None:
     axes = ["time_s", ".", "."]
     frames = new_group(entry, "frames", "NXdata", signal="image", axes=axes, time_s_indices=0)
+    say(frames, default_slice=_FIRST)
+    _add_title(frames, "Frames as they were grabbed")
     new_columns(frames, FRAME_COLUMNS, checksum)
     new_images(frames, "image", (camera.height, camera.width), image_dtype(camera.bits), checksum)
     say(frames["image"], bits=camera.bits)
@@ -182,6 +193,8 @@ def _create_frames(entry: h5py.Group, camera: CameraInfo, checksum: bool) -> Non
 def _create_bursts(entry: h5py.Group, camera: CameraInfo, frames: int, checksum: bool) -> None:
     axes = ["time_s", ".", "."]
     bursts = new_group(entry, "bursts", "NXdata", signal="sum", axes=axes, time_s_indices=0)
+    say(bursts, default_slice=_FIRST)
+    _add_title(bursts, "Sums of bursts")
     new_columns(bursts, BURST_COLUMNS, checksum)
     size = (camera.height, camera.width)
     dtype = np.uint16 if (2**camera.bits - 1) * frames < 2**16 else np.uint32
@@ -198,6 +211,7 @@ def _create_bursts(entry: h5py.Group, camera: CameraInfo, frames: int, checksum:
 
 def _create_load(entry: h5py.Group, checksum: bool) -> None:
     load = new_group(entry, "load", "NXdata", signal="force", axes=["time_s"], time_s_indices=0)
+    _add_title(load, "Force")
     new_columns(load, LOAD_COLUMNS, checksum)
     say(load["flags"], flag_names=json.dumps({flag.name: flag.value for flag in LoadFlag}))
     lines = load.create_dataset("lines", (0,), "u1", maxshape=(None,), chunks=(8192,), fletcher32=checksum)

@@ -43,7 +43,7 @@ class Roi:
         return f"{self.x},{self.y},{self.width},{self.height}"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ZoiGrid:
     """A regular grid of ZOIs, left- and top-aligned in a region of interest.
 
@@ -62,6 +62,11 @@ class ZoiGrid:
     size: int
     step: int
     active: NDArray[np.bool_]
+
+    def __repr__(self) -> str:
+        rows, columns = self.active.shape
+        places = f"{self.size} px, {self.step} px apart, in x,y,w,h = {self.roi.text}"
+        return f"<ZoiGrid {rows} x {columns} ZOIs of {places}; {int(self.active.sum())} active>"
 
     @classmethod
     def cover(

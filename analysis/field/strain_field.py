@@ -23,7 +23,7 @@ from analysis.field.uncertainty import PAIR_INDEX, combination, fixed_sum, produ
 from analysis.field.windows import Window
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class StrainField:
     """One measured field on the grid of the reference; NaN where the status is not OK.
 
@@ -72,6 +72,14 @@ class StrainField:
             array = getattr(self, name)
             if array is not None:
                 array.flags.writeable = False
+
+    def __repr__(self) -> str:
+        rows, columns = self.grid.shape
+        words = f"{self.n_valid} of {self.grid.n_active} with a value"
+        refused = ", ".join(f"{n} {status.name}" for status, n in self.refused.items())
+        means = ", ".join(f"{name} {self.mean(name)[0]:+.3g}" for name in ("exx", "eyy", "exy"))
+        refused = f" ({refused})" if refused else ""
+        return f"<StrainField {rows} x {columns} ZOIs, {words}{refused}; mean {means} ({self.measure})>"
 
     @classmethod
     def from_values(

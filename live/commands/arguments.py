@@ -11,6 +11,7 @@ import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from live.commands.examples import example_of
 from live.commands.exit_codes import EXIT_CODES
 
 
@@ -27,6 +28,7 @@ COMMANDS = {
     "demo": Entry("live.commands.demo", "the same on a simulated tensile test, compared with its truth"),
     "replay": Entry("live.commands.replay", "measure a recorded session, or any folder of pictures"),
     "map": Entry("live.commands.map", "draw a map of the results over a picture, as a PNG"),
+    "show": Entry("live.commands.show", "a finished run in the view, with a slider in time"),
     "export": Entry(
         "live.commands.export", "a finished run as csv, npz, mat, vtk, tiff, png, mp4, gif, r3xa"
     ),
@@ -53,9 +55,13 @@ COMMANDS = {
     ),
     "recover": Entry("live.commands.recover", "copy what is readable of a damaged or unfinished session"),
     "warm-up": Entry("live.commands.warm_up", "compile everything ahead of the first test"),
+    "completion": Entry(
+        "live.commands.completion", "a script that completes commands and options in the shell"
+    ),
     "devices": Entry("live.commands.devices", "list cameras with their formats, and serial ports"),
 }
 
+_Plain = argparse.RawDescriptionHelpFormatter
 Command = Callable[[argparse.Namespace], int]
 
 
@@ -65,20 +71,27 @@ def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
         prog="phasedic",
         description="Live strain measurement by phase-DIC: frames, load, strain maps while the specimen is pulled.",
         epilog=EXIT_CODES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=_Plain,
     )
     parser.add_argument("--version", action="version", version=_version())
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     asked = next((word for word in argv if word in COMMANDS), "")
     for name, entry in COMMANDS.items():
         own = subparsers.add_parser(
-            name, help=entry.words, epilog=EXIT_CODES, formatter_class=argparse.RawDescriptionHelpFormatter
+            name, help=entry.words, epilog=example_of(name) + EXIT_CODES, formatter_class=_Plain
         )
         if name == asked:
             importlib.import_module(entry.module).add_arguments(own)
     arguments = parser.parse_args(argv)
     command: Command = importlib.import_module(COMMANDS[arguments.command].module).command
     return command, arguments
+
+
+def parser_of(command: str) -> argparse.ArgumentParser:
+    """A parser that knows all of one command."""
+    parser = argparse.ArgumentParser(prog=f"phasedic {command}")
+    importlib.import_module(COMMANDS[command].module).add_arguments(parser)
+    return parser
 
 
 def _version() -> str:

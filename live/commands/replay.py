@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import threading
 from pathlib import Path
+from typing import Any
 
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, overrides
@@ -19,6 +20,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin here, seconds")
     parser.add_argument("--to", dest="end_s", type=float, metavar="S", help="end here, seconds")
     parser.add_argument("--reference", metavar="FILE", help="reference picture (default: the first)")
+    words = "forces against file or time_s, as a CSV with a heading such as file,force_kN"
+    parser.add_argument("--load", dest="forces", metavar="FILE.csv", help=words)
     add_measure(parser)
 
 
@@ -33,14 +36,30 @@ def command(arguments: argparse.Namespace) -> int:
         end_s=arguments.end_s,
         reference=arguments.reference,
         config_file=Path(arguments.config) if arguments.config else None,
-        overrides=overrides(arguments),
+        overrides=_overrides(arguments),
+        forces=Path(arguments.forces) if arguments.forces else None,
     )
     screen, stopping = Screen(), threading.Event()
     with signals(stopping.set, screen.say):
         done = replay(request, screen, stopping)
     screen.say()
-    for line in [*summary_lines(done.books, done.config.specimen), *file_lines(done.folder)]:
+    summary = summary_lines(done.books, done.config.specimen)
+    for line in [*summary, *done.lines, *file_lines(done.folder)]:
         screen.say(line)
+    if done.config.output.report:
+        from live.commands.report import write_report
+
+        write_report(done.folder, screen)
     if done.exit_code in EXIT_WORDS:
         screen.say(f"exit code {done.exit_code}: {EXIT_WORDS[done.exit_code]}")
     return done.exit_code
+
+
+def _overrides(arguments: argparse.Namespace) -> dict[str, Any]:
+    """What the command line sets; where the forces come from is stored with the results."""
+    given = overrides(arguments)
+    return (
+        given
+        if arguments.forces is None
+        else {**given, "metadata.forces": str(Path(arguments.forces).absolute())}
+    )

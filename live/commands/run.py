@@ -112,5 +112,9 @@ def conclude(outcome: Outcome, screen: Screen) -> None:
     rrd = outcome.folder / "view.rrd"
     if rrd.exists():
         screen.say(f"look at it again with: {rerun_command()} {rrd}")
+    if outcome.config.output.report:
+        from live.commands.report import write_report
+
+        write_report(outcome.folder, screen)
     if outcome.exit_code in EXIT_WORDS:
         screen.say(f"exit code {outcome.exit_code}: {EXIT_WORDS[outcome.exit_code]}")

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.errors import ConfigError, DataError
+from acquire.errors import DataError
 from live.export.job import Job
 from live.export.target import new_file
-from live.finished import MEANS, Display, quantity_of
-from live.results import Strain
+from live.finished import Display
+from live.results import Strain, dataset, mean_name, quantity_of
 
 
 def write_npz(job: Job, path: Path) -> None:
@@ -63,52 +63,18 @@ def to_xarray(strain: Strain, display: Display | None = None, fields: tuple[str,
     ConfigError
         xarray is not installed.
     """
-    try:
-        import xarray
-    except ImportError:
-        raise ConfigError("this needs xarray: pip install 'phasedic[xarray]'") from None
-    shown, grid = display or Display(), strain.grid
-    maps = {
-        name: (("time", "y", "x"), shown.shown(name, strain.maps(name)), _attributes(shown, name))
-        for name in fields or strain.names
-    }
-    means = {
-        _mean_name(name): ("time", shown.shown(name, values), _attributes(shown, name))
-        for name, values in strain.values.items()
-        if name != "time_s"
-    }
-    places = {
-        "time": ("time", strain.time_s, {"units": "s"}),
-        "y": ("y", shown.y(grid), _attributes(shown, "y")),
-        "x": ("x", shown.x(grid), _attributes(shown, "x")),
-    }
-    about = {"strain_measure": strain.strain_measure, "start_time": strain.start_utc, "axes": shown.axes()}
-    return xarray.Dataset({**maps, **means}, places, about)
-
-
-def _mean_name(name: str) -> str:
-    """Means stand beside maps of the same name."""
-    plain = MEANS.get(name, name)
-    return (
-        f"mean_{plain}"
-        if quantity_of(plain.removeprefix("sigma_")).is_strain or plain in ("u", "v")
-        else plain
-    )
-
-
-def _attributes(display: Display, name: str) -> dict[str, str]:
-    return {"units": display.unit(name), "long_name": quantity_of(name).words}
+    return dataset(strain, display or Display(), fields)
 
 
 def _small(job: Job) -> dict[str, NDArray[Any]]:
     """Everything but the maps."""
     grid = job.strain.grid
     places = {"x": job.display.x(grid), "y": job.display.y(grid), "active": grid.active}
-    return {**places, **{_mean_name(name): job.column(name) for name in job.strain.values}}
+    return {**places, **{mean_name(name): job.column(name) for name in job.strain.values}}
 
 
 def _about(job: Job) -> dict[str, Any]:
-    names = {_mean_name(name): name for name in job.strain.values}
+    names = {mean_name(name): name for name in job.strain.values}
     units = {name: job.display.unit(name) or "1" for name in ("x", "y", *job.fields)}
     units |= {shown: job.display.unit(name) or "1" for shown, name in names.items()}
     words = {name: quantity_of(name).words for name in ("x", "y", *job.fields)}

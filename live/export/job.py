@@ -85,7 +85,13 @@ class Job:
 
     def column(self, name: str) -> NDArray[Any]:
         """One number an instant as it is exported, (number of rows,); a column of ``Strain.values``."""
-        return self.display.shown(name, self.strain.values[name][list(self.rows)])
+        values = self.display.shown(name, self.strain.values[name][list(self.rows)])
+        return -values if self.display.y_up and self._is_shear(name) else values
+
+    def _is_shear(self, name: str) -> bool:
+        """Whether a column is of a gauge that reads a shear, which changes its sign with the y axis."""
+        gauge = self.run.gauges.get(name.removeprefix("gauge_"))
+        return gauge is not None and gauge.described.get("value") in ("exy", "gamma_xy")
 
     def steps(self, now: Callable[[], float] = time.monotonic) -> Iterator[tuple[int, int]]:
         """(k, row) for each instant; tells how far it is once that has taken two seconds."""

@@ -52,9 +52,18 @@ def means(job: Job, file: TextIO, notes: bool = True) -> None:
 def _mean_words(job: Job, name: str) -> str:
     if name in _AVERAGED:
         return job.display.definition(name) + ", mean over the valid ZOIs"
+    if "gauge_" in name:
+        return job.display.definition(name) + _gauge_words(job, name)
     if name.startswith("sigma_"):
         return f"{job.display.definition(name)}, of that mean; the overlap of ZOIs is taken into account"
     return job.display.definition(name)
+
+
+def _gauge_words(job: Job, name: str) -> str:
+    gauge = job.run.gauges.get(name.removeprefix("gauge_"))
+    said = gauge.described if gauge is not None else {}
+    known = (f"{key} {value}" for key, value in said.items() if value is not None)
+    return f" ({', '.join(known)}; places in px, y down)" if said else ""
 
 
 def field_table(job: Job, number: int, file: TextIO) -> None:

@@ -1,13 +1,23 @@
 """A finished run, read back from its folder.
 
 ``run_folder`` ties results, recording and settings together, ``pictures`` finds the picture of a measured
-instant, ``quantities`` says what every number means, ``display`` turns numbers into the units and axes that
+instant, ``fields`` makes a strain field of its maps, ``display`` turns numbers into the units and axes that
 are asked for.
 """
 
 from live.finished.display import Display
 from live.finished.pictures import Pictures
-from live.finished.quantities import MEANS, UNITLESS, Quantity, quantity_of
-from live.finished.run_folder import RunFolder, open_run
+from live.finished.run_folder import GaugeTrack, RunFolder, open_run
+from live.results import MEANS, UNITLESS, Quantity, quantity_of
 
-__all__ = ["MEANS", "UNITLESS", "Display", "Pictures", "Quantity", "RunFolder", "open_run", "quantity_of"]
+__all__ = [
+    "MEANS",
+    "UNITLESS",
+    "Display",
+    "GaugeTrack",
+    "Pictures",
+    "Quantity",
+    "RunFolder",
+    "open_run",
+    "quantity_of",
+]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
 from analysis.field import ZoiGrid
-from live.finished.quantities import Quantity, quantity_of
+from live.results import Quantity, quantity_of
 
 
 @dataclass(frozen=True, slots=True)

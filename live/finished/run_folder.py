@@ -7,7 +7,7 @@ with open_run("runs/20261122T081747Z") as run:
 from __future__ import annotations
 
 import os
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -19,12 +19,31 @@ from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event, EventKind
 from acquire.session import Session
+from analysis.field import StrainField
+from live.finished.fields import read_field
 from live.finished.pictures import Pictures, of_images, of_session
-from live.results import Strain
+from live.results import Strain, gauge_columns
 from live.setup import SpecimenConfig, from_dict
 
 SESSION, STRAIN = "session.h5", "strain.h5"
 _AS_FILES = ("files:", "video:")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GaugeTrack:
+    """A virtual gauge over a test.
+
+    Attributes
+    ----------
+    value, sigma : (T,) float64
+        Strain and its standard uncertainty; NaN where it was lost.
+    described : mapping of str to JSON value
+        Kind and place as they were configured; empty where the file does not say.
+    """
+
+    value: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    described: dict[str, Any]
 
 
 class RunFolder(Closing):
@@ -124,6 +143,43 @@ class RunFolder(Closing):
         """The strain across the load."""
         return "eyy" if self.specimen.axis == "x" else "exx"
 
+    @cached_property
+    def gauges(self) -> dict[str, GaugeTrack]:
+        """The virtual gauges by name, in the order of the configuration."""
+        values, described = self.strain.values, self.section("gauges")
+        names = [name.removeprefix("gauge_") for name in values if f"sigma_{name}" in values]
+        names = [name for name in names if gauge_columns(name)[0] in values]
+        tracks = {}
+        for name in names:
+            value, sigma = (np.asarray(values[column], np.float64) for column in gauge_columns(name))
+            said = described.get(name)
+            tracks[name] = GaugeTrack(value, sigma, said if isinstance(said, dict) else {})
+        return tracks
+
+    @property
+    def axial_strain(self) -> NDArray[np.float64]:
+        """Strain along the load, (T,): of the gauge ``axial`` where there is one, else the mean."""
+        return self._along("axial", self.axial)
+
+    @property
+    def transverse_strain(self) -> NDArray[np.float64]:
+        """Strain across the load, (T,): of the gauge ``transverse`` where there is one, else the mean."""
+        return self._along("transverse", self.transverse)
+
+    def _along(self, gauge: str, mean: str) -> NDArray[np.float64]:
+        found = self.gauges.get(gauge)
+        return np.asarray(self.strain.values[mean], np.float64) if found is None else found.value
+
+    def field(self, row: int) -> StrainField:
+        """The strain field of one instant, as ``strain.h5`` holds it.
+
+        Raises
+        ------
+        DataError
+            There is no such instant, or it cannot be read.
+        """
+        return read_field(self.strain, row)
+
     @property
     def force(self) -> NDArray[np.float64]:
         """Force at each instant, (T,) N; NaN where it is not known."""
@@ -146,6 +202,9 @@ class RunFolder(Closing):
     def start_monotonic(self) -> float:
         """Time zero of the results on the clock of the recording's events, s."""
         return 0.0 if self.session is None else self.session.start_monotonic
+
+    def __repr__(self) -> str:
+        return f"<RunFolder {self.path}: {self.strain.n} instants>"
 
     def close(self) -> None:
         """Close the files; again without effect."""

@@ -11,7 +11,7 @@ from typing import Any
 from acquire.clock import ClockPair
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event
-from acquire.frame import Burst, CameraInfo
+from acquire.frame import Burst, CameraInfo, Frame
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from live.measure import NewReference
@@ -30,6 +30,8 @@ class ReplayRequest:
         Part of the session, in seconds since its start.
     reference : str or None
         An image file as the reference, in place of the first pictures.
+    forces : Path or None
+        A CSV with the forces (``live.replay.forces``).
     config_file : Path or None
     overrides : mapping of "section.key" to value
     """
@@ -41,9 +43,30 @@ class ReplayRequest:
     reference: str | None
     config_file: Path | None
     overrides: Mapping[str, Any]
+    forces: Path | None = None
 
 
 Work = Burst | NewReference
+
+
+class Seen:
+    """Counts the pictures that pass.
+
+    Attributes
+    ----------
+    pictures, left_out, reference : int
+        All of them; those that cannot be read or are not like the first; those of the reference.
+    """
+
+    def __init__(self) -> None:
+        self.pictures = self.left_out = self.reference = 0
+
+    def passing(self, frames: Iterable[Frame]) -> Iterator[Frame]:
+        """The same frames."""
+        for frame in frames:
+            self.pictures += 1
+            self.left_out += frame.damaged
+            yield frame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,6 +77,8 @@ class Material:
     ----------
     expected : int or None
         How many bursts there will be at most, where that is known.
+    seen : Seen or None
+        The pictures so far; None for a session, whose bursts say what was lost.
     """
 
     camera: CameraInfo
@@ -64,6 +89,7 @@ class Material:
     events: tuple[Event, ...] = ()
     samples: tuple[LoadSample, ...] = ()
     expected: int | None = None
+    seen: Seen | None = None
 
 
 def check_window(request: ReplayRequest) -> None:

@@ -13,22 +13,24 @@ from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
-from live.replay.material import Material, ReplayRequest, Window
+from live.replay.material import Material, ReplayRequest, Seen, Window
 from live.setup import Config
 
 
 def picture_material(camera: Camera, request: ReplayRequest, config: Config) -> Material:
-    frames = iter(camera)
+    seen = Seen()
+    frames = seen.passing(camera)
     if request.reference is not None:
         reference = reference_from(request.reference, camera.info)
     else:
         reference = _leading_burst(frames, config.measure.reference_burst or 1, request.source)
+        seen.reference = reference.n
     loads = LoadLog(config.load.max_gap_s, config.load.lag_s)
     loads.close()
     bursts = Window.of(request, 0.0).part(average_bursts(frames, config.measure.burst or 1))
     start = ClockPair(0.0, datetime.datetime.now(datetime.UTC))
     expected = _expected(camera.info, 0 if request.reference is not None else reference.n, config)
-    return Material(camera.info, reference, bursts, loads, start, expected=expected)
+    return Material(camera.info, reference, bursts, loads, start, expected=expected, seen=seen)
 
 
 def _expected(camera: CameraInfo, taken: int, config: Config) -> int | None:

@@ -15,12 +15,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
 
+from acquire.addresses import parse_address
+from acquire.camera import with_scheme
 from acquire.errors import ConfigError, DataError
-from acquire.events import EventKind
+from acquire.events import Event, EventKind, EventSink
 from acquire.frame import Burst
+from acquire.opencv import picture_times
 from acquire.session import Session
 from live.measure import History, averaged, kinds_of, measure, prepare
 from live.outputs import About, Outputs, make_outputs
+from live.replay.ahead import ahead
+from live.replay.forces import read_forces
 from live.replay.material import Material, ReplayRequest, Work, check_window
 from live.replay.pictures import picture_material, picture_of
 from live.replay.session import session_config, session_material, session_path
@@ -41,15 +46,28 @@ from live.setup import (
 from live.specimen import Look, is_sought, placed_on
 from live.tell import Books, Journal, Ledger, Screen
 
+_MOST_TOLD = 5  # pictures that were left out, in the summary
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Replayed:
-    """What a replay leaves behind."""
+    """What a replay leaves behind.
+
+    Attributes
+    ----------
+    folder : Path
+    books : Books
+    config : Config
+    exit_code : int
+    lines : tuple of str
+        How it went, for a person: pictures that were left out, pace, the kernel's share of the time.
+    """
 
     folder: Path
     books: Books
     config: Config
     exit_code: int
+    lines: tuple[str, ...] = ()
 
 
 def replay(request: ReplayRequest, screen: Screen, stopping: threading.Event) -> Replayed:
@@ -73,8 +91,8 @@ def replay(request: ReplayRequest, screen: Screen, stopping: threading.Event) ->
         config = session_config(session, request, overrides, path)
         if request.overrides.get("measure.roi") == AUTO and "measure.mask" not in request.overrides:
             config = replace(config, measure=replace(config.measure, mask=None))  # the one it found then
-        material = session_material(session, request, config, path)
-        return _run(material, config, request, screen, stopping)
+        material = _with_forces(session_material(session, request, config, path), request, config)
+        return _run(material, config, request, screen, stopping, Journal())
 
 
 # -- pictures -----------------------------------------------------------------------------------
@@ -90,19 +108,47 @@ def _replay_pictures(request: ReplayRequest, screen: Screen, stopping: threading
         load=replace(config.load, address="none:"),
         measure=replace(config.measure, roi=region),
     )
-    rig = open_rig(config.camera.address, "none:", crop=config.camera.crop)
+    journal = Journal()
+    rig = open_rig(config.camera.address, "none:", _in_test_time(journal), crop=config.camera.crop)
     try:
         with rig.camera as camera:
-            return _run(picture_material(camera, request, config), config, request, screen, stopping)
+            material = _with_forces(picture_material(camera, request, config), request, config)
+            return _run(material, config, request, screen, stopping, journal)
     finally:
         rig.close()
+
+
+def _with_forces(material: Material, request: ReplayRequest, config: Config) -> Material:
+    """The same with the forces of the CSV that was given."""
+    if request.forces is None:
+        return material
+    address, table = parse_address(with_scheme(request.source)), read_forces(request.forces)
+    names = picture_times(address) if table.names and address.scheme == "files" else None
+    samples = table.samples(names, material.start.monotonic)
+    return replace(
+        material, samples=tuple(samples), loads=table.log(samples, config.load.max_gap_s, config.load.lag_s)
+    )
+
+
+def _in_test_time(journal: Journal) -> EventSink:
+    """Events of a picture have its time, which is data of theirs."""
+
+    def record(event: Event) -> None:
+        journal.record(replace(event, t=float(event.data.get("t", 0.0))))
+
+    return record
 
 
 # -- the run ------------------------------------------------------------------------------------
 
 
 def _run(
-    material: Material, config: Config, request: ReplayRequest, screen: Screen, stopping: threading.Event
+    material: Material,
+    config: Config,
+    request: ReplayRequest,
+    screen: Screen,
+    stopping: threading.Event,
+    journal: Journal,
 ) -> Replayed:
     camera = material.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
@@ -118,14 +164,14 @@ def _run(
     bursts = _not_empty(material.bursts, request.source)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
     config = with_mask(config, mask, folder)
-    books = Books(Journal(), Ledger(), material.loads, History())
+    books = Books(journal, Ledger(), material.loads, History())
     screen.say(f"replaying {request.source} into {folder}")
     outputs = make_outputs(About(config, folder, camera, grid, material.start), books, screen)
-    began = time.perf_counter()
+    began, work = time.perf_counter(), ahead(bursts)
     try:
         _give_past(material, outputs)
         for m in measure(
-            bursts,
+            work,
             kernel,
             material.loads,
             noise_GL=noise_GL,
@@ -136,15 +182,46 @@ def _run(
             on_event=books.journal,
             timer=time.perf_counter,
         ):
-            books.ledger.add(measured=m.burst.n, grabbed=m.burst.n)
+            books.ledger.add(measured=m.burst.n, grabbed=m.burst.n, lost=m.burst.lost)
             outputs.frame(picture_of(m.burst))
             screen.progress(outputs.add(m), m.number + 1, material.expected, time.perf_counter() - began)
             if stopping.is_set():
                 break
+        took = time.perf_counter() - began
     finally:
+        work.close()
         outputs.end()
-    lossy = outputs.failed or not books.history.told_something
-    return Replayed(folder, books, config, 130 if stopping.is_set() else 5 if lossy else 0)
+    lines = [*_account(material, books), pace_line(books.history, took)]
+    lossy = (
+        outputs.failed or not books.history.told_something or bool(material.seen and material.seen.left_out)
+    )
+    return Replayed(folder, books, config, 130 if stopping.is_set() else 5 if lossy else 0, tuple(lines))
+
+
+def _account(material: Material, books: Books) -> list[str]:
+    """The fate of every picture, and why some were left out."""
+    seen = material.seen
+    if seen is None or not seen.left_out:
+        return []
+    why = [event.text for event in books.journal.events("warning") if event.kind is EventKind.DEVICE]
+    more = [f"... and {len(why) - _MOST_TOLD} more; the log (-v) has all"] if len(why) > _MOST_TOLD else []
+    measured = books.ledger.measured
+    words = (
+        f"{seen.pictures} pictures: reference {seen.reference}, measured {measured}, left out {seen.left_out}"
+    )
+    rest = seen.pictures - seen.reference - measured - seen.left_out
+    words += f", of no whole burst {rest}" * (rest > 0)
+    return [words, *(f"  {text}" for text in [*why[:_MOST_TOLD], *more])]
+
+
+def pace_line(history: History, seconds: float) -> str:
+    """How fast it went, and how much of the time the kernel took."""
+    n, zois = len(history.instants), sum(instant.n_zoi for instant in history.instants)
+    share = sum(instant.measure_s for instant in history.instants) / seconds
+    return (
+        f"{n} bursts in {seconds:.1f} s: {n / seconds:.3g} bursts/s, {zois / seconds:,.0f} ZOI/s, of that time"
+        f" {share:.0%} in the kernel"
+    )
 
 
 def _noise_of(reference: Burst) -> float | None:

@@ -9,7 +9,7 @@ import numpy as np
 from live.finished import RunFolder
 from live.maps import Unit, unit_for
 from live.report.evaluation import Curve as TestCurve
-from live.report.svg import Array, Curve, Figure, Mark
+from live.report.svg import COLOURS, Array, Curve, Figure, Mark
 
 _NAMES = ("exx", "eyy", "exy")
 
@@ -72,6 +72,21 @@ def means(run: RunFolder) -> Figure:
     )
     return Figure(
         "strain-time", "Mean strains", "time, s", f"strain, {e.name}", curves, x_range=time_range(run)
+    )
+
+
+def gauges(run: RunFolder) -> Figure | None:
+    """Virtual gauges against time, each in a band of one standard uncertainty; None without any."""
+    found = run.gauges
+    if not found:
+        return None
+    e = strain_unit(*(gauge.value for gauge in found.values()))
+    curves = tuple(
+        Curve(name, run.strain.time_s, gauge.value * e.factor, gauge.sigma * e.factor, k % COLOURS)
+        for k, (name, gauge) in enumerate(found.items())
+    )
+    return Figure(
+        "gauges-time", "Virtual gauges", "time, s", f"strain, {e.name}", curves, x_range=time_range(run)
     )
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.evaluate import Curve as Measured
-from analysis.evaluate import TensileFigures, evaluate_test
+from analysis.evaluate import Figure, TensileFigures, Track, evaluate_test, find_lag
 from live.finished import RunFolder
 from live.setup import from_dict
 from live.tell import options_of
@@ -27,7 +27,7 @@ class Curve:
     Attributes
     ----------
     axial, transverse : (T,) float64
-        Mean strains.
+        Strains of the gauges of these names, else mean strains.
     load : (T,) float64
         Stress, Pa, or force, N, where the section is not known; NaN where no force is known.
     is_stress : bool
@@ -47,9 +47,9 @@ class Curve:
     @classmethod
     def of(cls, run: RunFolder) -> Curve:
         """The curve of ``run``."""
-        values, stress = run.strain.values, run.stress
+        stress = run.stress
         load = run.force if stress is None else stress
-        axial, transverse = (np.asarray(values[n], np.float64) for n in (run.axial, run.transverse))
+        axial, transverse = run.axial_strain, run.transverse_strain
         specimen = from_dict({"specimen": run.section("specimen")}, {}, str(run.path)).specimen
         measured = Measured(np.asarray(run.strain.time_s, np.float64), axial, load, transverse)
         figures = evaluate_test(measured, options_of(specimen))
@@ -78,6 +78,17 @@ def _elastic(axial: Array, load: Array, figures: TensileFigures) -> NDArray[np.b
 def _intercept(axial: Array, load: Array, figures: TensileFigures) -> float:
     part = _elastic(axial, load, figures) & np.isfinite(load)
     return float(np.mean(load[part]) - figures.E.value * np.mean(axial[part])) if part.any() else math.nan
+
+
+def lag_of(run: RunFolder) -> Figure:
+    """How late the recorded load comes beside the frames, s, as the test itself tells it."""
+    samples = run.session.load_samples() if run.session is not None else []
+    if not samples:
+        return Figure.none("no readings of a load cell were recorded")
+    t = np.array([sample.t - run.start_monotonic for sample in samples])
+    force = np.array([sample.force for sample in samples])
+    strain = Track(np.asarray(run.strain.time_s, np.float64), run.axial_strain)
+    return find_lag(strain, Track(t, force))
 
 
 def instants(run: RunFolder, curve: Curve) -> dict[int, str]:

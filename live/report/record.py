@@ -1,14 +1,20 @@
-"""What was kept of a run: ledger, events, definitions, versions, hashes."""
+"""What was kept of a run: gauges, times, ledger, events, definitions, versions, hashes."""
 
 from __future__ import annotations
 
 import hashlib
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.evaluate import CONFIDENCE
 from live.finished import MEANS, RunFolder, quantity_of
+from live.maps import unit_for
+from live.report.evaluation import lag_of
 from live.report.page import Part, element, facts, joined, paragraph, table
 from live.setup import versions
-from live.tell import Screen
+from live.tell import Screen, interval, quantity
 
 _MOST_EVENTS = 3000
 _KINDS = (".h5", ".csv", ".json", ".png", ".tif")
@@ -19,6 +25,43 @@ _FIGURES = (
     ("Rp0.2", "Pa", "stress where the curve crosses the elastic line moved by 0.2 % strain"),
     ("Rm", "Pa", "highest stress: force over the undeformed section"),
 )
+
+
+def gauges(run: RunFolder) -> Part:
+    """The virtual gauges: what each is, how far it went, where it ended, and how often it was lost."""
+    rows = []
+    for name, gauge in run.gauges.items():
+        e = unit_for(_largest(gauge.value))
+        known = np.isfinite(gauge.value)
+        last = quantity(gauge.value[-1] * e.factor, gauge.sigma[-1] * e.factor, e.name).replace("+-", "±")
+        words = "; ".join(f"{key} {_plain(value)}" for key, value in gauge.described.items())
+        largest = f"{_largest(gauge.value) * e.factor:.4g} {e.name}" if known.any() else "not known"
+        rows.append((name, words or "not recorded", largest, last, int(np.count_nonzero(~known))))
+    heads = ("gauge", "what it is, px", "largest", "last ± sigma", "instants lost")
+    return table(heads, rows, (2, 3, 4)) if rows else Part("")
+
+
+def _largest(values: NDArray[np.float64]) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.abs(known).max()) if known.size else 0.0
+
+
+def _plain(value: object) -> str:
+    return ", ".join(map(_plain, value)) if isinstance(value, list | tuple) else str(value)
+
+
+def times(run: RunFolder) -> Part:
+    """How late the load came beside the frames, and the results after them."""
+    lag = lag_of(run)
+    words = interval(lag, 1e-3, "ms").replace("+-", "±") if lag.known else f"not known: {lag.why}"
+    sign = f" ({CONFIDENCE:.0%} interval; positive: the load comes late; not applied)" if lag.known else ""
+    late = np.asarray(run.strain.values.get("latency_s", ()), np.float64) * 1e3
+    late = late[np.isfinite(late)]
+    found = {"lag of the load beside the frames": words + sign}
+    if late.size:
+        p50, p95 = np.percentile(late, (50, 95))
+        found["from the last frame of a burst to its result"] = f"p50 {p50:.0f} ms, p95 {p95:.0f} ms"
+    return facts(found)
 
 
 def ledger(run: RunFolder) -> Part:

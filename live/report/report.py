@@ -24,7 +24,7 @@ from live.report.evaluation import (
 from live.report.maps import Shots, maps, shots, statuses
 from live.report.page import Part, captioned, element, facts, joined, page, paragraph, section, table, tiles
 from live.report.practice import Known, reporting_table
-from live.report.record import definitions, events, hashes, ledger, version_table
+from live.report.record import definitions, events, gauges, hashes, ledger, times, version_table
 from live.report.svg import Figure, draw
 from live.tell import Screen, interval
 
@@ -102,7 +102,7 @@ def _content(run: RunFolder, wanted: Wanted, screen: Screen) -> _Content:
 
 def _figures(run: RunFolder, curve: Curve) -> tuple[Figure, ...]:
     first = [curves.stress_strain(curve)] if curve.has_load else []
-    found = [*first, curves.force(run), curves.means(run), curves.valid(run)]
+    found = [*first, curves.force(run), curves.gauges(run), curves.means(run), curves.valid(run)]
     return tuple(figure for figure in found if figure is not None)
 
 
@@ -115,6 +115,8 @@ def _parts(content: _Content, wanted: Wanted, side: int) -> list[Part]:
         _head(run, content.curve),
         section("Specimen and rig", facts(_rig(run, taken))),
         section("Curves", plots(content.figures), _about_curves(content.curve)),
+        section("Virtual gauges", gauges(run)),
+        section("Lag and latency", times(run)),
         section("Maps", *(maps(run, name, chosen, taken, side) for name in fields)),
         section("Noise floor", *_noise_section(content)),
         section("Status of the ZOIs", statuses(run, max(chosen), taken, min(side, 480))),
@@ -162,7 +164,8 @@ def _extent(run: RunFolder, curve: Curve) -> dict[str, str]:
     found = {"ZOIs with a value, last": f"{int(values['n_valid'][-1])} of {int(values['n_zoi'][-1])}"}
     if np.isfinite(curve.axial).any():
         largest = curve.axial[np.nanargmax(np.abs(curve.axial))] * e.factor
-        found[f"largest mean {run.axial}"] = f"{largest:.4g} {e.name}"
+        name = "gauge axial" if "axial" in run.gauges else f"mean {run.axial}"
+        found[f"largest {name}"] = f"{largest:.4g} {e.name}"
     return found
 
 

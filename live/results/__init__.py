@@ -1,12 +1,27 @@
 """``strain.h5`` and ``strain.csv``: written row by row, read back by ``Strain``.
 
 ``writer`` waits for the force of a ``row`` and hands it to ``strain_h5`` and ``strain_csv``; ``info`` is
-what stands beside the numbers, ``reader`` opens the file; ``python -m live.results`` is a first reading in
+what stands beside the numbers, ``quantities`` says what every number means, ``reader`` opens the file,
+``dataset`` makes an xarray of it; ``python -m live.results`` is a first reading in
 a child process.
 """
 
+from live.results.dataset import dataset, mean_name
 from live.results.info import ResultsInfo
+from live.results.quantities import MEANS, UNITLESS, Quantity, quantity_of
 from live.results.reader import Strain
+from live.results.row import gauge_columns
 from live.results.writer import Results
 
-__all__ = ["Results", "ResultsInfo", "Strain"]
+__all__ = [
+    "MEANS",
+    "UNITLESS",
+    "Quantity",
+    "Results",
+    "ResultsInfo",
+    "Strain",
+    "dataset",
+    "gauge_columns",
+    "mean_name",
+    "quantity_of",
+]

@@ -37,6 +37,7 @@ KNOWN = {
     "true_stress_Pa",
     "force_raw_N",
 }  # columns whose type is declared where they are there
+ERRORS = "_errors"  # NeXus' second name of the uncertainty of what stands before it
 MOST_PIXELS = 65_535
 
 ROOT = {"format": Declared("text"), "format_version": Declared("int", (), 1), "start_time": Declared("text")}

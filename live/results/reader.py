@@ -36,6 +36,7 @@ from acquire.hdf5 import (
 )
 from analysis.field import ZoiGrid
 from live.results import layout
+from live.results.dataset import Stored, dataset
 from live.results.info import FORMAT, FORMAT_VERSION
 
 _log = logging.getLogger(__name__)
@@ -136,6 +137,27 @@ class Strain(Closing):
         except (OSError, RuntimeError) as error:
             raise DataError(f"{self.path}: map {name!r} cannot be read ({error}); make it again") from error
 
+    def to_xarray(self, *fields: str) -> Any:
+        """Maps and means as an ``xarray.Dataset`` with coordinates ``time`` (s), ``y`` and ``x`` (px) and units.
+
+        Parameters
+        ----------
+        *fields : str
+            Maps; all without.
+
+        Raises
+        ------
+        ConfigError
+            xarray is not installed (``pip install 'phasedic[xarray]'``).
+        DataError
+            There is no such map, or it cannot be read.
+        """
+        return dataset(self, Stored(), fields or None)
+
+    def __repr__(self) -> str:
+        rows, columns = self.grid.shape
+        return f"<Strain {self.path.name}: {self.n} instants of {rows} x {columns} ZOIs, {self.strain_measure} strain>"
+
     def close(self) -> None:
         """Close the file; again without effect."""
         self._file.close()
@@ -198,7 +220,8 @@ def _columns(mean: Any) -> dict[str, Any]:
     """All columns: those that every file has, and whatever another version has added."""
     ours = {*layout.NEEDED, *(name for name in mean if name in layout.KNOWN)}
     known = {name: layout.column_declared(name) for name in ours}
-    return open_datasets(mean, dict.fromkeys(mean, layout.ANY_COLUMN) | known)
+    there = (name for name in mean if not name.endswith(layout.ERRORS))
+    return open_datasets(mean, dict.fromkeys(there, layout.ANY_COLUMN) | known)
 
 
 def _rows(path: Path, datasets: Sequence[Any], *, whole: bool) -> int:

@@ -96,6 +96,7 @@ class StrainWriter:
             let_go(self._file)
         else:
             self._guard(self._flush)
+            self._guard(self._show_last)
             self._guard(self._file.close)
 
     def _append(self, row: Row) -> None:
@@ -110,6 +111,11 @@ class StrainWriter:
         self._file.flush()
         self._pace.done()
         self._flushed = self._values.length
+
+    def _show_last(self) -> None:
+        """Viewers begin with the last instant; a file that was never closed says the first."""
+        shown = _slice_of(max(self._values.length - 1, 0))
+        self._file["entry/strain"].attrs.modify("default_slice", shown)
 
     def _guard(self, action: Callable[[], Any]) -> Any:
         try:
@@ -156,6 +162,11 @@ def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
     return file
 
 
+def _slice_of(row: int) -> Any:
+    """Which of the maps is shown first, as NeXus says it: of fixed length, so that it can be changed in place."""
+    return np.array([str(row), ".", "."], "S12")
+
+
 def _group(parent: Any, name: str, nx_class: str, **attrs: Any) -> Any:
     group = parent.create_group(name)
     group.attrs.update(NX_class=nx_class, **attrs)
@@ -171,6 +182,8 @@ def _add_mean(entry: Any, info: ResultsInfo) -> None:
         dataset.attrs["units"] = _UNITS.get(name, "")
         if name in STRAINS:
             dataset.attrs["uncertainties"] = f"sigma_{name}"
+    for name in STRAINS:
+        mean[f"{name}{layout.ERRORS}"] = mean[f"sigma_{name}"]
     entry["strain/time_s"] = mean["time_s"]
     for name in ("force_N", "frame", "last_frame", "n_frames", "noise_GL", "lost"):
         entry[f"strain/{name}"] = mean[name]
@@ -186,6 +199,7 @@ def _add_gauges(entry: Any, info: ResultsInfo) -> None:
     for name, described in info.gauges.items():
         column, sigma = gauge_columns(name)
         group[name], group[f"sigma_{name}"] = entry["mean"][column], entry["mean"][sigma]
+        group[f"{name}{layout.ERRORS}"] = entry["mean"][sigma]
         entry["mean"][column].attrs.update(uncertainties=sigma, gauge=json.dumps(described))
 
 
@@ -196,9 +210,13 @@ def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
         grid=json.dumps(grid.to_dict()),
         frame_of_reference="fields lie on the reference picture; x right, y down, px",
         auxiliary_signals=["exx", "exy"],
+        title=f"Strain maps, {info.strain_measure} strain",
+        default_slice=_slice_of(0),
     )
     for name in layout.MAPS:
         _add_map(strain, name, grid.shape)
+    for name in layout.PLAIN_MAPS:
+        strain[f"{name}{layout.ERRORS}"] = strain[f"sigma_{name}"]
     for name, values in (("x", grid.x), ("y", grid.y)):
         strain[name] = np.asarray(values, np.float64)
         strain[name].attrs.update(units="px", long_name=f"{name} of the centre of the ZOI (px)")
@@ -218,7 +236,7 @@ def _add_map(strain: Any, name: str, shape: tuple[int, int]) -> None:
     plain = name.removeprefix("sigma_")
     unit = "px" if plain in ("u", "v") else ""
     words = _WORDS[plain] if plain == name else f"standard uncertainty of {_WORDS[plain]}"
-    dataset.attrs.update(units=unit, long_name=f"{words} ({unit})" if unit else words)
+    dataset.attrs.update(units=unit, long_name=f"{words} ({unit})" if unit else words, interpretation="image")
     if name == "status":
         dataset.attrs["meaning"] = json.dumps(_status_words())
 

@@ -338,3 +338,4 @@ class OutputConfig:
     seconds: float | None = key(
         number(0.01, 1e7), None, "end after this time", Option("seconds", "S"), optional=True
     )
+    report: bool = key(FLAG, False, "write report.html at the end", Option("report", on=True))

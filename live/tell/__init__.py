@@ -8,7 +8,7 @@ the view, ``figures`` those of a tensile test in words, ``summary`` all that is 
 from live.tell.board import AlarmBoard, Vitals
 from live.tell.books import Books
 from live.tell.card import StatusCard
-from live.tell.figures import elastic_lines, evaluate, interval, options_of, quantity
+from live.tell.figures import elastic_lines, evaluate, figure_lines, interval, options_of, quantity
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen, say
@@ -26,6 +26,7 @@ __all__ = [
     "Vitals",
     "elastic_lines",
     "evaluate",
+    "figure_lines",
     "file_lines",
     "interval",
     "options_of",

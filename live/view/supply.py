@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from live.view.exchange.messages import (
     Where,
@@ -17,6 +17,7 @@ from live.view.exchange.setup import ViewSetup
 from live.view.exchange.wire import Kind, Message
 from live.view.waiting import Past, Waiting, taken
 
+Story = Callable[[], Iterable[Message]]
 FIELD_HZ = 10.0
 MOST_BYTES_S = 60e6
 """Of fields, and of pictures; very large ones are sent less often."""
@@ -29,6 +30,8 @@ class Supply:
     ----------
     setup : ViewSetup
     waiting : Waiting
+    story : callable
+        Gives what else there is to tell, message by message and from the beginning, as fast as it is taken.
 
     Attributes
     ----------
@@ -36,8 +39,9 @@ class Supply:
         Fields and pictures.
     """
 
-    def __init__(self, setup: ViewSetup, waiting: Waiting) -> None:
+    def __init__(self, setup: ViewSetup, waiting: Waiting, story: Story = lambda: ()) -> None:
         self._setup, self._waiting, self._past = setup, waiting, Past()
+        self._story = story
         self._first: Iterator[Message] = iter(())
         self._due_t = {Kind.FIELD: -math.inf, Kind.PICTURE: -math.inf}
         self._ending = False
@@ -58,6 +62,7 @@ class Supply:
         yield events_message(list(self._past.events))
         if self._past.status is not None:
             yield Message(Kind.STATUS, {"markdown": self._past.status})
+        yield from self._story()
 
     def next(self, now: float) -> Message | None:
         """What is to be sent at ``now`` (s, monotonic); None: nothing for the moment."""

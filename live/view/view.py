@@ -19,7 +19,7 @@ from live.view.exchange.messages import Where, row_of
 from live.view.exchange.setup import ViewSetup
 from live.view.exchange.wire import Kind
 from live.view.keeper import Keeper, Tell
-from live.view.supply import Supply
+from live.view.supply import Story, Supply
 from live.view.viewer import rerun_command, url
 from live.view.waiting import Waiting
 
@@ -47,6 +47,8 @@ class View:
     serving : callable
         Called, by the view's thread, with this view once viewers can connect, and again where they
         must anew, since the process was.
+    story : callable
+        Gives messages (``live.view.exchange``) that are all shown, from the beginning, of a finished test.
     """
 
     def __init__(
@@ -57,9 +59,10 @@ class View:
         rrd: Path | None,
         tell: Tell = lambda text, level: None,
         serving: Callable[[View], None] = lambda view: None,
+        story: Story = lambda: (),
     ) -> None:
         self._setup, self._waiting = setup, Waiting()
-        self._supply = Supply(setup, self._waiting)
+        self._supply = Supply(setup, self._waiting, story)
         where = Where(port, None if rrd is None else str(rrd.absolute()), str(uuid.uuid4()))
         self._keeper = Keeper(self._supply, where, tell, lambda: serving(self))
         self._picture_t = self._load_t = -math.inf

@@ -56,7 +56,8 @@ ROOMS = {
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
     " analysis.evaluate live.signals live.channels live.measure live.operate live.pace live.recording live.setup"
     " live.tell live.outputs",
-    "live.replay": "acquire acquire.burst acquire.camera acquire.load_cell acquire.opencv acquire.session analysis"
+    "live.replay": "acquire acquire.burst acquire.camera acquire.files acquire.load_cell acquire.opencv"
+    " acquire.protocols acquire.session analysis"
     " live.measure live.setup live.specimen live.tell live.outputs",
     "live.characterise": "acquire acquire.opencv analysis analysis.field analysis.picture analysis.paper_estimator"
     " hw_mocks live.maps",
@@ -69,6 +70,8 @@ ROOMS = {
     "live.export": "acquire analysis.field live.results live.maps live.tell live.finished",
     "live.report": "acquire analysis.field analysis.evaluate analysis.picture live.results live.maps live.tell"
     " live.setup live.finished live.export",
+    "live.show": "acquire analysis analysis.field analysis.evaluate live.measure live.tell live.finished live.view"
+    " live.view.exchange",
     "live.batch": "acquire live.replay live.setup live.results",
     "live.serve": "acquire live.operate live.tell live.outputs live.measure",
 }

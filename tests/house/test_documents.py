@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -56,6 +57,14 @@ def test_the_picture_is_of_today() -> None:
     assert PICTURE.read_text(encoding="utf-8") == drawing(read_house(ROOT, PACKAGES)), (
         "the rooms or what they say of themselves have changed: python -m docs.make_architecture"
     )
+
+
+def test_the_citation_and_the_changes_are_of_this_version() -> None:
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
+    assert f"version: {version}" in citation
+    (released,) = (line.split(": ")[1] for line in citation if line.startswith("date-released: "))
+    assert f"## {version}, {released}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").splitlines()
 
 
 def test_quoted_messages_are_said() -> None:

@@ -18,6 +18,7 @@ from acquire.session import SessionInfo, SessionWriter
 from analysis.field.strain_field import StrainField
 from live.measure.measurement import Measurement
 from live.results import Results, ResultsInfo
+from live.setup import from_dict, gauges_for
 from tests.live.made_up import CAMERA, START, make_field, make_frame, make_grid, make_measurement
 
 E_PA, YIELD, HARDENING_PA, WIDTH_MM, THICKNESS_MM = 70e9, 0.003, 1e8, 10.0, 2.0
@@ -29,6 +30,12 @@ CONFIG: dict[str, Any] = {
     "measure": {"zoi": 32, "step": 16, "order": 1, "window": "gaussian"},
     "specimen": {"width_mm": WIDTH_MM, "thickness_mm": THICKNESS_MM, "axis": "y"},
 }
+
+GAUGES: dict[str, Any] = {
+    "axial": {"kind": "line", "start": [64, 20], "end": [64, 76]},
+    "shear": {"kind": "area", "box": [40, 30, 50, 40], "value": "exy"},
+}
+"""Virtual gauges for ``config``: an extensometer and a shear."""
 
 FieldOf = Callable[[int, float], StrainField]
 
@@ -83,11 +90,13 @@ def _write_results(
         {"phasedic": "0.1.0", "python": "3.11"},
         CAMERA,
         area_m2=area,
+        gauges=config.get("gauges", {}),
     )
+    gauges = gauges_for(from_dict({"gauges": config.get("gauges", {})}, {}, "made up"), make_grid())
     with Results(folder, make_grid(), info) as results:
         for k, strain in enumerate(strains):
             burst = make_measurement(k, strain).burst
-            results.add(Measurement.of(k, burst, field_of(k, strain), force_of(strain)))
+            results.add(Measurement.of(k, burst, field_of(k, strain), force_of(strain), gauges=gauges))
 
 
 def session_writer(

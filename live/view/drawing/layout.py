@@ -24,6 +24,9 @@ CURVE_WIDTH = 1.6
 
 BACKGROUND = (18, 20, 24)
 
+VALUES = "/specimen/values"
+"""Where every ZOI tells its values when it is pointed at or clicked."""
+
 
 def bar_unit(setup: ViewSetup) -> float:
     """A length that has about the same size on the screen for all shapes of picture, px."""
@@ -36,9 +39,13 @@ def blueprint(setup: ViewSetup) -> Any:
 
     return rrb.Blueprint(
         rrb.Horizontal(_pictures(setup), _right(setup), column_shares=_shares(setup)),
-        rrb.TimePanel(state="collapsed", timeline="time", play_state="following"),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline="time",
+            play_state="paused" if setup.finished else "following",
+        ),
         rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
+        rrb.SelectionPanel(state="expanded" if setup.finished else "collapsed"),
         auto_views=False,
         auto_layout=False,
     )
@@ -64,7 +71,9 @@ def _camera(setup: ViewSetup) -> Any:
 
 def _map(setup: ViewSetup, name: str) -> Any:
     return _picture_view(
-        setup, f"Strain {name}", ["/camera/picture", f"/specimen/map/{name}", f"/bar/{name}/**"]
+        setup,
+        f"Strain {name}",
+        ["/camera/picture", f"/specimen/map/{name}", f"/bar/{name}/**", *[VALUES] * setup.finished],
     )
 
 

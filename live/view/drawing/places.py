@@ -19,6 +19,9 @@ APPLICATION = "phasedic"
 SERVER_MIB = 128
 """What a viewer that comes late can still be shown; beyond, the oldest pictures and maps go."""
 
+FINISHED_MIB = 768
+"""Of a finished test everything is to be kept: whoever tells it chooses no more than that."""
+
 RRD_LIMIT_BYTES = 1e9
 _FLUSH_S = 10.0
 
@@ -47,6 +50,10 @@ class Rates:
     gather_s: float = 0.1
     limit_bytes: float = math.inf
     repeat_bytes: float = math.inf
+
+
+ALL = Rates(math.inf, math.inf)
+"""Whatever comes."""
 
 
 class Place:
@@ -131,8 +138,9 @@ def serve(setup: ViewSetup, where: Where, tell: Callable[[str], None]) -> tuple[
     if wanted and door.port != wanted:
         tell(f"port {wanted} is taken; the view is on {door.port}")
     host, port = hidden()
-    rates = Rates(setup.picture_hz, 10.0, repeat_bytes=SERVER_MIB * 2**20 / 4)
-    sink = rr.GrpcServerSink(host, port, server_memory_limit=f"{SERVER_MIB}MiB")
+    memory = FINISHED_MIB if setup.finished else SERVER_MIB
+    rates = ALL if setup.finished else Rates(setup.picture_hz, 10.0, repeat_bytes=SERVER_MIB * 2**20 / 4)
+    sink = rr.GrpcServerSink(host, port, server_memory_limit=f"{memory}MiB")
     place = _place(sink, setup, where.recording, rates, door.drawn)
     wait_for(host, port)
     door.open(host, port)
@@ -152,7 +160,7 @@ def write(setup: ViewSetup, where: Where) -> Place:
     path = Path(where.rrd or "")
     with path.open("xb"):  # rerun overwrites
         pass
-    rates = Rates(1.0, 2.0, 1.0, gather_s=5.0, limit_bytes=RRD_LIMIT_BYTES)
+    rates = ALL if setup.finished else Rates(1.0, 2.0, 1.0, gather_s=5.0, limit_bytes=RRD_LIMIT_BYTES)
     # Two streams of one name in a process would be one stream.
     return _place(rr.FileSink(str(path)), setup, f"{where.recording}-file", rates)
 

@@ -11,7 +11,7 @@ import time
 from typing import Any
 
 from live.view.drawing.guard import follow, memory_MiB
-from live.view.drawing.places import Place, serve, write
+from live.view.drawing.places import FINISHED_MIB, Place, serve, write
 from live.view.drawing.scene import Scene
 from live.view.exchange.messages import Where, events_of, field_of, picture_of, rows_of, setup_of
 from live.view.exchange.setup import ViewSetup
@@ -55,7 +55,7 @@ def main() -> int:
             return 3
         # Only now: a machine without a free core would be long in loading rerun.
         os.nice(_NICE - os.nice(0))
-        _draw(reader, Scene(places, setup), line)
+        _draw(reader, Scene(places, setup), line, MOST_MIB + FINISHED_MIB * setup.finished)
     except EOFError:
         return 1
     except Exception as error:
@@ -90,7 +90,7 @@ def _open(setup: ViewSetup, where: Where, line: Line) -> list[Place]:
     return places
 
 
-def _draw(reader: Reader, scene: Scene, line: Line) -> None:
+def _draw(reader: Reader, scene: Scene, line: Line, most_MiB: float) -> None:
     scene.begin()
     look_t = time.monotonic()
     try:
@@ -98,7 +98,7 @@ def _draw(reader: Reader, scene: Scene, line: Line) -> None:
             _show(scene, message)
             if time.monotonic() - look_t > _LOOK_S:
                 look_t = time.monotonic()
-                if (grown := memory_MiB()) > MOST_MIB:
+                if (grown := memory_MiB()) > most_MiB:
                     line.say(Kind.FULL, memory_MiB=round(grown))
                     return
         scene.end()

@@ -16,10 +16,19 @@ from acquire.events import Event, EventKind
 from live.maps import MICROSTRAIN, AutoRange, Unit, colour, number, ramp, unit_for
 from live.view.drawing.curve import MAX_POINTS
 from live.view.drawing.curve_drawing import CurveDrawing
-from live.view.drawing.layout import BAR_GAP, BAR_HEIGHT, BAR_LABEL, BAR_TOP, BAR_WIDTH, LETTER, bar_unit
+from live.view.drawing.layout import (
+    BAR_GAP,
+    BAR_HEIGHT,
+    BAR_LABEL,
+    BAR_TOP,
+    BAR_WIDTH,
+    LETTER,
+    VALUES,
+    bar_unit,
+)
 from live.view.drawing.marks import CYAN, YELLOW, encode, reduced, words
 from live.view.drawing.places import Place
-from live.view.drawing.shapes import ArrowScale, mean_motion, region_edges, sample_boxes, thinned
+from live.view.drawing.shapes import ArrowScale, mean_motion, region_edges, sample_boxes, thinned, value_dots
 from live.view.exchange.messages import Picture, Row
 from live.view.exchange.setup import STRAINS, ViewSetup
 from live.view.exchange.thinned import Thinned
@@ -105,6 +114,8 @@ class Scene:
         self._specimen(field)
         for name in STRAINS:
             self._map(field, name)
+        if self._setup.finished:
+            self._values(field)
         self._bar_labels()
         points = np.array(self._curve.items(), np.float64).reshape(-1, 2)
         self._drawn_curve.draw(points)
@@ -173,6 +184,11 @@ class Scene:
         picture = rr.EncodedImage(contents=data, media_type="image/png", draw_order=10)
         self._log_due(f"specimen/map/{name}", picture)
         self._count(data)
+
+    def _values(self, field: StrainField) -> None:
+        """A dot in each ZOI that tells its values where a person clicks."""
+        for part in value_dots(field):
+            self._log_due(VALUES, part)
 
     def _bar(self, name: str) -> None:
         import rerun as rr

@@ -1,4 +1,4 @@
-"""Where things lie on the picture: sample ZOIs, arrows, and the mean motion of the specimen.
+"""Where things lie on the picture: sample ZOIs, arrows, dots with values, and the mean motion of the specimen.
 
 Places are those of rerun, whose pixel (0, 0) covers 0..1: ours (its centre is 0) plus 0.5.
 """
@@ -6,15 +6,20 @@ Places are those of rerun, whose pixel (0, 0) covers 0..1: ours (its centre is 0
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from analysis.field import Status
+from live.maps import MICROSTRAIN
+from live.view.exchange.setup import STRAINS
 
 if TYPE_CHECKING:
     from analysis.field import StrainField, ZoiGrid
 
 Points = NDArray[np.float64]
+_DOT = (255, 255, 255, 70)
 _MOST_BOXES, _MOST_ARROWS, _MOST_POINTS = 16, 240, 2000
 
 
@@ -114,3 +119,39 @@ class ArrowScale:
 def _round_below(value: float) -> float:
     decade = 10.0 ** math.floor(math.log10(value))
     return max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1 + 1e-9)) * decade
+
+
+def value_dots(field: StrainField) -> tuple[Any, Any]:
+    """A dot a ZOI with a label in words (shown where it is pointed at), and its numbers as components."""
+    import rerun as rr
+
+    wanted = np.asarray(field.grid.active, bool)
+    numbers = {"u_px": field.u, "v_px": field.v}
+    for name in STRAINS:
+        numbers[f"{name}_um_m"] = getattr(field, name) * MICROSTRAIN.factor
+        numbers[f"sigma_{name}_um_m"] = getattr(field, f"sigma_{name}") * MICROSTRAIN.factor
+    found = {name: np.asarray(values[wanted], np.float64) for name, values in numbers.items()}
+    places, rows, columns = centres(field.grid)[wanted], *np.nonzero(wanted)
+    words = [
+        _words(row, column, status, {name: values[k] for name, values in found.items()})
+        for k, (row, column, status) in enumerate(
+            zip(rows.tolist(), columns.tolist(), field.status[wanted].tolist(), strict=True)
+        )
+    ]
+    dots = rr.Points2D(
+        places,
+        radii=rr.Radius.ui_points(1.2),
+        colors=_DOT,
+        labels=words,
+        show_labels=False,
+        draw_order=15,
+    )
+    return dots, rr.AnyValues(row=rows, column=columns, status=field.status[wanted], **found)
+
+
+def _words(row: int, column: int, status: int, of: dict[str, float]) -> str:
+    head = f"ZOI {row}, {column}"
+    if status != Status.OK:
+        return f"{head}: {Status(status).name}"
+    strains = "\n".join(f"{n} {of[f'{n}_um_m']:+.1f} ± {of[f'sigma_{n}_um_m']:.1f} µm/m" for n in STRAINS)
+    return f"{head}\nu {of['u_px']:+.4f}  v {of['v_px']:+.4f} px\n{strains}"

@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
-from analysis.field import StrainField, ZoiGrid
+from analysis.field import Measure, StrainField, ZoiGrid
 from live.measure import Measurement
 from live.view.exchange.setup import STRAINS, ViewSetup
 from live.view.exchange.wire import Kind, Message, WireError
@@ -61,7 +61,7 @@ class Picture:
 def setup_message(setup: ViewSetup, where: Where) -> Message:
     """The first message: what is shown, and where."""
     names = ("title", "width", "height", "bits", "start_monotonic", "area_m2", "axis", "strain_range")
-    meta = {name: getattr(setup, name) for name in (*names, "picture_hz")}
+    meta = {name: getattr(setup, name) for name in (*names, "picture_hz", "finished")}
     places = {"port": where.port, "rrd": where.rrd, "recording": where.recording}
     return Message(
         Kind.SETUP, {**meta, **places, "grid": setup.grid.to_dict()}, {"active": setup.grid.active}
@@ -103,7 +103,7 @@ def field_message(t: float, field: StrainField) -> Message:
         "parameters": field.parameters, "covariance": field.covariance, "status": field.status,
         "active": field.grid.active,
     }  # fmt: skip
-    return Message(Kind.FIELD, {"t": t, "grid": field.grid.to_dict()}, arrays)
+    return Message(Kind.FIELD, {"t": t, "grid": field.grid.to_dict(), "measure": field.measure}, arrays)
 
 
 def field_of(message: Message) -> tuple[float, StrainField]:
@@ -120,8 +120,9 @@ def field_of(message: Message) -> tuple[float, StrainField]:
     nothing = np.zeros(grid.shape, np.float32)
     none = np.broadcast_to(nothing, covariance.shape)
     field = StrainField(
-        grid, parameters, covariance, none, nothing, status, np.zeros(grid.shape, np.uint8), nothing
-    )
+        grid, parameters, covariance, none, nothing, status, np.zeros(grid.shape, np.uint8), nothing,
+        measure=_measure(message),
+    )  # fmt: skip
     return _number(message, "t"), field
 
 
@@ -155,6 +156,15 @@ def events_of(message: Message) -> list[Event]:
         ]
     except (KeyError, TypeError, ValueError) as error:
         raise WireError(f"events to the view are damaged: {error}") from error
+
+
+def _measure(message: Message) -> Measure:
+    said = message.meta.get("measure")
+    known: tuple[Measure, ...] = get_args(Measure)
+    for measure in known:
+        if said == measure:
+            return measure
+    raise WireError(f"a field to the view is of a measure of strain {said!r} that is not known")
 
 
 def _grid(description: Any, message: Message) -> ZoiGrid:

@@ -34,6 +34,8 @@ class ViewSetup:
         Fixed symmetric range of the maps (dimensionless); None: automatic.
     picture_hz : float, 1/s
         Pictures shown per second of the test, at most.
+    finished : bool
+        A test of the past: all that is told is shown, kept for the slider of time, and every ZOI tells its values.
     """
 
     title: str
@@ -46,3 +48,4 @@ class ViewSetup:
     axis: Literal["x", "y"] = "y"
     strain_range: float | None = None
     picture_hz: float = 5.0
+    finished: bool = False

@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DataError, PhasedicError
-from acquire.opencv.images import natural_key, read_image
+from acquire.events import Event
+from acquire.opencv import images
+from acquire.opencv.images import MOST_TOLD, natural_key, read_image
 from acquire.opencv.tiff_pages import count_pages
 
 
@@ -94,17 +96,48 @@ def test_colour_has_to_be_chosen(tmp_path: Path) -> None:
         open_camera(f"files:{path}?gray=alpha")
 
 
-def test_sizes_that_differ_name_both_files_after_what_was_well(tmp_path: Path) -> None:
-    write(tmp_path / "a0.png", picture())
+def test_a_picture_that_is_broken_or_of_another_size_is_damaged_and_told(tmp_path: Path) -> None:
+    for k in range(4):
+        write(tmp_path / f"a{k}.png", picture())
     write(tmp_path / "a1.png", picture(shape=(12, 20)))
-    frames = []
-    with (
-        open_camera(f"files:{tmp_path}/*.png") as camera,
-        pytest.raises(DataError, match=r"a1.png is 20x12 .*a0.png is 16x12"),
-    ):
-        for frame in camera:
-            frames.append(frame)  # noqa: PERF402 (those before the error count)
-    assert len(frames) == 1
+    (tmp_path / "a2.png").write_text("this is no image")
+    told: list[Event] = []
+    with open_camera(f"files:{tmp_path}/*.png?fps=2", told.append) as camera:
+        frames = list(camera)
+    assert [frame.damaged for frame in frames] == [False, True, True, False]
+    assert [(frame.index, frame.image.shape) for frame in frames] == [(k, (12, 16)) for k in range(4)]
+    assert not frames[1].image.any()
+    assert "a1.png is 20x12 uint8, but" in told[0].text
+    assert "a2.png: not an image" in told[1].text
+    assert all(event.text.endswith("this picture is left out") for event in told)
+    assert [event.data for event in told] == [{"t": 0.5, "file": "a1.png"}, {"t": 1.0, "file": "a2.png"}]
+
+
+def test_a_folder_of_rubbish_is_not_told_picture_by_picture(tmp_path: Path) -> None:
+    write(tmp_path / "a.png", picture())
+    for k in range(50):
+        (tmp_path / f"b{k}.png").write_text("no image")
+    told: list[Event] = []
+    with open_camera(f"files:{tmp_path}/*.png", told.append) as camera:
+        assert sum(frame.damaged for frame in camera) == 50
+    assert len(told) == MOST_TOLD + 1
+    assert told[-1].text == "50 pictures were left out in all"
+
+
+def test_a_page_that_is_broken_leaves_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert cv2.imwritemulti(str(tmp_path / "stack.tif"), [picture() for _ in range(3)])
+    read, sources = images.read_picture_page, []
+
+    def broken(path: Path, source: Any, page: int) -> Any:
+        sources.append(id(source))
+        if page == 1:
+            raise DataError("page 1 is broken")
+        return read(path, source, page)
+
+    with open_camera(f"files:{tmp_path}/stack.tif") as camera:
+        monkeypatch.setattr(images, "read_picture_page", broken)
+        assert [frame.damaged for frame in camera] == [False, True, False]
+    assert len(set(sources)) == 1, "the file is read once"
 
 
 def test_nothing_there(tmp_path: Path) -> None:

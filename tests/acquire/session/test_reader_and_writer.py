@@ -261,7 +261,9 @@ def test_every_dataset_has_units_and_the_plots_are_named(path: Path) -> None:
         file.visititems(look)
         assert without == []
         assert file["entry"].attrs["default"] == b"frames"
+        assert file["entry/frames"].attrs["default_slice"].tolist() == [b"0", b".", b"."]
         for group, signal in (("frames", "image"), ("load", "force")):
+            assert len(file["entry"][group]["title"][()]) > 3
             assert file["entry"][group].attrs["NX_class"] == b"NXdata"
             assert file["entry"][group].attrs["signal"] == signal.encode()
 

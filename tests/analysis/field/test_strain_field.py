@@ -161,3 +161,15 @@ def test_a_sum_has_the_same_bits_wherever_its_values_lie() -> None:
     assert found == {fixed_sum(values)}
     assert fixed_sum(values) == pytest.approx(values.sum(), rel=1e-12)
     assert fixed_sum(values[:0]) == 0.0
+
+
+def test_a_field_and_a_grid_are_told_in_one_line() -> None:
+    grid = ZoiGrid.cover(Roi(4, 8, 640, 480), size=32, step=16)
+    status = np.zeros(grid.shape)
+    status[3, :4] = Status.LOST
+    field = StrainField.from_values(grid, {"dv_dy": 1.25e-3}, status=status)
+    assert repr(field) == (
+        "<StrainField 29 x 39 ZOIs, 1127 of 1131 with a value (4 LOST);"
+        " mean exx +0, eyy +0.00125, exy +0 (small)>"
+    )
+    assert repr(grid) == "<ZoiGrid 29 x 39 ZOIs of 32 px, 16 px apart, in x,y,w,h = 4,8,640,480; 1131 active>"

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from live.cli import main
+from live.results import Strain
 
 
 def speckle(seed: int = 1, shape: tuple[int, int] = (96, 128)) -> np.ndarray:
@@ -62,15 +63,27 @@ def test_arguments(
     assert not (tmp_path / "out" / "session.h5").exists()
 
 
-def test_pictures_of_different_sizes(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
+def test_pictures_that_are_cut_off_or_of_another_size_are_left_out(
+    capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path
+) -> None:
     cv2.imwrite(str(shots / "a_3.png"), speckle(shape=(90, 128)))
-    refused(capsys, 4, "a_3.png", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")
-
-
-def test_a_truncated_picture(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
+    cv2.imwrite(str(shots / "a_4.png"), speckle())
     whole = (shots / "a_1.png").read_bytes()
     (shots / "a_1.png").write_bytes(whole[: len(whole) // 2])
-    refused(capsys, 4, "a_1.png", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")
+    out = tmp_path / "out"
+    assert main(["replay", str(shots), "--zoi", "32", "--out", str(out), "--no-view", "--no-rrd"]) == 5
+    said = capsys.readouterr().out
+    assert "5 pictures: reference 1, measured 2, left out 2" in said
+    assert "a_1.png: not an image, or cut off" in said
+    assert "a_3.png is 128x90 uint8, but" in said
+    with Strain.open(out / "strain.h5") as strain:
+        assert strain.values["frame"].tolist() == [2, 4]
+        assert strain.values["lost"].tolist() == [1, 1]
+
+
+def test_a_reference_that_is_cut_off(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
+    (shots / "a_0.png").write_bytes(b"no picture")
+    refused(capsys, 4, "a_0.png", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")
 
 
 def test_a_zoi_larger_than_the_roi(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:

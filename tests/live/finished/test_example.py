@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import runpy
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -20,3 +23,18 @@ def test_it_reads_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert (folder / "from_python" / "report.html").is_file()
     with np.load(folder / "from_python" / "strain.npz") as held:
         assert held["v"].shape[0] == len(PULLED)
+
+
+def test_the_notebook_runs_cell_by_cell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    runpy.run_module("examples.notebook", run_name="__main__")
+    said = capsys.readouterr().out
+    modulus = re.search(r"E = ([0-9.]+) GPa from 5 instants", said)
+    assert modulus is not None
+    assert float(modulus[1]) == pytest.approx(70, rel=0.01)
+    assert re.search(r"<StrainField 11 x 15 ZOIs, 165 of 165 with a value; mean exx -0.0018", said)
+    assert "<Strain strain.h5: 5 instants of 11 x 15 ZOIs, engineering strain>" in said
+    assert list(tmp_path.glob("phasedic-*/report.html"))

@@ -157,3 +157,10 @@ def test_a_part_is_cut_as_configured(shots: Path, tmp_path: Path) -> None:
     assert replay(request, Screen(quiet=True), threading.Event()).exit_code == 0
     with Strain.open(tmp_path / "out" / "strain.h5") as strain:
         assert strain.grid.x[-1] < 120
+
+
+def test_a_report_at_the_end(shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main(["replay", str(shots), *SMALL, "--report", "--out", str(out)]) == 0
+    assert str(out / "report.html") in capsys.readouterr().out
+    assert "<h2>Maps</h2>" in (out / "report.html").read_text(encoding="utf-8")

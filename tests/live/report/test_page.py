@@ -136,6 +136,18 @@ def test_files(run_dir: Path, tmp_path: Path) -> None:
         )
 
 
+def test_a_run_that_has_just_ended_gets_its_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    make_run(tmp_path / "full")
+    make_run(tmp_path / "empty", [], session=False)
+    for name in ("full", "empty", "full"):
+        command.write_report(tmp_path / name, Screen())
+    said = capsys.readouterr().out
+    assert Reader((tmp_path / "full" / "report.html").read_text(encoding="utf-8")).seen["svg"] > 3
+    assert "warning: no report was made: " in said
+    assert "holds no measurement" in said
+    assert "report.html exists already" in said, "nothing is overwritten"
+
+
 @pytest.mark.skipif(find_browser() is None, reason="no browser here")
 def test_pdf_and_png(run_dir: Path, tmp_path: Path) -> None:
     out, figures = tmp_path / "r.html", tmp_path / "figures"

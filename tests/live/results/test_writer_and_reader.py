@@ -151,11 +151,40 @@ def test_nexus_viewers_find_the_default_plot(tmp_path: Path) -> None:
         assert data.attrs["NX_class"] == "NXdata"
         signal = data[data.attrs["signal"]]
         assert [len(data[axis]) for axis in data.attrs["axes"]] == list(signal.shape)
+        assert data.attrs["title"] == "Strain maps, small strain"
+        assert data["eyy_errors"] == data["sigma_eyy"], "a link, not a copy"
+        assert entry["mean/eyy_errors"] == entry["mean/sigma_eyy"]
+        assert data.attrs["default_slice"].tolist() == [b"0", b".", b"."]
         assert len(data["force_N"]) == len(data["frame"]) == 1
         for name, item in data.items():
             assert "units" in item.attrs, name
         words = json.loads(data["status"].attrs["meaning"])
         assert words["0"].startswith("OK")
+
+
+def test_viewers_begin_with_the_last_instant_and_readers_see_each_column_once(tmp_path: Path) -> None:
+    with open_results(tmp_path) as results:
+        for k in range(12):
+            results.add(make_measurement(k))
+    with h5py.File(tmp_path / "strain.h5") as file:
+        assert file["entry/strain"].attrs["default_slice"].tolist() == [b"11", b".", b"."]
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        assert not [name for name in strain.values if name.endswith("_errors")]
+
+
+def test_what_silx_and_nexpy_make_of_it(tmp_path: Path) -> None:
+    silx, nexus = pytest.importorskip("silx.io"), pytest.importorskip("nexusformat.nexus")
+    nxdata = pytest.importorskip("silx.io.nxdata")
+    with open_results(tmp_path) as results:
+        results.add(make_measurement(0))
+    with silx.open(str(tmp_path / "strain.h5")) as file:
+        plot = nxdata.get_default(file)
+        assert plot.is_valid
+        assert not plot.issues
+        assert plot.errors is not None
+        assert (plot.title, plot.interpretation) == ("Strain maps, small strain", "image")
+    plotted = nexus.nxload(str(tmp_path / "strain.h5")).plottable_data
+    assert [axis.nxname for axis in plotted.nxaxes] == ["time_s", "y", "x"]
 
 
 def test_time_of_the_kernel_and_latency_are_columns(tmp_path: Path) -> None:

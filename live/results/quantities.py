@@ -28,7 +28,8 @@ class Quantity:
     @property
     def is_strain(self) -> bool:
         """A strain, a gradient or the uncertainty of one: what percent are made of."""
-        return self.name.removeprefix("sigma_") in _STRAINS
+        plain = self.name.removeprefix("sigma_")
+        return plain in _STRAINS or plain.startswith(_GAUGE)
 
     @property
     def turns(self) -> bool:
@@ -76,6 +77,7 @@ _INSTANTS = (
     Quantity("kernel", "s", "time that the kernel took; nan where nobody measured it"),
     Quantity("latency", "s", "from the stamp of the last frame of the burst to the result; nan in a replay"),
 )
+_GAUGE = "gauge_"
 _KNOWN = {q.name: q for q in (*_FIELDS, *_PLACES, *_INSTANTS)}
 
 MEANS = {
@@ -90,6 +92,12 @@ def quantity_of(name: str) -> Quantity:
     plain = MEANS.get(name, name)
     if plain in _KNOWN:
         return _KNOWN[plain]
+    gauge = plain.removeprefix("sigma_")
+    if gauge.startswith(_GAUGE):
+        words = f"strain of the virtual gauge {gauge.removeprefix(_GAUGE)!r}; nan where it was lost"
+        return Quantity(
+            plain, UNITLESS, words if plain == gauge else f"standard uncertainty (1 sigma) of {gauge}"
+        )
     of = _KNOWN.get(plain.removeprefix("sigma_"))
     if of is None or not plain.startswith("sigma_"):
         return Quantity(plain, UNITLESS, "see docs/strain-format.md")

@@ -1,0 +1,47 @@
+"""``phasedic show``: a finished run in the view, with a slider in time."""
+
+from __future__ import annotations
+
+import argparse
+import threading
+from pathlib import Path
+
+from acquire.errors import ConfigError
+from live.commands.run import signals
+from live.finished import open_run
+from live.show import Asked, show
+from live.tell import Screen
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic show``."""
+    parser.add_argument("run", help="folder of a run or replay, or a strain.h5")
+    parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin here, seconds")
+    parser.add_argument("--to", dest="end_s", type=float, metavar="S", help="end here, seconds")
+    words = "one instant in N (default: as many as the viewer can keep)"
+    parser.add_argument("--every", type=int, metavar="N", help=words)
+    parser.add_argument("--port", type=int, default=9876, help="of the view on 127.0.0.1 (default 9876)")
+    words = "write this file instead, for: rerun FILE.rrd"
+    parser.add_argument("--rrd", metavar="FILE.rrd", help=words)
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic show``."""
+    _check(arguments)
+    screen, enough = Screen(), threading.Event()
+    asked = Asked(arguments.start_s, arguments.end_s, arguments.every)
+    rrd = Path(arguments.rrd) if arguments.rrd else None
+    with signals(enough.set, lambda text: None), open_run(arguments.run) as run:
+        show(run, asked, screen, enough, port=arguments.port, rrd=rrd)
+    if rrd is not None:
+        screen.say(str(rrd))
+    return 0
+
+
+def _check(arguments: argparse.Namespace) -> None:
+    if arguments.every is not None and arguments.every < 1:
+        raise ConfigError(f"--every {arguments.every} is not possible; give a whole number from 1")
+    if not 1024 <= arguments.port <= 65535:
+        raise ConfigError(f"--port {arguments.port} is not possible; give 1024 to 65535")
+    if arguments.rrd and Path(arguments.rrd).exists():
+        raise ConfigError(f"{arguments.rrd} exists already and is not overwritten; give another name")

@@ -1,0 +1,166 @@
+"""What the view is told of a finished run: setup, curves, events, then picture and maps instant by instant."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import ConfigError, DataError
+from acquire.frame import Frame, frozen
+from analysis.evaluate import Curve, evaluate_test
+from live.finished import RunFolder
+from live.tell import figure_lines, options_of
+from live.view import ViewSetup
+from live.view.exchange.messages import (
+    events_message,
+    field_message,
+    picture_message,
+    rows_message,
+)
+from live.view.exchange.setup import STRAINS
+from live.view.exchange.wire import Kind, Message
+
+MOST_BYTES = 500e6
+"""Of pictures and maps, as they are drawn: the viewer keeps them all in memory."""
+
+_BYTES_PX, _BYTES_ZOI = 0.35, 250.0  # of a JPEG of speckle; of three maps and the values of a ZOI
+_LONGEST_PX = 1280  # larger pictures are drawn reduced
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Which part of the run.
+
+    Attributes
+    ----------
+    start_s, end_s : float or None, s
+        Since the start of the test.
+    every : int or None
+        One instant in so many; None: as many as the viewer can keep.
+    """
+
+    start_s: float | None = None
+    end_s: float | None = None
+    every: int | None = None
+
+
+def chosen(run: RunFolder, asked: Asked) -> tuple[int, ...]:
+    """Rows of the instants that are shown, the last of them always.
+
+    Raises
+    ------
+    ConfigError
+        None is left.
+    DataError
+        The run holds none.
+    """
+    t = run.strain.time_s
+    if not len(t):
+        raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to show")
+    low = -math.inf if asked.start_s is None else asked.start_s
+    high = math.inf if asked.end_s is None else asked.end_s
+    rows = np.flatnonzero((t >= low) & (t <= high))
+    if not len(rows):
+        raise ConfigError(
+            f"--from, --to: no measurement between {low:g} and {high:g} s; they reach from {t[0]:.6g} to {t[-1]:.6g} s"
+        )
+    every = asked.every or math.ceil(len(rows) * _bytes_each(run) / MOST_BYTES)
+    return tuple(int(row) for row in rows[::-1][::every][::-1])
+
+
+def _bytes_each(run: RunFolder) -> float:
+    width, height = size_of(run)
+    reduced = max(1, math.ceil(max(width, height) / _LONGEST_PX))
+    return _BYTES_PX * width * height / reduced**2 + _BYTES_ZOI * run.strain.grid.n_active
+
+
+def size_of(run: RunFolder) -> tuple[int, int]:
+    """Width and height of the pictures, px; without any, as far as the ZOIs reach."""
+    if run.pictures is not None:
+        return run.pictures.info.width, run.pictures.info.height
+    roi = run.strain.grid.roi
+    return 2 * roi.x + roi.width, 2 * roi.y + roi.height
+
+
+def setup_of(run: RunFolder) -> ViewSetup:
+    """What is shown, and how."""
+    width, height = size_of(run)
+    return ViewSetup(
+        title=run.title,
+        width=width,
+        height=height,
+        bits=run.pictures.info.bits if run.pictures is not None else 8,
+        grid=run.strain.grid,
+        start_monotonic=0.0,
+        area_m2=run.specimen.area_m2,
+        axis="x" if run.specimen.axis == "x" else "y",
+        finished=True,
+    )
+
+
+def story(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Message]:
+    """Everything, times in seconds since the start of the test.
+
+    Raises
+    ------
+    DataError
+        A file cannot be read.
+    """
+    yield Message(Kind.STATUS, {"markdown": _status(run)})
+    yield from _curves(run)
+    yield from _events(run)
+    pictures = iter(()) if run.pictures is None else run.pictures.each(rows)
+    since = 0
+    for row, image in zip_longest(rows, pictures):
+        t = float(run.strain.time_s[row])
+        if image is not None and run.pictures is not None:
+            yield picture_message(_frame(image, t, run.pictures.info.bits))
+        yield rows_message(Kind.POINTS, _points(run, since, row + 1))
+        since = row + 1
+        yield field_message(t, run.field(row))
+
+
+def _frame(image: NDArray[Any], t: float, bits: int) -> Frame:
+    kind = np.uint8 if bits <= 8 else np.uint16
+    whole = image if image.dtype == kind else np.rint(image).astype(kind)
+    return Frame(frozen(whole), 0, t, "nominal", 0, bits, t)
+
+
+def _curves(run: RunFolder) -> Iterator[Message]:
+    values, t = run.strain.values, np.asarray(run.strain.time_s, np.float64)
+    columns = [values[column] for name in STRAINS for column in (name, f"sigma_{name}")]
+    yield rows_message(Kind.MEANS, zip(t, *columns, strict=True))
+    loads = [(t[row], run.force[row]) for row in range(run.strain.n)]
+    if run.session is not None and (samples := run.session.load_samples()):
+        loads = [(sample.t - run.start_monotonic, sample.force) for sample in samples]
+    yield rows_message(Kind.LOADS, (row for row in loads if math.isfinite(row[1])))
+
+
+def _points(run: RunFolder, start: int, stop: int) -> list[tuple[float, float]]:
+    """Strain and N of some instants, for the curve that grows with the slider."""
+    found = zip(run.axial_strain[start:stop].tolist(), run.force[start:stop].tolist(), strict=True)
+    return [point for point in found if all(map(math.isfinite, point))]
+
+
+def _events(run: RunFolder) -> Iterator[Message]:
+    yield events_message([replace(event, t=event.t - run.start_monotonic) for event in run.events])
+
+
+def _status(run: RunFolder) -> str:
+    """The figures of the test and the gauges at its end, as Markdown."""
+    load = run.force / (run.specimen.area_m2 or 1.0)
+    curve = Curve(np.asarray(run.strain.time_s, np.float64), run.axial_strain, load, run.transverse_strain)
+    lines = figure_lines(evaluate_test(curve, options_of(run.specimen)), run.specimen)
+    lines += [
+        f"gauge **{name}** {gauge.value[-1] * 1e6:+.0f} ± {gauge.sigma[-1] * 1e6:.0f} µm/m at the end"
+        for name, gauge in run.gauges.items()
+    ]
+    values = run.strain.values
+    head = f"**{run.title}**, {run.strain.n} instants, {values['n_valid'][-1]} of {values['n_zoi'][-1]} ZOIs at the end"
+    return "\n\n".join([head, *(line.strip().replace("+-", "±") for line in lines)])
