@@ -10,7 +10,7 @@ from analysis.field.motion import Motion
 from analysis.field.status import Status
 from analysis.field.strain_field import StrainField
 from analysis.field.tensor import Measure, StrainTensor
-from analysis.field.uncertainty import PAIR_INDEX, VALUES
+from analysis.field.uncertainty import PAIR_INDEX, VALUES, combination, products, variance_of_sum
 from analysis.field.windows import WINDOWS, Window, profile
 
 __all__ = [
@@ -25,5 +25,8 @@ __all__ = [
     "StrainTensor",
     "Window",
     "ZoiGrid",
+    "combination",
+    "products",
     "profile",
+    "variance_of_sum",
 ]

@@ -19,7 +19,7 @@ from analysis.field.grid import ZoiGrid
 from analysis.field.motion import Motion
 from analysis.field.status import Status
 from analysis.field.tensor import Floats, Measure, StrainTensor, elongations, half_logarithm
-from analysis.field.uncertainty import PAIR_INDEX, combination, fixed_sum, products, variance_of_sum
+from analysis.field.uncertainty import PAIR_INDEX, Sums, combination, fixed_sum, products, variance_of_sum
 from analysis.field.windows import Window
 
 
@@ -51,6 +51,8 @@ class StrainField:
         For the start in the next frame.
     measure : "small", "engineering", "green" or "hencky"
         What ``exx``, ``eyy``, ``exy`` and their means are; the uncertainties are those of the small strains.
+    sums : Sums, optional
+        Makes the uncertainty of means right where neighbours nearly cancel (gradients on dense grids).
     """
 
     grid: ZoiGrid
@@ -65,6 +67,7 @@ class StrainField:
     window: Window = "gaussian"
     motion: Motion | None = None
     measure: Measure = "small"
+    sums: Sums | None = None
 
     def __post_init__(self) -> None:
         for name in ("parameters", "covariance", "covariance_reference", "residual", "status",
@@ -217,7 +220,14 @@ class StrainField:
         value = fixed_sum(self.value(name)[chosen]) / count
         # A ZOI without predicted noise (sigma NaN) leaves the mean without a sigma, not without a value.
         variance = variance_of_sum(np.where(chosen, self.sigma(name), 0.0), name, self.grid, self.window)
-        return value, float(np.sqrt(max(variance, 0.0)) / count)
+        return value, float(np.sqrt(max(variance, 0.0)) / count) * self._more(name, where)
+
+    def _more(self, name: str, where: ArrayLike | None) -> float:
+        """What the pattern of the ZOIs makes of the noise of a mean, over what their overlap says."""
+        if self.sums is None:
+            return 1.0
+        gauge = self.grid.active if where is None else self.grid.active & np.asarray(where, bool)
+        return self.sums.factor(name, gauge)
 
     def strain(self, measure: Measure = "small") -> StrainTensor:
         """The strain of a measure: "small", "engineering" (elongations), "green" (Green-Lagrange) or "hencky".

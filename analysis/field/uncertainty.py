@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.field.grid import ZoiGrid
 from analysis.field.tensor import Floats
@@ -51,6 +53,14 @@ def combination(name: str) -> Mapping[int, float]:
     if name not in _COMBINATIONS:
         raise ValueError(f"unknown value {name!r}; known: {', '.join(VALUES)}")
     return _COMBINATIONS[name]
+
+
+class Sums(Protocol):
+    """Who knows more of the noise of means than the overlap of windows says."""
+
+    def factor(self, name: str, where: NDArray[np.bool_]) -> float:
+        """Standard deviation of the mean of ``name`` over a gauge (R, C), over that of ``variance_of_sum``."""
+        ...
 
 
 @lru_cache(maxsize=len(VALUES))

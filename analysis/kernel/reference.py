@@ -6,7 +6,7 @@ The first is made by ``Reference.first``, one that goes on from a later picture 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,9 @@ from analysis.kernel.prepared import PatternError, Prepared, prepare_reference
 from analysis.kernel.quadrature import Sensors, make_sensors
 from analysis.kernel.settings import KernelSettings
 from analysis.picture import Box
+
+if TYPE_CHECKING:
+    from analysis.fit.sums import MeanNoise
 
 Floats = NDArray[np.float64]
 Image = NDArray[np.float32]
@@ -66,6 +69,8 @@ class Reference:
         Smallest of u and v, smallest of the gradients, largest of u and v, for a noise of 1 GL.
     share_variance : (A, 2) float64, px^2
         Of u and v if nothing else were sought, for a noise of 1 GL.
+    sums : MeanNoise or None
+        Of the sensor form.
     """
 
     grid: ZoiGrid
@@ -82,6 +87,7 @@ class Reference:
     unit_covariance: NDArray[np.float32]
     unit_sigma: Floats
     share_variance: Floats
+    sums: MeanNoise | None
 
     @classmethod
     def first(
@@ -209,6 +215,7 @@ def _laid_out(
     sharpness = float((line.sum() / (line @ line)) ** 2)
     index = np.flatnonzero(grid.active)
     lengths, slopes = (np.sqrt(np.maximum(prepared.covariance[:, k].astype(np.float64), 0)) for k in _AFFINE)
+    unit_covariance = np.ascontiguousarray(_spread(prepared.covariance, index, grid.shape, 0))
     return Reference(
         grid=grid,
         settings=settings,
@@ -221,10 +228,26 @@ def _laid_out(
         placement=placement,
         spacing=_spacing(prepared.origins, grid.step),
         sharpness=sharpness,
-        unit_covariance=np.ascontiguousarray(_spread(prepared.covariance, index, grid.shape, 0)),
+        unit_covariance=unit_covariance,
         unit_sigma=np.stack([lengths.min(1), slopes.min(1), lengths.max(1)]),
         share_variance=1 / np.maximum(prepared.weight * sharpness * prepared.energy, 1e-12),
+        sums=None if sensors is not None else _sums(grid, settings, index, prepared, unit_covariance),
     )
+
+
+def _sums(
+    grid: ZoiGrid,
+    settings: KernelSettings,
+    index: NDArray[np.intp],
+    prepared: Prepared,
+    unit_covariance: NDArray[np.float32],
+) -> MeanNoise:
+    from analysis.fit.sums import MeanNoise
+
+    return MeanNoise(
+        grid, settings.window, settings.order, prepared.status == Status.OK, index, prepared.origins,
+        prepared.images, prepared.inverse, unit_covariance,
+    )  # fmt: skip
 
 
 def _spacing(origins: NDArray[np.int64], step: int) -> int:

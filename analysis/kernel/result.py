@@ -62,6 +62,7 @@ def field_of(attempt: Attempt, expected: Expected | None = None) -> StrainField:
         noise=_noise_found(attempt, ok, noise.current),
         window=reference.settings.window,
         motion=None if expected is None else _motion(attempt, values, expected),
+        sums=reference.sums,
     )
 
 

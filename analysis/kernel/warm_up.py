@@ -32,13 +32,13 @@ PICTURE_KINDS = ("uint8", "uint16", "float32")
 def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) -> bool:
     """Whether numba's cache lacks a loop that pictures of these kinds (and the estimator by phases) need."""
     from analysis.compiled.loops import is_cached
-    from analysis.fit import assembly, clipping, iteration, sensitivity, verdict
+    from analysis.fit import assembly, clipping, iteration, sensitivity, sums, verdict
     from analysis.follow import alpha_beta, climb
     from analysis.picture import prefilter
 
     loops = [
         sensitivity.prepare, iteration.track, climb.climb, alpha_beta.advance, verdict.judge,
-        assembly.weigh, assembly.scale, clipping.shares,
+        assembly.weigh, assembly.scale, clipping.shares, sums.scatter,
     ]  # fmt: skip
     loops += [iteration.warp_zois, iteration.compose_all, iteration.within_image] * phase
     return not (all(map(is_cached, loops)) and all(is_cached(prefilter.coefficients, kind) for kind in kinds))
@@ -84,6 +84,7 @@ def _everything(kinds: Sequence[str], phase: bool) -> None:
     for settings in [*ways, *([KernelSettings(estimator="phase")] * phase)]:
         kernel = PhaseKernel(image, grid, settings, NoiseModel(0.1, 1.0), clipped)
         field = kernel.measure(image, clipped=clipped)
+        field.mean("exx")
         kernel.measure(image, start=field)
     for kind in kinds:
         kernel.measure(image.astype(kind), start=field)
@@ -154,6 +155,8 @@ def _rest() -> None:
     image, grid = _small()
     kernel = PhaseKernel(image, grid)
     kernel.reference.searched(image)
+    if kernel.reference.sums is not None:
+        kernel.reference.sums.factor("exx", grid.active)
     line = profile("gaussian", 32)
     clipped_share(np.zeros((32, 32), np.bool_), np.zeros((1, 2), np.int64), line)
     none, pairs, single = np.empty(0), np.empty((0, 2)), np.empty(0, np.float32)

@@ -1,0 +1,144 @@
+"""What noise makes of a mean over ZOIs, from the ZOIs as they are.
+
+Each value is a sum over the pixels of its ZOI: a row of (J' w J)^-1 times J' w. A mean over ZOIs is therefore one
+such sum over the picture, and the noise of the mean is the root of the sum of its squares. For gradients neighbours
+nearly cancel within a gauge, and what is left is decided by how the pattern differs from ZOI to ZOI, which no
+overlap of windows knows: on dense grids the mean scatters up to 1.5 times as much as those say.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.compiled.loops import helper
+from analysis.field import Window, ZoiGrid, combination, profile, variance_of_sum
+from analysis.fit.sensitivity import columns, parameter_scale
+
+Floats = NDArray[np.float64]
+
+CHANNELS, MONOMIALS = 4, ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+"""f_x, f_y, f and 1, each times 1, x, y, x^2, xy, y^2."""
+MOST_KEPT = 64
+"""Gauges whose factors are remembered."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MeanNoise:
+    """How far the noise of means over ZOIs of one reference exceeds what the overlap of windows says.
+
+    Attributes
+    ----------
+    grid : ZoiGrid
+    window : str
+    order : 1 or 2
+    able : (A,) bool
+        Which of the active ZOIs can be measured.
+    index : (A,)
+        Flat places of the active ZOIs on the grid.
+    origins : (A, 2) int64
+        First row and column of each.
+    images : (>= 3, H, W) float32
+        f_x, f_y and f of the filtered reference.
+    inverse : (>= A, P, P) float32
+        (J' w J)^-1 of each ZOI.
+    unit_covariance : (21, R, C) float32
+    """
+
+    grid: ZoiGrid
+    window: Window
+    order: int
+    able: NDArray[np.bool_]
+    index: NDArray[np.intp]
+    origins: NDArray[np.int64]
+    images: NDArray[np.float32]
+    inverse: NDArray[np.float32]
+    unit_covariance: NDArray[np.float32]
+    _known: dict[tuple[str, bytes], float] = field(default_factory=dict, repr=False)
+
+    def factor(self, name: str, where: NDArray[np.bool_]) -> float:
+        """Standard deviation of the mean of ``name`` over a gauge (R, C), over that of overlapping windows.
+
+        Of all its ZOIs that can be measured: for one that is lost the gauge is not asked again. 1 where nothing
+        can be said.
+        """
+        key = name, np.packbits(where).tobytes()
+        if key not in self._known:
+            if len(self._known) >= MOST_KEPT:
+                self._known.clear()
+            self._known[key] = self._factor(name, where)
+        return self._known[key]
+
+    def _factor(self, name: str, where: NDArray[np.bool_]) -> float:
+        which = np.flatnonzero(self.able & where.ravel()[self.index])
+        if len(which) < 2:
+            return 1.0
+        chosen = np.zeros(self.grid.shape)
+        chosen.ravel()[self.index[which]] = 1
+        sigma = np.sqrt(np.maximum(unit_variance(name, self.unit_covariance), 0)) * chosen
+        expected = variance_of_sum(sigma, name, self.grid, self.window)
+        made = self._variance(name, which)
+        return math.sqrt(made / expected) if expected > 0 and math.isfinite(made) else 1.0
+
+    def _variance(self, name: str, which: NDArray[np.intp]) -> float:
+        """Variance of the sum over the ZOIs ``which`` for noise of 1 GL."""
+        size, origins = self.grid.size, np.ascontiguousarray(self.origins[which])
+        corner = origins.min(axis=0)
+        out = np.zeros(origins.max(axis=0) - corner + size)
+        line = profile(self.window, size)
+        along = (np.arange(size) - (size - 1) / 2) / (size / 2)
+        pitch, samples = self.images.shape[2], self.images[0].size
+        flat = self.images.reshape(-1)
+        scatter(flat, samples, pitch, origins, self._weights(name, which), line, along, corner, out)
+        return float(np.cumsum(np.cumsum(out**2, axis=1)[:, -1])[-1])
+
+    def _weights(self, name: str, which: NDArray[np.intp]) -> Floats:
+        """The row of the inverse that makes ``name``, by channel and monomial, (B, 4, 6)."""
+        half = self.inverse.shape[1] // 2 - 3
+        units = parameter_scale(self.order, self.grid.size)
+        row = np.zeros((len(which), self.inverse.shape[1]))
+        for parameter, share in combination(name).items():
+            at = parameter % 3 + (half if parameter > 2 else 0)
+            row += share * units[at] * self.inverse[which, at]
+        out = np.zeros((len(which), CHANNELS, len(MONOMIALS)))
+        for j, (channel, x, y) in enumerate(columns(self.order)):
+            out[:, channel, MONOMIALS.index((int(x), int(y)))] = row[:, j]
+        return out
+
+
+def unit_variance(name: str, covariance: NDArray[np.float32]) -> Floats:
+    """Variance of a value from the 21 covariances, (R, C)."""
+    from analysis.field import products
+
+    return np.asarray(sum(share * covariance[pair].astype(np.float64) for pair, share in products(name)))
+
+
+@helper
+def scatter(
+    images: Any, samples: int, pitch: int, origins: Any, weights: Any, line: Any, along: Any, corner: Any, out: Any
+) -> None:  # fmt: skip
+    """Add what each ZOI takes of each pixel to ``out``, whose first pixel is ``corner`` (row, column)."""
+    size = len(line)
+    for z in range(len(origins)):
+        a = weights[z]
+        for y in range(size):
+            eta = along[y]
+            top, left = origins[z, 0] + y, origins[z, 1]
+            at = top * pitch + left
+            to = out[top - corner[0], left - corner[1] : left - corner[1] + size]
+            x0 = a[0, 0] + eta * (a[0, 2] + eta * a[0, 5])
+            x1 = a[0, 1] + eta * a[0, 4]
+            y0 = a[1, 0] + eta * (a[1, 2] + eta * a[1, 5])
+            y1 = a[1, 1] + eta * a[1, 4]
+            f0 = a[2, 0] + eta * a[2, 2]
+            d0 = a[3, 0] + eta * a[3, 2]
+            for x in range(size):
+                xi = along[x]
+                value = images[at + x] * (x0 + xi * (x1 + xi * a[0, 3]))
+                value += images[samples + at + x] * (y0 + xi * (y1 + xi * a[1, 3]))
+                value += images[2 * samples + at + x] * (f0 + xi * a[2, 1])
+                to[x] += line[y] * line[x] * (value + d0 + xi * a[3, 1])
