@@ -25,6 +25,13 @@ BENDING_CHANCE = 5.0
 BENDING_SHARE = 0.15
 """... beyond the squares of a limit in px and of this share of the displacement that the strain makes in
 the ZOI, which a crack exceeds."""
+EMPTY_SHARES, EMPTY_SIGMA = (0.1, 0.4), 0.05
+"""A fit that leaves between these shares of what the noise should leave, where u or v is more uncertain than this
+(px), had nothing to fit: a dark or blurred background with hardly noise and hardly pattern. One that leaves still
+less has the same picture before it."""
+MANY_STEPS, SLOW_SIGMA = 8, 0.065
+"""A fit that took so many steps, where u or v is more uncertain than this (px), has been led along an edge of the
+specimen or through clutter (seen on a polymer bar and an open hole; a pattern takes one to five)."""
 LEAST_GAIN, MOST_GAIN = 0.2, 5.0
 PATTERN_OVER_NOISE = 3.0
 """Gradient energy of a ZOI over that of filtered noise alone; less is no pattern."""

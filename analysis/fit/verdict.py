@@ -17,16 +17,21 @@ from analysis.fit.validity import (
     BENDING_CHANCE,
     BENDING_SHARE,
     CHANCE,
+    EMPTY_SHARES,
+    EMPTY_SIGMA,
     LEAST_GAIN,
     LOST_SHARE,
+    MANY_STEPS,
     MODEL_SHARE,
     MOST_GAIN,
     NOISE_FACTOR,
+    SLOW_SIGMA,
     UNKNOWN_NOISE_FACTOR,
 )
 
 OK, OUTSIDE, LOST, UNEVEN = int(Status.OK), int(Status.OUTSIDE), int(Status.LOST), int(Status.UNEVEN)
 NOT_CONVERGED, POOR_MATCH = int(Status.NOT_CONVERGED), int(Status.POOR_MATCH)
+NO_PATTERN = int(Status.NO_PATTERN)
 
 
 @parallel
@@ -54,8 +59,10 @@ def judge(found: Out, left: Any, expected: Any, known: Known, rule: Rule, out: A
             out[z] = OUTSIDE
         elif not left[z] <= allowed + LOST_SHARE * pattern:
             out[z] = LOST
-        elif found.state[z] != CONVERGED:
+        elif found.state[z] != CONVERGED or _slow(found, z, known, expected[z]):
             out[z] = NOT_CONVERGED
+        elif _is_empty(left[z] / expected[z]) and _sigma(known, z, expected[z]) > EMPTY_SIGMA:
+            out[z] = NO_PATTERN
         elif not (LEAST_GAIN < gain < MOST_GAIN and left[z] <= allowed + MODEL_SHARE * pattern):
             out[z] = POOR_MATCH
         else:
@@ -63,6 +70,23 @@ def judge(found: Out, left: Any, expected: Any, known: Known, rule: Rule, out: A
             stretch = stretch_of(found.p, z, rule.lever)
             of_u, of_v = variance * known.unit[z, 0], variance * known.unit[z, 1]
             out[z] = UNEVEN if _bends(found.bending[z], of_u, of_v, rule.noise, stretch, rule.limit) else OK
+
+
+@helper
+def _sigma(known: Any, z: int, variance: Any) -> Any:
+    """Uncertainty of the worse of u and v of ZOI ``z`` if nothing else were sought, px."""
+    return math.sqrt(max(known.unit[z, 0], known.unit[z, 1]) * variance)
+
+
+@helper
+def _is_empty(left: Any) -> bool:
+    return EMPTY_SHARES[0] < left < EMPTY_SHARES[1]
+
+
+@helper
+def _slow(found: Any, z: int, known: Any, variance: Any) -> Any:
+    """Whether a weak pattern was followed in so many small steps that it may have been led away."""
+    return found.iterations[z] >= MANY_STEPS and _sigma(known, z, variance) > SLOW_SIGMA
 
 
 @helper
