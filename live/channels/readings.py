@@ -76,7 +76,8 @@ class Readings:
         """The slope of the least-squares line through the last second, three points or more."""
         if math.isnan(axial):
             return math.nan
-        self._course.append((t, axial))
+        if not self._course or t > self._course[-1][0]:
+            self._course.append((t, axial))
         while len(self._course) > 3 and self._course[0][0] < t - RATE_S:
             self._course.popleft()
         if len(self._course) < 3:

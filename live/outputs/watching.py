@@ -6,14 +6,16 @@ from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
+from live.channels import Readings
 from live.measure import History, Instant, Measurement
 from live.outputs.consumer import Consumer
-from live.tell import Ledger, StatusCard
-from live.view import Thinned, View
+from live.tell import Books, Ledger, StatusCard
+from live.view import Figures, Thinned, View
 
 CLOSE_S = 10.0
 """For drawing what waits and closing the file at the end of a test."""
 
+IDLE_S = 0.5
 CARD_INSTANTS = 2000
 """The figures of the card are of so many instants at most, evenly thinned; those of the summary of all."""
 
@@ -73,3 +75,41 @@ class CardWriter(Consumer):
             history = History()
             history.instants += self._instants.items()
             self._view.status(self._card.written(history, self._ledger))
+
+
+class FiguresWriter(Consumer):
+    """Shows the large figures of the view, with the newest load, alarms and state."""
+
+    name = "figures"
+
+    def __init__(self, view: View, readings: Readings, books: Books) -> None:
+        self._view, self._readings, self._books = view, readings, books
+        self._last: Measurement | None = None
+
+    def measurement(self, measurement: Measurement) -> None:
+        """Show the newest."""
+        self._last = measurement
+        self._show(measurement, measurement.t)
+
+    def idle(self) -> float:
+        """Show what has changed meanwhile."""
+        if self._last is not None and self._books.vitals.state:
+            now = max(self._last.t, self._books.vitals.frame_t)
+            self._show(self._last, now)
+        return IDLE_S
+
+    def _show(self, measurement: Measurement, t: float) -> None:
+        read, i = self._readings.read(measurement), measurement.instant
+        self._view.figures(
+            Figures(
+                t=t,
+                state=self._books.vitals.state or "REPLAY",
+                axial=read["axial"],
+                sigma=read["sigma_axial"],
+                force_N=read["force_N"],
+                stress_MPa=read["stress_MPa"],
+                valid=i.n_valid,
+                zois=i.n_zoi,
+                alarms=self._books.alarms.texts,
+            )
+        )

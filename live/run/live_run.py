@@ -146,6 +146,7 @@ class LiveRun:
             stack.enter_context(self._rig.load)
             self._stop.then(self._rig.camera.stop)
             waits = "" if self._recording.on or not self._setting.config.record.enabled else _ARMED
+            self._books.vitals.state = self.state
             self._books.journal.tell(EventKind.START, "phasedic", f"the test begins{waits}")
             self._load.start()
             self.grabber.start()
@@ -205,6 +206,7 @@ class LiveRun:
     def _show(self, instant: Instant | None, words: str = "") -> None:
         """Renew the status line; called with every measurement."""
         self._last = instant
+        self._books.vitals.state = self.state
         if self._screen.is_due:
             self._screen.standing(self._standing(words))
 

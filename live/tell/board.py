@@ -17,11 +17,14 @@ class Vitals:
         When the last frame and the last load sample came, monotonic; NaN before the first.
     disk_s : float, s
         Until the disk is full; infinite where nothing is written.
+    state : str
+        What a live run does with its frames; empty in a replay.
     """
 
     frame_t: float = math.nan
     load_t: float = math.nan
     disk_s: float = math.inf
+    state: str = ""
 
     def channels(self, now: float) -> dict[str, float]:
         """The channels of the machine (``live.channels``) at ``now``, monotonic s."""
