@@ -143,3 +143,24 @@ def test_large_pictures_are_reduced_to_eight_bits(bits: int) -> None:
     small, factor = reduced(image, bits, 200)
     assert (factor, small.shape, small.dtype) == (3, (100, 166), np.uint8)
     assert (small[0, 0], small[0, -1]) == (0, 255)
+
+
+def views_of(part: object) -> list[str]:
+    """The names of all views of a layout."""
+    inside = getattr(part, "contents", None)
+    named = [str(part.name)] if type(part).__name__.endswith("View") else []  # type: ignore[attr-defined]
+    return (
+        named + [name for one in inside if not isinstance(one, str) for name in views_of(one)]
+        if isinstance(inside, list | tuple)
+        else named
+    )
+
+
+@pytest.mark.parametrize(
+    ("more", "not_there"),
+    [({}, set()), ({"with_load": False}, {"Load, N", "Load – strain"}), ({"finished": True}, {"Now"})],
+)
+def test_nothing_empty_takes_room(more: dict[str, Any], not_there: set[str]) -> None:
+    shown = set(views_of(blueprint(make_setup(**more)).root_container))
+    everything = {"Now", "Camera", "eyy", "status", "Load, N", "Load – strain", "Status", "Events"}
+    assert everything - not_there <= shown and not not_there & shown
