@@ -73,7 +73,7 @@ def make_outputs(about: About, books: Books, screen: Screen, more: Sequence[Cons
     if view is not None:
         card = StatusCard(config.specimen, books.loads)
         figures = FiguresWriter(view, _readings(about, books), books)
-        consumers += [CardWriter(view, card, books.ledger), figures, Watching(view)]
+        consumers += [CardWriter(view, card, books.ledger), figures, Watching(view, books.journal.names)]
     return Outputs([*consumers, *more], books.loads, books.journal, books.history)
 
 

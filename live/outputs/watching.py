@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import replace
+
 from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Frame
@@ -26,8 +29,8 @@ class Watching(Consumer):
     name = "view"
     blocks = False
 
-    def __init__(self, view: View) -> None:
-        self._view = view
+    def __init__(self, view: View, names: Mapping[str, str]) -> None:
+        self._view, self._names = view, names
 
     def frame(self, frame: Frame) -> None:
         """Offer a frame; a few a second are taken."""
@@ -48,8 +51,8 @@ class Watching(Consumer):
         self._view.load(sample.t, sample.force)
 
     def event(self, event: Event) -> None:
-        """Offer an event."""
-        self._view.event(event)
+        """Offer an event, a device by its name."""
+        self._view.event(replace(event, source=self._names.get(event.source, event.source)))
 
     def end(self) -> str:
         """Let it draw what waits, and close it."""
