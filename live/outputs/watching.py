@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -92,27 +93,31 @@ class FiguresWriter(Consumer):
     def measurement(self, measurement: Measurement) -> None:
         """Show the newest."""
         self._last = measurement
-        self._show(measurement, measurement.t)
+        self._show(measurement.t)
+
+    def event(self, event: Event) -> None:
+        """Wake up: the first one comes before the first frame."""
 
     def idle(self) -> float:
-        """Show what has changed meanwhile."""
-        if self._last is not None and self._books.vitals.state:
-            now = max(self._last.t, self._books.vitals.frame_t)
-            self._show(self._last, now)
+        """Show what has changed meanwhile, also before anything is measured."""
+        vitals = self._books.vitals
+        if vitals.state and not math.isnan(vitals.frame_t):
+            self._show(vitals.frame_t)
         return IDLE_S
 
-    def _show(self, measurement: Measurement, t: float) -> None:
-        read, i = self._readings.read(measurement), measurement.instant
+    def _show(self, t: float) -> None:
+        i = None if self._last is None else self._last.instant
+        read = self._readings.read(self._last) if self._last else self._readings.load()
         self._view.figures(
             Figures(
                 t=t,
                 state=self._books.vitals.state or "REPLAY",
-                axial=read["axial"],
-                sigma=read["sigma_axial"],
+                axial=read.get("axial", math.nan),
+                sigma=read.get("sigma_axial", math.nan),
                 force_N=read["force_N"],
                 stress_MPa=read["stress_MPa"],
-                valid=i.n_valid,
-                zois=i.n_zoi,
+                valid=0 if i is None else i.n_valid,
+                zois=0 if i is None else i.n_zoi,
                 alarms=self._books.alarms.texts,
             )
         )

@@ -25,6 +25,9 @@ CURVE_WIDTH = 1.6
 
 _TITLES = {"e1": "e1 (largest)", "e2": "e2 (smallest)"}
 
+_WIDE = 2.2
+"""Pictures wider than that many heights stand one above the other."""
+
 ROWS = [2.4, 5.6, 3.8]
 """Shares of the height: the large figures, the pictures, plots and words."""
 
@@ -79,8 +82,12 @@ def _middle(setup: ViewSetup) -> Any:
 
     axial = "eyy" if setup.axis == "y" else "exx"
     maps = rrb.Tabs(*(_map(setup, name) for name in MAPS), active_tab=MAPS.index(axial))
-    views = [_camera(setup), maps, *([_curve(setup)] if setup.with_load else [])]
-    return rrb.Horizontal(*views)
+    curve = [_curve(setup)] if setup.with_load else []
+    if setup.width > _WIDE * setup.height:
+        return rrb.Horizontal(
+            rrb.Vertical(_camera(setup), maps), *curve, column_shares=[5, 3][: 1 + len(curve)]
+        )
+    return rrb.Horizontal(_camera(setup), maps, *curve)
 
 
 def _below(setup: ViewSetup) -> Any:

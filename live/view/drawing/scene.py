@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.events import Event, EventKind
+from analysis.field import Status
 from live.maps import MICROSTRAIN, number, ramp
 from live.view.drawing.curve import MAX_POINTS
 from live.view.drawing.curve_drawing import CurveDrawing
@@ -26,7 +27,7 @@ from live.view.drawing.layout import (
     VALUES,
     bar_unit,
 )
-from live.view.drawing.marks import CYAN, YELLOW, encode, reduced, words
+from live.view.drawing.marks import CYAN, DIM, YELLOW, encode, reduced, words
 from live.view.drawing.places import Place
 from live.view.drawing.shapes import ArrowScale, mean_motion, region_edges, sample_boxes, thinned, value_dots
 from live.view.exchange.figures import Figures
@@ -187,11 +188,13 @@ class Scene:
         self._log_due(
             "zoi/words", words([[0.5 * self._setup.width, -0.08 * bar_unit(self._setup)]], [text], CYAN)
         )
-        lost = thinned(field.grid, np.isnan(field.exx) & field.grid.active)
-        self._log_due(
-            "specimen/zoi/rejected",
-            rr.Points2D(lost, colors=RED, radii=rr.Radius.ui_points(1.5), draw_order=25),
-        )
+        plain = field.status == Status.NO_PATTERN  # background, where nothing is to be lost
+        for name, wanted, colour in (("plain", plain, DIM), ("rejected", ~plain & np.isnan(field.exx), RED)):
+            dots = thinned(field.grid, wanted & field.grid.active)
+            self._log_due(
+                f"specimen/zoi/{name}",
+                rr.Points2D(dots, colors=colour, radii=rr.Radius.ui_points(1.5), draw_order=25),
+            )
 
     def _draw_maps(self, field: StrainField, names: tuple[str, ...]) -> None:
         import rerun as rr

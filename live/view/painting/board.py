@@ -63,6 +63,8 @@ def _known(value: float, form: str) -> str:
 def _line(f: Figures) -> str:
     if f.alarms:
         return "ALARM  " + "   ".join(f.alarms)
+    if not f.zois:
+        return "nothing measured yet"
     lost = f.zois - f.valid
     return f"{f.valid} of {f.zois} ZOIs" + (f", {lost} LOST" if lost else "")
 
