@@ -111,6 +111,13 @@ def test_alarms_that_cannot_be(tmp_path: Path, text: str, says: str) -> None:
         load_config(path, {})
 
 
+def test_a_gauge_that_is_still_to_be_placed_may_be_watched() -> None:
+    alarm = [{"channel": "gauge_area", "above": 0.01}]
+    assert load_config(None, {"alarm": alarm, "measure.gauges": "auto"}).alarm[0].channel == "gauge_area"
+    with pytest.raises(ConfigError, match="unknown channel"):
+        load_config(None, {"alarm": alarm})
+
+
 def test_alarms_come_back_from_a_file_as_they_were() -> None:
     alarms = [{"channel": "force_N", "above": 1.0}, {"channel": "axial", "below": 0.0, "end": True}]
     config = load_config(None, {"alarm": alarms})
