@@ -124,7 +124,7 @@ def test_alarms_come_back_from_a_file_as_they_were() -> None:
     assert from_dict(json.loads(json.dumps(config.as_dict())), {}, "a file") == config
 
 
-REAL = "sim:uniform?seconds=4&fps=20&width=224&height=192&bits=12"
+REAL = "sim:uniform?seconds=4&fps=20&buffers=64&width=224&height=192&bits=12"
 
 
 def test_from_the_stamp_of_the_frame_to_the_action_within_two_measurement_periods(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ from tests.live.lines.test_server import Caller
 from tests.live.signals.test_strain_out import Listener, free_port, read
 from tests.live.test_end_to_end import live_run
 
-CAMERA = "sim:uniform?seconds=6&fps=30&width=224&height=192&bits=12&hold=1.5"
+CAMERA = "sim:uniform?seconds=6&fps=30&buffers=64&width=224&height=192&bits=12&hold=1.5"
 GAUGES = {
     "axial": {"kind": "line", "start": [112, 40], "end": [112, 150]},
     "across": {"kind": "transverse", "box": [40, 60, 140, 70]},
