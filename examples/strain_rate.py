@@ -102,7 +102,7 @@ def control(rate: float, until: float) -> None:
 def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> Outcome:
     """A run with the controller beside it."""
     settings = {
-        "camera.address": f"sim:uniform?seconds=60&fps=40&width=224&height=192&machine={MACHINE}",
+        "camera.address": f"sim:uniform?seconds=60&fps=40&buffers=64&width=224&height=192&machine={MACHINE}",
         "load.address": "sim:",
         "measure.burst": 2,
         "measure.zoi": 48,

@@ -44,15 +44,13 @@ class Readings:
         """All channels by name; NaN where one is not known."""
         i = measurement.instant
         axial, sigma = self._axial(i)
-        force = self._force(i)
         values = {
             "time_s": i.t - self._start,
             "frame": measurement.burst.first_index,
             "axial": axial,
             "sigma_axial": sigma,
             "strain_rate": self._rate(i.t, axial),
-            "force_N": force,
-            "stress_MPa": force / self._area_m2 * 1e-6 if self._area_m2 else math.nan,
+            **self.load(i.force),
             "lost_share": 1 - i.n_valid / max(i.n_zoi, 1),
         }
         values |= {
@@ -68,15 +66,21 @@ class Readings:
             return gauge.value, gauge.sigma
         return getattr(i, self._mean), getattr(i, f"sigma_{self._mean}")
 
-    def _force(self, i: Instant) -> float:
+    def load(self, without: float = math.nan) -> dict[str, float]:
+        """Force and stress of the newest sample; where there is none, of the force ``without`` (N)."""
         sample = self._latest()
-        return i.force if sample is None else sample.force
+        force = without if sample is None else sample.force
+        return {
+            "force_N": force,
+            "stress_MPa": force / self._area_m2 * 1e-6 if self._area_m2 else math.nan,
+        }
 
     def _rate(self, t: float, axial: float) -> float:
         """The slope of the least-squares line through the last second, three points or more."""
         if math.isnan(axial):
             return math.nan
-        self._course.append((t, axial))
+        if not self._course or t > self._course[-1][0]:
+            self._course.append((t, axial))
         while len(self._course) > 3 and self._course[0][0] < t - RATE_S:
             self._course.popleft()
         if len(self._course) < 3:

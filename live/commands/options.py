@@ -17,7 +17,7 @@ MEASURE = (
     "roi", "mask", "zoi", "step", "gauges", "scale", "burst", "reference-burst", "window", "estimator", "strain",
     "order", "bending", "noise",
 )  # fmt: skip
-OUTPUT = ("out", "no-view", "no-rrd", "axis", "standard", "zero", "lag", "report")
+OUTPUT = ("out", "no-view", "no-rrd", "light", "axis", "standard", "zero", "lag", "report")
 
 
 def add_options(parser: argparse.ArgumentParser, title: str, *names: str) -> None:

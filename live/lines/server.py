@@ -6,6 +6,7 @@ import logging
 import selectors
 import socket
 import threading
+import time
 from collections.abc import Callable
 
 from live.lines.client import Client
@@ -13,6 +14,7 @@ from live.lines.client import Client
 log = logging.getLogger(__name__)
 
 MOST_CLIENTS = 32
+_PAUSE_S = 0.05
 
 
 class LineServer:
@@ -89,7 +91,8 @@ class LineServer:
     def _accept(self, selector: selectors.BaseSelector) -> None:
         try:
             connection, (host, port, *_) = self._listening.accept()
-        except OSError:
+        except OSError:  # gone again, or no handle is left: then it would be tried without a pause
+            time.sleep(_PAUSE_S)
             return
         if len(self._clients) >= MOST_CLIENTS:
             connection.close()

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any, cast
 from acquire.clock import ClockPair
 from acquire.events import EventKind, Level
 from acquire.frame import CameraInfo
+from live.channels import Readings
 from live.outputs.consumer import Consumer
 from live.outputs.files import Files
 from live.outputs.outputs import Outputs
-from live.outputs.watching import CardWriter, Watching
+from live.outputs.watching import CardWriter, FiguresWriter, Watching
 from live.results import Results, ResultsInfo
-from live.setup import Config, describe, versions
+from live.setup import Config, describe, outlines, versions
 from live.tell import Books, Screen, StatusCard
 from live.view import View, ViewSetup, spawn_viewer
 
@@ -71,7 +72,8 @@ def make_outputs(about: About, books: Books, screen: Screen, more: Sequence[Cons
     view = _view(about, books, screen)
     if view is not None:
         card = StatusCard(config.specimen, books.loads)
-        consumers += [CardWriter(view, card, books.ledger), Watching(view)]
+        figures = FiguresWriter(view, _readings(about, books), books)
+        consumers += [CardWriter(view, card, books.ledger), figures, Watching(view, books.journal.names)]
     return Outputs([*consumers, *more], books.loads, books.journal, books.history)
 
 
@@ -89,6 +91,11 @@ def _view(about: About, books: Books, screen: Screen) -> View | None:
         area_m2=about.config.specimen.area_m2,
         axis="x" if about.config.specimen.axis == "x" else "y",
         strain_range=v.strain_range,
+        with_load=about.config.load.address != "none:",
+        outlines=outlines(about.config.gauges),
+        light=v.light,
+        picture_hz=1.0 if v.light else 5.0,
+        scale="automatic" if v.scale == "automatic" else "symmetric",
     )
     rrd = about.folder / "view.rrd" if v.rrd else None
 
@@ -99,6 +106,17 @@ def _view(about: About, books: Books, screen: Screen) -> View | None:
         _announce(view, v.spawn, screen)
 
     return View(setup, port=v.port if v.enabled else None, rrd=rrd, tell=tell, serving=serving)
+
+
+def _readings(about: About, books: Books) -> Readings:
+    """With the newest load while the test runs; in a replay with that of the measurement."""
+    specimen, loads, vitals = about.config.specimen, books.loads, books.vitals
+    return Readings(
+        about.start.monotonic,
+        specimen.axis,
+        specimen.area_m2,
+        lambda: loads.latest if vitals.state else None,
+    )
 
 
 def _announce(view: View, spawn: bool, screen: Screen) -> None:

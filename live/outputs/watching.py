@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
 from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
+from live.channels import Readings
 from live.measure import History, Instant, Measurement
 from live.outputs.consumer import Consumer
-from live.tell import Ledger, StatusCard
-from live.view import Thinned, View
+from live.tell import Books, Ledger, StatusCard
+from live.view import Figures, Thinned, View
 
 CLOSE_S = 10.0
 """For drawing what waits and closing the file at the end of a test."""
 
+IDLE_S = 0.5
 CARD_INSTANTS = 2000
 """The figures of the card are of so many instants at most, evenly thinned; those of the summary of all."""
 
@@ -24,8 +30,8 @@ class Watching(Consumer):
     name = "view"
     blocks = False
 
-    def __init__(self, view: View) -> None:
-        self._view = view
+    def __init__(self, view: View, names: Mapping[str, str]) -> None:
+        self._view, self._names = view, names
 
     def frame(self, frame: Frame) -> None:
         """Offer a frame; a few a second are taken."""
@@ -46,8 +52,8 @@ class Watching(Consumer):
         self._view.load(sample.t, sample.force)
 
     def event(self, event: Event) -> None:
-        """Offer an event."""
-        self._view.event(event)
+        """Offer an event, a device by its name."""
+        self._view.event(replace(event, source=self._names.get(event.source, event.source)))
 
     def end(self) -> str:
         """Let it draw what waits, and close it."""
@@ -73,3 +79,45 @@ class CardWriter(Consumer):
             history = History()
             history.instants += self._instants.items()
             self._view.status(self._card.written(history, self._ledger))
+
+
+class FiguresWriter(Consumer):
+    """Shows the large figures of the view, with the newest load, alarms and state."""
+
+    name = "figures"
+
+    def __init__(self, view: View, readings: Readings, books: Books) -> None:
+        self._view, self._readings, self._books = view, readings, books
+        self._last: Measurement | None = None
+
+    def measurement(self, measurement: Measurement) -> None:
+        """Show the newest."""
+        self._last = measurement
+        self._show(measurement.t)
+
+    def event(self, event: Event) -> None:
+        """Wake up: the first one comes before the first frame."""
+
+    def idle(self) -> float:
+        """Show what has changed meanwhile, also before anything is measured."""
+        vitals = self._books.vitals
+        if vitals.state and not math.isnan(vitals.frame_t):
+            self._show(vitals.frame_t)
+        return IDLE_S
+
+    def _show(self, t: float) -> None:
+        i = None if self._last is None else self._last.instant
+        read = self._readings.read(self._last) if self._last else self._readings.load()
+        self._view.figures(
+            Figures(
+                t=t,
+                state=self._books.vitals.state or "REPLAY",
+                axial=read.get("axial", math.nan),
+                sigma=read.get("sigma_axial", math.nan),
+                force_N=read["force_N"],
+                stress_MPa=read["stress_MPa"],
+                valid=0 if i is None else i.n_valid,
+                zois=0 if i is None else i.n_zoi,
+                alarms=self._books.alarms.texts,
+            )
+        )

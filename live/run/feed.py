@@ -11,6 +11,7 @@ from live.run.grabber import Grabber
 from live.tell import Ledger
 
 POLL_S = 0.2
+TAKING = "taking the reference"
 
 
 class Feed:
@@ -54,7 +55,7 @@ class Feed:
                 self._skip(burst)
             if reference is not None or ended:
                 return reference
-            self._idle("taking the reference")
+            self._idle(TAKING)
 
     def another_reference(self) -> Reference | None:
         """Have a reference taken from the next frames, and wait for it."""

@@ -20,7 +20,7 @@ from live.measure import Instant
 from live.operate import OrderRefused
 from live.outputs import About, Consumer, Outputs, make_outputs
 from live.pace import Pace
-from live.run.feed import Feed
+from live.run.feed import TAKING, Feed
 from live.run.grabber import Grabber, GrabPlan
 from live.run.load_thread import LoadThread, tare_orders
 from live.run.measuring import Measuring
@@ -34,6 +34,7 @@ from live.tell import Books, Screen, Standing
 
 _ARMED = "; nothing is recorded until start is ordered"
 _SILENT_S = 1.0
+_HINT_AFTER = 3  # times the frames of a reference
 _GRACE_S = 5.0  # a timed run without frames ends this much later
 INTERRUPTED = "interrupted"
 """The reason that makes exit code 130."""
@@ -71,7 +72,7 @@ class LiveRun:
         plan = GrabPlan.of(setting.config, setting.bursts)
         self.grabber = Grabber(self._rig.camera, plan, books, self._take, self._averaged)
         self._last: Instant | None = None
-        self._began = time.monotonic()
+        self._began, self._hinted = time.monotonic(), False
         self._has_recorded = recording.on
         self._feed = Feed(self.grabber, books.ledger, self._idle)
         self._load = LoadThread(self._rig.load, books, outputs, recording)
@@ -146,6 +147,7 @@ class LiveRun:
             stack.enter_context(self._rig.load)
             self._stop.then(self._rig.camera.stop)
             waits = "" if self._recording.on or not self._setting.config.record.enabled else _ARMED
+            self._books.vitals.state = self.state
             self._books.journal.tell(EventKind.START, "phasedic", f"the test begins{waits}")
             self._load.start()
             self.grabber.start()
@@ -199,12 +201,27 @@ class LiveRun:
         if words or self.paused:
             silent = self._last is None or not time.monotonic() - self._books.vitals.frame_t < _SILENT_S
             self._show(self._last, words if silent else "")
+        if words == TAKING:
+            self._hint_once()
         if time.monotonic() > self._deadline and not self._stop.asked:
             self.stop("the time is over")
+
+    def _hint_once(self) -> None:
+        """A reference needs frames in a row: where they are lost again and again, say what helps."""
+        n, ledger = self._setting.bursts[0], self._books.ledger
+        if self._hinted or self._last is not None or not ledger.lost or ledger.grabbed < _HINT_AFTER * n:
+            return
+        self._hinted = True
+        text = (
+            f"no {n} frames in a row for the reference, {ledger.lost} were lost: lower the rate of the camera, or take"
+            " --reference-burst smaller"
+        )
+        self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "warning")
 
     def _show(self, instant: Instant | None, words: str = "") -> None:
         """Renew the status line; called with every measurement."""
         self._last = instant
+        self._books.vitals.state = self.state
         if self._screen.is_due:
             self._screen.standing(self._standing(words))
 
@@ -221,6 +238,7 @@ class LiveRun:
             instant=self._last,
             p95_s=self._pace.p95_s,
             disk_s=books.vitals.disk_s if self.recording else math.inf,
+            peak_N=books.vitals.peak_N,
             alarms=books.alarms.texts,
             words=words,
         )

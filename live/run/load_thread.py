@@ -54,7 +54,7 @@ class LoadThread:
         try:
             for sample in self._cell:
                 self._books.loads.append(sample)
-                self._books.vitals.load_t = time.monotonic()
+                self._books.vitals.loaded(time.monotonic(), sample.force)
                 self._books.ledger.add(load_samples=1)
                 self._recording.sample(sample)
                 self._outputs.load(sample)

@@ -10,7 +10,7 @@ from live.setup.checks import ALL, AUTO, GIVEN
 from live.setup.compiling import compile_ahead
 from live.setup.config import Config, from_dict, load_config, options, settings_in
 from live.setup.folder import FILES, make_folder, versions
-from live.setup.gauges import GaugeConfig, describe, gauges_for
+from live.setup.gauges import GaugeConfig, describe, gauges_for, outlines
 from live.setup.grid import grid_for, kernel_settings, whole_picture
 from live.setup.pictures import correction, read_mask, with_flat_field, with_mask
 from live.setup.rig import Rig, open_load, open_rig
@@ -42,6 +42,7 @@ __all__ = [
     "open_load",
     "open_rig",
     "options",
+    "outlines",
     "read_mask",
     "settings_in",
     "versions",

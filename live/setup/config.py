@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 from acquire.errors import ConfigError, DataError
 from acquire.files import read_bytes
 from live.channels import channel_names
-from live.setup.checks import Option, Refused, in_px
+from live.setup.checks import AUTO, Option, Refused, in_px
 from live.setup.gauges import NAME, GaugeConfig
 from live.setup.sections import (
     AlarmConfig,
@@ -63,6 +63,9 @@ class Config:
         plain = dataclasses.asdict(self)
         return plain | {"alarm": {str(n): alarm for n, alarm in enumerate(plain["alarm"], 1)}}
 
+
+AUTO_GAUGES = ("axial", "transverse", "area")
+"""Those that are placed on the specimen once it is found (``live.specimen.placing``)."""
 
 _SECTIONS: dict[str, type] = {
     f.name: f.default_factory  # type: ignore[misc]
@@ -223,8 +226,9 @@ def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
 
 
 def _check_channels(config: Config, where: str) -> None:
-    measured = channel_names(config.gauges)
-    known = channel_names(config.gauges, machine=True)
+    placed = AUTO_GAUGES if config.measure.gauges == AUTO else ()
+    gauges = dict.fromkeys((*config.gauges, *placed))
+    measured, known = channel_names(gauges), channel_names(gauges, machine=True)
     asked = [("strain_out", channel, measured) for channel in config.strain_out.channels or ()]
     asked += [(f"alarm {number}", alarm.channel, known) for number, alarm in enumerate(config.alarm, 1)]
     for whose, channel, names in asked:

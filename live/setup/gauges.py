@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, cast
 
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
     from analysis import ZoiGrid
     from analysis.evaluate import Gauge
     from live.setup.config import Config
+
+Point = tuple[float, float]
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 """A gauge's name stands in the columns of files."""
@@ -104,3 +107,24 @@ def _check_place(gauge: Gauge, grid: ZoiGrid) -> None:
         f"gauges.{gauge.name}: no ZOI is there; the centres of ZOIs reach from {grid.x[0]:g}, {grid.y[0]:g} to"
         f" {grid.x[-1]:g}, {grid.y[-1]:g} px, and a mask may leave some out"
     )
+
+
+def outlines(gauges: Mapping[str, GaugeConfig]) -> dict[str, tuple[Point, ...]]:
+    """Where gauges lie, as lines to be drawn, px: an extensometer, the outline of an area, a cross on a ZOI."""
+    drawn = {name: _outline(gauge) for name, gauge in gauges.items()}
+    return {name: points for name, points in drawn.items() if points}
+
+
+def _outline(gauge: GaugeConfig) -> tuple[Point, ...]:
+    if gauge.start is not None and gauge.end is not None:
+        return gauge.start, gauge.end
+    if gauge.at is not None:
+        (x, y), r = gauge.at, 8.0
+        return (x - r, y), (x + r, y), (x, y), (x, y - r), (x, y + r)
+    if gauge.corners is not None:
+        return (*gauge.corners, gauge.corners[0])
+    if gauge.box is not None:
+        x0, y0, width, height = gauge.box
+        x1, y1 = x0 + width, y0 + height
+        return (x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)
+    return ()

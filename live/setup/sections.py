@@ -273,7 +273,16 @@ class ViewConfig:
     port: int = key(integer(1024, 65535), 9876, "port of the view on 127.0.0.1; the next free one is taken")
     spawn: bool = key(FLAG, True, "open the viewer when there is a display")
     strain_range: float | None = key(
-        number(1e-7, 10), None, "fixed symmetric range of the strain maps; automatic without", optional=True
+        number(1e-7, 10),
+        None,
+        "fixed symmetric range of the strain maps; follows the data without",
+        optional=True,
+    )
+    scale: str = key(
+        choice("symmetric", "automatic"), "symmetric", "colours about zero, or over the values there are"
+    )
+    light: bool = key(
+        FLAG, False, "for slow links: a small picture and the maps once a second", Option("light", on=True)
     )
 
 

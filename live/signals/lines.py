@@ -33,8 +33,8 @@ class Lines:
         """The line, without its end; what is not known is null in JSON and nan in CSV."""
         values = self._readings.read(measurement)
         if not self._json:
-            return ",".join(_number(values[channel]) for channel in self._channels)
-        told = {channel: _rounded(values[channel]) for channel in self._channels}
+            return ",".join(_number(values.get(channel, math.nan)) for channel in self._channels)
+        told = {channel: _rounded(values.get(channel, math.nan)) for channel in self._channels}
         return json.dumps(told, separators=(",", ":"))
 
 

@@ -17,11 +17,23 @@ class Vitals:
         When the last frame and the last load sample came, monotonic; NaN before the first.
     disk_s : float, s
         Until the disk is full; infinite where nothing is written.
+    peak_N : float, N
+        The largest force so far; NaN before the first.
+    state : str
+        What a live run does with its frames; empty in a replay.
     """
 
     frame_t: float = math.nan
     load_t: float = math.nan
     disk_s: float = math.inf
+    peak_N: float = math.nan
+    state: str = ""
+
+    def loaded(self, t: float, force_N: float) -> None:
+        """A load sample came at ``t`` (s, monotonic)."""
+        self.load_t = t
+        if not self.peak_N >= force_N and not math.isnan(force_N):
+            self.peak_N = force_N
 
     def channels(self, now: float) -> dict[str, float]:
         """The channels of the machine (``live.channels``) at ``now``, monotonic s."""

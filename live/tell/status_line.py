@@ -37,6 +37,8 @@ class Standing:
         Latency; NaN where it is not known.
     disk_s : float, s
         Until the disk is full.
+    peak_N : float, N
+        The largest force so far.
     alarms : sequence of str
         Words of those that are on.
     words : str
@@ -52,6 +54,7 @@ class Standing:
     instant: Instant | None = None
     p95_s: float = math.nan
     disk_s: float = math.inf
+    peak_N: float = math.nan
     alarms: Sequence[str] = ()
     words: str = ""
 
@@ -72,14 +75,9 @@ def fitted(parts: Sequence[Part], width: int) -> str:
 def _test(s: Standing) -> list[Part]:
     alarm = " ".join(f"ALARM {text}" for text in s.alarms)
     stress = f"{s.force_N / s.area_m2 * 1e-6:.1f} MPa" if s.area_m2 and not math.isnan(s.force_N) else ""
-    return [
-        (1, alarm),
-        (2, s.state),
-        (7, duration(s.elapsed_s)),
-        (0, force(s.force_N)),
-        (4, stress),
-        (3, s.words),
-    ]
+    peak = "" if math.isnan(s.peak_N) else f"peak {force(s.peak_N)}"
+    load = [(0, force(s.force_N)), (4, stress), (12, peak)]
+    return [(1, alarm), (2, s.state), (7, duration(s.elapsed_s)), *load, (3, s.words)]
 
 
 def _strain(i: Instant | None) -> list[Part]:

@@ -5,9 +5,10 @@
 there alone. ``viewer`` finds rerun's program.
 """
 
+from live.view.exchange.figures import Figures
 from live.view.exchange.setup import ViewSetup
 from live.view.exchange.thinned import Thinned
 from live.view.view import View
 from live.view.viewer import rerun_command, spawn_viewer
 
-__all__ = ["Thinned", "View", "ViewSetup", "rerun_command", "spawn_viewer"]
+__all__ = ["Figures", "Thinned", "View", "ViewSetup", "rerun_command", "spawn_viewer"]

@@ -83,6 +83,9 @@ class Supply:
         if waiting.status is not None:
             past.status, waiting.status = waiting.status, None
             return Message(Kind.STATUS, {"markdown": past.status})
+        if waiting.figures is not None:
+            figures, waiting.figures = waiting.figures, None
+            return Message(Kind.FIGURES, figures.as_meta())
         return None
 
     def _large(self, now: float) -> Message | None:

@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from live.view.exchange.figures import Figures
 from live.view.exchange.messages import Where, row_of
 from live.view.exchange.setup import ViewSetup
 from live.view.exchange.wire import Kind
@@ -83,7 +84,10 @@ class View:
 
     def settled(self, measurement: Measurement) -> None:
         """Offer a point of the curve: a measurement whose force is final."""
-        strain = measurement.instant.eyy if self._setup.axis == "y" else measurement.instant.exx
+        i = measurement.instant
+        strain = i.eyy if self._setup.axis == "y" else i.exx
+        if (gauge := i.gauges.get("axial")) is not None:
+            strain = gauge.value
         if math.isfinite(strain) and math.isfinite(measurement.force):
             self._waiting.row(Kind.POINTS, (strain, measurement.force))
 
@@ -100,6 +104,10 @@ class View:
     def status(self, text_markdown: str) -> None:
         """Set the status card."""
         self._waiting.status = text_markdown
+
+    def figures(self, figures: Figures) -> None:
+        """Set the large figures."""
+        self._waiting.figures = figures
 
     def close(self, seconds: float) -> None:
         """Draw what waits, finish the file and end; a process that takes longer is killed, and it is told."""

@@ -47,10 +47,11 @@ ROOMS = {
     "live.recording": "acquire live.operate live.tell",
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",
-    "live.view.drawing": "acquire analysis.field live.maps live.view.exchange",
+    "live.view.painting": "acquire analysis.field live.maps live.view.exchange",
+    "live.view.drawing": "acquire analysis.field live.maps live.view.exchange live.view.painting",
     "live.view": "acquire analysis.field live.measure live.pace live.view.exchange",
-    "live.outputs": "acquire acquire.load_cell analysis live.measure live.pace live.setup live.tell live.results"
-    " live.view",
+    "live.outputs": "acquire acquire.load_cell analysis live.channels live.measure live.pace live.setup live.tell"
+    " live.results live.view",
     "live.signals": "acquire acquire.serial_line live.channels live.lines live.measure live.outputs live.setup"
     " live.tell",
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"

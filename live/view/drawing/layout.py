@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from live.view.exchange.setup import STRAINS, ViewSetup
+from live.view.exchange.setup import MAPS, ViewSetup
+from live.view.painting import HEIGHT, WIDTH
 
 BAR_GAP, BAR_WIDTH, BAR_LABEL, BAR_ROOM = 0.03, 0.035, 0.16, 0.275
 """Colour bar, right of the picture: its left edge, width, middle and right end of its labels.
@@ -21,6 +22,14 @@ LETTER = 0.028
 
 CURVE_WIDTH = 1.6
 """Width of the curve's rectangle; its height is 1."""
+
+_TITLES = {"e1": "e1 (largest)", "e2": "e2 (smallest)"}
+
+_WIDE = 2.2
+"""Pictures wider than that many heights stand one above the other."""
+
+ROWS = [2.4, 5.6, 3.8]
+"""Shares of the height: the large figures, the pictures, plots and words."""
 
 BACKGROUND = (18, 20, 24)
 
@@ -38,7 +47,9 @@ def blueprint(setup: ViewSetup) -> Any:
     import rerun.blueprint as rrb
 
     return rrb.Blueprint(
-        rrb.Horizontal(_pictures(setup), _right(setup), column_shares=_shares(setup)),
+        rrb.Vertical(
+            *([] if setup.finished else [_board()]), _middle(setup), _below(setup), row_shares=_rows(setup)
+        ),
         rrb.TimePanel(
             state="collapsed",
             timeline="time",
@@ -51,29 +62,57 @@ def blueprint(setup: ViewSetup) -> Any:
     )
 
 
-def _shares(setup: ViewSetup) -> list[int]:
-    square = 0.55 <= setup.width / setup.height <= 1.15
-    return [5, 4] if square else [8, 5]
+def _rows(setup: ViewSetup) -> list[float]:
+    return ROWS[1:] if setup.finished else ROWS
 
 
-def _pictures(setup: ViewSetup) -> Any:
+def _board() -> Any:
+    """The large figures."""
     import rerun.blueprint as rrb
 
-    views = [_camera(setup), *(_map(setup, name) for name in STRAINS)]
-    shape = setup.width / setup.height
-    columns = 4 if shape < 0.55 else 1 if shape > 3.5 else 2
-    return rrb.Grid(*views, grid_columns=columns)
+    bounds = rrb.VisualBounds2D(x_range=[0, WIDTH], y_range=[0, HEIGHT])
+    return rrb.Spatial2DView(
+        origin="/figures", name="Now", visual_bounds=bounds, background=[*BACKGROUND, 255]
+    )
+
+
+def _middle(setup: ViewSetup) -> Any:
+    """Picture, maps as tabs (the strain along the load in front), and the curve where there is a load."""
+    import rerun.blueprint as rrb
+
+    axial = "eyy" if setup.axis == "y" else "exx"
+    maps = rrb.Tabs(*(_map(setup, name) for name in MAPS), active_tab=MAPS.index(axial))
+    curve = [_curve(setup)] if setup.with_load else []
+    if setup.width > _WIDE * setup.height:
+        return rrb.Horizontal(
+            rrb.Vertical(_camera(setup), maps), *curve, column_shares=[5, 3][: 1 + len(curve)]
+        )
+    return rrb.Horizontal(_camera(setup), maps, *curve)
+
+
+def _below(setup: ViewSetup) -> Any:
+    import rerun.blueprint as rrb
+
+    plots = [_strain(), *([_load()] if setup.with_load else [])]
+    status = rrb.TextDocumentView(origin="/status", name="Status")
+    shares = [4, 3, 3, 4] if setup.with_load else [6, 3, 4]
+    return rrb.Horizontal(*plots, status, _events(), column_shares=shares)
 
 
 def _camera(setup: ViewSetup) -> Any:
-    return _picture_view(setup, "Camera", ["/camera/**", "/zoi/**", "/specimen/zoi/**"])
+    return _picture_view(
+        setup, "Camera", ["/camera/**", "/zoi/**", "/specimen/zoi/**", "/specimen/gauges/**"]
+    )
 
 
 def _map(setup: ViewSetup, name: str) -> Any:
     return _picture_view(
         setup,
-        f"Strain {name}",
-        ["/camera/picture", f"/specimen/map/{name}", f"/bar/{name}/**", *[VALUES] * setup.finished],
+        _TITLES.get(name, name),
+        [
+            *("/camera/picture", f"/specimen/map/{name}", "/specimen/gauges/**", f"/bar/{name}/**"),
+            *[VALUES] * setup.finished,
+        ],
     )
 
 
@@ -91,17 +130,6 @@ def _picture_view(setup: ViewSetup, name: str, contents: list[str]) -> Any:
     return rrb.Spatial2DView(
         origin="/", contents=contents, name=name, visual_bounds=bounds, background=[*BACKGROUND, 255]
     )
-
-
-def _right(setup: ViewSetup) -> Any:
-    import rerun.blueprint as rrb
-
-    # Side by side they are high: rerun labels only whole decades where a plot is low.
-    curves = rrb.Horizontal(_strain(), _load())
-    middle = rrb.Horizontal(
-        _curve(setup), rrb.TextDocumentView(origin="/status", name="Status"), column_shares=[5, 3]
-    )
-    return rrb.Vertical(curves, middle, _events(), row_shares=[10, 10, 5])
 
 
 def _strain() -> Any:

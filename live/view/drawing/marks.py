@@ -16,7 +16,7 @@ GREY, DIM = (170, 175, 185), (62, 66, 74)
 ORANGE, CYAN, YELLOW = (255, 169, 64), (64, 224, 255), (255, 212, 59)
 
 
-def words(places: Any, labels: list[str], colour: tuple[int, int, int] = GREY) -> Any:
+def words(places: Any, labels: list[str], colour: Any = GREY) -> Any:
     """Text hung below its places."""
     import rerun as rr
 

@@ -74,7 +74,13 @@ class Place:
 
     def __init__(self, stream: Any, rates: Rates, drawn: Callable[[int], None] = lambda count: None) -> None:
         self.stream, self._rates, self._drawn = stream, rates, drawn
-        self._hz = {"picture": rates.picture_hz, "map": rates.map_hz, "rows": rates.row_hz}
+        self._hz = {
+            "picture": rates.picture_hz,
+            "map": rates.map_hz,
+            "more": rates.map_hz / 4,
+            "figures": min(4.0, rates.row_hz),
+            "rows": rates.row_hz,
+        }
         self._last_t = dict.fromkeys(self._hz, -math.inf)
         self._rows: dict[str, list[Sequence[float]]] = {}
         self.drawn_bytes = self._repeated_at = 0
@@ -85,8 +91,11 @@ class Place:
         self._drawn(self.drawn_bytes)
 
     def takes(self, what: str, t: float) -> bool:
-        """Whether a "picture", "map" or "rows" at ``t`` (s) is due; then the next is not, for a while."""
-        full = self.drawn_bytes >= self._rates.limit_bytes and what != "rows"
+        """Whether a "picture", "map", "more" (maps), "figures" or "rows" at ``t`` (s) is due.
+
+        Then the next is not, for a while.
+        """
+        full = self.drawn_bytes >= self._rates.limit_bytes and what not in ("rows", "figures")
         if full or t - self._last_t[what] < 0.999 / self._hz[what]:
             return False
         self._last_t[what] = t
@@ -139,7 +148,8 @@ def serve(setup: ViewSetup, where: Where, tell: Callable[[str], None]) -> tuple[
         tell(f"port {wanted} is taken; the view is on {door.port}")
     host, port = hidden()
     memory = FINISHED_MIB if setup.finished else SERVER_MIB
-    rates = ALL if setup.finished else Rates(setup.picture_hz, 10.0, repeat_bytes=SERVER_MIB * 2**20 / 4)
+    live = Rates(setup.picture_hz, 1.0 if setup.light else 10.0, repeat_bytes=SERVER_MIB * 2**20 / 4)
+    rates = ALL if setup.finished else live
     sink = rr.GrpcServerSink(host, port, server_memory_limit=f"{memory}MiB")
     place = _place(sink, setup, where.recording, rates, door.drawn)
     wait_for(host, port)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.events import Event, EventKind
-from live.maps import MICROSTRAIN, AutoRange, Unit, colour, number, ramp, unit_for
+from analysis.field import Status
+from live.maps import MICROSTRAIN, number, ramp
 from live.view.drawing.curve import MAX_POINTS
 from live.view.drawing.curve_drawing import CurveDrawing
 from live.view.drawing.layout import (
@@ -26,24 +27,28 @@ from live.view.drawing.layout import (
     VALUES,
     bar_unit,
 )
-from live.view.drawing.marks import CYAN, YELLOW, encode, reduced, words
+from live.view.drawing.marks import CYAN, DIM, YELLOW, encode, reduced, words
 from live.view.drawing.places import Place
 from live.view.drawing.shapes import ArrowScale, mean_motion, region_edges, sample_boxes, thinned, value_dots
+from live.view.exchange.figures import Figures
 from live.view.exchange.messages import Picture, Row
-from live.view.exchange.setup import STRAINS, ViewSetup
+from live.view.exchange.setup import MAPS, STRAINS, ViewSetup
 from live.view.exchange.thinned import Thinned
+from live.view.painting import FieldMaps, Painted, paint
 
 if TYPE_CHECKING:
     from analysis.field import StrainField, ZoiGrid
 
 COLOURS = {"exx": (255, 107, 107), "eyy": (81, 207, 102), "exy": (116, 163, 255)}
-RED = (255, 90, 60)
-MAP_ALPHA = 225
+RED, GAUGE, GAUGE_NAME = (255, 90, 60), (255, 0, 255), (255, 200, 255)
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 _RAMP = (8, 256)
 _STRAINS_KEPT, _FORCES_KEPT = 5000, 10_000
 QUALITY, LONGEST_PX = 80, 1280
+FIGURES_QUALITY = 70
+LIGHT_QUALITY, LIGHT_LONGEST_PX = 50, 640
 """Of the JPEG, 1..100; larger pictures are reduced by a whole factor."""
+_MORE = tuple(name for name in MAPS if name not in STRAINS)
 
 
 class Scene:
@@ -58,8 +63,8 @@ class Scene:
     def __init__(self, places: Sequence[Place], setup: ViewSetup) -> None:
         self._places, self._setup = places, setup
         self._due: Sequence[Place] = places
-        self._ranges = {name: AutoRange(setup.strain_range) for name in STRAINS}
-        self._limits: dict[str, float] = {}
+        self._maps = FieldMaps(setup)
+        self._shown_spans: dict[str, object] = {}
         self._curve: Thinned[Row] = Thinned(MAX_POINTS)
         self._drawn_curve = CurveDrawing(self._log_due, self._log, setup)
         self._arrows = ArrowScale()
@@ -70,8 +75,9 @@ class Scene:
         """All that does not change."""
         import rerun as rr
 
-        for name in STRAINS:
-            self._bar(name)
+        for name in MAPS:
+            if name != "status":
+                self._bar(name)
         for name in STRAINS:
             style = rr.Measurements.from_fields(names=name, colors=COLOURS[name], widths=2.0)
             self._log(f"strain/{name}", style, static=True)
@@ -95,8 +101,9 @@ class Scene:
         self._due = [place for place in self._places if place.takes("picture", picture.t)]
         if not self._due:
             return
-        image, factor = reduced(picture.image, picture.bits, LONGEST_PX)
-        data = encode(".jpg", image, QUALITY)
+        light = self._setup.light
+        image, factor = reduced(picture.image, picture.bits, LIGHT_LONGEST_PX if light else LONGEST_PX)
+        data = encode(".jpg", image, LIGHT_QUALITY if light else QUALITY)
         self._at(picture.t)
         self._log_due(
             "camera/picture", rr.EncodedImage(contents=data, media_type="image/jpeg", draw_order=-10)
@@ -112,13 +119,14 @@ class Scene:
             return
         self._at(t)
         self._specimen(field)
-        for name in STRAINS:
-            self._map(field, name)
+        self._draw_maps(field, STRAINS)
         if self._setup.finished:
             self._values(field)
-        self._bar_labels()
         points = np.array(self._curve.items(), np.float64).reshape(-1, 2)
         self._drawn_curve.draw(points)
+        self._due = [place for place in self._due if place.takes("more", t)]
+        if self._due:
+            self._draw_maps(field, _MORE)
 
     def _outlines(self, grid: ZoiGrid) -> None:
         """The outlines of the ZOIs, and where the maps lie."""
@@ -126,9 +134,20 @@ class Scene:
 
         step = float(grid.step)
         corner = (float(grid.x[0]) + 0.5 - step / 2, float(grid.y[0]) + 0.5 - step / 2, 0.0)
-        for name in STRAINS:
+        for name in MAPS:
             place = rr.Transform3D(translation=corner, scale=(step, step, 1.0))
             self._log(f"specimen/map/{name}", place, static=True)
+        strips = [[[x + 0.5, y + 0.5] for x, y in strip] for strip in self._setup.outlines.values()]
+        if strips:
+            gauges = rr.LineStrips2D(
+                strips,
+                colors=GAUGE,
+                radii=rr.Radius.ui_points(2.0),
+                draw_order=50,
+            )
+            self._log("specimen/gauges", gauges, static=True)
+            names = words([strip[0] for strip in strips], list(self._setup.outlines), GAUGE_NAME)
+            self._log("specimen/gauges/names", names, static=True)
         boxes = sample_boxes(grid)
         self._log(
             "specimen/zoi/boxes",
@@ -169,21 +188,26 @@ class Scene:
         self._log_due(
             "zoi/words", words([[0.5 * self._setup.width, -0.08 * bar_unit(self._setup)]], [text], CYAN)
         )
-        lost = thinned(field.grid, np.isnan(field.exx) & field.grid.active)
-        self._log_due(
-            "specimen/zoi/rejected",
-            rr.Points2D(lost, colors=RED, radii=rr.Radius.ui_points(1.5), draw_order=25),
-        )
+        plain = field.status == Status.NO_PATTERN  # background, where nothing is to be lost
+        for name, wanted, colour in (("plain", plain, DIM), ("rejected", ~plain & np.isnan(field.exx), RED)):
+            dots = thinned(field.grid, wanted & field.grid.active)
+            self._log_due(
+                f"specimen/zoi/{name}",
+                rr.Points2D(dots, colors=colour, radii=rr.Radius.ui_points(1.5), draw_order=25),
+            )
 
-    def _map(self, field: StrainField, name: str) -> None:
+    def _draw_maps(self, field: StrainField, names: tuple[str, ...]) -> None:
         import rerun as rr
 
-        values = getattr(field, name)
-        limit = self._ranges[name].update(values, getattr(field, f"sigma_{name}"))
-        data = encode(".png", colour(values, limit, MAP_ALPHA)[..., [2, 1, 0, 3]], 1)
-        picture = rr.EncodedImage(contents=data, media_type="image/png", draw_order=10)
-        self._log_due(f"specimen/map/{name}", picture)
-        self._count(data)
+        for name, painted in self._maps.paint(field, names).items():
+            data = encode(".png", painted.rgba[..., [2, 1, 0, 3]], 1)
+            picture = rr.EncodedImage(contents=data, media_type="image/png", draw_order=10)
+            self._log_due(f"specimen/map/{name}", picture)
+            self._count(data)
+            says = painted.span or painted.legend
+            if self._shown_spans.get(name) != says:
+                self._shown_spans[name] = says
+                self._log(f"bar/{name}/ticks", self._ticks(painted))
 
     def _values(self, field: StrainField) -> None:
         """A dot in each ZOI that tells its values where a person clicks."""
@@ -201,21 +225,17 @@ class Scene:
         place = rr.Transform3D(translation=(w + BAR_GAP * unit, BAR_TOP * h, 0.0), scale=scale)
         self._log(f"bar/{name}/ramp", place, static=True)
 
-    def _bar_labels(self) -> None:
-        limits = {name: self._ranges[name].limit for name in STRAINS}
-        if limits == self._limits:
-            return
-        self._limits = limits
-        unit = unit_for(max(limits.values()))
-        for name, limit in limits.items():
-            self._log(f"bar/{name}/ticks", self._ticks(limit, unit))
-
-    def _ticks(self, limit: float, unit: Unit) -> Any:
-        share, length = np.array([1.0, 0.5, 0.0, -0.5, -1.0]), bar_unit(self._setup)
-        y = (BAR_TOP + BAR_HEIGHT * (1 - share) / 2) * self._setup.height - LETTER * length
-        x, top = self._setup.width + BAR_LABEL * length, BAR_TOP * self._setup.height
+    def _ticks(self, painted: Painted) -> Any:
+        length, height = bar_unit(self._setup), self._setup.height
+        x, top = self._setup.width + BAR_LABEL * length, BAR_TOP * height
+        if painted.span is None:
+            places = [[x, top + 0.1 * k * length] for k in range(len(painted.legend))]
+            return words(places, [text for text, _ in painted.legend], [c for _, c in painted.legend])
+        (low, high), share = painted.span, np.array([1.0, 0.75, 0.5, 0.25, 0.0])
+        y = (BAR_TOP + BAR_HEIGHT * (1 - share)) * height - LETTER * length
         points = [*([x, yk] for yk in y), [x - 0.04 * length, top - 0.09 * length]]
-        return words(points, [*(number(s * limit * unit.factor) for s in share), unit.name])
+        values = (low + share * (high - low)) * painted.unit.factor
+        return words(points, [*(number(float(f"{v:.6g}")) for v in values), painted.unit.name])
 
     # -- curves -------------------------------------------------------------------------------
 
@@ -257,7 +277,7 @@ class Scene:
                 rows = [(row[0], *row[2 * k + 1 : 2 * k + 3]) for row in self._strains.items()]
                 place.send(f"strain/{name}", rows, _columns)
         if forgetting:
-            self._limits = {}
+            self._shown_spans = {}
             self._drawn_curve.forget()
 
     # -- words --------------------------------------------------------------------------------
@@ -272,6 +292,16 @@ class Scene:
         source = event.source.partition("?")[0]
         text = f"{self._since_start(event.t):.1f} s  {source}: {event.text}"
         self._log("events", rr.TextLog(text, level=_LEVELS[event.level]))
+
+    def figures(self, figures: Figures) -> None:
+        """The large figures, no more often than the rates say."""
+        import rerun as rr
+
+        self._due = [place for place in self._places if place.takes("figures", figures.t)]
+        if self._due:
+            data = encode(".jpg", paint(figures), FIGURES_QUALITY)
+            self._at(figures.t)
+            self._log_due("figures", rr.EncodedImage(contents=data, media_type="image/jpeg"))
 
     def status(self, markdown: str) -> None:
         """The status card."""

@@ -61,7 +61,8 @@ class Picture:
 def setup_message(setup: ViewSetup, where: Where) -> Message:
     """The first message: what is shown, and where."""
     names = ("title", "width", "height", "bits", "start_monotonic", "area_m2", "axis", "strain_range")
-    meta = {name: getattr(setup, name) for name in (*names, "picture_hz", "finished")}
+    more = ("picture_hz", "finished", "with_load", "outlines", "light", "scale")
+    meta = {name: getattr(setup, name) for name in (*names, *more)}
     places = {"port": where.port, "rrd": where.rrd, "recording": where.recording}
     return Message(
         Kind.SETUP, {**meta, **places, "grid": setup.grid.to_dict()}, {"active": setup.grid.active}
@@ -101,7 +102,7 @@ def field_message(t: float, field: StrainField) -> Message:
     """A strain field at ``t`` (s, monotonic): what the view draws of it, as it lies in memory."""
     arrays: dict[str, NDArray[Any]] = {
         "parameters": field.parameters, "covariance": field.covariance, "status": field.status,
-        "active": field.grid.active,
+        "active": field.grid.active, "residual": field.residual,
     }  # fmt: skip
     return Message(Kind.FIELD, {"t": t, "grid": field.grid.to_dict(), "measure": field.measure}, arrays)
 
@@ -110,8 +111,11 @@ def field_of(message: Message) -> tuple[float, StrainField]:
     """Time and field; what the view does not draw of it is 0."""
     grid = _grid(message.meta.get("grid"), message)
     parameters, covariance, status = (_array(message, n) for n in ("parameters", "covariance", "status"))
+    residual = _array(message, "residual")
     halves = parameters.shape[:1] in ((6,), (12,))
-    if not halves or {parameters.shape[1:], covariance.shape[1:], status.shape} != {grid.shape}:
+    if not halves or {parameters.shape[1:], covariance.shape[1:], status.shape, residual.shape} != {
+        grid.shape
+    }:
         raise WireError(
             f"a field to the view has shapes {parameters.shape}, {covariance.shape}, {status.shape}"
         )
@@ -120,7 +124,7 @@ def field_of(message: Message) -> tuple[float, StrainField]:
     nothing = np.zeros(grid.shape, np.float32)
     none = np.broadcast_to(nothing, covariance.shape)
     field = StrainField(
-        grid, parameters, covariance, none, nothing, status, np.zeros(grid.shape, np.uint8), nothing,
+        grid, parameters, covariance, none, residual, status, np.zeros(grid.shape, np.uint8), nothing,
         measure=_measure(message),
     )  # fmt: skip
     return _number(message, "t"), field

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
     from analysis.field import ZoiGrid
 
 STRAINS = ("exx", "eyy", "exy")
+MAPS = (*STRAINS, "e1", "e2", "sigma", "residual", "status")
+"""What is shown as maps: strains, principal strains, sigma of the strain along the load, chi squared, status."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,6 +39,14 @@ class ViewSetup:
         Pictures shown per second of the test, at most.
     finished : bool
         A test of the past: all that is told is shown, kept for the slider of time, and every ZOI tells its values.
+    with_load : bool
+        Whether there is a load to show.
+    outlines : mapping of name to ((x, y), ...), px
+        Lines drawn on the picture: gauges.
+    light : bool
+        For slow links: pictures and maps smaller and seldom.
+    scale : "symmetric" | "automatic"
+        Colours of the maps about zero, or over the values there are.
     """
 
     title: str
@@ -49,3 +60,7 @@ class ViewSetup:
     strain_range: float | None = None
     picture_hz: float = 5.0
     finished: bool = False
+    with_load: bool = True
+    outlines: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    light: bool = False
+    scale: Literal["symmetric", "automatic"] = "symmetric"

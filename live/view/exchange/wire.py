@@ -42,6 +42,7 @@ class Kind(IntEnum):
     EVENTS = 7
     STATUS = 8
     END = 9
+    FIGURES = 10
     SERVING = 20  # port (None: no server), rrd (None: no file)
     TROUBLE = 21  # text, lasting: whether to start anew is of no use
     FULL = 22  # memory_MiB: the process ends because it grew to this

@@ -9,11 +9,13 @@ import pytest
 
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
+from live.channels import Readings
 from live.measure import History
 from live.outputs import Outputs
-from live.outputs.watching import CARD_INSTANTS, CardWriter, Watching
+from live.outputs.watching import CARD_INSTANTS, CardWriter, FiguresWriter, Watching
 from live.setup import SpecimenConfig
-from live.tell import Journal, Ledger, StatusCard
+from live.tell import Books, Journal, Ledger, StatusCard
+from live.view import Figures
 from tests.live.made_up import START, make_frame, make_loads, make_measurement
 
 
@@ -37,7 +39,9 @@ class KeptView:
 
 def watched(*views: KeptView) -> tuple[Outputs, Journal]:
     journal = Journal()
-    return Outputs([Watching(v) for v in views], make_loads(10.0, lambda t: t), journal, History()), journal  # type: ignore[arg-type]
+    return Outputs(
+        [Watching(v, {}) for v in views], make_loads(10.0, lambda t: t), journal, History()
+    ), journal  # type: ignore[arg-type]
 
 
 def test_everything_is_offered() -> None:
@@ -90,3 +94,31 @@ def test_the_card_says_where_the_test_stands() -> None:
     assert time.perf_counter() - begin < 10.0
     (_, (text,)) = view.given[-1]
     assert "33 of 34" in text.replace("*", "") or "ZOIs valid" in text
+
+
+class FakeView:
+    """Keeps the large figures."""
+
+    def __init__(self) -> None:
+        self.shown: list[Figures] = []
+
+    def figures(self, figures: Figures) -> None:
+        self.shown.append(figures)
+
+
+@pytest.mark.parametrize("state", ["ARMED", ""])
+def test_the_large_figures_before_and_after_the_first_measurement(state: str) -> None:
+    """Live the load is shown from the first frame on; a replay (no state) shows the force of each measurement."""
+    books, view = Books.new(1.0), FakeView()
+    books.loads.append(LoadSample(START, 800.0))
+    books.vitals.state, books.vitals.frame_t = state, START + 1
+    readings = Readings(START, "y", 40e-6, lambda: books.loads.latest if state else None)
+    writer = FiguresWriter(view, readings, books)  # type: ignore[arg-type]
+    writer.idle()
+    assert [(f.state, f.force_N, f.zois) for f in view.shown] == ([("ARMED", 800.0, 0)] if state else [])
+    books.alarms.put("limit", "limit: too much")
+    writer.measurement(make_measurement(1, 1e-3, force=500.0))
+    last = view.shown[-1]
+    assert (last.state, last.force_N) == (("ARMED", 800.0) if state else ("REPLAY", 500.0))
+    assert last.axial == pytest.approx(1e-3) and last.alarms == ("limit: too much",)
+    assert last.stress_MPa == pytest.approx(last.force_N / 40)

@@ -25,6 +25,7 @@ from live.run import Outcome, run_live
 from live.run import live_run as live_module
 from live.setup import load_config
 from live.tell import Screen
+from tests.live.test_end_to_end import live_run
 
 FPS = 40.0
 
@@ -138,3 +139,11 @@ def test_another_program_on_a_core_loses_no_frame(tmp_path: Path) -> None:
         finally:
             other.kill()
     assert (outcome.books.ledger.unrecorded, outcome.books.ledger.lost) == (0, 0)
+
+
+def test_frames_that_never_make_a_reference_come_with_a_hint(tmp_path: Path) -> None:
+    faults = ",".join(f"drop@{0.4 * k + 0.2:g}" for k in range(10))
+    camera = f"sim:uniform?fps=40&width=224&height=192&bits=12&seconds=4&faults={faults}"
+    outcome = live_run(tmp_path / "run", camera, **{"measure.reference_burst": 32})
+    hints = [e.text for e in outcome.books.journal.events("warning") if e.source == "reference"]
+    assert len(hints) == 1 and "no 32 frames in a row" in hints[0] and "--reference-burst" in hints[0]

@@ -111,13 +111,20 @@ def test_alarms_that_cannot_be(tmp_path: Path, text: str, says: str) -> None:
         load_config(path, {})
 
 
+def test_a_gauge_that_is_still_to_be_placed_may_be_watched() -> None:
+    alarm = [{"channel": "gauge_area", "above": 0.01}]
+    assert load_config(None, {"alarm": alarm, "measure.gauges": "auto"}).alarm[0].channel == "gauge_area"
+    with pytest.raises(ConfigError, match="unknown channel"):
+        load_config(None, {"alarm": alarm})
+
+
 def test_alarms_come_back_from_a_file_as_they_were() -> None:
     alarms = [{"channel": "force_N", "above": 1.0}, {"channel": "axial", "below": 0.0, "end": True}]
     config = load_config(None, {"alarm": alarms})
     assert from_dict(json.loads(json.dumps(config.as_dict())), {}, "a file") == config
 
 
-REAL = "sim:uniform?seconds=4&fps=20&width=224&height=192&bits=12"
+REAL = "sim:uniform?seconds=4&fps=20&buffers=64&width=224&height=192&bits=12"
 
 
 def test_from_the_stamp_of_the_frame_to_the_action_within_two_measurement_periods(tmp_path: Path) -> None:

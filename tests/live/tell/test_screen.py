@@ -69,9 +69,9 @@ def standing(**more: Any) -> Standing:
 
 
 def test_the_status_line_has_everything_where_there_is_room() -> None:
-    assert status_line(standing(), 200) == (
-        "REC  1:15  1234.5 N  30.9 MPa  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs  30 fps"
-        "  measured 120  skipped 8  lost 0  p95 42 ms  disk 120 min"
+    assert status_line(standing(peak_N=1500.0), 200) == (
+        "REC  1:15  1234.5 N  30.9 MPa  peak 1500.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs"
+        "  30 fps  measured 120  skipped 8  lost 0  p95 42 ms  disk 120 min"
     )
 
 

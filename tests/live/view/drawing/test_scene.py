@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +14,7 @@ import pytest
 
 from acquire.events import Event, EventKind
 from analysis.field import StrainField
-from live.view import ViewSetup
+from live.view import Figures, ViewSetup
 from live.view.drawing.layout import blueprint
 from live.view.drawing.marks import reduced
 from live.view.drawing.places import Place, Rates
@@ -61,6 +62,7 @@ def draw_a_test(scene: Scene, seconds: float = 3.0) -> None:
         scene.points([(1e-4 * k, 10.0 * k)])
         scene.means([row_of(measurement)])
         scene.field(measurement.t, measurement.field)
+        scene.figures(Figures(measurement.t, "REC", 1e-3, 1e-6, 10.0 * k, math.nan, 12, 12))
 
 
 STATIC = 1
@@ -77,6 +79,12 @@ def test_every_mean_is_drawn_and_pictures_and_maps_as_often_as_asked(tmp_path: P
         assert rows["/load/force"] == 150 + STATIC
         assert rows["/camera/picture"] == pictures
         assert rows["/specimen/map/exx"] == maps + STATIC
+        assert (
+            rows["/specimen/map/status"]
+            == rows["/specimen/map/e1"]
+            == pytest.approx(maps / 4 + STATIC, abs=1)
+        )
+        assert rows["/figures"] == {10.0: 10, 2.0: 3}[maps / 3]
         assert rows["/curve/line"] == maps
         assert rows["/curve/axes"] >= 1  # drawn where it changes, in both
         assert rows["/specimen/zoi/boxes"] == STATIC
@@ -135,3 +143,24 @@ def test_large_pictures_are_reduced_to_eight_bits(bits: int) -> None:
     small, factor = reduced(image, bits, 200)
     assert (factor, small.shape, small.dtype) == (3, (100, 166), np.uint8)
     assert (small[0, 0], small[0, -1]) == (0, 255)
+
+
+def views_of(part: object) -> list[str]:
+    """The names of all views of a layout."""
+    inside = getattr(part, "contents", None)
+    named = [str(part.name)] if type(part).__name__.endswith("View") else []  # type: ignore[attr-defined]
+    return (
+        named + [name for one in inside if not isinstance(one, str) for name in views_of(one)]
+        if isinstance(inside, list | tuple)
+        else named
+    )
+
+
+@pytest.mark.parametrize(
+    ("more", "not_there"),
+    [({}, set()), ({"with_load": False}, {"Load, N", "Load – strain"}), ({"finished": True}, {"Now"})],
+)
+def test_nothing_empty_takes_room(more: dict[str, Any], not_there: set[str]) -> None:
+    shown = set(views_of(blueprint(make_setup(**more)).root_container))
+    everything = {"Now", "Camera", "eyy", "status", "Load, N", "Load – strain", "Status", "Events"}
+    assert everything - not_there <= shown and not not_there & shown
