@@ -153,7 +153,12 @@ class RunFolder(Closing):
         for name in names:
             value, sigma = (np.asarray(values[column], np.float64) for column in gauge_columns(name))
             said = described.get(name)
-            tracks[name] = GaugeTrack(value, sigma, said if isinstance(said, dict) else {})
+            known = (
+                {key: item for key, item in said.items() if item is not None}
+                if isinstance(said, dict)
+                else {}
+            )
+            tracks[name] = GaugeTrack(value, sigma, known)
         return tracks
 
     @property

@@ -208,6 +208,8 @@ def _about_curves(curve: Curve) -> Part:
         return paragraph("No force is known at any instant, so there is no stress-strain curve.", "dim")
     words = "Bands are one standard uncertainty of the mean on either side."
     figures = curve.figures
+    if not figures.E.known:
+        words += f" E is not known: {figures.E.why}."
     if figures.span is not None:
         low, high = (100 * strain for strain in figures.span.strain)
         words += (
