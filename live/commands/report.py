@@ -8,7 +8,7 @@ from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
 from live.export import check_free, new_file
-from live.finished import Display, open_run
+from live.finished import Display, RunFolder, open_run
 from live.report import (
     NO_BROWSER,
     Report,
@@ -39,7 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     words = "map to show; may be given again (default: the strain along the load)"
     parser.add_argument("--field", dest="fields", action="append", default=[], metavar="NAME", help=words)
-    parser.add_argument("--scale", type=float, metavar="MM/PX", help="what one pixel measures, in mm")
+    parser.add_argument(
+        "--scale", type=float, metavar="MM/PX", help="what one pixel measures, in mm (default: as configured)"
+    )
     words = "several tests in one page: curves, mean and scatter, and a CSV beside it"
     parser.add_argument("--compare", nargs="+", default=[], metavar="RUN", help=words)
 
@@ -64,7 +66,7 @@ def command(arguments: argparse.Namespace) -> int:
                 write_table(tests, file)
             screen.say(str(out.with_suffix(".csv")))
         else:
-            report = make_report(found[0], _wanted(arguments), screen)
+            report = make_report(found[0], _wanted(arguments, found[0]), screen)
     _save(report, out, arguments, screen)
     return 0
 
@@ -73,14 +75,14 @@ def write_report(folder: Path, screen: Screen) -> None:
     """``report.html`` in the folder of a run that has just ended; what goes wrong is told and harms nothing."""
     try:
         with open_run(folder) as run:
-            save_page(make_report(run, Wanted(), screen), folder / "report.html")
+            save_page(make_report(run, Wanted(mm_per_px=run.mm_per_px), screen), folder / "report.html")
         screen.say(f"  {folder / 'report.html'}")
     except PhasedicError as error:
         screen.say(f"warning: no report was made: {error}")
 
 
-def _wanted(arguments: argparse.Namespace) -> Wanted:
-    scale = Display(arguments.scale).mm_per_px
+def _wanted(arguments: argparse.Namespace, run: RunFolder) -> Wanted:
+    scale = Display(arguments.scale).mm_per_px or run.mm_per_px
     return Wanted(tuple(arguments.fields), tuple(arguments.times), scale)
 
 

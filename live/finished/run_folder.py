@@ -6,6 +6,7 @@ with open_run("runs/20261122T081747Z") as run:
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -127,6 +128,14 @@ class RunFolder(Closing):
             return from_dict({"specimen": stored}, {}, str(self.strain.path)).specimen
         except ConfigError as error:
             raise DataError(f"{error}; make the results again with phasedic replay") from None
+
+    @property
+    def mm_per_px(self) -> float | None:
+        """The scale that was configured; None where there is none."""
+        scale = self.section("scale").get("mm_per_px")
+        if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0 < scale < math.inf:
+            return None
+        return float(scale)
 
     @property
     def title(self) -> str:
