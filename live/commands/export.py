@@ -6,8 +6,9 @@ import argparse
 from pathlib import Path
 
 from acquire.errors import ConfigError
+from live.commands.options import add_gauge_option
 from live.export import FORMATS, ExportRequest, Options, export
-from live.finished import Display, RunFolder, open_run
+from live.finished import Display, RunFolder, add_gauges, open_run
 from live.tell import Screen
 
 
@@ -22,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--until", dest="end_s", type=float, metavar="S", help="end here, seconds")
     words = "tables: one line a ZOI and instant, one line an instant (a file a map), or the means"
     parser.add_argument("--layout", choices=("long", "wide", "means"), default="long", help=words)
+    add_gauge_option(parser)
     add_display(parser)
     films = parser.add_argument_group("pictures and films")
     films.add_argument("--fps", type=float, default=10.0, metavar="N", help="instants a second (default 10)")
@@ -60,6 +62,8 @@ def command(arguments: argparse.Namespace) -> int:
         raise ConfigError(f"--fps {arguments.fps:g} is not possible; give 0.1 to 240")
     screen = Screen()
     with open_run(arguments.run) as run:
+        if arguments.more_gauges:
+            add_gauges(run, Path(arguments.more_gauges))
         screen.say(str(export(run, _request(arguments, run), screen)))
     return 0
 

@@ -7,8 +7,9 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
+from live.commands.options import add_gauge_option
 from live.export import check_free, new_file
-from live.finished import Display, RunFolder, open_run
+from live.finished import Display, RunFolder, add_gauges, open_run
 from live.report import (
     NO_BROWSER,
     Report,
@@ -43,6 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scale", type=float, metavar="MM/PX", help="what one pixel measures, in mm (default: as configured)"
     )
     words = "several tests in one page: curves, mean and scatter, and a CSV beside it"
+    add_gauge_option(parser)
     parser.add_argument("--compare", nargs="+", default=[], metavar="RUN", help=words)
 
 
@@ -57,6 +59,8 @@ def command(arguments: argparse.Namespace) -> int:
     default = Path("comparison.html") if arguments.compare else None
     with ExitStack() as opened:
         found = [opened.enter_context(open_run(run)) for run in runs]
+        for run in found if arguments.more_gauges else ():
+            add_gauges(run, Path(arguments.more_gauges))
         out = Path(arguments.out) if arguments.out else default or found[0].path / "report.html"
         check_free(*_targets(out, arguments))
         if arguments.compare:
