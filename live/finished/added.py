@@ -16,8 +16,9 @@ from live.setup import describe, gauges_for, load_config
 def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
     """Add the ``[gauges.NAME]`` of a TOML file to ``run``, as long as it is open; its files stay as they are.
 
-    Values and uncertainties are those that a replay with this file would give. One of a name that is there already
-    takes its place.
+    Values are those that a replay with this file would give, and so are the uncertainties of extensometers and single
+    ZOIs. That of a mean over an area is of the overlap of the windows alone, which is low on dense grids (by 6 % at a
+    step of a quarter of a ZOI, by a third at most). One of a name that is there already takes its place.
 
     Raises
     ------
