@@ -16,9 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.camera import with_scheme
 from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event, EventKind
+from acquire.record_mode import Crop
 from acquire.session import Session
 from analysis.field import StrainField
 from live.finished.fields import read_field
@@ -106,12 +108,20 @@ class RunFolder(Closing):
         """
         if self.session is not None:
             return of_session(self.session, self.strain)
-        if not self.camera_address.startswith(_AS_FILES):
-            return None
         try:
-            return of_images(self.camera_address, self.strain)
+            address = with_scheme(self.camera_address) if self.camera_address else ""
+            return of_images(address, self.strain, self._crop) if address.startswith(_AS_FILES) else None
         except PhasedicError:
             return None
+
+    @property
+    def _crop(self) -> Crop | None:
+        """The part of the pictures that was measured; None for all of it, or where the file says what cannot be."""
+        crop = self.section("camera").get("crop")
+        if not isinstance(crop, list) or [type(value) for value in crop] != [int] * 4:
+            return None
+        x, y, width, height = crop
+        return x, y, width, height
 
     @property
     def specimen(self) -> SpecimenConfig:
