@@ -1,10 +1,10 @@
-# make demo | test | lint | bench | accuracy | v4l2-test ; each sets up its own .venv first.
+# make demo | test | lint | docs | bench | accuracy | v4l2-test ; each sets up its own .venv first.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test lint format bench accuracy v4l2-test clean
+.PHONY: demo test lint format docs bench accuracy v4l2-test clean
 .DEFAULT_GOAL := demo
 
 $(VENV)/base: pyproject.toml
@@ -22,6 +22,10 @@ $(VENV)/dev: $(VENV)/test
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,dev]'
 	@touch $@
 
+$(VENV)/docs: $(VENV)/base
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
 demo: $(VENV)/base
 	@$(BIN)/phasedic demo
 
@@ -36,6 +40,9 @@ lint: $(VENV)/dev
 format: $(VENV)/dev
 	@$(BIN)/ruff check --fix-only --quiet .
 	@$(BIN)/ruff format --quiet .
+
+docs: $(VENV)/docs
+	@$(BIN)/python -m docs.make_site
 
 bench: $(VENV)/test
 	@$(BIN)/python -m tests.bench

@@ -5,7 +5,7 @@
 """
 
 from acquire.opencv.gray import to_gray
-from acquire.opencv.images import picture_times, read_image
+from acquire.opencv.images import picture_names, picture_times, read_image
 from acquire.opencv.webcam import capture
 
-__all__ = ["capture", "picture_times", "read_image", "to_gray"]
+__all__ = ["capture", "picture_names", "picture_times", "read_image", "to_gray"]

@@ -229,6 +229,11 @@ def _size(shape: tuple[int, ...]) -> str:
     return f"{shape[1]}x{shape[0]}"
 
 
+def picture_names(address: Address) -> list[tuple[str, int]]:
+    """File and page of each picture of ``files:...``, in their order; raises as ``find_images``."""
+    return [(path.name, page) for path in find_images(address.target) for page in range(_count(path))]
+
+
 def picture_times(address: Address) -> dict[str, float]:
     """Name -> time (s) of each picture of ``files:...``, as ``open_files`` would stamp them.
 

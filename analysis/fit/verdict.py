@@ -79,7 +79,7 @@ def _sigma(known: Any, z: int, variance: Any) -> Any:
 
 
 @helper
-def _is_empty(left: Any) -> bool:
+def _is_empty(left: Any) -> Any:
     return EMPTY_SHARES[0] < left < EMPTY_SHARES[1]
 
 

@@ -6,8 +6,9 @@ import argparse
 from pathlib import Path
 
 from acquire.errors import ConfigError
+from live.commands.options import add_gauge_option
 from live.export import FORMATS, ExportRequest, Options, export
-from live.finished import Display, open_run
+from live.finished import Display, RunFolder, add_gauges, open_run
 from live.tell import Screen
 
 
@@ -22,6 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--until", dest="end_s", type=float, metavar="S", help="end here, seconds")
     words = "tables: one line a ZOI and instant, one line an instant (a file a map), or the means"
     parser.add_argument("--layout", choices=("long", "wide", "means"), default="long", help=words)
+    add_gauge_option(parser)
     add_display(parser)
     films = parser.add_argument_group("pictures and films")
     films.add_argument("--fps", type=float, default=10.0, metavar="N", help="instants a second (default 10)")
@@ -32,19 +34,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def add_display(parser: argparse.ArgumentParser) -> None:
     """Units and axes."""
     group = parser.add_argument_group("units and axes")
-    group.add_argument("--mm", action="store_true", help="lengths in mm; needs --scale")
+    group.add_argument("--mm", action="store_true", help="lengths in mm, by --scale or the scale of the test")
     group.add_argument("--scale", type=float, metavar="MM/PX", help="what one pixel measures, in mm")
     group.add_argument("--y-up", action="store_true", help="y upwards: v and exy change their sign")
     group.add_argument("--percent", action="store_true", help="strains in percent")
 
 
-def display_of(arguments: argparse.Namespace) -> Display:
-    """Units and axes that were asked for; raises ConfigError where mm are asked for without a scale."""
-    if arguments.mm and arguments.scale is None:
+def display_of(arguments: argparse.Namespace, stored: float | None = None) -> Display:
+    """Units and axes that were asked for; ``stored`` is the scale of the test, mm/px.
+
+    Raises
+    ------
+    ConfigError
+        mm are asked for without a scale, or a scale without mm.
+    """
+    if arguments.mm and arguments.scale is None and stored is None:
         raise ConfigError("--mm needs the scale: give --scale with what one pixel measures, in mm")
     if arguments.scale is not None and not arguments.mm:
         raise ConfigError("--scale does nothing without --mm; give both")
-    return Display(arguments.scale, arguments.y_up, arguments.percent)
+    scale = (stored if arguments.scale is None else arguments.scale) if arguments.mm else None
+    return Display(scale, arguments.y_up, arguments.percent)
 
 
 def command(arguments: argparse.Namespace) -> int:
@@ -52,15 +61,20 @@ def command(arguments: argparse.Namespace) -> int:
     if not 0.1 <= arguments.fps <= 240:
         raise ConfigError(f"--fps {arguments.fps:g} is not possible; give 0.1 to 240")
     screen = Screen()
-    request = ExportRequest(
+    with open_run(arguments.run) as run:
+        if arguments.more_gauges:
+            add_gauges(run, Path(arguments.more_gauges))
+        screen.say(str(export(run, _request(arguments, run), screen)))
+    return 0
+
+
+def _request(arguments: argparse.Namespace, run: RunFolder) -> ExportRequest:
+    return ExportRequest(
         arguments.to,
         None if arguments.out is None else Path(arguments.out),
         arguments.fields,
         arguments.start_s,
         arguments.end_s,
-        display_of(arguments),
+        display_of(arguments, run.mm_per_px),
         Options(arguments.layout, arguments.fps, arguments.limit, not arguments.no_picture),
     )
-    with open_run(arguments.run) as run:
-        screen.say(str(export(run, request, screen)))
-    return 0

@@ -5,10 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+import numpy as np
+
 from acquire.opencv import read_image
 from live.maps import Picture, draw, save
 from live.results import Strain
 from live.tell import say
+
+_SEEN_PX = 2.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -43,5 +47,17 @@ def command(arguments: argparse.Namespace) -> int:
             arguments.deconvolve,
         )
         save(draw(strain, picture, background), path)
+        if arguments.over is not None:
+            _tell_of_motion(strain, arguments.row)
     say(str(path))
     return 0
+
+
+def _tell_of_motion(strain: Strain, row: int) -> None:
+    """The map lies on the reference: over a later picture it would be misplaced."""
+    moved = float(np.nanmax(np.hypot(strain.maps("u", row), strain.maps("v", row)), initial=0.0))
+    if moved > _SEEN_PX:
+        say(
+            f"note: the map lies on the reference picture; the specimen moved by up to {moved:.0f} px since, so give"
+            " the reference to --over, or phasedic export --to png, which moves the map with it"
+        )

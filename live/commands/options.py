@@ -62,6 +62,12 @@ def add_measure(parser: argparse.ArgumentParser) -> None:
     add_verbose(parser)
 
 
+def add_gauge_option(parser: argparse.ArgumentParser) -> None:
+    """--gauges of the commands that look at a finished run."""
+    words = "virtual gauges to lay over the run: a TOML file with tables [gauges.NAME]"
+    parser.add_argument("--gauges", dest="more_gauges", metavar="FILE.toml", help=words)
+
+
 def add_verbose(parser: argparse.ArgumentParser) -> None:
     """--verbose."""
     parser.add_argument("--verbose", "-v", action="store_true", help="tell more")

@@ -7,8 +7,9 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
+from live.commands.options import add_gauge_option
 from live.export import check_free, new_file
-from live.finished import Display, open_run
+from live.finished import Display, RunFolder, add_gauges, open_run
 from live.report import (
     NO_BROWSER,
     Report,
@@ -39,8 +40,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     words = "map to show; may be given again (default: the strain along the load)"
     parser.add_argument("--field", dest="fields", action="append", default=[], metavar="NAME", help=words)
-    parser.add_argument("--scale", type=float, metavar="MM/PX", help="what one pixel measures, in mm")
+    parser.add_argument(
+        "--scale", type=float, metavar="MM/PX", help="what one pixel measures, in mm (default: as configured)"
+    )
     words = "several tests in one page: curves, mean and scatter, and a CSV beside it"
+    add_gauge_option(parser)
     parser.add_argument("--compare", nargs="+", default=[], metavar="RUN", help=words)
 
 
@@ -55,6 +59,8 @@ def command(arguments: argparse.Namespace) -> int:
     default = Path("comparison.html") if arguments.compare else None
     with ExitStack() as opened:
         found = [opened.enter_context(open_run(run)) for run in runs]
+        for run in found if arguments.more_gauges else ():
+            add_gauges(run, Path(arguments.more_gauges))
         out = Path(arguments.out) if arguments.out else default or found[0].path / "report.html"
         check_free(*_targets(out, arguments))
         if arguments.compare:
@@ -64,7 +70,7 @@ def command(arguments: argparse.Namespace) -> int:
                 write_table(tests, file)
             screen.say(str(out.with_suffix(".csv")))
         else:
-            report = make_report(found[0], _wanted(arguments), screen)
+            report = make_report(found[0], _wanted(arguments, found[0]), screen)
     _save(report, out, arguments, screen)
     return 0
 
@@ -73,14 +79,14 @@ def write_report(folder: Path, screen: Screen) -> None:
     """``report.html`` in the folder of a run that has just ended; what goes wrong is told and harms nothing."""
     try:
         with open_run(folder) as run:
-            save_page(make_report(run, Wanted(), screen), folder / "report.html")
+            save_page(make_report(run, Wanted(mm_per_px=run.mm_per_px), screen), folder / "report.html")
         screen.say(f"  {folder / 'report.html'}")
     except PhasedicError as error:
         screen.say(f"warning: no report was made: {error}")
 
 
-def _wanted(arguments: argparse.Namespace) -> Wanted:
-    scale = Display(arguments.scale).mm_per_px
+def _wanted(arguments: argparse.Namespace, run: RunFolder) -> Wanted:
+    scale = Display(arguments.scale).mm_per_px or run.mm_per_px
     return Wanted(tuple(arguments.fields), tuple(arguments.times), scale)
 
 

@@ -7,8 +7,9 @@ import threading
 from pathlib import Path
 
 from acquire.errors import ConfigError
+from live.commands.options import add_gauge_option
 from live.commands.run import signals
-from live.finished import open_run
+from live.finished import add_gauges, open_run
 from live.show import Asked, show
 from live.tell import Screen
 
@@ -20,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--to", dest="end_s", type=float, metavar="S", help="end here, seconds")
     words = "one instant in N (default: as many as the viewer can keep)"
     parser.add_argument("--every", type=int, metavar="N", help=words)
+    add_gauge_option(parser)
     parser.add_argument("--port", type=int, default=9876, help="of the view on 127.0.0.1 (default 9876)")
     words = "write this file instead, for: rerun FILE.rrd"
     parser.add_argument("--rrd", metavar="FILE.rrd", help=words)
@@ -32,6 +34,8 @@ def command(arguments: argparse.Namespace) -> int:
     asked = Asked(arguments.start_s, arguments.end_s, arguments.every)
     rrd = Path(arguments.rrd) if arguments.rrd else None
     with signals(enough.set, lambda text: None), open_run(arguments.run) as run:
+        if arguments.more_gauges:
+            add_gauges(run, Path(arguments.more_gauges))
         show(run, asked, screen, enough, port=arguments.port, rrd=rrd)
     if rrd is not None:
         screen.say(str(rrd))

@@ -62,7 +62,7 @@ def _mean_words(job: Job, name: str) -> str:
 def _gauge_words(job: Job, name: str) -> str:
     gauge = job.run.gauges.get(name.removeprefix("gauge_"))
     said = gauge.described if gauge is not None else {}
-    known = (f"{key} {value}" for key, value in said.items() if value is not None)
+    known = (f"{key} {value}" for key, value in said.items())
     return f" ({', '.join(known)}; places in px, y down)" if said else ""
 
 

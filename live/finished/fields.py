@@ -7,7 +7,7 @@ from typing import cast
 
 import numpy as np
 
-from analysis.field import PAIR_INDEX, Measure, StrainField
+from analysis.field import PAIR_INDEX, WINDOWS, Measure, StrainField, Window
 from live.results import Strain
 
 _GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
@@ -30,4 +30,12 @@ def read_field(strain: Strain, row: int) -> StrainField:
     shear = np.asarray(strain.maps("sigma_exy", row), np.float64)
     both = sigmas["du_dy"] ** 2 + sigmas["dv_dx"] ** 2
     covariance[PAIR_INDEX[_DU_DY, _DV_DX]] = (4 * shear**2 - both) / 2
-    return replace(field, covariance=covariance, measure=cast(Measure, strain.strain_measure))
+    measure = cast(Measure, strain.strain_measure)
+    return replace(field, covariance=covariance, measure=measure, window=_window(strain))
+
+
+def _window(strain: Strain) -> Window:
+    """The weight of the ZOIs, which says how far neighbours are correlated; gaussian where it is not recorded."""
+    said = strain.config.get("measure")
+    name = said.get("window") if isinstance(said, dict) else None
+    return cast(Window, name) if name in WINDOWS else "gaussian"

@@ -9,8 +9,10 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from acquire.camera import Camera, open_camera
+from acquire.camera import Camera, CroppedCamera, open_camera
+from acquire.errors import PhasedicError
 from acquire.frame import CameraInfo
+from acquire.record_mode import Crop
 from acquire.session import Session
 from live.results import Strain
 
@@ -50,16 +52,30 @@ def of_session(session: Session, strain: Strain) -> Pictures | None:
     return Pictures(session.camera, each)
 
 
-def of_images(address: str, strain: Strain) -> Pictures:
-    """Those that a replay measured; raises what ``open_camera`` raises where they are gone."""
-    with open_camera(address) as camera:
+def of_images(address: str, strain: Strain, crop: Crop | None = None) -> Pictures:
+    """Those that a replay measured, ``crop`` (x, y, width, height) of them.
+
+    Raises what ``open_camera`` raises where they are gone.
+    """
+    with _opened(address, crop) as camera:
         info = camera.info
 
     def each(rows: Sequence[int]) -> Iterator[Image]:
-        with open_camera(address) as again:
+        with _opened(address, crop) as again:
             yield from _numbered(again, [int(strain.values["frame"][row]) for row in rows])
 
     return Pictures(info, each)
+
+
+def _opened(address: str, crop: Crop | None) -> Camera:
+    camera = open_camera(address)
+    if crop is None:
+        return camera
+    try:
+        return CroppedCamera(camera, crop)
+    except PhasedicError:
+        camera.close()
+        raise
 
 
 def _numbered(camera: Camera, numbers: Sequence[int]) -> Iterator[Image]:

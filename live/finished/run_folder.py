@@ -6,6 +6,7 @@ with open_run("runs/20261122T081747Z") as run:
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -15,9 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.camera import with_scheme
 from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event, EventKind
+from acquire.record_mode import Crop
 from acquire.session import Session
 from analysis.field import StrainField
 from live.finished.fields import read_field
@@ -105,12 +108,20 @@ class RunFolder(Closing):
         """
         if self.session is not None:
             return of_session(self.session, self.strain)
-        if not self.camera_address.startswith(_AS_FILES):
-            return None
         try:
-            return of_images(self.camera_address, self.strain)
+            address = with_scheme(self.camera_address) if self.camera_address else ""
+            return of_images(address, self.strain, self._crop) if address.startswith(_AS_FILES) else None
         except PhasedicError:
             return None
+
+    @property
+    def _crop(self) -> Crop | None:
+        """The part of the pictures that was measured; None for all of it, or where the file says what cannot be."""
+        crop = self.section("camera").get("crop")
+        if not isinstance(crop, list) or [type(value) for value in crop] != [int] * 4:
+            return None
+        x, y, width, height = crop
+        return x, y, width, height
 
     @property
     def specimen(self) -> SpecimenConfig:
@@ -127,6 +138,14 @@ class RunFolder(Closing):
             return from_dict({"specimen": stored}, {}, str(self.strain.path)).specimen
         except ConfigError as error:
             raise DataError(f"{error}; make the results again with phasedic replay") from None
+
+    @property
+    def mm_per_px(self) -> float | None:
+        """The scale that was configured; None where there is none."""
+        scale = self.section("scale").get("mm_per_px")
+        if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0 < scale < math.inf:
+            return None
+        return float(scale)
 
     @property
     def title(self) -> str:
@@ -153,7 +172,12 @@ class RunFolder(Closing):
         for name in names:
             value, sigma = (np.asarray(values[column], np.float64) for column in gauge_columns(name))
             said = described.get(name)
-            tracks[name] = GaugeTrack(value, sigma, said if isinstance(said, dict) else {})
+            known = (
+                {key: item for key, item in said.items() if item is not None}
+                if isinstance(said, dict)
+                else {}
+            )
+            tracks[name] = GaugeTrack(value, sigma, known)
         return tracks
 
     @property

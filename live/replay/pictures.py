@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import csv
 import datetime
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
+from acquire.addresses import parse_address
 from acquire.burst import average_bursts, burst_of
-from acquire.camera import Camera
+from acquire.camera import Camera, with_scheme
 from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
+from acquire.opencv import picture_names
 from live.replay.material import Material, ReplayRequest, Seen, Window
 from live.setup import Config
 
@@ -69,6 +73,26 @@ def reference_from(path: str, camera: CameraInfo) -> Burst:
             f" {camera.bits} bits; they must be the same"
         )
     return burst_of([Frame(frozen(image), 0, 0.0, "nominal", 0, camera.bits, 0.0)])
+
+
+def write_names(source: str, path: Path) -> None:
+    """Which file each frame of the results was, as a CSV; nothing where the source has no files.
+
+    Raises
+    ------
+    DataError
+        It exists, or cannot be written.
+    """
+    address = parse_address(with_scheme(source))
+    if address.scheme != "files":
+        return
+    try:
+        with path.open("x", encoding="utf-8", errors="surrogateescape", newline="") as file:
+            rows = csv.writer(file, lineterminator="\n")
+            rows.writerow(("frame", "file", "page"))
+            rows.writerows((frame, *name) for frame, name in enumerate(picture_names(address)))
+    except OSError as error:
+        raise DataError(f"{path}: cannot be written ({error.strerror}); choose another --out") from None
 
 
 def picture_of(burst: Burst) -> Frame:

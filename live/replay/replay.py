@@ -27,7 +27,7 @@ from live.outputs import About, Outputs, make_outputs
 from live.replay.ahead import ahead
 from live.replay.forces import read_forces
 from live.replay.material import Material, ReplayRequest, Work, check_window
-from live.replay.pictures import picture_material, picture_of
+from live.replay.pictures import picture_material, picture_of, write_names
 from live.replay.session import session_config, session_material, session_path
 from live.setup import (
     AUTO,
@@ -165,6 +165,7 @@ def _run(
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
     config = with_mask(config, mask, folder)
     books = Books(journal, Ledger(), material.loads, History())
+    write_names(request.source, folder / "pictures.csv")
     screen.say(f"replaying {request.source} into {folder}")
     outputs = make_outputs(About(config, folder, camera, grid, material.start), books, screen)
     began, work = time.perf_counter(), ahead(bursts)
@@ -219,7 +220,7 @@ def pace_line(history: History, seconds: float) -> str:
     n, zois = len(history.instants), sum(instant.n_zoi for instant in history.instants)
     share = sum(instant.measure_s for instant in history.instants) / seconds
     return (
-        f"{n} bursts in {seconds:.1f} s: {n / seconds:.3g} bursts/s, {zois / seconds:,.0f} ZOI/s, of that time"
+        f"{n} bursts in {seconds:.3g} s: {n / seconds:.3g} bursts/s, {zois / seconds:,.0f} ZOI/s, of that time"
         f" {share:.0%} in the kernel"
     )
 

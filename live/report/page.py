@@ -27,7 +27,7 @@ h3{font-size:1rem;margin:1.2rem 0 .3rem}p{max-width:60rem;margin:.4rem 0}.dim{co
 .tile{border:1px solid var(--faint);border-radius:6px;padding:.5rem .7rem}.tile b{display:block;font-size:1.05rem}
 table{border-collapse:collapse;margin:.4rem 0;font-size:.94em}th,td{text-align:left;vertical-align:top;
 padding:.22rem .9rem .22rem 0;border-bottom:1px solid var(--faint);overflow-wrap:anywhere}th{font-weight:600}
-td:first-child{overflow-wrap:normal}.wide{overflow-x:auto}.number{text-align:right;font-variant-numeric:tabular-nums}
+th,td:first-child{overflow-wrap:normal}.wide{overflow-x:auto}.number{text-align:right;font-variant-numeric:tabular-nums}
 .open{color:var(--mark)}.error{color:#c0271b}.warning{color:var(--mark)}
 svg.plot,figure{max-width:100%;margin:0}figcaption{color:var(--dim);font-size:.85rem;margin:.15rem 0 .6rem}
 .plots{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(30rem,100%),1fr));gap:.4rem 1.2rem}

@@ -19,11 +19,18 @@ from live.tell import Screen, interval, quantity
 _MOST_EVENTS = 3000
 _KINDS = (".h5", ".csv", ".json", ".png", ".tif")
 _FIGURES = (
-    ("E", "Pa", "slope of stress over axial mean strain between 10 % and 60 % of Rp0.2, by least squares"),
+    (
+        "E",
+        "Pa",
+        "slope of stress over axial strain by least squares, over the strains named under Figures of the test",
+    ),
     ("EA", "N", "the same of force where the section is not known"),
-    ("nu", "1", "minus the slope of transverse over axial mean strain in the same part"),
-    ("Rp0.2", "Pa", "stress where the curve crosses the elastic line moved by 0.2 % strain"),
+    ("nu", "1", "minus the slope of transverse over axial strain in the same part"),
+    ("Rp0.1, Rp0.2, Rp1", "Pa", "stress where the curve crosses the elastic line moved by so much strain"),
+    ("ReH, ReL", "Pa", "upper and lower yield strength, where there is a yield point"),
     ("Rm", "Pa", "highest stress: force over the undeformed section"),
+    ("Agt, Ag", "1", "extension at Rm, total and plastic"),
+    ("At, A", "1", "extension at the break, total and plastic"),
 )
 
 
@@ -47,17 +54,23 @@ def _largest(values: NDArray[np.float64]) -> float:
 
 
 def _plain(value: object) -> str:
-    return ", ".join(map(_plain, value)) if isinstance(value, list | tuple) else str(value)
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_plain, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 def times(run: RunFolder) -> Part:
     """How late the load came beside the frames, and the results after them."""
     lag = lag_of(run)
     words = interval(lag, 1e-3, "ms").replace("+-", "±") if lag.known else f"not known: {lag.why}"
-    sign = f" ({CONFIDENCE:.0%} interval; positive: the load comes late; not applied)" if lag.known else ""
+    sign = f" ({CONFIDENCE:.0%} interval; positive: the load comes late)" if lag.known else ""
     late = np.asarray(run.strain.values.get("latency_s", ()), np.float64) * 1e3
     late = late[np.isfinite(late)]
-    found = {"lag of the load beside the frames": words + sign}
+    taken = run.section("load").get("lag_s")
+    found = {
+        "lag of the load beside the frames": words + sign,
+        "lag taken off the force": f"{taken:g} s" if isinstance(taken, int | float) and taken else "none",
+    }
     if late.size:
         p50, p95 = np.percentile(late, (50, 95))
         found["from the last frame of a burst to its result"] = f"p50 {p50:.0f} ms, p95 {p95:.0f} ms"

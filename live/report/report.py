@@ -26,7 +26,7 @@ from live.report.page import Part, captioned, element, facts, joined, page, para
 from live.report.practice import Known, reporting_table
 from live.report.record import definitions, events, gauges, hashes, ledger, times, version_table
 from live.report.svg import Figure, draw
-from live.tell import Screen, interval
+from live.tell import Screen, figure_lines, interval
 
 MOST_BYTES = 5_000_000
 _SIDES = (720, 480, 320, 200)  # px, of the pictures: smaller ones where the page would be too large
@@ -115,6 +115,7 @@ def _parts(content: _Content, wanted: Wanted, side: int) -> list[Part]:
         _head(run, content.curve),
         section("Specimen and rig", facts(_rig(run, taken))),
         section("Curves", plots(content.figures), _about_curves(content.curve)),
+        section("Figures of the test", *figure_table(run, content.curve)),
         section("Virtual gauges", gauges(run)),
         section("Lag and latency", times(run)),
         section("Maps", *(maps(run, name, chosen, taken, side) for name in fields)),
@@ -208,6 +209,8 @@ def _about_curves(curve: Curve) -> Part:
         return paragraph("No force is known at any instant, so there is no stress-strain curve.", "dim")
     words = "Bands are one standard uncertainty of the mean on either side."
     figures = curve.figures
+    if not figures.E.known:
+        words += f" E is not known: {figures.E.why}."
     if figures.span is not None:
         low, high = (100 * strain for strain in figures.span.strain)
         words += (
@@ -215,6 +218,12 @@ def _about_curves(curve: Curve) -> Part:
             f" ({figures.standard}, R^2 {figures.r2:.5f}); intervals of E, nu and Rp0.2 are of {CONFIDENCE:.0%}."
         )
     return paragraph(words, "dim")
+
+
+def figure_table(run: RunFolder, curve: Curve) -> list[Part]:
+    """All figures in words, how they were had, and which are not known and why."""
+    lines = figure_lines(curve.figures, run.specimen) if curve.has_load else []
+    return [paragraph(line.strip().replace("+-", "±").replace("  ", ", ")) for line in lines]
 
 
 def _noise_section(content: _Content) -> list[Part]:

@@ -37,7 +37,7 @@ class Quantity:
         return self.name in _TURNING
 
 
-_STRAINS = ("exx", "eyy", "exy", "du_dx", "du_dy", "dv_dx", "dv_dy")
+_STRAINS = ("exx", "eyy", "exy", "true_strain", "du_dx", "du_dy", "dv_dx", "dv_dy")
 # One index y (of place or of displacement) changes the sign, two restore it.
 _TURNING = ("v", "exy", "du_dy", "dv_dx", "y")
 
@@ -66,6 +66,11 @@ _INSTANTS = (
     Quantity("time", "s", "middle of the burst, since the start of the test"),
     Quantity("force", "N", "force at that time, tension positive; nan where it is not known"),
     Quantity("stress", "Pa", "force over the undeformed section"),
+    Quantity("true_strain", UNITLESS, "logarithm of one plus the axial engineering strain"),
+    Quantity(
+        "true_stress", "Pa", "stress times one plus the axial engineering strain; volume taken as constant"
+    ),
+    Quantity("force_raw", "N", "force before the lag was taken off"),
     Quantity("n_valid", UNITLESS, "ZOIs with a value"),
     Quantity("n_zoi", UNITLESS, "ZOIs asked for"),
     Quantity("noise", "GL", "temporal standard deviation of one frame; nan for a burst of one"),
@@ -81,7 +86,8 @@ _GAUGE = "gauge_"
 _KNOWN = {q.name: q for q in (*_FIELDS, *_PLACES, *_INSTANTS)}
 
 MEANS = {
-    "time_s": "time", "force_N": "force", "stress_Pa": "stress", "noise_GL": "noise",
+    "time_s": "time", "force_N": "force", "stress_Pa": "stress", "true_stress_Pa": "true_stress",
+    "force_raw_N": "force_raw", "noise_GL": "noise",
     "duration_s": "duration", "kernel_s": "kernel", "latency_s": "latency", "u_px": "u", "v_px": "v",
 }  # fmt: skip
 """Columns of ``Strain.values`` whose name carries the unit, and the quantity each is; others have its name."""

@@ -40,7 +40,7 @@ def show(
         setup_of(run),
         port=None if rrd else port,
         rrd=rrd,
-        tell=lambda text, level: _say(screen, text, level),
+        tell=lambda text, level: None if enough.is_set() else _say(screen, text, level),
         serving=lambda view: _announce(view, screen),
         story=told.messages,
     )

@@ -67,7 +67,8 @@ ROOMS = {
     "live.commands": "*",
     "live.cli": "acquire.errors acquire.printable live.commands.arguments live.unhurried",
     # A finished run is its results and its recording, or the images it measured.
-    "live.finished": "acquire acquire.camera acquire.session analysis.field live.results live.setup",
+    "live.finished": "acquire acquire.camera acquire.session analysis.evaluate analysis.field live.results"
+    " live.setup",
     "live.export": "acquire analysis.field live.results live.maps live.tell live.finished",
     "live.report": "acquire analysis.field analysis.evaluate analysis.picture live.results live.maps live.tell"
     " live.setup live.finished live.export",

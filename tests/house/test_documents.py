@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
+import re
 import tomllib
 from pathlib import Path
 
 import pytest
 
+from docs import make_site
 from docs.make_architecture import PICTURE, drawing
+from tests.house.links import dead_links
 from tests.house.messages import quoted, spoken, unsaid
 from tests.house.references import dead_in, dead_references, words
 from tests.house.rooms import PACKAGES
@@ -25,6 +29,52 @@ PLACES = [*PACKAGES, "tests", "docs", "examples"]
 def test_pages_name_what_is_there() -> None:
     dead = [found for page in PAGES for found in dead_references(ROOT, page)]
     assert not dead, "\n" + "\n".join(dead)
+
+
+def test_links_lead_somewhere() -> None:
+    dead = [found for page in [*PAGES, ROOT / "CHANGELOG.md"] for found in dead_links(ROOT, page)]
+    assert not dead, "\n" + "\n".join(dead)
+
+
+@pytest.mark.parametrize(
+    ("link", "dead"),
+    [
+        ("[a](b.md)", False),
+        ("![a](b.md#the-second-part)", False),
+        ("[a](#here)", False),
+        ("[a](https://example.org/gone)", False),
+        ("`[a](gone.md)`", False),
+        ("[a](gone.md)", True),
+        ("[a](b.md#gone)", True),
+        ("[a](../../../etc/passwd)", True),
+    ],
+)
+def test_a_dead_link_is_found(tmp_path: Path, link: str, dead: bool) -> None:
+    (tmp_path / "b.md").write_text("# B\n\n## The second part\n", encoding="utf-8")
+    (tmp_path / "a.md").write_text(f"# Here\n\n{link}\n", encoding="utf-8")
+    assert bool(list(dead_links(tmp_path, tmp_path / "a.md"))) is dead
+
+
+@pytest.mark.parametrize("module", make_site.REFERENCE.values())
+def test_the_reference_describes_what_is_there(module: str) -> None:
+    assert importlib.import_module(module).__doc__
+
+
+def test_the_navigation_names_pages_that_are_there() -> None:
+    nav = (ROOT / "mkdocs.yml").read_text(encoding="utf-8").partition("\nnav:")[2]
+    named = set(re.findall(r"[\w./-]+\.md", nav.partition("not_in_nav")[0]))
+    there = {page.relative_to(ROOT).as_posix() for page in PAGES} - {"README.md"}
+    assert named - there == {"index.md", "reference.md", "CHANGELOG.md"}
+
+
+@pytest.mark.slow
+def test_the_pages_are_built_without_a_warning() -> None:
+    pytest.importorskip("mkdocs")
+    pytest.importorskip("mkdocstrings")
+    assert make_site.main() == 0
+    page = (ROOT / "build" / "site" / "reference.html").read_text(encoding="utf-8")
+    assert "PhaseKernel" in page
+    assert "deformed" in page
 
 
 @pytest.mark.parametrize("place", PLACES)

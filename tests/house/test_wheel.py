@@ -157,8 +157,9 @@ def test_the_demo_runs_where_only_the_wheel_is(fresh: Path, tmp_path: Path) -> N
     ]
     environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
     done = subprocess.run(
-        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=280, check=False
-    )
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=280, check=False,
+        stdin=subprocess.DEVNULL,
+    )  # fmt: skip
     said = done.stdout + done.stderr
     # 1: in so short a test on a busy machine the truth may be missed; that is not the subject here.
     assert done.returncode in (0, 1), said

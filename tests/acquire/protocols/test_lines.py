@@ -86,3 +86,14 @@ def test_unknown_presets_list_the_known(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="No such file"):
         load_preset(str(tmp_path / "nothing.toml"))
     assert PRESETS.exists()
+
+
+def test_the_example_reads_the_lines_that_it_shows() -> None:
+    path = Path(__file__).parents[3] / "examples" / "own-protocol" / "scale.toml"
+    shown = [line[6:] for line in path.read_text().splitlines() if line.startswith("#     ")]
+    made = parser("lines", f"preset={path}")
+    readings = made.feed("".join(f"{line}\r\n" for line in ["", *shown]).encode())
+    assert [reading.value for reading in readings] == pytest.approx([12.345, -0.12, math.nan], nan_ok=True)
+    assert [reading.unit for reading in readings] == ["kN", "kN", None]
+    assert [reading.flags for reading in readings] == [LoadFlag.NONE, LoadFlag.UNSTABLE, LoadFlag.OVERLOAD]
+    assert made.commands["tare"] == b"T\r\n"

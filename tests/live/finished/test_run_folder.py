@@ -59,7 +59,17 @@ def test_a_replay_finds_the_session_it_was_made_from(tmp_path: Path) -> None:
         assert run.pictures is not None
 
 
-def test_a_replay_of_pictures_finds_them_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("source", "more", "shape"),
+    [
+        ("files:{folder}/*.png", [], (96, 128)),
+        ("{folder}/*.png", [], (96, 128)),
+        ("{folder}", ["0, 0, 96, 80"], (80, 96)),
+    ],
+)
+def test_a_replay_of_pictures_finds_them_again(
+    tmp_path: Path, source: str, more: list[str], shape: tuple[int, int]
+) -> None:
     rng = np.random.default_rng(1)
     pattern = cv2.GaussianBlur(rng.normal(size=(96, 128)).astype(np.float32), (0, 0), 2.0)
     for k in range(4):
@@ -68,10 +78,14 @@ def test_a_replay_of_pictures_finds_them_again(tmp_path: Path) -> None:
         cv2.imwrite(str(tmp_path / f"a{k}.png"), image)
     out = str(tmp_path / "out")
     arguments = ["--zoi", "32", "--out", out, "--no-view", "--no-rrd"]
-    assert main(["replay", f"files:{tmp_path}/*.png", *arguments]) == 0
+    config = tmp_path / "crop.toml"
+    config.write_text(f"[camera]\ncrop = [{more[0]}]\n" if more else "")
+    assert main(["replay", source.format(folder=tmp_path), "--config", str(config), *arguments]) == 0
     with open_run(out) as run:
         assert run.pictures is not None
-        assert [int(image[0, 0]) for image in run.pictures.each([0, 2])] == [1, 3]
+        images = list(run.pictures.each([0, 2]))
+        assert [int(image[0, 0]) for image in images] == [1, 3]
+        assert (run.pictures.info.height, run.pictures.info.width) == images[0].shape == shape
     for path in tmp_path.glob("a*.png"):
         path.unlink()
     with open_run(out) as run:

@@ -48,6 +48,17 @@ def test_a_picture_comes_out(results: Path, tmp_path: Path, more: list[str]) -> 
     assert drawn.std() > 5
 
 
+def test_that_a_map_lies_on_the_reference_is_told_where_it_matters(
+    results: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    over = ["--over", str(results / "a1.png")]
+    assert main(["map", str(results / "out" / "strain.h5"), str(tmp_path / "a.png"), *over]) == 0
+    assert "note:" not in capsys.readouterr().out, "nothing has moved as far as a person sees"
+    monkeypatch.setattr("live.commands.map._SEEN_PX", 0.05)
+    assert main(["map", str(results / "out" / "strain.h5"), str(tmp_path / "b.png"), *over]) == 0
+    assert "note: the map lies on the reference picture" in capsys.readouterr().out
+
+
 def test_what_was_done_is_named() -> None:
     grid = ZoiGrid.cover(Roi(0, 0, 192, 160), 48, 8)
     assert Picture("eyy").treatment(grid) == ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import threading
 from pathlib import Path
@@ -157,6 +158,17 @@ def test_a_part_is_cut_as_configured(shots: Path, tmp_path: Path) -> None:
     assert replay(request, Screen(quiet=True), threading.Event()).exit_code == 0
     with Strain.open(tmp_path / "out" / "strain.h5") as strain:
         assert strain.grid.x[-1] < 120
+
+
+def test_the_results_say_which_file_each_frame_was(shots: Path, session: Path, tmp_path: Path) -> None:
+    assert main(["replay", str(shots), *SMALL, "--out", str(tmp_path / "a")]) == 0
+    names = list(csv.DictReader((tmp_path / "a" / "pictures.csv").read_text(encoding="utf-8").splitlines()))
+    with Strain.open(tmp_path / "a" / "strain.h5") as strain:
+        found = [names[int(frame)]["file"] for frame in strain.values["frame"]]
+    assert found == [f"a{k}.png" for k in range(1, len(STRAINS))]
+    assert {row["page"] for row in names} == {"0"}
+    assert main(["replay", str(session), *SMALL, "--out", str(tmp_path / "b")]) == 0
+    assert not (tmp_path / "b" / "pictures.csv").exists()
 
 
 def test_a_report_at_the_end(shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
