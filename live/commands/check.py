@@ -80,5 +80,5 @@ def _load(config: Config) -> LoadReport | None:
     """A few seconds of the load cell, where there is one."""
     if config.load.address == "none:":
         return None
-    cell = open_load(config.load.address)
+    cell = open_load(config.load.address, camera_address=config.camera.address)
     return load_check.report(load_check.listen(cell, LISTEN_S), cell.info)

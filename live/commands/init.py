@@ -17,6 +17,9 @@ from live.specimen import Overlay, Proposal, look, mask_picture, propose, rig_te
 from live.tell import Screen
 
 RECORDED = ("files", "video", "session")
+MEASURE = (
+    "roi", "mask", "zoi", "step", "gauges", "burst", "reference-burst", "noise", "scale", "axis",
+)  # fmt: skip
 OWN = ("measure.roi", "measure.mask", "measure.zoi", "measure.step", "measure.gauges", "camera.address",
        "load.address", "specimen.axis")  # fmt: skip
 """Keys that the text of a proposal has; others that are given are added to it."""
@@ -34,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(
         parser, "devices, looked for where they are not given", "camera", "crop", "load", "dark", "flat"
     )
-    add_options(parser, "measurement", "roi", "mask", "zoi", "step", "gauges", "burst", "scale", "axis")
+    add_options(parser, "measurement", *MEASURE)
     parser.add_argument("--section", metavar="W,T", help="width,thickness of the section in mm, for stresses")
     add_verbose(parser)
 
