@@ -17,7 +17,7 @@ from live.commands.exit_codes import NOT_READY
 from live.commands.options import add_measure, add_options, configured
 from live.commands.watching import interrupts, watch
 from live.setup import Config, open_load
-from live.specimen import Overlay, snapshot, with_auto_gauges
+from live.specimen import Overlay, snapshot, troubles, with_auto_gauges
 from live.tell import Screen
 
 LISTEN_S = 3.0
@@ -55,7 +55,7 @@ def command(arguments: argparse.Namespace) -> int:
         with interrupts() as stop:
             figures = watch(config, target, screen, stop.is_set)
     else:
-        figures = examine(take(config), config, _load(config))
+        figures = examine(take(config, troubles(screen.say)), config, _load(config))
     if arguments.snapshot:
         write_picture(Path(arguments.snapshot), _drawn(figures, config, target))
         screen.say(f"written: {arguments.snapshot}")

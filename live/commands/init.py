@@ -52,7 +52,7 @@ def command(arguments: argparse.Namespace) -> int:
     said = overrides(arguments)
     found = _devices(said, screen)
     config = load_config(None, {**said, "camera.address": found.camera, "load.address": found.load})
-    seen = look(config)
+    seen = look(config, screen.say)
     words = found.camera_words or printable(seen.camera.name), found.load_words
     proposal = propose(seen, config, said, words, found.others)
     if mask is not None and proposal.region.mask is not None:

@@ -122,9 +122,9 @@ def test_devices_are_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     look = init.look
     opened = []
 
-    def first_look(config):
+    def first_look(config, say):
         opened.append(config.camera.address)
-        return look(load_config(None, {"camera.address": SIM}))
+        return look(load_config(None, {"camera.address": SIM}), say)
 
     monkeypatch.setattr(init, "look", first_look)
     rig = made(tmp_path)
