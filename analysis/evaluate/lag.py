@@ -208,7 +208,9 @@ def _without(values: Floats, columns: Floats) -> Floats:
 
 def _pace_noise(force: Track) -> float:
     """Standard deviation that the noise of the force puts into its pace."""
-    samples = max(_SMOOTH_S / float(np.median(np.diff(force.t))), 1.0)
+    # Of samples that come in bunches, several with one stamp, the mean distance tells, not the median.
+    spacing = float(np.median(np.diff(force.t))) or float(np.ptp(force.t)) / (len(force.t) - 1)
+    samples = max(_SMOOTH_S / spacing, 1.0)
     return noise(force.values) * math.sqrt(2 / samples) / _SMOOTH_S
 
 

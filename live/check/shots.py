@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
-from acquire.events import ignore_event
+from acquire.events import EventSink, ignore_event
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from live.setup import DEFAULT_REFERENCE_BURST, Config, open_rig
 
@@ -73,7 +73,7 @@ class Shots:
         return math.sqrt(total / (2 * (len(self) - 1)))
 
 
-def take(config: Config) -> Shots:
+def take(config: Config, on_event: EventSink = ignore_event) -> Shots:
     """Twice as many frames as the reference has, so that one half can be measured against the other.
 
     A folder that has fewer is judged by what it has. Frames that are lost in between are counted.
@@ -90,7 +90,7 @@ def take(config: Config) -> Shots:
         raise ConfigError(
             f"measure.reference_burst = {reference} is too short for a check; allowed: from {FEWEST}"
         )
-    rig = open_rig(config.camera.address, "none:", ignore_event, crop=config.camera.crop)
+    rig = open_rig(config.camera.address, "none:", on_event, crop=config.camera.crop)
     frames: list[Frame] = []
     lost = 0
     try:

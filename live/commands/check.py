@@ -14,10 +14,10 @@ from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
 from live.check import WITHOUT_TARGET, Figures, examine, judge, table_lines, take
 from live.commands.exit_codes import NOT_READY
-from live.commands.options import add_measure, add_options, configured
+from live.commands.options import PICTURES, add_measure, add_options, configured, to_be_new
 from live.commands.watching import interrupts, watch
 from live.setup import Config, open_load
-from live.specimen import Overlay, snapshot, with_auto_gauges
+from live.specimen import Overlay, snapshot, troubles, with_auto_gauges
 from live.tell import Screen
 
 LISTEN_S = 3.0
@@ -48,14 +48,14 @@ def command(arguments: argparse.Namespace) -> int:
     config = configured(arguments)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")
-    if arguments.snapshot and Path(arguments.snapshot).exists():
-        raise ConfigError(f"{arguments.snapshot} exists; nothing is overwritten, choose another name")
+    if arguments.snapshot:
+        to_be_new(Path(arguments.snapshot), *PICTURES)
     target = None if arguments.target is None else arguments.target * 1e-6
     if arguments.watch:
         with interrupts() as stop:
             figures = watch(config, target, screen, stop.is_set)
     else:
-        figures = examine(take(config), config, _load(config))
+        figures = examine(take(config, troubles(screen.say)), config, _load(config))
     if arguments.snapshot:
         write_picture(Path(arguments.snapshot), _drawn(figures, config, target))
         screen.say(f"written: {arguments.snapshot}")
@@ -80,5 +80,5 @@ def _load(config: Config) -> LoadReport | None:
     """A few seconds of the load cell, where there is one."""
     if config.load.address == "none:":
         return None
-    cell = open_load(config.load.address)
+    cell = open_load(config.load.address, camera_address=config.camera.address)
     return load_check.report(load_check.listen(cell, LISTEN_S), cell.info)

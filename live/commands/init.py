@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import argparse
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from acquire.addresses import parse_address
-from acquire.errors import ConfigError, DeviceError
+from acquire.errors import DeviceError
 from acquire.files import write_picture
 from acquire.printable import printable
-from live.commands.options import add_options, add_verbose, overrides
+from live.commands.options import PICTURES, add_options, add_verbose, overrides, to_be_new
 from live.setup import load_config, new_rig
 from live.specimen import Overlay, Proposal, look, mask_picture, propose, rig_text, snapshot
 from live.tell import Screen
 
 RECORDED = ("files", "video", "session")
+MEASURE = (
+    "roi", "mask", "zoi", "step", "gauges", "burst", "reference-burst", "noise", "scale", "axis",
+)  # fmt: skip
 OWN = ("measure.roi", "measure.mask", "measure.zoi", "measure.step", "measure.gauges", "camera.address",
        "load.address", "specimen.axis")  # fmt: skip
 """Keys that the text of a proposal has; others that are given are added to it."""
@@ -34,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(
         parser, "devices, looked for where they are not given", "camera", "crop", "load", "dark", "flat"
     )
-    add_options(parser, "measurement", "roi", "mask", "zoi", "step", "gauges", "burst", "scale", "axis")
+    add_options(parser, "measurement", *MEASURE)
     parser.add_argument("--section", metavar="W,T", help="width,thickness of the section in mm, for stresses")
     add_verbose(parser)
 
@@ -45,11 +49,14 @@ def command(arguments: argparse.Namespace) -> int:
     rig = Path(arguments.file)
     png = Path(arguments.snapshot) if arguments.snapshot else rig.with_suffix(".png")
     mask = rig.with_name(f"{rig.stem}-mask.png") if arguments.fixed else None
-    _nothing_there(rig, png, mask)
+    to_be_new(rig)
+    to_be_new(png, *PICTURES)
+    if mask is not None:
+        to_be_new(mask)
     said = overrides(arguments)
     found = _devices(said, screen)
     config = load_config(None, {**said, "camera.address": found.camera, "load.address": found.load})
-    seen = look(config)
+    seen = look(config, screen.say)
     words = found.camera_words or printable(seen.camera.name), found.load_words
     proposal = propose(seen, config, said, words, found.others)
     if mask is not None and proposal.region.mask is not None:
@@ -66,12 +73,6 @@ def command(arguments: argparse.Namespace) -> int:
 def _kept(said: dict[str, object], fixed: bool) -> set[str]:
     """What stands in the file as it was given, in place of what was found."""
     return set() if fixed else {"measure.roi", "measure.mask", "measure.gauges"} & set(said)
-
-
-def _nothing_there(*paths: Path | None) -> None:
-    for path in paths:
-        if path is not None and (path.exists() or path.is_symlink()):
-            raise ConfigError(f"{path} exists; nothing is overwritten, choose another name")
 
 
 # -- devices ------------------------------------------------------------------------------------
@@ -162,4 +163,5 @@ def _tell(p: Proposal, rig: Path, png: Path, screen: Screen) -> None:
     )
     screen.say(f"gauges: {', '.join(p.config.gauges) or 'none'}")
     screen.say(f"written: {rig}, and {png} to look at")
-    screen.say(f"next: phasedic check --config {rig}, then phasedic run --config {rig}")
+    name = shlex.quote(str(rig))
+    screen.say(f"next: phasedic check --config {name}, then phasedic run --config {name}")

@@ -20,6 +20,9 @@ MEASURE = (
 OUTPUT = ("out", "no-view", "no-rrd", "light", "axis", "standard", "zero", "lag", "report")
 
 
+PICTURES = (".png", ".tif")
+
+
 def add_options(parser: argparse.ArgumentParser, title: str, *names: str) -> None:
     """A group of options by their names."""
     group, known = parser.add_argument_group(title), options()
@@ -66,6 +69,14 @@ def add_gauge_option(parser: argparse.ArgumentParser) -> None:
     """--gauges of the commands that look at a finished run."""
     words = "virtual gauges to lay over the run: a TOML file with tables [gauges.NAME]"
     parser.add_argument("--gauges", dest="more_gauges", metavar="FILE.toml", help=words)
+
+
+def to_be_new(path: Path, *endings: str) -> None:
+    """Raises ConfigError where there is such a file already, or its name does not end in one of these."""
+    if path.exists() or path.is_symlink():
+        raise ConfigError(f"{path} exists; nothing is overwritten, choose another name")
+    if endings and path.suffix.lower() not in endings:
+        raise ConfigError(f"{path}: no such picture can be written; end its name in {' or '.join(endings)}")
 
 
 def add_verbose(parser: argparse.ArgumentParser) -> None:

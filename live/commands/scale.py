@@ -68,7 +68,7 @@ def command(arguments: argparse.Namespace) -> int:
     _check(arguments)
     config = configured(arguments)
     stand_off = arguments.stand_off or config.scale.stand_off_mm
-    scale = _scale(arguments, config, stand_off)
+    scale = _scale(arguments, config, stand_off, screen)
     screen.say(
         f"scale: {scale.mm_per_px:.6g} +- {scale.sigma:.2g} mm/px ({scale.relative:.2%}), {scale.method}"
     )
@@ -98,13 +98,13 @@ def _check(arguments: argparse.Namespace) -> None:
             raise ConfigError(f"--{name.replace('_', '-')} {value:g} is not possible; give mm above 0")
 
 
-def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | None) -> Scale:
+def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | None, screen: Screen) -> Scale:
     if arguments.points is not None:
         x1, y1, x2, y2 = _numbers(arguments.points, ",", 4, float, "--points", "12,30,840,32")
         return from_points((x1, y1, x2, y2), _needed(arguments, "length"), arguments.sigma)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS or --config rig.toml")
-    seen = look(config)
+    seen = look(config, screen.say)
     if arguments.width is None:
         return from_board(seen.picture, _board(arguments), arguments.sigma, stand_off)
     width = config.specimen.width_mm if arguments.width == OF_THE_RIG else arguments.width

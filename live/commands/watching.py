@@ -13,11 +13,11 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import TYPE_CHECKING, TextIO
 
-from acquire.events import ignore_event
 from acquire.printable import printable
 from live.check import GLANCE, Figures, Glance, Rolling, Watch, judge
 from live.check.judge import Line
 from live.setup import DEFAULT_REFERENCE_BURST, Config, open_rig
+from live.specimen import troubles
 from live.tell import Screen
 from live.view import View, ViewSetup, spawn_viewer
 
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 EVERY_S = 1 / 3
 BAR = 30
 CLOSE_S = 5.0
+MOST_NOTES = 4  # the newest
 
 
 def watch(config: Config, target: float | None, screen: Screen, stopped: Callable[[], bool]) -> Figures:
@@ -39,7 +40,7 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
     """
     frames = 2 * (config.measure.reference_burst or DEFAULT_REFERENCE_BURST)
     watch, show, notes = Watch(config), Display(screen), list[str]()
-    rig = open_rig(config.camera.address, "none:", ignore_event, crop=config.camera.crop)
+    rig = open_rig(config.camera.address, "none:", troubles(notes.append), crop=config.camera.crop)
     try:
         with Rolling(rig.camera, frames) as rolling, _viewed(config, notes) as view:
             due = time.monotonic()
@@ -48,7 +49,7 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
                 if shots is not None:
                     glance = watch.glance(shots)
                     lines = judge(glance.figures, target, config.measure.reference_shift_px)
-                    told = [*notes, peak_line(glance), *(line.text() for line in lines)]
+                    told = [*notes[-MOST_NOTES:], peak_line(glance), *(line.text() for line in lines)]
                     show.lines(told, short(glance, lines))
                     view(rolling, glance, lines)
                 due = max(due + EVERY_S, time.monotonic())

@@ -95,6 +95,9 @@ def _open_load(address: str, on_event: EventSink, specimen: VirtualSpecimen | No
     return open_sim_load(parse_address(address), on_event, specimen)
 
 
-def open_load(address: str, on_event: EventSink = ignore_event) -> LoadCell:
-    """A load cell alone, a simulated one too; raises as ``open_load_cell``."""
-    return _open_load(address, on_event, _specimen("none:", address))
+def open_load(address: str, on_event: EventSink = ignore_event, camera_address: str = "none:") -> LoadCell:
+    """A load cell alone, a simulated one too; raises as ``open_load_cell``.
+
+    A simulated one pulls the specimen that a simulated camera at ``camera_address`` sees.
+    """
+    return _open_load(address, on_event, _specimen(camera_address, address))

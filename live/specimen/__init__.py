@@ -17,6 +17,7 @@ from live.specimen.region import (
     placed_on,
     region_of,
     searched,
+    troubles,
     with_mask_at,
 )
 from live.specimen.scale import OUT_OF_PLANE_MM, Scale, false_strain, from_points, from_width
@@ -44,6 +45,7 @@ __all__ = [
     "rig_text",
     "searched",
     "snapshot",
+    "troubles",
     "with_auto_gauges",
     "with_mask_at",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import shlex
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from acquire.errors import ConfigError
+from acquire.printable import printable
 from live.setup import AUTO, Config, GaugeConfig
 from live.specimen.placing import with_auto_gauges
 from live.specimen.region import Look, Region, is_sought, region_of
@@ -140,7 +142,7 @@ def rig_text(p: Proposal, path: Path, mask: Path | None = None) -> str:
 
 
 def _head(path: Path) -> Iterator[str]:
-    name = _quoted(str(path))
+    name = " ".join(printable(shlex.quote(str(path))).split())
     yield f"# The rig, as phasedic init found it on {datetime.datetime.now(datetime.UTC):%Y-%m-%d %H:%M} UTC."
     yield f"# Next: phasedic check --config {name}, then phasedic run --config {name}"
     yield f"# For lengths in mm: phasedic scale --config {name} --points X1,Y1,X2,Y2 --length MM"
@@ -204,7 +206,7 @@ def _gauge(name: str, g: GaugeConfig) -> Iterator[str]:
 
 
 def _remark(words: str) -> str:
-    return f"   # {' '.join(words.split())}" if words else ""
+    return f"   # {printable(' '.join(words.split()))}" if words else ""
 
 
 def _numbers(values: Iterable[float]) -> str:

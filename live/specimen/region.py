@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
-from acquire.events import ignore_event
+from acquire.events import Event, EventSink
 from acquire.files import write_picture
 from acquire.frame import CameraInfo
 from live.setup import ALL, AUTO, Config, grid_for, open_rig, read_mask, whole_picture
@@ -31,7 +32,7 @@ Bools = NDArray[np.bool_]
 
 LOOK_FRAMES = 4
 """Taken of a live camera to find the specimen; of pictures, one."""
-ALL_SHARE = 0.98  # of the picture: the specimen fills it
+ALL_SHARE = 0.98  # of the picture: the specimen fills it, but for holes that a ZOI would feel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +101,7 @@ def _found(config: Config, picture: NDArray[Any], noise: float | None) -> Region
     specimen = find_specimen(picture, noise) if min(picture.shape) >= config.measure.zoi else None
     if specimen is None:
         return none
-    if specimen.share > ALL_SHARE:
+    if specimen.share > ALL_SHARE and _deepest_gap(specimen.mask) < config.measure.zoi / 4:
         return Region(None, None, "the specimen fills the picture: all but a rim", found=True)
     box = _within(specimen.box.x, specimen.box.y, specimen.box.width, specimen.box.height, config, picture)
     share = f"{specimen.share:.0%} of the picture"
@@ -114,6 +115,12 @@ def _found(config: Config, picture: NDArray[Any], noise: float | None) -> Region
         zoi = config.measure.zoi
         return replace(none, words=f"the pattern that was found takes no ZOI of {zoi} px: all but a rim")
     return region
+
+
+def _deepest_gap(mask: Bools) -> float:
+    """How far inside what is left out one can be, px: the radius of a hole."""
+    gaps = np.where(mask, np.uint8(0), np.uint8(1))
+    return float(load_cv2().distanceTransform(gaps, load_cv2().DIST_L2, 5).max()) if gaps.any() else 0.0
 
 
 def _within(x: int, y: int, w: int, h: int, config: Config, picture: NDArray[Any]) -> Box:
@@ -148,15 +155,17 @@ class Look:
         return width, height
 
 
-def look(config: Config) -> Look:
+def look(config: Config, say: Callable[[str], None]) -> Look:
     """Open the camera, take a few frames, and close it again; raises as ``open_rig``.
+
+    What goes wrong meanwhile is said: a camera that gives nothing is waited for.
 
     Raises
     ------
     DataError
         The camera gave nothing.
     """
-    rig = open_rig(config.camera.address, "none:", ignore_event, crop=config.camera.crop)
+    rig = open_rig(config.camera.address, "none:", troubles(say), crop=config.camera.crop)
     n = LOOK_FRAMES if rig.camera.info.live else 1
     images: list[NDArray[Any]] = []
     try:
@@ -170,6 +179,16 @@ def look(config: Config) -> Look:
     if not images:
         raise DataError(f"{config.camera.address}: gave no whole frame; look at the camera")
     return Look(*_mean_and_noise(images), rig.camera.info)
+
+
+def troubles(say: Callable[[str], None]) -> EventSink:
+    """Warnings and errors of a device, said."""
+
+    def tell(event: Event) -> None:
+        if event.level != "info":
+            say(event.text)
+
+    return tell
 
 
 def _mean_and_noise(images: list[NDArray[Any]]) -> tuple[NDArray[Any], float | None]:
@@ -190,7 +209,7 @@ def searched(config: Config, say: Callable[[str], None]) -> Iterator[Config]:
         yield config
         return
     sought = is_sought(config)
-    config, mask = placed_on(config, look(config), say)
+    config, mask = placed_on(config, look(config, say), say)
     with TemporaryDirectory(prefix="phasedic-") as folder:
         yield with_mask_at(config, mask if sought else None, Path(folder) / "mask.png")
 

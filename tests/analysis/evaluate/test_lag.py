@@ -75,3 +75,11 @@ def test_gaps_are_left_out() -> None:
     values[::7] = np.nan
     figure = find_lag(Track(strain.t, values), force)
     assert abs(figure.value - 0.15) < 0.02
+
+
+def test_samples_that_come_in_bunches() -> None:
+    """A busy machine reads several lines at once and stamps them alike."""
+    strain, force = tracks(0, 0.15)
+    bunched = np.repeat(force.t[::4], 4)[: len(force.t)]
+    figure = find_lag(strain, Track(bunched, force.values))
+    assert figure.value == pytest.approx(0.15, abs=0.05)

@@ -87,6 +87,19 @@ def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[st
         (tmp_path / taken).unlink()
 
 
+def test_names_of_any_kind(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A name may hold what TOML or a shell would read otherwise; a picture that cannot be is told at once."""
+    rig = tmp_path / "a 'b\n[measure]\n\"é.toml"
+    assert main(["init", str(rig), "--camera", SIM]) == 0
+    assert load_config(rig, {}).camera.address == SIM
+    capsys.readouterr()
+    assert (
+        main(["init", str(tmp_path / "c.toml"), "--camera", SIM, "--snapshot", str(tmp_path / "c.abc")]) == 2
+    )
+    assert "end its name in .png or .tif" in capsys.readouterr().err
+    assert not (tmp_path / "c.toml").exists()
+
+
 @pytest.mark.parametrize("wide", [True, False])
 def test_pictures(tmp_path: Path, wide: bool) -> None:
     """A slender specimen lying or standing in the picture; no load cell is looked for."""
@@ -122,9 +135,9 @@ def test_devices_are_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     look = init.look
     opened = []
 
-    def first_look(config):
+    def first_look(config, say):
         opened.append(config.camera.address)
-        return look(load_config(None, {"camera.address": SIM}))
+        return look(load_config(None, {"camera.address": SIM}), say)
 
     monkeypatch.setattr(init, "look", first_look)
     rig = made(tmp_path)

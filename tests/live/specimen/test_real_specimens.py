@@ -34,7 +34,7 @@ HALF = ZOI / 2
 
 def region_in(path: Path) -> Region:
     config = load_config(None, {"camera.address": f"files:{path}", "measure.zoi": ZOI})
-    seen = look(config)
+    seen = look(config, print)
     return region_of(config, seen.picture, seen.noise)
 
 

@@ -12,8 +12,8 @@ import pytest
 
 from live.cli import main
 from live.results import Strain
-from live.setup import load_config
-from live.specimen import Look, placed_on, region_of
+from live.setup import load_config, open_rig
+from live.specimen import Look, look, placed_on, region_of
 
 SIM = "sim:hole?seconds=2&fps=20&width=320&height=320&hole=40&lockstep=yes"
 QUICK = ["--zoi", "32", "--step", "16", "--no-view", "--no-rrd"]
@@ -101,3 +101,42 @@ def test_nothing_that_stands_out_is_told() -> None:
     assert mask is None
     assert config.measure.roi == "all"
     assert said[0].startswith("no specimen was found that stands out")
+
+
+def test_a_camera_that_gives_nothing_at_first_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is waited for, and that is said; what is no trouble is not."""
+    from acquire.events import Event, EventKind
+
+    def troubled(address: str, load: str, on_event, **how):
+        on_event(Event(0.0, EventKind.LOST, "camera", "no picture for 2.0 s; still waiting", "warning"))
+        on_event(Event(0.0, EventKind.LOST, "camera", "opened", "info"))
+        return open_rig(address, load, on_event, **how)
+
+    monkeypatch.setattr("live.specimen.region.open_rig", troubled)
+    said: list[str] = []
+    seen = look(load_config(None, {"camera.address": SIM}), said.append)
+    assert said == ["no picture for 2.0 s; still waiting"]
+    assert seen.size == (320, 320)
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "sim:hole?width=400&height=360&hole=50&lockstep=yes&seconds=2",
+        "sim:hole?width=400&height=360&hole=30&radius=3.5&noise=3&bits=8&lockstep=yes&seconds=2",
+        "sim:woven?width=300&height=260&lockstep=yes&seconds=2",
+    ],
+)
+def test_simulated_specimens(address: str) -> None:
+    """The mask is that of the simulated specimen, to half a ZOI."""
+    config = load_config(None, {"camera.address": address, "measure.zoi": 32})
+    rig = open_rig(address, "none:")
+    rig.close()
+    assert rig.specimen is not None
+    truth = rig.specimen.mask()
+    seen = look(config, print)
+    inside = region_of(config, seen.picture, seen.noise).inside(*seen.size, 32)
+    distance = [cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (truth, ~truth)]
+    assert not inside[distance[1] > 16].any()
+    deep = distance[0] > 16 if not truth.all() else truth
+    assert inside[4:-4, 4:-4][deep[4:-4, 4:-4]].all()

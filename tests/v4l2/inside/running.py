@@ -85,7 +85,7 @@ class Run:
             str(out),
             *more,
         ]
-        argv += ["--no-view", "--no-rrd"]
+        argv += ["--roi", "all", "--no-view", "--no-rrd"]
         with self._words.open("w") as words:
             self._process = subprocess.Popen(argv, stdout=words, stderr=subprocess.STDOUT)
 

@@ -6,13 +6,18 @@ import subprocess
 import sys
 import time
 from itertools import islice
+from pathlib import Path
+from typing import Any
 
 import pytest
+from numpy.typing import NDArray
 
 from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.v4l2.listing import list_cameras
-from tests.v4l2.inside import vivid
+from live.cli import main
+from live.setup import load_config
+from tests.v4l2.inside import running, vivid
 
 SMALL = "/dev/video0?format=GREY&width=640&height=360"
 
@@ -37,6 +42,26 @@ def test_the_command_lists_it() -> None:
     assert done.returncode == 0, done.stderr
     assert "/dev/video0" in done.stdout
     assert "/dev/ttyACM0" in done.stdout
+
+
+@pytest.mark.v4l2
+def test_a_rig_file_is_made_of_what_is_plugged_in(
+    tmp_path: Path, pictures: dict[str, NDArray[Any]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The camera and the indicator are found by themselves, the specimen where it is said to look."""
+    with running.Indicator(10.0):
+        assert main(["init", str(tmp_path / "rig.toml")]) == 0
+    config = load_config(tmp_path / "rig.toml", {})
+    assert "/dev/v" in config.camera.address
+    assert "format=" in config.camera.address
+    assert config.load.address.startswith("/dev/ttyACM0?protocol=")
+    assert (tmp_path / "rig.png").exists()
+    with vivid.looped("GREY", pictures["reference_8"], fps=50):
+        camera = "/dev/video0?input=1&format=GREY"
+        looped = tmp_path / "looped.toml"
+        assert main(["init", str(looped), "--camera", camera, "--load", "none:"]) == 0
+    assert "the specimen" in capsys.readouterr().out
+    assert load_config(looped, {}).measure.roi == "auto"
 
 
 @pytest.mark.v4l2
