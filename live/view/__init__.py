@@ -8,6 +8,6 @@ there alone. ``viewer`` finds rerun's program.
 from live.view.exchange.setup import ViewSetup
 from live.view.exchange.thinned import Thinned
 from live.view.view import View
-from live.view.viewer import rerun_command, spawn_viewer
+from live.view.viewer import has_display, rerun_command, spawn_viewer
 
-__all__ = ["Thinned", "View", "ViewSetup", "rerun_command", "spawn_viewer"]
+__all__ = ["Thinned", "View", "ViewSetup", "has_display", "rerun_command", "spawn_viewer"]
