@@ -10,7 +10,7 @@ from acquire.errors import PhasedicError
 from acquire.printable import brief
 from live.commands.options import add_measure, add_options, overrides
 from live.commands.report import write_report
-from live.commands.run import invite, signals, watched
+from live.commands.run import OTHER_PROGRAMS, RECORDING, invite, signals, watched
 from live.serve import DEFAULT_PORT, Desk, Draft
 from live.setup import load_config
 from live.tell import Screen
@@ -21,9 +21,8 @@ EXIT_INTERRUPTED = 130
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic page``."""
-    add_options(
-        parser, "devices and recording", "camera", "load", "no-record", "record", "dark", "flat", "crop"
-    )
+    add_options(parser, "devices and recording", *RECORDING)
+    add_options(parser, "other programs", *OTHER_PROGRAMS)
     add_measure(parser)
     words = f"port of the page on 127.0.0.1 (default {DEFAULT_PORT}); the next free one is taken"
     parser.add_argument("--page-port", type=int, default=DEFAULT_PORT, metavar="N", help=words)

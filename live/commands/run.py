@@ -24,6 +24,9 @@ from live.view import has_display, rerun_command, spawn_viewer
 if TYPE_CHECKING:
     from live.serve import Desk
 
+RECORDING = ("camera", "load", "no-record", "record", "armed", "start-above", "dark", "flat", "crop")
+OTHER_PROGRAMS = ("orders", "strain-out", "strain-format", "strain-channels", "token-file")
+
 
 @contextlib.contextmanager
 def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[None]:
@@ -50,23 +53,8 @@ def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[No
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic run``."""
-    add_options(
-        parser,
-        "devices and recording",
-        "camera",
-        "load",
-        "no-record",
-        "record",
-        "armed",
-        "start-above",
-        "dark",
-        "flat",
-        "crop",
-        "seconds",
-    )
-    add_options(
-        parser, "other programs", "orders", "strain-out", "strain-format", "strain-channels", "token-file"
-    )
+    add_options(parser, "devices and recording", *RECORDING, "seconds")
+    add_options(parser, "other programs", *OTHER_PROGRAMS)
     words = "show the operator's page in the browser, on 127.0.0.1, while it runs (phasedic page sets up too)"
     parser.add_argument("--page", action="store_true", help=words)
     add_measure(parser)

@@ -189,6 +189,7 @@ class Bench:
             "measure": {"zoi": m.zoi, "step": m.step, "burst": m.burst or DEFAULT_BURST},
             "specimen": {key: getattr(specimen, key) for key in ("width_mm", "thickness_mm", "axis")},
             "metadata": dict(config.metadata),
+            "scale": {"px_per_mm": config.scale.px_per_mm, "sigma": config.scale.sigma_mm_per_px},
             "unsaved": sorted(self.draft.changes),
             "file": str(self.draft.path),
         }

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from dataclasses import replace
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from acquire.errors import ConfigError, DataError
 from live.serve.bench import OVERLAYS, Bench
 from live.serve.draft import with_setting
 from live.serve.region import Drawn
+from live.setup import describe, grid_for
+from live.specimen import auto_gauges, from_points
 
 Said = Mapping[str, Any]
 SLIDERS = ("exposure_us", "gain", "brightness")
@@ -101,6 +104,35 @@ def gauge(bench: Bench, said: Said) -> None:
     bench.draft.change_all(changes)
 
 
+def place(bench: Bench, said: Said) -> None:
+    """Gauges that place themselves on the region; others stay."""
+    drawn = _drawn(bench)
+    if drawn.box is None:
+        raise DataError("no region is drawn yet: draw one, or find the specimen")
+    m, axis = bench.draft.config.measure, bench.draft.config.specimen.axis
+    height, width = drawn.mask.shape
+    box = replace(bench.draft.config, measure=replace(m, roi=drawn.box, mask=None))
+    placed = auto_gauges(grid_for(box, width, height, drawn.mask), axis)
+    bench.draft.change_all({f"gauges.{name}": describe(table) for name, table in placed.items()})
+
+
+def scale(bench: Bench, said: Said) -> None:
+    """mm per px from two points and their distance."""
+    points, length = said.get("points"), said.get("mm")
+    numbers = [*(v for point in points for v in point), length] if _are_points(points) else []
+    if len(numbers) != 5 or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in numbers):
+        raise ConfigError("a scale is two points in px and their distance in mm")
+    x1, y1, x2, y2, mm = (float(v) for v in numbers)
+    bench.draft.change_all(from_points((x1, y1, x2, y2), mm).changes())
+    bench.region_changed()
+
+
+def _are_points(said: object) -> TypeGuard[list[list[Any]]]:
+    return (
+        isinstance(said, list) and len(said) == 2 and all(isinstance(p, list) and len(p) == 2 for p in said)
+    )
+
+
 def check(bench: Bench, said: Said) -> None:
     """The whole check, with its table."""
     bench.check()
@@ -126,6 +158,8 @@ CHANGES: dict[str, Callable[[Bench, Said], None]] = {
     "address": address,
     "set": put,
     "gauge": gauge,
+    "place": place,
+    "scale": scale,
     "check": check,
     "forget": forget,
     "save": save,

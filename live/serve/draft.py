@@ -24,6 +24,10 @@ CHANGEABLE = frozenset(
         "specimen.width_mm", "specimen.thickness_mm", "specimen.diameter_mm", "specimen.area_mm2",
         "specimen.gauge_length_mm", "specimen.axis", "specimen.standard", "metadata.specimen", "metadata.operator",
         "metadata.material",
+        "scale.mm_per_px",
+        "scale.sigma_mm_per_px",
+        "scale.date",
+        "scale.method",
     }
 )  # fmt: skip
 """Keys that a page may change, beside gauges."""
@@ -84,7 +88,7 @@ class Draft:
         """
         if mask is not None:
             self.change_all({"measure.mask": str(self._mask_beside(mask))})
-        write_rig(self.path, self.changes)
+        self._config = write_rig(self.path, self.changes)
         self.changes = {}
 
     def _mask_beside(self, mask: NDArray[np.bool_]) -> Path:

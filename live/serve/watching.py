@@ -7,7 +7,6 @@ thread, and the map is made only while a page is open.
 from __future__ import annotations
 
 import math
-import shutil
 import threading
 import time
 from collections import deque
@@ -29,8 +28,8 @@ from live.serve.web import Hub
 from live.setup import Config, describe
 from live.tell import Books, sentence
 
-STATE_S, PICTURE_S, DISK_S = 0.1, 0.25, 2.0
-"""Between states, pictures and looks at the disk."""
+STATE_S, PICTURE_S = 0.1, 0.25
+"""Between states and between pictures."""
 MOST_EVENTS = 30
 _LATENCIES = 100
 
@@ -40,6 +39,9 @@ class Running(Protocol):
 
     @property
     def paused(self) -> bool: ...
+
+    @property
+    def recording(self) -> bool: ...
 
     @property
     def books(self) -> Books: ...
@@ -91,8 +93,7 @@ class Watching(Consumer):
         self._late: deque[float] = deque(maxlen=_LATENCIES)
         self._began = now()
         self._t0 = math.nan
-        self._due = {"state": 0.0, "picture": 0.0, "disk": 0.0}
-        self._disk = _Disk()
+        self._due = {"state": 0.0, "picture": 0.0}
         self._stopped = threading.Event()
 
     def attend(self, running: Running) -> None:
@@ -146,9 +147,6 @@ class Watching(Consumer):
     def idle(self) -> float:
         """Tell and draw what is due."""
         now = self._now()
-        if now >= self._due["disk"]:
-            self._due["disk"] = now + DISK_S
-            self._disk.look(self._running, now)
         if now >= self._due["state"]:
             self._due["state"] = now + STATE_S
             self._hub.tell("run", self.state())
@@ -179,7 +177,6 @@ class Watching(Consumer):
             "picture": {"n": self._shown, "of": self._component, **self._scale},
             "events": [{"s": max(at - self._began, 0.0), **event} for at, event in self._events],
             "late_s": _p95(self._late),
-            "disk_min": self._disk.minutes,
         }
         if self._newest is not None:
             told |= _measured(self._newest.instant, self._axis)
@@ -187,6 +184,9 @@ class Watching(Consumer):
             told |= {
                 "fps": running.fps,
                 "ledger": running.books.ledger.as_dict(),
+                "recording": running.recording,
+                "alarms": [printable(text) for text in running.books.alarms.texts],
+                "disk_min": running.books.vitals.disk_s / 60,
                 "folder": str(running.folder),
             }
         return told
@@ -215,28 +215,6 @@ class Watching(Consumer):
         self._scale |= {"width": size[1], "height": size[0], "gauges": gauges_of(self._config)}
         self.picture = as_jpeg(picture)
         self._shown += 1
-
-
-class _Disk:
-    """How long the disk lasts at the pace of the recording."""
-
-    def __init__(self) -> None:
-        self.minutes = math.nan
-        self._before: tuple[float, int] | None = None
-
-    def look(self, running: Running | None, now: float) -> None:
-        """Look at the size of the files and at the room that is left."""
-        if running is None:
-            return
-        try:
-            size = sum(item.stat().st_size for item in running.folder.iterdir())
-            free = shutil.disk_usage(running.folder).free
-        except OSError:
-            return
-        before, self._before = self._before, (now, size)
-        if before is not None and now > before[0]:
-            pace = (size - before[1]) / (now - before[0])
-            self.minutes = min(free / pace / 60, 1e5) if pace > 0 else math.nan
 
 
 def axial_of(i: Instant, axis: str) -> tuple[float, float]:

@@ -30,11 +30,16 @@ export function showRun(told) {
   put($("word"), t(WORDS[told.state] ?? told.state));
   put($("elapsed"), time(told.elapsed_s));
   put($("pause").querySelector("[data-t]"), t(paused ? "Go on" : "Pause"));
+  $("state").classList.toggle("unrecorded", told.recording === false);
+  put($("notrecorded"), told.recording === false && told.state !== "ended" ? t("not recorded") : "");
+  document.querySelector("#run [data-line=start]").disabled = told.recording !== false;
+  document.querySelector("#run [data-line=stop]").disabled = told.recording !== true;
   put($("force"), fixed(told.force_N, Math.abs(told.force_N ?? 0) < 1000 ? 1 : 0));
   put($("stress"), told.stress_Pa == null ? "–" : fixed(told.stress_Pa / 1e6, 1));
   strains(told);
   strip(told);
   events(told);
+  alarm(told);
   picture(told.picture);
   curves.follow(told.points);
 }
@@ -112,9 +117,14 @@ function events(told) {
     item.append(when, text);
     return item;
   }));
-  const bad = list.findLast((one) => one.level === "error" && told.elapsed_s - one.s < 20);
-  $("state").classList.toggle("alarm", Boolean(bad));
-  put($("alarm"), bad?.text ?? "");
+}
+
+// An alarm stays until it goes or is silenced, an error for a while.
+function alarm(told) {
+  const error = told.events.findLast((one) => one.level === "error" && told.elapsed_s - one.s < 20);
+  const words = [...(told.alarms ?? []), ...(error && !told.alarms?.length ? [error.text] : [])].join(" · ");
+  $("state").classList.toggle("alarm", Boolean(words));
+  put($("alarm"), words);
 }
 
 // The next picture is asked for when the last has come: a slow page gets fewer, never old ones.

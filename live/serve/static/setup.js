@@ -303,7 +303,7 @@ function check(value) {
   const verdict = $("verdict");
   put(verdict, value.checking ? t("checking …") : value.go == null ? "" : value.go ? "GO" : "NO-GO");
   verdict.className = value.go == null ? "" : value.go ? "go" : "nogo";
-  const mark = JSON.stringify([value.lines, value.table, value.measure, document.documentElement.lang]);
+  const mark = JSON.stringify([value.lines, value.table, value.measure, value.scale, document.documentElement.lang]);
   if (mark === shownCheck) return;
   shownCheck = mark;
   const sorted = [...value.lines].sort((a, b) => a.good - b.good);
@@ -319,12 +319,13 @@ function check(value) {
   table(value);
 }
 
-function table({ table: known, measure }) {
+function table({ table: known, measure, scale }) {
+  const mm = scale?.px_per_mm;
   const rows = [];
   const row = (tag, cells) => { const line = document.createElement("tr"); for (const [text, here] of cells) { const cell = document.createElement(tag); cell.textContent = text; cell.className = here ? "here" : ""; line.append(cell); } rows.push(line); };
   if (known) {
-    row("th", [["ZOI"], [`VSG px`], ...known.bursts.map((n) => [n])]);
-    for (const one of known.rows) row("td", [[one.zoi], [one.vsg.toFixed(0)], ...one.noise.map((v, i) => [v == null ? "–" : (v * 1e6).toFixed(0), one.zoi === measure.zoi && known.bursts[i] === measure.burst])]);
+    row("th", [["ZOI"], [`VSG ${mm ? "mm" : "px"}`], ...known.bursts.map((n) => [n])]);
+    for (const one of known.rows) row("td", [[one.zoi], [mm ? (one.vsg / mm).toFixed(2) : one.vsg.toFixed(0)], ...one.noise.map((v, i) => [v == null ? "–" : (v * 1e6).toFixed(0), one.zoi === measure.zoi && known.bursts[i] === measure.burst])]);
     const caption = document.createElement("caption");
     caption.textContent = t("strain noise of one ZOI, µm/m, by frames of a burst");
     rows.unshift(caption);
@@ -335,7 +336,7 @@ function table({ table: known, measure }) {
 function showScale() {
   if (scaled) return;
   const s = told.scale;
-  put($("scale"), s ? `${s.px_per_mm.toFixed(2)} px/mm` : "");
+  put($("scale"), s?.px_per_mm ? `${s.px_per_mm.toFixed(2)} px/mm${s.sigma ? ` ± ${(100 * s.sigma * s.px_per_mm).toFixed(2)} %` : ""}` : "");
 }
 
 choose("rectangle");

@@ -89,6 +89,11 @@ def set_up(page: Page, folder: Path) -> None:
         page.page.press(f'[data-set="{key}"]', "Tab")
     page.until(lambda: page.posted[-1].get("key") == "specimen.thickness_mm", "the section is sent")
     page.page.evaluate("() => document.activeElement.blur()")
+    page.page.keyboard.press("0")
+    page.click((100.0, 200.0), (300.0, 200.0))
+    page.page.fill("#scale input", "10")
+    page.page.press("#scale input", "Enter")
+    page.until(lambda: "px/mm" in page.text("scale"), "the scale is taken")
     page.page.keyboard.press("w")
     page.until(lambda: "· saved" in page.text("file"), "it is saved")
     check_saved(page, folder)
@@ -103,6 +108,7 @@ def check_saved(page: Page, folder: Path) -> None:
     x, y, w, h = config.measure.roi
     assert np.allclose((x, y, x + w - 1, y + h - 1), (60, 50, 420, 330), atol=1)
     assert set(config.gauges) == {"axial", "transverse", "middle"}
+    assert config.scale.px_per_mm == pytest.approx(20, rel=0.01)
     axial, across, middle = (config.gauges[name] for name in ("axial", "transverse", "middle"))
     assert np.allclose([axial.start, axial.end], [(240, 100), (240, 290)], atol=1)
     assert np.allclose(across.box, (160, 150, 160, 100), atol=1)
