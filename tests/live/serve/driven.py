@@ -68,10 +68,15 @@ class Program:
         try:
             self.said += self.process.communicate(timeout=30)[0]
         except subprocess.TimeoutExpired:
+            self.kill()
+        return self.process.returncode
+
+    def kill(self) -> None:
+        """Now, where it still runs."""
+        if self.process.poll() is None:
             self.process.kill()
             self.said += self.process.communicate()[0]
         self._log.close()
-        return self.process.returncode
 
 
 class Page:
@@ -100,7 +105,6 @@ class Page:
         end = time.monotonic() + PATIENCE_S
         while not holds():
             if time.monotonic() > end:
-                self.page.screenshot(path="/tmp/page-that-hangs.png")
                 raise AssertionError(f"not within {PATIENCE_S:g} s: {what}; {self.complaints}")
             self.page.wait_for_timeout(100)
 

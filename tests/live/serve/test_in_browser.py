@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from live.serve.web.door import Door
-from live.setup import load_config, read_mask
+from live.setup import compile_ahead, load_config, read_mask
 from tests.live.serve.driven import FLAGS, Page, Program, chromium
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
@@ -24,6 +24,7 @@ WATCH_LAYOUT = """() => { window.moved = []; new PerformanceObserver(list => win
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     path = chromium()
+    compile_ahead(("uint16", "float32"))  # here, so that the patience of the tests need not cover it
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as driver:
@@ -32,6 +33,20 @@ def browser() -> Iterator[Any]:
         )
         yield opened
         opened.close()
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
+    """Starts ``phasedic`` in a folder of its own; whatever happens, it does not run on."""
+    programs: list[Program] = []
+
+    def begin(*words: str) -> Program:
+        programs.append(Program(tmp_path, *words))
+        return programs[-1]
+
+    yield begin
+    for program in programs:
+        program.kill()
 
 
 def opened(browser: Any, program: Program, **wanted: Any) -> Page:
@@ -51,19 +66,14 @@ def distance_to_way(points: list[list[float]]) -> np.ndarray:
     return nearest
 
 
-def test_from_nothing_to_a_report(browser: Any, tmp_path: Path) -> None:
+def test_from_nothing_to_a_report(browser: Any, tmp_path: Path, start: Callable[..., Program]) -> None:
     words = ["page", "--camera", CAMERA, "--load", "sim:", "--no-view", "--no-rrd", "--page-port", "0"]
-    program = Program(tmp_path, *words)
+    program = start(*words)
     page = opened(browser, program)
-    try:
-        set_up(page, tmp_path)
-        run(page, program)
-        after(page, tmp_path)
-    finally:
-        if page.stage() != "gone":
-            program.process.terminate()
-        code = program.end()
-    assert code == 0, program.said
+    set_up(page, tmp_path)
+    run(page, program)
+    after(page, tmp_path)
+    assert program.end() == 0, program.said
     here = program.address.partition("/?")[0]
     assert page.asked and all(url.startswith((here, "data:")) for url in page.asked), "asks somebody else"
     assert not [one for one in page.complaints if "ERR_" not in one], page.complaints
@@ -183,9 +193,9 @@ def after(page: Page, folder: Path) -> None:
     page.until(lambda: page.stage() == "gone", "it has ended")
 
 
-def test_a_page_that_is_killed_changes_nothing(browser: Any, tmp_path: Path) -> None:
+def test_a_page_that_is_killed_changes_nothing(browser: Any, start: Callable[..., Program]) -> None:
     words = ["run", "--page", "--camera", CAMERA, "--load", "sim:", "--no-view", "--no-rrd", "--out", "out"]
-    program = Program(tmp_path, *words)
+    program = start(*words)
     page = opened(browser, program, color_scheme="dark")
     page.until(lambda: page.page.get_attribute("#state", "data-word") == "measuring", "it measures")
     assert page.page.get_attribute("html", "data-theme") == "dark"
@@ -201,9 +211,9 @@ def test_a_page_that_is_killed_changes_nothing(browser: Any, tmp_path: Path) -> 
     assert "adds up" in program.said and "STOPPED" not in program.said
 
 
-def test_another_site_gets_nothing(browser: Any, tmp_path: Path) -> None:
+def test_another_site_gets_nothing(browser: Any, start: Callable[..., Program]) -> None:
     """A page of another origin: its request carries no cookie, and is refused whatever it says."""
-    program = Program(tmp_path, "page", "--camera", CAMERA, "--page-port", "0")
+    program = start("page", "--camera", CAMERA, "--page-port", "0")
     page = opened(browser, program)
     page.until(lambda: page.stage() == "setup", "it is there")
     port = int(program.address.partition("/?")[0].rpartition(":")[2])
