@@ -60,8 +60,9 @@ def serve(desk: Desk, screen: Screen, interrupted: threading.Event) -> None:
         if outcome.exit_code == EXIT_INTERRUPTED:
             interrupted.set()
             return
-        write_report(outcome.folder, screen)
         report = outcome.folder / "report.html"
+        if not report.exists():
+            write_report(outcome.folder, screen)
         desk.reported(report if report.exists() else None)
         if not desk.after():
             return

@@ -24,7 +24,7 @@ def ended(books: Books, specimen: SpecimenConfig, folder: Path, words: str) -> d
         "figures": [] if figures is None else _figures(figures, specimen),
         "lines": [line.strip() for line in summary_lines(books, specimen)],
         "ledger": books.ledger.line(),
-        "troubles": [sentence(event) for event in troubles[-5:]],
+        "troubles": [sentence(event, books.journal.names) for event in troubles[-5:]],
     }
 
 

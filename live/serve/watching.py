@@ -140,7 +140,8 @@ class Watching(Consumer):
         """Keep the last ones."""
         if event.kind is EventKind.MEASURED:
             return
-        text = printable(sentence(event))
+        names = {} if self._running is None else self._running.books.journal.names
+        text = printable(sentence(event, names))
         told = {"level": event.level, "kind": str(event.kind), "text": text}
         self._events.append((self._now(), told))
 
