@@ -47,7 +47,7 @@ def command(arguments: argparse.Namespace) -> int:
     mask = rig.with_name(f"{rig.stem}-mask.png") if arguments.fixed else None
     _nothing_there(rig, png, mask)
     said = overrides(arguments)
-    found = _devices(said, screen)
+    found = find_devices(said, screen)
     config = load_config(None, {**said, "camera.address": found.camera, "load.address": found.load})
     seen = look(config)
     words = found.camera_words or printable(seen.camera.name), found.load_words
@@ -88,7 +88,8 @@ class Found:
     others: tuple[str, ...] = ()
 
 
-def _devices(said: dict[str, object], screen: Screen) -> Found:
+def find_devices(said: dict[str, object], screen: Screen) -> Found:
+    """Camera and load cell as ``said``, else those that are there; raises DeviceError where there is no camera."""
     camera, words, others = str(said.get("camera.address") or ""), "", tuple[str, ...]()
     if not camera:
         camera, words, others = _camera()

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from acquire.errors import PhasedicError
 from acquire.printable import brief
+from live.commands.init import find_devices
 from live.commands.options import add_measure, add_options, overrides
 from live.commands.report import write_report
 from live.commands.run import OTHER_PROGRAMS, RECORDING, invite, signals, watched
@@ -33,6 +34,9 @@ def command(arguments: argparse.Namespace) -> int:
     screen = Screen()
     path, said = Path(arguments.config or RIG), overrides(arguments)
     draft = Draft(load_config(path if path.exists() else None, said), path, said)
+    if not draft.config.camera.address:
+        found = find_devices(said, screen)
+        draft.change_all({"camera.address": found.camera, "load.address": found.load})
     interrupted = threading.Event()
     with Desk(draft, arguments.page_port) as desk:
 

@@ -30,15 +30,18 @@ from live.serve.region import Drawn
 from live.serve.watching import gauges_of
 from live.serve.web import Hub
 from live.setup import (
+    AUTO,
     DEFAULT_BURST,
     DEFAULT_REFERENCE_BURST,
+    GIVEN,
     Config,
     compile_ahead,
+    describe,
     gauges_for,
     grid_for,
     read_mask,
 )
-from live.specimen import region_of
+from live.specimen import auto_gauges, region_of
 
 log = logging.getLogger(__name__)
 
@@ -125,6 +128,17 @@ class Bench:
         sought = replace(self.draft.config, measure=replace(m, roi=None, mask=None))
         region = region_of(sought, stack.mean(axis=0), noise or None)
         self._take(Drawn(region.inside(info.width, info.height, m.zoi), region.words))
+
+    def place_gauges(self) -> None:
+        """Gauges on the region as it is drawn; raises DataError or ConfigError where there is no room."""
+        drawn, config = self.drawn, self.draft.config
+        if drawn is None or drawn.box is None:
+            raise DataError("no region is drawn yet: draw one, or find the specimen")
+        height, width = drawn.mask.shape
+        box = replace(config, measure=replace(config.measure, roi=drawn.box, mask=None))
+        placed = auto_gauges(grid_for(box, width, height, drawn.mask), config.specimen.axis)
+        gauges = {f"gauges.{name}": describe(table) for name, table in placed.items()}
+        self.draft.change_all(gauges | {"measure.gauges": GIVEN})
 
     def save(self) -> None:
         """Write the rig file, with the region as it is drawn; raises ConfigError where that cannot be."""
@@ -239,6 +253,8 @@ class Bench:
         self._compile(info)
         if self.drawn is None:
             self._begin(info)
+            if self.draft.config.measure.gauges == AUTO:
+                self.place_gauges()
         collected = self.eye.collected()
         if collected is not None:
             self._check(collected, info)

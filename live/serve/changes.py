@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any, TypeGuard
 
 import numpy as np
@@ -12,8 +11,7 @@ from acquire.errors import ConfigError, DataError
 from live.serve.bench import OVERLAYS, Bench
 from live.serve.draft import with_setting
 from live.serve.region import Drawn
-from live.setup import describe, grid_for
-from live.specimen import auto_gauges, from_points
+from live.specimen import from_points
 
 Said = Mapping[str, Any]
 SLIDERS = ("exposure_us", "gain", "brightness")
@@ -106,14 +104,7 @@ def gauge(bench: Bench, said: Said) -> None:
 
 def place(bench: Bench, said: Said) -> None:
     """Gauges that place themselves on the region; others stay."""
-    drawn = _drawn(bench)
-    if drawn.box is None:
-        raise DataError("no region is drawn yet: draw one, or find the specimen")
-    m, axis = bench.draft.config.measure, bench.draft.config.specimen.axis
-    height, width = drawn.mask.shape
-    box = replace(bench.draft.config, measure=replace(m, roi=drawn.box, mask=None))
-    placed = auto_gauges(grid_for(box, width, height, drawn.mask), axis)
-    bench.draft.change_all({f"gauges.{name}": describe(table) for name, table in placed.items()})
+    bench.place_gauges()
 
 
 def scale(bench: Bench, said: Said) -> None:

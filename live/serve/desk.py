@@ -53,6 +53,7 @@ class Desk:
     stage : str
     bench : Bench or None
         While it is set up.
+    server : PageServer
     """
 
     def __init__(self, draft: Draft | None, port: int = DEFAULT_PORT) -> None:
@@ -76,7 +77,7 @@ class Desk:
             "/report": self._show_report,
         }
         posts = {"/order": self._order, "/setup": self._change, "/map": self._map, "/viewer": self._viewer}
-        self._server = PageServer(self._hub, gets, posts, port)
+        self.server = PageServer(self._hub, gets, posts, port)
         self._tell_stage()
 
     def __enter__(self) -> Desk:
@@ -85,13 +86,13 @@ class Desk:
     def __exit__(self, *_: object) -> None:
         self._hub.tell("stage", {"stage": "gone"})
         threading.Event().wait(GOODBYE_S)
-        self._server.close()
+        self.server.close()
         self._folder.cleanup()
 
     @property
     def address(self) -> str:
         """What a person opens in a browser."""
-        return self._server.address
+        return self.server.address
 
     def quit(self) -> None:
         """Leave the set-up, or what comes after a test."""
@@ -224,8 +225,8 @@ class Desk:
         live, word = self._live, line.strip()
         if live is not None:
             return answer(line, live)
-        if self.stage == RUN:
-            return "no: the test is being opened" if self._watching else "no: nothing runs"
+        if self.stage == RUN or (self.stage == SET_UP and self.bench is None):
+            return "no: the test is being opened"
         allowed = (START, QUIT) if self.stage == SET_UP else (NEXT, QUIT)
         if word not in allowed or self.draft is None:
             return f"no: now there are {', '.join(allowed)}"

@@ -16,21 +16,20 @@ from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DataError
 from acquire.files import write_picture
 from acquire.frame import CameraInfo
-from live.setup import Config, from_dict, settings_in, write_rig
+from live.setup import Config, from_dict, load_config, settings_in, write_rig
 
 CHANGEABLE = frozenset(
     {
-        "camera.address", "load.address", "measure.zoi", "measure.step", "measure.burst", "measure.roi", "measure.mask",
+        "camera.address", "load.address", "measure.zoi", "measure.step", "measure.burst", "measure.roi",
+        "measure.mask", "measure.gauges",
         "specimen.width_mm", "specimen.thickness_mm", "specimen.diameter_mm", "specimen.area_mm2",
         "specimen.gauge_length_mm", "specimen.axis", "specimen.standard", "metadata.specimen", "metadata.operator",
-        "metadata.material",
-        "scale.mm_per_px",
-        "scale.sigma_mm_per_px",
-        "scale.date",
-        "scale.method",
+        "metadata.material", "scale.mm_per_px", "scale.sigma_mm_per_px", "scale.date", "scale.method",
     }
 )  # fmt: skip
 """Keys that a page may change, beside gauges."""
+
+OF_TODAY = ("output.", "view.")
 
 
 class Draft:
@@ -43,7 +42,7 @@ class Draft:
     path : Path
         Of the rig file; need not be there yet.
     said : mapping of "section.key" to value
-        What the command line says: saved with the rest.
+        What the command line says: saved with the rest, but for what is of this time alone (``OF_TODAY``).
 
     Attributes
     ----------
@@ -52,11 +51,11 @@ class Draft:
     """
 
     def __init__(self, given: Config, path: Path, said: Mapping[str, Any]) -> None:
-        self._given, self.path = given, path
+        self.path = path
+        self._of_today = {key: value for key, value in said.items() if key.startswith(OF_TODAY)}
         in_file = settings_in(path) if path.exists() else {}
-        self.changes: dict[str, Any] = {
-            key: value for key, value in said.items() if in_file.get(key) != value
-        }
+        lasting = {key: value for key, value in said.items() if key not in self._of_today}
+        self.changes: dict[str, Any] = {key: v for key, v in lasting.items() if in_file.get(key) != v}
         self._config = given
 
     @property
@@ -88,7 +87,8 @@ class Draft:
         """
         if mask is not None:
             self.change_all({"measure.mask": str(self._mask_beside(mask))})
-        self._config = write_rig(self.path, self.changes)
+        write_rig(self.path, self.changes)
+        self._config = load_config(self.path, self._of_today)
         self.changes = {}
 
     def _mask_beside(self, mask: NDArray[np.bool_]) -> Path:
