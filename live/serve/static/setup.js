@@ -26,6 +26,7 @@ function choose(name) {
   points = [];
   drag = null;
   for (const button of document.querySelectorAll("[data-tool]")) button.setAttribute("aria-pressed", String(button.dataset.tool === name));
+  $("hint").dataset.t = HINTS[name];
   put($("hint"), t(HINTS[name]));
   svg.style.cursor = name === "move" ? "default" : "crosshair";
   sketch();
