@@ -17,7 +17,7 @@ from tests.live.serve.driven import FLAGS, Page, Program, chromium
 
 IMAGES = Path(__file__).parent / "images"
 CAMERA = "sim:hole?fps=15&seconds=44&hold=8&buffers=64&px_per_mm=20"
-COLOURS = 128
+COLOURS = 256
 WIDE = 960  # px in the documents
 
 

@@ -10,12 +10,6 @@ let last = performance.now(), stage = {};
 
 const shown = {
   stage(value) {
-    if (value.stage === "gone") source.close();
-    if (value.stage === "gone" && stage.stage === "after") {  // what came out can still be read
-      stage = value;
-      document.body.classList.add("ended");
-      return;
-    }
     stage = value;
     const moved = document.body.dataset.stage !== value.stage;
     document.body.dataset.stage = value.stage;
@@ -28,6 +22,12 @@ const shown = {
   run: (value) => { if (stage.stage === "run") showRun(value); },
   after: showAfter,
   beat() {},
+  gone() {
+    source.close();
+    if (stage.stage === "after") document.body.classList.add("ended");  // what came out can still be read
+    else document.body.dataset.stage = "gone";
+    stage = { stage: "gone" };
+  },
 };
 
 let source;

@@ -18,7 +18,7 @@ export async function post(path, value) {
   } catch {
     said = `no: ${t("NO LINK")}`;
   }
-  put($("answer"), said === "ok" ? `${value.line ?? value.do ?? ""} ✓` : said);
+  put($("answer"), said === "ok" ? `${value.line ?? value.do ?? value.of ?? ""} ✓` : said);
   $("answer").classList.toggle("no", said.startsWith("no"));
   return said;
 }

@@ -56,7 +56,7 @@ export default {
   "Specimen": "Éprouvette",
   "Start the test": "Démarrer l’essai",
   "Step, px": "Pas, px",
-  "Stop recording": "Arrêter l’enregistrement",
+  "Stop recording": "Arrêter l’enreg.",
   "Strain": "Déformation",
   "Stress": "Contrainte",
   "Take": "Prendre",

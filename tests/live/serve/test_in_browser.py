@@ -206,7 +206,8 @@ def test_a_page_that_is_killed_changes_nothing(browser: Any, start: Callable[...
     page.page.keyboard.press("q")
     assert page.stage() == "run", "what ends the test is asked for twice"
     page.page.keyboard.press("q")
-    page.until(lambda: page.stage() in ("after", "gone"), "it ends")
+    page.until(lambda: page.page.evaluate("() => document.body.classList.contains('ended')"), "it ends")
+    assert page.stage() == "after" and "ZOIs valid" in page.text("summary"), "what came out stays on the page"
     assert program.end() == 0, program.said
     assert "adds up" in program.said and "STOPPED" not in program.said
 
