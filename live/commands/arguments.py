@@ -26,6 +26,9 @@ class Entry:
 COMMANDS = {
     "run": Entry("live.commands.run", "measure live, recording everything"),
     "demo": Entry("live.commands.demo", "the same on a simulated tensile test, compared with its truth"),
+    "page": Entry(
+        "live.commands.page", "set up, measure and conclude in the browser: point instead of typing"
+    ),
     "replay": Entry("live.commands.replay", "measure a recorded session, or any folder of pictures"),
     "map": Entry("live.commands.map", "draw a map of the results over a picture, as a PNG"),
     "show": Entry("live.commands.show", "a finished run in the view, with a slider in time"),

@@ -54,7 +54,7 @@ def command(arguments: argparse.Namespace) -> int:
     if mask is not None:
         to_be_new(mask)
     said = overrides(arguments)
-    found = _devices(said, screen)
+    found = find_devices(said, screen)
     config = load_config(None, {**said, "camera.address": found.camera, "load.address": found.load})
     seen = look(config, screen.say)
     words = found.camera_words or printable(seen.camera.name), found.load_words
@@ -89,7 +89,8 @@ class Found:
     others: tuple[str, ...] = ()
 
 
-def _devices(said: dict[str, object], screen: Screen) -> Found:
+def find_devices(said: dict[str, object], screen: Screen) -> Found:
+    """Camera and load cell as ``said``, else those that are there; raises DeviceError where there is no camera."""
     camera, words, others = str(said.get("camera.address") or ""), "", tuple[str, ...]()
     if not camera:
         camera, words, others = _camera()

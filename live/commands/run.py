@@ -6,8 +6,10 @@ import argparse
 import contextlib
 import signal
 import sys
+import webbrowser
 from collections.abc import Callable, Iterator, Sequence
 from types import FrameType
+from typing import TYPE_CHECKING
 
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, add_options, configured
@@ -17,7 +19,13 @@ from live.run import INTERRUPTED, LiveRun, Outcome, Stop, run_live
 from live.setup import Config
 from live.specimen import searched
 from live.tell import Screen, file_lines, sentence, summary_lines
-from live.view import rerun_command
+from live.view import has_display, rerun_command, spawn_viewer
+
+if TYPE_CHECKING:
+    from live.serve import Desk
+
+RECORDING = ("camera", "load", "no-record", "record", "armed", "start-above", "dark", "flat", "crop")
+OTHER_PROGRAMS = ("orders", "strain-out", "strain-format", "strain-channels", "token-file")
 
 
 @contextlib.contextmanager
@@ -45,23 +53,10 @@ def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[No
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic run``."""
-    add_options(
-        parser,
-        "devices and recording",
-        "camera",
-        "load",
-        "no-record",
-        "record",
-        "armed",
-        "start-above",
-        "dark",
-        "flat",
-        "crop",
-        "seconds",
-    )
-    add_options(
-        parser, "other programs", "orders", "strain-out", "strain-format", "strain-channels", "token-file"
-    )
+    add_options(parser, "devices and recording", *RECORDING, "seconds")
+    add_options(parser, "other programs", *OTHER_PROGRAMS)
+    words = "show the operator's page in the browser, on 127.0.0.1, while it runs (phasedic page sets up too)"
+    parser.add_argument("--page", action="store_true", help=words)
     add_measure(parser)
 
 
@@ -69,13 +64,56 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
     screen = Screen()
     with searched(configured(arguments), screen.say) as config:
-        outcome = run_to_the_end(config, screen)
-    conclude(outcome, screen)
+        outcome = run_beside_page(config, screen) if arguments.page else run_to_the_end(config, screen)
+    if not arguments.page:
+        conclude(outcome, screen)
     return outcome.exit_code
 
 
-def run_to_the_end(config: Config, screen: Screen, consumers: Sequence[Consumer] = ()) -> Outcome:
-    """Run with signals, keyboard, port for orders and viewer attached."""
+def run_beside_page(config: Config, screen: Screen) -> Outcome:
+    """Run with the operator's page, which ends with the run."""
+    from live.serve import Desk
+
+    with Desk(None) as desk:
+        invite(desk, screen)
+        return watched(desk, config, screen)
+
+
+def watched(desk: Desk, config: Config, screen: Screen) -> Outcome:
+    """One test, with the page, told to its end."""
+    from live.serve import ended
+
+    desk.viewer = lambda: _open_viewer(config)
+    outcome = run_to_the_end(config, screen, [desk.begin(config)], desk.attend)
+    conclude(outcome, screen)
+    words = EXIT_WORDS.get(outcome.exit_code, "")
+    desk.end(ended(outcome.books, outcome.config.specimen, outcome.folder, words))
+    return outcome
+
+
+def invite(desk: Desk, screen: Screen) -> None:
+    """Open the page where there is a display; say how to open it."""
+    if has_display() and webbrowser.open(desk.address):
+        screen.say("the page opens in the browser")
+    screen.say(f"the page: {desk.address}")
+
+
+def _open_viewer(config: Config) -> str:
+    """The viewer of the view, in a window of its own."""
+    if not config.view.enabled:
+        return "no: the view is switched off"
+    if spawn_viewer(config.view.port) is None:
+        return "no: no window can be opened here; the folder of the run has view.rrd"
+    return "ok"
+
+
+def run_to_the_end(
+    config: Config,
+    screen: Screen,
+    consumers: Sequence[Consumer] = (),
+    attend: Callable[[LiveRun], None] = lambda live: None,
+) -> Outcome:
+    """Run with signals, keyboard, port for orders and viewer attached; ``attend`` gives orders too."""
     stop, operate = Stop(), config.operate
     with contextlib.ExitStack() as stack:
         port = OrderPort(operate.orders, operate.token_file, screen) if operate.orders else None
@@ -86,6 +124,7 @@ def run_to_the_end(config: Config, screen: Screen, consumers: Sequence[Consumer]
                 stack.callback(keyboard.close)
             if port is not None:
                 port.open(live)
+            attend(live)
 
         if port is not None:
             stack.callback(port.close)

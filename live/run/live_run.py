@@ -12,6 +12,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
 from acquire.events import Event, EventKind
@@ -92,6 +93,21 @@ class LiveRun:
     def recording(self) -> bool:
         """Whether frames are recorded."""
         return self._recording.on
+
+    @property
+    def books(self) -> Books:
+        """What is kept of the test so far."""
+        return self._books
+
+    @property
+    def folder(self) -> Path:
+        """Of the files."""
+        return self._setting.folder
+
+    @property
+    def fps(self) -> float:
+        """Frames a second, as they come."""
+        return self.grabber.fps
 
     def stop(self, reason: str) -> None:
         """End the run cleanly, soon."""

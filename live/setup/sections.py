@@ -268,7 +268,12 @@ class AlarmConfig:
 class ViewConfig:
     """[view]"""
 
-    enabled: bool = key(FLAG, True, "serve the rerun view", Option("no-view", off=True))
+    enabled: bool = key(
+        FLAG,
+        True,
+        "serve the rerun view (its port on 127.0.0.1 asks for no token)",
+        Option("no-view", off=True),
+    )
     rrd: bool = key(FLAG, True, "write view.rrd", Option("no-rrd", off=True))
     port: int = key(integer(1024, 65535), 9876, "port of the view on 127.0.0.1; the next free one is taken")
     spawn: bool = key(FLAG, True, "open the viewer when there is a display")

@@ -75,10 +75,12 @@ ROOMS = {
     "live.show": "acquire analysis analysis.field analysis.evaluate live.measure live.tell live.finished live.view"
     " live.view.exchange",
     "live.batch": "acquire live.replay live.setup live.results",
-    "live.serve": "acquire live.operate live.tell live.outputs live.measure",
+    "live.serve.web": "acquire live.pace",
+    "live.serve": "acquire acquire.camera acquire.files analysis.field analysis.evaluate live.measure live.setup"
+    " live.specimen live.check live.maps live.pace live.operate live.tell live.outputs live.serve.web",
 }
 # Rooms that have their line before they have a folder.
-TO_COME = {"live.batch", "live.serve"}
+TO_COME = {"live.batch"}
 # The one door to the simulated devices; it stands in one module, not in its whole room.
 DOORS = {"live.setup.rig": "hw_mocks"}
 
@@ -86,7 +88,11 @@ DOORS = {"live.setup.rig": "hw_mocks"}
 STARTED = {
     "live.commands", "live.run", "live.replay", "live.check", "live.characterise", "live.batch", "live.serve",
 }  # fmt: skip
-MAY_START = {"live.batch": {"live.replay"}, "live.characterise.experiments": {"live.characterise"}}
+# The page judges the still specimen as the check does.
+MAY_START = {
+    "live.batch": {"live.replay"}, "live.serve": {"live.check"},
+    "live.characterise.experiments": {"live.characterise"},
+}  # fmt: skip
 
 # Library -> the rooms that alone import it.
 LIBRARIES = {

@@ -1,0 +1,72 @@
+"""``phasedic page``: the operator's page; set up, run, what came out, and again until it is ended."""
+
+from __future__ import annotations
+
+import argparse
+import threading
+from pathlib import Path
+
+from acquire.errors import PhasedicError
+from acquire.printable import brief
+from live.commands.init import find_devices
+from live.commands.options import add_measure, add_options, overrides
+from live.commands.report import write_report
+from live.commands.run import OTHER_PROGRAMS, RECORDING, invite, signals, watched
+from live.serve import DEFAULT_PORT, Desk, Draft
+from live.setup import load_config
+from live.tell import Screen
+
+RIG = "rig.toml"
+EXIT_INTERRUPTED = 130
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic page``."""
+    add_options(parser, "devices and recording", *RECORDING)
+    add_options(parser, "other programs", *OTHER_PROGRAMS)
+    add_measure(parser)
+    words = f"port of the page on 127.0.0.1 (default {DEFAULT_PORT}); the next free one is taken"
+    parser.add_argument("--page-port", type=int, default=DEFAULT_PORT, metavar="N", help=words)
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic page``; 0 when it is ended from the page, 130 when it is interrupted."""
+    screen = Screen()
+    path, said = Path(arguments.config or RIG), overrides(arguments)
+    draft = Draft(load_config(path if path.exists() else None, said), path, said)
+    if not draft.config.camera.address:
+        found = find_devices(said, screen)
+        draft.change_all({"camera.address": found.camera, "load.address": found.load})
+    interrupted = threading.Event()
+    with Desk(draft, arguments.page_port) as desk:
+
+        def interrupt() -> None:
+            interrupted.set()
+            desk.quit()
+
+        with signals(interrupt, screen.say):
+            invite(desk, screen)
+            serve(desk, screen, interrupted)
+    return EXIT_INTERRUPTED if interrupted.is_set() else 0
+
+
+def serve(desk: Desk, screen: Screen, interrupted: threading.Event) -> None:
+    """Specimen after specimen."""
+    words = ""
+    while not interrupted.is_set() and (config := desk.set_up(words)) is not None:
+        try:
+            outcome = watched(desk, config, screen)
+        except PhasedicError as error:
+            words = brief(error)
+            screen.say(f"the test did not begin: {words}")
+            continue
+        words = ""
+        if outcome.exit_code == EXIT_INTERRUPTED:
+            interrupted.set()
+            return
+        report = outcome.folder / "report.html"
+        if not report.exists():
+            write_report(outcome.folder, screen)
+        desk.reported(report if report.exists() else None)
+        if not desk.after():
+            return

@@ -1,0 +1,157 @@
+"""What a page may change while the rig is set up; each a word, checked, and refused in a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from acquire.errors import ConfigError, DataError
+from live.serve.bench import OVERLAYS, Bench
+from live.serve.draft import with_setting
+from live.serve.region import Drawn
+from live.specimen import from_points
+
+Said = Mapping[str, Any]
+SLIDERS = ("exposure_us", "gain", "brightness")
+
+
+def _drawn(bench: Bench) -> Drawn:
+    if bench.drawn is None:
+        raise DataError("the camera has given no picture yet")
+    return bench.drawn
+
+
+def draw(bench: Bench, said: Said) -> None:
+    """Strokes of a tool."""
+    strokes = said.get("strokes")
+    if not isinstance(strokes, list) or not 1 <= len(strokes) <= 500:
+        raise ConfigError("strokes are a list")
+    if not all(isinstance(one, dict) for one in strokes):
+        raise ConfigError("a stroke has a tool and points")
+    _drawn(bench).draw(strokes)
+    bench.region_changed()
+
+
+def undo(bench: Bench, said: Said) -> None:
+    """The region as it was before."""
+    _drawn(bench).undo()
+    bench.region_changed()
+
+
+def find(bench: Bench, said: Said) -> None:
+    """The specimen in the picture."""
+    bench.find()
+
+
+def everything(bench: Bench, said: Said) -> None:
+    """The whole picture."""
+    drawn = _drawn(bench)
+    drawn.take(np.ones_like(drawn.mask), "the whole picture")
+    bench.region_changed()
+
+
+def overlay(bench: Bench, said: Said) -> None:
+    """Something laid over the picture, or taken off."""
+    if said.get("name") not in OVERLAYS:
+        raise ConfigError(f"there are {', '.join(OVERLAYS)}")
+    bench.overlays[str(said["name"])] = said.get("on") is True
+
+
+def camera(bench: Bench, said: Said) -> None:
+    """A setting of the camera's address; the camera is opened anew and tells what is in force."""
+    key, value = said.get("key"), said.get("value")
+    if key not in SLIDERS or not isinstance(value, int | float) or isinstance(value, bool):
+        raise ConfigError(f"a number for one of {', '.join(SLIDERS)}")
+    bench.eye.reopen(with_setting(bench.draft.config.camera.address, str(key), float(value)))
+
+
+def address(bench: Bench, said: Said) -> None:
+    """Another camera."""
+    if not isinstance(said.get("value"), str):
+        raise ConfigError("an address is a text")
+    bench.eye.reopen(said["value"])
+
+
+def put(bench: Bench, said: Said) -> None:
+    """A key of the configuration, such as specimen.width_mm."""
+    key, value = said.get("key"), said.get("value")
+    if (
+        not isinstance(key, str)
+        or key.startswith(("camera.", "gauges."))
+        or key in ("measure.roi", "measure.mask")
+    ):
+        raise ConfigError(f"{key} is not changed like this")
+    bench.draft.change_all({key: None if value == "" else value})
+    if key.startswith("measure."):
+        bench.region_changed()
+
+
+def gauge(bench: Bench, said: Said) -> None:
+    """A gauge made, moved, named anew (``was``), or, without ``gauge``, taken away."""
+    name, was, table = said.get("name"), said.get("was"), said.get("gauge")
+    if not isinstance(name, str) or not isinstance(table, dict | None):
+        raise ConfigError("a gauge has a name and a table")
+    changes: dict[str, Any] = {}
+    if isinstance(was, str) and was != name and was in bench.draft.config.gauges:
+        if name in bench.draft.config.gauges:
+            raise ConfigError(f"there is a gauge {name} already")
+        changes[f"gauges.{was}"] = None
+    changes[f"gauges.{name}"] = table
+    bench.draft.change_all(changes)
+
+
+def place(bench: Bench, said: Said) -> None:
+    """Gauges that place themselves on the region; others stay."""
+    bench.place_gauges()
+
+
+def scale(bench: Bench, said: Said) -> None:
+    """mm per px from two points and their distance."""
+    points, length = said.get("points"), said.get("mm")
+    numbers = [*(v for point in points for v in point), length] if _are_points(points) else []
+    if len(numbers) != 5 or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in numbers):
+        raise ConfigError("a scale is two points in px and their distance in mm")
+    x1, y1, x2, y2, mm = (float(v) for v in numbers)
+    bench.draft.change_all(from_points((x1, y1, x2, y2), mm).changes())
+    bench.region_changed()
+
+
+def _are_points(said: object) -> TypeGuard[list[list[Any]]]:
+    return (
+        isinstance(said, list) and len(said) == 2 and all(isinstance(p, list) and len(p) == 2 for p in said)
+    )
+
+
+def check(bench: Bench, said: Said) -> None:
+    """The whole check, with its table."""
+    bench.check()
+
+
+def forget(bench: Bench, said: Said) -> None:
+    """The peak of the sharpness."""
+    bench.forget_peak()
+
+
+def save(bench: Bench, said: Said) -> None:
+    """Into the rig file."""
+    bench.save()
+
+
+CHANGES: dict[str, Callable[[Bench, Said], None]] = {
+    "draw": draw,
+    "undo": undo,
+    "find": find,
+    "all": everything,
+    "overlay": overlay,
+    "camera": camera,
+    "address": address,
+    "set": put,
+    "gauge": gauge,
+    "place": place,
+    "scale": scale,
+    "check": check,
+    "forget": forget,
+    "save": save,
+}

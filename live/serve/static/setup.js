@@ -1,0 +1,343 @@
+// Setting up: light and focus, region and gauges with the mouse, scale, the check, the rig file.
+import { $, change, put } from "./base.js";
+import { drawGauges, make, place, placed, places, shape } from "./draw.js";
+import { t } from "./words.js";
+
+const svg = $("drawing");
+let told = {}, tool = "rectangle", points = [], busy = false, shownPicture = -1, edition = -1, drag = null, pending = null;
+
+const HINTS = {
+  rectangle: "Drag a rectangle over the specimen; with Shift it is added.",
+  polygon: "Click the corners; Enter or a double click closes it, Escape forgets it.",
+  brush: "Paint what is measured.",
+  eraser: "Paint what is not measured.",
+  line: "Drag from one end of the extensometer to the other.",
+  transverse: "Drag a rectangle: strain across the load.",
+  area: "Drag a rectangle: its mean strain.",
+  zoi: "Click a place.",
+  move: "Drag the handles; with the keyboard Tab and the arrows.",
+  scale: "Click two points whose distance you know.",
+};
+const GAUGES = ["line", "transverse", "area", "zoi"];
+const DRAGGED = ["rectangle", "line", "transverse", "area"];
+
+function choose(name) {
+  tool = name;
+  points = [];
+  drag = null;
+  for (const button of document.querySelectorAll("[data-tool]")) button.setAttribute("aria-pressed", String(button.dataset.tool === name));
+  $("hint").dataset.t = HINTS[name];
+  put($("hint"), t(HINTS[name]));
+  svg.style.cursor = name === "move" ? "default" : "crosshair";
+  sketch();
+}
+for (const button of document.querySelectorAll("[data-tool]")) button.addEventListener("click", () => choose(button.dataset.tool));
+
+// -- the mouse ---------------------------------------------------------------------------------
+
+svg.addEventListener("pointerdown", (event) => {
+  if (event.button !== 0 || !told.camera) return;
+  const at = place(svg, event), handle = event.target.dataset?.handle;
+  if (handle && (tool === "move" || GAUGES.includes(tool))) {
+    const [name, index] = handle.split(" ");
+    drag = { name, index: Number(index) };
+    pending = told.gauges[name];
+  } else if (tool === "polygon" || tool === "zoi" || tool === "scale") {
+    points.push(at);
+    if (tool === "zoi" || (tool === "scale" && points.length === 2)) finish(false);
+  } else if (tool !== "move") {
+    points = [at];
+    drag = { tool };
+  }
+  if (drag) svg.setPointerCapture(event.pointerId);
+  sketch();
+});
+
+svg.addEventListener("pointermove", (event) => {
+  if (!drag) return;
+  const moves = event.getCoalescedEvents?.() ?? [];
+  for (const one of moves.length ? moves : [event]) moved(place(svg, one));
+  sketch();
+});
+
+function moved(at) {
+  if (drag.name) {
+    const now = places[pending.kind](pending).map((p, i) => (i === drag.index ? at : p));
+    pending = placed(pending, now);
+  } else if (DRAGGED.includes(tool)) {
+    points = [points[0], at];
+  } else {
+    points.push(at);
+  }
+}
+
+svg.addEventListener("pointerup", (event) => {
+  if (!drag) return;
+  moved(place(svg, event));
+  const was = drag;
+  drag = null;
+  if (was.name) {
+    change({ do: "gauge", name: was.name, gauge: pending });
+    told.gauges[was.name] = pending;
+    pending = null;
+  } else {
+    finish(event.shiftKey);
+  }
+  sketch();
+});
+svg.addEventListener("dblclick", () => { if (tool === "polygon") { points.pop(); finish(false); } });
+
+function finish(add) {
+  const drawn = points;
+  points = [];
+  if (GAUGES.includes(tool)) newGauge(drawn);
+  else if (tool === "scale") askLength(drawn);
+  else if (tool !== "polygon" || drawn.length > 2) change({ do: "draw", strokes: strokes(drawn, add) });
+  sketch();
+}
+
+// A long way is sent in pieces that hang together.
+function strokes(drawn, add) {
+  const radius = Number($("radius").value), found = [];
+  for (let i = 0; i < drawn.length; i += 4000) found.push({ tool, points: drawn.slice(Math.max(i - 1, 0), i + 4000), radius, add });
+  return found;
+}
+
+const NAMES = { line: "axial", transverse: "transverse", area: "area", zoi: "point" };
+function newGauge(drawn) {
+  const kind = tool, base = NAMES[kind];
+  let name = base;
+  for (let n = 2; name in told.gauges; n++) name = `${base}${n}`;
+  if (kind !== "zoi" && (drawn.length < 2 || Math.hypot(drawn[1][0] - drawn[0][0], drawn[1][1] - drawn[0][1]) < 3)) return;
+  const empty = { line: { kind }, zoi: { kind }, transverse: { kind, box: [] }, area: { kind, box: [] } }[kind];
+  const gauge = placed(empty, drawn);
+  change({ do: "gauge", name, gauge });
+}
+
+let scaled = null;
+function askLength(drawn) {
+  if (drawn.length < 2 || Math.hypot(drawn[1][0] - drawn[0][0], drawn[1][1] - drawn[0][1]) < 3) return;
+  scaled = drawn;
+  const form = document.createElement("form"), input = document.createElement("input"), button = document.createElement("button");
+  Object.assign(input, { type: "number", min: "0", step: "any", required: true, placeholder: "mm" });
+  input.setAttribute("aria-label", t("Length in mm"));
+  button.textContent = t("Take");
+  form.append(input, button);
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    await change({ do: "scale", points: scaled, mm: Number(input.value) });
+    scaled = null;
+    sketch();
+    showScale();
+  });
+  $("scale").replaceChildren(form);
+  input.focus();
+}
+
+function sketch() {
+  for (const old of svg.querySelectorAll(".sketch")) old.remove();
+  const group = make("g", { class: "sketch" }), last = points.at(-1);
+  if (pending) group.append(shape(pending));
+  if (scaled ?? (tool === "scale" && points.length > 1)) {
+    const [a, b] = scaled ?? points;
+    group.append(make("line", { class: "drawn", x1: a[0], y1: a[1], x2: b[0], y2: b[1] }));
+  } else if (points.length && (tool === "brush" || tool === "eraser")) {
+    group.append(make("polyline", { class: "stroke", points: points.join(" "), "stroke-width": 2 * $("radius").value }));
+  } else if (points.length > 1 && tool === "line") {
+    group.append(make("line", { class: "drawn", x1: points[0][0], y1: points[0][1], x2: last[0], y2: last[1] }));
+  } else if (points.length && (tool === "polygon" || tool === "scale")) {
+    group.append(make("polygon", { class: "drawn", points: points.join(" ") }));
+    for (const p of points) group.append(make("circle", { class: "drawn", cx: p[0], cy: p[1], r: 2 }));
+  } else if (points.length > 1) {
+    const [x0, y0] = points[0];
+    group.append(make("rect", { class: "drawn", x: Math.min(x0, last[0]), y: Math.min(y0, last[1]), width: Math.abs(last[0] - x0), height: Math.abs(last[1] - y0) }));
+  }
+  if (group.children.length) svg.append(group);
+}
+
+// Keys of the set-up; true where one was used.
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+export function setupKeys(event) {
+  const handle = document.activeElement?.dataset?.handle, arrow = ARROWS[event.key];
+  if (handle && arrow) {
+    const [name, index] = handle.split(" "), step = event.shiftKey ? 10 : 1, gauge = told.gauges[name];
+    const now = places[gauge.kind](gauge).map((p, i) => (i === Number(index) ? p.map((v, k) => v + step * arrow[k]) : p));
+    told.gauges[name] = placed(gauge, now);
+    change({ do: "gauge", name, gauge: told.gauges[name] });
+    gaugesOver();
+    event.preventDefault();
+    return true;
+  }
+  if (event.key === "Enter" && tool === "polygon" && points.length > 2) { finish(false); return true; }
+  if (event.key === "Escape") { points = []; drag = pending = scaled = null; showScale(); sketch(); return true; }
+  return false;
+}
+
+// -- what is shown -----------------------------------------------------------------------------
+
+const percent = (value) => (value == null ? "–" : value > 0 && value < 1e-4 ? "<0.01 %" : `${(value * 100).toFixed(2)} %`);
+
+export function showSetup(value) {
+  const dragged = drag?.name ? told.gauges[drag.name] : null;
+  told = value;
+  if (dragged) told.gauges[drag.name] = dragged;
+  put($("trouble"), value.trouble || value.doubt);
+  put($("busy"), value.busy);
+  put($("sharpness"), value.sharpness == null ? "–" : value.sharpness.toFixed(3));
+  put($("saturated"), percent(value.saturated));
+  put($("sigma"), value.sigma == null ? "–" : `${(value.sigma * 1e6).toFixed(0)} µm/m`);
+  $("sharp").value = value.peak ? (value.sharpness ?? 0) / value.peak : 0;
+  const c = value.camera;
+  put($("camera"), c ? `${c.name}, ${c.width} × ${c.height} px, ${c.bits} bit${c.fps ? `, ${c.fps} fps` : ""}` : "");
+  put($("region"), value.region ? `${value.region.words}${value.zois == null ? "" : ` · ${value.zois} ZOIs`}` : "");
+  put($("file"), `${value.file}${value.unsaved.length ? ` · ${t("not saved")}` : ` · ${t("saved")}`}`);
+  picture(value);
+  gaugesOver();
+  gaugeList(value.gauges);
+  sliders(c?.sliders ?? []);
+  fields(value);
+  for (const box of document.querySelectorAll("[data-overlay]")) if (box !== document.activeElement) box.checked = value.overlays[box.dataset.overlay];
+  check(value);
+  showScale();
+}
+
+function picture(value) {
+  if (value.picture && value.picture !== shownPicture && !busy) {
+    busy = true;
+    shownPicture = value.picture;
+    const image = $("live");
+    image.onload = image.onerror = () => { busy = false; };
+    image.src = `/picture?setup=${value.picture}`;
+  }
+  if (value.region && value.region.edition !== edition) {
+    edition = value.region.edition;
+    $("mask").src = `/mask?edition=${edition}-${Date.now()}`;
+  }
+}
+
+function gaugesOver() {
+  if (told.camera && !pending) {
+    const before = svg.dataset.mark;
+    drawGauges(svg, told.gauges, told.camera.width, told.camera.height, true);
+    if (svg.dataset.mark !== before) sketch();
+  }
+}
+
+function gaugeList(gauges) {
+  const list = $("gauges"), names = Object.keys(gauges);
+  if (list.contains(document.activeElement) || list.dataset.names === names.join()) return;
+  list.dataset.names = names.join();
+  list.replaceChildren(...names.map((name) => {
+    const item = document.createElement("li"), input = document.createElement("input"), away = document.createElement("button");
+    input.value = name;
+    input.maxLength = 32;
+    input.setAttribute("aria-label", t("Name"));
+    input.addEventListener("change", async () => {
+      const said = await change({ do: "gauge", name: input.value, was: name, gauge: told.gauges[name] });
+      if (!said.startsWith("ok")) input.value = name;
+      input.blur();
+      list.dataset.names = "";
+    });
+    away.type = "button";
+    away.textContent = "×";
+    away.setAttribute("aria-label", `${t("Take away")} ${name}`);
+    away.addEventListener("click", () => { away.blur(); change({ do: "gauge", name, gauge: null }); });
+    item.append(input, away);
+    return item;
+  }));
+}
+
+const LABELS = { exposure_us: "Exposure, µs", gain: "Gain", brightness: "Brightness" };
+function sliders(wanted) {
+  const box = $("sliders");
+  if (box.dataset.keys !== wanted.map((one) => one.key).join()) {
+    box.dataset.keys = wanted.map((one) => one.key).join();
+    box.replaceChildren(...wanted.map((one) => {
+      const label = document.createElement("label"), name = document.createElement("span"), input = document.createElement("input"), value = document.createElement("output");
+      name.dataset.t = LABELS[one.key];
+      name.textContent = t(LABELS[one.key]);
+      Object.assign(input, { type: "range", min: 0, max: 1000, step: 1 });
+      input.dataset.key = one.key;
+      input.addEventListener("change", () => change({ do: "camera", key: one.key, value: at(input, input.value) }));
+      input.addEventListener("input", () => put(value, number(at(input, input.value))));
+      label.append(name, input, value);
+      return label;
+    }));
+  }
+  wanted.forEach((one, i) => {
+    const [, input, value] = box.children[i].children;
+    Object.assign(input.dataset, { low: one.low, high: one.high, log: one.log });
+    if (input === document.activeElement && input.matches(":active")) return;
+    const share = one.log ? Math.log(one.value / one.low) / Math.log(one.high / one.low) : (one.value - one.low) / (one.high - one.low);
+    input.value = Math.round(1000 * share);
+    put(value, number(one.value));
+  });
+}
+
+function at(input, place) {
+  const low = Number(input.dataset.low), high = Number(input.dataset.high), share = place / 1000;
+  return Number((input.dataset.log === "true" ? low * (high / low) ** share : low + share * (high - low)).toPrecision(3));
+}
+const number = (value) => (value >= 100 ? value.toFixed(0) : value.toPrecision(3));
+
+for (const input of document.querySelectorAll("[data-set]")) {
+  const ranged = input.type === "range", numeric = ranged || input.type === "number";
+  if (ranged) input.addEventListener("input", () => put(input.nextElementSibling, input.value));
+  input.addEventListener("change", () => change({ do: "set", key: input.dataset.set, value: numeric && input.value !== "" ? Number(input.value) : input.value }));
+}
+
+function fields(value) {
+  for (const input of document.querySelectorAll("[data-set]")) {
+    if (input === document.activeElement) continue;
+    const [section, key] = input.dataset.set.split("."), now = value[section][key] ?? "";
+    if (input.value !== String(now)) input.value = now;
+    if (input.type === "range") put(input.nextElementSibling, String(now));
+  }
+}
+
+for (const box of document.querySelectorAll("[data-overlay]")) {
+  box.addEventListener("change", () => { change({ do: "overlay", name: box.dataset.overlay, on: box.checked }); box.blur(); });
+}
+
+let shownCheck = "";
+function check(value) {
+  const verdict = $("verdict");
+  put(verdict, value.checking ? t("checking …") : value.go == null ? "" : value.go ? "GO" : "NO-GO");
+  verdict.className = value.go == null ? "" : value.go ? "go" : "nogo";
+  const mark = JSON.stringify([value.lines, value.table, value.measure, value.scale, document.documentElement.lang]);
+  if (mark === shownCheck) return;
+  shownCheck = mark;
+  const sorted = [...value.lines].sort((a, b) => a.good - b.good);
+  $("lines").replaceChildren(...sorted.map((one) => {
+    const item = document.createElement("li"), what = document.createElement("b"), words = document.createElement("span"), advice = document.createElement("em");
+    what.textContent = one.what;
+    words.textContent = ` ${one.value}`;
+    advice.textContent = one.good ? "" : one.advice;
+    item.className = one.good ? "" : "look";
+    item.append(what, words, advice);
+    return item;
+  }));
+  table(value);
+}
+
+function table({ table: known, measure, scale }) {
+  const mm = scale?.px_per_mm;
+  const rows = [];
+  const row = (tag, cells) => { const line = document.createElement("tr"); for (const [text, here] of cells) { const cell = document.createElement(tag); cell.textContent = text; cell.className = here ? "here" : ""; line.append(cell); } rows.push(line); };
+  if (known) {
+    row("th", [["ZOI"], [`VSG ${mm ? "mm" : "px"}`], ...known.bursts.map((n) => [n])]);
+    for (const one of known.rows) row("td", [[one.zoi], [mm ? (one.vsg / mm).toFixed(2) : one.vsg.toFixed(0)], ...one.noise.map((v, i) => [v == null ? "–" : (v * 1e6).toFixed(0), one.zoi === measure.zoi && known.bursts[i] === measure.burst])]);
+    const caption = document.createElement("caption");
+    caption.textContent = t("strain noise of one ZOI, µm/m, by frames of a burst");
+    rows.unshift(caption);
+  }
+  $("table").replaceChildren(...rows);
+}
+
+function showScale() {
+  if (scaled) return;
+  const s = told.scale;
+  put($("scale"), s?.px_per_mm ? `${s.px_per_mm.toFixed(2)} px/mm${s.sigma ? ` ± ${(100 * s.sigma * s.px_per_mm).toFixed(2)} %` : ""}` : "");
+}
+
+choose("rectangle");

@@ -1,0 +1,219 @@
+"""The page's server: the standard library's, on 127.0.0.1 alone, a thread for each request.
+
+Requests of a page are few; what is told to it goes as server-sent events (``hub``). ``door`` judges every
+request before anything is done.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import secrets
+import threading
+from collections.abc import Callable, Mapping
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+from acquire.errors import DeviceError
+from live.pace import OUTPUT, yield_to_others
+from live.serve.web.answers import OURS, Answer, of_json, static
+from live.serve.web.door import Door, Refused
+from live.serve.web.hub import Hub
+
+log = logging.getLogger(__name__)
+
+HOST = "127.0.0.1"
+DEFAULT_PORT = 8765
+BEAT_S = 0.5
+"""Between heartbeats; the page says NO LINK after 2 s without."""
+_SLOW_S = 10.0  # a page that does not take what is sent to it for so long has gone
+
+Query = Mapping[str, str]
+Get = Callable[[Query], Answer]
+Post = Callable[[Mapping[str, Any]], Any]
+
+
+class PageServer:
+    """Serves until it is closed.
+
+    Parameters
+    ----------
+    hub : Hub
+    gets, posts : mapping of path to callable
+        What is answered beside the files of the page and the events.
+    port : int
+        The next ones are tried where it is taken; 0: any.
+
+    Attributes
+    ----------
+    door : Door
+
+    Raises
+    ------
+    DeviceError
+        No port is free.
+    """
+
+    def __init__(
+        self, hub: Hub, gets: Mapping[str, Get], posts: Mapping[str, Post], port: int = DEFAULT_PORT
+    ) -> None:
+        self.hub, self.gets, self.posts = hub, gets, posts
+        self._closed = threading.Event()
+        self._server = _bound(port)
+        self.door = Door(self._server.server_address[1], secrets.token_urlsafe(24))
+        self._server.page = self
+        self._threads = [
+            threading.Thread(target=self._server.serve_forever, args=(0.2,), name="page", daemon=True),
+            threading.Thread(target=self._beat, name="page-beat", daemon=True),
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def address(self) -> str:
+        """What a person opens in a browser."""
+        return self.door.address
+
+    def close(self) -> None:
+        """End all streams and give the port back."""
+        self._closed.set()
+        self.hub.close()
+        self._server.shutdown()
+        self._server.server_close()
+
+    def _beat(self) -> None:
+        beats = 0
+        while not self._closed.wait(BEAT_S):
+            beats += 1
+            self.hub.tell("beat", beats)
+
+
+class _Server(ThreadingHTTPServer):
+    daemon_threads = True
+    allow_reuse_address = True
+    page: PageServer
+
+
+def _bound(port: int) -> _Server:
+    last: OSError | None = None
+    for candidate in range(port, port + (10 if port else 1)):
+        try:
+            return _Server((HOST, candidate), _Handler)
+        except OSError as error:
+            last = error
+    raise DeviceError(
+        f"the page: no port from {port} to {port + 9} is free on {HOST} ({last}); end what holds them"
+    )
+
+
+class _Handler(BaseHTTPRequestHandler):
+    """One request."""
+
+    server: _Server
+    protocol_version = "HTTP/1.1"
+    server_version, sys_version = "phasedic", ""
+    timeout = _SLOW_S
+
+    def setup(self) -> None:
+        yield_to_others(OUTPUT)
+        super().setup()
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Requests are nobody's business; an address with the token must not be logged."""
+
+    def do_GET(self) -> None:
+        """A file of the page, the events, or what ``gets`` has."""
+        self._guarded(self._get)
+
+    def do_POST(self) -> None:
+        """An order or a change."""
+        self._guarded(self._post)
+
+    def _guarded(self, step: Callable[[], None]) -> None:
+        try:
+            self.server.page.door.check_place(self.headers)
+            step()
+        except Refused as refused:
+            self.close_connection = True
+            self._send(Answer(refused.why.encode(), "text/plain; charset=utf-8"), refused.status)
+        except (OSError, ValueError):  # the browser has gone, or sends no HTTP
+            self.close_connection = True
+        except Exception:
+            log.exception("a request to the page failed")
+            self.close_connection = True
+            self._send(Answer(b"a defect; see the log", "text/plain; charset=utf-8"), 500)
+
+    def _get(self) -> None:
+        page, parts = self.server.page, urlsplit(self.path)
+        query = {key: values[-1] for key, values in parse_qs(parts.query).items()}
+        if parts.path == "/" and "token" in query:
+            self._let_in(query["token"])
+            return
+        page.door.check_cookie(self.headers)
+        if parts.path == "/events":
+            self._events(page.hub)
+        elif parts.path in page.gets:
+            self._send(page.gets[parts.path](query))
+        else:
+            name = "index.html" if parts.path == "/" else parts.path.removeprefix("/static/")
+            self._send(static(name))
+
+    def _let_in(self, word: str) -> None:
+        """Put the token into a cookie and take it out of the address, where it could be read or handed on."""
+        door = self.server.page.door
+        if not door.is_key(word):
+            raise Refused(403, "a wrong token; open the address that phasedic has printed")
+        self.send_response(303)
+        self.send_header("Location", "/")
+        self.send_header("Set-Cookie", door.cookie)
+        self.send_header("Content-Length", "0")
+        self.end_headers()
+
+    def _post(self) -> None:
+        page = self.server.page
+        length = page.door.check_post(self.headers)
+        page.door.check_cookie(self.headers)
+        handler = page.posts.get(urlsplit(self.path).path)
+        if handler is None:
+            raise Refused(404, "there is no such thing")
+        try:
+            value = json.loads(self.rfile.read(length))
+        except (ValueError, RecursionError):
+            raise Refused(400, "not JSON") from None
+        if not isinstance(value, dict):
+            raise Refused(400, "an object is expected")
+        self._send(of_json(handler(value)))
+
+    def _events(self, hub: Hub) -> None:
+        """Server-sent events until the page goes or all is over."""
+        stream = hub.open()
+        if stream is None:
+            raise Refused(503, "too many pages are open; close one")
+        try:
+            self.close_connection = True
+            self._head(200, "text/event-stream", OURS, None)
+            while (messages := stream.take(BEAT_S)) is not None:
+                for kind, message in messages.items():
+                    self.wfile.write(b"event: %s\ndata: %s\n\n" % (kind.encode(), message))
+                self.wfile.flush()
+        finally:
+            hub.leave(stream)
+
+    def _send(self, answer: Answer, status: int = 200) -> None:
+        self._head(status, answer.kind, answer.policy, len(answer.content))
+        self.wfile.write(answer.content)
+
+    def _head(self, status: int, kind: str, policy: str, length: int | None) -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        if length is not None:
+            self.send_header("Content-Length", str(length))
+        self.send_header("Content-Security-Policy", policy)
+        self.send_header("Cache-Control", "no-store")
+        self.send_header("X-Content-Type-Options", "nosniff")
+        self.send_header("Referrer-Policy", "no-referrer")
+        self.send_header("Cross-Origin-Resource-Policy", "same-origin")
+        if self.close_connection:
+            self.send_header("Connection", "close")
+        self.end_headers()
