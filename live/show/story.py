@@ -15,6 +15,7 @@ from acquire.errors import ConfigError, DataError
 from acquire.frame import Frame, frozen
 from analysis.evaluate import Curve, evaluate_test
 from live.finished import RunFolder
+from live.setup import from_dict, outlines
 from live.tell import figure_lines, options_of
 from live.view import ViewSetup
 from live.view.exchange.messages import (
@@ -101,7 +102,18 @@ def setup_of(run: RunFolder) -> ViewSetup:
         area_m2=run.specimen.area_m2,
         axis="x" if run.specimen.axis == "x" else "y",
         finished=True,
+        with_load=bool(np.isfinite(run.force).any()),
+        outlines=_outlines(run),
     )
+
+
+def _outlines(run: RunFolder) -> dict[str, tuple[tuple[float, float], ...]]:
+    """Where the gauges lie; of one whose place the file does not tell, nothing."""
+    described = {name: gauge.described for name, gauge in run.gauges.items()}
+    try:
+        return outlines(from_dict({"gauges": described}, {}, str(run.path)).gauges)
+    except ConfigError:
+        return {}
 
 
 def story(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Message]:

@@ -72,8 +72,8 @@ ROOMS = {
     "live.export": "acquire analysis.field live.results live.maps live.tell live.finished",
     "live.report": "acquire analysis.field analysis.evaluate analysis.picture live.results live.maps live.tell"
     " live.setup live.finished live.export",
-    "live.show": "acquire analysis analysis.field analysis.evaluate live.measure live.tell live.finished live.view"
-    " live.view.exchange",
+    "live.show": "acquire analysis analysis.field analysis.evaluate live.measure live.setup live.tell live.finished"
+    " live.view live.view.exchange",
     "live.batch": "acquire live.replay live.setup live.results",
     "live.serve.web": "acquire live.pace",
     "live.serve": "acquire acquire.camera acquire.files analysis.field analysis.evaluate live.measure live.setup"

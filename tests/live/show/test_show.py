@@ -13,7 +13,7 @@ import pytest
 from live.cli import main
 from live.finished import RunFolder, open_run
 from live.show import Asked, show
-from live.show.story import chosen, story
+from live.show.story import chosen, setup_of, story
 from live.tell import Screen
 from live.view.exchange.messages import events_of, field_of, picture_of, rows_of
 from live.view.exchange.wire import Kind
@@ -64,6 +64,20 @@ def test_the_story_is_what_the_files_hold(run: RunFolder) -> None:
     status = next(message for message in messages if message.kind is Kind.STATUS)
     assert "**S1**, 96 instants" in status.meta["markdown"]
     assert "gauge **shear**" in status.meta["markdown"]
+
+
+def test_the_gauges_are_drawn_where_they_lie(run: RunFolder, tmp_path: Path) -> None:
+    assert setup_of(run).outlines == {
+        "axial": ((64.0, 20.0), (64.0, 76.0)),
+        "shear": ((40, 30), (90, 30), (90, 70), (40, 70), (40, 30)),
+    }
+    assert setup_of(run).with_load
+    run.strain.config["gauges"] = {"axial": {"kind": "spiral"}}
+    del run.gauges
+    assert setup_of(run).outlines == {}
+    with open_run(make_run(tmp_path, PULLED[:3], session=False)) as plain:
+        plain.strain.values["force_N"][:] = np.nan
+        assert not setup_of(plain).with_load
 
 
 def test_all_of_it_is_drawn_and_every_zoi_tells_its_values(
