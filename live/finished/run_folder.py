@@ -210,10 +210,16 @@ class RunFolder(Closing):
         return np.asarray(self.strain.values["force_N"], np.float64)
 
     @property
+    def force_one_zero(self) -> NDArray[np.float64]:
+        """The force as if the zero of the first instant had held to the end, (T,) N: no tare in mid-test."""
+        zero = self.strain.values.get("zero_N")
+        return self.force if zero is None else self.force + np.asarray(zero - zero[0], np.float64)
+
+    @property
     def stress(self) -> NDArray[np.float64] | None:
         """Force over the section, (T,) Pa; None where the section is not known."""
         area = self.specimen.area_m2
-        return None if area is None else self.force / area
+        return None if area is None else self.force_one_zero / area
 
     @cached_property
     def events(self) -> list[Event]:

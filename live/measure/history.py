@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -31,8 +33,24 @@ class History:
         return np.array([getattr(instant, name) for instant in self.instants], np.float64)
 
     def forces(self, loads: LoadLog) -> Array:
-        """The force at each instant with all samples that have come by now, (N,) float64, N."""
-        return np.array([loads.force_at(instant.t) for instant in self.instants], np.float64)
+        """The force at each instant with all samples that have come by now, (N,) float64, N.
+
+        As if the zero of the first instant had held to the end: a tare in mid-test is no unloading.
+        """
+        return np.array(
+            [loads.force_at(i.t) + loads.zero_at(i.t) - zero for i, zero in self._with_first_zero(loads)],
+            np.float64,
+        )
+
+    def _with_first_zero(self, loads: LoadLog) -> Iterator[tuple[Instant, float]]:
+        zero = loads.zero_at(self.instants[0].t) if self.instants else 0.0
+        return ((instant, zero) for instant in self.instants)
+
+    def tared_in_mid_test(self, loads: LoadLog) -> float:
+        """What tares after the first instant have taken off the force by the last one, N."""
+        if not self.instants:
+            return 0.0
+        return loads.zero_at(self.instants[-1].t) - loads.zero_at(self.instants[0].t)
 
     def along(self, axis: str) -> tuple[Array, Array]:
         """Strain along and across the load: the gauges ``axial`` and ``transverse``, or else the means."""

@@ -45,6 +45,8 @@ class Instant:
         In the order of the configuration.
     force_raw : float, N
         As stamped, where a lag of the load was taken off ``force``; else NaN.
+    zero : float, N
+        What tares have taken off ``force`` by then.
     """
 
     t: float
@@ -67,6 +69,7 @@ class Instant:
     latency_s: float = math.nan
     gauges: Mapping[str, GaugeValue] = field(default_factory=dict)
     force_raw: float = math.nan
+    zero: float = 0.0
 
 
 def instant_of(burst: Burst, field: StrainField, force: float, measure_s: float = 0.0) -> Instant:

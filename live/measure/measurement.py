@@ -56,6 +56,6 @@ class Measurement:
         """The same once it is known how long it took, from the stamp of the last frame."""
         return replace(self, instant=replace(self.instant, latency_s=latency_s))
 
-    def with_force(self, force: float, raw: float = math.nan) -> Measurement:
-        """The same once the force is known; ``raw`` as stamped, where a lag was taken off."""
-        return replace(self, instant=replace(self.instant, force=force, force_raw=raw))
+    def with_force(self, force: float, raw: float = math.nan, zero: float = 0.0) -> Measurement:
+        """The same once the force is known; ``raw`` as stamped, where a lag was taken off; ``zero`` by tares."""
+        return replace(self, instant=replace(self.instant, force=force, force_raw=raw, zero=zero))

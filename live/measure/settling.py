@@ -22,6 +22,8 @@ class Loads(Protocol):
 
     def raw_force_at(self, t: float) -> float: ...
 
+    def zero_at(self, t: float) -> float: ...
+
     def covers(self, t: float) -> bool: ...
 
 
@@ -60,4 +62,6 @@ class Settling:
 
     def _with_force(self, measurement: Measurement) -> Measurement:
         t = measurement.t
-        return measurement.with_force(self._loads.force_at(t), self._loads.raw_force_at(t))
+        return measurement.with_force(
+            self._loads.force_at(t), self._loads.raw_force_at(t), self._loads.zero_at(t)
+        )

@@ -84,8 +84,10 @@ def session_material(session: Session, request: ReplayRequest, config: Config, p
     samples = tuple(session.load_samples())
     for sample in samples:
         loads.append(sample)
-    loads.close()
     events = tuple(session.events())
+    for event in events:
+        loads.take_event(event)
+    loads.close()
     told = [e for e in events if e.kind is EventKind.REFERENCE and not e.data.get("renewed")]
     stored = open_store(session, path)
     if request.reference is not None:

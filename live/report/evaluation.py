@@ -48,7 +48,7 @@ class Curve:
     def of(cls, run: RunFolder) -> Curve:
         """The curve of ``run``."""
         stress = run.stress
-        load = run.force if stress is None else stress
+        load = run.force_one_zero if stress is None else stress
         axial, transverse = run.axial_strain, run.transverse_strain
         specimen = from_dict({"specimen": run.section("specimen")}, {}, str(run.path)).specimen
         measured = Measured(np.asarray(run.strain.time_s, np.float64), axial, load, transverse)

@@ -71,6 +71,7 @@ _INSTANTS = (
         "true_stress", "Pa", "stress times one plus the axial engineering strain; volume taken as constant"
     ),
     Quantity("force_raw", "N", "force before the lag was taken off"),
+    Quantity("zero", "N", "what tares had taken off the force by then"),
     Quantity("n_valid", UNITLESS, "ZOIs with a value"),
     Quantity("n_zoi", UNITLESS, "ZOIs asked for"),
     Quantity("noise", "GL", "temporal standard deviation of one frame; nan for a burst of one"),
@@ -87,7 +88,7 @@ _KNOWN = {q.name: q for q in (*_FIELDS, *_PLACES, *_INSTANTS)}
 
 MEANS = {
     "time_s": "time", "force_N": "force", "stress_Pa": "stress", "true_stress_Pa": "true_stress",
-    "force_raw_N": "force_raw", "noise_GL": "noise",
+    "force_raw_N": "force_raw", "zero_N": "zero", "noise_GL": "noise",
     "duration_s": "duration", "kernel_s": "kernel", "latency_s": "latency", "u_px": "u", "v_px": "v",
 }  # fmt: skip
 """Columns of ``Strain.values`` whose name carries the unit, and the quantity each is; others have its name."""

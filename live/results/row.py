@@ -101,6 +101,7 @@ def _values(measurement: Measurement, maps: dict[str, NDArray[Any]], info: RowIn
         "v_px": instant.v,
         "latency_s": instant.latency_s,
         "kernel_s": instant.measure_s or math.nan,
+        "zero_N": instant.zero,
     }
     for name, gauge in instant.gauges.items():
         values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma), strict=True))

@@ -26,7 +26,14 @@ if TYPE_CHECKING:
 
 FLUSH_S = 0.25  # a row waits for its flush no longer than this
 _UNITS = {"time_s": "s", "force_N": "N", "noise_GL": "GL", "duration_s": "s", "u_px": "px", "v_px": "px"}
-_UNITS |= {"stress_Pa": "Pa", "true_stress_Pa": "Pa", "force_raw_N": "N", "latency_s": "s", "kernel_s": "s"}
+_UNITS |= {
+    "stress_Pa": "Pa",
+    "true_stress_Pa": "Pa",
+    "force_raw_N": "N",
+    "zero_N": "N",
+    "latency_s": "s",
+    "kernel_s": "s",
+}
 _WORDS = {
     "u": "displacement along x (right)",
     "v": "displacement along y (down)",

@@ -76,6 +76,16 @@ def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list
     return [f"lag of the load beside the frames: {interval(lag, 1e-3, 'ms')} ({CONFIDENCE:.0%}; {how})"]
 
 
+def tare_line(history: History, loads: LoadLog) -> list[str]:
+    """That the zero was moved in mid-test; nothing where it was not."""
+    tared = history.tared_in_mid_test(loads)
+    if not tared:
+        return []
+    return [
+        f"tared in mid-test by {tared:+.4g} N: these figures go by the zero before; strain.csv has it as zero_N"
+    ]
+
+
 def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
     """How far the largest strain lies off the axis of the load; nothing where the strains do not tell."""
     angle = principal_direction(*(history.column(name) for name in ("exx", "eyy", "exy")))

@@ -10,7 +10,7 @@ from acquire.printable import brief
 from live.measure import History
 from live.setup import SpecimenConfig
 from live.tell.books import Books
-from live.tell.figures import alignment_line, evaluate, figure_lines, lag_line
+from live.tell.figures import alignment_line, evaluate, figure_lines, lag_line, tare_line
 
 
 def noise_line(history: History) -> str:
@@ -64,6 +64,7 @@ def summary_lines(books: Books, specimen: SpecimenConfig) -> list[str]:
     lines += latency_lines(history)
     figures = figure_lines(evaluate(history, books.loads, specimen), specimen)
     if figures:
+        figures += tare_line(history, books.loads)
         figures += alignment_line(history, specimen) + lag_line(history, books.loads, specimen)
     return lines + figures
 

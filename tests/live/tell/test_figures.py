@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from acquire.events import Event, EventKind
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from live.measure import History
@@ -21,17 +22,35 @@ AREA_M2 = 20e-6
 FLAT = SpecimenConfig(width_mm=10.0, thickness_mm=2.0)
 
 
-def kept(truth: Truth, lag: float = 0.0) -> tuple[History, LoadLog]:
-    """A run whose mean strains and loads follow a curve, the load ``lag`` late."""
+def kept(truth: Truth, lag: float = 0.0, tared_at: float | None = None) -> tuple[History, LoadLog]:
+    """A run whose mean strains and loads follow a curve, the load ``lag`` late, tared once in mid-test."""
     curve, history, loads = noisy(truth, 1), History(), LoadLog()
     assert curve.transverse is not None
     one = make_measurement(0).instant
     for t, axial, across in zip(curve.t, curve.strain, curve.transverse, strict=True):
         history.add(replace(one, t=START + t, eyy=axial, exx=across))
     true = truth.curve
+    zero = 0.0
     for t in np.arange(0, true.t[-1] + 0.5, 1 / 80):
-        loads.append(LoadSample(START + t, AREA_M2 * float(np.interp(t - lag, true.t, true.stress))))
+        force = AREA_M2 * float(np.interp(t - lag, true.t, true.stress))
+        if tared_at is not None and not zero and t >= tared_at:
+            zero = force
+            loads.take_event(Event(START + t, EventKind.TARE, "a cell", "", "info", {"step_N": zero}))
+        loads.append(LoadSample(START + t, force - zero))
     return history, loads
+
+
+def test_a_tare_in_mid_test_falsifies_no_figure() -> None:
+    truth = ramberg_osgood()
+    plain, tared = (
+        evaluate(*kept(truth, tared_at=at), FLAT) for at in (None, 0.3 * float(truth.curve.t[-1]))
+    )
+    for name in ("E", "Rm"):
+        assert getattr(tared, name).value == pytest.approx(getattr(plain, name).value, rel=2e-3)
+    books = Books(Journal(), Ledger(), *reversed(kept(truth, tared_at=1.0)))
+    assert any(line.strip().startswith("tared in mid-test by +") for line in summary_lines(books, FLAT))
+    books = Books(Journal(), Ledger(), *reversed(kept(truth)))
+    assert not any("tared" in line for line in summary_lines(books, FLAT))
 
 
 def test_a_metal_by_its_standard() -> None:
