@@ -16,7 +16,7 @@ from playwright.sync_api import sync_playwright
 from tests.live.serve.driven import FLAGS, Page, Program, chromium
 
 IMAGES = Path(__file__).parent / "images"
-CAMERA = "sim:hole?fps=15&seconds=44&hold=8&buffers=64&px_per_mm=20"
+CAMERA = "sim:woven?fps=15&seconds=44&hold=8&buffers=64&px_per_mm=20"
 COLOURS = 256
 WIDE = 960  # px in the documents
 
