@@ -15,6 +15,7 @@ CASES: dict[str, list[str]] = {
     "30 fps, 945 ZOIs": [],
     "the same, 0.3 % saturated": ["--saturated", "0.003"],
     "the same, 12 bits": ["--bits", "12"],
+    "the same, a viewer attached": ["--viewer"],
     "30 fps, 4,000 ZOIs of 32 px": ["--zoi", "32", "--step", "17"],
     "60 fps, 285 ZOIs": ["--fps", "60", "--step", "64"],
     "60 fps, burst 4, 945 ZOIs": ["--fps", "60", "--burst", "4"],

@@ -7,11 +7,16 @@ Prints one JSON object.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
+import socket
+import subprocess
 import sys
 import tempfile
+import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +27,9 @@ from live.outputs import Consumer
 from live.run import Outcome, run_live
 from live.setup import load_config
 from live.tell import Screen
+from live.view.viewer import url, viewer_binary
 
+PORT = 19_876
 SETTLED_S = 2.0
 """Skips and latencies count from so long after the first measurement."""
 
@@ -78,12 +85,42 @@ def run(case: argparse.Namespace, folder: Path) -> tuple[Outcome, np.ndarray]:
         "view.enabled": not case.bare,
         "view.rrd": not case.bare,
         "view.spawn": False,
+        "view.port": PORT,
         "output.dir": str(folder / "run"),
     }
     config = load_config(None, {key: value for key, value in settings.items() if value is not None})
     watch = Watch()
-    outcome = run_live(config, Screen(quiet=not case.loud), consumers=[watch])
+    with attached(folder) if case.viewer else contextlib.nullcontext():
+        outcome = run_live(config, Screen(quiet=not case.loud), consumers=[watch])
     return outcome, np.array(watch.rows)
+
+
+@contextlib.contextmanager
+def attached(folder: Path) -> Iterator[None]:
+    """A viewer's program that takes the whole view over the wire; it draws nothing, as one on another screen."""
+    ended, taken = threading.Event(), folder / "taken.rrd"
+
+    def take() -> None:
+        while not _is_served() and not ended.wait(0.1):
+            pass
+        command = [str(viewer_binary()), url(PORT), "--save", str(taken)]
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
+            ended.wait()
+            process.terminate()
+
+    thread = threading.Thread(target=take)
+    thread.start()
+    yield
+    ended.set()
+    thread.join()
+    if not taken.exists() or taken.stat().st_size < 1_000_000:
+        raise RuntimeError("the viewer took nothing")
+
+
+def _is_served() -> bool:
+    with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", PORT), 0.2):
+        return True
+    return False
 
 
 def figures(case: argparse.Namespace, outcome: Outcome, rows: np.ndarray) -> dict[str, Any]:
@@ -126,6 +163,7 @@ def main() -> int:
     parser.add_argument("--saturated", type=float, default=0.0)
     parser.add_argument("--seconds", type=float, default=22.0)
     parser.add_argument("--bare", action="store_true", help="no recording, view or load cell")
+    parser.add_argument("--viewer", action="store_true", help="a viewer takes the view")
     parser.add_argument("--disk", action="store_true", help="measure the disk too")
     parser.add_argument("--loud", action="store_true", help="print what the run prints")
     case = parser.parse_args()
