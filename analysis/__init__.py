@@ -19,6 +19,7 @@ from analysis.kernel import (
     PatternError,
     PhaseKernel,
     not_compiled,
+    numerics,
     warm_up,
 )
 
@@ -35,5 +36,6 @@ __all__ = [
     "StrainField",
     "ZoiGrid",
     "not_compiled",
+    "numerics",
     "warm_up",
 ]

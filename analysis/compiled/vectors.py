@@ -22,6 +22,7 @@ from numba.extending import intrinsic, models, register_model
 
 from analysis.compiled.loops import FAST
 
+PROCESSOR: str = llvm.get_host_cpu_name()
 LANES: int = 16 if llvm.get_host_cpu_features().get("avx512f") else 8
 _FLAGS = tuple(sorted(FAST))
 _FLOAT = ir.FloatType()

@@ -44,6 +44,14 @@ def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) ->
     return not (all(map(is_cached, loops)) and all(is_cached(prefilter.coefficients, kind) for kind in kinds))
 
 
+def numerics() -> dict[str, str]:
+    """What the last digits of every result belong to: processor, width of its vectors, and the loops themselves."""
+    from analysis.compiled.loops import digest
+    from analysis.compiled.vectors import LANES, PROCESSOR
+
+    return {"processor": PROCESSOR, "vectors": f"{LANES} float32", "loops": digest()}
+
+
 def warm_up(part: str = ALL, kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) -> None:
     """Compile, or load from numba's cache, every loop that a kernel can need.
 

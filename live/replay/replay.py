@@ -40,6 +40,7 @@ from live.setup import (
     load_config,
     make_folder,
     open_rig,
+    other_digits,
     read_mask,
     with_mask,
 )
@@ -87,6 +88,10 @@ def replay(request: ReplayRequest, screen: Screen, stopping: threading.Event) ->
             screen.say(f"note: {session.recovered}")
         if session.mode.every > 1:
             screen.say(f"note: one frame in {session.mode.every} was recorded; measured as a slower camera")
+        if request.as_measured and (otherwise := other_digits(session.versions)):
+            screen.say(
+                f"note: recorded with {', '.join(otherwise)}; the last digits of the results may differ"
+            )
         overrides = {"camera.address": f"session:{path}", "load.address": f"session:{path}"}
         config = session_config(session, request, overrides, path)
         if request.overrides.get("measure.roi") == AUTO and "measure.mask" not in request.overrides:

@@ -9,7 +9,7 @@ configuration, ``compiling`` has the loops compiled ahead, ``folder`` makes the 
 from live.setup.checks import ALL, AUTO, GIVEN
 from live.setup.compiling import compile_ahead
 from live.setup.config import Config, from_dict, load_config, options, settings_in
-from live.setup.folder import FILES, make_folder, versions
+from live.setup.folder import FILES, make_folder, other_digits, versions
 from live.setup.gauges import GaugeConfig, describe, gauges_for, outlines
 from live.setup.grid import grid_for, kernel_settings, whole_picture
 from live.setup.pictures import correction, read_mask, with_flat_field, with_mask
@@ -42,6 +42,7 @@ __all__ = [
     "open_load",
     "open_rig",
     "options",
+    "other_digits",
     "outlines",
     "read_mask",
     "settings_in",

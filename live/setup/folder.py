@@ -5,10 +5,13 @@ from __future__ import annotations
 import datetime
 import logging
 import platform
+from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from typing import Any
 
 from acquire.errors import ConfigError
+from acquire.printable import printable
 
 log = logging.getLogger(__name__)
 
@@ -20,7 +23,9 @@ _PACKAGES = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless", "h
 
 
 def versions() -> dict[str, str]:
-    """Versions of ourselves, of Python and of what we stand on."""
+    """Versions of ourselves, of Python and of what we stand on, and what the last digits belong to."""
+    from analysis import numerics
+
     found = {
         "python": platform.python_version(),
         "machine": platform.machine(),
@@ -31,7 +36,17 @@ def versions() -> dict[str, str]:
             found[name] = version(name)
         except PackageNotFoundError:
             found[name] = "not installed"
-    return found
+    return found | numerics()
+
+
+_DIGITS = ("numba", "numpy", "machine", "processor", "vectors", "loops")
+
+
+def other_digits(then: Mapping[str, Any]) -> list[str]:
+    """What was otherwise when something with the versions ``then`` was measured, where its last digits hang on it."""
+    now = versions()
+    differ = [name for name in _DIGITS if name in then and str(then[name]) != now[name]]
+    return [f"{name} {printable(str(then[name]))[:40]} (here {now[name]})" for name in differ]
 
 
 def make_folder(wanted: str | None, now: datetime.datetime) -> Path:

@@ -7,11 +7,15 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from pathlib import Path
 
 import h5py
 import numpy as np
+import pytest
 
+from analysis import numerics
 from live.cli import main
 
 RECORDED = Path(__file__).with_name("recorded")
@@ -25,3 +29,29 @@ def test_an_old_session_gives_the_same_strain(tmp_path: Path) -> None:
         now = file["entry/strain"]
         for name in set(then.files) - {"cpu", "iterations"}:
             np.testing.assert_allclose(now[name][()], then[name], rtol=1e-4, atol=1e-7, err_msg=name)
+
+
+def write_versions(path: Path, versions: dict[str, str]) -> None:
+    with h5py.File(path, "r+") as file:
+        del file["entry/versions"]
+        file["entry/versions"] = np.bytes_(json.dumps(versions))
+
+
+def test_a_replay_says_where_the_last_digits_may_differ(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Elsewhere processor, vectors or loops are others; what was not written down then is not told."""
+    path = tmp_path / "session.h5"
+    shutil.copy(RECORDED / "session.h5", path)
+    command = ["replay", str(path), "--as-measured", "--no-view", "--no-rrd", "--out"]
+    write_versions(path, {"vectors": "4 float32", "loops": "\x1b[31m"})
+    assert main([*command, str(tmp_path / "other")]) == 0
+    told = capsys.readouterr().out
+    assert (
+        "recorded with vectors 4 float32 (here" in told
+        and "the last digits of the results may differ" in told
+    )
+    assert "\x1b" not in told
+    write_versions(path, numerics())
+    assert main([*command, str(tmp_path / "same")]) == 0
+    assert "vectors" not in capsys.readouterr().out
