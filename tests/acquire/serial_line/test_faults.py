@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -32,6 +33,7 @@ class Run:
     began: float = 0.0
     samples: list[LoadSample] = field(default_factory=list)
     events: list[Event] = field(default_factory=list)
+    machine_late_s: float = 0.0  # by which another program has held this one up meanwhile
 
     @property
     def told(self) -> str:
@@ -87,8 +89,13 @@ def runs() -> dict[str, Run]:
     threads = [threading.Thread(target=one, args=item) for item in texts.items()]
     for thread in threads:
         thread.start()
-    for thread in threads:
-        thread.join()
+    late = 0.0
+    while any(thread.is_alive() for thread in threads):
+        asked = time.monotonic() + 0.005
+        time.sleep(0.005)
+        late = max(late, time.monotonic() - asked)
+    for run in found.values():
+        run.machine_late_s = late
     return found
 
 
@@ -98,9 +105,10 @@ def test_no_force_is_wrong(name: str, runs: dict[str, Run]) -> None:
     doubtful = LoadFlag.STALE | LoadFlag.STEP
     good = [s for s in run.samples if not math.isnan(s.force) and not s.flags & doubtful]
     assert len(good) > 40
-    # 0.15 s of the ramp: what a busy machine may delay a line by before it is known to be late.
+    # 0.1 s of the ramp, by which a line may be late before it is known to be, and what this machine was late itself.
     for s in good:
-        assert s.force == pytest.approx(truth(s.t - run.began), abs=20.0 * 0.15), (name, s)
+        allowed = 20.0 * (0.1 + 2 * run.machine_late_s)
+        assert s.force == pytest.approx(truth(s.t - run.began), abs=allowed), (name, s)
 
 
 @pytest.mark.parametrize("name", NAMES)

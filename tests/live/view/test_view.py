@@ -139,7 +139,7 @@ def test_killed_it_comes_back_on_its_port_and_knows_the_past(
 def test_stopped_it_is_replaced_and_holds_nothing_up(
     make: Callable[..., Watched], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(keeper, "STUCK_S", 0.5)
+    monkeypatch.setattr(keeper, "STUCK_S", 2.0)  # a busy machine may keep the new one waiting for a second
     watched = make(None, tmp_path / "view.rrd")
     until(lambda: watched.served)
     stopped = watched.view.pid or 0
@@ -156,7 +156,7 @@ def test_stopped_it_is_replaced_and_holds_nothing_up(
     watched.close()
     assert longest < 1.0
     assert is_gone(stopped)
-    assert watched.told == ["warning: the view's process took nothing for 1 s (stopped?) and is started anew"]
+    assert watched.told == ["warning: the view's process took nothing for 2 s (stopped?) and is started anew"]
     assert rows_in(tmp_path / "view-2.rrd")["/strain/eyy"] == k + 1
 
 
