@@ -57,5 +57,5 @@ def has_pattern(
         What noise alone gives for ``energy``.
     """
     strong = np.all(energy > PATTERN_OVER_NOISE * noise_energy, axis=1)
-    sigma = np.sqrt(unit_variance.max(axis=1)) * max(noise, 0.1)
+    sigma = np.sqrt(np.maximum(unit_variance.max(axis=1), 0)) * max(noise, 0.1)
     return np.asarray(strong & (unit_variance.min(axis=1) > 0) & (sigma < WORST_SIGMA_U))
