@@ -83,7 +83,7 @@ def watched(desk: Desk, config: Config, screen: Screen) -> Outcome:
     """One test, with the page, told to its end."""
     from live.serve import ended
 
-    desk.viewer = lambda: _open_viewer(config)
+    desk.viewer = _open_viewer
     outcome = run_to_the_end(config, screen, [desk.begin(config)], desk.attend)
     conclude(outcome, screen)
     words = EXIT_WORDS.get(outcome.exit_code, "")
@@ -98,11 +98,9 @@ def invite(desk: Desk, screen: Screen) -> None:
     screen.say(f"the page: {desk.address}")
 
 
-def _open_viewer(config: Config) -> str:
+def _open_viewer(port: int) -> str:
     """The viewer of the view, in a window of its own."""
-    if not config.view.enabled:
-        return "no: the view is switched off"
-    if spawn_viewer(config.view.port) is None:
+    if spawn_viewer(port) is None:
         return "no: no window can be opened here; the folder of the run has view.rrd"
     return "ok"
 

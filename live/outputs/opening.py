@@ -103,6 +103,7 @@ def _view(about: About, books: Books, screen: Screen) -> View | None:
         books.journal.tell(EventKind.VIEW, "view", text, level)
 
     def serving(view: View) -> None:
+        books.vitals.view_port = view.port
         _announce(view, v.spawn, screen)
 
     return View(setup, port=v.port if v.enabled else None, rrd=rrd, tell=tell, serving=serving)

@@ -54,6 +54,8 @@ class Desk:
     bench : Bench or None
         While it is set up.
     server : PageServer
+    viewer : callable
+        Opens a viewer of the view at a port; its answer.
     """
 
     def __init__(self, draft: Draft | None, port: int = DEFAULT_PORT) -> None:
@@ -69,7 +71,7 @@ class Desk:
         self._wishes: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._folder = TemporaryDirectory(prefix="phasedic-")
         self._said = ""
-        self.viewer: Callable[[], str] = lambda: "no: there is no viewer here"
+        self.viewer: Callable[[int], str] = lambda port: "no: there is no viewer here"
         gets = {
             "/points": self._points,
             "/picture": self._picture,
@@ -214,7 +216,11 @@ class Desk:
         return {"answer": f"no: {refusal}" if refusal else "ok"}
 
     def _viewer(self, said: Mapping[str, Any]) -> dict[str, str]:
-        return {"answer": self.viewer()}
+        """Open it at the port that the view has told: another than was wanted where that was taken."""
+        port = None if self._live is None else self._live.books.vitals.view_port
+        if port is None:
+            return {"answer": "no: the view is switched off, or not there yet; after a test see its view.rrd"}
+        return {"answer": self.viewer(port)}
 
     def _order(self, said: Mapping[str, Any]) -> dict[str, str]:
         """One line, one answer."""

@@ -271,7 +271,7 @@ class ViewConfig:
     enabled: bool = key(
         FLAG,
         True,
-        "serve the rerun view (its port on 127.0.0.1 asks for no token)",
+        "serve the rerun view (its port on 127.0.0.1 asks for no token: all users of this machine can look)",
         Option("no-view", off=True),
     )
     rrd: bool = key(FLAG, True, "write view.rrd", Option("no-rrd", off=True))

@@ -21,6 +21,8 @@ class Vitals:
         The largest force so far; NaN before the first.
     state : str
         What a live run does with its frames; empty in a replay.
+    view_port : int or None
+        Where viewers connect; None while they cannot.
     """
 
     frame_t: float = math.nan
@@ -28,6 +30,7 @@ class Vitals:
     disk_s: float = math.inf
     peak_N: float = math.nan
     state: str = ""
+    view_port: int | None = None
 
     def loaded(self, t: float, force_N: float) -> None:
         """A load sample came at ``t`` (s, monotonic)."""

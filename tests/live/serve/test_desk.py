@@ -15,6 +15,7 @@ from acquire.events import EventKind
 from live.serve.desk import Desk
 from live.serve.draft import Draft
 from live.setup import Config, load_config
+from live.tell import Books
 from tests.live.serve.test_server import ask
 
 CAMERA = "sim:uniform?width=256&height=192&fps=15&seconds=30"
@@ -129,6 +130,7 @@ class Run:
 
     def __init__(self) -> None:
         self.heard: list[str] = []
+        self.books = Books.new(0.5)
 
     def stop(self, reason: str) -> None:
         self.heard.append("quit")
@@ -150,7 +152,13 @@ def test_orders_during_a_run_and_after(at: At) -> None:
     assert run.heard == ["tare", "note a b", "quit"]
     assert at.change(do="all") == "no: nothing is set up now"
     assert at.post("/map", {"of": "e1"}) == "ok" and at.post("/map", {"of": "x"}).startswith("no:")
+    opened: list[int] = []
+    at.desk.viewer = lambda port: opened.append(port) or "ok"  # type: ignore[func-returns-value]
+    assert at.post("/viewer", {}).startswith("no:"), "the view does not serve yet"
+    run.books.vitals.view_port = 9999
+    assert at.post("/viewer", {}) == "ok" and opened == [9999]
     at.desk.end({"figures": []})
+    assert at.post("/viewer", {}).startswith("no:") and opened == [9999], "the view ends with the run"
     assert at.order("tare").startswith("no:") and at.order("next") == "ok"
     assert at.desk.after()
     assert at.desk.draft is not None and at.desk.draft.config.metadata["specimen"] == "specimen-2"
