@@ -8,7 +8,7 @@ load comes beside the frames. ``deconvolution`` takes the blur of the ZOI off a 
 
 from analysis.evaluate.curve import Curve, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
-from analysis.evaluate.elastic import principal_direction
+from analysis.evaluate.elastic import LoadAxis, load_axis, principal_direction
 from analysis.evaluate.figure import CONFIDENCE, Figure
 from analysis.evaluate.gauges import (
     AreaGauge,
@@ -35,6 +35,7 @@ __all__ = [
     "GaugeValue",
     "Interval",
     "LineGauge",
+    "LoadAxis",
     "Options",
     "Span",
     "Standard",
@@ -50,6 +51,7 @@ __all__ = [
     "find_lag",
     "free",
     "gauge_zois",
+    "load_axis",
     "measure_gauge",
     "principal_direction",
     "true_curve",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,6 +182,67 @@ def principal_direction(exx: Floats, eyy: Floats, exy: Floats) -> Figure:
     along, beside = line @ moved, line[0] * moved[1] - line[1] * moved[0]
     sigma = math.sqrt(float(beside @ beside) / (n - 2) / max(float(along @ along), 1e-300))
     return Figure.about(0.5 * math.remainder(turn, 2 * math.pi), 0.5 * sigma, n - 2)
+
+
+@dataclass(frozen=True, slots=True)
+class LoadAxis:
+    """Along which side of the picture a test is loaded.
+
+    Attributes
+    ----------
+    axis : "x" or "y"
+    found : bool
+        Whether the strains tell it; else it is what was given, or y.
+    off : Figure
+        Angle from the axis to the direction whose length changes most, rad, positive clockwise on the screen.
+    """
+
+    axis: Literal["x", "y"]
+    found: bool
+    off: Figure
+
+
+def load_axis(exx: Floats, eyy: Floats, exy: Floats, given: str = "auto") -> LoadAxis:
+    """The axis of the load: as ``given`` ("x", "y"), or found: nearest to the strain of largest magnitude.
+
+    That holds for pulling and pressing, where Poisson's ratio is below 1. It is found once the angle and its
+    interval lie within 45 degrees of it.
+
+    Parameters
+    ----------
+    exx, eyy, exy : (N,) float64
+        Means of a test; NaN where unknown.
+    given : "x", "y" or "auto"
+    """
+    angle = principal_direction(exx, eyy, exy)
+    if angle.known:
+        angle = angle.minus(0.0 if _is_longest(angle.value, exx, eyy, exy) else math.pi / 2)
+    offs = {axis: _turned(angle, at) for axis, at in (("x", 0.0), ("y", math.pi / 2))}
+    axis: Literal["x", "y"]
+    if given in offs:
+        axis = "x" if given == "x" else "y"
+        return LoadAxis(axis, False, offs[axis])
+    axis = "x" if abs(offs["x"].value) < math.pi / 4 else "y"
+    off = offs[axis]
+    found = max(abs(off.low), abs(off.high)) < math.pi / 4
+    return LoadAxis(axis if found else "y", found, off if found else offs["y"])
+
+
+def _is_longest(angle: float, exx: Floats, eyy: Floats, exy: Floats) -> bool:
+    """Whether strain along ``angle`` has changed more than across it, where both have changed most."""
+    known = np.isfinite(exx) & np.isfinite(eyy) & np.isfinite(exy)
+    c, s = math.cos(angle), math.sin(angle)
+    turn = 2 * exy[known] * s * c
+    along = exx[known] * c * c + eyy[known] * s * s + turn
+    across = exx[known] * s * s + eyy[known] * c * c - turn
+    most = int(np.argmax(np.abs((along - along[0]) - (across - across[0]))))
+    return bool(abs(along[most] - along[0]) >= abs(across[most] - across[0]))
+
+
+def _turned(angle: Figure, at: float) -> Figure:
+    """From the direction ``at`` (rad), of two ways the nearer."""
+    off = angle.minus(at)
+    return off.minus(math.pi * round(off.value / math.pi)) if off.known else off
 
 
 def _ends(values: Floats, line: Line, least_sigma: float) -> tuple[Reading, Reading]:

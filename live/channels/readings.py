@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
-from live.measure import Instant, Measurement
+from live.measure import AxisFinder, Instant, Measurement
 
 RATE_S = 1.0
 """The strain rate is the slope of the axial strain over this time."""
@@ -27,8 +27,8 @@ class Readings:
     ----------
     start : float, s
         Time zero, monotonic.
-    axis : "x" or "y"
-        Of the load.
+    axis : "x", "y" or "auto"
+        Of the load; auto: as the strains tell it, y until then.
     area_m2 : float or None, m^2
     latest : callable giving LoadSample or None
     """
@@ -37,12 +37,13 @@ class Readings:
         self, start: float, axis: str, area_m2: float | None, latest: Callable[[], Sample | None]
     ) -> None:
         self._start, self._area_m2, self._latest = start, area_m2, latest
-        self._mean = "eyy" if axis == "y" else "exx"
+        self._axis = AxisFinder(axis)
         self._course: deque[tuple[float, float]] = deque()
 
     def read(self, measurement: Measurement) -> dict[str, float]:
         """All channels by name; NaN where one is not known."""
         i = measurement.instant
+        self._axis.add(i)
         axial, sigma = self._axial(i)
         values = {
             "time_s": i.t - self._start,
@@ -64,7 +65,8 @@ class Readings:
         gauge = i.gauges.get("axial")
         if gauge is not None:
             return gauge.value, gauge.sigma
-        return getattr(i, self._mean), getattr(i, f"sigma_{self._mean}")
+        mean = f"e{self._axis.axis * 2}"
+        return getattr(i, mean), getattr(i, f"sigma_{mean}")
 
     def load(self, without: float = math.nan) -> dict[str, float]:
         """Force and stress of the newest sample; where there is none, of the force ``without`` (N)."""

@@ -293,7 +293,7 @@ def _gauges(config: Config, grid: ZoiGrid, field: StrainField | None, factor: fl
 
     if field is None or not field.n_valid:
         return
-    along = "exx" if config.specimen.axis == "x" else "eyy"
+    along = "exx" if config.specimen.first_axis == "x" else "eyy"
     yield GaugeNoise("", factor * field.mean(along)[1])
     for gauge in gauges_for(with_auto_gauges(config, grid), grid):
         value = measure_gauge(gauge, field)

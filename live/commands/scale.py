@@ -114,7 +114,7 @@ def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | Non
         )
     sought = replace(config, measure=replace(config.measure, roi=AUTO, mask=None))
     region = region_of(sought, seen.picture, seen.noise)
-    return from_width(seen.picture, region, config.specimen.axis, width, arguments.sigma)
+    return from_width(seen.picture, region, config.specimen.first_axis, width, arguments.sigma)
 
 
 def _board(arguments: argparse.Namespace) -> Board:

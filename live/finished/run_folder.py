@@ -22,6 +22,7 @@ from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event, EventKind
 from acquire.record_mode import Crop
 from acquire.session import Session
+from analysis.evaluate import LoadAxis, load_axis
 from analysis.field import StrainField
 from live.finished.fields import read_field
 from live.finished.pictures import Pictures, of_images, of_session
@@ -152,15 +153,21 @@ class RunFolder(Closing):
         """Name of the specimen, else of the folder."""
         return str(self.strain.metadata.get("specimen") or self.path.resolve().name)
 
+    @cached_property
+    def load_axis(self) -> LoadAxis:
+        """The axis of the load, as it was given or as the means tell it."""
+        exx, eyy, exy = (np.asarray(self.strain.values[name], np.float64) for name in ("exx", "eyy", "exy"))
+        return load_axis(exx, eyy, exy, self.specimen.axis)
+
     @property
     def axial(self) -> str:
         """The strain along the load: "exx" or "eyy"."""
-        return "exx" if self.specimen.axis == "x" else "eyy"
+        return f"e{self.load_axis.axis * 2}"
 
     @property
     def transverse(self) -> str:
         """The strain across the load."""
-        return "eyy" if self.specimen.axis == "x" else "exx"
+        return "eyy" if self.load_axis.axis == "x" else "exx"
 
     @cached_property
     def gauges(self) -> dict[str, GaugeTrack]:

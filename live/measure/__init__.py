@@ -5,7 +5,7 @@ with a ``tracker``, ``measurement`` is what comes out with its means (``instant`
 ``settling`` waits for its force; ``smear_guard`` warns of motion within a burst.
 """
 
-from live.measure.history import History
+from live.measure.history import AxisFinder, History
 from live.measure.instant import Instant, ordered_mean
 from live.measure.measurement import Measurement
 from live.measure.pipeline import NewReference, measure
@@ -25,6 +25,7 @@ from live.measure.smear_guard import SmearGuard
 
 __all__ = [
     "HOLD_S",
+    "AxisFinder",
     "Correction",
     "History",
     "Instant",

@@ -1,16 +1,22 @@
-"""The means of all measured instants, kept in memory for the summary and the status line."""
+"""The means of all measured instants, kept in memory for the summary and the status line; the axis they tell."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquire.load_cell import LoadLog
+from analysis.evaluate import LoadAxis, load_axis
 from live.measure.instant import Instant
 
 Array = NDArray[np.float64]
+MOST_INSTANTS = 2000
+"""That are kept, evenly thinned."""
+_FIRST, _GROWTH = 8, 1.1  # looked at first, and again whenever there are so many times more
 
 
 class History:
@@ -52,9 +58,14 @@ class History:
             return 0.0
         return loads.zero_at(self.instants[-1].t) - loads.zero_at(self.instants[0].t)
 
+    def axis(self, given: str) -> LoadAxis:
+        """Of the load: "x" or "y" as ``given``, or what all instants tell where that is "auto"."""
+        return load_axis(self.column("exx"), self.column("eyy"), self.column("exy"), given)
+
     def along(self, axis: str) -> tuple[Array, Array]:
         """Strain along and across the load: the gauges ``axial`` and ``transverse``, or else the means."""
-        names = ("eyy", "exx") if axis == "y" else ("exx", "eyy")
+        chosen = axis if axis in ("x", "y") else self.axis(axis).axis
+        names = ("eyy", "exx") if chosen == "y" else ("exx", "eyy")
         axial, transverse = self.gauge("axial"), self.gauge("transverse")
         return (
             self.column(names[0]) if axial is None else axial,
@@ -66,3 +77,43 @@ class History:
         if not self.instants or name not in self.instants[0].gauges:
             return None
         return np.array([instant.gauges[name].value for instant in self.instants], np.float64)
+
+
+class AxisFinder:
+    """Given the same instants it tells the same, in a test and in its replay.
+
+    Parameters
+    ----------
+    given : "x", "y" or "auto"
+
+    Attributes
+    ----------
+    axis : "x" or "y"
+        As given, or as the strains tell it; y until they do.
+    """
+
+    def __init__(self, given: str) -> None:
+        self.axis: Literal["x", "y"] = "x" if given == "x" else "y"
+        self._seeks = given not in ("x", "y")
+        self._kept: list[tuple[float, float, float]] = []
+        self._count, self._every, self._next = 0, 1, _FIRST
+        self._t = -math.inf
+
+    def add(self, instant: Instant) -> Literal["x", "y"]:
+        """The axis with one instant more; one that is told again counts once."""
+        if self._seeks and instant.t > self._t:
+            self._t = instant.t
+            self._keep(instant)
+            if self._count >= self._next:
+                self._next = math.ceil(self._count * _GROWTH)
+                exx, eyy, exy = np.array(self._kept, np.float64).T
+                self.axis = load_axis(exx, eyy, exy).axis
+        return self.axis
+
+    def _keep(self, instant: Instant) -> None:
+        if self._count % self._every == 0:
+            self._kept.append((instant.exx, instant.eyy, instant.exy))
+        self._count += 1
+        if len(self._kept) > MOST_INSTANTS:
+            del self._kept[1::2]
+            self._every *= 2

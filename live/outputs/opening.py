@@ -11,6 +11,7 @@ from acquire.clock import ClockPair
 from acquire.events import EventKind, Level
 from acquire.frame import CameraInfo
 from live.channels import Readings
+from live.measure import AxisFinder
 from live.outputs.consumer import Consumer
 from live.outputs.files import Files
 from live.outputs.outputs import Outputs
@@ -89,7 +90,7 @@ def _view(about: About, books: Books, screen: Screen) -> View | None:
         grid=about.grid,
         start_monotonic=about.start.monotonic,
         area_m2=about.config.specimen.area_m2,
-        axis="x" if about.config.specimen.axis == "x" else "y",
+        axis=about.config.specimen.first_axis,
         strain_range=v.strain_range,
         with_load=about.config.load.address != "none:",
         outlines=outlines(about.config.gauges),
@@ -106,7 +107,8 @@ def _view(about: About, books: Books, screen: Screen) -> View | None:
         books.vitals.view_port = view.port
         _announce(view, v.spawn, screen)
 
-    return View(setup, port=v.port if v.enabled else None, rrd=rrd, tell=tell, serving=serving)
+    port, finder = v.port if v.enabled else None, AxisFinder(about.config.specimen.axis)
+    return View(setup, port=port, rrd=rrd, tell=tell, serving=serving, axis=finder)
 
 
 def _readings(about: About, books: Books) -> Readings:

@@ -26,7 +26,7 @@ from live.report.page import Part, captioned, element, facts, joined, page, para
 from live.report.practice import Known, reporting_table
 from live.report.record import definitions, events, gauges, hashes, ledger, times, version_table
 from live.report.svg import Figure, draw
-from live.tell import Screen, figure_lines, interval
+from live.tell import Screen, axis_words, figure_lines, interval
 
 MOST_BYTES = 5_000_000
 _SIDES = (720, 480, 320, 200)  # px, of the pictures: smaller ones where the page would be too large
@@ -177,7 +177,9 @@ def _rig(run: RunFolder, taken: Shots) -> dict[str, object]:
     found["section"] = (
         f"{s.width_mm:g} mm x {s.thickness_mm:g} mm" if known else "not known: forces, no stresses"
     )
-    found["load along"] = f"{s.axis} of the picture"
+    found["load along"] = f"{run.load_axis.axis} of the picture"
+    if known_angle := axis_words(run.load_axis):
+        found["direction of the load"] = known_angle
     if camera is not None:
         fps = f", {camera.fps:g} frames/s" if camera.fps else ""
         size = f"{camera.width} x {camera.height} px, {camera.bits} bits{fps}, clock: {camera.clock}"

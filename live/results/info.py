@@ -32,8 +32,8 @@ class ResultsInfo:
         Cross-section of the specimen; with it the rows have a stress.
     gauges : mapping of name to JSON values
         The virtual gauges, each as it was described.
-    axis : "x" or "y"
-        Of the load.
+    axis : "x", "y" or "auto"
+        Of the load; auto: as the means tell it, y until then.
     lagged : bool
         A lag of the load was taken off, so that rows have the force without it too.
     """

@@ -34,9 +34,6 @@ class RowInfo(Protocol):
     def area_m2(self) -> float | None: ...
 
     @property
-    def axis(self) -> str: ...
-
-    @property
     def lagged(self) -> bool: ...
 
 
@@ -57,10 +54,10 @@ class Row:
     values: dict[str, float | int]
 
     @classmethod
-    def of(cls, measurement: Measurement, info: RowInfo) -> Row:
-        """The row of ``measurement`` in the measure of strain of ``info``."""
+    def of(cls, measurement: Measurement, info: RowInfo, axis: str = "y") -> Row:
+        """The row of ``measurement`` in the measure of strain of ``info``; ``axis`` is that of the load."""
         maps = maps_of(measurement.field, info.strain_measure)
-        return cls(maps, _values(measurement, maps, info))
+        return cls(maps, _values(measurement, maps, info, axis))
 
 
 def gauge_columns(name: str) -> tuple[str, str]:
@@ -80,7 +77,9 @@ def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any
     return maps
 
 
-def _values(measurement: Measurement, maps: dict[str, NDArray[Any]], info: RowInfo) -> dict[str, float | int]:
+def _values(
+    measurement: Measurement, maps: dict[str, NDArray[Any]], info: RowInfo, axis: str
+) -> dict[str, float | int]:
     burst, instant = measurement.burst, measurement.instant
     values: dict[str, float | int] = {
         "frame": burst.first_index,
@@ -107,21 +106,22 @@ def _values(measurement: Measurement, maps: dict[str, NDArray[Any]], info: RowIn
         values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma), strict=True))
     if info.area_m2 is not None:
         values["stress_Pa"] = stress = instant.force / info.area_m2
-        stretch = _stretch(measurement, values, info)
+        stretch = _stretch(measurement, values, info.strain_measure, axis)
         values |= {"true_strain": math.log(stretch), "true_stress_Pa": stress * stretch}
     if info.lagged:
         values["force_raw_N"] = instant.force_raw
     return values
 
 
-def _stretch(measurement: Measurement, values: Mapping[str, float], info: RowInfo) -> float:
+def _stretch(
+    measurement: Measurement, values: Mapping[str, float], measure: StrainMeasure, axis: str
+) -> float:
     """Length over first length along the load: of the gauge ``axial``, or else of the mean strain."""
     gauge = measurement.instant.gauges.get("axial")
     if gauge is not None:
         stretch = 1 + gauge.value
     else:
-        strain = values["eyy" if info.axis == "y" else "exx"]
-        stretch = _stretched(strain, info.strain_measure)
+        stretch = _stretched(values["eyy" if axis == "y" else "exx"], measure)
     return stretch if stretch > 0 else math.nan
 
 

@@ -7,6 +7,7 @@ second: after a kill those are there (open with ``swmr=True``, as ``Strain.open`
 from __future__ import annotations
 
 import json
+import math
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +17,7 @@ import numpy as np
 
 from acquire.errors import DataError
 from acquire.hdf5 import Pace, PictureStack, Table, let_go
+from analysis.evaluate import load_axis
 from live.results import layout
 from live.results.info import FORMAT, FORMAT_VERSION
 from live.results.row import STRAINS, Row, gauge_columns
@@ -71,7 +73,7 @@ class StrainWriter:
     def __init__(
         self, path: Path, grid: ZoiGrid, info: ResultsInfo, now: Callable[[], float] = time.monotonic
     ) -> None:
-        self._path, self.failed = path, False
+        self._path, self.failed, self._axis = path, False, info.axis
         self._flushed = 0  # rows
         self._pace = Pace(FLUSH_S, now)
         self._file = self._guard(lambda: _create(path, grid, info))
@@ -104,6 +106,7 @@ class StrainWriter:
         else:
             self._guard(self._flush)
             self._guard(self._show_last)
+            self._guard(self._tell_axis)
             self._guard(self._file.close)
 
     def _append(self, row: Row) -> None:
@@ -123,6 +126,14 @@ class StrainWriter:
         """Viewers begin with the last instant; a file that was never closed says the first."""
         shown = _slice_of(max(self._values.length - 1, 0))
         self._file["entry/strain"].attrs.modify("default_slice", shown)
+
+    def _tell_axis(self) -> None:
+        """The axis of the load, and the angle from it to the largest strain, as all means tell them."""
+        mean = self._file["entry/mean"]
+        exx, eyy, exy = (np.asarray(mean[name], np.float64) for name in STRAINS)
+        load = load_axis(exx, eyy, exy, self._axis)
+        mean.attrs.modify("load_axis", np.array(load.axis, "S1"))
+        mean.attrs.modify("load_angle_deg", np.float64(math.degrees(load.off.value)))
 
     def _guard(self, action: Callable[[], Any]) -> Any:
         try:
@@ -183,6 +194,8 @@ def _group(parent: Any, name: str, nx_class: str, **attrs: Any) -> Any:
 def _add_mean(entry: Any, info: ResultsInfo) -> None:
     mean = _group(entry, "mean", "NXdata", signal="eyy", axes=["time_s"], title="Means over the valid ZOIs")
     mean.attrs["auxiliary_signals"] = ["exx", "exy"]
+    mean.attrs["load_axis"] = np.array("x" if info.axis == "x" else "y", "S1")
+    mean.attrs["load_angle_deg"] = np.float64(math.nan)
     for name in _value_names(info):
         kind = layout.column_declared(name).dtype
         dataset = mean.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(256,), fletcher32=True)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from acquire.closing import Closing
 from acquire.errors import DataError
+from live.measure import AxisFinder
 from live.results.info import ResultsInfo
 from live.results.row import Row
 from live.results.strain_csv import CsvWriter
@@ -39,7 +40,7 @@ class Results(Closing):
     """
 
     def __init__(self, folder: Path, grid: ZoiGrid, info: ResultsInfo) -> None:
-        self._info = info
+        self._info, self._axis = info, AxisFinder(info.axis)
         self.h5_path, self.csv_path = folder / "strain.h5", folder / "strain.csv"
         self.written = 0
         self._closed = False
@@ -66,7 +67,7 @@ class Results(Closing):
             The file cannot be written (a full disk); what was written before stays readable.
             Stop adding then.
         """
-        row = Row.of(measurement, self._info)
+        row = Row.of(measurement, self._info, self._axis.add(measurement.instant))
         self._h5.write(row)
         self._csv.write(row)
         self.written += 1

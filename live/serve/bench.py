@@ -136,7 +136,7 @@ class Bench:
             raise DataError("no region is drawn yet: draw one, or find the specimen")
         height, width = drawn.mask.shape
         box = replace(config, measure=replace(config.measure, roi=drawn.box, mask=None))
-        placed = auto_gauges(grid_for(box, width, height, drawn.mask), config.specimen.axis)
+        placed = auto_gauges(grid_for(box, width, height, drawn.mask), config.specimen.first_axis)
         gauges = {f"gauges.{name}": describe(table) for name, table in placed.items()}
         self.draft.change_all(gauges | {"measure.gauges": GIVEN})
 

@@ -20,7 +20,7 @@ from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
 from acquire.printable import printable
-from live.measure import Instant, Measurement
+from live.measure import AxisFinder, Instant, Measurement
 from live.outputs import Consumer, Policy
 from live.serve.curve import Curve
 from live.serve.painting import COMPONENTS, Colours, as_jpeg, lay_cells, shrunk
@@ -75,9 +75,9 @@ class Watching(Consumer):
 
     def __init__(self, hub: Hub, config: Config, now: Callable[[], float] = time.monotonic) -> None:
         self._hub, self._config, self._now = hub, config, now
-        self._axis = config.specimen.axis
-        self._component = "exx" if self._axis == "x" else "eyy"
-        self._colours = Colours(self._axis, config.view.strain_range)
+        self._finder = AxisFinder(config.specimen.axis)
+        self._component = f"e{self._finder.axis * 2}"
+        self._colours = Colours(self._finder.axis, config.view.strain_range)
         names = list(config.gauges) or ["exx", "eyy", "exy"]
         self.curve = Curve(["t", "stress" if config.specimen.area_m2 else "force", "axial", *names])
         self._names = names
@@ -119,7 +119,7 @@ class Watching(Consumer):
         i = measurement.instant
         if math.isnan(self._t0):
             self._t0 = i.t
-        axial, _ = axial_of(i, self._axis)
+        axial, _ = axial_of(i, self._finder.add(i))
         gauges = [
             i.gauges[name].value if name in i.gauges else getattr(i, name, math.nan) for name in self._names
         ]
@@ -180,7 +180,7 @@ class Watching(Consumer):
             "late_s": _p95(self._late),
         }
         if self._newest is not None:
-            told |= _measured(self._newest.instant, self._axis)
+            told |= _measured(self._newest.instant, self._finder.axis)
         if running is not None:
             told |= {
                 "fps": running.fps,

@@ -59,7 +59,7 @@ def gauges_for(config: Config, grid: ZoiGrid) -> tuple[Gauge, ...]:
     ConfigError
         A key is missing or impossible, or no ZOI lies where a gauge is.
     """
-    gauges = tuple(_gauge(name, table, config.specimen.axis) for name, table in config.gauges.items())
+    gauges = tuple(_gauge(name, table, config.specimen.first_axis) for name, table in config.gauges.items())
     for gauge in gauges:
         _check_place(gauge, grid)
     return gauges

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from live.setup.checks import (
     AUTO,
@@ -308,7 +309,10 @@ class SpecimenConfig:
         number(1e-3, 1e6), None, "gauge length, told beside the extensions", optional=True
     )
     axis: str = key(
-        choice("x", "y"), "y", "direction of the load in the image", Option("axis", choices=("x", "y"))
+        choice(AUTO, "x", "y"),
+        AUTO,
+        "direction of the load in the image; auto: of the largest strain, y until that tells",
+        Option("axis", choices=(AUTO, "x", "y")),
     )
 
     standard: str = key(
@@ -327,6 +331,11 @@ class SpecimenConfig:
         Option("zero", choices=("raw", "toe", "preload")),
     )
     preload_MPa: float = key(number(1e-3, 1e5), 1.0, "stress from which strain counts with zero = preload")
+
+    @property
+    def first_axis(self) -> Literal["x", "y"]:
+        """The direction of the load as far as it is known before the test."""
+        return "x" if self.axis == "x" else "y"
 
     @property
     def area_m2(self) -> float | None:

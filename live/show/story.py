@@ -100,7 +100,7 @@ def setup_of(run: RunFolder) -> ViewSetup:
         grid=run.strain.grid,
         start_monotonic=0.0,
         area_m2=run.specimen.area_m2,
-        axis="x" if run.specimen.axis == "x" else "y",
+        axis=run.load_axis.axis,
         finished=True,
         with_load=bool(np.isfinite(run.force).any()),
         outlines=_outlines(run),

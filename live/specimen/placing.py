@@ -36,7 +36,7 @@ def with_auto_gauges(config: Config, grid: ZoiGrid) -> Config:
     """
     if config.measure.gauges != AUTO:
         return config
-    gauges = {**auto_gauges(grid, config.specimen.axis), **config.gauges}
+    gauges = {**auto_gauges(grid, config.specimen.first_axis), **config.gauges}
     return replace(config, gauges=gauges, measure=replace(config.measure, gauges=GIVEN))
 
 

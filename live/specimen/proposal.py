@@ -107,7 +107,7 @@ def _size(region: Region, config: Config, seen: Look) -> int:
     """The largest ZOI of which four fit side by side across the middle half of the specimen."""
     width, height = seen.size
     inside = region.inside(width, height, SIZES[-1])
-    inside = inside if config.specimen.axis == "y" else inside.T
+    inside = inside if config.specimen.first_axis == "y" else inside.T
     rows = np.flatnonzero(inside.any(axis=1))
     quarter = len(rows) // 4
     widths = sorted(inside[rows[quarter : len(rows) - quarter]].sum(axis=1))

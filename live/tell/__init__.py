@@ -8,7 +8,15 @@ the view, ``figures`` those of a tensile test in words, ``summary`` all that is 
 from live.tell.board import AlarmBoard, Vitals
 from live.tell.books import Books
 from live.tell.card import StatusCard
-from live.tell.figures import elastic_lines, evaluate, figure_lines, interval, options_of, quantity
+from live.tell.figures import (
+    axis_words,
+    elastic_lines,
+    evaluate,
+    figure_lines,
+    interval,
+    options_of,
+    quantity,
+)
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen, say
@@ -24,6 +32,7 @@ __all__ = [
     "Standing",
     "StatusCard",
     "Vitals",
+    "axis_words",
     "elastic_lines",
     "evaluate",
     "figure_lines",

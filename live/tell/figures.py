@@ -11,13 +11,13 @@ from analysis.evaluate import (
     Curve,
     Figure,
     Interval,
+    LoadAxis,
     Options,
     TensileFigures,
     Track,
     evaluate_test,
     find_lag,
     free,
-    principal_direction,
 )
 from live.measure import History
 from live.setup import SpecimenConfig
@@ -88,14 +88,21 @@ def tare_line(history: History, loads: LoadLog) -> list[str]:
 
 def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
     """How far the largest strain lies off the axis of the load; nothing where the strains do not tell."""
-    angle = principal_direction(*(history.column(name) for name in ("exx", "eyy", "exy")))
-    if not angle.known:
-        return []
-    off = angle.minus(math.pi / 2 if specimen.axis == "y" else 0.0)
-    off = off.minus(math.pi * round(off.value / math.pi))
-    words = f"largest strain {interval(off, math.pi / 180, 'degrees')} off {specimen.axis} (clockwise)"
-    wrong = abs(off.value) > math.pi / 4
-    return [words + (f"; is specimen.axis = {specimen.axis!r} right?" if wrong else "")]
+    load = history.axis(specimen.axis)
+    words = axis_words(load)
+    stays = load.found and load.axis != specimen.first_axis and history.gauge("axial") is not None
+    return [words + ("; the gauge axial stays where it was placed" if stays else "")] if words else []
+
+
+def axis_words(load: LoadAxis) -> str:
+    """The axis of the load with the angle to it; empty where the strains do not tell."""
+    if not load.off.known:
+        return ""
+    words = f"largest strain {interval(load.off, math.pi / 180, 'degrees')} off {load.axis} (clockwise)"
+    if load.found:
+        return f"{words}; {load.axis} was found to be the axis of the load"
+    wrong = abs(load.off.value) > math.pi / 4
+    return words + (f"; is specimen.axis = {load.axis!r} right?" if wrong else "")
 
 
 def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]:

@@ -64,9 +64,8 @@ def summary_lines(books: Books, specimen: SpecimenConfig) -> list[str]:
     lines += latency_lines(history)
     figures = figure_lines(evaluate(history, books.loads, specimen), specimen)
     if figures:
-        figures += tare_line(history, books.loads)
-        figures += alignment_line(history, specimen) + lag_line(history, books.loads, specimen)
-    return lines + figures
+        figures += tare_line(history, books.loads) + lag_line(history, books.loads, specimen)
+    return lines + figures + alignment_line(history, specimen)
 
 
 def file_lines(folder: Path) -> list[str]:

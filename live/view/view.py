@@ -15,6 +15,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from live.measure import AxisFinder
 from live.view.exchange.figures import Figures
 from live.view.exchange.messages import Where, row_of
 from live.view.exchange.setup import ViewSetup
@@ -50,6 +51,8 @@ class View:
         must anew, since the process was.
     story : callable
         Gives messages (``live.view.exchange``) that are all shown, from the beginning, of a finished test.
+    axis : AxisFinder, optional
+        Of the curve; without, as in ``setup``.
     """
 
     def __init__(
@@ -61,8 +64,10 @@ class View:
         tell: Tell = lambda text, level: None,
         serving: Callable[[View], None] = lambda view: None,
         story: Story = lambda: (),
+        axis: AxisFinder | None = None,
     ) -> None:
         self._setup, self._waiting = setup, Waiting()
+        self._axis = axis or AxisFinder(setup.axis)
         self._supply = Supply(setup, self._waiting, story)
         where = Where(port, None if rrd is None else str(rrd.absolute()), str(uuid.uuid4()))
         self._keeper = Keeper(self._supply, where, tell, lambda: serving(self))
@@ -85,7 +90,7 @@ class View:
     def settled(self, measurement: Measurement) -> None:
         """Offer a point of the curve: a measurement whose force is final."""
         i = measurement.instant
-        strain = i.eyy if self._setup.axis == "y" else i.exx
+        strain = i.eyy if self._axis.add(i) == "y" else i.exx
         if (gauge := i.gauges.get("axial")) is not None:
             strain = gauge.value
         if math.isfinite(strain) and math.isfinite(measurement.force):

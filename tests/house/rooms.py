@@ -36,7 +36,7 @@ ROOMS = {
     "live.channels": "acquire live.measure",
     "live.setup": "acquire acquire.burst acquire.camera acquire.files acquire.hdf5 acquire.load_cell acquire.opencv"
     " analysis analysis.evaluate live.channels live.measure live.lines",
-    "live.results": "acquire acquire.hdf5 analysis.field live.measure",
+    "live.results": "acquire acquire.hdf5 analysis.evaluate analysis.field live.measure",
     "live.tell": "acquire acquire.load_cell analysis.evaluate live.measure live.setup",
     "live.maps": "acquire acquire.opencv analysis.field analysis.evaluate live.results",
     "live.specimen": "acquire acquire.burst acquire.files acquire.opencv analysis analysis.field analysis.quality"

@@ -75,6 +75,6 @@ class CurveDrawing:
         places = [*([xk, 1.03] for xk in x), *([-0.13, yk - 0.05] for yk in y)]
         labels = [number(v * across.factor) for v in across.ticks] + [number(v * up.factor) for v in up.ticks]
         what = "stress" if self._setup.area_m2 else "load"
-        names = [f"strain e{self._setup.axis * 2} ({across.unit})", f"{what} ({up.unit})"]
+        names = [f"axial strain ({across.unit})", f"{what} ({up.unit})"]
         titles = [[CURVE_WIDTH / 2, 1.15], [0.0, -0.2]]
         self._log_change("curve/ticks", words([*places, *titles], [*labels, *names]))

@@ -17,6 +17,7 @@ from analysis.evaluate import (
     TensileFigures,
     evaluate_test,
     free,
+    load_axis,
     principal_direction,
 )
 from tests.analysis.evaluate.curves import Truth, composite, linear, lueders, noisy, ramberg_osgood
@@ -165,6 +166,34 @@ def test_a_neck_is_no_yield_point() -> None:
 def test_impossible_options_are_refused(make) -> None:
     with pytest.raises(ValueError, match=r"known: raw|needs that preload|0 <= low < high"):
         make()
+
+
+def uniaxial(degrees: float, most: float, seed: int = 3) -> list[np.ndarray]:
+    """exx, eyy, exy of a test along a direction, with noise."""
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    along = np.linspace(0, most, 100)
+    across = -0.3 * along
+    true = (along * c * c + across * s * s, along * s * s + across * c * c, (along - across) * s * c)
+    return [e + 3e-5 + np.random.default_rng(seed + k).normal(0, 1e-5, 100) for k, e in enumerate(true)]
+
+
+@pytest.mark.parametrize("most", [2e-3, -2e-3], ids=["pulled", "pressed"])
+@pytest.mark.parametrize(
+    ("degrees", "axis", "off"), [(3, "x", 3), (92, "y", 2), (-80, "y", 10), (178, "x", -2)]
+)
+def test_the_axis_of_the_load_is_found(degrees: float, axis: str, off: float, most: float) -> None:
+    found = load_axis(*uniaxial(degrees, most))
+    assert found.found and found.axis == axis
+    assert math.degrees(found.off.value) == pytest.approx(off, abs=0.3)
+    other = load_axis(*uniaxial(degrees, most), "x" if axis == "y" else "y")
+    assert other.axis != axis and not other.found, "what is given holds"
+    assert abs(math.degrees(other.off.value)) == pytest.approx(90 - abs(off), abs=0.3)
+
+
+@pytest.mark.parametrize(("degrees", "most"), [(45.0, 2e-3), (-45.0, -2e-3), (3.0, 1e-6)])
+def test_an_axis_that_the_strains_do_not_tell_is_y(degrees: float, most: float) -> None:
+    found = load_axis(*uniaxial(degrees, most))
+    assert (found.axis, found.found) == ("y", False)
 
 
 @pytest.mark.parametrize("degrees", [0.0, 2.5, 88.0, -40.0])

@@ -172,6 +172,24 @@ def test_viewers_begin_with_the_last_instant_and_readers_see_each_column_once(tm
         assert not [name for name in strain.values if name.endswith("_errors")]
 
 
+@pytest.mark.parametrize("given", ["auto", "y"])
+def test_the_axis_of_the_load_is_stored(tmp_path: Path, given: str) -> None:
+    with open_results(tmp_path, axis=given, area_m2=1e-5) as results:
+        for k in range(40):
+            m, e = make_measurement(k, 0.0, force=1.0), 1e-4 * k
+            results.add(dataclasses.replace(m, instant=dataclasses.replace(m.instant, exx=e, eyy=-0.3 * e)))
+    with h5py.File(tmp_path / "strain.h5") as file:
+        attributes = dict(file["entry/mean"].attrs)
+    if given == "y":
+        assert attributes["load_axis"] == b"y" and abs(attributes["load_angle_deg"]) == pytest.approx(90)
+    else:
+        assert attributes["load_axis"] == b"x" and attributes["load_angle_deg"] == pytest.approx(0, abs=1e-3)
+    with Strain.open(tmp_path / "strain.h5") as strain:
+        name = "exx" if given == "auto" else "eyy"
+        true = strain.values["true_strain"][-1]
+        assert true == pytest.approx(math.log1p(strain.values[name][-1]), rel=1e-12)
+
+
 def test_what_silx_and_nexpy_make_of_it(tmp_path: Path) -> None:
     silx, nexus = pytest.importorskip("silx.io"), pytest.importorskip("nexusformat.nexus")
     nxdata = pytest.importorskip("silx.io.nxdata")

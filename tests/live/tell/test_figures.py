@@ -106,11 +106,24 @@ def test_the_lag_of_the_load_is_told() -> None:
 
 def test_the_direction_of_the_load_is_told() -> None:
     history, loads = kept(ramberg_osgood())
-    assert "off y (clockwise)" in alignment_line(history, FLAT)[0]
+    assert "off y (clockwise); y was found" in alignment_line(history, FLAT)[0]
+    assert alignment_line(history, replace(FLAT, axis="y"))[0].endswith("off y (clockwise)")
     assert "is specimen.axis = 'x' right?" in alignment_line(history, replace(FLAT, axis="x"))[0]
     assert alignment_line(History(), FLAT) == []
     books = Books(Journal(), Ledger(), loads, history)
     assert any("off y" in line for line in summary_lines(books, FLAT))
+
+
+def test_the_axis_is_found_where_it_is_not_given() -> None:
+    history, loads = kept(ramberg_osgood())
+    turned = History()
+    for i in history.instants:
+        turned.add(replace(i, exx=i.eyy, eyy=i.exx))
+    assert "off x (clockwise); x was found" in alignment_line(turned, FLAT)[0]
+    upright, lying = (figure_lines(evaluate(h, loads, FLAT), FLAT) for h in (history, turned))
+    assert upright == lying
+    given = replace(FLAT, axis="y")
+    assert figure_lines(evaluate(turned, loads, given), given) != lying
 
 
 def test_any_section_gives_an_area() -> None:
