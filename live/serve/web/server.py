@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import logging
 import secrets
+import socket
 import threading
 from collections.abc import Callable, Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -27,6 +28,7 @@ HOST = "127.0.0.1"
 DEFAULT_PORT = 8765
 BEAT_S = 0.5
 """Between heartbeats; the page says NO LINK after 2 s without."""
+_UNREAD_BYTES = 2**14  # held for a page that does not read; more would be old when it reads again
 _SLOW_S = 10.0  # a page that does not take what is sent to it for so long has gone
 
 Query = Mapping[str, str]
@@ -192,6 +194,7 @@ class _Handler(BaseHTTPRequestHandler):
             raise Refused(503, "too many pages are open; close one")
         try:
             self.close_connection = True
+            self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _UNREAD_BYTES)
             self._head(200, "text/event-stream", OURS, None)
             while (messages := stream.take(BEAT_S)) is not None:
                 for kind, message in messages.items():
