@@ -41,7 +41,7 @@ from live.setup import (
     grid_for,
     read_mask,
 )
-from live.specimen import auto_gauges, region_of
+from live.specimen import Board, Scale, auto_gauges, from_board, region_of
 
 log = logging.getLogger(__name__)
 
@@ -78,7 +78,7 @@ class Bench:
         self.overlays = {"saturated": True, "quality": False}
         self._figures: Figures | None = None
         self._told: dict[str, Any] = {"table": None, "go": None, "lines": [], "checking": False}
-        self._told |= {"doubt": "", "busy": ""}
+        self._told |= {"doubt": "", "busy": "", "remarks": []}
         self._peak, self._shown, self._edition = 0.0, 0, 0
         self._lock = threading.RLock()
         self._leave = threading.Event()
@@ -128,6 +128,20 @@ class Bench:
         sought = replace(self.draft.config, measure=replace(m, roi=None, mask=None))
         region = region_of(sought, stack.mean(axis=0), noise or None)
         self._take(Drawn(region.inside(info.width, info.height, m.zoi), region.words))
+
+    def scale_from(self, board: Board) -> Scale:
+        """The scale from a board in what is seen now; raises DataError where none is."""
+        frames = self.eye.recent()
+        if not frames:
+            raise DataError("the camera has given no picture yet")
+        picture = np.stack([frame.image for frame in frames]).mean(axis=0, dtype=np.float32)
+        scale = from_board(picture, board, stand_off_mm=self.draft.config.scale.stand_off_mm)
+        self._told["remarks"] = [printable(remark) for remark in scale.remarks]
+        return scale
+
+    def scaled(self) -> None:
+        """The scale has been taken another way: what was said of a board is old."""
+        self._told["remarks"] = []
 
     def place_gauges(self) -> None:
         """Gauges on the region as it is drawn; raises DataError or ConfigError where there is no room."""

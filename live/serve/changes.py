@@ -11,9 +11,10 @@ from acquire.errors import ConfigError, DataError
 from live.serve.bench import OVERLAYS, Bench
 from live.serve.draft import with_setting
 from live.serve.region import Drawn
-from live.specimen import from_points
+from live.specimen import Board, from_points
 
 Said = Mapping[str, Any]
+LONGEST_MM = 1e5
 SLIDERS = ("exposure_us", "gain", "brightness")
 
 
@@ -115,7 +116,28 @@ def scale(bench: Bench, said: Said) -> None:
         raise ConfigError("a scale is two points in px and their distance in mm")
     x1, y1, x2, y2, mm = (float(v) for v in numbers)
     bench.draft.change_all(from_points((x1, y1, x2, y2), mm).changes())
+    bench.scaled()
     bench.region_changed()
+
+
+def board(bench: Bench, said: Said) -> None:
+    """mm per px from a board that is held where the specimen will be; without ``marker`` a checkerboard."""
+    columns, rows = said.get("columns"), said.get("rows")
+    square, marker = said.get("square"), said.get("marker", 0)
+    words = said.get("dictionary", "4X4_50")
+    if type(columns) is not int or type(rows) is not int or not isinstance(words, str) or len(words) > 40:
+        raise ConfigError(
+            "a board has whole numbers of columns and rows, and a dictionary where it has markers"
+        )
+    if not (_is_length(square) and _is_length(marker)):
+        raise ConfigError("squares and markers of a board are lengths in mm")
+    seen = Board(columns, rows, float(square), float(marker), words)
+    bench.draft.change_all(bench.scale_from(seen).changes())
+    bench.region_changed()
+
+
+def _is_length(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < LONGEST_MM
 
 
 def _are_points(said: object) -> TypeGuard[list[list[Any]]]:
@@ -151,6 +173,7 @@ CHANGES: dict[str, Callable[[Bench, Said], None]] = {
     "gauge": gauge,
     "place": place,
     "scale": scale,
+    "board": board,
     "check": check,
     "forget": forget,
     "save": save,

@@ -17,6 +17,7 @@ const HINTS = {
   zoi: "Click a place.",
   move: "Drag the handles; with the keyboard Tab and the arrows.",
   scale: "Click two points whose distance you know.",
+  board: "Hold the board where the specimen will be. Of a checkerboard count the inner corners, of a ChArUco board the squares.",
 };
 const GAUGES = ["line", "transverse", "area", "zoi"];
 const DRAGGED = ["rectangle", "line", "transverse", "area"];
@@ -118,6 +119,7 @@ let scaled = null;
 function askLength(drawn) {
   if (drawn.length < 2 || Math.hypot(drawn[1][0] - drawn[0][0], drawn[1][1] - drawn[0][1]) < 3) return;
   scaled = drawn;
+  asking = false;
   const form = document.createElement("form"), input = document.createElement("input"), button = document.createElement("button");
   Object.assign(input, { type: "number", min: "0", step: "any", required: true, placeholder: "mm" });
   input.setAttribute("aria-label", t("Length in mm"));
@@ -132,6 +134,42 @@ function askLength(drawn) {
   });
   $("scale").replaceChildren(form);
   input.focus();
+}
+
+// A board is seen in the picture as it is: no click, only what it is.
+const BOARD = { columns: "Columns", rows: "Rows", square: "Square, mm", marker: "Marker, mm (none: checkerboard)" };
+let asking = false;
+$("board").addEventListener("click", () => {
+  asking = true;
+  scaled = null;
+  $("hint").dataset.t = HINTS.board;
+  put($("hint"), t(HINTS.board));
+  const form = document.createElement("form"), button = document.createElement("button"), last = document.createElement("input");
+  const inputs = Object.entries(BOARD).map(([key, words]) => {
+    const input = document.createElement("input"), whole = key === "columns" || key === "rows";
+    Object.assign(input, { name: key, type: "number", min: whole ? "3" : "0", step: whole ? "1" : "any", required: key !== "marker" });
+    return labelled(input, t(words));
+  });
+  Object.assign(last, { name: "dictionary", type: "text", value: "4X4_50", maxLength: 39 });
+  button.textContent = t("Take");
+  form.append(...inputs, labelled(last, t("Dictionary of the markers")), button);
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const said = { do: "board", dictionary: last.value };
+    for (const key of Object.keys(BOARD)) said[key] = form.elements[key].value === "" ? 0 : Number(form.elements[key].value);
+    if (await change(said) !== "ok") return;
+    asking = false;
+    showScale();
+  });
+  $("scale").replaceChildren(form);
+  inputs[0].querySelector("input").focus();
+});
+
+function labelled(input, words) {
+  const label = document.createElement("label"), name = document.createElement("span");
+  name.textContent = words;
+  label.append(name, input);
+  return label;
 }
 
 function sketch() {
@@ -169,7 +207,7 @@ export function setupKeys(event) {
     return true;
   }
   if (event.key === "Enter" && tool === "polygon" && points.length > 2) { finish(false); return true; }
-  if (event.key === "Escape") { points = []; drag = pending = scaled = null; showScale(); sketch(); return true; }
+  if (event.key === "Escape") { points = []; drag = pending = scaled = null; asking = false; showScale(); sketch(); return true; }
   return false;
 }
 
@@ -335,9 +373,9 @@ function table({ table: known, measure, scale }) {
 }
 
 function showScale() {
-  if (scaled) return;
+  if (scaled || asking) return;
   const s = told.scale;
-  put($("scale"), s?.px_per_mm ? `${s.px_per_mm.toFixed(2)} px/mm${s.sigma ? ` ± ${(100 * s.sigma * s.px_per_mm).toFixed(2)} %` : ""}` : "");
+  put($("scale"), s?.px_per_mm ? `${s.px_per_mm.toFixed(2)} px/mm${s.sigma ? ` ± ${(100 * s.sigma * s.px_per_mm).toFixed(2)} %` : ""}${told.remarks.map((one) => ` · ${one}`).join("")}` : "");
 }
 
 choose("rectangle");

@@ -7,12 +7,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
 from live.serve.web.door import Door
 from live.setup import compile_ahead, load_config, read_mask
 from tests.live.serve.driven import FLAGS, Page, Program, chromium
+from tests.live.specimen.test_scale import CHARUCO, seen
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 WIDTH, HEIGHT = 480, 384
@@ -191,6 +193,23 @@ def after(page: Page, folder: Path) -> None:
     for _ in range(2):
         page.page.click("#setup [data-line=quit]")
     page.until(lambda: page.stage() == "gone", "it has ended")
+
+
+def test_the_scale_from_a_board(browser: Any, tmp_path: Path, start: Callable[..., Program]) -> None:
+    picture = seen(CHARUCO, 9.0)
+    (tmp_path / "shots").mkdir()
+    for k in range(300):
+        cv2.imwrite(str(tmp_path / "shots" / f"{k:03}.png"), picture)
+    program = start("page", "--camera", "files:shots?fps=10", "--roi", "all", "--page-port", "0")
+    page = opened(browser, program)
+    page.until(lambda: bool(page.text("camera")), "the camera is seen")
+    page.page.keyboard.press("b")
+    assert "inner corners" in page.text("hint")
+    for name, value in (("columns", 8), ("rows", 6), ("square", 6), ("marker", 4.5)):
+        page.page.fill(f"#scale [name={name}]", str(value))
+    page.page.click("#scale button")
+    page.until(lambda: page.text("scale").startswith("9.00 px/mm"), "the scale is told")
+    assert page.text("answer") == "board ✓" and not page.complaints
 
 
 def test_a_page_that_is_killed_changes_nothing(browser: Any, start: Callable[..., Program]) -> None:

@@ -30,7 +30,7 @@ def words() -> set[str]:
         text = path.read_text("utf-8")
         found |= set(re.findall(r'\bt\("(.+?)"\)', text)) | set(re.findall(r'dataset\.t = "(.+?)"', text))
         found |= {word for pair in re.findall(r'\bt\(\w+ \? "(.+?)" : "(.+?)"\)', text) for word in pair}
-        for table in re.findall(r"const (?:HINTS|LABELS|WORDS) = \{(.*?)\};", text, re.S):
+        for table in re.findall(r"const (?:HINTS|LABELS|WORDS|BOARD) = \{(.*?)\};", text, re.S):
             found |= set(re.findall(r': "(.+?)"', table))
         for cells in re.findall(r"const CELLS = \[(.*?)\]", text, re.S):
             found |= set(re.findall(r'"(.+?)"', cells)) - {"ZOIs"}
