@@ -12,7 +12,7 @@ from live.tell.figures import elastic_lines, evaluate, figure_lines, interval, o
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen, say
-from live.tell.status_line import Standing
+from live.tell.status_line import Standing, duration
 from live.tell.summary import file_lines, summary_lines
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "Standing",
     "StatusCard",
     "Vitals",
+    "duration",
     "elastic_lines",
     "evaluate",
     "figure_lines",
