@@ -30,6 +30,7 @@ COMMANDS = {
         "live.commands.page", "set up, measure and conclude in the browser: point instead of typing"
     ),
     "replay": Entry("live.commands.replay", "measure a recorded session, or any folder of pictures"),
+    "batch": Entry("live.commands.batch", "many sessions or folders of pictures, replayed by workers"),
     "map": Entry("live.commands.map", "draw a map of the results over a picture, as a PNG"),
     "show": Entry("live.commands.show", "a finished run in the view, with a slider in time"),
     "export": Entry(

@@ -9,6 +9,7 @@ EXAMPLES = {
     "scale": "phasedic scale --camera /dev/video0 --points 100,200,900,200 --length 25",
     "page": "phasedic page --camera '/dev/video0?format=Y12&fps=30'",
     "replay": "phasedic replay 'shots/*.tif' --zoi 32 --step 8 --load forces.csv --section 20,2 --out out",
+    "batch": "phasedic batch 'runs/*/session.h5' --zoi 32 --step 8 --section 20,2 --workers 4 --out asked-again",
     "map": "phasedic map out/strain.h5 eyy.png --field eyy --over shots/0000.tif",
     "show": "phasedic show runs/20261122T081747Z --from 2 --to 10",
     "export": "phasedic export runs/20261122T081747Z --to vtk --fields u,v,eyy --mm --scale 0.02 --y-up",

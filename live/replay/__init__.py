@@ -5,6 +5,6 @@ finds the bursts of a session whatever it holds.
 """
 
 from live.replay.material import ReplayRequest
-from live.replay.replay import replay
+from live.replay.replay import Replayed, replay
 
-__all__ = ["ReplayRequest", "replay"]
+__all__ = ["ReplayRequest", "Replayed", "replay"]

@@ -34,6 +34,8 @@ class ReplayRequest:
         A CSV with the forces (``live.replay.forces``).
     config_file : Path or None
     overrides : mapping of "section.key" to value
+    settled : Path or None
+        Where the folder of the results will lie in the end, if that is not where they are written.
     """
 
     source: str
@@ -44,6 +46,7 @@ class ReplayRequest:
     config_file: Path | None
     overrides: Mapping[str, Any]
     forces: Path | None = None
+    settled: Path | None = None
 
 
 Work = Burst | NewReference

@@ -62,6 +62,8 @@ class Replayed:
     exit_code : int
     lines : tuple of str
         How it went, for a person: pictures that were left out, pace, the kernel's share of the time.
+    left_out : int
+        Pictures that could not be read or are not like the first.
     """
 
     folder: Path
@@ -69,6 +71,7 @@ class Replayed:
     config: Config
     exit_code: int
     lines: tuple[str, ...] = ()
+    left_out: int = 0
 
 
 def replay(request: ReplayRequest, screen: Screen, stopping: threading.Event) -> Replayed:
@@ -168,10 +171,10 @@ def _run(
     kernel, noise_GL = prepare(material.reference, grid, settings, stated, correct, what)
     bursts = _not_empty(material.bursts, request.source)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
-    config = with_mask(config, mask, folder)
+    config = _settled(with_mask(config, mask, folder), request.settled)
     books = Books(journal, Ledger(), material.loads, History())
     write_names(request.source, folder / "pictures.csv")
-    screen.say(f"replaying {request.source} into {folder}")
+    screen.say(f"replaying {request.source} into {request.settled or folder}")
     outputs = make_outputs(About(config, folder, camera, grid, material.start), books, screen)
     began, work = time.perf_counter(), ahead(bursts)
     try:
@@ -198,10 +201,22 @@ def _run(
         work.close()
         outputs.end()
     lines = [*_account(material, books), pace_line(books.history, took)]
-    lossy = (
-        outputs.failed or not books.history.told_something or bool(material.seen and material.seen.left_out)
+    left_out = material.seen.left_out if material.seen else 0
+    lossy = outputs.failed or not books.history.told_something or left_out > 0
+    code = 130 if stopping.is_set() else 5 if lossy else 0
+    return Replayed(folder, books, config, code, tuple(lines), left_out)
+
+
+def _settled(config: Config, folder: Path | None) -> Config:
+    """The configuration that the results hold, of where they will lie."""
+    if folder is None:
+        return config
+    mask = config.measure.mask and str(folder / "mask.png")
+    return replace(
+        config,
+        measure=replace(config.measure, mask=mask),
+        output=replace(config.output, dir=str(folder)),
     )
-    return Replayed(folder, books, config, 130 if stopping.is_set() else 5 if lossy else 0, tuple(lines))
 
 
 def _account(material: Material, books: Books) -> list[str]:

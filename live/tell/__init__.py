@@ -20,7 +20,7 @@ from live.tell.figures import (
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen, say
-from live.tell.status_line import Standing
+from live.tell.status_line import Standing, duration
 from live.tell.summary import file_lines, summary_lines
 
 __all__ = [
@@ -33,6 +33,7 @@ __all__ = [
     "StatusCard",
     "Vitals",
     "axis_words",
+    "duration",
     "elastic_lines",
     "evaluate",
     "figure_lines",

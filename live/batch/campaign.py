@@ -1,0 +1,176 @@
+"""A campaign: what is missing is done by workers, and all of it stands in one table."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from acquire.errors import ConfigError, PhasedicError
+from live.batch import places
+from live.batch.keys import key_of
+from live.batch.listed import Listed
+from live.batch.row import Row, failed
+from live.batch.standing import Standing
+from live.batch.summary import write_summary
+from live.batch.task import Task, row_done
+from live.setup import compile_ahead, load_config
+from live.tell import Screen
+
+_LOOK_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What is asked of a campaign.
+
+    Attributes
+    ----------
+    tests : sequence of Listed
+    out : Path
+        The folder of a test is made in it.
+    workers : int
+    config : str or None
+        A configuration for all; that of a test goes before it.
+    overrides : mapping of "section.key" to value
+        For all; those of a test go before them.
+    start_s, end_s : float or None, s
+    as_measured : bool
+    """
+
+    tests: Sequence[Listed]
+    out: Path
+    workers: int
+    config: str | None = None
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+    start_s: float | None = None
+    end_s: float | None = None
+    as_measured: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Campaign:
+    """What came out.
+
+    Attributes
+    ----------
+    rows : tuple of Row
+        In the order of the tests.
+    new : int
+        Tests that were replayed now.
+    files : tuple of Path
+        The tables.
+    exit_code : int
+    """
+
+    rows: tuple[Row, ...]
+    new: int
+    files: tuple[Path, ...]
+    exit_code: int
+
+
+def run_campaign(wanted: Wanted, screen: Screen, stopping: threading.Event) -> Campaign:
+    """Replay what is missing; setting ``stopping`` ends it early, without a table.
+
+    Raises
+    ------
+    ConfigError
+        The settings cannot be, or a folder holds results of other settings.
+    DataError
+        The table cannot be written.
+    """
+    load_config(Path(wanted.config) if wanted.config else None, wanted.overrides)
+    _make(wanted.out)
+    rows, tasks = _planned(wanted)
+    places.sweep(wanted.out)
+    ready = len(wanted.tests) - len(tasks)
+    screen.say(f"{len(wanted.tests)} tests: {ready} as they are, {len(tasks)} to replay into {wanted.out}")
+    if tasks:
+        _work(wanted, tasks, rows, screen, stopping)
+    places.sweep(wanted.out)
+    places.sweep_whole(wanted.out, {name for name, row in rows.items() if row.is_done})
+    if stopping.is_set():
+        return Campaign(tuple(rows.values()), len(tasks), (), 130)
+    found = tuple(rows[test.name] for test in wanted.tests)
+    files = write_summary(found, wanted.out)
+    code = 0 if all(row.is_well for row in found) else 5
+    return Campaign(found, len(tasks), tuple(files), code)
+
+
+def _make(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"{out}: cannot be made ({error.strerror}); choose another --out") from None
+
+
+def _planned(wanted: Wanted) -> tuple[dict[str, Row], list[Task]]:
+    """The rows there are, and the tasks that are missing."""
+    rows: dict[str, Row] = {}
+    tasks: list[Task] = []
+    for test in wanted.tests:
+        task = _task(wanted, test)
+        try:
+            task = dataclasses.replace(task, key=key_of(task))
+        except PhasedicError as error:
+            rows[task.name] = failed(task.name, task.source, str(error), error.exit_code)
+            continue
+        if (row := row_done(task)) is not None:
+            rows[task.name] = row
+        else:
+            tasks.append(task)
+    taken = [str(task.folder) for task in tasks if task.folder.exists()]
+    if taken:
+        more = f" and {len(taken) - 1} more" if len(taken) > 1 else ""
+        raise ConfigError(
+            f"{taken[0]}{more}: holds results of other settings, another recording or another version; nothing is"
+            " overwritten, choose another --out"
+        )
+    return rows, tasks
+
+
+def _task(wanted: Wanted, test: Listed) -> Task:
+    return Task(
+        name=test.name,
+        out=str(wanted.out.absolute()),
+        source=test.source,
+        config=_absolute(test.config or wanted.config),
+        reference=_absolute(test.reference),
+        forces=_absolute(test.forces),
+        start_s=wanted.start_s,
+        end_s=wanted.end_s,
+        as_measured=wanted.as_measured,
+        overrides={**wanted.overrides, **test.overrides},
+    )
+
+
+def _absolute(path: str | None) -> str | None:
+    return None if path is None else str(Path(path).absolute())
+
+
+def _work(
+    wanted: Wanted, tasks: Sequence[Task], rows: dict[str, Row], screen: Screen, stopping: threading.Event
+) -> None:
+    from analysis import PICTURE_KINDS
+    from live.batch.pool import Pool
+
+    compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
+    standing = Standing(len(tasks), time.monotonic)
+
+    def done(task: Task, row: Row) -> None:
+        rows[task.name] = row
+        standing.done(task.name)
+        if not row.is_well:
+            screen.say(row.words)
+
+    pool = Pool(tasks, wanted.workers, lambda task, progress: standing.told(task.name, progress), done)
+    try:
+        while not pool.wait(_LOOK_S) and not stopping.is_set():
+            screen.status(standing.words())
+    finally:
+        pool.close()
+    screen.say(standing.words())

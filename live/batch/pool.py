@@ -1,0 +1,158 @@
+"""Worker processes of this machine, one task at a time each; one that dies is replaced and its task done again.
+
+Each is a Python of its own with one thread for the numerics (the libraries read that before they are imported).
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+
+from live.batch.row import Row, failed
+from live.batch.task import Progress, Task
+
+_ONE_THREAD = (
+    "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM",
+)  # fmt: skip
+MOST_DEATHS = 3
+_LAST_S = 5.0
+
+Told = Callable[[Task, Progress], object]
+Done = Callable[[Task, Row], object]
+
+
+class Pool:
+    """``workers`` processes at work on ``tasks``; ``told`` and ``done`` are called from threads.
+
+    A task whose worker died three times is a failed row; those of other workers go on untouched.
+    """
+
+    def __init__(self, tasks: Sequence[Task], workers: int, told: Told, done: Done) -> None:
+        self._waiting, self._deaths = deque(tasks), dict.fromkeys((task.name for task in tasks), 0)
+        self._told, self._done = told, done
+        self._stopped = threading.Event()
+        self._workers: set[_Worker] = set()
+        self._lock = threading.Lock()
+        n = min(workers, len(tasks))
+        self._threads = [threading.Thread(target=self._serve, name="worker", daemon=True) for _ in range(n)]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def pids(self) -> list[int]:
+        """Of the processes at work."""
+        with self._lock:
+            return [worker.pid for worker in self._workers]
+
+    def wait(self, seconds: float) -> bool:
+        """Whether all is done within ``seconds``."""
+        for thread in self._threads:
+            thread.join(seconds / len(self._threads))
+        return not any(thread.is_alive() for thread in self._threads)
+
+    def close(self) -> None:
+        """End all workers, in the middle of a task too."""
+        self._stopped.set()
+        with self._lock:
+            for worker in self._workers:
+                worker.kill()
+        for thread in self._threads:
+            thread.join()
+
+    def _serve(self) -> None:
+        worker: _Worker | None = None
+        try:
+            while (task := self._next()) is not None:
+                worker = worker or self._new()
+                row = worker.perform(task, self._told)
+                if row is None:
+                    self._end(worker)
+                    worker, row = None, self._after_death(task)
+                if row is not None:
+                    self._done(task, row)
+        finally:
+            if worker is not None:
+                self._end(worker)
+
+    def _next(self) -> Task | None:
+        with self._lock:
+            return self._waiting.popleft() if self._waiting and not self._stopped.is_set() else None
+
+    def _new(self) -> _Worker:
+        worker = _Worker()
+        with self._lock:
+            self._workers.add(worker)
+        if self._stopped.is_set():
+            worker.kill()
+        return worker
+
+    def _end(self, worker: _Worker) -> None:
+        worker.end()
+        with self._lock:
+            self._workers.discard(worker)
+
+    def _after_death(self, task: Task) -> Row | None:
+        """Once more, as the last of all; None then."""
+        if self._stopped.is_set():
+            return None
+        self._deaths[task.name] += 1
+        if self._deaths[task.name] < MOST_DEATHS:
+            with self._lock:
+                self._waiting.append(task)
+            return None
+        words = f"its worker died {MOST_DEATHS} times; is there memory enough for --workers?"
+        return failed(task.name, task.source, words, 1)
+
+
+class _Worker:
+    """One process."""
+
+    def __init__(self) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "live.batch"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=os.environ | dict.fromkeys(_ONE_THREAD, "1"),
+            text=True,
+            encoding="utf-8",
+        )
+        self.pid = self._process.pid
+
+    def perform(self, task: Task, told: Told) -> Row | None:
+        """The row of ``task``; None where the process died over it."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        try:
+            self._process.stdin.write(task.to_json() + "\n")
+            self._process.stdin.flush()
+            for line in self._process.stdout:
+                message = json.loads(line)
+                if "row" in message:
+                    return Row.of(message["row"])
+                told(task, Progress(**message["progress"]))
+        except (OSError, ValueError):  # half a line is the last word of a process that was killed
+            pass
+        return None
+
+    def kill(self) -> None:
+        """At once."""
+        self._process.kill()
+
+    def end(self) -> None:
+        """Let it go; it ends where nothing comes any more."""
+        for stream in (self._process.stdin, self._process.stdout):
+            if stream is not None:
+                try:
+                    stream.close()
+                except OSError:
+                    continue
+        try:
+            self._process.wait(_LAST_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()

@@ -1,0 +1,134 @@
+"""A test in one line of the table: settings, figures with their intervals, noise, losses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from acquire.printable import printable
+from analysis.evaluate import Figure, TensileFigures
+from live.measure import History
+from live.replay import Replayed
+from live.setup import Config
+from live.tell import evaluate
+
+Value = str | int | float | None
+COLUMNS: dict[str, type] = {
+    "test": str, "source": str, "outcome": str, "exit_code": int, "error": str,
+    "zoi_px": int, "step_px": int, "burst": int, "order": int, "window": str, "estimator": str, "strain": str,
+    "instants": int, "zois": int, "valid_last": int,
+    **{f"{name}{end}": float for name in ("E_GPa", "nu", "Rp0.2_MPa", "Rm_MPa", "EA_kN", "Fp0.2_kN", "Fm_kN")
+       for end in ("", "_low", "_high")},
+    "noise_GL": float, "strain_noise": float, "mean_strain_noise": float,
+    "frames_lost": int, "pictures_left_out": int, "seconds": float,
+}  # fmt: skip
+"""Name of each column, with its kind; a number that is not known is empty."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Row:
+    """One test; ``values`` has all of ``COLUMNS``."""
+
+    values: Mapping[str, Value]
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> Row:
+        """With the columns there are, in their order; what is of another kind is left empty."""
+        return cls({name: _fitting(values.get(name), kind) for name, kind in COLUMNS.items()})
+
+    @property
+    def is_well(self) -> bool:
+        """Whether nothing is missing."""
+        return self.values["exit_code"] == 0
+
+    @property
+    def is_done(self) -> bool:
+        """Whether there are results."""
+        return self.values["outcome"] != "failed"
+
+    @property
+    def words(self) -> str:
+        """Name and what went wrong, in a line."""
+        return f"{self.values['test']}: {self.values['outcome']}: {self.values['error']}"
+
+
+def failed(name: str, source: str, error: str, exit_code: int) -> Row:
+    """The row of a test without results."""
+    found = {"test": name, "source": source, "outcome": "failed", "exit_code": exit_code, "error": error}
+    return Row.of(found)
+
+
+def row_of(name: str, source: str, done: Replayed, seconds: float) -> Row:
+    """The row of a test that was replayed."""
+    history, code = done.books.history, done.exit_code
+    said = (
+        "" if code == 0 else "; ".join(done.lines[:1]) if history.told_something else "nothing was measured"
+    )
+    return Row.of(
+        {
+            "test": name,
+            "source": source,
+            "outcome": "done" if code == 0 else "with loss",
+            "exit_code": code,
+            "error": said,
+            **_settings(done.config),
+            **_counts(history),
+            **_figures(evaluate(history, done.books.loads, done.config.specimen), done.config),
+            **_noise(history),
+            "frames_lost": done.books.ledger.lost,
+            "pictures_left_out": done.left_out,
+            "seconds": round(seconds, 3),
+        }
+    )
+
+
+def _settings(config: Config) -> dict[str, Any]:
+    measure = config.measure
+    names = ("burst", "order", "window", "estimator", "strain")
+    found = {name: getattr(measure, name) for name in names}
+    return {"zoi_px": measure.zoi, "step_px": measure.step, **found}
+
+
+def _counts(history: History) -> dict[str, Any]:
+    last = history.instants[-1] if history.instants else None
+    found: dict[str, Any] = {"instants": len(history.instants)}
+    return found if last is None else {**found, "zois": last.n_zoi, "valid_last": last.n_valid}
+
+
+def _figures(figures: TensileFigures, config: Config) -> dict[str, Any]:
+    """Stresses where the section is known, else forces."""
+    if config.specimen.area_m2 is None:
+        known = {"EA_kN": figures.E.over(1e3), "nu": figures.nu, "Fp0.2_kN": figures.Rp02.over(1e3)}
+        known["Fm_kN"] = figures.Rm.over(1e3)
+    else:
+        known = {"E_GPa": figures.E.over(1e9), "nu": figures.nu, "Rp0.2_MPa": figures.Rp02.over(1e6)}
+        known["Rm_MPa"] = figures.Rm.over(1e6)
+    return {key: value for name, figure in known.items() for key, value in _interval(name, figure).items()}
+
+
+def _interval(name: str, figure: Figure) -> dict[str, float]:
+    return {name: figure.value, f"{name}_low": figure.low, f"{name}_high": figure.high}
+
+
+def _noise(history: History) -> dict[str, float]:
+    """Typical of the test: of one frame, of one ZOI's strain and of the mean strain, as predicted."""
+    columns = {"noise_GL": "noise_GL", "strain_noise": "zoi_sigma", "mean_strain_noise": "sigma_eyy"}
+    return {name: _median(history, column) for name, column in columns.items()}
+
+
+def _median(history: History, column: str) -> float:
+    values = history.column(column)
+    values = values[np.isfinite(values)]
+    return float(np.median(values)) if values.size else math.nan
+
+
+def _fitting(value: Any, kind: type) -> Value:
+    if kind is str:
+        return "" if value is None else printable(value)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return int(value) if kind is int else float(value)

@@ -1,0 +1,24 @@
+"""A small campaign: three materials, four sessions of each."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from live.cli import main
+
+KINDS = ("uniform", "hole", "woven")
+SIZE = "lockstep=yes&seconds=2&fps=12&width=160&height=128&bits=12&hole=10"
+
+
+@pytest.fixture(scope="package")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the runs ``uniform-1``, ``hole-1`` and so on."""
+    folder = tmp_path_factory.mktemp("campaign")
+    for kind in KINDS:
+        for seed in range(1, 5):
+            words = ["--zoi", "32", "--step", "16", "--reference-burst", "4", "--burst", "2"]
+            words += ["--no-view", "--no-rrd", "--out", str(folder / f"{kind}-{seed}")]
+            assert main(["run", "--camera", f"sim:{kind}?{SIZE}&seed={seed}", "--load", "sim:", *words]) == 0
+    return folder

@@ -1,0 +1,235 @@
+"""``phasedic batch``: what it makes, what it does again, and what is left when something dies."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import dataclasses
+import os
+import platform
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from pyarrow import parquet
+
+from live.batch import Wanted, find_tests, run_campaign
+from live.cli import main
+from live.tell import Screen
+
+ROOT = Path(__file__).parents[3]
+SETTINGS = ["--zoi", "48", "--step", "12", "--section", "20,2"]
+
+
+def batch(*words: object) -> int:
+    return main(["batch", *map(str, words)])
+
+
+def rows(out: Path) -> list[dict[str, str]]:
+    return list(csv.DictReader((out / "summary.csv").read_text(encoding="utf-8").splitlines()))
+
+
+def parts(out: Path) -> list[Path]:
+    return [path for path in out.glob(".*.part") if path.is_dir()]
+
+
+def datasets(path: Path) -> dict[str, np.ndarray]:
+    found: dict[str, np.ndarray] = {}
+    with h5py.File(path) as file:
+        file.visititems(
+            lambda name, item: (
+                found.update({name: np.asarray(item[()])}) if isinstance(item, h5py.Dataset) else None
+            )
+        )
+    return found
+
+
+def until(true: Callable[[], bool], seconds: float = 60.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "it did not come to that"
+        time.sleep(0.01)
+
+
+def started(*words: object) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "live.cli", "batch", *map(str, words)]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
+
+
+def pid_of(part: Path) -> int:
+    return int(part.name.split(".")[-2])
+
+
+def is_gone(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").split(") ")[1][0] == "Z"
+    except OSError:
+        return True
+
+
+@pytest.fixture(scope="module")
+def done(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("done") / "again"
+    assert batch(runs / "*" / "session.h5", *SETTINGS, "--workers", 2, "--out", out) == 0
+    return out
+
+
+def test_twelve_tests_in_one_table(done: Path) -> None:
+    table = rows(done)
+    assert [row["test"] for row in table] == sorted(
+        f"{k}-{n}" for k in ("hole", "uniform", "woven") for n in (1, 2, 3, 4)
+    )
+    assert {(row["outcome"], row["zoi_px"], row["exit_code"]) for row in table} == {("done", "48", "0")}
+    assert all(float(row["Rm_MPa"]) > 0 and 0 < float(row["strain_noise"]) < 0.01 for row in table)
+    typed = parquet.read_table(done / "summary.parquet")
+    assert typed.column("test").to_pylist() == [row["test"] for row in table]
+    assert typed.column("Rm_MPa").to_pylist() == [float(row["Rm_MPa"]) for row in table]
+    assert not parts(done)
+
+
+@pytest.mark.parametrize("name", ["uniform-1", "hole-2", "woven-4"])
+def test_bit_equal_to_a_replay(runs: Path, done: Path, tmp_path: Path, name: str) -> None:
+    words = ["replay", str(runs / name / "session.h5"), *SETTINGS, "--no-view", "--no-rrd"]
+    assert main([*words, "--out", str(tmp_path / "alone")]) == 0
+    ours, alone = datasets(done / name / "strain.h5"), datasets(tmp_path / "alone" / "strain.h5")
+    assert len(ours) > 20
+    assert ours.keys() == alone.keys()
+    differ = {key for key in alone if ours[key].tobytes() != alone[key].tobytes()}
+    assert {key for key in differ if alone[key].dtype != "O"} <= {"entry/config", "entry/mean/kernel_s"}
+
+
+def test_the_results_say_where_they_lie(done: Path) -> None:
+    assert b".part" not in (done / "hole-1" / "strain.h5").read_bytes()
+    assert b".part" not in (done / "hole-1" / "replay.txt").read_bytes()
+
+
+def test_again_only_what_is_missing(runs: Path, done: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = {path: path.stat().st_mtime_ns for path in done.glob("*/strain.h5")}
+    words = (runs / "*" / "session.h5", *SETTINGS, "--out", done)
+    assert batch(*words) == 0
+    assert "12 as they are, 0 to replay" in capsys.readouterr().out
+    shutil.rmtree(done / "hole-3")
+    assert batch(*words) == 0
+    assert "11 as they are, 1 to replay" in capsys.readouterr().out
+    after = {path: path.stat().st_mtime_ns for path in done.glob("*/strain.h5")}
+    assert {path for path in before if before[path] != after[path]} == {done / "hole-3" / "strain.h5"}
+
+
+@pytest.mark.parametrize("other", [["--zoi", "32"], ["--section", "10,2"], ["--from", "0.5"]])
+def test_other_settings_need_another_folder(
+    runs: Path, done: Path, capsys: pytest.CaptureFixture[str], other: list[str]
+) -> None:
+    assert batch(runs / "hole-1" / "session.h5", *SETTINGS, *other, "--out", done) == 2
+    assert "holds results of other settings" in capsys.readouterr().err
+
+
+def test_one_that_fails_stops_no_other(
+    runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "broken").mkdir()
+    (tmp_path / "broken" / "session.h5").write_bytes(b"no session at all" * 100)
+    shutil.copytree(runs / "hole-1", tmp_path / "good")
+    words = (tmp_path / "*" / "session.h5", *SETTINGS, "--out", tmp_path / "out")
+    assert batch(*words) == 5
+    told = rows(tmp_path / "out")
+    assert [(row["test"], row["outcome"], row["exit_code"]) for row in told] == [
+        ("broken", "failed", "4"),
+        ("good", "done", "0"),
+    ]
+    assert "session.h5" in told[0]["error"]
+    assert f"broken: failed: {told[0]['error']}" in capsys.readouterr().out
+    assert not (tmp_path / "out" / "broken").exists()
+    shutil.copy(runs / "hole-2" / "session.h5", tmp_path / "broken" / "session.h5")
+    assert batch(*words) == 0
+    assert "1 as they are, 1 to replay" in capsys.readouterr().out
+
+
+def test_a_worker_that_is_killed(runs: Path, done: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    caller = started(runs / "[hu]*" / "session.h5", *SETTINGS, "--workers", 2, "--out", out)
+    until(lambda: bool(parts(out)))
+    os.kill(pid_of(parts(out)[0]), signal.SIGKILL)
+    assert caller.wait(120) == 0
+    assert [row["outcome"] for row in rows(out)] == ["done"] * 8
+    assert not parts(out)
+    for name in ("hole-1", "uniform-4"):
+        ours, other = datasets(out / name / "strain.h5"), datasets(done / name / "strain.h5")
+        assert all(
+            np.array_equal(ours[key], other[key], equal_nan=True) for key in ours if key.endswith("/eyy")
+        )
+
+
+def test_a_caller_that_is_killed(runs: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = (runs / "hole-*" / "session.h5", *SETTINGS, "--workers", 2, "--out", out)
+    caller = started(*words)
+    until(lambda: bool(parts(out)))
+    caller.kill()
+    caller.wait()
+    left = parts(out)
+    until(lambda: all(is_gone(pid_of(part)) for part in left))
+    assert not (out / "summary.csv").exists()
+    assert all(
+        (folder / "batch.json").exists() for folder in out.iterdir() if not folder.name.startswith(".")
+    )
+    assert batch(*words) == 0
+    assert [row["outcome"] for row in rows(out)] == ["done"] * 4
+    assert not parts(out)
+
+
+def test_interrupted(runs: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    caller = started(runs / "*" / "session.h5", *SETTINGS, "--workers", 2, "--out", out)
+    until(lambda: bool(parts(out)))
+    workers = [pid_of(part) for part in parts(out)]
+    caller.send_signal(signal.SIGINT)
+    assert caller.wait(60) == 130
+    assert all(is_gone(pid) for pid in workers)
+    assert not parts(out)
+    assert not (out / "summary.csv").exists()
+
+
+def test_one_that_always_kills_its_worker(runs: Path, tmp_path: Path) -> None:
+    out, over = tmp_path / "out", threading.Event()
+
+    def kill() -> None:
+        while not over.is_set():
+            for part in parts(out):
+                if part.name.startswith(".hole-1."):
+                    with contextlib.suppress(ProcessLookupError):
+                        os.kill(pid_of(part), signal.SIGKILL)
+            time.sleep(0.005)
+
+    threading.Thread(target=kill, daemon=True).start()
+    tests = find_tests([str(runs / "hole-[12]" / "session.h5")])
+    tests[0] = dataclasses.replace(tests[0], overrides={"measure.step": 1})  # takes seconds
+    try:
+        found = run_campaign(Wanted(tests, out, 2), Screen(quiet=True), threading.Event())
+    finally:
+        over.set()
+    assert found.exit_code == 5
+    assert [row.values["outcome"] for row in found.rows] == ["failed", "done"]
+    assert "died 3 times" in str(found.rows[0].values["error"])
+    assert not parts(out)
+
+
+def test_parts_of_others(runs: Path, done: Path) -> None:
+    """Of this machine by their process; of another one when the test is whole."""
+    host = platform.node().replace(".", "-")
+    ended = subprocess.Popen([sys.executable, "-c", ""])
+    ended.wait()
+    names = [f".new.{host}.{ended.pid}", f".new.{host}.{os.getppid()}", ".new.else.1", ".hole-1.else.1"]
+    for name in names:
+        (done / f"{name}.part").mkdir()
+    assert batch(runs / "*" / "session.h5", *SETTINGS, "--out", done) == 0
+    assert {part.name for part in parts(done)} == {f"{name}.part" for name in names[1:3]}
+    for part in parts(done):
+        part.rmdir()
