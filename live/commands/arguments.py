@@ -31,6 +31,7 @@ COMMANDS = {
     ),
     "replay": Entry("live.commands.replay", "measure a recorded session, or any folder of pictures"),
     "batch": Entry("live.commands.batch", "many sessions or folders of pictures, replayed by workers"),
+    "study": Entry("live.commands.study", "one test with many settings: noise against what they show"),
     "map": Entry("live.commands.map", "draw a map of the results over a picture, as a PNG"),
     "show": Entry("live.commands.show", "a finished run in the view, with a slider in time"),
     "export": Entry(

@@ -4,7 +4,8 @@
 finds the bursts of a session whatever it holds.
 """
 
-from live.replay.material import ReplayRequest
+from live.replay.material import Material, ReplayRequest
+from live.replay.opened import open_material
 from live.replay.replay import Replayed, replay
 
-__all__ = ["ReplayRequest", "Replayed", "replay"]
+__all__ = ["Material", "ReplayRequest", "Replayed", "open_material", "replay"]

@@ -9,9 +9,13 @@ from live.report.browser import NO_BROWSER, find_browser
 from live.report.comparison import compare, tests_of, write_table
 from live.report.report import Report, Wanted, make_report
 from live.report.saving import save_figures, save_page, save_pdf
+from live.report.svg import Curve as Line
+from live.report.svg import Figure
 
 __all__ = [
     "NO_BROWSER",
+    "Figure",
+    "Line",
     "Report",
     "Wanted",
     "compare",

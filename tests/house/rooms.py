@@ -76,6 +76,7 @@ ROOMS = {
     " live.view live.view.exchange",
     "live.batch": "acquire acquire.camera acquire.files analysis analysis.evaluate live.measure live.replay live.setup"
     " live.tell",
+    "live.study": "acquire analysis.field analysis.quality live.measure live.replay live.setup",
     "live.serve.web": "acquire live.pace",
     "live.serve": "acquire acquire.camera acquire.files analysis.field analysis.evaluate live.measure live.setup"
     " live.specimen live.check live.maps live.pace live.operate live.tell live.outputs live.serve.web",
@@ -87,11 +88,12 @@ DOORS = {"live.setup.rig": "hw_mocks"}
 
 # What is started by a command alone: no other room's line may name these (a batch replays).
 STARTED = {
-    "live.commands", "live.run", "live.replay", "live.check", "live.characterise", "live.batch", "live.serve",
+    "live.commands", "live.run", "live.replay", "live.check", "live.characterise", "live.batch", "live.study",
+    "live.serve",
 }  # fmt: skip
 # The page judges the still specimen as the check does.
 MAY_START = {
-    "live.batch": {"live.replay"}, "live.serve": {"live.check"},
+    "live.batch": {"live.replay"}, "live.study": {"live.replay"}, "live.serve": {"live.check"},
     "live.characterise.experiments": {"live.characterise"},
 }  # fmt: skip
 

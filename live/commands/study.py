@@ -1,0 +1,185 @@
+"""``phasedic study``: one test measured with many settings, and which to take."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import itertools
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from acquire.errors import ConfigError
+from live.commands.options import add_options, add_verbose, overrides
+from live.export import check_free, new_folder
+from live.report import Figure, Line, save_figures
+from live.setup import AUTO, compile_ahead
+from live.tell import Screen
+
+if TYPE_CHECKING:
+    from live.study import Advice, Found, Setting
+
+MEASURE = ("roi", "mask", "burst", "reference-burst", "estimator", "strain", "bending", "noise", "axis")
+WINDOWS = ("gaussian", "uniform", "tukey", "bi-triangular")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic study``."""
+    parser.add_argument("source", help="session.h5, or pictures as for replay")
+    parser.add_argument(
+        "--zoi", type=_numbers, default=[24, 32, 48, 64, 96], metavar="PX,PX", help="sides of ZOIs"
+    )
+    parser.add_argument(
+        "--step", type=_numbers, metavar="PX,PX", help="distances (default: a quarter of the ZOI)"
+    )
+    parser.add_argument(
+        "--order", type=_numbers, default=[1], metavar="1,2", help="orders of the shape of a ZOI"
+    )
+    parser.add_argument("--window", type=_windows, default=["gaussian"], metavar="NAME,NAME", help="weights")
+    words = "seconds in which nothing moves (default: as the force tells)"
+    parser.add_argument("--static", type=_seconds, metavar="A,B", help=words)
+    words = "seconds of the load to be studied (default: about the highest force)"
+    parser.add_argument("--loaded", type=_seconds, metavar="C,D", help=words)
+    words = "folder to make: table, figures, measure.toml"
+    parser.add_argument(
+        "--out", dest="folder", default="study", metavar="DIR", help=f"{words} (default study)"
+    )
+    parser.add_argument("--config", metavar="FILE", help="TOML file; what is given here overrides it")
+    add_options(parser, "measurement", *MEASURE)
+    add_verbose(parser)
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic study``."""
+    from live.measure import kinds_of
+    from live.replay import ReplayRequest, open_material
+    from live.study import recommended, study, take_windows
+
+    screen, out = Screen(), Path(arguments.folder)
+    check_free(out)
+    settings, found = _settings(arguments), []
+    config_file = Path(arguments.config) if arguments.config else None
+    request = ReplayRequest(arguments.source, False, None, None, None, config_file, overrides(arguments))
+    with open_material(request) as (material, config):
+        if AUTO in (config.measure.roi, config.measure.gauges):
+            raise ConfigError("a study does not look for the specimen; give --roi x,y,width,height or all")
+        compile_ahead(kinds_of(material.camera), phase=config.measure.estimator == "phase", say=screen.status)
+        windows = take_windows(material, arguments.static, arguments.loaded)
+        n = f"{len(windows.still)} still and {len(windows.loaded)} loaded bursts"
+        screen.say(f"{len(settings)} settings on {n} of {arguments.source}")
+        screen.say(_HEAD)
+        for one in study(material, windows, config, settings):
+            found.append(one)
+            screen.say(_line(one))
+    advice = recommended(found)
+    with new_folder(out) as part:
+        (part / "study.csv").write_text(_csv(found), encoding="utf-8")
+        (part / "measure.toml").write_text(_section(advice), encoding="utf-8")
+        save_figures(_figures(found), part / "figures", screen)
+    screen.say(f"take {advice.found.setting.words}: {advice.why}")
+    screen.say(_section(advice).rstrip())
+    screen.say(f"  {out}")
+    return 0
+
+
+def _settings(arguments: argparse.Namespace) -> list[Setting]:
+    from live.study import Setting
+
+    found = [
+        Setting(zoi, step, order, window)
+        for zoi, order, window in itertools.product(arguments.zoi, arguments.order, arguments.window)
+        for step in arguments.step or [max(1, zoi // 4)]
+    ]
+    return list(dict.fromkeys(found))
+
+
+# -- what is shown ------------------------------------------------------------------------------
+
+_HEAD = (
+    "  zoi step order window        l10 px  VSG px  noise um/m  over predicted  strain um/m    +-"
+    "  gradient um/m/px  valid"
+)
+
+
+def _line(one: Found) -> str:
+    s = one.setting
+    mark = "" if one.is_told else "  noise"
+    return (
+        f"{s.zoi:5d} {s.step:4d} {s.order:5d} {s.window:12s} {one.l10:7.1f} {one.vsg:7.1f} {one.noise * 1e6:11.1f}"
+        f" {one.noise / one.predicted:15.2f} {one.seen * 1e6:12.0f} {one.sigma * 1e6:5.0f}"
+        f" {one.gradient * 1e6:17.1f} {one.valid:6.0%}{mark}"
+    )
+
+
+def _csv(found: Sequence[Found]) -> str:
+    rows = [{**dataclasses.asdict(one.setting), **_values(one)} for one in found]
+    lines = [",".join(rows[0]), *(",".join(f"{value:.8g}" if isinstance(value, float) else str(value)
+             for value in row.values()) for row in rows)]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def _values(one: Found) -> dict[str, Any]:
+    values = {name: getattr(one, name) for name in ("l10", "vsg", "noise", "predicted", "seen", "sigma")}
+    return {**values, "gradient": one.gradient, "valid": one.valid}
+
+
+def _section(advice: Advice) -> str:
+    s = advice.found.setting
+    return f'[measure]\nzoi = {s.zoi}\nstep = {s.step}\norder = {s.order}\nwindow = "{s.window}"\n'
+
+
+def _figures(found: Sequence[Found]) -> list[Figure]:
+    """Noise and strain over the size of the virtual gauge, a line for each order and weight."""
+    kinds = list(dict.fromkeys((one.setting.order, one.setting.window) for one in found))
+    parts = [[one for one in found if (one.setting.order, one.setting.window) == kind] for kind in kinds]
+    names = [f"order {order}, {window}" for order, window in kinds]
+    noise = tuple(
+        _curve(name, part, "noise", k) for k, (name, part) in enumerate(zip(names, parts, strict=True))
+    )
+    seen = tuple(
+        _curve(name, part, "seen", k) for k, (name, part) in enumerate(zip(names, parts, strict=True))
+    )
+    x = "size of the virtual gauge, px"
+    return [
+        Figure("noise", "Noise of one ZOI", x, "noise, um/m", noise),
+        Figure("strain", "Largest strain, its noise taken off", x, "strain, um/m", seen),
+    ]
+
+
+def _curve(name: str, part: Sequence[Found], value: str, colour: int) -> Line:
+    part = sorted(part, key=lambda one: one.vsg)
+    x, y = np.array([one.vsg for one in part]), np.array([getattr(one, value) * 1e6 for one in part])
+    sigma = np.array([one.sigma * 1e6 for one in part]) if value == "seen" else None
+    return Line(name, x, y, sigma, colour)
+
+
+# -- what is read -------------------------------------------------------------------------------
+
+
+def _numbers(word: str) -> list[int]:
+    try:
+        found = [int(part) for part in word.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{word!r}: give whole numbers, as 24,32,48") from None
+    if min(found) < 1:
+        raise argparse.ArgumentTypeError(f"{word!r}: give numbers from 1")
+    return found
+
+
+def _windows(word: str) -> list[str]:
+    for part in word.split(","):
+        if part not in WINDOWS:
+            raise argparse.ArgumentTypeError(f"{part!r}: there are {', '.join(WINDOWS)}")
+    return word.split(",")
+
+
+def _seconds(word: str) -> tuple[float, float]:
+    try:
+        low, high = (float(part) for part in word.split(","))
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"{word!r}: give two numbers, as 0,1.5") from None
+    if not low < high:
+        raise argparse.ArgumentTypeError(f"{word!r}: the first must be the smaller")
+    return low, high

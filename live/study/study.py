@@ -1,0 +1,193 @@
+"""A study of settings: what each shows of the strain, and with how much noise (the VSG study of the iDICs guide).
+
+Only the bursts of a still and of a loaded window are measured. A largest value is one of noise too where noise
+is large; so the ZOI is looked for in one half of the bursts and read in the other, less its value when still,
+which takes the noise of the reference off.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import ConfigError
+from acquire.frame import Burst
+from analysis.quality import gauge_length, l10_strain
+from live.measure import averaged, prepare
+from live.replay import Material
+from live.setup import Config, correction, grid_for, kernel_settings, read_mask
+from live.study.windows import Windows
+
+if TYPE_CHECKING:
+    from analysis.field import StrainField
+
+Array = NDArray[np.float64]
+KEEPS = 0.95  # of the largest strain
+TOLD = 3.0  # sigmas above which a strain is told from noise
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """One of the settings tried."""
+
+    zoi: int
+    step: int
+    order: int
+    window: str
+
+    @property
+    def words(self) -> str:
+        """In a line."""
+        return f"{self.zoi} px ZOIs, step {self.step}, order {self.order}, {self.window}"
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What one setting gave; strains dimensionless.
+
+    Attributes
+    ----------
+    setting : Setting
+    noise, predicted : float
+        Standard deviation of the strain along the load of one ZOI, over the ZOIs of still instants.
+    l10, vsg : float, px
+        Period of a strain that has lost 10 %; side of the square with the same noise.
+    seen, sigma : float
+        Largest strain along the load under load, its noise taken off, and its standard uncertainty.
+    gradient : float, 1/px
+        Largest difference of neighbours over their distance, in the same way.
+    valid : float
+        Share of the ZOIs that have a value under load.
+    """
+
+    setting: Setting
+    noise: float
+    predicted: float
+    l10: float
+    vsg: float
+    seen: float
+    sigma: float
+    gradient: float
+    valid: float
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the strain stands out of its noise."""
+        return self.seen >= TOLD * self.sigma
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """The setting to take, and why."""
+
+    found: Found
+    why: str
+
+
+def study(
+    material: Material, windows: Windows, config: Config, settings: Sequence[Setting]
+) -> Iterator[Found]:
+    """Measure both windows with one setting after the other.
+
+    Raises
+    ------
+    ConfigError, DataError
+        As for a replay with such a setting; also where no ZOI has a value in both windows.
+    """
+    for setting in settings:
+        measure = dataclasses.replace(config.measure, **dataclasses.asdict(setting))
+        one = dataclasses.replace(config, measure=measure)
+        yield _found(setting, one.specimen.axis, *_fields(material, windows, one))
+
+
+def _fields(
+    material: Material, windows: Windows, config: Config
+) -> tuple[list[StrainField], list[StrainField]]:
+    camera = material.camera
+    mask = read_mask(config.measure.mask, camera.width, camera.height)
+    grid, correct = grid_for(config, camera.width, camera.height, mask), correction(config, camera)
+    kernel, noise_GL = prepare(
+        material.reference, grid, kernel_settings(config), config.measure.noise_GL, correct
+    )
+
+    def measured(bursts: Sequence[Burst]) -> list[StrainField]:
+        start, found = None, []
+        for burst in map(correct, bursts):
+            start = kernel.measure(
+                burst.mean, start=start, noise=averaged(noise_GL, burst.n), clipped=burst.clipped
+            )
+            found.append(dataclasses.replace(start, measure=cast(Any, config.measure.strain)))
+        return found
+
+    return measured(windows.still), measured(windows.loaded)
+
+
+def _found(setting: Setting, axis: str, still: list[StrainField], loaded: list[StrainField]) -> Found:
+    name = "exx" if axis == "x" else "eyy"
+    at_rest = np.stack([np.asarray(getattr(field, name), np.float64) for field in still])
+    pulled = np.stack([np.asarray(getattr(field, name), np.float64) for field in loaded])
+    known = np.isfinite(at_rest).all(0) & np.isfinite(pulled).all(0)
+    if known.sum() < 2:
+        raise ConfigError(f"{setting.words}: fewer than two ZOIs have a value in both windows; leave it out")
+    noise = math.sqrt(float(np.mean([np.var(one[known], ddof=1) for one in at_rest])))
+    variances = [float(np.mean(np.asarray(getattr(field, f"sigma_{name}"))[known] ** 2)) for field in still]
+    first, second = (np.where(known, pulled[k::2].mean(0) - at_rest[k::2].mean(0), np.nan) for k in (0, 1))
+    grid = still[0].grid
+    share = 1 / len(pulled[1::2]) + 1 / len(still[1::2])
+    return Found(
+        setting=setting,
+        noise=noise,
+        predicted=math.sqrt(float(np.mean(variances))),
+        l10=l10_strain(setting.zoi, cast(Any, setting.window)),
+        vsg=gauge_length(setting.zoi, cast(Any, setting.window)),
+        seen=_largest(first, second),
+        sigma=noise * math.sqrt(share),
+        gradient=max(_largest(np.diff(first, axis=k), np.diff(second, axis=k)) for k in (0, 1)) / grid.step,
+        valid=float(np.isfinite(pulled).all(0).sum() / max(1, grid.n_active)),
+    )
+
+
+def _largest(first: Array, second: Array) -> float:
+    """The place is that of the largest magnitude of ``first``, the value that of ``second``; 0 without one."""
+    if not np.isfinite(first).any():
+        return 0.0
+    place = np.unravel_index(int(np.nanargmax(np.abs(first))), first.shape)
+    return float(max(0.0, np.sign(first[place]) * second[place]))
+
+
+def recommended(found: Sequence[Found]) -> Advice:
+    """The knee: least noise among those that still show the largest strain.
+
+    Raises
+    ------
+    ConfigError
+        No setting shows a strain that stands out of its noise.
+    """
+    told = [one for one in found if one.is_told]
+    if not told:
+        raise ConfigError(
+            "no setting shows a strain above its noise: take larger ZOIs (--zoi), or another --loaded window"
+        )
+    top = max(told, key=lambda one: one.seen - one.sigma)
+    keep = [one for one in told if one.seen >= KEEPS * (top.seen - top.sigma)]
+    best = min(keep, key=lambda one: one.noise)
+    why = (
+        f"of the {len(keep)} settings that show at least {KEEPS:.0%} of the largest strain"
+        f" ({top.seen * 1e6:.0f} um/m, with {top.setting.words}) it has the least noise"
+    )
+    larger = [one for one in told if one.noise < best.noise]
+    if larger:
+        nearest = max(larger, key=lambda one: one.seen)
+        why += f"; {nearest.setting.words} has less, but shows {nearest.seen / top.seen:.0%}"
+    sizes = [one.setting.zoi for one in found]
+    if best.setting.zoi == max(sizes):
+        why += "; it is the largest tried, larger ones may do as well"
+    elif best.setting.zoi == min(sizes):
+        why += "; it is the smallest tried, smaller ones may show more"
+    return Advice(best, why)
