@@ -6,8 +6,12 @@ Both count what they could not pass on; nothing is dropped silently.
 from __future__ import annotations
 
 import threading
+import time
 from collections import deque
 from typing import Generic, TypeVar
+
+CATCH_UP_S = 2.0
+"""What is shown is what happens now: a reader far too slow for the pace is not kept among the first bursts."""
 
 Item = TypeVar("Item")
 Stored = TypeVar("Stored")
@@ -46,19 +50,19 @@ class Mailbox(_Channel[Item]):
     waits : bool
     at_first : int
         Places until the reader, who has things to prepare, has caught up; one who has not after as many
-        items goes on with the newest.
+        items, or after ``CATCH_UP_S``, goes on with the newest.
     """
 
     def __init__(self, *, waits: bool = False, at_first: int = 1) -> None:
         super().__init__()
         self._waits = waits
         self._places = self._patience = at_first
-        self._reading = False
+        self._reading, self._until = False, 0.0
         self._skipped: list[Item] = []
 
     def begin(self) -> None:
         """The reader is ready: from now on it is behind, or has caught up."""
-        self._reading = True
+        self._reading, self._until = True, time.monotonic() + CATCH_UP_S
 
     def put(self, item: Item) -> None:
         """Place ``item``; what lay there untaken is counted as skipped. Ignored after ``close``."""
@@ -83,9 +87,13 @@ class Mailbox(_Channel[Item]):
             return item
 
     def _look_how_far(self) -> None:
-        self._patience -= self._reading
-        if self._reading and (not self._items or self._patience <= 0):
+        if not self._reading or self._places == 1:
+            return
+        self._patience -= 1
+        if not self._items or self._patience < 0 or time.monotonic() > self._until:
             self._places = 1
+            while len(self._items) > 1:
+                self._skipped.append(self._items.popleft())
 
     def take_skipped(self) -> list[Item]:
         """What was skipped since the last call."""

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import threading
+import time
 
+import pytest
+
+from live.run import channels
 from live.run.channels import ByteBuffer, Mailbox
 
 
@@ -74,6 +78,18 @@ def test_a_reader_who_never_catches_up_goes_on_with_the_newest() -> None:
         taken.append(box.get(0))
     assert taken[:2] == [0, 1]
     assert taken[3:] == list(range(7, 40, 2))
+
+
+def test_a_slow_reader_is_not_kept_in_the_past(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(channels, "CATCH_UP_S", 0.05)
+    box: Mailbox[int] = Mailbox(at_first=50)
+    for i in range(40):
+        box.put(i)
+    box.begin()
+    assert box.get(0) == 0
+    time.sleep(0.1)
+    assert box.get(0) == 39
+    assert box.take_skipped() == list(range(1, 39))
 
 
 def test_closing_frees_a_waiting_producer() -> None:
