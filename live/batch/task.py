@@ -167,5 +167,6 @@ def _replayed(task: Task, part: Path, tell: Tell) -> Row:
         done = replay(task.request(part), screen, threading.Event())
         for line in [*summary_lines(done.books, done.config.specimen), *done.lines]:
             screen.say(line)
-    tell(Progress(len(done.books.history.instants), None, sum(i.n_zoi for i in done.books.history.instants)))
+    history = done.books.history
+    tell(Progress(len(history.instants), None, int(history.column("n_zoi").sum())))
     return row_of(task.name, task.source, done, time.monotonic() - began)

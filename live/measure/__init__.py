@@ -1,10 +1,12 @@
 """The one measuring path, live and in a replay: no thread, file, device or clock.
 
 ``preparation`` makes a kernel of a reference burst (``reference``), ``pipeline`` measures burst after burst
-with a ``tracker``, ``measurement`` is what comes out with its means (``instant``, kept in ``history``),
-``settling`` waits for its force; ``smear_guard`` warns of motion within a burst.
+with a ``tracker``, ``measurement`` is what comes out with its means (``instant``, kept in ``history`` and ``kept``),
+``settling`` waits for its force; ``guards`` warn of motion within a burst and of
+strains that are no longer small.
 """
 
+from live.measure.guards import SmearGuard
 from live.measure.history import AxisFinder, History
 from live.measure.instant import Instant, ordered_mean
 from live.measure.measurement import Measurement
@@ -21,7 +23,6 @@ from live.measure.preparation import (
 from live.measure.reference import Reference, ReferenceTaker
 from live.measure.rehearsal import kinds_of, rehearse
 from live.measure.settling import HOLD_S, Loads, Settling
-from live.measure.smear_guard import SmearGuard
 
 __all__ = [
     "HOLD_S",

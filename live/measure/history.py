@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from acquire.load_cell import LoadLog
 from analysis.evaluate import LoadAxis, load_axis
 from live.measure.instant import Instant
+from live.measure.kept import Instants
 
 Array = NDArray[np.float64]
 MOST_INSTANTS = 2000
@@ -20,10 +20,10 @@ _FIRST, _GROWTH = 8, 1.1  # looked at first, and again whenever there are so man
 
 
 class History:
-    """All instants so far."""
+    """All instants so far: added by one thread, read by any."""
 
     def __init__(self) -> None:
-        self.instants: list[Instant] = []
+        self.instants = Instants()
 
     def add(self, instant: Instant) -> None:
         """Keep ``instant``."""
@@ -32,31 +32,25 @@ class History:
     @property
     def told_something(self) -> bool:
         """Whether any ZOI had a value at any instant."""
-        return any(instant.n_valid for instant in self.instants)
+        return bool(self.column("n_valid").any())
 
     def column(self, name: str) -> Array:
         """One quantity over time, (N,) float64."""
-        return np.array([getattr(instant, name) for instant in self.instants], np.float64)
+        return self.instants.column(name)
 
     def forces(self, loads: LoadLog) -> Array:
         """The force at each instant with all samples that have come by now, (N,) float64, N.
 
         As if the zero of the first instant had held to the end: a tare in mid-test is no unloading.
         """
-        return np.array(
-            [loads.force_at(i.t) + loads.zero_at(i.t) - zero for i, zero in self._with_first_zero(loads)],
-            np.float64,
-        )
-
-    def _with_first_zero(self, loads: LoadLog) -> Iterator[tuple[Instant, float]]:
-        zero = loads.zero_at(self.instants[0].t) if self.instants else 0.0
-        return ((instant, zero) for instant in self.instants)
+        t = self.column("t").tolist()
+        zero = loads.zero_at(t[0]) if t else 0.0
+        return np.array([loads.force_at(one) + loads.zero_at(one) - zero for one in t], np.float64)
 
     def tared_in_mid_test(self, loads: LoadLog) -> float:
         """What tares after the first instant have taken off the force by the last one, N."""
-        if not self.instants:
-            return 0.0
-        return loads.zero_at(self.instants[-1].t) - loads.zero_at(self.instants[0].t)
+        t = self.column("t")
+        return loads.zero_at(t[-1]) - loads.zero_at(t[0]) if t.size else 0.0
 
     def axis(self, given: str) -> LoadAxis:
         """Of the load: "x" or "y" as ``given``, or what all instants tell where that is "auto"."""
@@ -74,9 +68,7 @@ class History:
 
     def gauge(self, name: str) -> Array | None:
         """A gauge over time, (N,) float64; None where there is none of that name."""
-        if not self.instants or name not in self.instants[0].gauges:
-            return None
-        return np.array([instant.gauges[name].value for instant in self.instants], np.float64)
+        return self.instants.gauge(name)
 
 
 class AxisFinder:

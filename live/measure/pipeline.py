@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 from acquire.events import EventSink, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
+from live.measure.guards import StrainGuard
 from live.measure.measurement import Measurement
 from live.measure.preparation import Correction, unchanged
-from live.measure.strain_guard import StrainGuard
 from live.measure.tracker import Tracker
 
 if TYPE_CHECKING:

@@ -77,7 +77,8 @@ class CardWriter(Consumer):
         self._instants.append(measurement.instant)
         if self._card.is_due(measurement.t):
             history = History()
-            history.instants += self._instants.items()
+            for instant in self._instants.items():
+                history.add(instant)
             self._view.status(self._card.written(history, self._ledger))
 
 

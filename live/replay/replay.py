@@ -237,8 +237,8 @@ def _account(material: Material, books: Books) -> list[str]:
 
 def pace_line(history: History, seconds: float) -> str:
     """How fast it went, and how much of the time the kernel took."""
-    n, zois = len(history.instants), sum(instant.n_zoi for instant in history.instants)
-    share = sum(instant.measure_s for instant in history.instants) / seconds
+    n, zois = len(history.instants), history.column("n_zoi").sum()
+    share = history.column("measure_s").sum() / seconds
     return (
         f"{n} bursts in {seconds:.3g} s: {n / seconds:.3g} bursts/s, {zois / seconds:,.0f} ZOI/s, of that time"
         f" {share:.0%} in the kernel"

@@ -49,11 +49,11 @@ def why_nothing(books: Books) -> str:
 def summary_lines(books: Books, specimen: SpecimenConfig) -> list[str]:
     """The summary, a line each."""
     history = books.history
-    valid = [instant for instant in history.instants if instant.n_valid]
-    if not valid:
+    valid = np.flatnonzero(history.column("n_valid"))
+    if not valid.size:
         return [why_nothing(books)]
-    last = valid[-1]
-    largest = max(valid, key=lambda instant: abs(instant.largest)).largest
+    last, strains = history.instants[int(valid[-1])], history.column("largest")[valid]
+    largest = strains[np.argmax(np.abs(strains))]
     refused = f" ({last.refused})" if last.refused else ""
     lines = [
         f"measured {len(history.instants)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",

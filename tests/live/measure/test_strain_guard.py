@@ -14,7 +14,7 @@ from analysis import Roi, StrainField, ZoiGrid
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
-from live.measure.strain_guard import StrainGuard
+from live.measure.guards import StrainGuard
 from live.results import Strain
 
 SHAPE, TURN, STRAIN, NU = (160, 192), math.radians(3), 0.01, 0.3

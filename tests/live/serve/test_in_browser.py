@@ -220,7 +220,9 @@ def test_a_page_that_is_killed_changes_nothing(browser: Any, start: Callable[...
     assert page.page.get_attribute("html", "data-theme") == "dark"
     page.page.context.close()
     page = opened(browser, program, color_scheme="light")
-    page.until(lambda: page.stage() == "run" and any(map(str.isdigit, page.text("force"))), "another sees it too")
+    page.until(
+        lambda: page.stage() == "run" and any(map(str.isdigit, page.text("force"))), "another sees it too"
+    )
     assert page.page.get_attribute("html", "data-theme") == "light"
     page.page.keyboard.press("q")
     assert page.stage() == "run", "what ends the test is asked for twice"

@@ -7,7 +7,7 @@ import math
 
 from acquire.burst.accumulate import burst_of
 from acquire.events import Event
-from live.measure.smear_guard import SmearGuard
+from live.measure.guards import SmearGuard
 from tests.live.fakes import frame
 
 
