@@ -116,9 +116,12 @@ class Child:
 
 
 def _environment() -> dict[str, str]:
-    """Ours, with this very code in front; -P keeps the folder we were started in out of it."""
+    """Ours, with this very code in front; -P keeps the folder we were started in out of it.
+
+    Rerun's allocator is to give back at once what its server lets go: a tenth less memory in a long test.
+    """
     paths = [_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])]
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
+    return {"MIMALLOC_PURGE_DELAY": "0", **os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
 @contextlib.contextmanager

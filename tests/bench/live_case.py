@@ -16,6 +16,7 @@ import sys
 import tempfile
 import threading
 import time
+from array import array
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -41,11 +42,15 @@ class Watch(Consumer):
     blocks = False
 
     def __init__(self) -> None:
-        self.rows: list[tuple[float, ...]] = []
+        self._numbers = array("d")  # not a list of tuples: a soak looks at what grows
 
     def measurement(self, measurement: Measurement) -> None:
         i, b = measurement.instant, measurement.burst
-        self.rows.append((b.t, b.first_index, b.last_index, i.latency_s, i.measure_s, i.n_valid))
+        self._numbers.extend((b.t, b.first_index, b.last_index, i.latency_s, i.measure_s, i.n_valid))
+
+    def rows(self) -> np.ndarray:
+        """All so far, (N, 6)."""
+        return np.array(self._numbers).reshape(-1, 6)
 
 
 def skipped_share(rows: np.ndarray) -> float:
@@ -92,7 +97,7 @@ def run(case: argparse.Namespace, folder: Path) -> tuple[Outcome, np.ndarray]:
     watch = Watch()
     with attached(folder) if case.viewer else contextlib.nullcontext():
         outcome = run_live(config, Screen(quiet=not case.loud), consumers=[watch])
-    return outcome, np.array(watch.rows)
+    return outcome, watch.rows()
 
 
 @contextlib.contextmanager

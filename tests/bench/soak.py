@@ -111,7 +111,7 @@ def run(case: argparse.Namespace, folder: Path) -> tuple[dict[str, object], Curv
     outcome = run_live(config, Screen(quiet=True), consumers=[watch])
     ended.set()
     thread.join()
-    rows = np.array(watch.rows)
+    rows = watch.rows()
     early = rows[(rows[:, 0] > rows[0, 0] + 60) & (rows[:, 0] < rows[0, 0] + WARM_S), 3]
     late = rows[rows[:, 0] > rows[-1, 0] - WARM_S, 3]
     found = {

@@ -16,7 +16,7 @@ from live.view.exchange.messages import Where
 from live.view.exchange.setup import ViewSetup
 
 APPLICATION = "phasedic"
-SERVER_MIB = 128
+SERVER_MIB = 64
 """What a viewer that comes late can still be shown; beyond, the oldest pictures and maps go."""
 
 FINISHED_MIB = 768
@@ -37,6 +37,9 @@ class Rates:
     gather_s : float, s
         What is drawn of one thing in so long goes out together; rerun's memory grows with each parcel
         (of a file: for good).
+    parcel_bytes : int
+        What is drawn of one thing goes out when it comes to this much; large parcels leave holes in the memory,
+        which grew by as much as was written.
     limit_bytes : float
         When the pictures and maps drawn come to this much they stop; the curves go on.
     repeat_bytes : float
@@ -48,6 +51,7 @@ class Rates:
     map_hz: float
     row_hz: float = 10.0
     gather_s: float = 0.1
+    parcel_bytes: int = 2**20
     limit_bytes: float = math.inf
     repeat_bytes: float = math.inf
 
@@ -170,7 +174,11 @@ def write(setup: ViewSetup, where: Where) -> Place:
     path = Path(where.rrd or "")
     with path.open("xb"):  # rerun overwrites
         pass
-    rates = ALL if setup.finished else Rates(1.0, 2.0, 1.0, gather_s=5.0, limit_bytes=RRD_LIMIT_BYTES)
+    rates = (
+        ALL
+        if setup.finished
+        else Rates(1.0, 2.0, 1.0, gather_s=5.0, parcel_bytes=2**16, limit_bytes=RRD_LIMIT_BYTES)
+    )
     # Two streams of one name in a process would be one stream.
     return _place(rr.FileSink(str(path)), setup, f"{where.recording}-file", rates)
 
@@ -184,7 +192,7 @@ def _place(
 ) -> Place:
     import rerun as rr
 
-    parcels = rr.ChunkBatcherConfig(flush_tick=rates.gather_s)
+    parcels = rr.ChunkBatcherConfig(flush_tick=rates.gather_s, flush_num_bytes=rates.parcel_bytes)
     stream = rr.RecordingStream(APPLICATION, recording_id=recording, batcher_config=parcels)
     stream.set_sinks(sink)
     stream.send_recording_name(setup.title)

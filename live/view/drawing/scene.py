@@ -64,7 +64,7 @@ class Scene:
         self._places, self._setup = places, setup
         self._due: Sequence[Place] = places
         self._maps = FieldMaps(setup)
-        self._shown_spans: dict[str, object] = {}
+        self._drawn: dict[str, object] = {}
         self._curve: Thinned[Row] = Thinned(MAX_POINTS)
         self._drawn_curve = CurveDrawing(self._log_due, self._log, setup)
         self._arrows = ArrowScale()
@@ -75,6 +75,7 @@ class Scene:
         """All that does not change."""
         import rerun as rr
 
+        self._at(self._setup.start_monotonic)
         for name in MAPS:
             if name != "status":
                 self._bar(name)
@@ -185,16 +186,15 @@ class Scene:
         total, outlined = field.grid.n_active, len(sample_boxes(field.grid))
         some = f"{outlined} of {number(total)}" if outlined < total else f"all {total}"
         text = f"displacement ×{number(factor)} · {some} ZOIs outlined"
-        self._log_due(
-            "zoi/words", words([[0.5 * self._setup.width, -0.08 * bar_unit(self._setup)]], [text], CYAN)
-        )
+        if self._changed("words", text):
+            place = [[0.5 * self._setup.width, -0.08 * bar_unit(self._setup)]]
+            self._log("zoi/words", words(place, [text], CYAN))
         plain = field.status == Status.NO_PATTERN  # background, where nothing is to be lost
         for name, wanted, colour in (("plain", plain, DIM), ("rejected", ~plain & np.isnan(field.exx), RED)):
             dots = thinned(field.grid, wanted & field.grid.active)
-            self._log_due(
-                f"specimen/zoi/{name}",
-                rr.Points2D(dots, colors=colour, radii=rr.Radius.ui_points(1.5), draw_order=25),
-            )
+            if self._changed(name, dots.tobytes()):
+                points = rr.Points2D(dots, colors=colour, radii=rr.Radius.ui_points(1.5), draw_order=25)
+                self._log(f"specimen/zoi/{name}", points)
 
     def _draw_maps(self, field: StrainField, names: tuple[str, ...]) -> None:
         import rerun as rr
@@ -204,10 +204,15 @@ class Scene:
             picture = rr.EncodedImage(contents=data, media_type="image/png", draw_order=10)
             self._log_due(f"specimen/map/{name}", picture)
             self._count(data)
-            says = painted.span or painted.legend
-            if self._shown_spans.get(name) != says:
-                self._shown_spans[name] = says
+            if self._changed(f"bar/{name}", painted.span or painted.legend):
                 self._log(f"bar/{name}/ticks", self._ticks(painted))
+
+    def _changed(self, what: str, says: object) -> bool:
+        """Whether it is to be drawn anew: a server's memory grows with each thing drawn."""
+        if self._drawn.get(what) == says:
+            return False
+        self._drawn[what] = says
+        return True
 
     def _values(self, field: StrainField) -> None:
         """A dot in each ZOI that tells its values where a person clicks."""
@@ -277,7 +282,7 @@ class Scene:
                 rows = [(row[0], *row[2 * k + 1 : 2 * k + 3]) for row in self._strains.items()]
                 place.send(f"strain/{name}", rows, _columns)
         if forgetting:
-            self._shown_spans = {}
+            self._drawn = {}
             self._drawn_curve.forget()
 
     # -- words --------------------------------------------------------------------------------
@@ -307,7 +312,9 @@ class Scene:
         """The status card."""
         import rerun as rr
 
-        self._log("status", rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN), static=True)
+        # What is static a server keeps for ever, each of them.
+        card = rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN)
+        self._log("status", card, static=self._setup.finished)
 
     # -- rerun --------------------------------------------------------------------------------
 
