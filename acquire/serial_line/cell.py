@@ -31,6 +31,7 @@ log = logging.getLogger(__name__)
 BLOCK = 2048  # bytes of one round
 REST_S = 0.05  # between two rounds at most
 AWAY_S, AWAY_BYTES, AWAY_BLOCK = 0.05, 1 << 22, 1 << 16  # what is thrown away at a time
+AWAY_PAUSE_S, FULL_BYTES = 0.002, 2048  # of a buffer of the system that was full, about
 ANSWER_S = 1.0  # that an answer may take from its first byte to its last
 TARE_S = 0.3  # that a device may take to tare
 FORCED, UNDO = "force", "undo"
@@ -126,14 +127,16 @@ class SerialCell(Closing):
 
     def _throw_away(self) -> int:
         """Let go what waits, as far as it goes in a moment; the number of bytes."""
-        until, count, empty = self._clock() + AWAY_S, 0, False
-        while not empty and count < AWAY_BYTES and self._clock() < until and not self._stop.is_set():
+        until, count, nothing = self._clock() + AWAY_S, 0, 0
+        while nothing < 2 and count < AWAY_BYTES and self._clock() < until and not self._stop.is_set():
             data = self._link.receive(AWAY_BLOCK, wait=False)
-            count, empty = count + len(data), not data
+            count, nothing = count + len(data), 0 if data else nothing + 1
+            if nothing == 1 and count >= FULL_BYTES:  # it had 64 kB more behind, which take a moment to come
+                self._sleep(AWAY_PAUSE_S)
         if count:
             self._times.received(count, self._clock())
         self._parser.restart(count)
-        self._flood.skip(empty, self._clock())
+        self._flood.skip(nothing > 0, self._clock())
         return count
 
     def _begin_anew(self) -> None:
@@ -227,6 +230,8 @@ class SerialCell(Closing):
         if not readings:
             return []
         times = [self._times.began(reading.start) for reading in readings]
+        stamps = [(r.device_ms, t) for r, t in zip(readings, times, strict=True) if r.device_ms is not None]
+        self._device.begin(stamps)
         if self._flood.late(self._last_read) or self._last_read < self._taring_until:
             self._pace.restart()
             late = [True] * len(times)

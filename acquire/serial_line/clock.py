@@ -88,6 +88,12 @@ class DeviceClock:
         self._count, self._square = 0, 0.0
         self.jumps = 0
 
+    def begin(self, messages: Sequence[tuple[float, float]]) -> None:
+        """Tie to the least delayed of the first ``messages`` (ms, s): they may have waited together."""
+        if messages and math.isnan(self._offset):
+            offset, arrived = min((arrived - device_ms * 1e-3, arrived) for device_ms, arrived in messages)
+            self._tie(offset, arrived)
+
     def stamp(self, device_ms: float, arrived: float) -> DeviceTime:
         """The stamp of a message.
 
@@ -120,7 +126,7 @@ class DeviceClock:
 
     def _tie(self, offset: float, arrived: float) -> None:
         self._offset = self._first_offset = offset
-        self._first_t = arrived
+        self._first_t = self._last_t = arrived
         self._other_offset = self._late_since = math.nan
 
     def _fits(self, offset: float, device_ms: float, arrived: float) -> bool:
