@@ -27,21 +27,21 @@ MOST_FRAMES = 65536  # a sum of so many 16-bit samples still fits into 32 bits
 
 
 @cache
-def compile_loops() -> None:
-    """Have the compiled loops ready (once a process), so that no frame is lost to a compiler later."""
+def compile_loops(kinds: tuple[str, ...] = ("uint8", "uint16")) -> None:
+    """Have the loops ready for frames of these types (once a process), so that none is lost to a compiler later."""
     from acquire.burst.accumulate_loops import GROUP, fold, scratch
     from acquire.burst.smear_loops import tile_sums
 
     if not (fold.stats.cache_path and any(Path(fold.stats.cache_path).glob("smear_loops.tile_sums-*.nbi"))):
-        log.info("compiling the burst loops, once on this machine; this takes some ten seconds")
+        log.info("compiling the burst loops, once on this machine; this takes some seconds")
     mean, clipped, total = np.empty(9, np.float32), np.empty(9, np.bool_), np.empty(9, np.uint32)
-    for dtype in (np.uint8, np.uint16):
-        image = frozen(np.zeros((3, 3), dtype))
+    for kind in kinds:
+        image = frozen(np.zeros((3, 3), kind))
         fold(
             (image.reshape(-1),) * GROUP,
             1,
             image.reshape(-1),
-            *scratch(dtype),
+            *scratch(kind),
             total,
             mean,
             clipped,
@@ -86,7 +86,6 @@ class BurstAccumulator:
     ) -> None:
         if not 1 <= n <= MOST_FRAMES:
             raise ConfigError(f"a burst of {n} frames is not possible; allowed: 1 to {MOST_FRAMES}")
-        compile_loops()
         self._n, self._not_before, self._shorten_above_px = n, not_before, shorten_above_px
         self.length = n
         self._times: list[float] = []
@@ -172,6 +171,7 @@ class _Sums:
     """The running sums of one burst. Frames are kept, not copied, until a group can be folded."""
 
     def __init__(self, like: Frame) -> None:
+        compile_loops((like.image.dtype.name,))
         self._like = like
         self.mean = np.empty(like.image.shape, np.float32)
         self.clipped = np.empty(like.image.shape, np.bool_)

@@ -19,8 +19,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic average``: a dark frame (lens covered) or a flat frame (evenly lit)."""
-    from acquire.burst import average_bursts, save_mean
+    from acquire.burst import average_bursts, compile_loops, save_mean
     from acquire.errors import DataError
+    from live.measure import kinds_of
     from live.setup import open_rig
 
     screen = Screen()
@@ -28,6 +29,7 @@ def command(arguments: argparse.Namespace) -> int:
     crop = tuple(given) if given else None
     rig = open_rig(arguments.camera, "none:", lambda event: screen.say(event.text), crop=crop)
     try:
+        compile_loops(kinds_of(rig.camera.info)[:1])
         with rig.camera:
             burst = next(average_bursts(rig.camera, arguments.frames), None)
     finally:
