@@ -33,7 +33,7 @@ class Rates:
     Attributes
     ----------
     picture_hz, map_hz, row_hz : float, 1/s
-        Pictures, maps; and how often what came of means and loads (all of it) is drawn.
+        Pictures, maps; and how often what came of means and loads (all of it) is drawn, a parcel each time.
     gather_s : float, s
         What is drawn of one thing in so long goes out together; rerun's memory grows with each parcel
         (of a file: for good).
@@ -82,7 +82,7 @@ class Place:
             "picture": rates.picture_hz,
             "map": rates.map_hz,
             "more": rates.map_hz / 4,
-            "figures": min(4.0, rates.row_hz),
+            "figures": min(4.0, 5 * rates.row_hz),
             "rows": rates.row_hz,
         }
         self._last_t = dict.fromkeys(self._hz, -math.inf)
@@ -177,7 +177,7 @@ def write(setup: ViewSetup, where: Where) -> Place:
     rates = (
         ALL
         if setup.finished
-        else Rates(1.0, 2.0, 1.0, gather_s=5.0, parcel_bytes=2**16, limit_bytes=RRD_LIMIT_BYTES)
+        else Rates(1.0, 2.0, 0.2, gather_s=5.0, parcel_bytes=2**16, limit_bytes=RRD_LIMIT_BYTES)
     )
     # Two streams of one name in a process would be one stream.
     return _place(rr.FileSink(str(path)), setup, f"{where.recording}-file", rates)

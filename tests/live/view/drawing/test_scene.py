@@ -70,7 +70,7 @@ STATIC = 1
 
 def test_every_mean_is_drawn_and_pictures_and_maps_as_often_as_asked(tmp_path: Path) -> None:
     fast, slow = tmp_path / "fast.rrd", tmp_path / "slow.rrd"
-    places = {fast: Rates(5.0, 10.0), slow: Rates(1.0, 2.0, 1.0)}
+    places = {fast: Rates(5.0, 10.0), slow: Rates(1.0, 2.0, 0.2)}
     with scene_into(places, make_setup(area_m2=4e-5)) as (scene, _):
         draw_a_test(scene)
     for path, pictures, maps in ((fast, 15, 30), (slow, 3, 6)):
