@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import socket
 import time
+from abc import ABC, abstractmethod
 from typing import Any
 
 from acquire.errors import DeviceError, PhasedicError
@@ -23,7 +24,7 @@ AGAIN_S = 1.0
 """A serial port that was lost is opened again so often."""
 
 
-class StrainOut(Consumer):
+class StrainOut(Consumer, ABC):
     """One way out; ``send`` takes a line without its end."""
 
     policy = Policy.NEWEST
@@ -42,9 +43,9 @@ class StrainOut(Consumer):
         if event.kind is EventKind.ALARM and event.data.get("line"):
             self.send(str(event.data["line"]))
 
+    @abstractmethod
     def send(self, line: str) -> None:
         """Send a line."""
-        raise NotImplementedError
 
 
 class TcpOut(StrainOut):
