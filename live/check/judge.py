@@ -11,6 +11,7 @@ import numpy as np
 from analysis.quality import Steadiness, aliased, mains_of
 from live.check.advice import advice
 from live.check.figures import Figures, median
+from live.check.shots import FEWEST
 
 MOST_SATURATED, MOST_DARK, MOST_PILED = 1e-4, 0.01, 1e-3
 LEAST_LIGHT, MOST_LIGHT = 0.3, 0.95  # of full scale, 99th percentile
@@ -54,6 +55,7 @@ def judge(figures: Figures, target: float | None = None, most_shift_px: float = 
         Drift that is accepted.
     """
     return [
+        *_few(figures),
         Line("region", figures.region.words),
         *_camera(figures),
         *_light(figures),
@@ -63,6 +65,16 @@ def judge(figures: Figures, target: float | None = None, most_shift_px: float = 
         _floor(figures, target),
         *_gauges(figures),
     ]
+
+
+def _few(f: Figures) -> Iterator[Line]:
+    if f.shots.few:
+        told = f"{len(f.shots)}, too few for what changes in time; the pattern is that of the first"
+        yield Line("pictures", told)
+
+
+def _unsaid(f: Figures) -> str:
+    return f"not told by {f.shots.said}: it takes {FEWEST} of the still specimen"
 
 
 def _camera(f: Figures) -> Iterator[Line]:
@@ -103,10 +115,17 @@ def _light(f: Figures) -> Iterator[Line]:
     if e.piled > MOST_PILED:
         yield Line("clipped below the top", f"{e.piled:.1%} at one highest level", False,
                    "saturated before the end of the scale: less light, or say the true depth (bits=...)")  # fmt: skip
-    yield _flicker(f)
+    yield Line("flicker", _unsaid(f)) if f.shots.few else _flicker(f)
     full = 2**f.shots.camera.bits - 1
     shown = f"{f.noise:.2f} GL of one frame, {f.noise / full:.2%} of full scale"
-    yield Line("noise", shown, f.noise > 0, "every frame is the same: is this a live picture?")
+    if f.shots.few:
+        yield Line("noise", f"{shown}, {_noise_from(f)}; how it changes in time is {_unsaid(f)}")
+    else:
+        yield Line("noise", shown, f.noise > 0, "every frame is the same: is this a live picture?")
+
+
+def _noise_from(f: Figures) -> str:
+    return "as stated" if f.noise_stated else "as the spectrum of the picture has it"
 
 
 def _flicker(f: Figures) -> Line:
@@ -176,6 +195,10 @@ def _sssig(f: Figures) -> Line:
 
 def _motion(f: Figures, most_px: float) -> Iterator[Line]:
     s = f.still
+    if f.shots.few:
+        yield Line("drift", _unsaid(f))
+        yield Line("vibration", _unsaid(f))
+        return
     if not math.isfinite(s.drift_px):
         yield Line("drift", "not measured", f.zois.without_pattern < 1, "nothing can be followed")
         return
@@ -214,7 +237,9 @@ def _floor(f: Figures, target: float | None) -> Line:
         return Line(what, f"not measured: too few ZOIs of {f.zoi} px", False, words)
     known = typical if noise is None else noise.known
     told = f"{known * 1e6:.0f} um/m predicted"
-    if noise is not None:
+    if f.shots.few:
+        told += f" from the noise {_noise_from(f)}"
+    elif noise is not None:
         told = f"{noise.known * 1e6:.0f} um/m measured, {noise.predicted * 1e6:.0f} predicted"
     value = f"{told} (one ZOI of {f.zoi} px, burst of {f.burst})"
     if noise is not None and noise.measured > HONEST * noise.predicted:
