@@ -17,7 +17,7 @@ from live.check.ground import Bench, Ground
 from live.check.predicted import GaugeNoise, Predicted, predicted
 from live.check.shots import Shots
 from live.check.stillness import Stillness, light, stillness
-from live.setup import DEFAULT_BURST, Config, correction
+from live.setup import Config, correction
 from live.specimen import Region, region_of
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def examine(
     bench = Bench.of(shots, Ground.of(sought(shots, config), config, shots.camera))
     m = config.measure
     sizes, orders, bursts = (SIZES, ORDERS, BURSTS) if table else ((), (), ())
-    wanted = (*sizes, m.zoi), (*orders, m.order), (*bursts, m.burst or DEFAULT_BURST)
+    wanted = (*sizes, m.zoi), (*orders, m.order), (*bursts, bench.burst)
     return figures_of(bench, Measured.of(bench), noise_floors(bench, *wanted), load)
 
 
@@ -186,7 +186,7 @@ def figures_of(
         floors=floors,
         zoi=m.zoi,
         order=m.order,
-        burst=m.burst or DEFAULT_BURST,
+        burst=bench.burst,
         noise_stated=m.noise_GL is not None,
         removed=None if same else float((bench.picture.mean - bench.raw)[ground.inside].std()),
         gauges=measured.predicted.gauges,

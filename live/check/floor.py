@@ -83,7 +83,7 @@ def noise_floors(
     """The table, by size and order."""
     lengths = sorted(set(bursts))
     bench_bursts = {n: list(_bursts(bench, n)) for n in lengths}
-    reference = bench.burst(0, bench.half)
+    reference = bench.mean(0, bench.half)
     return tuple(
         _floor(bench, size, order, reference, bench_bursts)
         for size in sorted(set(sizes))
@@ -95,12 +95,12 @@ def noise_floors(
 def _bursts(bench: Bench, n: int) -> Iterator[Burst]:
     """Bursts of n frames from the second half, from its whole length; of too few frames the first alone."""
     if bench.shots.few:
-        yield from [bench.burst(0, 1)] if n == 1 else []
+        yield from [bench.mean(0, 1)] if n == 1 else []
         return
     room = len(bench.shots) - bench.half
     count = min(room // n, MOST_BURSTS)
     for k in range(count):
-        yield bench.burst(bench.half + k * (room // count), n)
+        yield bench.mean(bench.half + k * (room // count), n)
 
 
 def _floor(bench: Bench, size: int, order: int, reference: Burst, bursts: dict[int, list[Burst]]) -> Floor:

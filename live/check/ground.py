@@ -12,7 +12,7 @@ from acquire.frame import Burst, CameraInfo
 from analysis.picture import noise_of_picture
 from live.check.shots import Shots, temporal_noise
 from live.measure import Correction
-from live.setup import DEFAULT_REFERENCE_BURST, Config, correction, kernel_settings
+from live.setup import DEFAULT_BURST, DEFAULT_REFERENCE_BURST, Config, correction, kernel_settings
 from live.specimen import Region
 
 if TYPE_CHECKING:
@@ -83,8 +83,8 @@ class Bench:
         Some at the ZOIs in every frame.
     noise : float, GL
         Of one frame: as stated, as it changes in time, or of too few frames from the spectrum of the picture.
-    reference : int
-        Frames of the reference of the test.
+    reference, burst : int
+        Frames in each of the test; one where nothing is given and the pictures are few.
     """
 
     shots: Shots
@@ -95,6 +95,7 @@ class Bench:
     pixels: NDArray[Any]
     noise: float
     reference: int
+    burst: int
 
     @classmethod
     def of(cls, shots: Shots, ground: Ground) -> Bench:
@@ -106,22 +107,23 @@ class Bench:
             noise = m.noise_GL
         else:
             noise = noise_of_picture(picture.mean) if shots.few else temporal_noise(pixels)
-        reference = m.reference_burst or DEFAULT_REFERENCE_BURST
-        return cls(shots, ground, kernel_settings(ground.config), picture, raw.mean, pixels, noise, reference)
+        reference = m.reference_burst or (1 if shots.few else DEFAULT_REFERENCE_BURST)
+        burst, settings = m.burst or (1 if shots.few else DEFAULT_BURST), kernel_settings(ground.config)
+        return cls(shots, ground, settings, picture, raw.mean, pixels, noise, reference, burst)
 
     @property
     def half(self) -> int:
         """Frames of the reference here."""
         return 1 if self.shots.few else len(self.shots) // 2
 
-    def burst(self, first: int, count: int) -> Burst:
+    def mean(self, first: int, count: int) -> Burst:
         """A corrected burst, cut to the region."""
         return self.ground.correct(self.shots.cut(*self.ground.cut).mean(first, count))
 
     def halves(self) -> tuple[Burst, Burst]:
         """The reference here and what is measured against it; of too few frames the first and itself."""
-        first = self.burst(0, self.half)
-        return first, first if self.shots.few else self.burst(self.half, self.half)
+        first = self.mean(0, self.half)
+        return first, first if self.shots.few else self.mean(self.half, self.half)
 
 
 def around(inside: Bools) -> Cut:

@@ -29,16 +29,21 @@ WITHOUT_TARGET = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One figure of the check, whether it is good enough, and what to do where it is not."""
+    """One figure of the check, whether it is good enough, and what to do where it is not.
+
+    What is not ``told`` by the pictures there are is neither good nor bad.
+    """
 
     what: str
     value: str
     good: bool = True
     advice: str = ""
+    told: bool = True
 
     def text(self) -> str:
         """The line for a person."""
-        return f"{'ok  ' if self.good else 'LOOK'}  {self.what:<22} {self.value}" + (
+        mark = "ok  " if self.told else "?   "
+        return f"{mark if self.good else 'LOOK'}  {self.what:<22} {self.value}" + (
             "" if self.good or not self.advice else f"\n      -> {self.advice}"
         )
 
@@ -73,8 +78,8 @@ def _few(f: Figures) -> Iterator[Line]:
         yield Line("pictures", told)
 
 
-def _unsaid(f: Figures) -> str:
-    return f"not told by {f.shots.said}: it takes {FEWEST} of the still specimen"
+def _untold(f: Figures, what: str) -> Line:
+    return Line(what, f"not told by {f.shots.said}: it takes {FEWEST} of the still specimen", told=False)
 
 
 def _camera(f: Figures) -> Iterator[Line]:
@@ -115,11 +120,12 @@ def _light(f: Figures) -> Iterator[Line]:
     if e.piled > MOST_PILED:
         yield Line("clipped below the top", f"{e.piled:.1%} at one highest level", False,
                    "saturated before the end of the scale: less light, or say the true depth (bits=...)")  # fmt: skip
-    yield Line("flicker", _unsaid(f)) if f.shots.few else _flicker(f)
+    yield _untold(f, "flicker") if f.shots.few else _flicker(f)
     full = 2**f.shots.camera.bits - 1
     shown = f"{f.noise:.2f} GL of one frame, {f.noise / full:.2%} of full scale"
     if f.shots.few:
-        yield Line("noise", f"{shown}, {_noise_from(f)}; how it changes in time is {_unsaid(f)}")
+        yield Line("noise", f"{shown}, {_noise_from(f)}")
+        yield _untold(f, "noise in time")
     else:
         yield Line("noise", shown, f.noise > 0, "every frame is the same: is this a live picture?")
 
@@ -151,7 +157,8 @@ def _pattern(f: Figures) -> Iterator[Line]:
                "more light, a longer exposure, or a pattern of blacker black and whiter white")  # fmt: skip
     low, high = RADIUS_PX
     words = "finer speckle or a wider field of view" if f.radius > high else "coarser speckle, or focus"
-    yield Line("speckle radius", f"{f.radius:.2f} px (best from 1.5 to 4)", low <= f.radius <= high, words)
+    radius = f"{f.radius:.2f} px" if math.isfinite(f.radius) else "none is seen"
+    yield Line("speckle radius", f"{radius} (best from 1.5 to 4)", low <= f.radius <= high, words)
     yield _sharpness(f)
     yield _sssig(f)
     share, n = z.without_pattern, z.grid.n_active
@@ -174,7 +181,7 @@ def _sharpness(f: Figures) -> Line:
     of = {name: m for name, side in sides.items() if math.isfinite(m := median(side))}
     value = f"{f.sharpness:.3f} 1/px"
     if not of:
-        return Line("sharpness", value)
+        return Line("sharpness", "no pattern is seen", False, "spray a pattern, set focus and exposure")
     softest, sharpest = min(of, key=lambda k: of[k]), max(of, key=lambda k: of[k])
     even = of[softest] >= LEAST_SHARP * of[sharpest]
     text = f"{value}, {softest} {of[softest]:.3f}, {sharpest} {of[sharpest]:.3f}"
@@ -185,7 +192,7 @@ def _sharpness(f: Figures) -> Line:
 
 def _sssig(f: Figures) -> Line:
     known = f.zois.sssig[np.isfinite(f.zois.sssig)]
-    if not known.size:
+    if not known.any():
         return Line("SSSIG of a ZOI", "none", False, "spray a pattern")
     weak = float(np.percentile(known, 5))
     px = math.sqrt(2) * f.noise / math.sqrt(max(weak, 1e-9))
@@ -196,8 +203,7 @@ def _sssig(f: Figures) -> Line:
 def _motion(f: Figures, most_px: float) -> Iterator[Line]:
     s = f.still
     if f.shots.few:
-        yield Line("drift", _unsaid(f))
-        yield Line("vibration", _unsaid(f))
+        yield from (_untold(f, what) for what in ("drift", "vibration"))
         return
     if not math.isfinite(s.drift_px):
         yield Line("drift", "not measured", f.zois.without_pattern < 1, "nothing can be followed")

@@ -14,7 +14,7 @@ from acquire.errors import DataError
 from analysis.field import StrainField
 from live.check.ground import Bench
 from live.measure import averaged, prepare
-from live.setup import DEFAULT_BURST, gauges_for
+from live.setup import gauges_for
 from live.specimen import with_auto_gauges
 
 if TYPE_CHECKING:
@@ -50,11 +50,11 @@ class Predicted:
 
 def predicted(bench: Bench) -> Predicted:
     """Predict it."""
-    grid, burst = bench.ground.grid, bench.ground.config.measure.burst or DEFAULT_BURST
+    grid = bench.ground.grid
     field = _half_on_half(bench)
     if field is None:
         return Predicted(np.full(grid.shape, np.nan), ())
-    factor = math.sqrt((1 / bench.reference + 1 / burst) / (2 / bench.half))
+    factor = math.sqrt((1 / bench.reference + 1 / bench.burst) / (2 / bench.half))
     both = np.sqrt((field.sigma_exx**2 + field.sigma_eyy**2) / 2)
     sigma = np.where(field.ok, factor * both, np.nan)
     return Predicted(sigma, tuple(_gauges(bench.ground.config, replace(field, grid=grid), factor)))

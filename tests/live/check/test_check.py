@@ -79,10 +79,13 @@ def test_a_few_pictures_are_judged_by_what_they_tell(
     assert main(["check", *stated, "--noise", f"{whole.noise:.3f}"]) == 0
     said = capsys.readouterr().out
     assert f"pictures               {count}, too few" in said
-    for what in ("flicker", "drift", "vibration"):
-        assert re.search(rf"ok +{what} +not told by {count} picture.*: it takes 8", said), what
+    for what in ("noise in time", "flicker", "drift", "vibration"):
+        assert re.search(rf"\? +{what} +not told by {count} picture.*: it takes 8", said), what
     assert "predicted from the noise as stated" in said
     assert said.rstrip().splitlines()[-1].startswith(f"GO, as far as {count} picture")
+    assert "reference of 16" in said
+    assert main(["check", *stated[:4]]) in (0, 6)
+    assert "reference of 1\n" in capsys.readouterr().out
     known = {**config_values(tmp_path), "measure.noise_GL": whole.noise}
     few = examine(take(load_config(None, known)), load_config(None, known))
     assert few.radius == pytest.approx(whole.radius, rel=0.03)
@@ -96,6 +99,20 @@ def test_a_few_pictures_are_judged_by_what_they_tell(
     # Without a stated noise the spectrum of the picture tells it.
     spectral = examine(take(load_config(None, config_values(tmp_path))), config)
     assert spectral.noise == pytest.approx(whole.noise, rel=0.2)
+
+
+def test_a_black_picture(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """No figure is made up where there is nothing to see."""
+    cv2.imwrite(str(tmp_path / "a.png"), np.zeros((200, 300), np.uint8))
+    assert main(["check", "--camera", f"files:{tmp_path}", "--zoi", "32"]) == 6
+    said = capsys.readouterr().out
+    assert "nan" not in said
+    for what in (
+        "speckle radius         none is seen",
+        "sharpness              no pattern",
+        "SSSIG of a ZOI         none",
+    ):
+        assert f"LOOK  {what}" in said
 
 
 def config_values(folder: Path) -> dict[str, object]:
