@@ -131,7 +131,8 @@ class Measured:
     @classmethod
     def of(cls, bench: Bench) -> Measured:
         """Ask it for everything."""
-        return cls(predicted(bench), stillness(bench))
+        noise = predicted(bench)
+        return cls(noise, stillness(bench, noise.able))
 
 
 def examine(

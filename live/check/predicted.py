@@ -47,6 +47,11 @@ class Predicted:
     sigma: Floats
     gauges: tuple[GaugeNoise, ...]
 
+    @property
+    def able(self) -> NDArray[np.bool_]:
+        """(R, C): which ZOIs can be measured."""
+        return np.isfinite(self.sigma)
+
 
 def predicted(bench: Bench) -> Predicted:
     """Predict it."""

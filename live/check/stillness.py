@@ -57,13 +57,20 @@ class Stillness:
         return max((self.exx, self.eyy), key=lambda s: s.vibration)
 
 
-def stillness(bench: Bench) -> Stillness:
-    """Each frame against the mean of the first few, over some dozens of ZOIs about the middle of the region.
+def stillness(bench: Bench, able: NDArray[np.bool_]) -> Stillness:
+    """Each frame against the mean of the first few, over some dozens of ZOIs about the middle of all that are able.
 
-    Without any pattern, and for too few frames, all motion is NaN.
+    Parameters
+    ----------
+    bench : Bench
+    able : (R, C) bool
+        ZOIs with a pattern. Without any, and for too few frames, all motion is NaN.
     """
     times = bench.shots.times
-    fields = [] if bench.shots.few else _fields(bench)
+    able = able & bench.ground.grid.active
+    fields = (
+        _fields(bench, bench.ground.grid.subset(active=able)) if able.any() and not bench.shots.few else []
+    )
 
     def series(name: str) -> Steadiness:
         pairs = [field.mean(name) for field in fields] or [(math.nan, math.nan)] * len(times)
@@ -84,10 +91,9 @@ def light(bench: Bench) -> Steadiness:
     return steadiness(bench.shots.times, levels / mean, noise)
 
 
-def _fields(bench: Bench) -> list[StrainField]:
+def _fields(bench: Bench, grid: ZoiGrid) -> list[StrainField]:
     """Of every frame, on no more of the picture than is needed."""
-    ground = bench.ground
-    middle = _middle(ground.grid)
+    ground, middle = bench.ground, _middle(grid)
     cut = around(_covered(middle, ground.at_zois.shape))
     correct = correction(ground.config, ground.camera, cut)
     shots, grid = bench.shots.cut(*cut), moved(middle, cut)

@@ -152,7 +152,7 @@ class Watch:
             return Measured.of(bench)
         if turn % TURNS == 3:
             return replace(before, predicted=predicted(bench))
-        return replace(before, still=stillness(bench)) if turn % TURNS == 6 else before
+        return replace(before, still=stillness(bench, before.predicted.able)) if turn % TURNS == 6 else before
 
 
 def _alike(one: Region, other: Region, ground: Ground) -> bool:
