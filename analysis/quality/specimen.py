@@ -10,6 +10,7 @@ into is left out, and of several speckled places the largest is the specimen.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,7 @@ NARROWEST = 32.0  # px: what is narrower takes no ZOI
 SPECKLES = 3.0  # radii: std of the window that judges
 WINDOW = (5.0, 24.0)  # px
 SMALLEST_SHARE = 0.005  # of the picture
+SLOW_PX = 20.0  # std of what is taken for light and background, for the contrast
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,6 +76,7 @@ def find_specimen(image: ArrayLike, noise: float | None = None) -> Specimen | No
     picture = np.asarray(image, np.float32)
     sigma = max(noise_of_picture(picture) if noise is None else noise, QUANTISATION)
     gradient = _Gradient.of(picture, sigma)
+    spread = _Spread.of(picture, gradient, sigma)
     window, cap, radius, core = WINDOW[0] + 1, math.inf, 2.0, None
     for _ in range(3):
         quality = gradient.quality(window, cap)
@@ -82,7 +85,7 @@ def find_specimen(image: ArrayLike, noise: float | None = None) -> Specimen | No
             return None
         inner = _inner(core, window)
         cap = CAP * math.sqrt(2 * float(np.median(quality[inner])))
-        radius = _speckle_radius(picture, gradient, sigma, inner)
+        radius = spread.radius(inner)
         window = float(np.clip(SPECKLES * radius, *WINDOW))
     assert core is not None
     for _ in range(2):
@@ -94,10 +97,11 @@ def find_specimen(image: ArrayLike, noise: float | None = None) -> Specimen | No
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Gradient:
-    """Slightly smoothed gradients of a picture, and the variance that its noise gives them."""
+    """Products of the gradients of a picture, slightly smoothed, and the variance that its noise gives them."""
 
-    x: NDArray[np.float32]
-    y: NDArray[np.float32]
+    xx: NDArray[np.float32]
+    yy: NDArray[np.float32]
+    xy: NDArray[np.float32]
     variance: float
 
     @classmethod
@@ -105,28 +109,66 @@ class _Gradient:
         from scipy.ndimage import gaussian_filter
 
         x, y = (gaussian_filter(picture, 1.0, order=order, mode="nearest") for order in ((0, 1), (1, 0)))
-        return cls(x, y, sigma**2 / (8 * math.pi))
+        return cls(x * x, y * y, x * y, sigma**2 / (8 * math.pi))
 
     def quality(self, window: float, cap: float) -> Cells:
         """Smaller eigenvalue of the structure tensor in a Gaussian of std ``window`` px, GL^2/px^2."""
-        gx, gy = self.x, self.y
-        if math.isfinite(cap):
-            factor = np.minimum(np.float32(1), np.float32(cap) / np.maximum(np.hypot(gx, gy), 1e-9))
-            gx, gy = gx * factor, gy * factor
-        xx, yy, xy = (_blurred(_cells(product), window) for product in (gx * gx, gy * gy, gx * gy))
+        xx, yy, xy = (_blurred(cells, window) for cells in self._capped(cap))
         smaller = (xx + yy) / 2 - np.hypot((xx - yy) / 2, xy)
         return np.asarray(smaller - self.variance, np.float32)
 
+    def _capped(self, cap: float) -> Iterator[Cells]:
+        """The products, none of a gradient larger than ``cap``."""
+        if not math.isfinite(cap):
+            yield from (_means(product) for product in (self.xx, self.yy, self.xy))
+            return
+        share = self.xx + self.yy
+        np.maximum(share, np.float32(1e-18), out=share)
+        np.divide(np.float32(cap**2), share, out=share)
+        np.minimum(share, np.float32(1), out=share)
+        room = np.empty_like(share)
+        for product in (self.xx, self.yy, self.xy):
+            yield _means(np.multiply(product, share, out=room))
+
     def power(self) -> Cells:
         """Mean square of one component, the noise taken out, GL^2/px^2."""
-        return np.asarray(_cells(self.x**2 + self.y**2) / 2 - self.variance, np.float32)
+        return np.asarray((_means(self.xx) + _means(self.yy)) / 2 - self.variance, np.float32)
 
 
-def _cells(values: NDArray[np.float32]) -> Cells:
-    """Means over cells; what is left over at the right and below is left out."""
-    rows, columns = values.shape[0] // CELL, values.shape[1] // CELL
-    whole = values[: rows * CELL, : columns * CELL].reshape(rows, CELL, columns, CELL)
-    return np.asarray(whole.mean(axis=(1, 3)), np.float32)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Spread:
+    """Contrast of a picture and power of its gradient, both squared and about each cell."""
+
+    contrast: Cells
+    power: Cells
+    noise: float
+
+    @classmethod
+    def of(cls, picture: NDArray[np.float32], gradient: _Gradient, sigma: float) -> _Spread:
+        zero = picture - picture.mean(dtype=np.float64).astype(np.float32)
+        level, square = _means(zero), _means(zero * zero)
+        slow = _blurred(level, SLOW_PX)
+        contrast = square - 2 * slow * level + slow**2
+        return cls(_blurred(contrast, WINDOW[0]), _blurred(gradient.power(), WINDOW[0]), sigma**2)
+
+    def radius(self, inner: Bools) -> float:
+        """r from contrast over gradient: a blob of radius r has C^2 = 2 r^2 g^2, smoothed 1 px beforehand."""
+        contrast, power = (float(np.median(values[inner])) for values in (self.contrast, self.power))
+        ratio = (contrast - self.noise) / max(power, 1e-9)
+        return math.sqrt(max(ratio / 2 - 0.5, 0.5))
+
+
+def _means(values: NDArray[np.float32]) -> Cells:
+    """Over cells; what is left over at the right and below is left out."""
+    rows, columns = (n // CELL * CELL for n in values.shape)
+    sums = values[:rows:CELL, :columns].copy()
+    for k in range(1, CELL):
+        sums += values[k:rows:CELL, :columns]
+    cells = sums[:, ::CELL].copy()
+    for k in range(1, CELL):
+        cells += sums[:, k::CELL]
+    cells *= np.float32(CELL**-2)
+    return cells
 
 
 def _blurred(cells: NDArray[np.float32], px: float) -> Cells:
@@ -150,17 +192,6 @@ def _inner(piece: Bools, px: float) -> Bools:
 
     inner = np.asarray(distance_transform_edt(piece) > px / CELL)
     return inner if inner.any() else piece
-
-
-def _speckle_radius(picture: NDArray[np.float32], gradient: _Gradient, sigma: float, inner: Bools) -> float:
-    """r from contrast over gradient: a blob of radius r has C^2 = 2 r^2 g^2, smoothed 1 px beforehand."""
-    from scipy.ndimage import gaussian_filter
-
-    slow = gaussian_filter(picture, 4 * WINDOW[0], mode="nearest")
-    contrast = _blurred(_cells((picture - slow) ** 2), WINDOW[0])
-    power = _blurred(gradient.power(), WINDOW[0])
-    ratio = (float(np.median(contrast[inner])) - sigma**2) / max(float(np.median(power[inner])), 1e-9)
-    return math.sqrt(max(ratio / 2 - 0.5, 0.5))
 
 
 def _outlined(quality: Cells, core: Bools, variance: float, window: float) -> Bools | None:

@@ -3,38 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.errors import DataError
 from acquire.load_cell.check import LoadReport
-from analysis.picture import autocorrelation_fwhm, sssig
-from analysis.quality import Depth, Exposure, depth, exposure
-from live.check.floor import BURSTS, ORDERS, SIZES, Bench, Floor, noise_floors
+from analysis.quality import Depth, Exposure, depth, exposure, speckle_radius, zoi_pattern
+from live.check.floor import BURSTS, ORDERS, SIZES, Floor, noise_floors
+from live.check.ground import Bench, Ground
+from live.check.predicted import GaugeNoise, Predicted, predicted
 from live.check.shots import Shots
-from live.check.stillness import Stillness, stillness
-from live.measure import averaged, prepare
-from live.setup import (
-    DEFAULT_BURST,
-    DEFAULT_REFERENCE_BURST,
-    Config,
-    correction,
-    gauges_for,
-    kernel_settings,
-)
-from live.specimen import Region, region_of, with_auto_gauges
+from live.check.stillness import Stillness, light, stillness
+from live.setup import Config, correction
+from live.specimen import Region, region_of
 
 if TYPE_CHECKING:
-    from analysis import StrainField, ZoiGrid
+    from analysis import ZoiGrid
 
 Floats = NDArray[np.float64]
-
-FWHM_OF_RADIUS = 4 * math.sqrt(math.log(2))
-PIXELS_LOOKED_AT = 200_000  # of each frame, for light and bits
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,15 +57,6 @@ class Zois:
         return 1 - float(np.isfinite(self.sigma[active]).mean()) if active.any() else 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class GaugeNoise:
-    """Predicted strain noise of a gauge for one burst of the test; NaN with the reason."""
-
-    name: str
-    sigma: float
-    reason: str = ""
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Figures:
     """What a check has found.
@@ -86,7 +66,7 @@ class Figures:
     region : Region
     shots : Shots
     noise : float, GL
-        Of one frame, in the region.
+        Of one frame, at the ZOIs.
     exposure : Exposure
     depth : Depth
     radius : float, px
@@ -96,6 +76,8 @@ class Figures:
     floors : tuple of Floor
     zoi, order, burst : int
         Of the test.
+    noise_stated : bool
+        Whether it was given; from too few frames it comes from the spectrum of the picture otherwise.
     removed : float or None, GL
         Standard deviation of what dark and flat frame took out; None without them.
     gauges : tuple of GaugeNoise
@@ -116,6 +98,7 @@ class Figures:
     zoi: int
     order: int
     burst: int
+    noise_stated: bool = False
     removed: float | None = None
     gauges: tuple[GaugeNoise, ...] = ()
     load: LoadReport | None = None
@@ -138,12 +121,25 @@ class Figures:
         return median(self.zois.sharpness)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """What the kernel has to be asked for: the slower part of the figures."""
+
+    predicted: Predicted
+    still: Stillness
+
+    @classmethod
+    def of(cls, bench: Bench) -> Measured:
+        """Ask it for everything."""
+        noise = predicted(bench)
+        return cls(noise, stillness(bench, noise.able))
+
+
 def examine(
     shots: Shots,
     config: Config,
     load: LoadReport | None = None,
     table: bool = True,
-    region: Region | None = None,
 ) -> Figures:
     """Judge frames of a still specimen.
 
@@ -154,47 +150,49 @@ def examine(
     load : LoadReport, optional
     table : bool
         Whether all ZOIs, orders and bursts of the table are tried, or those of the test alone.
-    region : Region, optional
-        Where it is known already; then no noise is measured either, only predicted: for a glance.
 
     Raises
     ------
     ConfigError, DataError
         Region, mask, dark or flat do not fit.
     """
-    m, camera = config.measure, shots.camera
-    correct = correction(config, camera)
-    raw = shots.mean()
-    whole = correct(raw)
-    glance = region is not None
-    region = region or region_of(config, whole.mean, averaged(shots.noise() or None, len(shots)))
-    inside = region.inside(camera.width, camera.height, m.zoi)
-    grid = region.grid(config, camera.width, camera.height)
-    at_zois = _inner_halves(grid, inside)
-    noise = m.noise_GL if m.noise_GL is not None else shots.noise(at_zois)
-    reference, burst = m.reference_burst or DEFAULT_REFERENCE_BURST, m.burst or DEFAULT_BURST
-    bench = Bench(shots, inside, at_zois, kernel_settings(config), noise, reference, correct)
-    pixels = _pixels(shots, at_zois)
-    field = _half_on_half(bench, grid)
-    factor = math.sqrt((1 / reference + 1 / burst) / (2 / bench.half))
+    bench = Bench.of(shots, Ground.of(sought(shots, config), config, shots.camera))
+    m = config.measure
     sizes, orders, bursts = (SIZES, ORDERS, BURSTS) if table else ((), (), ())
+    wanted = (*sizes, m.zoi), (*orders, m.order), (*bursts, bench.burst)
+    return figures_of(bench, Measured.of(bench), noise_floors(bench, *wanted), load)
+
+
+def sought(shots: Shots, config: Config) -> Region:
+    """The region of a test, looked for in the mean of the frames, or in the first of too few."""
+    picture = correction(config, shots.camera)(shots.mean(0, 1 if shots.few else None))
+    return region_of(config, picture.mean, shots.noise())
+
+
+def figures_of(
+    bench: Bench, measured: Measured, floors: tuple[Floor, ...] = (), load: LoadReport | None = None
+) -> Figures:
+    """All figures: those that are read off the frames, beside what was measured with the kernel."""
+    ground, m, bits = bench.ground, bench.ground.config.measure, bench.shots.camera.bits
+    same = bench.picture.mean is bench.raw
     return Figures(
-        region=region,
-        shots=shots,
-        noise=noise,
-        exposure=exposure(pixels, camera.bits),
-        depth=depth(pixels, camera.bits),
-        radius=_radius(whole.mean, noise, len(shots), at_zois),
-        zois=_zois(bench, grid, whole.mean, _sigma(field, grid, factor)),
-        still=_still(bench, grid),
-        floors=() if glance else noise_floors(bench, (*sizes, m.zoi), (*orders, m.order), (*bursts, burst)),
+        region=ground.region,
+        shots=bench.shots,
+        noise=bench.noise,
+        exposure=exposure(bench.pixels, bits),
+        depth=depth(bench.pixels, bits),
+        radius=_radius(bench),
+        zois=_zois(bench, measured.predicted.sigma),
+        still=replace(measured.still, light=light(bench)),
+        floors=floors,
         zoi=m.zoi,
         order=m.order,
-        burst=burst,
-        removed=None if whole is raw else float((whole.mean - raw.mean)[inside].std()),
-        gauges=tuple(_gauges(config, grid, field, factor)),
+        burst=bench.burst,
+        noise_stated=m.noise_GL is not None,
+        removed=None if same else float((bench.picture.mean - bench.raw)[ground.inside].std()),
+        gauges=measured.predicted.gauges,
         load=load,
-        px_per_mm=config.scale.px_per_mm,
+        px_per_mm=ground.config.scale.px_per_mm,
     )
 
 
@@ -218,93 +216,23 @@ def median(values: Floats) -> float:
     return float(np.median(known)) if known.size else math.nan
 
 
-def _inner_halves(grid: ZoiGrid, inside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(H, W) bool: the middle of each active ZOI, half as wide; the region where there is none."""
-    found = np.zeros(inside.shape, bool)
-    half, quarter = grid.size // 2, grid.size // 4
-    for row, column in np.argwhere(grid.active):
-        top, left = grid.first_y[row] + quarter, grid.first_x[column] + quarter
-        found[top : top + half, left : left + half] = True
-    return found if found.any() else inside
-
-
-def _pixels(shots: Shots, inside: NDArray[np.bool_]) -> NDArray[Any]:
-    """Some of the pixels of the region in every frame, (N, P)."""
-    index = np.flatnonzero(inside)
-    index = index[:: max(1, len(index) // PIXELS_LOOKED_AT)]
-    return np.asarray(shots.frames.reshape(len(shots), -1)[:, index])
-
-
-def _radius(picture: NDArray[Any], noise: float, n: int, inside: NDArray[np.bool_]) -> float:
-    rows, columns = np.flatnonzero(inside.any(axis=1)), np.flatnonzero(inside.any(axis=0))
+def _radius(bench: Bench) -> float:
+    at_zois = bench.ground.at_zois[bench.ground.cut]
+    rows, columns = np.flatnonzero(at_zois.any(axis=1)), np.flatnonzero(at_zois.any(axis=0))
+    if not rows.size:
+        return math.nan
     cut = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-    return autocorrelation_fwhm(picture[cut], noise / math.sqrt(n), inside[cut]) / FWHM_OF_RADIUS
+    noise = bench.noise / math.sqrt(bench.picture.n)
+    return speckle_radius(bench.picture.mean[cut], noise, at_zois[cut])
 
 
-def _zois(bench: Bench, grid: ZoiGrid, picture: NDArray[Any], sigma: Floats) -> Zois:
+def _zois(bench: Bench, sigma: Floats) -> Zois:
     """Pattern of each ZOI, and what the kernel makes of it."""
-    noise = bench.noise / math.sqrt(len(bench.shots))
-    along_x, along_y = sssig(picture, grid, noise)
-    pixels = grid.size**2
-    variance = np.maximum(_variance(picture, grid) - noise**2, 0)
+    grid = bench.ground.zois
+    found = zoi_pattern(bench.picture.mean, grid, bench.noise / math.sqrt(bench.picture.n))
     with np.errstate(invalid="ignore", divide="ignore"):
-        sharpness = np.sqrt((along_x + along_y) / (2 * pixels) / variance)
-    off = ~grid.active
-    contrast, weaker = np.sqrt(variance), np.minimum(along_x, along_y)
+        sharpness = np.sqrt((found.along_x + found.along_y) / (2 * grid.size**2) / found.variance)
+    contrast, weaker = np.sqrt(found.variance), np.minimum(found.along_x, found.along_y)
     for values in (contrast, weaker, sharpness):
-        values[off] = np.nan
-    return Zois(grid, sigma, contrast, weaker, sharpness)
-
-
-def _variance(picture: NDArray[Any], grid: ZoiGrid) -> Floats:
-    """Of the grey levels in each ZOI, (R, C), GL^2."""
-    zero = picture.astype(np.float64) - float(picture.mean())
-    mean, square = (_box_means(values, grid) for values in (zero, zero**2))
-    return np.asarray(square - mean**2)
-
-
-def _box_means(values: Floats, grid: ZoiGrid) -> Floats:
-    total = np.pad(values, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
-    top, left, size = grid.first_y[:, None], grid.first_x[None, :], grid.size
-    corners = total[top + size, left + size] - total[top, left + size] - total[top + size, left]
-    return np.asarray((corners + total[top, left]) / size**2)
-
-
-def _half_on_half(bench: Bench, grid: ZoiGrid) -> StrainField | None:
-    """The second half of the frames against the first; None where there is no pattern."""
-    first, second = (bench.correct(bench.shots.mean(k, bench.half)) for k in (0, bench.half))
-    try:
-        kernel, _ = prepare(first, grid, bench.settings, bench.noise)
-    except DataError:
-        return None
-    return kernel.measure(second.mean, noise=averaged(bench.noise, bench.half))
-
-
-def _sigma(field: StrainField | None, grid: ZoiGrid, factor: float) -> Floats:
-    """Predicted strain noise of each ZOI, exx and eyy in the mean, for a burst of the test."""
-    if field is None:
-        return np.full(grid.shape, np.nan)
-    both = np.sqrt((field.sigma_exx**2 + field.sigma_eyy**2) / 2)
-    return np.where(field.ok, factor * both, np.nan)
-
-
-def _gauges(config: Config, grid: ZoiGrid, field: StrainField | None, factor: float) -> Iterator[GaugeNoise]:
-    from analysis.evaluate import measure_gauge
-
-    if field is None or not field.n_valid:
-        return
-    along = "exx" if config.specimen.first_axis == "x" else "eyy"
-    yield GaugeNoise("", factor * field.mean(along)[1])
-    for gauge in gauges_for(with_auto_gauges(config, grid), grid):
-        value = measure_gauge(gauge, field)
-        yield GaugeNoise(gauge.name, factor * value.sigma, value.reason)
-
-
-def _still(bench: Bench, grid: ZoiGrid) -> Stillness:
-    """On the cut picture, where frame after frame is measured."""
-    from analysis import Roi, ZoiGrid
-
-    rows, columns = bench.cut
-    roi = grid.roi
-    moved = Roi(roi.x - columns.start, roi.y - rows.start, roi.width, roi.height)
-    return stillness(bench, ZoiGrid(moved, grid.size, grid.step, grid.active))
+        values[~grid.active] = np.nan
+    return Zois(bench.ground.grid, sigma, contrast, weaker, sharpness)

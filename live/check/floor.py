@@ -2,6 +2,7 @@
 
 One half of the frames is the reference, as in the test; bursts from the other half are measured against
 it. What comes out is noise: the scatter over ZOIs is *measured*, the kernel's own uncertainty *predicted*.
+From too few frames it is predicted alone.
 """
 
 from __future__ import annotations
@@ -17,15 +18,14 @@ from numpy.typing import NDArray
 from acquire.errors import DataError
 from acquire.frame import Burst
 from analysis.quality import gauge_length, l10_displacement, l10_strain
-from live.check.shots import Shots
-from live.measure import Correction, averaged, prepare, unchanged
+from live.check.ground import Bench
+from live.measure import averaged, prepare
 
 if TYPE_CHECKING:
-    from analysis import KernelSettings, PhaseKernel, StrainField, ZoiGrid
+    from analysis import PhaseKernel, StrainField, ZoiGrid
 
 SIZES, ORDERS, BURSTS = (32, 48, 64, 96), (1, 2), (1, 2, 4, 8, 16)
 MOST_BURSTS, MOST_ZOIS, FEWEST_ZOIS = 4, 200, 3
-MARGIN = 24  # px around the region: a spline reaches so far
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,52 +74,6 @@ class Floor:
         return next((noise for noise in self.noises if noise.burst == burst), None)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Bench:
-    """What is measured, cut to the region, and how.
-
-    Attributes
-    ----------
-    shots : Shots
-    inside : (H, W) bool
-        The region.
-    at_zois : (H, W) bool
-        The inner halves of its ZOIs: where light and noise are judged.
-    settings : KernelSettings
-    noise : float, GL
-        Of one frame.
-    reference : int
-        Frames of the reference of the test.
-    correct : callable
-    """
-
-    shots: Shots
-    inside: NDArray[np.bool_]
-    at_zois: NDArray[np.bool_]
-    settings: KernelSettings
-    noise: float
-    reference: int
-    correct: Correction = unchanged
-
-    @property
-    def half(self) -> int:
-        """Frames of the reference here."""
-        return len(self.shots) // 2
-
-    def burst(self, first: int, count: int) -> Burst:
-        """A corrected burst, cut to the region."""
-        burst = self.correct(self.shots.mean(first, count))
-        rows, columns = self.cut
-        return replace(burst, mean=burst.mean[rows, columns], clipped=burst.clipped[rows, columns])
-
-    @property
-    def cut(self) -> tuple[slice, slice]:
-        """Rows and columns of the region with a margin."""
-        spans = (np.flatnonzero(self.inside.any(axis=axis)) for axis in (1, 0))
-        rows, columns = (slice(max(int(s[0]) - MARGIN, 0), int(s[-1]) + 1 + MARGIN) for s in spans)
-        return rows, columns
-
-
 def noise_floors(
     bench: Bench,
     sizes: Sequence[int] = SIZES,
@@ -129,7 +83,7 @@ def noise_floors(
     """The table, by size and order."""
     lengths = sorted(set(bursts))
     bench_bursts = {n: list(_bursts(bench, n)) for n in lengths}
-    reference = bench.burst(0, bench.half)
+    reference = bench.mean(0, bench.half)
     return tuple(
         _floor(bench, size, order, reference, bench_bursts)
         for size in sorted(set(sizes))
@@ -139,11 +93,14 @@ def noise_floors(
 
 
 def _bursts(bench: Bench, n: int) -> Iterator[Burst]:
-    """Bursts of n frames from the second half, from its whole length."""
+    """Bursts of n frames from the second half, from its whole length; of too few frames the first alone."""
+    if bench.shots.few:
+        yield from [bench.mean(0, 1)] if n == 1 else []
+        return
     room = len(bench.shots) - bench.half
     count = min(room // n, MOST_BURSTS)
     for k in range(count):
-        yield bench.burst(bench.half + k * (room // count), n)
+        yield bench.mean(bench.half + k * (room // count), n)
 
 
 def _floor(bench: Bench, size: int, order: int, reference: Burst, bursts: dict[int, list[Burst]]) -> Floor:
@@ -177,8 +134,7 @@ def _grid(bench: Bench, size: int) -> ZoiGrid | None:
     """ZOIs all over the region, half overlapping at most, not more than are needed."""
     from analysis import Roi, ZoiGrid
 
-    rows, columns = bench.cut
-    inside = bench.inside[rows, columns]
+    inside = bench.ground.inside
     y, x = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
     roi = Roi(int(x[0]), int(y[0]), int(x[-1] - x[0]) + 1, int(y[-1] - y[0]) + 1)
     if min(roi.width, roi.height) < size:
@@ -192,13 +148,15 @@ def _grid(bench: Bench, size: int) -> ZoiGrid | None:
 
 
 def _noise(fields: list[StrainField], n: int, bench: Bench) -> Noise:
-    """Predicted and measured, brought to the reference of the test."""
+    """Predicted and, from frames enough, measured; brought to the reference of the test."""
     useful = [field for field in fields if field.n_valid >= FEWEST_ZOIS]
     if not useful:
         return Noise(n, math.nan, math.nan)
     scale = math.sqrt(_share(bench.reference, n) / _share(bench.half, n))
     predicted = _rms([field.sigma(name)[field.ok] for field in useful for name in ("exx", "eyy")])
-    measured = math.sqrt(float(np.mean([_scatter(f, name) for f in useful for name in ("exx", "eyy")])))
+    measured = math.nan
+    if not bench.shots.few:
+        measured = math.sqrt(float(np.mean([_scatter(f, name) for f in useful for name in ("exx", "eyy")])))
     return Noise(n, scale * predicted, scale * measured)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from analysis.quality import Steadiness, aliased, mains_of
 from live.check.advice import advice
 from live.check.figures import Figures, median
+from live.check.shots import FEWEST
 
 MOST_SATURATED, MOST_DARK, MOST_PILED = 1e-4, 0.01, 1e-3
 LEAST_LIGHT, MOST_LIGHT = 0.3, 0.95  # of full scale, 99th percentile
@@ -28,16 +29,21 @@ WITHOUT_TARGET = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """One figure of the check, whether it is good enough, and what to do where it is not."""
+    """One figure of the check, whether it is good enough, and what to do where it is not.
+
+    What is not ``told`` by the pictures there are is neither good nor bad.
+    """
 
     what: str
     value: str
     good: bool = True
     advice: str = ""
+    told: bool = True
 
     def text(self) -> str:
         """The line for a person."""
-        return f"{'ok  ' if self.good else 'LOOK'}  {self.what:<22} {self.value}" + (
+        mark = "ok  " if self.told else "?   "
+        return f"{mark if self.good else 'LOOK'}  {self.what:<22} {self.value}" + (
             "" if self.good or not self.advice else f"\n      -> {self.advice}"
         )
 
@@ -54,6 +60,7 @@ def judge(figures: Figures, target: float | None = None, most_shift_px: float = 
         Drift that is accepted.
     """
     return [
+        *_few(figures),
         Line("region", figures.region.words),
         *_camera(figures),
         *_light(figures),
@@ -63,6 +70,16 @@ def judge(figures: Figures, target: float | None = None, most_shift_px: float = 
         _floor(figures, target),
         *_gauges(figures),
     ]
+
+
+def _few(f: Figures) -> Iterator[Line]:
+    if f.shots.few:
+        told = f"{len(f.shots)}, too few for what changes in time; the pattern is that of the first"
+        yield Line("pictures", told)
+
+
+def _untold(f: Figures, what: str) -> Line:
+    return Line(what, f"not told by {f.shots.said}: it takes {FEWEST} of the still specimen", told=False)
 
 
 def _camera(f: Figures) -> Iterator[Line]:
@@ -103,10 +120,18 @@ def _light(f: Figures) -> Iterator[Line]:
     if e.piled > MOST_PILED:
         yield Line("clipped below the top", f"{e.piled:.1%} at one highest level", False,
                    "saturated before the end of the scale: less light, or say the true depth (bits=...)")  # fmt: skip
-    yield _flicker(f)
+    yield _untold(f, "flicker") if f.shots.few else _flicker(f)
     full = 2**f.shots.camera.bits - 1
     shown = f"{f.noise:.2f} GL of one frame, {f.noise / full:.2%} of full scale"
-    yield Line("noise", shown, f.noise > 0, "every frame is the same: is this a live picture?")
+    if f.shots.few:
+        yield Line("noise", f"{shown}, {_noise_from(f)}")
+        yield _untold(f, "noise in time")
+    else:
+        yield Line("noise", shown, f.noise > 0, "every frame is the same: is this a live picture?")
+
+
+def _noise_from(f: Figures) -> str:
+    return "as stated" if f.noise_stated else "as the spectrum of the picture has it"
 
 
 def _flicker(f: Figures) -> Line:
@@ -132,7 +157,8 @@ def _pattern(f: Figures) -> Iterator[Line]:
                "more light, a longer exposure, or a pattern of blacker black and whiter white")  # fmt: skip
     low, high = RADIUS_PX
     words = "finer speckle or a wider field of view" if f.radius > high else "coarser speckle, or focus"
-    yield Line("speckle radius", f"{f.radius:.2f} px (best from 1.5 to 4)", low <= f.radius <= high, words)
+    radius = f"{f.radius:.2f} px" if math.isfinite(f.radius) else "none is seen"
+    yield Line("speckle radius", f"{radius} (best from 1.5 to 4)", low <= f.radius <= high, words)
     yield _sharpness(f)
     yield _sssig(f)
     share, n = z.without_pattern, z.grid.n_active
@@ -155,7 +181,7 @@ def _sharpness(f: Figures) -> Line:
     of = {name: m for name, side in sides.items() if math.isfinite(m := median(side))}
     value = f"{f.sharpness:.3f} 1/px"
     if not of:
-        return Line("sharpness", value)
+        return Line("sharpness", "no pattern is seen", False, "spray a pattern, set focus and exposure")
     softest, sharpest = min(of, key=lambda k: of[k]), max(of, key=lambda k: of[k])
     even = of[softest] >= LEAST_SHARP * of[sharpest]
     text = f"{value}, {softest} {of[softest]:.3f}, {sharpest} {of[sharpest]:.3f}"
@@ -166,7 +192,7 @@ def _sharpness(f: Figures) -> Line:
 
 def _sssig(f: Figures) -> Line:
     known = f.zois.sssig[np.isfinite(f.zois.sssig)]
-    if not known.size:
+    if not known.any():
         return Line("SSSIG of a ZOI", "none", False, "spray a pattern")
     weak = float(np.percentile(known, 5))
     px = math.sqrt(2) * f.noise / math.sqrt(max(weak, 1e-9))
@@ -176,6 +202,9 @@ def _sssig(f: Figures) -> Line:
 
 def _motion(f: Figures, most_px: float) -> Iterator[Line]:
     s = f.still
+    if f.shots.few:
+        yield from (_untold(f, what) for what in ("drift", "vibration"))
+        return
     if not math.isfinite(s.drift_px):
         yield Line("drift", "not measured", f.zois.without_pattern < 1, "nothing can be followed")
         return
@@ -214,7 +243,9 @@ def _floor(f: Figures, target: float | None) -> Line:
         return Line(what, f"not measured: too few ZOIs of {f.zoi} px", False, words)
     known = typical if noise is None else noise.known
     told = f"{known * 1e6:.0f} um/m predicted"
-    if noise is not None:
+    if f.shots.few:
+        told += f" from the noise {_noise_from(f)}"
+    elif noise is not None:
         told = f"{noise.known * 1e6:.0f} um/m measured, {noise.predicted * 1e6:.0f} predicted"
     value = f"{told} (one ZOI of {f.zoi} px, burst of {f.burst})"
     if noise is not None and noise.measured > HONEST * noise.predicted:

@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquire.errors import DataError
+from analysis.field import Roi, StrainField
 from analysis.quality import Steadiness, steadiness
-from live.check.floor import Bench
+from live.check.ground import Bench, around, moved
 from live.measure import averaged, prepare
+from live.setup import correction
 
 if TYPE_CHECKING:
-    from analysis import StrainField, ZoiGrid
+    from analysis import ZoiGrid
 
 FIRST = 4  # frames averaged as what motion is measured against
 MOST_ZOIS = 64
@@ -54,13 +57,20 @@ class Stillness:
         return max((self.exx, self.eyy), key=lambda s: s.vibration)
 
 
-def stillness(bench: Bench, grid: ZoiGrid) -> Stillness:
-    """Each frame against the mean of the first few, over at most some dozens of the ZOIs of ``grid``.
+def stillness(bench: Bench, able: NDArray[np.bool_]) -> Stillness:
+    """Each frame against the mean of the first few, over some dozens of ZOIs about the middle of all that are able.
 
-    ``grid`` is laid on the cut picture. Without any pattern all motion is NaN.
+    Parameters
+    ----------
+    bench : Bench
+    able : (R, C) bool
+        ZOIs with a pattern. Without any, and for too few frames, all motion is NaN.
     """
-    fields = _fields(bench, _thinned(grid))
     times = bench.shots.times
+    able = able & bench.ground.grid.active
+    fields = (
+        _fields(bench, bench.ground.grid.subset(active=able)) if able.any() and not bench.shots.few else []
+    )
 
     def series(name: str) -> Steadiness:
         pairs = [field.mean(name) for field in fields] or [(math.nan, math.nan)] * len(times)
@@ -75,26 +85,50 @@ def stillness(bench: Bench, grid: ZoiGrid) -> Stillness:
 
 def light(bench: Bench) -> Steadiness:
     """The mean grey level at the ZOIs in each frame, relative."""
-    levels = np.array([frame[bench.at_zois].mean(dtype=np.float64) for frame in bench.shots.frames])
+    levels = bench.pixels.mean(axis=1, dtype=np.float64)
     mean = max(float(levels.mean()), 1e-9)
-    noise = bench.noise / math.sqrt(max(int(bench.at_zois.sum()), 1)) / mean
+    noise = bench.noise / math.sqrt(bench.pixels.shape[1]) / mean
     return steadiness(bench.shots.times, levels / mean, noise)
 
 
 def _fields(bench: Bench, grid: ZoiGrid) -> list[StrainField]:
+    """Of every frame, on no more of the picture than is needed."""
+    ground, middle = bench.ground, _middle(grid)
+    cut = around(_covered(middle, ground.at_zois.shape))
+    correct = correction(ground.config, ground.camera, cut)
+    shots, grid = bench.shots.cut(*cut), moved(middle, cut)
     try:
-        kernel, _ = prepare(bench.burst(0, FIRST), grid, bench.settings, bench.noise)
+        kernel, _ = prepare(correct(shots.mean(0, FIRST)), grid, bench.settings, bench.noise)
     except DataError:
         return []
-    fields: list[StrainField] = []
-    for k in range(len(bench.shots)):
-        before = fields[-1] if fields else None
-        frame = bench.burst(k, 1)
-        fields.append(kernel.measure(frame.mean, start=before, noise=averaged(bench.noise, 1)))
-    return fields
+    fields = [StrainField.from_values(grid, {})]
+    for k in range(len(shots)):
+        frame = correct(shots.mean(k, 1))
+        fields.append(kernel.measure(frame.mean, start=fields[-1], noise=averaged(bench.noise, 1)))
+    return fields[1:]
 
 
-def _thinned(grid: ZoiGrid) -> ZoiGrid:
-    every = max(1, math.ceil(math.sqrt(grid.n_active / MOST_ZOIS)))
-    thin = grid.subset(every=every)
-    return thin if thin.n_active else grid
+def _middle(grid: ZoiGrid) -> ZoiGrid:
+    """ZOIs side by side rather than one over the other, the nearest to the middle of all; a grid of these alone."""
+    spread = math.ceil(math.sqrt(grid.n_active / MOST_ZOIS))
+    thin = grid.subset(every=max(1, min(spread, math.ceil(grid.size / grid.step))))
+    thin = thin if thin.n_active else grid
+    places = np.argwhere(thin.active)
+    far = np.hypot(*(places - places.mean(axis=0)).T)
+    near = places[np.argsort(far, kind="stable")[:MOST_ZOIS]]
+    active = np.zeros(grid.shape, bool)
+    active[near[:, 0], near[:, 1]] = True
+    (top, left), (bottom, right) = near.min(axis=0), near.max(axis=0)
+    x, y = int(grid.first_x[left]), int(grid.first_y[top])
+    width, height = (int(n) * grid.step + grid.size for n in (right - left, bottom - top))
+    part = active[top : bottom + 1, left : right + 1]
+    return replace(grid, roi=Roi(x, y, width, height), active=part)
+
+
+def _covered(grid: ZoiGrid, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+    """(H, W) bool: the pixels of its ZOIs."""
+    found = np.zeros(shape, bool)
+    for row, column in np.argwhere(grid.active):
+        top, left = grid.first_y[row], grid.first_x[column]
+        found[top : top + grid.size, left : left + grid.size] = True
+    return found

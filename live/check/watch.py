@@ -5,30 +5,32 @@ from __future__ import annotations
 import math
 import threading
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
-import numpy as np
-
 from acquire.camera import Camera
-from acquire.errors import DataError
 from acquire.frame import Frame
-from live.check.figures import Figures, examine
-from live.check.shots import FEWEST, Shots
-from live.measure import averaged
+from live.check.figures import Figures, Measured, examine, figures_of, sought
+from live.check.ground import Bench, Ground
+from live.check.predicted import predicted
+from live.check.shots import FEWEST, Shots, taken
+from live.check.stillness import stillness
 from live.setup import Config
-from live.specimen import Region, region_of
+from live.specimen import Region
 
 GLANCE = 8  # frames
-SEARCH_EVERY = 10
-"""The specimen is looked for anew at every tenth glance, and at each while none is found."""
+TURNS = 8
+"""Glances after which noise and motion are predicted and followed anew; searched, while nothing is found."""
+SEARCH_EVERY = 16
+"""Glances after which the specimen that was found is looked for anew."""
+RIM = 0.02  # of a region: where it is found a little otherwise, the old one stays
 
 
 class Rolling:
     """The newest frames of a camera, drained by a thread of its own from ``start`` to ``stop``."""
 
-    def __init__(self, camera: Camera, length: int) -> None:
-        self._camera = camera
+    def __init__(self, camera: Camera, length: int, address: str) -> None:
+        self._camera, self._address = camera, address
         self._frames: deque[Frame] = deque(maxlen=max(length, FEWEST))
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._drain, name="check", daemon=True)
@@ -57,15 +59,22 @@ class Rolling:
         PhasedicError
             Whatever ended the camera.
         """
+        frames = self._newest(count)
+        return None if len(frames) < FEWEST else self._shots(frames)
+
+    def last(self, count: int) -> Shots:
+        """The same of a camera that has ended, however few of pictures; DataError where it gave too few."""
+        return self._shots(self._newest(count))
+
+    def _newest(self, count: int) -> list[Frame]:
         if self._failed is not None:
             raise self._failed
         with self._lock:
-            frames = list(self._frames)[-count:]
-        if len(frames) < FEWEST:
-            return None
+            return list(self._frames)[-count:]
+
+    def _shots(self, frames: list[Frame]) -> Shots:
         lost = sum(frame.lost_before for frame in frames[1:])
-        times = np.array([frame.t for frame in frames])
-        return Shots(np.stack([frame.image for frame in frames]), times, lost, self._camera.info)
+        return taken(frames, self._camera.info, lost, self._address)
 
     def frame(self) -> Frame | None:
         """The newest one."""
@@ -97,29 +106,57 @@ class Glance:
 
 
 class Watch:
-    """Judges one set of frames after the other, and holds the peak of the sharpness."""
+    """Judges one set of frames after the other, and holds the peak of the sharpness.
+
+    What is read off the frames (light, contrast, sharpness, radius, flicker) is new at every glance. What
+    takes the kernel takes turns, and so does the search for the specimen: at most one of them at a glance.
+    """
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        self._region: Region | None = None
+        self._ground: Ground | None = None
+        self._measured: Measured | None = None
         self._peak = 0.0
         self._glances = 0
 
     def glance(self, shots: Shots) -> Glance:
         """The figures without the noises that take long; raises as ``examine``."""
-        if self._region is None or not self._region.found or self._glances % SEARCH_EVERY == 0:
-            noise = averaged(shots.noise() or None, len(shots))
-            self._region = region_of(self._config, shots.mean().mean, noise)
+        turn = self._glances
         self._glances += 1
-        figures = examine(shots, self._config, table=False, region=self._region)
+        ground = self._ground_at(shots, turn)
+        bench = Bench.of(shots, ground)
+        self._measured = measured = self._renewed(bench, turn)
+        figures = figures_of(bench, measured)
         if math.isfinite(figures.sharpness):
             self._peak = max(self._peak, figures.sharpness)
         return Glance(figures, self._peak)
 
-    def last(self, shots: Shots | None) -> Figures:
-        """All figures with the table; raises DataError where there were too few frames."""
-        if shots is None:
-            raise DataError(
-                f"{self._config.camera.address}: gave fewer than {FEWEST} whole frames; look at the camera"
-            )
+    def last(self, shots: Shots) -> Figures:
+        """All figures with the table."""
         return examine(shots, self._config)
+
+    def _ground_at(self, shots: Shots, turn: int) -> Ground:
+        """Laid anew where the specimen is found elsewhere; its rim alone is never quite the same."""
+        now = self._ground
+        due = SEARCH_EVERY if now is not None and now.region.found else TURNS
+        if now is None or turn % due == 0:
+            region = sought(shots, self._config)
+            if now is None or not _alike(region, now.region, now):
+                now = Ground.of(region, self._config, shots.camera)
+                self._ground, self._measured = now, None
+        return now
+
+    def _renewed(self, bench: Bench, turn: int) -> Measured:
+        before = self._measured
+        if before is None:
+            return Measured.of(bench)
+        if turn % TURNS == 3:
+            return replace(before, predicted=predicted(bench))
+        return replace(before, still=stillness(bench, before.predicted.able)) if turn % TURNS == 6 else before
+
+
+def _alike(one: Region, other: Region, ground: Ground) -> bool:
+    """Whether both are the same place, but for a rim."""
+    size = ground.camera.width, ground.camera.height, ground.config.measure.zoi
+    first, second = (region.inside(*size) for region in (one, other))
+    return one.found == other.found and bool((first ^ second).sum() <= RIM * (first | second).sum())

@@ -63,8 +63,17 @@ def command(arguments: argparse.Namespace) -> int:
     for line in [*(line.text() for line in lines), "", *table_lines(figures)]:
         screen.say(line)
     ready = all(line.good for line in lines)
-    screen.say("GO: ready" if ready else "NO-GO: not ready, see what to look at above")
+    screen.say(_verdict(figures, ready))
     return 0 if ready else NOT_READY
+
+
+def _verdict(figures: Figures, ready: bool) -> str:
+    if not ready:
+        return "NO-GO: not ready, see what to look at above"
+    if figures.shots.few:
+        told = "noise in time, flicker, drift and vibration are not judged"
+        return f"GO, as far as {figures.shots.said} can tell: {told}"
+    return "GO: ready"
 
 
 def _drawn(figures: Figures, config: Config, target: float | None) -> NDArray[np.uint8]:

@@ -42,7 +42,7 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
     watch, show, notes = Watch(config), Display(screen), list[str]()
     rig = open_rig(config.camera.address, "none:", troubles(notes.append), crop=config.camera.crop)
     try:
-        with Rolling(rig.camera, frames) as rolling, _viewed(config, notes) as view:
+        with Rolling(rig.camera, frames, config.camera.address) as rolling, _viewed(config, notes) as view:
             due = time.monotonic()
             while not (stopped() or rolling.over):
                 shots = rolling.newest(GLANCE)
@@ -52,10 +52,10 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
                     told = [*notes[-MOST_NOTES:], peak_line(glance), *(line.text() for line in lines)]
                     show.lines(told, short(glance, lines))
                     view(rolling, glance, lines)
-                due = max(due + EVERY_S, time.monotonic())
+                due = max(due + EVERY_S, time.monotonic() - EVERY_S)  # one that took longer is made up for
                 while not (stopped() or rolling.over) and time.monotonic() < due:
                     time.sleep(0.02)
-            last = rolling.newest(frames)
+            last = rolling.last(frames)
     finally:
         rig.close()
     show.end()

@@ -7,7 +7,7 @@ import contextlib
 import os
 import select
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any, TextIO
 
 from live.operate.keys import HELP, Keys
@@ -28,11 +28,11 @@ class Keyboard:
         self._orders, self._stream, self._screen = orders, stream, screen
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._work, name="keyboard", daemon=True)
-        self._mode = _single_keys(stream)
+        self._terminal = _Terminal.of(stream)
 
     def start(self) -> None:
         """Begin; says which keys there are."""
-        self._screen.say(HELP if self._mode else LINES)
+        self._screen.say(HELP if self._terminal else LINES)
         self._thread.start()
 
     def join(self, seconds: float) -> None:
@@ -42,32 +42,34 @@ class Keyboard:
     def close(self) -> None:
         """Listen no more; the terminal is again as it was."""
         self._closed.set()
-        if self._mode is not None:
+        if self._terminal is not None:
             self._thread.join(2 * _LOOK_S)
-            self._mode()
+            self._terminal.put_back()
 
     def _work(self) -> None:
         with contextlib.suppress(OSError, ValueError):
-            if self._mode is None:
+            if self._terminal is None:
                 self._take_lines()
             else:
-                self._take_keys()
+                self._take_keys(self._terminal)
 
     def _take_lines(self) -> None:
         for text in self._stream:
             if text.strip() and (said := answer(text, self._orders)) != "ok":
                 self._screen.say(said)
 
-    def _take_keys(self) -> None:
+    def _take_keys(self, terminal: _Terminal) -> None:
         keys = Keys(self._orders, self._screen)
-        for text in self._typed(self._stream.fileno()):
+        for text in self._typed(terminal):
             keys.type(text)
 
-    def _typed(self, number: int) -> Iterator[str]:
+    def _typed(self, terminal: _Terminal) -> Iterator[str]:
         decoder = codecs.getincrementaldecoder("utf-8")("replace")
         while not self._closed.is_set():
-            if select.select([number], [], [], _LOOK_S)[0]:
-                data = os.read(number, 256)
+            if not terminal.single():
+                self._closed.wait(_LOOK_S)  # what is typed is for somebody else
+            elif select.select([terminal.number], [], [], _LOOK_S)[0] and terminal.ours:
+                data = os.read(terminal.number, 256)
                 if not data:
                     return
                 yield decoder.decode(data)
@@ -82,27 +84,55 @@ def listen(orders: Orders, stream: TextIO | None, screen: Screen) -> Keyboard | 
     return keyboard
 
 
-def _single_keys(stream: TextIO) -> Callable[[], None] | None:
-    """Have a terminal give each key at once, unseen; what puts it back. None where it cannot.
+class _Terminal:
+    """A terminal that gives each key at once, unseen, while it is this program's.
 
-    In the background a terminal is left alone: changing it would stop the program.
+    A shell that stopped the program (Ctrl-Z) has its own way with the terminal, and leaves it so when the
+    program goes on: it is set again. In the background it is left alone: touching it would stop the program.
     """
-    try:
+
+    def __init__(self, number: int, before: Any) -> None:
+        self.number, self._before = number, before
+
+    @classmethod
+    def of(cls, stream: TextIO) -> _Terminal | None:
+        """The terminal that ``stream`` is, set to single keys; None where that cannot be."""
+        try:
+            import termios
+        except ImportError:  # another system
+            return None
+        try:
+            terminal = cls(stream.fileno(), termios.tcgetattr(stream.fileno()))
+        except (OSError, ValueError, termios.error):
+            return None
+        return terminal if terminal.single() else None
+
+    @property
+    def ours(self) -> bool:
+        """Whether the program is in the foreground."""
+        try:
+            return os.tcgetpgrp(self.number) == os.getpgrp()
+        except OSError:
+            return False
+
+    def single(self) -> bool:
+        """Have it give single keys, where it does not; whether it does."""
         import termios
         import tty
-    except ImportError:  # another system
-        return None
-    try:
-        number = stream.fileno()
-        if os.tcgetpgrp(number) != os.getpgrp():
-            return None
-        before: Any = termios.tcgetattr(number)
-        tty.setcbreak(number, termios.TCSADRAIN)
-    except (OSError, ValueError, termios.error):
-        return None
 
-    def put_back() -> None:
-        with contextlib.suppress(OSError, ValueError, termios.error):
-            termios.tcsetattr(number, termios.TCSADRAIN, before)
+        if not self.ours:
+            return False
+        try:
+            if termios.tcgetattr(self.number)[tty.LFLAG] & termios.ICANON:
+                tty.setcbreak(self.number, termios.TCSADRAIN)
+        except (OSError, ValueError, termios.error):
+            return False
+        return True
 
-    return put_back
+    def put_back(self) -> None:
+        """As it was."""
+        import termios
+
+        if self.ours:
+            with contextlib.suppress(OSError, ValueError, termios.error):
+                termios.tcsetattr(self.number, termios.TCSADRAIN, self._before)

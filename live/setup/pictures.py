@@ -48,8 +48,14 @@ def with_mask(config: Config, mask: NDArray[np.bool_] | None, folder: Path) -> C
     return replace(config, measure=replace(config.measure, mask=str(path)))
 
 
-def correction(config: Config, camera: CameraInfo) -> Correction:
-    """What takes the sensor's fixed pattern out of a burst; raises DataError where it cannot be used."""
+def correction(config: Config, camera: CameraInfo, cut: tuple[slice, slice] | None = None) -> Correction:
+    """What takes the sensor's fixed pattern out of a burst, or out of the rows and columns ``cut`` of one.
+
+    Raises
+    ------
+    DataError
+        It cannot be used.
+    """
     dark, flat = load_mean(config.camera.dark), load_mean(config.camera.flat)
     if dark is None and flat is None:
         return unchanged
@@ -60,6 +66,8 @@ def correction(config: Config, camera: CameraInfo) -> Correction:
             f"{config.camera.dark or config.camera.flat} has {width} x {height} px, the pictures"
             f" {camera.width} x {camera.height}; take it anew with this setting of the camera"
         )
+    if cut is not None:
+        field = FlatField(field.dark[cut], field.gain[cut], field.useless[cut])
     return field.apply
 
 

@@ -104,6 +104,7 @@ def setup_of(run: RunFolder) -> ViewSetup:
         finished=True,
         with_load=bool(np.isfinite(run.force).any()),
         outlines=_outlines(run),
+        gauges=tuple(run.gauges),
     )
 
 
@@ -148,6 +149,8 @@ def _curves(run: RunFolder) -> Iterator[Message]:
     values, t = run.strain.values, np.asarray(run.strain.time_s, np.float64)
     columns = [values[column] for name in STRAINS for column in (name, f"sigma_{name}")]
     yield rows_message(Kind.MEANS, zip(t, *columns, strict=True))
+    for name, gauge in run.gauges.items():
+        yield rows_message(Kind.GAUGE, zip(t, gauge.value, gauge.sigma, strict=True), name)
     loads = [(t[row], run.force[row]) for row in range(run.strain.n)]
     if run.session is not None and (samples := run.session.load_samples()):
         loads = [(sample.t - run.start_monotonic, sample.force) for sample in samples]

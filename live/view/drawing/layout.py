@@ -37,6 +37,11 @@ VALUES = "/specimen/values"
 """Where every ZOI tells its values when it is pointed at or clicked."""
 
 
+def gauge_path(name: str) -> str:
+    """Where the strain of a gauge is drawn over time."""
+    return f"gauges/{name}"
+
+
 def bar_unit(setup: ViewSetup) -> float:
     """A length that has about the same size on the screen for all shapes of picture, px."""
     return math.sqrt(setup.width * setup.height)
@@ -93,7 +98,7 @@ def _middle(setup: ViewSetup) -> Any:
 def _below(setup: ViewSetup) -> Any:
     import rerun.blueprint as rrb
 
-    plots = [_strain(), *([_load()] if setup.with_load else [])]
+    plots = [_strains(setup), *([_load()] if setup.with_load else [])]
     status = rrb.TextDocumentView(origin="/status", name="Status")
     shares = [4, 3, 3, 4] if setup.with_load else [6, 3, 4]
     return rrb.Horizontal(*plots, status, _events(), column_shares=shares)
@@ -134,6 +139,16 @@ def _picture_view(setup: ViewSetup, name: str, contents: list[str]) -> Any:
 
 def _strain() -> Any:
     return _plot("/strain", "Mean strain ± sigma, µm/m", legend=True)
+
+
+def _strains(setup: ViewSetup) -> Any:
+    """The mean strain, behind that of the gauges where there are any."""
+    import rerun.blueprint as rrb
+
+    if not setup.gauges:
+        return _strain()
+    gauges = _plot("/gauges", "Gauges ± sigma, µm/m", legend=True)
+    return rrb.Tabs(gauges, _strain(), active_tab=0)
 
 
 def _load() -> Any:

@@ -120,6 +120,8 @@ def _show(scene: Scene, message: Message) -> None:
         scene.loads(rows_of(message))
     elif kind is Kind.POINTS:
         scene.points(rows_of(message))
+    elif kind is Kind.GAUGE:
+        scene.gauge(str(message.meta.get("name")), rows_of(message))
     elif kind is Kind.EVENTS:
         for event in events_of(message):
             scene.event(event)

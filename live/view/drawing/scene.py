@@ -26,10 +26,19 @@ from live.view.drawing.layout import (
     LETTER,
     VALUES,
     bar_unit,
+    gauge_path,
 )
 from live.view.drawing.marks import CYAN, DIM, YELLOW, encode, reduced, words
 from live.view.drawing.places import Place
-from live.view.drawing.shapes import ArrowScale, mean_motion, region_edges, sample_boxes, thinned, value_dots
+from live.view.drawing.shapes import (
+    ArrowScale,
+    mean_motion,
+    region_edges,
+    sample_boxes,
+    thinned,
+    value_dots,
+    with_heads,
+)
 from live.view.exchange.figures import Figures
 from live.view.exchange.messages import Picture, Row
 from live.view.exchange.setup import MAPS, STRAINS, ViewSetup
@@ -40,6 +49,7 @@ if TYPE_CHECKING:
     from analysis.field import StrainField, ZoiGrid
 
 COLOURS = {"exx": (255, 107, 107), "eyy": (81, 207, 102), "exy": (116, 163, 255)}
+GAUGES = ((255, 0, 255), (64, 224, 255), (255, 212, 59), (81, 207, 102), (255, 107, 107), (116, 163, 255))
 RED, GAUGE, GAUGE_NAME = (255, 90, 60), (255, 0, 255), (255, 200, 255)
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 _RAMP = (8, 256)
@@ -82,6 +92,9 @@ class Scene:
         for name in STRAINS:
             style = rr.Measurements.from_fields(names=name, colors=COLOURS[name], widths=2.0)
             self._log(f"strain/{name}", style, static=True)
+        for k, name in enumerate(self._setup.gauges):
+            style = rr.Measurements.from_fields(names=name, colors=GAUGES[k % len(GAUGES)], widths=2.0)
+            self._log(gauge_path(name), style, static=True)
         self._log("load/force", rr.SeriesLines(colors=YELLOW, names="load", widths=2.0), static=True)
         self._outlines(self._setup.grid)
         self._region(self._setup.grid)
@@ -177,12 +190,10 @@ class Scene:
         matrix, shift = mean_motion(field)
         self._log_due("specimen", rr.Transform3D(mat3x3=matrix, translation=shift))
         origins, vectors, factor = self._arrows.arrows(field)
-        self._log_due(
-            "zoi/displacement",
-            rr.Arrows2D(
-                origins=origins, vectors=vectors, colors=CYAN, radii=rr.Radius.ui_points(1.0), draw_order=30
-            ),
+        arrows = rr.LineStrips2D(
+            with_heads(origins, vectors), colors=CYAN, radii=rr.Radius.ui_points(1.0), draw_order=30
         )
+        self._log_due("zoi/displacement", arrows)
         total, outlined = field.grid.n_active, len(sample_boxes(field.grid))
         some = f"{outlined} of {number(total)}" if outlined < total else f"all {total}"
         text = f"displacement ×{number(factor)} · {some} ZOIs outlined"
@@ -255,6 +266,11 @@ class Scene:
             row = (self._since_start(t), force)
             self._forces.append(row)
             self._add(t, "load/force", row)
+
+    def gauge(self, name: str, rows: Iterable[Row]) -> None:
+        """Time (s), strain and sigma of a gauge."""
+        for t, *values in rows:
+            self._add(t, gauge_path(name), (self._since_start(t), *values))
 
     def means(self, rows: Iterable[Row]) -> None:
         """Time (s), and mean and sigma of each strain."""

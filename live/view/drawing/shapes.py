@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 Points = NDArray[np.float64]
 _DOT = (255, 255, 255, 70)
+_HEAD = 0.3, 0.15  # of an arrow: length and half the width
 _MOST_BOXES, _MOST_ARROWS, _MOST_POINTS = 16, 240, 2000
 
 
@@ -114,6 +115,13 @@ class ArrowScale:
         fits = room / max(longest, 1e-3)
         if not fits / 5 < self._factor <= fits:
             self._factor = _round_below(min(fits, 1000.0))
+
+
+def with_heads(origins: Points, vectors: Points) -> NDArray[np.float32]:
+    """(N, 5, 2): each arrow as one line, with a head that rerun's own would be too small to show."""
+    tips, across = origins + vectors, vectors[:, ::-1] * [-1, 1]
+    barbs = [tips - _HEAD[0] * vectors + side * _HEAD[1] * across for side in (1, -1)]
+    return np.stack([origins, tips, barbs[0], tips, barbs[1]], axis=1).astype(np.float32)
 
 
 def _round_below(value: float) -> float:

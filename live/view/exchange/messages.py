@@ -25,8 +25,8 @@ MOST_PICTURE_BYTES = 8_000_000
 To slice 20 megapixels costs the test 0.7 ms, to send them whole 4 ms, to reduce them well 14 ms.
 """
 
-COLUMNS = {Kind.MEANS: 1 + 2 * len(STRAINS), Kind.LOADS: 2, Kind.POINTS: 2}
-"""Numbers in a row: t and mean, sigma of each strain; t and N; strain and N."""
+COLUMNS = {Kind.MEANS: 1 + 2 * len(STRAINS), Kind.LOADS: 2, Kind.POINTS: 2, Kind.GAUGE: 3}
+"""Numbers in a row: t and mean, sigma of each strain; t and N; strain and N; t and strain, sigma of a gauge."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,7 +61,7 @@ class Picture:
 def setup_message(setup: ViewSetup, where: Where) -> Message:
     """The first message: what is shown, and where."""
     names = ("title", "width", "height", "bits", "start_monotonic", "area_m2", "axis", "strain_range")
-    more = ("picture_hz", "finished", "with_load", "outlines", "light", "scale")
+    more = ("picture_hz", "finished", "with_load", "outlines", "gauges", "light", "scale")
     meta = {name: getattr(setup, name) for name in (*names, *more)}
     places = {"port": where.port, "rrd": where.rrd, "recording": where.recording}
     return Message(
@@ -85,9 +85,13 @@ def row_of(measurement: Measurement) -> Row:
     return (i.t, i.exx, i.sigma_exx, i.eyy, i.sigma_eyy, i.exy, i.sigma_exy)
 
 
-def rows_message(kind: Kind, rows: Iterable[Row]) -> Message:
-    """Means, loads or points of the curve; ``COLUMNS`` says what is in a row."""
-    return Message(kind, {}, {"rows": np.array(list(rows), np.float64).reshape(-1, COLUMNS[kind])})
+def rows_message(kind: Kind, rows: Iterable[Row], name: str = "") -> Message:
+    """Means, loads, points of the curve, or the gauge called ``name``; ``COLUMNS`` says what is in a row."""
+    return Message(
+        kind,
+        {"name": name} if name else {},
+        {"rows": np.array(list(rows), np.float64).reshape(-1, COLUMNS[kind])},
+    )
 
 
 def rows_of(message: Message) -> list[Row]:

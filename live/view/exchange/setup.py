@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Literal
 
@@ -43,6 +43,8 @@ class ViewSetup:
         Whether there is a load to show.
     outlines : mapping of name to ((x, y), ...), px
         Lines drawn on the picture: gauges.
+    gauges : sequence of str
+        Those whose strain is drawn over time.
     light : bool
         For slow links: pictures and maps smaller and seldom.
     scale : "symmetric" | "automatic"
@@ -62,5 +64,6 @@ class ViewSetup:
     finished: bool = False
     with_load: bool = True
     outlines: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    gauges: Sequence[str] = ()
     light: bool = False
     scale: Literal["symmetric", "automatic"] = "symmetric"

@@ -43,6 +43,7 @@ class Kind(IntEnum):
     STATUS = 8
     END = 9
     FIGURES = 10
+    GAUGE = 11
     SERVING = 20  # port (None: no server), rrd (None: no file)
     TROUBLE = 21  # text, lasting: whether to start anew is of no use
     FULL = 22  # memory_MiB: the process ends because it grew to this

@@ -151,6 +151,17 @@ def test_a_shaking_camera_is_seen_with_its_frequency(taken: Shots) -> None:
     assert "mainly at 7.0 Hz" in text
 
 
+def test_motion_is_that_of_what_has_a_pattern(taken: Shots) -> None:
+    """Of a specimen at one side of a region that is all of the picture."""
+    height, width = taken.frames.shape[1:]
+    frames = np.full((len(taken), height, width + 1200), 100, np.uint8)
+    frames[:, :, :width] = taken.frames
+    config = load_config(None, {"measure.zoi": 48, "measure.roi": "all"})
+    still = examine(shots_of(frames, 8), config, table=False).still
+    assert still.drift_px < 0.01
+    assert still.worse.vibration < 0.01
+
+
 def test_bits_that_never_change(taken: Shots) -> None:
     coarse = (taken.frames.astype(np.uint16) & 0xF0) << 4
     assert "4 of 12 change" in said(shots_of(coarse, 12), "bits")

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import importlib
 import io
 import os
 import signal
 import threading
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from live.check import Watch, take
+from live.check import Glance, Watch, examine, take
 from live.check.judge import Line
+from live.check.watch import SEARCH_EVERY, TURNS
 from live.cli import main
 from live.commands import watching
 from live.commands.watching import Display, card, peak_line
 from live.setup import load_config
+from live.specimen import Region
 from live.tell import Screen
 
 STILL = "sim:uniform?bits=8&fps=50&width=224&height=192"
@@ -94,9 +99,72 @@ def test_a_camera_that_ends(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["--camera", STILL + "&seconds=4&lockstep=yes", "--no-view", *SMALL]
     assert main(["check", "--watch", *arguments]) == 0
     assert "strain noise of one ZOI" in capsys.readouterr().out
-    short = ["--camera", STILL + "&seconds=0.1&lockstep=yes", "--no-view", *SMALL]
+    short = ["--camera", STILL + "&seconds=0.1", "--no-view", *SMALL]
     assert main(["check", "--watch", *short]) == 4
-    assert "fewer than 8 whole frames" in capsys.readouterr().err
+    assert "whole frames, a check needs 8" in capsys.readouterr().err
+
+
+def test_the_work_of_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What takes long takes turns, the picture is averaged once; the figures are those of a check."""
+    said = {
+        "camera.address": STILL + "&seconds=5&lockstep=yes",
+        "measure.zoi": 48,
+        "measure.reference_burst": 8,
+    }
+    config = load_config(None, said)
+    sixteen = take(config)
+    shots = replace(sixteen, frames=sixteen.frames[:8], times=sixteen.times[:8])
+    done: list[str] = []
+
+    def counted(module: str, name: str, what: str) -> None:
+        real = getattr(importlib.import_module(module), name)
+
+        def call(*arguments: Any, **more: Any) -> Any:
+            done.append(what)
+            return real(*arguments, **more)
+
+        monkeypatch.setattr(f"{module}.{name}", call)
+
+    counted("live.check.predicted", "prepare", "reference")
+    counted("live.check.stillness", "prepare", "reference")
+    counted("live.check.watch", "sought", "search")
+    counted("live.check.figures", "noise_floors", "table")
+    watch, work, glances = Watch(config), list[list[str]](), list[Glance]()
+    for _ in range(2 * SEARCH_EVERY):
+        glances.append(watch.glance(shots))
+        work.append(list(done))
+        done.clear()
+    assert work[0] == ["search", "reference", "reference"]
+    assert all(len(one) <= 1 for one in work[1:])
+    later = [what for one in work[SEARCH_EVERY:] for what in one]
+    assert (later.count("reference"), later.count("search")) == (2 * SEARCH_EVERY // TURNS, 1)
+    once, last = examine(shots, config, table=False), glances[-1].figures
+    assert (last.noise, last.exposure, last.radius, last.still, last.gauges) == (
+        once.noise, once.exposure, once.radius, once.still, once.gauges,
+    )  # fmt: skip
+    for name in ("sigma", "contrast", "sssig", "sharpness"):
+        np.testing.assert_array_equal(getattr(last.zois, name), getattr(once.zois, name))
+
+
+def test_the_region_stays_where_only_its_rim_is_found_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = load_config(None, {"camera.address": STILL + "&seconds=5&lockstep=yes", "measure.zoi": 48})
+    shots = take(config)
+    boxes = iter([(8, 8, 200, 176), (9, 8, 199, 176), (60, 8, 148, 176)])
+    monkeypatch.setattr("live.check.watch.sought", lambda *_: Region(next(boxes), None, "found", True))
+    monkeypatch.setattr("live.check.watch.SEARCH_EVERY", 1)
+    watch = Watch(config)
+    assert [watch.glance(shots).figures.region.box for _ in range(3)] == [
+        (8, 8, 200, 176),
+        (8, 8, 200, 176),
+        (60, 8, 148, 176),
+    ]
+
+
+def test_pictures_that_are_few_leave_their_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = load_config(None, {"camera.address": STILL + "&seconds=5&lockstep=yes"})
+    cv2.imwrite(str(tmp_path / "one.png"), take(config).frames[0])
+    assert main(["check", "--watch", "--camera", f"files:{tmp_path}", "--no-view", *SMALL]) == 0
+    assert "GO, as far as 1 picture can tell" in capsys.readouterr().out
 
 
 class Terminal(io.StringIO):

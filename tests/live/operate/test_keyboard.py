@@ -6,7 +6,9 @@ import io
 import os
 import pty
 import select
+import signal
 import sys
+import termios
 import time
 from typing import Any
 
@@ -116,3 +118,47 @@ def test_a_true_terminal_gives_single_keys_and_is_put_back_as_it_was() -> None:
     os.waitpid(child, 0)
     os.close(master)
     assert b"CALLS new-reference False True" in got
+
+
+def test_a_terminal_gives_single_keys_again_after_ctrl_z() -> None:
+    """The test is the shell: stops the program, has lines itself, and lets it go on."""
+    program = (
+        "import sys, time; from live.operate import listen; from live.tell import Screen;"
+        "from tests.live.operate.test_orders import FakeLive; live = FakeLive();"
+        "k = listen(live, sys.stdin, Screen())\n"
+        "while not live.calls: time.sleep(0.01)\n"
+        "k.close()\n"
+        "print('CALLS', live.calls[0][0])"
+    )
+    child, master = pty.fork()
+    if child == 0:
+        os.execv(sys.executable, [sys.executable, "-c", program])
+    lines = termios.tcgetattr(master)
+    heard(master, b"keys: ")
+    assert not has_lines(master)
+    os.kill(child, signal.SIGSTOP)
+    os.waitpid(child, os.WUNTRACED)
+    termios.tcsetattr(master, termios.TCSANOW, lines)
+    os.kill(child, signal.SIGCONT)
+    until = time.monotonic() + 30
+    while has_lines(master):
+        assert time.monotonic() < until
+        time.sleep(0.02)
+    os.write(master, b"r")
+    heard(master, b"CALLS new-reference")
+    os.waitpid(child, 0)
+    os.close(master)
+
+
+def has_lines(master: int) -> bool:
+    """Whether a terminal waits for Enter."""
+    return bool(termios.tcgetattr(master)[3] & termios.ICANON)
+
+
+def heard(master: int, words: bytes) -> None:
+    """Wait until a program has said them."""
+    got, until = b"", time.monotonic() + 30
+    while words not in got:
+        assert time.monotonic() < until, got
+        if select.select([master], [], [], 0.2)[0]:
+            got += os.read(master, 4096)

@@ -61,6 +61,10 @@ def test_the_story_is_what_the_files_hold(run: RunFolder) -> None:
     assert [round(event.t, 3) for event in events] == [0.0, 0.0, 1.5]
     points = [row for message in messages if message.kind is Kind.POINTS for row in rows_of(message)]
     np.testing.assert_array_equal([row[0] for row in points], run.strain.values["gauge_axial"])
+    gauges = {message.meta["name"]: rows_of(message) for message in messages if message.kind is Kind.GAUGE}
+    assert list(gauges) == list(setup_of(run).gauges) == ["axial", "shear"]
+    axial = np.stack([run.strain.time_s, run.gauges["axial"].value, run.gauges["axial"].sigma], axis=1)
+    np.testing.assert_array_equal(gauges["axial"], axial)
     status = next(message for message in messages if message.kind is Kind.STATUS)
     assert "**S1**, 96 instants" in status.meta["markdown"]
     assert "gauge **shear**" in status.meta["markdown"]
@@ -88,6 +92,7 @@ def test_all_of_it_is_drawn_and_every_zoi_tells_its_values(
     found = drawn(path)
     assert sum(len(batch) for batch in found["/specimen/map/eyy"]) == N
     assert sum(len(batch) for batch in found["/camera/picture"]) == N
+    assert [sum(len(batch) for batch in found[f"/gauges/{name}"]) for name in GAUGES] == [N, N]
     batch = next(b for b in found["/specimen/values"] if "eyy_um_m" in b.schema.names)
     times = batch.column("time").cast("int64").to_pylist()
     row = int(np.argmin(np.abs(run.strain.time_s - times[-1] * 1e-9)))

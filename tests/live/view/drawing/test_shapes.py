@@ -7,7 +7,15 @@ import pytest
 
 from analysis.field.grid import Roi, ZoiGrid
 from analysis.field.strain_field import StrainField
-from live.view.drawing.shapes import ArrowScale, centres, mean_motion, region_edges, sample_boxes, thinned
+from live.view.drawing.shapes import (
+    ArrowScale,
+    centres,
+    mean_motion,
+    region_edges,
+    sample_boxes,
+    thinned,
+    with_heads,
+)
 from tests.live.made_up import make_field, make_grid
 
 
@@ -93,3 +101,9 @@ def test_the_edge_of_the_region() -> None:
 def test_no_region_has_no_edge() -> None:
     grid = ZoiGrid.cover(Roi(10, 20, 70, 70), size=20, step=7)
     assert region_edges(grid.subset(active=np.zeros(grid.shape, bool))).shape == (0, 2, 2)
+
+
+def test_an_arrow_has_its_head_at_its_tip() -> None:
+    ((start, tip, left, again, right),) = with_heads(np.array([[10.0, 20.0]]), np.array([[0.0, 40.0]]))
+    assert (*start, *tip, *again) == (10, 20, 10, 60, 10, 60)
+    assert sorted([*left, *right]) == pytest.approx([4, 16, 48, 48])
