@@ -15,7 +15,7 @@ LEAST_GAIN = 0.1
 """The gain by which the noise of the deformed image is divided at least."""
 
 
-@parallel
+@helper
 def weigh(
     measured: Any, left: Any, freedom: Any, gain: Any, reference: Any, current: Any,
     residual: Any, from_reference: Any, whole: Any,
@@ -34,7 +34,7 @@ def weigh(
     from_reference, whole : (A,) float32, GL^2, written
         In grey levels of the reference; NaN where nothing was measured.
     """
-    for z in prange(len(measured)):
+    for z in range(len(measured)):
         residual[z] = left[z] / freedom[z] / (gain[z] ** 2 * reference[z] + current[z])
         from_reference[z] = np.nan
         whole[z] = np.nan

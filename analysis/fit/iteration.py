@@ -12,6 +12,7 @@ import numpy as np
 from numba import prange
 
 from analysis.compiled.loops import helper, inlined, parallel
+from analysis.compiled.shares import SHARES, next_piece
 from analysis.compiled.vectors import LANES, fetch
 from analysis.fit.bundles import CONVERGED, DIVERGED, LEFT_IMAGE, RUNNING, Fit, Out, Picture, Stop
 from analysis.fit.moments import (
@@ -188,8 +189,18 @@ def track(picture: Picture, table: Any, fit: Fit, stop: Stop, out: Out) -> None:
     ``table`` (18,) has the weights of the taps (``splines.tap_table``). It is no part of the picture, since
     read from a tuple it lets the compiler sum in another order, and the last digit of float32 changes.
     """
-    for chunk in prange((len(fit.origins) + CHUNK - 1) // CHUNK):
-        _track_some(picture, table, fit, stop, out, chunk * CHUNK)
+    counter = np.zeros(1, np.int64)
+    for _ in prange(SHARES):
+        _track_share(picture, table, fit, stop, out, counter)
+
+
+@helper
+def _track_share(picture: Any, table: Any, fit: Any, stop: Any, out: Any, counter: Any) -> None:
+    """What one thread comes to do of all ZOIs."""
+    start = next_piece(counter) * CHUNK
+    while start < len(fit.origins):
+        _track_some(picture, table, fit, stop, out, start)
+        start = next_piece(counter) * CHUNK
 
 
 @helper

@@ -17,6 +17,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper, parallel
+from analysis.compiled.shares import SHARES, next_piece
 from analysis.fit.bundles import Images, Normal, WindowRows
 from analysis.fit.moments import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, product_moments
 from analysis.fit.shapes import cross_moments
@@ -135,8 +136,20 @@ def prepare(
     table : (P, 3), units : (6,)
     out : Normal, written
     """
-    for chunk in prange((len(origins) + CHUNK - 1) // CHUNK):
-        _prepare_some(images, origins, chunk * CHUNK, size, rows, table, units, out)
+    counter = np.zeros(1, np.int64)
+    for _ in prange(SHARES):
+        _prepare_share(images, origins, size, rows, table, units, out, counter)
+
+
+@helper
+def _prepare_share(
+    images: Any, origins: Any, size: int, rows: Any, table: Any, units: Any, out: Any, counter: Any
+) -> None:
+    """What one thread comes to do of all ZOIs."""
+    first = next_piece(counter) * CHUNK
+    while first < len(origins):
+        _prepare_some(images, origins, first, size, rows, table, units, out)
+        first = next_piece(counter) * CHUNK
 
 
 @helper

@@ -8,9 +8,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import prange
-
-from analysis.compiled.loops import helper, parallel
+from analysis.compiled.loops import helper
 from analysis.field import Status
 from analysis.fit.bundles import CONVERGED, LEFT_IMAGE, Known, Out, Rule
 from analysis.fit.validity import (
@@ -34,7 +32,7 @@ NOT_CONVERGED, POOR_MATCH = int(Status.NOT_CONVERGED), int(Status.POOR_MATCH)
 NO_PATTERN = int(Status.NO_PATTERN)
 
 
-@parallel
+@helper
 def judge(found: Out, left: Any, expected: Any, known: Known, rule: Rule, out: Any) -> None:
     """Write a status for each measured ZOI.
 
@@ -48,7 +46,7 @@ def judge(found: Out, left: Any, expected: Any, known: Known, rule: Rule, out: A
     rule : Rule
     out : (A,) uint8, written
     """
-    for z in prange(len(out)):
+    for z in range(len(out)):
         gain = found.nuisance[z, 0]
         chance = NOISE_FACTOR + CHANCE * math.sqrt(2 / max(known.pixels[z], 1.0))
         if not rule.noise_known:

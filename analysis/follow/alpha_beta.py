@@ -11,9 +11,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import prange
-
-from analysis.compiled.loops import parallel
+from analysis.compiled.loops import helper
 
 LEAST_ALPHA, LEAST_BETA = 0.4, 0.1
 """Parts of the news (measured less predicted) that enter position and motion after many frames."""
@@ -24,7 +22,7 @@ NEWS = 4.0
 AGE_MOVED, OLDEST = 3, 20
 
 
-@parallel
+@helper
 def advance(
     values: Any,
     guess: Any,
@@ -39,7 +37,7 @@ def advance(
     """See ``prediction.motion_after``; the last three (A, modes), (A, modes) and (A,) are written."""
     modes = values.shape[1]
     half = modes // 2
-    for z in prange(len(values)):
+    for z in range(len(values)):
         reach, known = 0.0, True
         for i in range(modes):
             news = abs(values[z, i] - guess[z, i])

@@ -9,6 +9,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper, inlined, parallel
+from analysis.compiled.shares import SHARES, next_piece
 from analysis.compiled.vectors import LANES, load, spread, store
 from analysis.picture.splines import LINE, PAD, PREFILTER_REACH, Box
 
@@ -46,15 +47,24 @@ def coefficients(image: NDArray[Any], offset: Any, taps: NDArray[np.float32], bo
     out = np.empty((height + 2 * PAD) * stride + LANES, np.float32)
     for n in range(out.size - LANES, out.size):
         out[n] = 0
-    for part in prange((box.bottom - box.top + PART - 1) // PART):
-        first = box.top + part * PART
-        _filter_part(image, offset, taps, box, first, min(first + PART, box.bottom), out)
+    counter = np.zeros(1, np.int64)
+    for _ in prange(SHARES):
+        _filter_share(image, offset, taps, box, counter, out)
     for y in range(PAD):
         if box.top == 0:
             _copy_row(out, _mirror(y - PAD, height) + PAD, stride, y)
         if box.bottom == height:
             _copy_row(out, _mirror(height + y, height) + PAD, stride, PAD + height + y)
     return out
+
+
+@helper
+def _filter_share(image: Any, offset: Any, taps: Any, box: Any, counter: Any, out: Any) -> None:
+    """What one thread comes to do of all rows."""
+    top = box.top + next_piece(counter) * PART
+    while top < box.bottom:
+        _filter_part(image, offset, taps, box, top, min(top + PART, box.bottom), out)
+        top = box.top + next_piece(counter) * PART
 
 
 @helper

@@ -68,8 +68,7 @@ def test_a_second_process_compiles_nothing() -> None:
         "image = np.random.default_rng(0).normal(100, 20, (96, 96)).astype(np.float32)\n"
         "kernel = PhaseKernel(image, ZoiGrid.cover(Roi(8, 8, 80, 80), 32, 16), noise=1.0)\n"
         "kernel.measure(image, start=kernel.measure(image))\n"
-        "for loop in (iteration.track, sensitivity.prepare, verdict.judge):\n"
-        "    loop = loop.dispatcher\n"
+        "for loop in (iteration.track.dispatcher, sensitivity.prepare.dispatcher, verdict.judge):\n"
         "    assert len(loop.signatures) == 1, loop\n"
         "    print(sum(loop.stats.cache_hits.values()), sum(loop.stats.cache_misses.values()))\n"
     )
