@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,8 @@ class ReplayRequest:
     overrides : mapping of "section.key" to value
     numbers : range or None
         Of the bursts within that part those from this number on, up to that one, by their order; of a session alone.
+    parts : sequence of Path
+        What ``measure_part`` has stored of all of it, in order: told, and not measured again.
     settled : Path or None
         Where the folder of the results will lie in the end, if that is not where they are written.
     """
@@ -52,6 +54,7 @@ class ReplayRequest:
     overrides: Mapping[str, Any]
     forces: Path | None = None
     numbers: range | None = None
+    parts: Sequence[Path] = ()
     settled: Path | None = None
 
 
@@ -86,6 +89,8 @@ class Material:
     ----------
     expected : int or None
         How many bursts there will be at most, where that is known.
+    times : (B,) float64 or None, s
+        Of the bursts, where they are known before they are read.
     seen : Seen or None
         The pictures so far; None for a session, whose bursts say what was lost.
     """
@@ -98,6 +103,7 @@ class Material:
     events: tuple[Event, ...] = ()
     samples: tuple[LoadSample, ...] = ()
     expected: int | None = None
+    times: NDArray[np.float64] | None = None
     seen: Seen | None = None
 
 

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from acquire.addresses import parse_address
 from acquire.burst import LIMIT_PX
@@ -98,34 +101,44 @@ def session_material(session: Session, request: ReplayRequest, config: Config, p
         reference, after = stored.first_burst(config.measure.reference_burst or 1)
     window = Window.of(request, session.start_monotonic)
     if request.as_measured:
-        bursts, expected = _measured_then(stored, events, window)
+        found = _measured_then(stored, events, window)
     else:
         n = config.measure.burst if session.mode.kind == "all" else request.overrides.get("measure.burst")
         limit_px = LIMIT_PX if config.measure.shorten_bursts else None
-        bursts, expected = _all_after(stored, after, n, limit_px, window, request.numbers)
+        found = _all_after(stored, after, n, limit_px, window, request.numbers)
     start = ClockPair(session.start_monotonic, session.start_utc)
-    return Material(session.camera, reference, window.part(bursts), loads, start, events, samples, expected)
+    bursts = window.part(found.bursts)
+    return Material(
+        session.camera, reference, bursts, loads, start, events, samples, found.expected, found.times
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """The bursts to measure; how many at most and when, where that is known."""
+
+    bursts: Iterable[Work]
+    expected: int | None = None
+    times: NDArray[np.float64] | None = None
 
 
 def _all_after(
     stored: Store, after: int, n: int | None, limit_px: float | None, window: Window, numbers: range | None
-) -> tuple[Iterable[Work], int | None]:
-    """Every burst, and how many that will be; where the pictures decide on their lengths, all must be read."""
+) -> _Found:
+    """Every burst; where the pictures decide on their lengths, all must be read."""
     if limit_px is not None:
-        return stored.shortened_after(after, n, limit_px), None
+        return _Found(stored.shortened_after(after, n, limit_px))
     places = stored.places_after(after, n)
     found = window.numbers(places.t)
     if numbers is not None:
         found = found[numbers.start : numbers.stop]
-    return stored.bursts_at(places, found), len(found)
+    return _Found(stored.bursts_at(places, found), len(found), places.t[found.start : found.stop])
 
 
-def _measured_then(
-    stored: Store, events: Iterable[Event], window: Window
-) -> tuple[Iterable[Work], int | None]:
+def _measured_then(stored: Store, events: Iterable[Event], window: Window) -> _Found:
     """The bursts of the live run."""
     wanted = _measured_within(events, window)
-    return _as_measured(stored, events, wanted), len(wanted) or None
+    return _Found(_as_measured(stored, events, wanted), len(wanted) or None)
 
 
 def _measured_within(events: Iterable[Event], window: Window) -> set[int]:

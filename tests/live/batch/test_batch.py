@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import dataclasses
 import os
 import platform
@@ -13,7 +12,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import h5py
@@ -24,21 +22,13 @@ from pyarrow import parquet
 from live.batch import Wanted, find_tests, run_campaign
 from live.cli import main
 from live.tell import Screen
+from tests.live.batch.running import is_gone, parts, pid_of, rows, started, until
 
-ROOT = Path(__file__).parents[3]
 SETTINGS = ["--zoi", "48", "--step", "12", "--section", "20,2"]
 
 
 def batch(*words: object) -> int:
     return main(["batch", *map(str, words)])
-
-
-def rows(out: Path) -> list[dict[str, str]]:
-    return list(csv.DictReader((out / "summary.csv").read_text(encoding="utf-8").splitlines()))
-
-
-def parts(out: Path) -> list[Path]:
-    return [path for path in out.glob(".*.part") if path.is_dir()]
 
 
 def datasets(path: Path) -> dict[str, np.ndarray]:
@@ -50,29 +40,6 @@ def datasets(path: Path) -> dict[str, np.ndarray]:
             )
         )
     return found
-
-
-def until(true: Callable[[], bool], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < end, "it did not come to that"
-        time.sleep(0.01)
-
-
-def started(*words: object) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "live.cli", "batch", *map(str, words)]
-    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL)
-
-
-def pid_of(part: Path) -> int:
-    return int(part.name.split(".")[-2])
-
-
-def is_gone(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").split(") ")[1][0] == "Z"
-    except OSError:
-        return True
 
 
 @pytest.fixture(scope="module")

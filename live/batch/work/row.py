@@ -27,6 +27,7 @@ COLUMNS: dict[str, type] = {
     "frames_lost": int, "pictures_left_out": int, "seconds": float,
 }  # fmt: skip
 """Name of each column, with its kind; a number that is not known is empty."""
+RENEWED = "renewed"  # outcome of a chunk that cannot stand in the place of its part of the whole
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,6 +61,13 @@ def failed(name: str, source: str, error: str, exit_code: int) -> Row:
     """The row of a test without results."""
     found = {"test": name, "source": source, "outcome": "failed", "exit_code": exit_code, "error": error}
     return Row.of(found)
+
+
+def row_of_chunk(name: str, source: str, as_the_whole: bool, seconds: float) -> Row:
+    """The row of a chunk, which comes into no table."""
+    outcome = "done" if as_the_whole else RENEWED
+    found = {"test": name, "source": source, "outcome": outcome, "exit_code": 0}
+    return Row.of({**found, "seconds": round(seconds, 3)})
 
 
 def row_of(name: str, source: str, done: Replayed, seconds: float) -> Row:
