@@ -7,6 +7,7 @@ measured before the chunk and thrown away. What waits lies in ``.NAME.KEY.chunks
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,7 +45,7 @@ def cut(task: Task) -> Cut:
     if times is None:
         return Cut(why="with shorten_bursts the places of bursts are not known before all is read")
     edges = [0, *_edges(times, task.chunk_s), len(times)]
-    pairs = list(zip(edges, edges[1:], strict=False))
+    pairs = list(itertools.pairwise(edges))
     return Cut(tuple(_chunk(task, k, a, b) for k, (a, b) in enumerate(pairs)) if len(pairs) > 1 else ())
 
 
