@@ -41,6 +41,8 @@ class Wanted:
     as_measured : bool
     chunk_s : float or None, s
         Cut longer sessions into chunks of about this length.
+    scheduler : str or None
+        Of a Dask cluster that does the work in the place of ``workers`` processes of this machine.
     """
 
     tests: Sequence[Listed]
@@ -52,6 +54,7 @@ class Wanted:
     end_s: float | None = None
     as_measured: bool = False
     chunk_s: float | None = None
+    scheduler: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -166,17 +169,23 @@ def _work(
     wanted: Wanted, tasks: Sequence[Task], rows: dict[str, Row], screen: Screen, stopping: threading.Event
 ) -> None:
     from analysis import PICTURE_KINDS
-    from live.batch.workers import Pool
+    from live.batch.workers import Cluster, Pool
 
-    compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
+    if wanted.scheduler is None:
+        compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
     standing = Standing(len(tasks), time.monotonic)
     course = Course(tasks, _cuts(tasks, screen), rows, standing, screen)
-    pool = Pool(course.first(), wanted.workers, course.told, course.done)
+    first = course.first()
+    workers: Pool | Cluster
+    if wanted.scheduler is None:
+        workers = Pool(first, wanted.workers, course.told, course.done)
+    else:
+        workers = Cluster(first, wanted.scheduler, course.told, course.done, screen)
     try:
-        while not pool.wait(_LOOK_S) and not stopping.is_set():
+        while not workers.wait(_LOOK_S) and not stopping.is_set():
             screen.status(standing.words())
     finally:
-        pool.close()
+        workers.close()
     screen.say(standing.words())
 
 

@@ -28,6 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers", type=int, default=_cores(), metavar="N", help="processes (default: one a core)"
     )
+    words = "a running Dask cluster in place of --workers, as tcp://HOST:PORT (extra cluster)"
+    parser.add_argument("--scheduler", metavar="ADDRESS", help=words)
     words = (
         "cut longer sessions into chunks of S seconds, for several workers; differs by less than 0.005 sigma"
     )
@@ -61,6 +63,7 @@ def command(arguments: argparse.Namespace) -> int:
         end_s=arguments.end_s,
         as_measured=arguments.as_measured,
         chunk_s=_chunk_s(arguments),
+        scheduler=arguments.scheduler,
     )
     screen, stopping = Screen(), threading.Event()
     with signals(stopping.set, screen.say):

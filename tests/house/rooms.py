@@ -76,7 +76,7 @@ ROOMS = {
     " live.view live.view.exchange",
     "live.batch.work": "acquire acquire.camera acquire.files analysis.evaluate live.measure live.replay live.setup"
     " live.tell",
-    "live.batch.workers": "acquire live.batch.work",
+    "live.batch.workers": "acquire analysis live.setup live.tell live.batch.work",
     "live.batch": "acquire acquire.files analysis live.replay live.setup live.tell live.batch.work live.batch.workers",
     "live.study": "acquire analysis.field analysis.quality live.measure live.replay live.setup",
     "live.serve.web": "acquire live.pace",
@@ -102,6 +102,7 @@ MAY_START = {
 # Library -> the rooms that alone import it.
 LIBRARIES = {
     "ctypes": "acquire.v4l2",
+    "distributed": "live.batch.workers",
     "cv2": "acquire analysis.follow",
     "fcntl": "acquire.v4l2",
     "h5py": "acquire.hdf5 acquire.session live.results",

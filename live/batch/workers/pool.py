@@ -14,10 +14,8 @@ from collections import deque
 from collections.abc import Callable, Sequence
 
 from live.batch.work import Progress, Row, Task, failed
+from live.batch.workers.there import ONE_THREAD
 
-ONE_THREAD = (
-    "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM",
-)  # fmt: skip
 MOST_DEATHS = 3
 _LAST_S = 5.0
 

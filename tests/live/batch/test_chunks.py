@@ -20,37 +20,21 @@ from tests.live.batch.running import is_gone, parts, pid_of, rows, started, unti
 from tests.live.made_run import session_writer
 from tests.live.made_up import START, make_frame
 
-SIZE = "lockstep=yes&seconds=31&fps=10&width=160&height=128&bits=12"
 SETTINGS = ["--zoi", "48", "--step", "16"]
-RUN = ["--burst", "1", "--reference-burst", "1", *SETTINGS, "--no-view", "--no-rrd"]
 CHUNK = ["--chunk", "10", "--workers", "2"]
 
 
-def recorded(folder: Path, *words: str) -> Path:
-    out = folder / "long"
-    assert (
-        main(["run", "--camera", f"sim:uniform?{SIZE}", "--load", "sim:", *RUN, *words, "--out", str(out)])
-        == 0
-    )
-    return out / "session.h5"
-
-
 @pytest.fixture(scope="module")
-def session(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return recorded(tmp_path_factory.mktemp("chunks"))
-
-
-@pytest.fixture(scope="module")
-def whole(session: Path) -> Path:
-    out = session.parent.with_name("whole")
-    assert main(["replay", str(session), *SETTINGS, "--no-view", "--no-rrd", "--out", str(out)]) == 0
+def whole(long: Path) -> Path:
+    out = long.parent.with_name("whole")
+    assert main(["replay", str(long), *SETTINGS, "--no-view", "--no-rrd", "--out", str(out)]) == 0
     return out
 
 
 @pytest.fixture(scope="module")
-def cut(session: Path) -> Path:
-    out = session.parent.with_name("cut")
-    assert main(["batch", str(session), *SETTINGS, *CHUNK, "--out", str(out)]) == 0
+def cut(long: Path) -> Path:
+    out = long.parent.with_name("cut")
+    assert main(["batch", str(long), *SETTINGS, *CHUNK, "--out", str(out)]) == 0
     return out
 
 
@@ -89,10 +73,10 @@ def working(out: Path) -> list[Path]:
     return [part for place in out.glob(".*.chunks") for part in parts(place)]
 
 
-def test_killed_in_the_middle(session: Path, cut: Path, tmp_path: Path) -> None:
+def test_killed_in_the_middle(long: Path, tmp_path: Path) -> None:
     """The chunks that are whole are not done again."""
     out = tmp_path / "out"
-    words = (session, *SETTINGS, "--step", "4", *CHUNK, "--out", out)
+    words = (long, *SETTINGS, "--step", "4", *CHUNK, "--out", out)
     caller = started(*words)
     until(lambda: len(list(out.glob(".long.*.chunks/0*/batch.json"))) > 0)
     whole = [path.stat().st_mtime_ns for path in out.glob(".long.*.chunks/0000/batch.json")]
@@ -158,9 +142,9 @@ def test_a_renewed_reference_is_not_cut(
     ],
 )
 def test_what_is_refused(
-    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], says: str
+    long: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], says: str
 ) -> None:
-    assert main(["batch", str(session), *words, "--out", str(tmp_path / "out")]) == 2
+    assert main(["batch", str(long), *words, "--out", str(tmp_path / "out")]) == 2
     assert says in capsys.readouterr().err
 
 
