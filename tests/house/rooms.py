@@ -74,8 +74,8 @@ ROOMS = {
     " live.setup live.finished live.export",
     "live.show": "acquire analysis analysis.field analysis.evaluate live.measure live.setup live.tell live.finished"
     " live.view live.view.exchange",
-    "live.batch.work": "acquire acquire.camera acquire.files analysis.evaluate live.measure live.replay live.setup"
-    " live.tell",
+    "live.batch.work": "acquire acquire.camera acquire.files analysis.evaluate live.measure live.replay live.results"
+    " live.setup live.tell",
     "live.batch.workers": "acquire analysis live.setup live.tell live.batch.work",
     "live.batch": "acquire acquire.files analysis live.replay live.setup live.tell live.batch.work live.batch.workers",
     "live.study": "acquire analysis.field analysis.quality live.measure live.replay live.setup",

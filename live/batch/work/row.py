@@ -11,6 +11,7 @@ import numpy as np
 
 from acquire.printable import printable
 from analysis.evaluate import Figure, TensileFigures
+from live.batch.work.noise import measured_noise
 from live.measure import History
 from live.replay import Replayed
 from live.setup import Config
@@ -24,6 +25,7 @@ COLUMNS: dict[str, type] = {
     **{f"{name}{end}": float for name in ("E_GPa", "nu", "Rp0.2_MPa", "Rm_MPa", "EA_kN", "Fp0.2_kN", "Fm_kN")
        for end in ("", "_low", "_high")},
     "noise_GL": float, "strain_noise": float, "mean_strain_noise": float,
+    "still_instants": int, "strain_noise_measured": float,
     "frames_lost": int, "pictures_left_out": int, "seconds": float,
 }  # fmt: skip
 """Name of each column, with its kind; a number that is not known is empty."""
@@ -87,6 +89,7 @@ def row_of(name: str, source: str, done: Replayed, seconds: float) -> Row:
             **_counts(history),
             **_figures(evaluate(history, done.books.loads, done.config.specimen), done.config),
             **_noise(history),
+            **measured_noise(done.folder / "strain.h5", history.forces(done.books.loads)),
             "frames_lost": done.books.ledger.lost,
             "pictures_left_out": done.left_out,
             "seconds": round(seconds, 3),
