@@ -64,10 +64,14 @@ class Cluster:
 
     def wait(self, seconds: float) -> bool:
         """Whether all is done within ``seconds``; raises DataError where the scheduler has gone."""
+        ended: list[tuple[Task, Any]] = []
         with contextlib.suppress(queue.Empty):
-            self._take(self._ended.get(timeout=seconds))
+            ended.append(self._ended.get(timeout=seconds))
             while True:
-                self._take(self._ended.get_nowait())
+                ended.append(self._ended.get_nowait())
+        rows = self._fetched([future for _, future in ended if future.status == "finished"])
+        for task, future in ended:
+            self._take(task, rows.get(future.key) or _given_up(task, future))
         self._gone_s = 0.0 if self._client.status == "running" else self._gone_s + seconds
         if self._gone_s > _GONE_S:
             raise DataError(
@@ -140,13 +144,16 @@ class Cluster:
         if title in self._tasks:
             self._told(self._tasks[title], Progress(*values))
 
-    def _take(self, ended: tuple[Task, Any]) -> None:
-        task, future = ended
+    def _fetched(self, futures: Sequence[Any]) -> dict[str, Row]:
+        """The rows of many in one go; none where the way to them is gone, for they lie on the disk as well."""
         try:
-            row = _row(task, future)
-        except Exception as error:  # of the way to the worker that has the row; results lie on the disk
-            log.debug("the row of %s did not come: %s", task.title, error)
-            row = row_done(task) or failed(task.title, task.source, "what became of it was not told", 1)
+            values = self._client.gather(futures) if futures else []
+        except Exception as error:  # of the network, or of a worker that has just died
+            log.debug("rows did not come: %s", error)
+            return {}
+        return {future.key: Row.of(value) for future, value in zip(futures, values, strict=True)}
+
+    def _take(self, task: Task, row: Row) -> None:
         if self._client.status != "running" and not row.is_done:
             return  # the scheduler is going, as ``wait`` will tell
         if self._left.pop(task.title, None) is not None:
@@ -213,9 +220,10 @@ def advice(found: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
         )
 
 
-def _row(task: Task, future: Any) -> Row:
-    if future.status == "finished":
-        return Row.of(future.result())
+def _given_up(task: Task, future: Any) -> Row:
+    """The row of a task that did not come to its end, or whose own row did not come back."""
+    if (row := row_done(task)) is not None:
+        return row
     error = future.exception() if future.status == "error" else None
-    why = f"{type(error).__name__}: {error}" if error else future.status
+    why = f"{type(error).__name__}: {error}" if error else f"what became of it was not told ({future.status})"
     return failed(task.title, task.source, f"the cluster gave it up: {printable(why)[:300]}", 1)

@@ -1,16 +1,21 @@
-"""A campaign as a process, and what it leaves."""
+"""A campaign and a Dask cluster as processes, and what they leave."""
 
 from __future__ import annotations
 
 import csv
+import dataclasses
+import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import h5py
 import numpy as np
+
+from live.batch.workers import there
 
 ROOT = Path(__file__).parents[3]
 
@@ -64,3 +69,49 @@ def is_gone(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").split(") ")[1][0] == "Z"
     except OSError:
         return True
+
+
+# -- a cluster ----------------------------------------------------------------------------------
+
+HERE = ["--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"]
+ONE_THREAD = dict.fromkeys(there.NEEDED, "1")
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Running:
+    """A scheduler and its workers."""
+
+    address: str
+    scheduler: subprocess.Popen[bytes]
+    workers: list[subprocess.Popen[bytes]]
+
+    @property
+    def pids(self) -> list[int]:
+        return [process.pid for process in (self.scheduler, *self.workers)]
+
+
+def dask(role: str, *words: object, **more: str) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", f"distributed.cli.dask_{role}", *map(str, words)]
+    nothing = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    return subprocess.Popen(command, cwd=ROOT, env=os.environ | more, **nothing)
+
+
+@contextmanager
+def running(folder: Path, workers: int = 2, **more: str) -> Iterator[Running]:
+    """As docs/scale.md says to start them."""
+    from distributed import Client
+
+    told = folder / "scheduler.json"
+    scheduler = dask("scheduler", *HERE, "--port", 0, "--scheduler-file", told)
+    one = ["--scheduler-file", told, "--nthreads", 1, "--no-nanny", *HERE, "--local-directory", folder]
+    made = [dask("worker", *one, **(more or ONE_THREAD)) for _ in range(workers)]
+    try:
+        until(told.exists)
+        with Client(scheduler_file=str(told), set_as_default=False, timeout=30) as client:
+            client.wait_for_workers(workers, timeout=60) if workers else None
+            address = client.scheduler.address
+        yield Running(address, scheduler, made)
+    finally:
+        for process in (*made, scheduler):
+            process.kill()
+            process.wait()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import re
 import signal
@@ -21,50 +20,20 @@ from live.batch.workers import cluster, there
 from live.cli import main
 from live.results import Strain
 from tests.live.batch.conftest import SETTINGS
-from tests.live.batch.running import ROOT, differing, is_gone, parts, pid_of, rows, started, until
-
-HERE = ["--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"]
-ONE_THREAD = dict.fromkeys(there.NEEDED, "1")
-
-
-@dataclasses.dataclass(frozen=True, slots=True, eq=False)
-class Running:
-    """A scheduler and its workers."""
-
-    address: str
-    scheduler: subprocess.Popen[bytes]
-    workers: list[subprocess.Popen[bytes]]
-
-    @property
-    def pids(self) -> list[int]:
-        return [process.pid for process in (self.scheduler, *self.workers)]
-
-
-def dask(role: str, *words: object, **more: str) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", f"distributed.cli.dask_{role}", *map(str, words)]
-    nothing = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    return subprocess.Popen(command, cwd=ROOT, env=os.environ | more, **nothing)
-
-
-@contextmanager
-def running(folder: Path, workers: int = 2, **more: str) -> Iterator[Running]:
-    """As docs/scale.md says to start them."""
-    from distributed import Client
-
-    told = folder / "scheduler.json"
-    scheduler = dask("scheduler", *HERE, "--port", 0, "--scheduler-file", told)
-    one = ["--scheduler-file", told, "--nthreads", 1, "--no-nanny", *HERE, "--local-directory", folder]
-    made = [dask("worker", *one, **(more or ONE_THREAD)) for _ in range(workers)]
-    try:
-        until(told.exists)
-        with Client(scheduler_file=str(told), set_as_default=False, timeout=30) as client:
-            client.wait_for_workers(workers, timeout=60) if workers else None
-            address = client.scheduler.address
-        yield Running(address, scheduler, made)
-    finally:
-        for process in (*made, scheduler):
-            process.kill()
-            process.wait()
+from tests.live.batch.running import (
+    HERE,
+    ONE_THREAD,
+    Running,
+    dask,
+    differing,
+    is_gone,
+    parts,
+    pid_of,
+    rows,
+    running,
+    started,
+    until,
+)
 
 
 @pytest.fixture(scope="module")
