@@ -10,6 +10,7 @@ import contextlib
 import logging
 import queue
 import uuid
+from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,7 +25,12 @@ from live.tell import Screen
 log = logging.getLogger(__name__)
 RETRIES = 2  # of a task that raised; one whose worker died is given to another three times by Dask itself
 _ANSWER_S = 10
+_ROOM, _LEAST_ROOM = (
+    4,
+    200,
+)  # tasks a worker, and of all, that the scheduler is given; 10,000 at once silence it
 _GONE_S = 5.0  # without the scheduler
+_QUIET_S = 15.0  # without a task that ends
 
 
 class Cluster:
@@ -51,13 +57,14 @@ class Cluster:
         self._topic = f"phasedic-{uuid.uuid4().hex}"
         self._tasks: dict[str, Task] = {}
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
-        self._left: dict[str, Any] = {}
-        self._gone_s = 0.0
+        self._waiting, self._left = deque(tasks), dict[str, Any]()
+        self._gone_s = self._quiet_s = 0.0
+        self._room = _LEAST_ROOM
         self._client = _connected(address)
         try:
             self._prepare(Path(tasks[0].out if not tasks[0].of else Path(tasks[0].out).parent))
             self._client.subscribe_topic(self._topic, self._hear)
-            self._submit(tasks)
+            self._feed()
         except BaseException:
             self._client.close()
             raise
@@ -72,12 +79,22 @@ class Cluster:
         rows = self._fetched([future for _, future in ended if future.status == "finished"])
         for task, future in ended:
             self._take(task, rows.get(future.key) or _given_up(task, future))
+        self._feed()
+        self._look(0.0 if ended else seconds)
         self._gone_s = 0.0 if self._client.status == "running" else self._gone_s + seconds
         if self._gone_s > _GONE_S:
             raise DataError(
                 f"{self._address}: the scheduler has gone; what is whole is kept: start it, and call again"
             )
-        return not self._left
+        return not self._left and not self._waiting
+
+    def _look(self, quiet_s: float) -> None:
+        """Tell where nobody is left to work."""
+        self._quiet_s = self._quiet_s + quiet_s if quiet_s else 0.0
+        if self._quiet_s > _QUIET_S and self._client.status == "running":
+            self._quiet_s = 0.0
+            if not self._client.nthreads():
+                self._screen.say(f"note: {self._address} has no workers any more; waiting for some")
 
     def close(self) -> None:
         """Take back what has not begun, and let go of the scheduler; what a worker has begun it ends."""
@@ -99,6 +116,7 @@ class Cluster:
         check(self._address, found)
         for words in advice(found):
             self._screen.say(words)
+        self._room = max(_LEAST_ROOM, _ROOM * len(found))
         self._compile(found)
 
     def _ask(self, function: Any, *arguments: Any) -> dict[str, Any]:
@@ -120,6 +138,12 @@ class Cluster:
         self._client.gather(futures, errors="skip")
 
     # -- the tasks ------------------------------------------------------------------------------
+
+    def _feed(self) -> None:
+        """Keep the scheduler at work, with no more than it can look through at once."""
+        if self._client.status == "running" and len(self._left) <= self._room // 2:
+            count = min(len(self._waiting), self._room - len(self._left))
+            self._submit([self._waiting.popleft() for _ in range(count)])
 
     def _submit(self, tasks: Sequence[Task]) -> None:
         if not tasks:
@@ -157,7 +181,7 @@ class Cluster:
         if self._client.status != "running" and not row.is_done:
             return  # the scheduler is going, as ``wait`` will tell
         if self._left.pop(task.title, None) is not None:
-            self._submit(self._done(task, row))
+            self._waiting.extendleft(self._done(task, row))
 
 
 def _connected(address: str) -> Any:

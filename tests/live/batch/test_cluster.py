@@ -88,8 +88,15 @@ def test_twelve_tests_as_by_the_pool(runs: Path, done: Path, standing: Running, 
 
 
 def test_a_long_one_in_chunks(
-    long: Path, standing: Running, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    long: Path,
+    standing: Running,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    """Also with a scheduler that is given no more than two tasks at a time."""
+    monkeypatch.setattr(cluster, "_LEAST_ROOM", 2)
+    monkeypatch.setattr(cluster, "_ROOM", 1)
     words = ["batch", str(long), "--zoi", "48", "--step", "16", "--chunk", "10", "--out"]
     assert main([*words, str(tmp_path / "there"), "--scheduler", standing.address]) == 0
     told = capsys.readouterr().out
