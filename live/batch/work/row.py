@@ -86,6 +86,7 @@ def row_of(name: str, source: str, done: Replayed, seconds: float) -> Row:
             "exit_code": code,
             "error": said,
             **_settings(done.config),
+            "burst": done.config.measure.burst or _burst(done),
             **_counts(history),
             **_figures(evaluate(history, done.books.loads, done.config.specimen), done.config),
             **_noise(history),
@@ -99,9 +100,15 @@ def row_of(name: str, source: str, done: Replayed, seconds: float) -> Row:
 
 def _settings(config: Config) -> dict[str, Any]:
     measure = config.measure
-    names = ("burst", "order", "window", "estimator", "strain")
+    names = ("order", "window", "estimator", "strain")
     found = {name: getattr(measure, name) for name in names}
     return {"zoi_px": measure.zoi, "step_px": measure.step, **found}
+
+
+def _burst(done: Replayed) -> int | None:
+    """Frames in a burst where nobody said how many."""
+    instants = len(done.books.history.instants)
+    return round(done.books.ledger.measured / instants) if instants else None
 
 
 def _counts(history: History) -> dict[str, Any]:

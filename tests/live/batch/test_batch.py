@@ -35,6 +35,7 @@ def test_twelve_tests_in_one_table(done: Path) -> None:
         f"{k}-{n}" for k in ("hole", "uniform", "woven") for n in (1, 2, 3, 4)
     )
     assert {(row["outcome"], row["zoi_px"], row["exit_code"]) for row in table} == {("done", "48", "0")}
+    assert {row["burst"] for row in table} == {"2"}
     assert all(float(row["Rm_MPa"]) > 0 and 0 < float(row["strain_noise"]) < 0.01 for row in table)
     typed = parquet.read_table(done / "summary.parquet")
     assert typed.column("test").to_pylist() == [row["test"] for row in table]
