@@ -16,6 +16,10 @@ from collections.abc import Callable, Sequence
 from live.batch.work import Progress, Row, Task, failed
 from live.batch.workers.there import ONE_THREAD
 
+# Of glibc: what one task leaves free goes back to the system before the next one.
+_LEAN = {
+    "MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "6000000", "MALLOC_TRIM_THRESHOLD_": "20000000",
+}  # fmt: skip
 MOST_DEATHS = 3
 _LAST_S = 5.0
 
@@ -120,7 +124,7 @@ class _Worker:
             [sys.executable, "-m", "live.batch.workers"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            env=os.environ | dict.fromkeys(ONE_THREAD, "1"),
+            env=_LEAN | os.environ | dict.fromkeys(ONE_THREAD, "1"),
             text=True,
             encoding="utf-8",
         )
