@@ -84,12 +84,20 @@ class Session(Closing):
     @property
     def indices(self) -> NDArray[np.int64]:
         """Sequence numbers of the frames, (N,)."""
-        return np.concatenate([part.columns["index"] for part in self._parts])
+        return self.frame_column("index")
 
     @property
     def times(self) -> NDArray[np.float64]:
         """Times of the frames, (N,) monotonic s."""
-        return np.concatenate([part.columns["monotonic_s"] for part in self._parts])
+        return self.frame_column("monotonic_s")
+
+    def frame_column(self, name: str) -> NDArray[Any]:
+        """A column of the table of frames (``layout.FRAME_COLUMNS``), (N,); no picture is read."""
+        return np.concatenate([part.columns[name] for part in self._parts])
+
+    def burst_column(self, name: str) -> NDArray[Any]:
+        """A column of the table of bursts (``layout.BURST_COLUMNS``), (burst_count,)."""
+        return np.concatenate([part.bursts[name] for part in self._parts])
 
     def frame(self, number: int) -> Frame:
         """The frame recorded as ``number``, 0 .. len - 1.

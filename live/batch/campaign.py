@@ -11,13 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError, PhasedicError
-from live.batch import places
-from live.batch.keys import key_of
+from live.batch.course import Course
+from live.batch.cutting import Cut, cut, sweep_chunks
 from live.batch.listed import Listed
-from live.batch.row import Row, failed
 from live.batch.standing import Standing
 from live.batch.summary import write_summary
-from live.batch.task import Task, row_done
+from live.batch.work import Row, Task, failed, key_of, row_done, sweep, sweep_whole
 from live.setup import compile_ahead, load_config
 from live.tell import Screen
 
@@ -40,6 +39,10 @@ class Wanted:
         For all; those of a test go before them.
     start_s, end_s : float or None, s
     as_measured : bool
+    chunk_s : float or None, s
+        Cut longer sessions into chunks of about this length.
+    scheduler : str or None
+        Of a Dask cluster that does the work in the place of ``workers`` processes of this machine.
     """
 
     tests: Sequence[Listed]
@@ -50,6 +53,8 @@ class Wanted:
     start_s: float | None = None
     end_s: float | None = None
     as_measured: bool = False
+    chunk_s: float | None = None
+    scheduler: str | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,19 +91,26 @@ def run_campaign(wanted: Wanted, screen: Screen, stopping: threading.Event) -> C
     load_config(Path(wanted.config) if wanted.config else None, wanted.overrides)
     _make(wanted.out)
     rows, tasks = _planned(wanted)
-    places.sweep(wanted.out)
+    _sweep(wanted.out, rows, tasks)
     ready = len(wanted.tests) - len(tasks)
     screen.say(f"{len(wanted.tests)} tests: {ready} as they are, {len(tasks)} to replay into {wanted.out}")
     if tasks:
         _work(wanted, tasks, rows, screen, stopping)
-    places.sweep(wanted.out)
-    places.sweep_whole(wanted.out, {name for name, row in rows.items() if row.is_done})
+    _sweep(wanted.out, rows, tasks)
     if stopping.is_set():
         return Campaign(tuple(rows.values()), len(tasks), (), 130)
     found = tuple(rows[test.name] for test in wanted.tests)
     files = write_summary(found, wanted.out)
     code = 0 if all(row.is_well for row in found) else 5
     return Campaign(found, len(tasks), tuple(files), code)
+
+
+def _sweep(out: Path, rows: Mapping[str, Row], tasks: Sequence[Task]) -> None:
+    """Remove what nobody works on and nobody needs."""
+    done = {name for name, row in rows.items() if row.is_done}
+    sweep(out)
+    sweep_whole(out, done)
+    sweep_chunks(out, done, {task.name: task for task in tasks})
 
 
 def _make(out: Path) -> None:
@@ -144,6 +156,7 @@ def _task(wanted: Wanted, test: Listed) -> Task:
         start_s=wanted.start_s,
         end_s=wanted.end_s,
         as_measured=wanted.as_measured,
+        chunk_s=wanted.chunk_s,
         overrides={**wanted.overrides, **test.overrides},
     )
 
@@ -156,21 +169,30 @@ def _work(
     wanted: Wanted, tasks: Sequence[Task], rows: dict[str, Row], screen: Screen, stopping: threading.Event
 ) -> None:
     from analysis import PICTURE_KINDS
-    from live.batch.pool import Pool
+    from live.batch.workers import Cluster, Pool
 
-    compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
+    if wanted.scheduler is None:
+        compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
     standing = Standing(len(tasks), time.monotonic)
-
-    def done(task: Task, row: Row) -> None:
-        rows[task.name] = row
-        standing.done(task.name)
-        if not row.is_well:
-            screen.say(row.words)
-
-    pool = Pool(tasks, wanted.workers, lambda task, progress: standing.told(task.name, progress), done)
+    course = Course(tasks, _cuts(tasks, screen), rows, standing, screen)
+    first = course.first()
+    workers: Pool | Cluster
+    if wanted.scheduler is None:
+        workers = Pool(first, wanted.workers, course.told, course.done)
+    else:
+        workers = Cluster(first, wanted.scheduler, course.told, course.done, screen)
     try:
-        while not pool.wait(_LOOK_S) and not stopping.is_set():
+        while not workers.wait(_LOOK_S) and not stopping.is_set():
             screen.status(standing.words())
     finally:
-        pool.close()
+        workers.close()
     screen.say(standing.words())
+
+
+def _cuts(tasks: Sequence[Task], screen: Screen) -> dict[str, Cut]:
+    """The chunks of those that are to be cut; said where one cannot be."""
+    found = {task.name: cut(task) for task in tasks if task.chunk_s is not None}
+    for name, one in found.items():
+        if one.why:
+            screen.say(f"{name}: done whole: {one.why}")
+    return found

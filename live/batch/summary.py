@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import DataError
-from live.batch.row import COLUMNS, Row, Value
+from live.batch.work import COLUMNS, Row, Value
 
 
 def write_summary(rows: Sequence[Row], out: Path) -> list[Path]:

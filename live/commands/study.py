@@ -39,7 +39,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--window", type=_windows, default=["gaussian"], metavar="NAME,NAME", help="weights")
     words = "seconds in which nothing moves (default: as the force tells)"
-    parser.add_argument("--static", type=_seconds, metavar="A,B", help=words)
+    words += "; none: there were none, the noise is the predicted one"
+    parser.add_argument("--static", type=_still, metavar="A,B", help=words)
     words = "seconds of the load to be studied (default: about the highest force)"
     parser.add_argument("--loaded", type=_seconds, metavar="C,D", help=words)
     words = "folder to make: table, figures, measure.toml"
@@ -64,7 +65,10 @@ def command(arguments: argparse.Namespace) -> int:
     request = ReplayRequest(arguments.source, False, None, None, None, config_file, overrides(arguments))
     with open_material(request) as (material, config):
         if AUTO in (config.measure.roi, config.measure.gauges):
-            raise ConfigError("a study does not look for the specimen; give --roi x,y,width,height or all")
+            raise ConfigError(
+                "a study does not look for the specimen; give --roi x,y,width,height or all, or the --mask that"
+                " 'phasedic replay' leaves beside its results"
+            )
         compile_ahead(kinds_of(material.camera), phase=config.measure.estimator == "phase", say=screen.status)
         windows = take_windows(material, arguments.static, arguments.loaded)
         n = f"{len(windows.still)} still and {len(windows.loaded)} loaded bursts"
@@ -106,9 +110,10 @@ _HEAD = (
 def _line(one: Found) -> str:
     s = one.setting
     mark = "" if one.is_told else "  noise"
+    over = f"{one.noise / one.predicted:.2f}" if one.measured else "-"
     return (
         f"{s.zoi:5d} {s.step:4d} {s.order:5d} {s.window:12s} {one.l10:7.1f} {one.vsg:7.1f} {one.noise * 1e6:11.1f}"
-        f" {one.noise / one.predicted:15.2f} {one.seen * 1e6:12.0f} {one.sigma * 1e6:5.0f}"
+        f" {over:>15s} {one.seen * 1e6:12.0f} {one.sigma * 1e6:5.0f}"
         f" {one.gradient * 1e6:17.1f} {one.valid:6.0%}{mark}"
     )
 
@@ -173,6 +178,12 @@ def _windows(word: str) -> list[str]:
         if part not in WINDOWS:
             raise argparse.ArgumentTypeError(f"{part!r}: there are {', '.join(WINDOWS)}")
     return word.split(",")
+
+
+def _still(word: str) -> tuple[float, float]:
+    from live.study import NEVER
+
+    return NEVER if word == "none" else _seconds(word)
 
 
 def _seconds(word: str) -> tuple[float, float]:

@@ -54,7 +54,7 @@ class _Reader(Generic[Item]):
         self._thread.join()
 
 
-def ahead(items: Iterable[Item], room: int = 4) -> Generator[Item]:
+def ahead(items: Iterable[Item], room: int = 2) -> Generator[Item]:
     """The same items in the same order, up to ``room`` of them taken ahead by a thread of their own.
 
     What ``items`` raises is raised here, after those that came before. Closing the iterator ends the thread.

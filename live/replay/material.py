@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from acquire.clock import ClockPair
 from acquire.errors import ConfigError, DataError
@@ -34,6 +37,10 @@ class ReplayRequest:
         A CSV with the forces (``live.replay.forces``).
     config_file : Path or None
     overrides : mapping of "section.key" to value
+    numbers : range or None
+        Of the bursts within that part those from this number on, up to that one, by their order; of a session alone.
+    parts : sequence of Path
+        What ``measure_part`` has stored of all of it, in order: told, and not measured again.
     settled : Path or None
         Where the folder of the results will lie in the end, if that is not where they are written.
     """
@@ -46,6 +53,8 @@ class ReplayRequest:
     config_file: Path | None
     overrides: Mapping[str, Any]
     forces: Path | None = None
+    numbers: range | None = None
+    parts: Sequence[Path] = ()
     settled: Path | None = None
 
 
@@ -80,6 +89,8 @@ class Material:
     ----------
     expected : int or None
         How many bursts there will be at most, where that is known.
+    times : (B,) float64 or None, s
+        Of the bursts, where they are known before they are read.
     seen : Seen or None
         The pictures so far; None for a session, whose bursts say what was lost.
     """
@@ -92,6 +103,7 @@ class Material:
     events: tuple[Event, ...] = ()
     samples: tuple[LoadSample, ...] = ()
     expected: int | None = None
+    times: NDArray[np.float64] | None = None
     seen: Seen | None = None
 
 
@@ -119,6 +131,17 @@ class Window:
         high = math.inf if request.end_s is None else origin + request.end_s
         return cls(low, high, origin)
 
+    def holds(self, t: float) -> bool:
+        """Whether a burst of that time is measured."""
+        return self.low <= t <= self.high
+
+    def numbers(self, times: NDArray[np.float64]) -> range:
+        """Of bursts in order, those to be read: within; where none is, the last one, for ``part`` to tell of."""
+        inside = np.flatnonzero((times >= self.low) & (times <= self.high))
+        if not inside.size:
+            return range(max(0, len(times) - 1), len(times))
+        return range(int(inside[0]), int(inside[-1]) + 1)
+
     def part(self, bursts: Iterable[Work]) -> Iterator[Work]:
         """Those within; raises DataError at the end where there was a burst, but none within."""
         last, found = math.nan, False
@@ -127,7 +150,7 @@ class Window:
                 yield item
                 continue
             last = item.t
-            if self.low <= last <= self.high:
+            if self.holds(last):
                 found = True
                 yield item
         if not found and not math.isnan(last):

@@ -5,13 +5,37 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 
 from acquire.events import ignore_event
 from acquire.session import Session
 from live.replay.material import Material, ReplayRequest, check_window
 from live.replay.pictures import picture_material
 from live.replay.session import session_config, session_material, session_path
-from live.setup import Config, load_config, open_rig
+from live.setup import AUTO, Config, load_config, open_rig, other_digits
+from live.tell import Screen
+
+
+@contextmanager
+def opened_session(path: Path, request: ReplayRequest, screen: Screen) -> Iterator[tuple[Material, Config]]:
+    """A session for a replay, with what is to be said of it; raises as ``replay``."""
+    with Session.open(path) as session:
+        for note in _notes(session, request):
+            screen.say(f"note: {note}")
+        overrides = {"camera.address": f"session:{path}", "load.address": f"session:{path}"}
+        config = session_config(session, request, overrides, path)
+        if request.overrides.get("measure.roi") == AUTO and "measure.mask" not in request.overrides:
+            config = replace(config, measure=replace(config.measure, mask=None))  # the one it found then
+        yield session_material(session, request, config, path), config
+
+
+def _notes(session: Session, request: ReplayRequest) -> Iterator[str]:
+    if session.recovered:
+        yield session.recovered
+    if session.mode.every > 1:
+        yield f"one frame in {session.mode.every} was recorded; measured as a slower camera"
+    if request.as_measured and (otherwise := other_digits(session.versions)):
+        yield f"recorded with {', '.join(otherwise)}; the last digits of the results may differ"
 
 
 @contextmanager

@@ -13,38 +13,31 @@ import time
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
 
 from acquire.addresses import parse_address
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
-from acquire.frame import Burst
 from acquire.opencv import picture_times
-from acquire.session import Session
-from live.measure import History, averaged, kinds_of, measure, prepare
+from live.measure import History
 from live.outputs import About, Outputs, make_outputs
 from live.replay.ahead import ahead
 from live.replay.forces import read_forces
 from live.replay.material import Material, ReplayRequest, Work, check_window
+from live.replay.opened import opened_session
+from live.replay.parts import Recital
 from live.replay.pictures import picture_material, picture_of, write_names
-from live.replay.session import session_config, session_material, session_path
+from live.replay.prepared import prepared
+from live.replay.session import session_path
 from live.setup import (
     AUTO,
     Config,
-    compile_ahead,
-    correction,
-    gauges_for,
-    grid_for,
-    kernel_settings,
     load_config,
     make_folder,
     open_rig,
-    other_digits,
-    read_mask,
     with_mask,
 )
-from live.specimen import Look, is_sought, placed_on
+from live.specimen import is_sought
 from live.tell import Books, Journal, Ledger, Screen
 
 _MOST_TOLD = 5  # pictures that were left out, in the summary
@@ -86,20 +79,8 @@ def replay(request: ReplayRequest, screen: Screen, stopping: threading.Event) ->
     check_window(request)
     if path is None:
         return _replay_pictures(request, screen, stopping)
-    with Session.open(path) as session:
-        if session.recovered:
-            screen.say(f"note: {session.recovered}")
-        if session.mode.every > 1:
-            screen.say(f"note: one frame in {session.mode.every} was recorded; measured as a slower camera")
-        if request.as_measured and (otherwise := other_digits(session.versions)):
-            screen.say(
-                f"note: recorded with {', '.join(otherwise)}; the last digits of the results may differ"
-            )
-        overrides = {"camera.address": f"session:{path}", "load.address": f"session:{path}"}
-        config = session_config(session, request, overrides, path)
-        if request.overrides.get("measure.roi") == AUTO and "measure.mask" not in request.overrides:
-            config = replace(config, measure=replace(config.measure, mask=None))  # the one it found then
-        material = _with_forces(session_material(session, request, config, path), request, config)
+    with opened_session(path, request, screen) as (found, config):
+        material = _with_forces(found, request, config)
         return _run(material, config, request, screen, stopping, Journal())
 
 
@@ -158,39 +139,20 @@ def _run(
     stopping: threading.Event,
     journal: Journal,
 ) -> Replayed:
-    camera = material.camera
-    mask = read_mask(config.measure.mask, camera.width, camera.height)
-    if AUTO in (config.measure.roi, config.measure.gauges):
-        seen = Look(material.reference.mean, _noise_of(material.reference), camera)
-        config, mask = placed_on(config, seen, screen.say)
-    grid = grid_for(config, camera.width, camera.height, mask)
-    correct, gauges = correction(config, camera), gauges_for(config, grid)
-    settings, stated = kernel_settings(config), config.measure.noise_GL
-    compile_ahead(kinds_of(camera), phase=settings.estimator == "phase", say=screen.status)
-    what = f"the reference of {request.source}"
-    kernel, noise_GL = prepare(material.reference, grid, settings, stated, correct, what)
-    bursts = _not_empty(material.bursts, request.source)
-    folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
-    config = _settled(with_mask(config, mask, folder), request.settled)
+    ready = prepared(material, config, request.source, screen)
+    stored = Recital.of(request.parts, ready)
+    measured = stored.measurements if stored else ready.measurements
+    bursts = _not_empty(stored.bursts() if stored else material.bursts, request.source)
+    folder = make_folder(ready.config.output.dir, datetime.datetime.now(datetime.UTC))
+    config = _settled(with_mask(ready.config, ready.mask, folder), request.settled)
     books = Books(journal, Ledger(), material.loads, History())
     write_names(request.source, folder / "pictures.csv")
     screen.say(f"replaying {request.source} into {request.settled or folder}")
-    outputs = make_outputs(About(config, folder, camera, grid, material.start), books, screen)
+    outputs = make_outputs(About(config, folder, material.camera, ready.grid, material.start), books, screen)
     began, work = time.perf_counter(), ahead(bursts)
     try:
         _give_past(material, outputs)
-        for m in measure(
-            work,
-            kernel,
-            material.loads,
-            noise_GL=noise_GL,
-            correct=correct,
-            gauges=gauges,
-            renew_at=config.measure.renew_at,
-            strain=cast(Any, config.measure.strain),
-            on_event=books.journal,
-            timer=time.perf_counter,
-        ):
+        for m in measured(work, material.loads, books.journal):
             books.ledger.add(measured=m.burst.n, grabbed=m.burst.n, lost=m.burst.lost)
             outputs.frame(picture_of(m.burst))
             screen.progress(outputs.add(m), m.number + 1, material.expected, time.perf_counter() - began)
@@ -200,7 +162,8 @@ def _run(
     finally:
         work.close()
         outputs.end()
-    lines = [*_account(material, books), pace_line(books.history, took)]
+    pace = f"joined of {len(request.parts)} chunks" if request.parts else pace_line(books.history, took)
+    lines = [*_account(material, books), pace]
     left_out = material.seen.left_out if material.seen else 0
     lossy = outputs.failed or not books.history.told_something or left_out > 0
     code = 130 if stopping.is_set() else 5 if lossy else 0
@@ -243,11 +206,6 @@ def pace_line(history: History, seconds: float) -> str:
         f"{n} bursts in {seconds:.3g} s: {n / seconds:.3g} bursts/s, {zois / seconds:,.0f} ZOI/s, of that time"
         f" {share:.0%} in the kernel"
     )
-
-
-def _noise_of(reference: Burst) -> float | None:
-    """Of the mean, GL; None where one frame tells nothing."""
-    return averaged(reference.noise, reference.n) if reference.noise > 0 else None
 
 
 def _not_empty(bursts: Iterable[Work], source: str) -> Iterator[Work]:

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from acquire.addresses import parse_address
 from acquire.burst import LIMIT_PX
@@ -18,7 +21,7 @@ from acquire.session import Session
 from live.measure import NewReference
 from live.replay.material import Material, ReplayRequest, Window, Work
 from live.replay.pictures import reference_from
-from live.replay.store import DEFAULT_BURST, Store, open_store
+from live.replay.store import Store, open_store
 from live.setup import Config, from_dict, settings_in
 
 LIVE_ONLY = ("output", "record", "operate", "strain_out", "alarm")
@@ -98,30 +101,59 @@ def session_material(session: Session, request: ReplayRequest, config: Config, p
         reference, after = stored.first_burst(config.measure.reference_burst or 1)
     window = Window.of(request, session.start_monotonic)
     if request.as_measured:
-        bursts: Iterable[Work] = _as_measured(stored, events)
+        found = _measured_then(stored, events, window)
     else:
-        whole = session.mode.kind == "all"
-        n = config.measure.burst if whole else request.overrides.get("measure.burst")
-        bursts = stored.bursts_after(after, n, LIMIT_PX if config.measure.shorten_bursts else None)
+        n = config.measure.burst if session.mode.kind == "all" else request.overrides.get("measure.burst")
+        limit_px = LIMIT_PX if config.measure.shorten_bursts else None
+        found = _all_after(stored, after, n, limit_px, window, request.numbers)
     start = ClockPair(session.start_monotonic, session.start_utc)
-    expected = _expected(session, events, config) if request.as_measured else _expected(session, (), config)
-    return Material(session.camera, reference, window.part(bursts), loads, start, events, samples, expected)
+    bursts = window.part(found.bursts)
+    return Material(
+        session.camera, reference, bursts, loads, start, events, samples, found.expected, found.times
+    )
 
 
-def _expected(session: Session, measured: Iterable[Event], config: Config) -> int | None:
-    """How many bursts there will be at most: those ``measured``, else what the frames are enough for."""
-    told = sum(event.kind is EventKind.MEASURED for event in measured)
-    if told or session.mode.kind == "bursts" or config.measure.shorten_bursts:
-        return told or None
-    return len(session) // (1 if session.mode.every > 1 else config.measure.burst or DEFAULT_BURST)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """The bursts to measure; how many at most and when, where that is known."""
+
+    bursts: Iterable[Work]
+    expected: int | None = None
+    times: NDArray[np.float64] | None = None
 
 
-def _as_measured(stored: Store, events: Iterable[Event]) -> Iterator[Work]:
+def _all_after(
+    stored: Store, after: int, n: int | None, limit_px: float | None, window: Window, numbers: range | None
+) -> _Found:
+    """Every burst; where the pictures decide on their lengths, all must be read."""
+    if limit_px is not None:
+        return _Found(stored.shortened_after(after, n, limit_px))
+    places = stored.places_after(after, n)
+    found = window.numbers(places.t)
+    if numbers is not None:
+        found = found[numbers.start : numbers.stop]
+    return _Found(stored.bursts_at(places, found), len(found), places.t[found.start : found.stop])
+
+
+def _measured_then(stored: Store, events: Iterable[Event], window: Window) -> _Found:
+    """The bursts of the live run."""
+    wanted = _measured_within(events, window)
+    return _Found(_as_measured(stored, events, wanted), len(wanted) or None)
+
+
+def _measured_within(events: Iterable[Event], window: Window) -> set[int]:
+    """The first frames of the bursts to be read: those within; where none is, the last, for ``window`` to tell of."""
+    told = [event for event in events if event.kind is EventKind.MEASURED]
+    inside = [event for event in told if window.holds(event.t)] or told[-1:]
+    return {int(event.data["first"]) for event in inside}
+
+
+def _as_measured(stored: Store, events: Iterable[Event], wanted: set[int]) -> Iterator[Work]:
     for event in events:
         renewed = event.kind is EventKind.REFERENCE and event.data.get("renewed")
         if renewed and not event.data.get("automatic"):  # the pipeline does those again by itself
             yield NewReference(stored.burst(event.data))
-        elif event.kind is EventKind.MEASURED:
+        elif event.kind is EventKind.MEASURED and int(event.data["first"]) in wanted:
             burst = stored.burst(event.data)
             # Sessions of older programs do not say it; then it is what the burst itself knows.
             lost = event.data.get("lost")

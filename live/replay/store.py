@@ -8,10 +8,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
+import numpy as np
+
 from acquire.burst import BurstAccumulator, average_bursts, burst_of
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Burst, Frame
 from acquire.session import Session
+from live.replay.places import Places, places_of_bursts, places_of_frames
 
 DEFAULT_BURST = 4  # of a session whose configuration says nothing
 
@@ -27,10 +30,16 @@ class Store(Protocol):
         """The first n frames, and the sequence number of the last; DataError where there are none."""
         ...
 
-    def bursts_after(
-        self, last: int, n: int | None, shorten_above_px: float | None = None
-    ) -> Iterator[Burst]:
+    def places_after(self, last: int, n: int | None) -> Places:
         """All bursts of n frames after sequence number ``last``; None: as they were recorded."""
+        ...
+
+    def bursts_at(self, places: Places, numbers: range) -> Iterator[Burst]:
+        """Those of ``places`` with these numbers, one after the other; nothing else is read."""
+        ...
+
+    def shortened_after(self, last: int, n: int | None, limit_px: float) -> Iterator[Burst]:
+        """All bursts of at most n frames, fewer where the picture moves by more than ``limit_px``."""
         ...
 
 
@@ -67,11 +76,15 @@ class _Frames:
             f"{self._path}: fewer than {n} frames without a gap; give a smaller --reference-burst"
         )
 
-    def bursts_after(
-        self, last: int, n: int | None, shorten_above_px: float | None = None
-    ) -> Iterator[Burst]:
+    def places_after(self, last: int, n: int | None) -> Places:
+        return places_of_frames(self._session, last, n or DEFAULT_BURST)
+
+    def bursts_at(self, places: Places, numbers: range) -> Iterator[Burst]:
+        return average_bursts(self._session.frames(*places.rows(numbers)), places.n)
+
+    def shortened_after(self, last: int, n: int | None, limit_px: float) -> Iterator[Burst]:
         frames = self._between(last + 1, self._indices[-1])
-        accumulator = BurstAccumulator(n or DEFAULT_BURST, shorten_above_px=shorten_above_px)
+        accumulator = BurstAccumulator(n or DEFAULT_BURST, shorten_above_px=limit_px)
         return (burst for burst in map(accumulator.add, frames) if burst is not None)
 
     def _between(self, first: int, last: int) -> Iterator[Frame]:
@@ -101,15 +114,18 @@ class _EveryKth(_Frames):
             raise DataError(f"{self._path}: fewer than {n} whole frames; give a smaller --reference-burst")
         return _averaged(frames), frames[-1].index
 
-    def bursts_after(
-        self, last: int, n: int | None, shorten_above_px: float | None = None
-    ) -> Iterator[Burst]:
+    def places_after(self, last: int, n: int | None) -> Places:
         if n is not None and n > 1:
             raise ConfigError(
                 f"{self._path} holds only one frame in {self._session.mode.every}, {n} of them are no burst;"
                 " give --burst 1"
             )
-        return average_bursts(self._between(last + 1, self._indices[-1]), 1)
+        return super().places_after(last, 1)
+
+    def shortened_after(self, last: int, n: int | None, limit_px: float) -> Iterator[Burst]:
+        """A frame cannot be shortened."""
+        places = self.places_after(last, n)
+        return self.bursts_at(places, range(len(places.t)))
 
 
 def _averaged(frames: Sequence[Frame]) -> Burst:
@@ -123,9 +139,12 @@ class _Bursts:
 
     def __init__(self, session: Session, path: Path) -> None:
         self._session, self._path = session, path
-        self._numbers = {
-            (burst.first_index, burst.last_index): number for number, burst in enumerate(session.bursts())
-        }
+        ends = zip(
+            session.burst_column("first_index").tolist(),
+            session.burst_column("last_index").tolist(),
+            strict=True,
+        )
+        self._numbers = {pair: number for number, pair in enumerate(ends)}
         if not self._numbers:
             raise DataError(f"{path}: the session holds no bursts; there is nothing to replay")
 
@@ -141,13 +160,18 @@ class _Bursts:
     def first_burst(self, n: int) -> tuple[Burst, int]:
         raise ConfigError(f"{self._path} holds bursts, not frames; --reference-burst cannot be changed")
 
-    def bursts_after(
-        self, last: int, n: int | None, shorten_above_px: float | None = None
-    ) -> Iterator[Burst]:
-        for burst in self._session.bursts():
-            if burst.first_index > last:
-                if n is not None and burst.n != n:
-                    raise ConfigError(
-                        f"{self._path} holds bursts of {burst.n} frames; give --burst {burst.n}"
-                    )
-                yield burst
+    def places_after(self, last: int, n: int | None) -> Places:
+        places = places_of_bursts(self._session, last)
+        lengths = self._session.burst_column("n")[places.starts]
+        if n is not None and np.any(other := lengths != n):
+            length = int(lengths[np.argmax(other)])
+            raise ConfigError(f"{self._path} holds bursts of {length} frames; give --burst {length}")
+        return places
+
+    def bursts_at(self, places: Places, numbers: range) -> Iterator[Burst]:
+        return map(self._session.burst, places.starts[numbers.start : numbers.stop].tolist())
+
+    def shortened_after(self, last: int, n: int | None, limit_px: float) -> Iterator[Burst]:
+        """They are as they were recorded."""
+        places = self.places_after(last, n)
+        return self.bursts_at(places, range(len(places.t)))

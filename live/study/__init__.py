@@ -4,6 +4,6 @@
 """
 
 from live.study.study import Advice, Found, Setting, recommended, study
-from live.study.windows import Windows, take_windows
+from live.study.windows import NEVER, Windows, take_windows
 
-__all__ = ["Advice", "Found", "Setting", "Windows", "recommended", "study", "take_windows"]
+__all__ = ["NEVER", "Advice", "Found", "Setting", "Windows", "recommended", "study", "take_windows"]

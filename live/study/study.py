@@ -55,7 +55,10 @@ class Found:
     ----------
     setting : Setting
     noise, predicted : float
-        Standard deviation of the strain along the load of one ZOI, over the ZOIs of still instants.
+        Standard deviation of the strain along the load of one ZOI, over the ZOIs of still instants; the same as
+        predicted where nothing was still.
+    measured : bool
+        Whether something was.
     l10, vsg : float, px
         Period of a strain that has lost 10 %; side of the square with the same noise.
     seen, sigma : float
@@ -75,6 +78,7 @@ class Found:
     sigma: float
     gradient: float
     valid: float
+    measured: bool = True
 
     @property
     def is_told(self) -> bool:
@@ -130,27 +134,33 @@ def _fields(
 
 def _found(setting: Setting, axis: str, still: list[StrainField], loaded: list[StrainField]) -> Found:
     name = "exx" if axis == "x" else "eyy"
-    at_rest = np.stack([np.asarray(getattr(field, name), np.float64) for field in still])
-    pulled = np.stack([np.asarray(getattr(field, name), np.float64) for field in loaded])
+    pulled = _stacked(loaded, name)
+    at_rest = _stacked(still, name) if still else np.zeros((2, *pulled.shape[1:]))
     known = np.isfinite(at_rest).all(0) & np.isfinite(pulled).all(0)
     if known.sum() < 2:
         raise ConfigError(f"{setting.words}: fewer than two ZOIs have a value in both windows; leave it out")
-    noise = math.sqrt(float(np.mean([np.var(one[known], ddof=1) for one in at_rest])))
-    variances = [float(np.mean(np.asarray(getattr(field, f"sigma_{name}"))[known] ** 2)) for field in still]
+    sigmas = _stacked(still or loaded, f"sigma_{name}")
+    predicted = math.sqrt(float(np.mean(sigmas[:, known] ** 2)))
+    noise = math.sqrt(float(np.mean([np.var(one[known], ddof=1) for one in at_rest]))) if still else predicted
     first, second = (np.where(known, pulled[k::2].mean(0) - at_rest[k::2].mean(0), np.nan) for k in (0, 1))
-    grid = still[0].grid
-    share = 1 / len(pulled[1::2]) + 1 / len(still[1::2])
+    grid = loaded[0].grid
+    share = 1 / len(pulled[1::2]) + (1 / len(still[1::2]) if still else 0)
     return Found(
         setting=setting,
         noise=noise,
-        predicted=math.sqrt(float(np.mean(variances))),
+        predicted=predicted,
         l10=l10_strain(setting.zoi, cast(Any, setting.window)),
         vsg=gauge_length(setting.zoi, cast(Any, setting.window)),
         seen=_largest(first, second),
         sigma=noise * math.sqrt(share),
         gradient=max(_largest(np.diff(first, axis=k), np.diff(second, axis=k)) for k in (0, 1)) / grid.step,
         valid=float(np.isfinite(pulled).all(0).sum() / max(1, grid.n_active)),
+        measured=bool(still),
     )
+
+
+def _stacked(fields: Sequence[StrainField], name: str) -> Array:
+    return np.stack([np.asarray(getattr(field, name), np.float64) for field in fields])
 
 
 def _largest(first: Array, second: Array) -> float:

@@ -27,7 +27,7 @@ class Windows:
     Attributes
     ----------
     still, loaded : tuple of Burst
-        At least two each.
+        At least two each; no still ones where there were none.
     still_s, loaded_s : (float, float), s
         Since the start, as they were taken.
     """
@@ -38,8 +38,12 @@ class Windows:
     loaded_s: Seconds
 
 
+NEVER: Seconds = (math.inf, -math.inf)
+"""The still window of a test in which nothing was still."""
+
+
 def take_windows(material: Material, still: Seconds | None, loaded: Seconds | None) -> Windows:
-    """Read the bursts of both windows, s since the start; without one, as the force tells it.
+    """Read the bursts of both windows, s since the start; without one, as the force tells it; ``NEVER`` for none.
 
     Raises
     ------
@@ -60,7 +64,7 @@ def take_windows(material: Material, still: Seconds | None, loaded: Seconds | No
     for name, bursts, least, (low, high) in zip(
         ("static", "loaded"), found, (LEAST_STILL, LEAST_LOADED), told, strict=True
     ):
-        if len(bursts) < least:
+        if len(bursts) < least and (low, high) != NEVER:
             raise DataError(
                 f"{len(bursts)} bursts from {low:.3g} to {high:.3g} s, {least} are needed; give --{name} A,B"
             )

@@ -74,8 +74,10 @@ ROOMS = {
     " live.setup live.finished live.export",
     "live.show": "acquire analysis analysis.field analysis.evaluate live.measure live.setup live.tell live.finished"
     " live.view live.view.exchange",
-    "live.batch": "acquire acquire.camera acquire.files analysis analysis.evaluate live.measure live.replay live.setup"
-    " live.tell",
+    "live.batch.work": "acquire acquire.camera acquire.files analysis.evaluate live.measure live.replay live.results"
+    " live.setup live.tell",
+    "live.batch.workers": "acquire analysis live.setup live.tell live.batch.work",
+    "live.batch": "acquire acquire.files analysis live.replay live.setup live.tell live.batch.work live.batch.workers",
     "live.study": "acquire analysis.field analysis.quality live.measure live.replay live.setup",
     "live.serve.web": "acquire live.pace",
     "live.serve": "acquire acquire.camera acquire.files analysis.field analysis.evaluate live.measure live.setup"
@@ -93,13 +95,14 @@ STARTED = {
 }  # fmt: skip
 # The page judges the still specimen as the check does.
 MAY_START = {
-    "live.batch": {"live.replay"}, "live.study": {"live.replay"}, "live.serve": {"live.check"},
-    "live.characterise.experiments": {"live.characterise"},
+    "live.batch": {"live.replay"}, "live.batch.work": {"live.replay"}, "live.study": {"live.replay"},
+    "live.serve": {"live.check"}, "live.characterise.experiments": {"live.characterise"},
 }  # fmt: skip
 
 # Library -> the rooms that alone import it.
 LIBRARIES = {
     "ctypes": "acquire.v4l2",
+    "distributed": "live.batch.workers",
     "cv2": "acquire analysis.follow",
     "fcntl": "acquire.v4l2",
     "h5py": "acquire.hdf5 acquire.session live.results",

@@ -9,6 +9,7 @@ import pytest
 from live.cli import main
 
 KINDS = ("uniform", "hole", "woven")
+SETTINGS = ["--zoi", "48", "--step", "12", "--section", "20,2"]
 SIZE = "lockstep=yes&seconds=2&fps=12&width=160&height=128&bits=12&hole=10"
 
 
@@ -22,3 +23,23 @@ def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
             words += ["--no-view", "--no-rrd", "--out", str(folder / f"{kind}-{seed}")]
             assert main(["run", "--camera", f"sim:{kind}?{SIZE}&seed={seed}", "--load", "sim:", *words]) == 0
     return folder
+
+
+@pytest.fixture(scope="package")
+def done(runs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """All of them replayed by the pool."""
+    out = tmp_path_factory.mktemp("done") / "again"
+    assert (
+        main(["batch", str(runs / "*" / "session.h5"), *SETTINGS, "--workers", "2", "--out", str(out)]) == 0
+    )
+    return out
+
+
+@pytest.fixture(scope="package")
+def long(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A session of 31 s with 310 bursts."""
+    out = tmp_path_factory.mktemp("long") / "long"
+    size = "lockstep=yes&seconds=31&fps=10&width=160&height=128&bits=12"
+    words = ["--burst", "1", "--reference-burst", "1", "--zoi", "48", "--step", "16", "--no-view", "--no-rrd"]
+    assert main(["run", "--camera", f"sim:uniform?{size}", "--load", "sim:", *words, "--out", str(out)]) == 0
+    return out / "session.h5"

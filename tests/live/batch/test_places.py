@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from live.batch.places import parts, sweep
+from live.batch.work.places import parts, sweep
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="zombies are told by /proc")

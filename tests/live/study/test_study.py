@@ -70,6 +70,32 @@ def test_without_a_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert "take 64 px ZOIs" in capsys.readouterr().out  # the strain is even
 
 
+def test_nothing_was_still(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The predicted noise stands in the place of the measured one."""
+    out = tmp_path / "study"
+    words = ["study", str(session), "--zoi", "24,64", "--roi", "all", "--static", "none", "--out", str(out)]
+    assert main(words) == 0
+    assert "0 still and 6 loaded bursts" in capsys.readouterr().out
+    small, large = rows(out)
+    assert all(row["noise"] == row["predicted"] for row in (small, large))
+    assert small["seen"] > 1.1 * large["seen"] > 0.008
+
+
+@pytest.mark.data
+def test_the_open_hole(data_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What docs/scale.md says of it; its pictures 04 and 07, which are elastic."""
+    shots = f"files:{data_dir}/dic_challenge_1_sample12_ohtcfrp/oht_cfrp_*.tiff"
+    words = ["--roi", "auto", "--no-view", "--no-rrd", "--zoi", "64", "--step", "64"]
+    assert main(["replay", shots, *words, "--out", str(tmp_path / "once")]) == 0
+    words = ["--static", "none", "--loaded", "2,3", "--zoi", "32,40,48,64", "--roi", "all"]
+    words += ["--mask", str(tmp_path / "once" / "mask.png"), "--out", str(tmp_path / "study")]
+    assert main(["study", shots, *words]) == 0
+    assert "take 40 px ZOIs, step 10, order 1" in capsys.readouterr().out
+    seen = {int(row["zoi"]): row["seen"] for row in rows(tmp_path / "study")}
+    assert seen[64] < 0.9 * seen[40]
+    assert seen[32] == pytest.approx(seen[40], rel=0.05)
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [

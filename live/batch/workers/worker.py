@@ -15,7 +15,7 @@ import sys
 import threading
 from typing import TextIO
 
-from live.batch.task import Progress, Task, perform
+from live.batch.work import Progress, Task, perform
 
 
 def main() -> int:

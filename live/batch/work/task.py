@@ -7,22 +7,22 @@ import json
 import logging
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from acquire.errors import PhasedicError
-from live.batch import places
-from live.batch.row import Row, failed, row_of
-from live.replay import ReplayRequest, replay
+from live.batch.work import places
+from live.batch.work.row import Row, failed, row_of, row_of_chunk
+from live.replay import ReplayRequest, measure_part, replay
 from live.tell import Screen, summary_lines
 
 if TYPE_CHECKING:
     from live.measure import Instant
 
 log = logging.getLogger(__name__)
-DONE, SAID = "batch.json", "replay.txt"
+DONE, SAID, FIELDS = "batch.json", "replay.txt", "fields"
 _TELL_EVERY_S = 0.25
 
 
@@ -40,6 +40,16 @@ class Task:
     start_s, end_s : float or None, s
     as_measured : bool
     overrides : mapping of "section.key" to value
+    chunk_s : float or None, s
+        A long session is cut into chunks of this length.
+    numbers : pair of int or None
+        This task is a chunk: the bursts from the first number up to the second are measured.
+    run_in : int
+        So many of them are thrown away.
+    chunks : sequence of str
+        This task joins what lies in these folders, done chunks of all of it.
+    of : str
+        The test that this task is a chunk of.
     key : str
         Of all that the results depend on (``keys``).
     """
@@ -54,6 +64,11 @@ class Task:
     end_s: float | None = None
     as_measured: bool = False
     overrides: Mapping[str, Any] = field(default_factory=dict)
+    chunk_s: float | None = None
+    numbers: tuple[int, int] | None = None
+    run_in: int = 0
+    chunks: Sequence[str] = ()
+    of: str = ""
     key: str = ""
 
     def to_json(self) -> str:
@@ -64,6 +79,11 @@ class Task:
     def from_json(cls, line: str) -> Task:
         """What ``to_json`` gave."""
         return cls(**json.loads(line))
+
+    @property
+    def title(self) -> str:
+        """Its name among all tasks."""
+        return f"{self.of}#{self.name}" if self.of else self.name
 
     @property
     def folder(self) -> Path:
@@ -82,6 +102,8 @@ class Task:
             config_file=Path(self.config) if self.config else None,
             overrides={**self.overrides, **always},
             forces=Path(self.forces) if self.forces else None,
+            numbers=range(*self.numbers) if self.numbers else None,
+            parts=[Path(chunk) / FIELDS for chunk in self.chunks],
             settled=self.folder,
         )
 
@@ -104,6 +126,7 @@ class _Telling(Screen):
     def __init__(self, stream: TextIO, tell: Tell) -> None:
         super().__init__(stream)
         self._tell, self._told, self._zois = tell, 0.0, 0
+        self.last = Progress(0, None, 0)
 
     def status(self, text: str) -> None:
         """Nothing: a file needs no status line."""
@@ -111,9 +134,10 @@ class _Telling(Screen):
     def progress(self, i: Instant, done: int, expected: int | None, elapsed_s: float) -> None:
         """Told to whoever waits, four times a second."""
         self._zois += i.n_zoi
+        self.last = Progress(done, expected, self._zois)
         if time.monotonic() - self._told >= _TELL_EVERY_S:
             self._told = time.monotonic()
-            self._tell(Progress(done, expected, self._zois))
+            self._tell(self.last)
 
 
 def _nobody(progress: Progress) -> None:
@@ -141,7 +165,7 @@ def perform(task: Task, tell: Tell = _nobody) -> Row:
     places.sweep(task.folder.parent, task.name)
     try:
         places.make(part)
-        row = _replayed(task, part, tell)
+        row = _measured(task, part, tell) if task.numbers else _replayed(task, part, tell)
         (part / DONE).write_text(json.dumps({"key": task.key, "row": row.values}, indent=1), encoding="utf-8")
         places.settle(part, task.folder)
         return row
@@ -158,7 +182,7 @@ def perform(task: Task, tell: Tell = _nobody) -> Row:
 def _not_done(task: Task, part: Path, words: str, code: int) -> Row:
     """Another caller may have been faster; else it has failed."""
     places.remove(part)
-    return row_done(task) or failed(task.name, task.source, words, code)
+    return row_done(task) or failed(task.title, task.source, words, code)
 
 
 def _replayed(task: Task, part: Path, tell: Tell) -> Row:
@@ -167,6 +191,20 @@ def _replayed(task: Task, part: Path, tell: Tell) -> Row:
         done = replay(task.request(part), screen, threading.Event())
         for line in [*summary_lines(done.books, done.config.specimen), *done.lines]:
             screen.say(line)
-    history = done.books.history
-    tell(Progress(len(history.instants), None, int(history.column("n_zoi").sum())))
-    return row_of(task.name, task.source, done, time.monotonic() - began)
+    tell(screen.last)
+    before = sum(_seconds(Path(chunk)) for chunk in task.chunks)
+    return row_of(task.name, task.source, done, before + time.monotonic() - began)
+
+
+def _seconds(chunk: Path) -> float:
+    return float(json.loads((chunk / DONE).read_text(encoding="utf-8"))["row"]["seconds"])
+
+
+def _measured(task: Task, part: Path, tell: Tell) -> Row:
+    """A chunk."""
+    began = time.monotonic()
+    with (part / SAID).open("w", encoding="utf-8") as said, (part / FIELDS).open("wb") as file:
+        screen = _Telling(said, tell)
+        as_the_whole = measure_part(task.request(part), file, task.run_in, screen)
+    tell(screen.last)
+    return row_of_chunk(task.title, task.source, as_the_whole, time.monotonic() - began)

@@ -15,7 +15,7 @@ from acquire.files import check_regular
 from live.setup import versions
 
 if TYPE_CHECKING:
-    from live.batch.task import Task
+    from live.batch.work.task import Task
 
 _ENDS = 1 << 20  # bytes at each end of a recording that stand for it
 _DECIDING = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless", "machine")
@@ -38,12 +38,20 @@ def key_of(task: Task) -> str:
         "forces": _file(task.forces),
         "part": [task.start_s, task.end_s, task.as_measured],
         "overrides": overrides,
-        "versions": _versions(),
+        "versions": deciding_versions(),
     }
+    if task.chunk_s is not None:
+        told["chunk_s"] = task.chunk_s
     return _hash(json.dumps(told, sort_keys=True, default=str).encode())
 
 
-def _versions() -> dict[str, str]:
+def key_of_chunk(task: Task) -> str:
+    """The key of a chunk, of that of the whole test, which it has so far."""
+    return _hash(json.dumps([task.key, task.numbers, task.run_in]).encode())
+
+
+def deciding_versions() -> dict[str, str]:
+    """Of what the numbers depend on."""
     found = versions()
     return {name: found[name] for name in _DECIDING}
 
@@ -53,6 +61,11 @@ def _hash(*pieces: bytes) -> str:
     for piece in pieces:
         digest.update(piece)
     return digest.hexdigest()
+
+
+def is_session(source: str) -> bool:
+    """Whether it is a recording, and no pictures."""
+    return parse_address(with_scheme(source)).scheme == "session"
 
 
 def _source(source: str) -> Any:

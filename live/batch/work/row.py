@@ -11,6 +11,7 @@ import numpy as np
 
 from acquire.printable import printable
 from analysis.evaluate import Figure, TensileFigures
+from live.batch.work.noise import measured_noise
 from live.measure import History
 from live.replay import Replayed
 from live.setup import Config
@@ -24,9 +25,11 @@ COLUMNS: dict[str, type] = {
     **{f"{name}{end}": float for name in ("E_GPa", "nu", "Rp0.2_MPa", "Rm_MPa", "EA_kN", "Fp0.2_kN", "Fm_kN")
        for end in ("", "_low", "_high")},
     "noise_GL": float, "strain_noise": float, "mean_strain_noise": float,
+    "still_instants": int, "strain_noise_measured": float,
     "frames_lost": int, "pictures_left_out": int, "seconds": float,
 }  # fmt: skip
 """Name of each column, with its kind; a number that is not known is empty."""
+RENEWED = "renewed"  # outcome of a chunk that cannot stand in the place of its part of the whole
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +65,13 @@ def failed(name: str, source: str, error: str, exit_code: int) -> Row:
     return Row.of(found)
 
 
+def row_of_chunk(name: str, source: str, as_the_whole: bool, seconds: float) -> Row:
+    """The row of a chunk, which comes into no table."""
+    outcome = "done" if as_the_whole else RENEWED
+    found = {"test": name, "source": source, "outcome": outcome, "exit_code": 0}
+    return Row.of({**found, "seconds": round(seconds, 3)})
+
+
 def row_of(name: str, source: str, done: Replayed, seconds: float) -> Row:
     """The row of a test that was replayed."""
     history, code = done.books.history, done.exit_code
@@ -76,9 +86,11 @@ def row_of(name: str, source: str, done: Replayed, seconds: float) -> Row:
             "exit_code": code,
             "error": said,
             **_settings(done.config),
+            "burst": done.config.measure.burst or _burst(done),
             **_counts(history),
             **_figures(evaluate(history, done.books.loads, done.config.specimen), done.config),
             **_noise(history),
+            **measured_noise(done.folder / "strain.h5", history.forces(done.books.loads)),
             "frames_lost": done.books.ledger.lost,
             "pictures_left_out": done.left_out,
             "seconds": round(seconds, 3),
@@ -88,9 +100,15 @@ def row_of(name: str, source: str, done: Replayed, seconds: float) -> Row:
 
 def _settings(config: Config) -> dict[str, Any]:
     measure = config.measure
-    names = ("burst", "order", "window", "estimator", "strain")
+    names = ("order", "window", "estimator", "strain")
     found = {name: getattr(measure, name) for name in names}
     return {"zoi_px": measure.zoi, "step_px": measure.step, **found}
+
+
+def _burst(done: Replayed) -> int | None:
+    """Frames in a burst where nobody said how many."""
+    instants = len(done.books.history.instants)
+    return round(done.books.ledger.measured / instants) if instants else None
 
 
 def _counts(history: History) -> dict[str, Any]:

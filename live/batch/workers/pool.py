@@ -13,17 +13,19 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from live.batch.row import Row, failed
-from live.batch.task import Progress, Task
+from live.batch.work import Progress, Row, Task, failed
+from live.batch.workers.there import ONE_THREAD
 
-_ONE_THREAD = (
-    "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM",
-)  # fmt: skip
+# Of glibc: what one task leaves free goes back to the system before the next one.
+_LEAN = {
+    "MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "6000000", "MALLOC_TRIM_THRESHOLD_": "20000000",
+}  # fmt: skip
 MOST_DEATHS = 3
 _LAST_S = 5.0
 
 Told = Callable[[Task, Progress], object]
-Done = Callable[[Task, Row], object]
+Done = Callable[[Task, Row], Sequence[Task]]
+"""Of a task that is done; gives those that can be done now."""
 
 
 class Pool:
@@ -33,7 +35,7 @@ class Pool:
     """
 
     def __init__(self, tasks: Sequence[Task], workers: int, told: Told, done: Done) -> None:
-        self._waiting, self._deaths = deque(tasks), dict.fromkeys((task.name for task in tasks), 0)
+        self._waiting, self._deaths = deque(tasks), dict.fromkeys((task.title for task in tasks), 0)
         self._told, self._done = told, done
         self._stopped = threading.Event()
         self._workers: set[_Worker] = set()
@@ -74,7 +76,7 @@ class Pool:
                     self._end(worker)
                     worker, row = None, self._after_death(task)
                 if row is not None:
-                    self._done(task, row)
+                    self._add(self._done(task, row))
         finally:
             if worker is not None:
                 self._end(worker)
@@ -82,6 +84,11 @@ class Pool:
     def _next(self) -> Task | None:
         with self._lock:
             return self._waiting.popleft() if self._waiting and not self._stopped.is_set() else None
+
+    def _add(self, tasks: Sequence[Task]) -> None:
+        with self._lock:
+            self._deaths |= dict.fromkeys((task.title for task in tasks), 0)
+            self._waiting.extendleft(tasks)
 
     def _new(self) -> _Worker:
         worker = _Worker()
@@ -100,13 +107,13 @@ class Pool:
         """Once more, as the last of all; None then."""
         if self._stopped.is_set():
             return None
-        self._deaths[task.name] += 1
-        if self._deaths[task.name] < MOST_DEATHS:
+        self._deaths[task.title] += 1
+        if self._deaths[task.title] < MOST_DEATHS:
             with self._lock:
                 self._waiting.append(task)
             return None
         words = f"its worker died {MOST_DEATHS} times; is there memory enough for --workers?"
-        return failed(task.name, task.source, words, 1)
+        return failed(task.title, task.source, words, 1)
 
 
 class _Worker:
@@ -114,10 +121,10 @@ class _Worker:
 
     def __init__(self) -> None:
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "live.batch"],
+            [sys.executable, "-m", "live.batch.workers"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            env=os.environ | dict.fromkeys(_ONE_THREAD, "1"),
+            env=_LEAN | os.environ | dict.fromkeys(ONE_THREAD, "1"),
             text=True,
             encoding="utf-8",
         )

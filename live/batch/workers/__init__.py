@@ -1,0 +1,8 @@
+"""Who does the work: ``pool`` has processes of this machine do it (``worker`` is their side), ``cluster`` a Dask
+cluster (``there`` is what runs on it).
+"""
+
+from live.batch.workers.cluster import Cluster
+from live.batch.workers.pool import Pool
+
+__all__ = ["Cluster", "Pool"]

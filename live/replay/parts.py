@@ -1,0 +1,149 @@
+"""A long session measured in parts, by several processes: what a part gives is kept as it is, and told as one replay.
+
+A part is a file of arrays: for each burst its description, parameters, covariances, and what is known of the fit. Its
+pictures are not kept, nor the motion that only the next burst needed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections import deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import DataError
+from acquire.events import Event, EventKind
+from acquire.frame import Burst, frozen
+from analysis import StrainField
+from live.measure import Measurement, unchanged
+from live.replay.ahead import ahead
+from live.replay.material import ReplayRequest, check_window
+from live.replay.opened import opened_session
+from live.replay.prepared import Prepared, prepared
+from live.replay.session import session_path
+from live.tell import Screen
+
+if TYPE_CHECKING:
+    from analysis import PhaseKernel
+
+_BURST = np.dtype(
+    [("n", "i8"), ("noise", "f8"), ("bits", "i8"), ("t", "f8"), ("duration", "f8"), ("first_index", "i8"),
+     ("last_index", "i8"), ("lost", "i8"), ("clock", "U8"), ("motion_px", "f8"), ("field_noise", "f8")]
+)  # fmt: skip
+_ARRAYS = ("parameters", "covariance", "residual", "gain", "status", "iterations")
+_NO_PICTURE = frozen(np.zeros((0, 0), np.float32))
+_NOT_CLIPPED = frozen(np.zeros((0, 0), np.bool_))
+
+
+def measure_part(request: ReplayRequest, file: IO[bytes], run_in: int, screen: Screen) -> bool:
+    """Measure ``request.numbers`` of a session into ``file``, but for the first ``run_in`` of them.
+
+    Returns
+    -------
+    bool
+        Whether all went as in the whole; False where a reference was renewed, which later parts would not know.
+
+    Raises
+    ------
+    ConfigError, DataError
+        As ``replay``; also where ``request.source`` is no session.
+    OSError
+        ``file`` cannot be written.
+    """
+    path = session_path(request.source)
+    if path is None:
+        raise DataError(f"{request.source}: pictures are not measured in parts")
+    check_window(request)
+    renewed: list[Event] = []
+
+    def listen(event: Event) -> None:
+        if event.kind is EventKind.REFERENCE:
+            renewed.append(event)
+
+    with opened_session(path, request, screen) as (material, config):
+        ready = prepared(material, config, request.source, screen)
+        work = ahead(material.bursts)
+        try:
+            for m in ready.measurements(work, material.loads, listen):
+                if renewed:
+                    return False
+                if m.number >= run_in:
+                    _put(m, file)
+                screen.progress(m.instant, m.number + 1, material.expected, 0.0)
+        finally:
+            work.close()
+    return not renewed
+
+
+def _put(m: Measurement, file: IO[bytes]) -> None:
+    names = [name for name in _BURST.names or () if name != "field_noise"]
+    described = (*(getattr(m.burst, name) for name in names), m.field.noise)
+    for array in (np.array(described, _BURST), *(getattr(m.field, name) for name in _ARRAYS)):
+        np.save(file, array, allow_pickle=False)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Stored:
+    burst: Burst
+    field: StrainField
+
+
+class Recital:
+    """Stands where a kernel does, and says of each burst what was found of it."""
+
+    def __init__(self, parts: Sequence[Path], ready: Prepared) -> None:
+        self._parts, self._ready = parts, ready
+        self._fields: deque[StrainField] = deque()
+        told = dataclasses.replace(
+            ready, kernel=cast("PhaseKernel", self), correct=unchanged, timer=lambda: 0.0
+        )
+        self.measurements = told.measurements
+
+    @classmethod
+    def of(cls, parts: Sequence[Path], ready: Prepared) -> Recital | None:
+        """Of ``parts``; None without any."""
+        return cls(parts, ready) if parts else None
+
+    def bursts(self) -> Iterator[Burst]:
+        """All bursts, without their pictures; raises DataError where a part is damaged."""
+        for path in self._parts:
+            for stored in _read(path, self._ready):
+                self._fields.append(stored.field)
+                yield stored.burst
+
+    def measure(self, image: object, **_: object) -> StrainField:
+        """The field of the next burst."""
+        return self._fields.popleft()
+
+    def renewed(self, *_: object, **__: object) -> PhaseKernel:
+        """Never: in no part was a reference renewed."""
+        raise ValueError("no reference was renewed")
+
+
+def _read(path: Path, ready: Prepared) -> Iterator[_Stored]:
+    try:
+        with path.open("rb") as file:
+            while file.peek(1):
+                described, *arrays = [np.load(file, allow_pickle=False) for _ in range(1 + len(_ARRAYS))]
+                yield _stored(described, dict(zip(_ARRAYS, arrays, strict=True)), ready)
+    except (OSError, ValueError, EOFError, KeyError) as error:
+        raise DataError(f"{path}: cannot be read ({error}); remove it and call again") from error
+
+
+def _stored(described: NDArray[Any], arrays: dict[str, Any], ready: Prepared) -> _Stored:
+    values = dict(zip(_BURST.names or (), described.item(), strict=True))
+    noise = values.pop("field_noise")
+    field = StrainField(
+        grid=ready.grid,
+        covariance_reference=np.zeros_like(arrays["covariance"]),  # only a renewal asks for it
+        noise=noise,
+        window=ready.kernel.reference.settings.window,
+        sums=ready.kernel.reference.sums,
+        **arrays,
+    )
+    return _Stored(Burst(mean=_NO_PICTURE, clipped=_NOT_CLIPPED, **values), field)
