@@ -2,8 +2,9 @@
 
 ``superblock`` reads a file's state without the library, ``child`` lets another process read it first,
 ``failure`` lets go of a file that can no longer be written, ``tables`` grow row by row, ``pictures`` chunk by
-chunk with a checksum of our own, ``pace`` says when to flush, ``nexus`` has the words of NeXus, ``disk``
-forecasts the room, ``declared`` and ``json_form`` check what stands in a file against what must.
+chunk with a checksum of our own, ``pace`` says when to flush and brings files to their disk, ``nexus`` has the
+words of NeXus, ``disk`` forecasts the room, ``declared`` and ``json_form`` check what stands in a file against
+what must.
 """
 
 from acquire.hdf5.child import probe
@@ -21,7 +22,7 @@ from acquire.hdf5.disk import forecast, free_bytes, network_share
 from acquire.hdf5.failure import let_go
 from acquire.hdf5.json_form import Said, check_object, read_object
 from acquire.hdf5.nexus import NO_UNIT, new_group, new_json, say, to_json, word
-from acquire.hdf5.pace import Pace
+from acquire.hdf5.pace import Pace, ToDisk
 from acquire.hdf5.pictures import PictureStack, compile_loops
 from acquire.hdf5.superblock import check_size, read_superblock
 from acquire.hdf5.tables import GrowingDataset, Table
@@ -34,6 +35,7 @@ __all__ = [
     "PictureStack",
     "Said",
     "Table",
+    "ToDisk",
     "check_links",
     "check_object",
     "check_size",

@@ -1,8 +1,8 @@
 """Writing a session: HDF5 in SWMR mode, one chunk a frame, flushed twenty times a second.
 
-A process that is killed loses at most what was written in its last ``FLUSH_S`` (docs/session-format.md has
-the figures). Not thread-safe: one recorder thread owns the writer. What is not recorded is the caller's to
-count; the writer never drops anything.
+A process that is killed loses at most what was written in its last ``FLUSH_S``, a power cut what came in the last
+second or so (docs/session-format.md has the figures). Not thread-safe: one recorder thread owns the writer. What
+is not recorded is the caller's to count; the writer never drops anything.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from acquire.closing import Closing
 from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Burst, Frame
-from acquire.hdf5 import GrowingDataset, Pace, PictureStack, Table, free_bytes, let_go, to_json
+from acquire.hdf5 import GrowingDataset, Pace, PictureStack, Table, ToDisk, free_bytes, let_go, to_json
 from acquire.load_sample import LoadSample
 from acquire.session import layout
 from acquire.session.bursts import BurstTable
@@ -84,6 +84,7 @@ class SessionWriter(Closing):
         self.unflushed_frames = 0
         self._written_bytes = 0
         self._file: h5py.File | None = _create(self.path)
+        self._to_disk = ToDisk(self.path)
         try:
             with self._guarded() as file:
                 layout.create(file, recorded, checksum)
@@ -210,6 +211,8 @@ class SessionWriter(Closing):
             self._bring(file)
 
     def _bring(self, file: h5py.File) -> None:
+        if self._to_disk.failure is not None:
+            raise self._to_disk.failure
         self._pace.began()
         for table in (self._frames, self._load, self._clock):
             table.write()
@@ -246,11 +249,15 @@ class SessionWriter(Closing):
         with self._guarded() as file:
             self._file = None
             file.close()
+            self._to_disk.close()
+            if self._to_disk.failure is not None:
+                raise self._to_disk.failure
 
     def _abandon(self) -> None:
         file, self._file = self._file, None
         if file is not None:
             let_go(file)
+        self._to_disk.close()
 
     def _open_file(self) -> h5py.File:
         if self._file is None:
