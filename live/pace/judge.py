@@ -13,6 +13,8 @@ from live.pace.processor import Use, used
 
 WINDOW_S = 5.0
 """Of the test, over which the pace is judged."""
+START_S = 2.0
+"""After the first result, until those whose bursts had to wait for it are through: they tell nothing of the pace."""
 FEWEST = 10
 EVERY_S = 30.0
 """The same warning is not told more often."""
@@ -54,6 +56,7 @@ class Pace:
         )
         self._told = -math.inf
         self._judged = -math.inf
+        self._begin = math.nan
         self.p95_s = math.nan
 
     def look(self, lag: Lag, period_s: float) -> str:
@@ -65,6 +68,10 @@ class Pace:
         period_s : float, s
             Between bursts.
         """
+        if math.isnan(self._begin):
+            self._begin = lag.t + lag.latency_s + START_S
+        if lag.t < self._begin:
+            return ""
         self._lags.append(lag)
         while self._lags[0].t < lag.t - WINDOW_S:
             self._lags.popleft()

@@ -47,8 +47,15 @@ def test_a_lost_pace_is_told_once_with_its_cause(cause: dict[str, float], says: 
     assert says in warning
 
 
+def test_the_bursts_that_waited_for_the_first_result_tell_nothing() -> None:
+    pace = Pace(lambda: 0.0, lambda: Use(0.0, 0.0, 0.0, 0.0))
+    late = [max(0.8 - 0.3 * k * PERIOD_S, 0.02) for k in range(150)]
+    assert not any(pace.look(Lag(k * PERIOD_S, late[k], 0.01), PERIOD_S) for k in range(150))
+    assert pace.p95_s < 0.05
+
+
 def test_it_is_told_again_when_it_lasts() -> None:
-    assert len(told(0.1, seconds=65)) == 3
+    assert len(told(0.1, seconds=68)) == 3
 
 
 def test_this_machine_says_who_uses_it() -> None:
