@@ -117,9 +117,12 @@ class Gate:
             self._open(f"the force is above {self._above_N:g} N")
 
     def event(self, event: Event) -> None:
-        """An event."""
+        """An event; those of the recorder's own thread must not wait for whoever waits for that thread."""
+        if event.kind is not EventKind.MEASURED:
+            self._recorder.event(event)
+            return
         with self._lock:
-            if event.kind is not EventKind.MEASURED or self._has(event):
+            if self._has(event):
                 self._recorder.event(event)
             elif not self.on:
                 self._hold(event, event.t, _SMALL)
@@ -136,7 +139,8 @@ class Gate:
         """Let go what is kept, and close the recording."""
         with self._lock:
             self._let_go()
-            self._recorder.close(ledger)
+        # Without the lock: what is still to be written may be told of.
+        self._recorder.close(ledger)
 
     def _open(self, why: str) -> str:
         with self._lock:

@@ -18,7 +18,7 @@ from hw_mocks.faults import SERIAL_FAULTS, FaultPlan, parse_faults
 from hw_mocks.indicator_output import Sensing
 from hw_mocks.indicator_server import IndicatorServer
 
-RATE, AT_S, SECONDS = 80.0, 0.6, 2.6
+RATE, AT_S, SECONDS = 80.0, 1.6, 3.2  # twenty devices at once are opened before the fault comes
 
 
 def truth(t: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from typing import Any
 
 import pytest
@@ -153,3 +154,32 @@ def test_an_order_that_changes_nothing_is_refused() -> None:
     bench.recorder.failed = "the disk is full"
     with pytest.raises(OrderRefused, match="disk is full"):
         bench.gate.order(START)
+
+
+class TellingRecorder(FakeRecorder):
+    """Its own thread tells something while it takes a frame and while it is closed, and is waited for."""
+
+    gate: Gate
+
+    def _tell(self) -> None:
+        event = Event(0.0, EventKind.RECORDER, "session.h5", "the disk is full in 20 s", "warning")
+        thread = threading.Thread(target=self.gate.event, args=(event,), daemon=True)
+        thread.start()
+        thread.join(5.0)
+        assert not thread.is_alive(), "it waits for whoever waits for it"
+
+    def frame(self, item: Any) -> None:
+        self._tell()
+        super().frame(item)
+
+    def close(self, ledger: dict[str, Any]) -> None:
+        self._tell()
+        super().close(ledger)
+
+
+def test_a_recorder_that_tells_something_does_not_hold_itself_up() -> None:
+    recorder = TellingRecorder()
+    recorder.gate = Gate(recorder, Ledger(), Journal(), Keep(0.5, 10**6), on=True)
+    recorder.gate.frame(frame(0), needed=False)
+    recorder.gate.close({})
+    assert recorder.given == [("recorder", None), 0, ("recorder", None), "closed"]
