@@ -10,6 +10,7 @@ import socket
 import threading
 import time
 import tty
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
@@ -73,7 +74,7 @@ TALKS: dict[str, Talk] = {
 }
 
 
-class Peer(Closing):
+class Peer(Closing, ABC):
     """Runs ``talk`` for every connection, in a thread.
 
     Attributes
@@ -91,8 +92,9 @@ class Peer(Closing):
         self._thread = threading.Thread(target=self._work, daemon=True)
         self._thread.start()
 
+    @abstractmethod
     def _work(self) -> None:
-        raise NotImplementedError
+        """Take connections, and talk to each."""
 
     def _speak(self, write: Write) -> None:
         self.connections += 1

@@ -25,10 +25,9 @@ from live.tell import Screen
 log = logging.getLogger(__name__)
 RETRIES = 2  # of a task that raised; one whose worker died is given to another three times by Dask itself
 _ANSWER_S = 10
-_ROOM, _LEAST_ROOM = (
-    4,
-    200,
-)  # tasks a worker, and of all, that the scheduler is given; 10,000 at once silence it
+_ROOM, _LEAST_ROOM = 4, 200
+"""Tasks a worker, and of all at least, that the scheduler is given; ten thousand at once silence it."""
+
 _GONE_S = 5.0  # without the scheduler
 _QUIET_S = 15.0  # without a task that ends
 
