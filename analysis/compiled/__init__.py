@@ -1,3 +1,4 @@
-"""How loops are compiled (``loops``), the vector instructions they say outright (``vectors``), and in which
-process their threads are (``forked``): numba.
+"""numba: how loops are compiled (``loops``), and their threads: what each does (``shares``), on which core (``cores``)
+and in which process they are (``forked``). The vector instructions that loops say outright (``vectors``,
+``convolution``).
 """

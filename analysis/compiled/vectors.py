@@ -24,7 +24,8 @@ from analysis.compiled.loops import FAST
 
 PROCESSOR: str = llvm.get_host_cpu_name()
 LANES: int = 16 if llvm.get_host_cpu_features().get("avx512f") else 8
-_FLAGS = tuple(sorted(FAST))
+FLAGS = tuple(sorted(FAST))
+"""What the compiler may do with the order of sums."""
 _FLOAT = ir.FloatType()
 _VECTOR = ir.VectorType(_FLOAT, LANES)
 _INT = ir.IntType(32)
@@ -66,7 +67,7 @@ def _define(operation: Callable[..., Any], instruction: str) -> None:
             return None
 
     def lower(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        return getattr(builder, instruction)(*arguments, flags=_FLAGS)
+        return getattr(builder, instruction)(*arguments, flags=FLAGS)
 
     infer_global(operation)(Rule)
     lower_builtin(operation, Vector, Vector)(lower)
@@ -78,9 +79,34 @@ for _operation, _instruction in (
     _define(_operation, _instruction)
 
 
-def _address(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
+def address_of(context: Any, builder: Any, array_type: Any, array: Any, index: Any) -> Any:
+    """For other intrinsics: where a vector lies that begins at the flat ``index`` of an array."""
     data = context.make_array(array_type)(context, builder, array).data
     return builder.bitcast(builder.gep(data, [index]), _VECTOR.as_pointer())
+
+
+def load_of(builder: Any, place: Any) -> Any:
+    """For other intrinsics: the vector at an address."""
+    return builder.load(place, align=_ALIGNMENT)
+
+
+def store_of(builder: Any, value: Any, place: Any) -> None:
+    """For other intrinsics: a vector written to an address."""
+    builder.store(value, place, align=_ALIGNMENT)
+
+
+def spread_of(builder: Any, value: Any) -> Any:
+    """For other intrinsics: a float32 in every lane."""
+    empty = ir.Constant(_VECTOR, ir.Undefined)
+    first = builder.insert_element(empty, value, ir.Constant(_INT, 0))
+    return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(_INT, LANES), [0] * LANES))
+
+
+def fused_of(builder: Any, a: Any, b: Any, c: Any) -> Any:
+    """For other intrinsics: a b + c."""
+    kind = ir.FunctionType(_VECTOR, [_VECTOR] * 3)
+    add = cgutils.get_or_insert_function(builder.module, kind, f"llvm.fmuladd.v{LANES}f32")
+    return builder.call(add, [a, b, c], fastmath=FLAGS)
 
 
 @intrinsic
@@ -88,8 +114,7 @@ def load(_typing: Any, array: Any, index: Any) -> Any:
     """LANES samples of a float32 array from the flat ``index`` (uintp) on."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        place = _address(context, builder, signature.args[0], *arguments)
-        return builder.load(place, align=_ALIGNMENT)
+        return load_of(builder, address_of(context, builder, signature.args[0], *arguments))
 
     return vector(array, types.uintp), generate
 
@@ -99,7 +124,7 @@ def address(_typing: Any, array: Any, index: Any) -> Any:
     """Where the flat ``index`` (uintp) of a float32 array lies in memory, for ``load_from``."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        place = _address(context, builder, signature.args[0], *arguments)
+        place = address_of(context, builder, signature.args[0], *arguments)
         return _opaque(builder, builder.ptrtoint(place, ir.IntType(_POINTER)))
 
     return types.uintp(array, types.uintp), generate
@@ -143,7 +168,7 @@ def fetch(_typing: Any, array: Any, index: Any) -> Any:
     """Ask for the cache line of a sample of a float32 array; any index (uintp) will do, it is not read."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        place = builder.bitcast(_address(context, builder, signature.args[0], *arguments), _BYTES)
+        place = builder.bitcast(address_of(context, builder, signature.args[0], *arguments), _BYTES)
         kind = ir.FunctionType(ir.VoidType(), [_BYTES, _INT, _INT, _INT])
         ask = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
         read, second_level, data = (ir.Constant(_INT, i) for i in (0, 2, 1))
@@ -158,8 +183,7 @@ def store(_typing: Any, array: Any, index: Any, value: Any) -> Any:
     """Write a vector to a float32 array from the flat ``index`` (uintp) on."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        place = _address(context, builder, signature.args[0], *arguments[:2])
-        builder.store(arguments[2], place, align=_ALIGNMENT)
+        store_of(builder, arguments[2], address_of(context, builder, signature.args[0], *arguments[:2]))
         return context.get_dummy_value()
 
     return types.void(array, types.uintp, vector), generate
@@ -170,9 +194,7 @@ def spread(_typing: Any, value: Any) -> Any:
     """A float32 in every lane."""
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        empty = ir.Constant(_VECTOR, ir.Undefined)
-        first = builder.insert_element(empty, arguments[0], ir.Constant(_INT, 0))
-        return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(_INT, LANES), [0] * LANES))
+        return spread_of(builder, arguments[0])
 
     return vector(types.float32), generate
 
@@ -182,9 +204,7 @@ def fused(_typing: Any, a: Any, b: Any, c: Any) -> Any:
     """a b + c in one instruction where the processor has it; a product used twice is not fused by itself."""
 
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
-        kind = ir.FunctionType(_VECTOR, [_VECTOR] * 3)
-        add = cgutils.get_or_insert_function(builder.module, kind, f"llvm.fmuladd.v{LANES}f32")
-        return builder.call(add, arguments, fastmath=_FLAGS)
+        return fused_of(builder, *arguments)
 
     return vector(vector, vector, vector), generate
 
@@ -206,6 +226,6 @@ def total(_typing: Any, value: Any) -> Any:
     def generate(_context: Any, builder: Any, _signature: Any, arguments: Any) -> Any:
         kind = ir.FunctionType(_FLOAT, [_FLOAT, _VECTOR])
         add = cgutils.get_or_insert_function(builder.module, kind, f"llvm.vector.reduce.fadd.v{LANES}f32")
-        return builder.call(add, [ir.Constant(_FLOAT, -0.0), arguments[0]], fastmath=_FLAGS)
+        return builder.call(add, [ir.Constant(_FLOAT, -0.0), arguments[0]], fastmath=FLAGS)
 
     return types.float32(vector), generate

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numba import prange
 
+from analysis.compiled.cores import caller, keep_apart
 from analysis.compiled.loops import helper, inlined, parallel
 from analysis.compiled.shares import SHARES, next_piece
 from analysis.compiled.vectors import LANES, fetch
@@ -41,7 +42,7 @@ LEFT_BY_LENGTH = 0.03
 LONGEST_STEP = 3.0
 """Pixels; a longer step at the edge of the ZOI is shortened to this."""
 CHUNK = 32
-"""ZOIs that a thread takes at a time."""
+"""ZOIs that a thread takes at a time, where there are many."""
 AHEAD, BEYOND = 16, 3
 """ZOIs ahead of the present one whose pixels are asked for; taps beyond the pixel that they make."""
 
@@ -189,23 +190,27 @@ def track(picture: Picture, table: Any, fit: Fit, stop: Stop, out: Out) -> None:
     ``table`` (18,) has the weights of the taps (``splines.tap_table``). It is no part of the picture, since
     read from a tuple it lets the compiler sum in another order, and the last digit of float32 changes.
     """
-    counter = np.zeros(1, np.int64)
-    for _ in prange(SHARES):
-        _track_share(picture, table, fit, stop, out, counter)
+    counters, calling = np.zeros(SHARES, np.int64), caller()
+    for share in prange(SHARES):
+        keep_apart(calling)
+        _track_share(picture, table, fit, stop, out, counters, share)
 
 
 @helper
-def _track_share(picture: Any, table: Any, fit: Any, stop: Any, out: Any, counter: Any) -> None:
+def _track_share(picture: Any, table: Any, fit: Any, stop: Any, out: Any, counters: Any, share: int) -> None:
     """What one thread comes to do of all ZOIs."""
-    start = next_piece(counter) * CHUNK
-    while start < len(fit.origins):
-        _track_some(picture, table, fit, stop, out, start)
-        start = next_piece(counter) * CHUNK
+    at_once = min(CHUNK, 1 + len(fit.origins) // SHARES)  # of some lost ones each may take as long as a frame
+    pieces = (len(fit.origins) + at_once - 1) // at_once
+    piece = next_piece(counters, share, pieces)
+    while piece >= 0:
+        start = piece * at_once
+        _track_some(picture, table, fit, stop, out, start, min(start + at_once, len(fit.origins)))
+        piece = next_piece(counters, share, pieces)
 
 
 @helper
-def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: int) -> None:
-    """``track`` for CHUNK ZOIs; a function of its own, since numba takes long over the body of a parallel loop."""
+def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: int, end: int) -> None:
+    """``track`` for some ZOIs; a function of its own, since numba takes long over the body of a parallel loop."""
     p, left, bending, nuisance = out.p, out.left, out.bending, out.nuisance
     state, iterations = out.state, out.iterations
     count = fit.inverse.shape[1]
@@ -224,7 +229,7 @@ def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: 
     step = np.empty(count)
     solved = np.empty(count + LANES, np.float32)
     bent_by = np.empty(2 * N_SHAPES)
-    for z in range(start, min(start + CHUNK, len(fit.origins))):
+    for z in range(start, end):
         top, first = fit.origins[z]
         q = p[z]
         _fetch(picture, fit, z, q)

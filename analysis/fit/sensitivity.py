@@ -16,6 +16,7 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
+from analysis.compiled.cores import caller, keep_apart
 from analysis.compiled.loops import helper, parallel
 from analysis.compiled.shares import SHARES, next_piece
 from analysis.fit.bundles import Images, Normal, WindowRows
@@ -136,20 +137,30 @@ def prepare(
     table : (P, 3), units : (6,)
     out : Normal, written
     """
-    counter = np.zeros(1, np.int64)
-    for _ in prange(SHARES):
-        _prepare_share(images, origins, size, rows, table, units, out, counter)
+    counters, calling = np.zeros(SHARES, np.int64), caller()
+    for share in prange(SHARES):
+        keep_apart(calling)
+        _prepare_share(images, origins, size, rows, table, units, out, counters, share)
 
 
 @helper
 def _prepare_share(
-    images: Any, origins: Any, size: int, rows: Any, table: Any, units: Any, out: Any, counter: Any
+    images: Any,
+    origins: Any,
+    size: int,
+    rows: Any,
+    table: Any,
+    units: Any,
+    out: Any,
+    counters: Any,
+    share: int,
 ) -> None:
     """What one thread comes to do of all ZOIs."""
-    first = next_piece(counter) * CHUNK
-    while first < len(origins):
-        _prepare_some(images, origins, first, size, rows, table, units, out)
-        first = next_piece(counter) * CHUNK
+    pieces = (len(origins) + CHUNK - 1) // CHUNK
+    piece = next_piece(counters, share, pieces)
+    while piece >= 0:
+        _prepare_some(images, origins, piece * CHUNK, size, rows, table, units, out)
+        piece = next_piece(counters, share, pieces)
 
 
 @helper

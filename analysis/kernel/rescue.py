@@ -20,6 +20,8 @@ _WORTH_RETRYING = np.isin(
     list(Status), (Status.LOST, Status.NOT_CONVERGED, Status.POOR_MATCH, Status.OUTSIDE)
 )
 """By status."""
+_DOWN, _RIGHT = (offset.ravel() - 1 for offset in np.indices((3, 3)))
+"""Rows and columns to a ZOI's neighbours, itself among them."""
 
 
 def rescue(attempt: Attempt, before: Floats | None, clipped: NDArray[np.bool_] | None = None) -> None:
@@ -115,16 +117,14 @@ def _lent(attempt: Attempt, places: _Places, lost: NDArray[np.intp]) -> tuple[Fl
     """
     reference, step = attempt.reference, attempt.reference.grid.step
     good = np.append(attempt.status == Status.OK, False)  # the last for "none"
-    total, number = np.zeros((6, len(lost))), np.zeros(len(lost))
-    for dy in (-1, 0, 1):
-        for dx in (-1, 0, 1):
-            zoi = places.zoi[places.row[lost] + dy, places.column[lost] + dx]
-            here = np.flatnonzero(good[zoi])
-            part = reference.total(attempt.found.p[zoi[here]], zoi[here])[:, reference.affine].T
-            for r in (0, 3):
-                part[r] -= step * (dx * part[r + 1] + dy * part[r + 2])
-            total[:, here] += part
-            number[here] += 1
+    zoi = places.zoi[places.row[lost, None] + _DOWN, places.column[lost, None] + _RIGHT]
+    to, which = np.nonzero(good[zoi])
+    lender = zoi[to, which]
+    part = reference.total(attempt.found.p[lender], lender)[:, reference.affine]
+    for r in (0, 3):
+        part[:, r] -= step * (_RIGHT[which] * part[:, r + 1] + _DOWN[which] * part[:, r + 2])
+    number = np.bincount(to, minlength=len(lost))
+    total = np.stack([np.bincount(to, values, len(lost)) for values in part.T], axis=1)
     with np.errstate(invalid="ignore"):
-        mean = np.where(number > 0, total / np.maximum(number, 1), np.nan)
-    return reference.local(reference.all_modes(mean.T), lost), number.astype(np.uint8)
+        mean = np.where(number[:, None] > 0, total / np.maximum(number, 1)[:, None], np.nan)
+    return reference.local(reference.all_modes(mean), lost), number.astype(np.uint8)

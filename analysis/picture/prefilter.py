@@ -8,21 +8,20 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from analysis.compiled.loops import helper, inlined, parallel
+from analysis.compiled.convolution import GROUP, REACH, ROWS, STRIP, filter_across, filter_along
+from analysis.compiled.cores import caller, keep_apart
+from analysis.compiled.loops import helper, parallel
 from analysis.compiled.shares import SHARES, next_piece
-from analysis.compiled.vectors import LANES, load, spread, store
-from analysis.picture.splines import LINE, PAD, PREFILTER_REACH, Box
+from analysis.compiled.vectors import LANES
+from analysis.picture.splines import LINE, PAD, Box
 
 f4 = np.float32
 
-GROUP = 4 * LANES
-"""Samples that are filtered at a time: one sum after the other would wait for each product."""
-BAND, STRIP = 16, 2 * GROUP
-"""Rows and columns that are filtered along y at a time, so that a row is read once from afar, not 31 times."""
-PART, RING = 128, BAND + 2 * PREFILTER_REACH
-"""Rows that one thread filters one after the other, and how many of them it keeps filtered along x."""
-_lanes = np.uintp(LANES)
-_two, _three = np.uintp(2), np.uintp(3)
+BAND = 4 * ROWS
+"""Rows that are filtered along y at a time, so that a row is read once from afar, not 31 times."""
+PART, RING = 64, BAND + 2 * REACH
+"""Rows that a thread comes for at a time, and how many it keeps filtered along x."""
+_reach = np.uintp(REACH)
 
 
 @helper
@@ -47,9 +46,10 @@ def coefficients(image: NDArray[Any], offset: Any, taps: NDArray[np.float32], bo
     out = np.empty((height + 2 * PAD) * stride + LANES, np.float32)
     for n in range(out.size - LANES, out.size):
         out[n] = 0
-    counter = np.zeros(1, np.int64)
-    for _ in prange(SHARES):
-        _filter_share(image, offset, taps, box, counter, out)
+    counters, calling = np.zeros(SHARES, np.int64), caller()
+    for share in prange(SHARES):
+        keep_apart(calling)
+        _filter_share(image, offset, taps, box, counters, share, out)
     for y in range(PAD):
         if box.top == 0:
             _copy_row(out, _mirror(y - PAD, height) + PAD, stride, y)
@@ -59,46 +59,64 @@ def coefficients(image: NDArray[Any], offset: Any, taps: NDArray[np.float32], bo
 
 
 @helper
-def _filter_share(image: Any, offset: Any, taps: Any, box: Any, counter: Any, out: Any) -> None:
-    """What one thread comes to do of all rows."""
-    top = box.top + next_piece(counter) * PART
-    while top < box.bottom:
-        _filter_part(image, offset, taps, box, top, min(top + PART, box.bottom), out)
-        top = box.top + next_piece(counter) * PART
+def _filter_share(image: Any, offset: Any, taps: Any, box: Any, counters: Any, share: int, out: Any) -> None:
+    """What one thread comes to do of all rows, a part after the other."""
+    width = image.shape[1]
+    line = np.zeros((width + GROUP - 1) // GROUP * GROUP + 2 * REACH, np.float32)
+    # An odd number of cache lines a row, or the rows would displace each other.
+    ring = np.empty((RING, line.size - 2 * REACH + LINE), np.float32)
+    band = np.empty((BAND, line.size), np.float32)
+    room = line, ring, band, np.empty(RING, np.intp)
+    parts = (box.bottom - box.top + PART - 1) // PART
+    ahead, part = -1, next_piece(counters, share, parts)
+    while part >= 0:
+        top = box.top + part * PART
+        if ahead != top + REACH:  # else the rows above are still in the ring
+            ahead = top - REACH
+        ahead = _filter_part(image, offset, taps, box, top, min(top + PART, box.bottom), ahead, room, out)
+        part = next_piece(counters, share, parts)
 
 
 @helper
-def _filter_part(image: Any, offset: Any, taps: Any, box: Any, top: int, bottom: int, out: Any) -> None:
-    """Rows ``top`` .. of the coefficients, along x and y in one go, so that what lies between stays in the cache."""
+def _filter_part(
+    image: Any, offset: Any, taps: Any, box: Any, top: int, bottom: int, ahead: int, room: Any, out: Any
+) -> int:
+    """Rows ``top`` .. of the coefficients, along x and y in one go, so that what lies between stays in the cache.
+
+    Rows before ``ahead`` are in the ring already; returns up to where they are then.
+    """
     height, width = image.shape
-    stride = width + 2 * PAD
+    line, ring, band, starts = room
     left = box.left // GROUP * GROUP
     right = (box.right + GROUP - 1) // GROUP * GROUP
-    line = np.zeros((width + GROUP - 1) // GROUP * GROUP + 2 * PREFILTER_REACH, np.float32)
-    # An odd number of cache lines a row, or the rows would displace each other.
-    ring = np.empty((RING, line.size - 2 * PREFILTER_REACH + LINE), np.float32)
-    band = np.empty((BAND, line.size), np.float32)
-    beside, starts = np.arange(2 * PREFILTER_REACH + 1), np.empty(RING, np.intp)
-    ahead = top - PREFILTER_REACH
     for first in range(top, bottom, BAND):
         count = min(BAND, bottom - first)
-        for y in range(ahead, first + count + PREFILTER_REACH):
+        for y in range(ahead, first + count + REACH):
             _mirrored_line(image[_mirror(y, height)], offset, left, right, line)
-            _filter(line, beside, left, right, taps, ring[(y + PREFILTER_REACH) % RING])
-        ahead = first + count + PREFILTER_REACH
+            row = ring[(y + REACH) % RING]
+            for x in range(left, right, GROUP):
+                filter_along(line, np.uintp(x) + _reach, taps, row, np.uintp(x))
+        ahead = first + count + REACH
         for i in range(RING):
             starts[i] = (first + i) % RING * ring.shape[1]
         for x in range(left, right, STRIP):
-            for y in range(count):
-                _filter(ring, starts[y:], x, min(x + STRIP, right), taps, band[y])
+            for y in range(0, count, ROWS):
+                filter_across(ring, starts, np.uintp(y), np.uintp(x), taps, band)
         for y in range(count):
-            row = out[(first + y + PAD) * stride : (first + y + PAD + 1) * stride]
-            for x in range(left, min(right, width)):
-                row[PAD + x] = band[y, x]
-            for x in range(PAD if left == 0 else 0):
-                row[x] = band[y, _mirror(x - PAD, width)]
-            for x in range(PAD if right >= width else 0):
-                row[PAD + width + x] = band[y, _mirror(width + x, width)]
+            _put_row(band[y], left, right, width, out[(first + y + PAD) * (width + 2 * PAD) :])
+    return ahead
+
+
+@helper
+def _put_row(row: Any, left: int, right: int, width: int, out: Any) -> None:
+    """A row of the coefficients, and what it has mirrored beyond the image."""
+    here, there = row[left : min(right, width)], out[PAD + left : PAD + min(right, width)]
+    for x in range(len(here)):
+        there[x] = here[x]
+    for x in range(PAD if left == 0 else 0):
+        out[x] = row[_mirror(x - PAD, width)]
+    for x in range(PAD if right >= width else 0):
+        out[PAD + width + x] = row[_mirror(width + x, width)]
 
 
 @helper
@@ -109,41 +127,14 @@ def _copy_row(out: Any, source: int, stride: int, to: int) -> None:
 
 @helper
 def _mirrored_line(row: Any, offset: Any, left: int, right: int, line: Any) -> None:
-    """Columns ``left`` .. ``right`` of a row less ``offset``, ``PREFILTER_REACH`` more beside, mirrored beyond it."""
-    width, reach = row.size, PREFILTER_REACH
-    for x in range(max(left - reach, 0), min(right + reach, width)):
-        line[x + reach] = f4(row[x]) - offset
-    for x in range(reach if left < reach else 0):
-        line[x] = line[_mirror(x - reach, width) + reach]
-    for x in range(reach if right + reach > width else 0):
-        line[width + reach + x] = line[_mirror(width + x, width) + reach]
-
-
-@helper
-def _filter(rows: Any, starts: Any, first: int, last: int, taps: Any, out: Any) -> None:
-    """Symmetric filter of the samples ``first`` .. ``last``; ``starts`` (31,) are the flat indices of its taps."""
-    reach = PREFILTER_REACH
-    for n in range(first, last, GROUP):
-        i = np.uintp(starts[reach] + n)
-        tap = spread(taps[0])
-        v0 = tap * load(rows, i)
-        v1 = tap * load(rows, i + _lanes)
-        v2 = tap * load(rows, i + _two * _lanes)
-        v3 = tap * load(rows, i + _three * _lanes)
-        for k in range(1, reach + 1):
-            tap = spread(taps[k])
-            p = np.uintp(starts[reach - k] + n)
-            q = np.uintp(starts[reach + k] + n)
-            v0 += tap * (load(rows, p) + load(rows, q))
-            v1 += tap * (load(rows, p + _lanes) + load(rows, q + _lanes))
-            v2 += tap * (load(rows, p + _two * _lanes) + load(rows, q + _two * _lanes))
-            v3 += tap * (load(rows, p + _three * _lanes) + load(rows, q + _three * _lanes))
-        _store_group(out, np.uintp(n), v0, v1, v2, v3)
-
-
-@inlined
-def _store_group(out: Any, n: Any, v0: Any, v1: Any, v2: Any, v3: Any) -> None:
-    store(out, n, v0)
-    store(out, n + _lanes, v1)
-    store(out, n + _two * _lanes, v2)
-    store(out, n + _three * _lanes, v3)
+    """Columns ``left`` .. ``right`` of a row less ``offset``, REACH more beside, mirrored beyond it."""
+    width = row.size
+    # Parts of the arrays, since of an index that may be negative no vectors are made.
+    first, end = max(left - REACH, 0), min(right + REACH, width)
+    here, there = row[first:end], line[first + REACH : end + REACH]
+    for x in range(len(here)):
+        there[x] = f4(here[x]) - offset
+    for x in range(REACH if left < REACH else 0):
+        line[x] = line[_mirror(x - REACH, width) + REACH]
+    for x in range(REACH if right + REACH > width else 0):
+        line[width + REACH + x] = line[_mirror(width + x, width) + REACH]

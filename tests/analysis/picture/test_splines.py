@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from analysis.compiled.convolution import GROUP, REACH
 from analysis.compiled.vectors import LANES
 from analysis.fit.bundles import Picture
 from analysis.fit.iteration import compose, warp_zois
 from analysis.picture.cutting import cut_bent_row, cut_leaning_row, cut_row, displacement
-from analysis.picture.prefilter import GROUP, PART, coefficients
+from analysis.picture.prefilter import PART, coefficients
 from analysis.picture.splines import PAD, Box, basis, prefilter_taps, tap_table
 
 RNG = np.random.default_rng(0)
@@ -41,6 +42,23 @@ def test_prefilter_is_that_of_scipy(degree: int, kind: type, shape: tuple[int, i
     expected = np.pad(expected, PAD, mode="reflect")
     found = found[: expected.size].reshape(expected.shape)
     assert np.max(np.abs(found - expected)) < 1e-4 * np.abs(expected).max()
+
+
+def test_the_filter_has_as_many_taps_as_are_put_down() -> None:
+    assert len(prefilter_taps(5)) == REACH + 1
+
+
+@pytest.mark.parametrize("box", [Box(0, 300, 33, 290), Box(70, 260, 0, 150), Box(17, 200, 120, 400)])
+def test_no_coefficient_depends_on_what_else_is_filtered(box: Box) -> None:
+    shape = (300, 400)
+    image = np.random.default_rng(2).integers(0, 256, shape).astype(np.uint8)
+    image.flags.writeable = False
+    whole, part = (
+        coefficients(image, np.float32(100), prefilter_taps(5), b)[: -LANES].reshape(-1, shape[1] + 2 * PAD)
+        for b in (Box(0, shape[0], 0, shape[1]), box)
+    )  # fmt: skip
+    inside = np.s_[PAD + box.top : PAD + box.bottom, PAD + box.left : PAD + box.right]
+    assert np.array_equal(whole[inside], part[inside])
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,83 @@
+"""Keeping the threads of a loop apart: on Linux a worker that wakes up may be put on the core of the one that woke it.
+
+It stays there while another core is idle: the scheduler looks again only some milliseconds later, and a frame is
+measured in that time. On two cores, a frame every 30 ms, nine of ten were measured on one of them.
+Elsewhere nothing is done.
+"""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba.core import cgutils, types
+from numba.extending import intrinsic
+
+from analysis.compiled.loops import helper
+
+LINUX = sys.platform == "linux"
+_WORDS = 16
+"""Of 64 bits: as many cores as the C library's own sets have."""
+_INT, _LONG = ir.IntType(32), ir.IntType(64)
+
+
+def _call(builder: Any, name: str, gives: Any, arguments: list[Any]) -> Any:
+    kind = ir.FunctionType(gives, [argument.type for argument in arguments])
+    return builder.call(cgutils.get_or_insert_function(builder.module, kind, name), arguments)
+
+
+@intrinsic
+def _thread(_typing: Any) -> Any:
+    """Which thread this is."""
+    return types.int64(), lambda _context, builder, _signature, _arguments: _call(
+        builder, "pthread_self", _LONG, []
+    )
+
+
+@intrinsic
+def _core(_typing: Any) -> Any:
+    """On which core this thread runs."""
+    return types.int32(), lambda _context, builder, _signature, _arguments: _call(
+        builder, "sched_getcpu", _INT, []
+    )
+
+
+def _affinity(name: str) -> Any:
+    """sched_getaffinity or sched_setaffinity of this thread, with a set as (_WORDS,) uint64; 0 where it is done."""
+
+    @intrinsic
+    def affinity(_typing: Any, cores: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+            this, size = ir.Constant(_INT, 0), ir.Constant(_LONG, 8 * _WORDS)
+            return _call(builder, name, _INT, [this, size, data])
+
+        return types.int32(cores), generate
+
+    return affinity
+
+
+_get_cores, _set_cores = _affinity("sched_getaffinity"), _affinity("sched_setaffinity")
+
+
+@helper
+def caller() -> Any:
+    """The thread that calls a loop, its core, and the cores that it may use; for ``keep_apart``."""
+    cores = np.zeros(_WORDS, np.uint64)
+    if not LINUX or _get_cores(cores) != 0:
+        return np.int64(0), np.int32(-1), cores
+    return _thread(), _core(), cores
+
+
+@helper
+def keep_apart(calling: Any) -> None:
+    """Go to another core, if this is another thread than the caller, on its core; and stay off that one."""
+    thread, core, cores = calling
+    if not LINUX or core < 0 or _core() != core or _thread() == thread:
+        return
+    others = cores.copy()
+    others[core // 64] &= ~(np.uint64(1) << np.uint64(core % 64))
+    if others.any():
+        _set_cores(others)
