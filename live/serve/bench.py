@@ -19,7 +19,7 @@ from acquire.errors import DataError, PhasedicError
 from acquire.files import write_picture
 from acquire.frame import CameraInfo, Frame
 from acquire.printable import brief, printable
-from live.check import Figures, Line, examine, judge
+from live.check import Figures, Line, Watch, examine, judge
 from live.measure import kinds_of
 from live.pace import OUTPUT, yield_to_others
 from live.serve.draft import Draft
@@ -77,6 +77,7 @@ class Bench:
         self.picture = b""
         self.overlays = {"saturated": True, "quality": False}
         self._figures: Figures | None = None
+        self._watch, self._watched = Watch(draft.config), tuple[Any, ...]()
         self._told: dict[str, Any] = {"table": None, "go": None, "lines": [], "checking": False}
         self._told |= {"doubt": "", "busy": "", "remarks": []}
         self._peak, self._shown, self._edition = 0.0, 0, 0
@@ -273,8 +274,14 @@ class Bench:
         if collected is not None:
             self._check(collected, info)
         else:
-            config = self.config(Path(self._folder.name))
-            self._note(examine(shots_of(frames, info), config, table=False))
+            self._glance(frames, info)
+
+    def _glance(self, frames: list[Frame], info: CameraInfo) -> None:
+        """What changes while lens and light are turned; what takes the kernel, in turns."""
+        edition, config = self._edition, self.config(Path(self._folder.name))
+        if self._watched != (edition, config, info):
+            self._watched, self._watch = (edition, config, info), Watch(config)
+        self._note(self._watch.glance(shots_of(frames, info)).figures)
 
     def _compile(self, info: CameraInfo) -> None:
         """By processes of their own: the test that follows must not measure with what this one has compiled."""
