@@ -12,7 +12,6 @@ from analysis.picture.pattern import (
     noise_of_picture,
     predicted_sigma,
     resolution_length,
-    sssig,
 )
 from analysis.picture.spectrum import Pattern, filtered_pattern
 from analysis.picture.splines import LINE, PAD, TAPS, Box, prefilter_taps, tap_table
@@ -31,6 +30,5 @@ __all__ = [
     "predicted_sigma",
     "prefilter_taps",
     "resolution_length",
-    "sssig",
     "tap_table",
 ]

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.field import ZoiGrid
 from analysis.picture.spectrum import NOISE_BAND, filtered_pattern, radial_spectrum
 
 Floats = NDArray[np.float64]
@@ -106,45 +105,30 @@ def describe_pattern(image: ArrayLike, bits: int | None = None, noise: float | N
     )
 
 
-def autocorrelation_fwhm(
-    image: ArrayLike, noise: float = 0.0, mask: NDArray[np.bool_] | None = None
-) -> float:
+def autocorrelation_fwhm(image: ArrayLike, noise: float = 0.0) -> float:
     """Full width at half height of the autocorrelation, mean of x and y, px; NaN where it never falls.
-
-    Of the pixels in ``mask`` (H, W) alone, where it is given.
 
     The variance of the noise is taken out of the value at zero lag. Between lags the logarithm is
     interpolated over the square of the lag, which is exact for Gaussian speckle. What varies over more
     than a twelfth of the shorter side is light or background, not speckle, and taken out first.
     """
+    from scipy.ndimage import gaussian_filter
+
     picture = _picture(image)
-    inside = np.ones(picture.shape) if mask is None else np.asarray(mask, np.float64)
-    wide = min(picture.shape) / SLOW_SHARE
-    zero = (picture - _slow(picture, inside, wide)) * inside
-    zero -= inside * (zero.sum() / max(inside.sum(), 1))
-    along_x, along_y = (
-        product / np.maximum(pairs, 1)
-        for product, pairs in zip(_autocorrelation(zero), _autocorrelation(inside), strict=True)
-    )
+    zero = picture - gaussian_filter(picture, min(picture.shape) / SLOW_SHARE, mode="nearest")
+    along_x, along_y = _autocorrelation(zero - zero.mean())
     return 2 * float(np.mean([_half_width(line, noise) for line in (along_x, along_y)]))
 
 
-def _slow(picture: Floats, inside: Floats, px: float) -> Floats:
-    """The light and what else varies over ``px``, from the pixels inside alone."""
-    from scipy.ndimage import gaussian_filter
-
-    total, weight = (gaussian_filter(values, px, mode="nearest") for values in (picture * inside, inside))
-    return np.asarray(total / np.maximum(weight, 1e-9))
-
-
 def _autocorrelation(values: Floats) -> tuple[Floats, Floats]:
-    """Sums of products at lags along x and along y, up to half the picture."""
+    """Mean products of pixels at lags along x and along y, up to half the picture."""
     from scipy.fft import irfft2, rfft2
 
     rows, columns = values.shape
     shape = (2 * rows, 2 * columns)
     product = irfft2(np.abs(rfft2(values, shape, workers=2)) ** 2, shape, workers=2)
-    return product[0, : columns // 2], product[: rows // 2, 0]
+    across, down = np.arange(columns // 2), np.arange(rows // 2)
+    return product[0, across] / (rows * (columns - across)), product[down, 0] / ((rows - down) * columns)
 
 
 def _half_width(line: Floats, noise: float) -> float:
@@ -157,23 +141,6 @@ def _half_width(line: Floats, noise: float) -> float:
     high, low = math.log(values[k - 1]), math.log(max(values[k], 1e-6))
     share = (high - math.log(0.5)) / (high - low)
     return math.sqrt((k - 1) ** 2 + share * (k**2 - (k - 1) ** 2))
-
-
-def sssig(image: ArrayLike, grid: ZoiGrid, noise: float | None = None) -> tuple[Floats, Floats]:
-    """Sum of squares of the gradients along x and along y in each ZOI, (R, C) each, GL^2/px^2.
-
-    The figure by which the field judges a subset; the noise is filtered out first.
-    """
-    pattern = filtered_pattern(_picture(image).astype(np.float32), noise, 5)
-    return _box_sums(pattern.grad_x, grid), _box_sums(pattern.grad_y, grid)
-
-
-def _box_sums(gradient: NDArray[np.float32], grid: ZoiGrid) -> Floats:
-    total = np.pad(gradient.astype(np.float64) ** 2, ((1, 0), (1, 0))).cumsum(0).cumsum(1)
-    top, left, size = grid.first_y[:, None], grid.first_x[None, :], grid.size
-    return np.asarray(
-        total[top + size, left + size] - total[top, left + size] - total[top + size, left] + total[top, left]
-    )
 
 
 def noise_of_burst(images: ArrayLike) -> float:

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from analysis.field.grid import Roi, ZoiGrid
 from analysis.picture.pattern import (
     autocorrelation_fwhm,
     clipped_share,
@@ -16,7 +15,6 @@ from analysis.picture.pattern import (
     noise_of_picture,
     predicted_sigma,
     resolution_length,
-    sssig,
 )
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
@@ -65,15 +63,6 @@ def test_noise_of_a_burst_and_of_a_picture(speckle: Speckle) -> None:
     assert noise_of_picture(frames[0]) == pytest.approx(20, rel=0.05)
     with pytest.raises(ValueError, match="at least 2"):
         noise_of_burst(frames[:1])
-
-
-def test_sssig_adds_up(speckle: Speckle) -> None:
-    light = speckle.reference() * FULL
-    grid = ZoiGrid.cover(Roi(0, 0, 400, 300), 100, 100)
-    along_x, along_y = sssig(light, grid)
-    report = describe_pattern(light)
-    assert along_x.shape == grid.shape
-    assert (along_x.sum() + along_y.sum()) / 2 == pytest.approx(report.gradient**2 * 400 * 300, rel=1e-3)
 
 
 def test_clipped_share() -> None:
