@@ -99,14 +99,18 @@ class Attempt:
         self.status[which] = status
         self.found.put(which, found)
 
-    def refuse_clipped(self, clipped: NDArray[np.bool_]) -> None:
-        """The status CLIPPED where too much of a ZOI lies on saturated pixels (H, W), found or as guessed."""
+    def refuse_clipped(self, clipped: NDArray[np.bool_], among: NDArray[np.bool_] | None = None) -> None:
+        """The status CLIPPED where too much of a ZOI lies on saturated pixels (H, W), found or as guessed.
+
+        ``among`` (A,) are those to be looked at; None: all.
+        """
         from analysis.fit.clipping import clipped_share
 
         reference, grid = self.reference, self.reference.grid
         ok = self.status == Status.OK
         at = np.where(ok[:, None], self.found.p, self.guess)[:, [reference.modes // 2, 0]]
-        which = np.flatnonzero((reference.prepared.status == Status.OK) & np.isfinite(at).all(axis=1))
+        seen = (reference.prepared.status == Status.OK) & np.isfinite(at).all(axis=1)
+        which = np.flatnonzero(seen if among is None else seen & among)
         first = reference.prepared.origins[which] + np.rint(np.clip(at[which], -1e6, 1e6)).astype(np.int64)
         share = clipped_share(clipped, first, profile(reference.settings.window, grid.size))
         self.status[which[share > CLIPPED_SHARE]] = Status.CLIPPED

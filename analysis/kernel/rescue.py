@@ -37,11 +37,12 @@ def rescue(attempt: Attempt, before: Floats | None, clipped: NDArray[np.bool_] |
     """
     if clipped is not None:
         attempt.refuse_clipped(clipped)
-    if not _lost(attempt).any():
+    lost = _lost(attempt)
+    if not lost.any():
         return
     _rescue(attempt, before)
     if clipped is not None:
-        attempt.refuse_clipped(clipped)
+        attempt.refuse_clipped(clipped, lost)
 
 
 def _rescue(attempt: Attempt, before: Floats | None) -> None:
