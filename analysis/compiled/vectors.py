@@ -163,19 +163,26 @@ def load_from(_typing: Any, place: Any, samples: Any) -> Any:
     return vector(types.uintp, types.uintp), generate
 
 
-@intrinsic
-def fetch(_typing: Any, array: Any, index: Any) -> Any:
-    """Ask for the cache line of a sample of a float32 array; any index (uintp) will do, it is not read."""
+def _fetching(level: int) -> Any:
+    """Asks for the cache line of a sample of a float32 array; any index (uintp) will do, it is not read."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        place = builder.bitcast(address_of(context, builder, signature.args[0], *arguments), _BYTES)
-        kind = ir.FunctionType(ir.VoidType(), [_BYTES, _INT, _INT, _INT])
-        ask = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
-        read, second_level, data = (ir.Constant(_INT, i) for i in (0, 2, 1))
-        builder.call(ask, [place, read, second_level, data])
-        return context.get_dummy_value()
+    @intrinsic
+    def ask_for(_typing: Any, array: Any, index: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            place = builder.bitcast(address_of(context, builder, signature.args[0], *arguments), _BYTES)
+            kind = ir.FunctionType(ir.VoidType(), [_BYTES, _INT, _INT, _INT])
+            ask = cgutils.get_or_insert_function(builder.module, kind, "llvm.prefetch.p0i8")
+            read, locality, data = (ir.Constant(_INT, i) for i in (0, 4 - level, 1))
+            builder.call(ask, [place, read, locality, data])
+            return context.get_dummy_value()
 
-    return types.void(array, types.uintp), generate
+        return types.void(array, types.uintp), generate
+
+    return ask_for
+
+
+fetch_soon, fetch_later = _fetching(1), _fetching(2)
+"""To the first level of the cache, for what is read next; to the second."""
 
 
 @intrinsic

@@ -14,7 +14,7 @@ from numba import prange
 from analysis.compiled.cores import caller, keep_apart
 from analysis.compiled.loops import helper, inlined, parallel
 from analysis.compiled.shares import SHARES, next_piece
-from analysis.compiled.vectors import LANES, fetch
+from analysis.compiled.vectors import LANES, fetch_later, fetch_soon
 from analysis.fit.bundles import CONVERGED, DIVERGED, LEFT_IMAGE, RUNNING, Fit, Out, Picture, Stop
 from analysis.fit.moments import (
     CHANNELS,
@@ -100,9 +100,13 @@ def compose(p: Any, order: int, d: Any) -> None:
 
 @inlined
 def _moments(
-    picture: Any, table: Any, fit: Any, top: int, first: int, q: Any, room: Any, m: Any, bent_by: Any
+    picture: Any, table: Any, fit: Any, top: int, first: int, q: Any, room: Any, next_one: Any, m: Any, bent_by: Any
 ) -> Any:  # fmt: skip
-    """Warp one ZOI and write J' w d to ``m`` and the sums with the shapes to ``bent_by``; returns d' w d."""
+    """Warp one ZOI and write J' w d to ``m`` and the sums with the shapes to ``bent_by``; returns d' w d.
+
+    ``next_one`` (first row and column of the next ZOI, motion down and right) is asked for meanwhile; a negative
+    row: it is not.
+    """
     plan, ramp, g, columns, sums = room
     starts, taus, where, how = plan
     size, order, rows, mix = fit.size, fit.order, fit.rows, fit.mix
@@ -117,6 +121,8 @@ def _moments(
     columns[:] = 0
     for y in range(0, size, ROWS):
         count = min(ROWS, size - y)
+        if next_one[0] >= 0:
+            _fetch_rows(picture, fit, next_one, y, count)
         if whole:
             warp_rows(
                 picture.c, np.uintp(stride), f4(q[1]), f4(q[4]), y, count, size, starts, taus,
@@ -171,8 +177,20 @@ def _fetch(picture: Any, fit: Any, z: int, q: Any) -> None:
         column = origin[1] + min(x, size - 1)
         for y in range(origin[0] + size - fresh, origin[0] + size):
             for k in range(4):
-                fetch(fit.images, np.uintp(y * fit.pitch + column + k * fit.samples))
-            fetch(picture.c, np.uintp((y + down) * (picture.width + 2 * PAD) + column + right))
+                fetch_later(fit.images, np.uintp(y * fit.pitch + column + k * fit.samples))
+            fetch_later(picture.c, np.uintp((y + down) * (picture.width + 2 * PAD) + column + right))
+
+
+@inlined
+def _fetch_rows(picture: Any, fit: Any, next_one: Any, y: int, count: int) -> None:
+    """Ask for some rows of the next ZOI, where they reach beyond this one: while it is computed they come nearer."""
+    top, left, down, right = next_one
+    fresh = min(fit.spacing, fit.size)
+    for row in range(top + y, top + y + count):
+        for x in range(left + fit.size - fresh + LANES - 1, left + fit.size + LANES - 1, LANES):
+            for k in range(4):
+                fetch_soon(fit.images, np.uintp(row * fit.pitch + x + k * fit.samples))
+            fetch_soon(picture.c, np.uintp((row + down) * (picture.width + 2 * PAD) + x + right))
 
 
 @inlined
@@ -180,7 +198,7 @@ def _fetch_all(array: Any, z: int) -> None:
     """Ask for what an array (A, m, n) holds of ZOI ``z``."""
     each = array.shape[1] * array.shape[2]
     for n in range(0, each, LANES):
-        fetch(array, np.uintp(z * each + n))
+        fetch_later(array, np.uintp(z * each + n))
 
 
 @parallel
@@ -241,7 +259,10 @@ def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: 
             if not _within(picture, q, fit.order, first + reach, top + reach, reach):
                 state[z] = LEFT_IMAGE
                 break
-            energy = _moments(picture, table, fit, top, first, q, room, m, bent_by)
+            coming = fit.origins[min(z + 1, end - 1)]
+            motion = int(q[half]) + PAD + BEYOND, int(q[0]) + PAD + BEYOND
+            next_one = (coming[0] if iteration == 0 else -1, coming[1], *motion)
+            energy = _moments(picture, table, fit, top, first, q, room, next_one, m, bent_by)
             left[z] = _solve(fit.inverse, z, m, step, energy, solved)
             gain: Any = 1 + step[modes]
             nuisance[z, 0] = gain
