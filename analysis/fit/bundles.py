@@ -184,11 +184,14 @@ class Known(NamedTuple):
         Effective number of independent pixels.
     unit : (A, 2), px^2 per GL^2
         Variance of u and of v from noise of 1 GL, of a ZOI without anything else to find.
+    centre : (A,), px per GL
+        Standard deviation of the worse of u and v from noise of 1 GL, as it is found.
     """
 
     signal: Floats
     pixels: Floats
     unit: Floats
+    centre: Floats
 
 
 class Rule(NamedTuple):
@@ -204,12 +207,15 @@ class Rule(NamedTuple):
         Width of the window that makes a displacement of a strain.
     limit : float, px
         What the displacement at the centre may be wrong by.
+    far : float
+        Of ``validity.CENTRE_VARIANCE``.
     """
 
     noise_known: bool
     noise: Floats
     lever: float
     limit: float
+    far: float
 
 
 class Images(NamedTuple):

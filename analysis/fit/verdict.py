@@ -64,10 +64,11 @@ def judge(found: Out, left: Any, expected: Any, known: Known, rule: Rule, out: A
         elif not (LEAST_GAIN < gain < MOST_GAIN and left[z] <= allowed + MODEL_SHARE * pattern):
             out[z] = POOR_MATCH
         else:
-            variance = max(expected[z], left[z])
-            stretch = stretch_of(found.p, z, rule.lever)
-            of_u, of_v = variance * known.unit[z, 0], variance * known.unit[z, 1]
-            out[z] = UNEVEN if _bends(found.bending[z], of_u, of_v, rule.noise, stretch, rule.limit) else OK
+            by_noise = NOISE_FACTOR * expected[z] if rule.noise_known else allowed
+            misfit = _used(left[z], by_noise, allowed + MODEL_SHARE * pattern - by_noise)
+            bent = _bent(found, z, known, max(expected[z], left[z]), rule)
+            doubt = (misfit + bent) * _beyond(known, z, rule.far)
+            out[z] = OK if doubt <= 1 else POOR_MATCH if misfit > bent else UNEVEN
 
 
 @helper
@@ -88,16 +89,29 @@ def _slow(found: Any, z: int, known: Any, variance: Any) -> Any:
 
 
 @helper
-def _bends(bending: Any, of_u: Any, of_v: Any, noise: Any, stretch: Any, limit: Any) -> bool:
-    """Whether the displacement jumps, or bends so much that the centre is wrong.
+def _used(value: Any, by_noise: Any, room: Any) -> Any:
+    """The share of the room beyond what noise makes that a value takes; not less than 0."""
+    share = (value - by_noise) / room
+    return 0.0 if share < 0 else share
 
-    ``stretch``, px, is the displacement that the strain makes over the width of the window: where a
+
+@helper
+def _bent(found: Any, z: int, known: Any, variance: Any, rule: Any) -> Any:
+    """How far the displacement bends or jumps, in shares of what is allowed; beyond 1 the centre is wrong.
+
+    The displacement that the strain makes over the width of the window allows for more: where a
     specimen necks the strain is steep, but small beside itself; across a crack it is not.
     """
-    mean = (of_u + of_v) * noise[0]
-    spread = math.sqrt(2 * noise[1] * (of_u**2 + of_v**2))
-    allowed = limit**2 + (BENDING_SHARE * stretch) ** 2
-    return not bending <= mean + BENDING_CHANCE * spread + allowed
+    of_u, of_v = variance * known.unit[z, 0], variance * known.unit[z, 1]
+    spread = math.sqrt(2 * rule.noise[1] * (of_u**2 + of_v**2))
+    allowed = rule.limit**2 + (BENDING_SHARE * stretch_of(found.p, z, rule.lever)) ** 2
+    return _used(found.bending[z], (of_u + of_v) * rule.noise[0], BENDING_CHANCE * spread + allowed)
+
+
+@helper
+def _beyond(known: Any, z: int, far: Any) -> Any:
+    """How much more counts what is left because the centre lies beyond its pattern; 1 as a rule."""
+    return max(1.0, known.centre[z] ** 2 / (far * max(known.unit[z, 0], known.unit[z, 1])))
 
 
 @helper

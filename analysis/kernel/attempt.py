@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from analysis.field import Status, profile
 from analysis.fit.bundles import LEFT_IMAGE, Fit, Known, Out, Picture, Rule
-from analysis.fit.validity import CLIPPED_SHARE
+from analysis.fit.validity import CENTRE_VARIANCE, CLIPPED_SHARE
 from analysis.kernel.noise import NoiseModel
 from analysis.kernel.quadrature import Sensors
 from analysis.kernel.reference import SPILL_PX, Places, Reference
@@ -151,11 +151,15 @@ class Attempt:
     def _judged(self, which: Places, found: Out) -> NDArray[np.uint8]:
         from analysis.fit.verdict import judge
 
-        reference, ready = self.reference, self.reference.prepared
+        reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
         freedom = ready.freedom[which]
-        known = Known(ready.signal[which], freedom * reference.sharpness, reference.share_variance[which])
+        known = Known(
+            ready.signal[which], freedom * reference.sharpness, reference.share_variance[which],
+            reference.unit_sigma[2, which],
+        )  # fmt: skip
         noise_known = self.noise is not None and reference.noise_model is not None
-        rule = Rule(noise_known, ready.shapes.noise, reference.grid.size / 6, reference.settings.bending_px)
+        far = CENTRE_VARIANCE[settings.order - 1]
+        rule = Rule(noise_known, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far)
         status = np.empty(len(freedom), np.uint8)
         judge(found, found.left / freedom, self._expected(which, found.nuisance[:, 0]), known, rule, status)
         return status

@@ -169,8 +169,8 @@ def _rest() -> None:
     clipped_share(np.zeros((32, 32), np.bool_), np.zeros((1, 2), np.int64), line)
     none, pairs, single = np.empty(0), np.empty((0, 2)), np.empty(0, np.float32)
     judge(
-        Out.starting(np.empty((0, 6))), none, none, Known(none, none, pairs),
-        Rule(True, np.empty(2), 1.0, 0.05), np.empty(0, np.uint8),
+        Out.starting(np.empty((0, 6))), none, none, Known(none, none, pairs, none),
+        Rule(True, np.empty(2), 1.0, 0.05, 4.0), np.empty(0, np.uint8),
     )  # fmt: skip
     weigh(np.empty(0, np.bool_), none, none, np.empty((2, 2))[:, 0], none, none, single, single, single)
     unit = np.empty((21, 0), np.float32)
