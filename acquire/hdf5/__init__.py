@@ -23,7 +23,7 @@ from acquire.hdf5.failure import let_go
 from acquire.hdf5.json_form import Said, check_object, read_object
 from acquire.hdf5.nexus import NO_UNIT, new_group, new_json, say, to_json, word
 from acquire.hdf5.pace import Pace, ToDisk
-from acquire.hdf5.pictures import PictureStack, compile_loops
+from acquire.hdf5.pictures import PictureReader, PictureStack, compile_loops
 from acquire.hdf5.superblock import check_size, read_superblock
 from acquire.hdf5.tables import GrowingDataset, Table
 
@@ -32,6 +32,7 @@ __all__ = [
     "Declared",
     "GrowingDataset",
     "Pace",
+    "PictureReader",
     "PictureStack",
     "Said",
     "Table",

@@ -1,17 +1,21 @@
-"""Appending pictures to an HDF5 file, one chunk each, past the library's own filter.
+"""Pictures in an HDF5 file, one chunk each, appended and read past the library's own filter.
 
-HDF5 computes its Fletcher-32 byte by byte within the flush: most of the time of a recorded frame. Here
-the chunk is made whole by our own code, to the same bytes, and handed over as it will stand in the file.
+HDF5 computes its Fletcher-32 byte by byte: most of the time of a frame that is recorded or read. Here the chunk is
+made whole by our own code, to the same bytes, and handed over as it will stand in the file; and read as it stands.
 """
 
 from __future__ import annotations
 
+import contextlib
+import sys
 from functools import cache
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
+
+_WORTH_NUMBA = 400  # pictures read, after which loading numba pays where nobody has done so
 
 
 @cache
@@ -71,3 +75,50 @@ class PictureStack:
 
         content = self._chunk[: self.row_bytes]
         self._chunk[self.row_bytes :].view("<u4")[0] = fletcher32(content, *self._scratch)
+
+
+class PictureReader:
+    """Reads the pictures of a dataset; one with another layout, or with bytes in doubt, is left to the library.
+
+    Parameters
+    ----------
+    dataset : h5py.Dataset
+    """
+
+    def __init__(self, dataset: h5py.Dataset) -> None:
+        self._dataset = dataset
+        self._shape: tuple[int, ...] = dataset.shape[1:]
+        self._bytes = int(np.prod(self._shape)) * dataset.dtype.itemsize
+        alone = dataset.id.get_create_plist().get_nfilters() == 1
+        self._sealed = bool(dataset.fletcher32) and alone and dataset.chunks == (1, *self._shape)
+        self._count = 0
+
+    def __getitem__(self, number: int) -> NDArray[Any]:
+        """The picture ``number``, of the dataset's shape and type.
+
+        Raises
+        ------
+        OSError, RuntimeError, ValueError or IndexError
+            From HDF5, where it cannot be read.
+        """
+        self._count += 1
+        if self._sealed and ("numba" in sys.modules or self._count > _WORTH_NUMBA):
+            # What is wrong with it the library will say.
+            with contextlib.suppress(OSError, RuntimeError, ValueError, OverflowError):
+                if (picture := self._at_once(number)) is not None:
+                    return picture
+        return np.asarray(self._dataset[number])
+
+    def _at_once(self, number: int) -> NDArray[Any] | None:
+        """The chunk as it stands in the file, without its checksum; None where that is not right."""
+        from acquire.hdf5.checksum_loops import fletcher32, scratch
+
+        chunk = np.empty(self._bytes + 4, np.uint8)
+        place = (number, *(0 for _ in self._shape))
+        unfiltered, stored = self._dataset.id.read_direct_chunk(place, out=chunk)
+        if unfiltered or len(stored) != len(chunk):
+            return None
+        content = chunk[: self._bytes]
+        if chunk[self._bytes :].view("<u4")[0] != fletcher32(content, *scratch()):
+            return None
+        return np.asarray(content.view(self._dataset.dtype).reshape(self._shape))

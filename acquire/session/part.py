@@ -21,6 +21,7 @@ from acquire.events import Event
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.hdf5 import (
     Declared,
+    PictureReader,
     check_links,
     check_size,
     open_dataset,
@@ -141,6 +142,7 @@ class SessionPart(Closing):
         pictures = stored.pictures_of(self.camera)
         frames, bursts = self._groups["frames"], self._groups["bursts"]
         self._images = open_datasets(frames, pictures["frames"])["image"]
+        self._pictures = PictureReader(self._images)
         self._clipped = open_datasets(bursts, pictures["bursts"])["clipped"]
         self._sums = stored.open_sums(bursts, self.camera)
         self._lines = open_dataset(self._groups["load"], "lines", stored.LINES)
@@ -179,7 +181,7 @@ class SessionPart(Closing):
         """
         row = {name: column[number].item() for name, column in self.columns.items()}
         with _reading(self.path, f"frame {number} cannot be read"):
-            image = self._images[int(self._frames.places[number])]
+            image = self._pictures[int(self._frames.places[number])]
         return Frame(
             image=frozen(image),
             index=row["index"],

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from acquire.hdf5 import PictureStack
+from acquire.hdf5 import PictureReader, PictureStack, compile_loops
 
 SIZES = [(1, 1), (3, 5), (12, 16), (37, 101), (360, 512), (363, 1025)]
 
@@ -56,8 +56,10 @@ def test_a_flipped_bit_is_seen_by_hdf5(tmp_path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[place + 7] ^= 1
     path.write_bytes(content)
-    with h5py.File(path) as file, pytest.raises(OSError, match="filter returned failure"):
-        file["image"][0]
+    with h5py.File(path) as file:
+        for picture in (file["image"], PictureReader(file["image"])):
+            with pytest.raises(OSError, match="filter returned failure"):
+                picture[0]
 
 
 def test_without_a_checksum_the_chunk_is_the_picture(tmp_path: Path) -> None:
@@ -74,3 +76,53 @@ def test_without_a_checksum_the_chunk_is_the_picture(tmp_path: Path) -> None:
 def test_chunks_of_another_kind_are_refused(tmp_path: Path, more: dict[str, Any]) -> None:
     with h5py.File(tmp_path / "odd.h5", "w") as file, pytest.raises(ValueError, match="not just one picture"):
         PictureStack(new_stack(file, "image", (12, 16), np.uint8, **more))
+
+
+class _Library:
+    """A dataset that counts what is read through the library's filter."""
+
+    def __init__(self, dataset: h5py.Dataset) -> None:
+        self._dataset, self.reads = dataset, 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._dataset, name)
+
+    def __getitem__(self, number: int) -> Any:
+        self.reads += 1
+        return self._dataset[number]
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.uint32])
+@pytest.mark.parametrize("shape", SIZES, ids=str)
+def test_what_is_read_is_what_was_written(tmp_path: Path, shape: tuple[int, ...], dtype: Any) -> None:
+    compile_loops()
+    with h5py.File(tmp_path / "theirs.h5", "w") as file:
+        dataset = new_stack(file, "image", shape, dtype)
+        dataset.resize(4, axis=0)
+        dataset[:] = pictures(shape, dtype)
+    with h5py.File(tmp_path / "theirs.h5") as file:
+        reader = PictureReader(library := _Library(file["image"]))
+        for k, picture in enumerate(pictures(shape, dtype)):
+            np.testing.assert_array_equal(reader[k], picture, strict=True)
+        assert library.reads == 0, "the library's filter was waited for"
+
+
+def test_what_is_not_as_we_write_it_is_read_by_the_library(tmp_path: Path) -> None:
+    picture = pictures((12, 16), np.uint16)[0]
+    with h5py.File(tmp_path / "others.h5", "w") as file:
+        for name, more in (("plain", {"fletcher32": False}), ("small", {"compression": "gzip"})):
+            dataset = new_stack(file, name, (12, 16), np.uint16, **more)
+            dataset.resize(1, axis=0)
+            dataset[0] = picture
+        two = new_stack(file, "two", (12, 16), np.uint16, chunks=(2, 12, 16))
+        two.resize(1, axis=0)
+        two[0] = picture
+        unfiltered = new_stack(file, "unfiltered", (12, 16), np.uint16)
+        unfiltered.resize(2, axis=0)
+        unfiltered.id.write_direct_chunk((0, 0, 0), picture.tobytes(), filter_mask=1)
+    with h5py.File(tmp_path / "others.h5") as file:
+        for name in ("plain", "small", "two", "unfiltered"):
+            np.testing.assert_array_equal(PictureReader(file[name])[0], picture, strict=True)
+        assert not PictureReader(file["unfiltered"])[1].any(), "what was never written is the fill value"
+        with pytest.raises(IndexError):
+            PictureReader(file["unfiltered"])[2]
