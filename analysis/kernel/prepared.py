@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -97,6 +97,7 @@ def prepare_reference(
     pattern = filtered_pattern(image, std, settings.interpolant)
     line = profile(settings.window, size)
     images = padded(pattern.grad_x, pattern.grad_y, pattern.level, image - np.float32(mean))
+    pattern = _within(pattern, images, image.shape)
     by_level = _by_level(images, pattern, mean, noise)
     out, shapes = _fits(images, by_level, origins, line, settings.order)
     energy = out.energy
@@ -122,6 +123,12 @@ def prepare_reference(
         level=energy[:, 3].astype(np.float64) + mean,
         status=status,
     )
+
+
+def _within(pattern: Pattern, images: NDArray[np.float32], shape: tuple[int, ...]) -> Pattern:
+    """The same pattern where it stands in ``images``, so that it is not kept twice."""
+    grad_x, grad_y, level = images[:3, : shape[0], : shape[1]]
+    return replace(pattern, grad_x=grad_x, grad_y=grad_y, level=level)
 
 
 def _fits(

@@ -55,6 +55,11 @@ class Outputs:
         """Take a frame; never waits."""
         self._give("frame", frame)
 
+    @property
+    def wants_frames(self) -> bool:
+        """Whether a frame is of use to anybody."""
+        return any(worker.wants("frame") for worker in self._workers)
+
     def load(self, sample: LoadSample) -> None:
         """Take a load sample; never waits."""
         self._give("load", sample)

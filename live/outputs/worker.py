@@ -53,9 +53,13 @@ class Worker:
         else:
             self._guarded(self._consumer.begin)
 
+    def wants(self, kind: str) -> bool:
+        """Whether things of this kind are taken, still."""
+        return kind in self._wanted and not self._failed and not self._ending
+
     def give(self, kind: str, item: Any) -> None:
         """Pass ``item`` on, or let it wait; waits itself only where the policy says so."""
-        if kind not in self._wanted or self._failed or self._ending:
+        if not self.wants(kind):
             return
         if not self._consumer.blocks:
             self._hand_over(kind, item)
@@ -111,8 +115,8 @@ class Worker:
         yield_to_others(OUTPUT)
         self._guarded(self._consumer.begin)
         while (batch := self._next()) is not None:
-            for kind, item in batch:
-                self._hand_over(kind, item)
+            while batch:
+                self._hand_over(*batch.popleft())  # and let go of: a measurement has pictures
             self._guarded(self._idle)
         self._close()
 
@@ -121,16 +125,16 @@ class Worker:
         if not self._failed:
             self._patience_s = self._consumer.idle()
 
-    def _next(self) -> list[tuple[str, Any]] | None:
+    def _next(self) -> deque[tuple[str, Any]] | None:
         """What waits, kind by kind; nothing where the consumer has something to do meanwhile; None at the end."""
         with self._changed:
             until = time.monotonic() + self._patience_s
             while not any(self._waiting.values()) and not self._ending:
                 left = min(until - time.monotonic(), _NAP_S if "load" in self._wanted else math.inf)
                 if left <= 0:
-                    return []
+                    return deque()
                 self._changed.wait(left if left < math.inf else None)
-            batch = [(kind, item) for kind in KINDS for item in self._waiting[kind]]
+            batch = deque((kind, item) for kind in KINDS for item in self._waiting[kind])
             for queue in self._waiting.values():
                 queue.clear()
             self._changed.notify_all()

@@ -54,8 +54,8 @@ class _Reader(Generic[Item]):
         self._thread.join()
 
 
-def ahead(items: Iterable[Item], room: int = 2) -> Generator[Item]:
-    """The same items in the same order, up to ``room`` of them taken ahead by a thread of their own.
+def ahead(items: Iterable[Item], room: int = 1) -> Generator[Item]:
+    """The same items in the same order, taken ahead by a thread of their own: ``room`` wait, and it has one at hand.
 
     What ``items`` raises is raised here, after those that came before. Closing the iterator ends the thread.
     """

@@ -154,8 +154,10 @@ def _run(
         _give_past(material, outputs)
         for m in measured(work, material.loads, books.journal):
             books.ledger.add(measured=m.burst.n, grabbed=m.burst.n, lost=m.burst.lost)
-            outputs.frame(picture_of(m.burst))
+            if outputs.wants_frames:
+                outputs.frame(picture_of(m.burst))
             screen.progress(outputs.add(m), m.number + 1, material.expected, time.perf_counter() - began)
+            del m  # its pictures are not kept while the next burst is measured
             if stopping.is_set():
                 break
         took = time.perf_counter() - began
@@ -211,12 +213,19 @@ def pace_line(history: History, seconds: float) -> str:
 def _not_empty(bursts: Iterable[Work], source: str) -> Iterator[Work]:
     """The same; nothing is written where there is nothing to measure."""
     rest = iter(bursts)
-    first = next(rest, None)
-    if first is None:
+    first = [*itertools.islice(rest, 1)]
+    if not first:
         raise DataError(
             f"{source}: no whole burst after the reference, nothing to measure; give a smaller --burst"
         )
-    return itertools.chain([first], rest)
+    return _after(first, rest)
+
+
+def _after(first: list[Work], rest: Iterator[Work]) -> Iterator[Work]:
+    """``first``, which is let go of, and the rest."""
+    while first:
+        yield first.pop()
+    yield from rest
 
 
 def _give_past(material: Material, outputs: Outputs) -> None:

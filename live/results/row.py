@@ -67,13 +67,11 @@ def gauge_columns(name: str) -> tuple[str, str]:
 
 def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any]]:
     """The (R, C) arrays of a field by the names they have in files; strains in ``measure``."""
-    plain = ("u", "v", *GRADIENTS, *STRAINS)
+    plain, strain = ("u", "v", *GRADIENTS), field.strain(measure)
     maps = {name: getattr(field, name) for name in plain}
-    maps |= {f"sigma_{name}": getattr(field, f"sigma_{name}") for name in plain}
+    maps |= {name: getattr(strain, name) for name in STRAINS}
+    maps |= {f"sigma_{name}": getattr(field, f"sigma_{name}") for name in (*plain, *STRAINS)}
     maps |= {name: getattr(field, name) for name in ("residual", "status", "iterations")}
-    if measure != "small":
-        strain = field.strain(measure)
-        maps |= {name: getattr(strain, name) for name in STRAINS}
     return maps
 
 

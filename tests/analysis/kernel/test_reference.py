@@ -74,3 +74,11 @@ def test_there_is_one_error_for_a_reference_without_a_pattern() -> None:
     assert analysis.PatternError is Raised and issubclass(PatternError, ValueError)
     with pytest.raises(PatternError, match="focus, exposure and speckle"):
         Reference.first(np.full(SHAPE, 100, np.float32), GRID, KernelSettings(), None, None)
+
+
+def test_the_pattern_is_kept_once() -> None:
+    ready = reference().prepared
+    for k, image in enumerate((ready.pattern.grad_x, ready.pattern.grad_y, ready.pattern.level)):
+        assert image.shape == SHAPE
+        assert np.shares_memory(image, ready.images[k])
+        assert np.array_equal(image, ready.images[k, : SHAPE[0], : SHAPE[1]])

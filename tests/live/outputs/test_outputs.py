@@ -210,6 +210,8 @@ def test_each_kind_reaches_those_who_define_it() -> None:
     loads = make_loads(10.0, lambda t: 100.0 * t)
     out, journal = outputs(listener, keeper, loads=loads)
     assert listener.begun.wait(10)
+    assert out.wants_frames
+    assert not outputs(keeper)[0].wants_frames
     give(out, [0, 1])
     for index in range(3):
         out.frame(frame(index))
