@@ -6,6 +6,7 @@ import dataclasses
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,8 @@ from live.batch.cutting import Cut, cut, sweep_chunks
 from live.batch.listed import Listed
 from live.batch.standing import Standing
 from live.batch.summary import write_summary
-from live.batch.work import Row, Task, failed, key_of, row_done, sweep, sweep_whole
+from live.batch.work import Row, Task, failed, key_of, longest_first, row_done, sweep, sweep_whole
+from live.batch.workers import Cluster, Hands, Pool
 from live.setup import compile_ahead, load_config
 from live.tell import Screen
 
@@ -90,12 +92,15 @@ def run_campaign(wanted: Wanted, screen: Screen, stopping: threading.Event) -> C
     """
     load_config(Path(wanted.config) if wanted.config else None, wanted.overrides)
     _make(wanted.out)
-    rows, tasks = _planned(wanted)
-    _sweep(wanted.out, rows, tasks)
-    ready = len(wanted.tests) - len(tasks)
-    screen.say(f"{len(wanted.tests)} tests: {ready} as they are, {len(tasks)} to replay into {wanted.out}")
-    if tasks:
-        _work(wanted, tasks, rows, screen, stopping)
+    with closing(_hands(wanted)) as hands:
+        rows, tasks = _planned(wanted)
+        _sweep(wanted.out, rows, tasks)
+        ready = len(wanted.tests) - len(tasks)
+        screen.say(
+            f"{len(wanted.tests)} tests: {ready} as they are, {len(tasks)} to replay into {wanted.out}"
+        )
+        if tasks:
+            _work(wanted, longest_first(tasks), rows, screen, stopping, hands)
     _sweep(wanted.out, rows, tasks)
     if stopping.is_set():
         return Campaign(tuple(rows.values()), len(tasks), (), 130)
@@ -103,6 +108,12 @@ def run_campaign(wanted: Wanted, screen: Screen, stopping: threading.Event) -> C
     files = write_summary(found, wanted.out)
     code = 0 if all(row.is_well for row in found) else 5
     return Campaign(found, len(tasks), tuple(files), code)
+
+
+def _hands(wanted: Wanted) -> Hands:
+    """Processes for what is missing at first sight: they load while this one plans."""
+    missing = sum(not (wanted.out / test.name).exists() for test in wanted.tests)
+    return Hands(0 if wanted.scheduler else min(wanted.workers, missing))
 
 
 def _sweep(out: Path, rows: Mapping[str, Row], tasks: Sequence[Task]) -> None:
@@ -166,10 +177,14 @@ def _absolute(path: str | None) -> str | None:
 
 
 def _work(
-    wanted: Wanted, tasks: Sequence[Task], rows: dict[str, Row], screen: Screen, stopping: threading.Event
+    wanted: Wanted,
+    tasks: Sequence[Task],
+    rows: dict[str, Row],
+    screen: Screen,
+    stopping: threading.Event,
+    hands: Hands,
 ) -> None:
     from analysis import PICTURE_KINDS
-    from live.batch.workers import Cluster, Pool
 
     if wanted.scheduler is None:
         compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
@@ -178,7 +193,7 @@ def _work(
     first = course.first()
     workers: Pool | Cluster
     if wanted.scheduler is None:
-        workers = Pool(first, wanted.workers, course.told, course.done)
+        workers = Pool(first, wanted.workers, course.told, course.done, hands)
     else:
         workers = Cluster(first, wanted.scheduler, course.told, course.done, screen)
     try:

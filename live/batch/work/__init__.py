@@ -4,7 +4,7 @@
 depends on, ``row`` is what it tells.
 """
 
-from live.batch.work.keys import deciding_versions, is_session, key_of, key_of_chunk
+from live.batch.work.keys import deciding_versions, is_session, key_of, key_of_chunk, longest_first
 from live.batch.work.places import parts, remove, sweep, sweep_whole
 from live.batch.work.row import COLUMNS, RENEWED, Row, Value, failed
 from live.batch.work.task import Progress, Task, perform, row_done
@@ -21,6 +21,7 @@ __all__ = [
     "is_session",
     "key_of",
     "key_of_chunk",
+    "longest_first",
     "parts",
     "perform",
     "remove",

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,7 +52,22 @@ def key_of_chunk(task: Task) -> str:
     return _hash(json.dumps([task.key, task.numbers, task.run_in]).encode())
 
 
-def deciding_versions() -> dict[str, str]:
+def longest_first(tasks: Iterable[Task]) -> list[Task]:
+    """Those of large recordings first, so that none of them is left to one worker at the end; pictures last."""
+    return sorted(tasks, key=_bytes, reverse=True)
+
+
+def _bytes(task: Task) -> int:
+    if not is_session(task.source):
+        return 0
+    path = Path(parse_address(with_scheme(task.source)).target).expanduser()
+    with contextlib.suppress(OSError):
+        return sum(file.stat().st_size for file in _set_of(path))
+    return 0  # gone since; the replay will tell
+
+
+@cache
+def deciding_versions() -> Mapping[str, str]:
     """Of what the numbers depend on."""
     found = versions()
     return {name: found[name] for name in _DECIDING}

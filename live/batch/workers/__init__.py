@@ -3,6 +3,6 @@ cluster (``there`` is what runs on it).
 """
 
 from live.batch.workers.cluster import Cluster
-from live.batch.workers.pool import Pool
+from live.batch.workers.pool import Hands, Pool
 
-__all__ = ["Cluster", "Pool"]
+__all__ = ["Cluster", "Hands", "Pool"]

@@ -28,13 +28,38 @@ Done = Callable[[Task, Row], Sequence[Task]]
 """Of a task that is done; gives those that can be done now."""
 
 
+class Hands:
+    """``count`` processes that load their libraries while it is found out what there is to do."""
+
+    def __init__(self, count: int) -> None:
+        self._idle = deque(_Worker() for _ in range(count))
+
+    def take(self) -> _Worker:
+        """One of them, or a new one where none is left."""
+        try:
+            return self._idle.popleft()
+        except IndexError:
+            return _Worker()
+
+    def close(self) -> None:
+        """Let go of those that nobody took."""
+        while self._idle:
+            worker = self._idle.popleft()
+            worker.kill()
+            worker.end()
+
+
 class Pool:
     """``workers`` processes at work on ``tasks``; ``told`` and ``done`` are called from threads.
 
-    A task whose worker died three times is a failed row; those of other workers go on untouched.
+    A task whose worker died three times is a failed row; those of other workers go on untouched. The first
+    processes are those of ``hands``, whoever made them closes them.
     """
 
-    def __init__(self, tasks: Sequence[Task], workers: int, told: Told, done: Done) -> None:
+    def __init__(
+        self, tasks: Sequence[Task], workers: int, told: Told, done: Done, hands: Hands | None = None
+    ) -> None:
+        self._hands = hands or Hands(0)
         self._waiting, self._deaths = deque(tasks), dict.fromkeys((task.title for task in tasks), 0)
         self._told, self._done = told, done
         self._stopped = threading.Event()
@@ -91,7 +116,7 @@ class Pool:
             self._waiting.extendleft(tasks)
 
     def _new(self) -> _Worker:
-        worker = _Worker()
+        worker = self._hands.take()
         with self._lock:
             self._workers.add(worker)
         if self._stopped.is_set():

@@ -15,6 +15,7 @@ import sys
 import threading
 from typing import TextIO
 
+from analysis import numerics
 from live.batch.work import Progress, Task, perform
 
 
@@ -25,6 +26,7 @@ def main() -> int:
     answers = _answers()
     tasks: queue.Queue[str] = queue.Queue()
     threading.Thread(target=_listen, args=(tasks,), daemon=True).start()
+    numerics()  # loads numba, while the caller plans
     while True:
         row = perform(Task.from_json(tasks.get()), lambda progress: _tell(answers, progress))
         _put(answers, {"row": dict(row.values)})

@@ -212,9 +212,32 @@ def answer(**other: object) -> dict[str, object]:
 @pytest.mark.parametrize("package", ["phasedic", "numpy"])
 def test_other_versions_are_refused(package: str) -> None:
     cluster.check("tcp://a:1", {"tcp://b:1": answer()})
-    other = deciding_versions() | {package: "0.0.1\x1b[31m"}
+    other = {**deciding_versions(), package: "0.0.1\x1b[31m"}
     with pytest.raises(ConfigError, match=rf"worker tcp://c:1 has {package} 0\.0\.1[^\x1b]*, here it is"):
         cluster.check("tcp://a:1", {"tcp://b:1": answer(), "tcp://c:1": answer(versions=other)})
+
+
+ELSEWHERE = """
+from importlib import metadata
+here = metadata.version
+metadata.version = lambda name: "0.0.1" if name == "phasedic" else here(name)
+"""
+"""As ``sitecustomize``: a machine that has another version of phasedic installed."""
+
+
+def test_a_worker_with_another_version_is_refused(
+    runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "sitecustomize.py").write_text(ELSEWHERE, encoding="utf-8")
+    paths = os.pathsep.join([str(tmp_path / "elsewhere"), os.environ.get("PYTHONPATH", "")])
+    words = ["batch", str(runs / "hole-1" / "session.h5"), "--out", str(tmp_path / "out"), "--scheduler"]
+    with running(tmp_path, 1, **ONE_THREAD, PYTHONPATH=paths) as made:
+        assert main([*words, made.address]) == 2
+    said = capsys.readouterr().err
+    assert "has phasedic 0.0.1, here it is" in said
+    assert "install the same there" in said
+    assert not list((tmp_path / "out").iterdir())
 
 
 def test_a_worker_that_does_not_see_the_results_is_refused() -> None:

@@ -1,0 +1,109 @@
+"""Workers that load their libraries while the campaign is planned, and the order of what they are given."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+
+from acquire.errors import ConfigError
+from live.batch import Wanted, campaign, find_tests, run_campaign
+from live.batch.work import Task, failed, longest_first
+from live.batch.workers import Hands, Pool
+from live.tell import Screen
+from tests.live.batch.running import is_gone
+
+
+class Counted(Hands):
+    """Remembers its processes, and which were taken."""
+
+    made: list[Counted]
+
+    def __init__(self, count: int) -> None:
+        super().__init__(count)
+        self.pids, self.taken = [worker.pid for worker in self._idle], list[int]()
+        Counted.made.append(self)
+
+    def take(self) -> object:
+        worker = super().take()
+        self.taken.append(worker.pid)
+        return worker
+
+
+@pytest.fixture(autouse=True)
+def counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    Counted.made = []
+    monkeypatch.setattr(campaign, "Hands", Counted)
+
+
+def wanted(tmp_path: Path, tests: int, **more: object) -> Wanted:
+    """Tests whose recordings are no recordings."""
+    for number in range(tests):
+        (tmp_path / f"{number}").mkdir()
+        (tmp_path / f"{number}" / "session.h5").write_bytes(b"nothing of a session")
+    found = find_tests([str(tmp_path / "[0-9]" / "session.h5")])
+    return Wanted(**{"tests": found, "out": tmp_path / "out", "workers": 2, **more})
+
+
+def test_they_are_there_before_it_is_known_what_they_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planned, before = campaign._planned, []
+
+    def plan(asked: Wanted) -> object:
+        before.extend(Counted.made[0].pids)
+        return planned(asked)
+
+    monkeypatch.setattr(campaign, "_planned", plan)
+    run_campaign(wanted(tmp_path, 3), Screen(quiet=True), threading.Event())
+    (made,) = Counted.made
+    assert len(before) == 2
+    assert set(made.taken) == set(before), "others were started"
+    assert all(map(is_gone, before))
+
+
+def test_those_that_nobody_needs_are_let_go_of(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "0").mkdir()  # of other settings
+    with pytest.raises(ConfigError, match="nothing is overwritten"):
+        run_campaign(wanted(tmp_path, 2), Screen(quiet=True), threading.Event())
+    (made,) = Counted.made
+    assert len(made.pids) == 1
+    assert not made.taken
+    assert all(map(is_gone, made.pids))
+
+
+def test_a_cluster_needs_none(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError):
+        run_campaign(
+            wanted(tmp_path, 1, scheduler="tcp://127.0.0.1:9x"), Screen(quiet=True), threading.Event()
+        )
+    assert not Counted.made[0].pids
+
+
+def test_a_pool_starts_more_where_they_are_not_enough(tmp_path: Path) -> None:
+    tasks = [Task(str(k), str(tmp_path), "nothing.h5", key="key") for k in range(2)]
+    rows = []
+    hands = Counted(1)
+    pool = Pool(tasks, 2, lambda task, progress: None, lambda task, row: rows.append(row) or (), hands)
+    while not pool.wait(0.05):
+        pass
+    pool.close()
+    hands.close()
+    assert [row.values["outcome"] for row in rows] == [failed("0", "", "", 1).values["outcome"]] * 2
+    assert hands.pids[0] in hands.taken
+    assert len(set(hands.taken)) == 2
+    assert all(map(is_gone, hands.taken))
+
+
+def test_the_longest_first(tmp_path: Path) -> None:
+    for name, length in (("short", 10), ("long", 1000), ("cut", 400)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "session.h5").write_bytes(b"x" * length)
+    (tmp_path / "cut" / "session.1.h5").write_bytes(b"x" * 800)  # where it was continued
+    (tmp_path / "pictures").mkdir()
+    sources = [tmp_path / name / "session.h5" for name in ("short", "long", "gone", "cut")]
+    tasks = [Task(source.parent.name, "", str(source)) for source in sources]
+    tasks.insert(0, Task("pictures", "", f"files:{tmp_path / 'pictures'}/*.tif"))
+    assert [task.name for task in longest_first(tasks)] == ["cut", "long", "short", "pictures", "gone"]
