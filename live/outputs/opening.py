@@ -16,13 +16,15 @@ from live.outputs.consumer import Consumer
 from live.outputs.files import Files
 from live.outputs.outputs import Outputs
 from live.outputs.watching import CardWriter, FiguresWriter, Watching
-from live.results import Results, ResultsInfo
+from live.results import FLUSH_S, Results, ResultsInfo
 from live.setup import Config, describe, outlines, versions
 from live.tell import Books, Screen, StatusCard
 from live.view import View, ViewSetup, spawn_viewer
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid
+
+SELDOM_S = 10.0  # a row may wait for its flush where nobody would have it from a broken run
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,6 +40,8 @@ class About:
     grid : ZoiGrid
     start : ClockPair
         Time zero of the files and curves.
+    aside : bool
+        Nobody looks into ``folder`` before all is done, and it counts for nothing until then.
     """
 
     config: Config
@@ -45,6 +49,7 @@ class About:
     camera: CameraInfo
     grid: ZoiGrid
     start: ClockPair
+    aside: bool = False
 
 
 def make_outputs(about: About, books: Books, screen: Screen, more: Sequence[Consumer] = ()) -> Outputs:
@@ -69,7 +74,9 @@ def make_outputs(about: About, books: Books, screen: Screen, more: Sequence[Cons
         axis=config.specimen.axis,
         lagged=config.load.lag_s != 0,
     )
-    consumers: list[Consumer] = [Files(Results(about.folder, about.grid, info))]
+    consumers: list[Consumer] = [
+        Files(Results(about.folder, about.grid, info, SELDOM_S if about.aside else FLUSH_S))
+    ]
     view = _view(about, books, screen)
     if view is not None:
         card = StatusCard(config.specimen, books.loads)

@@ -148,7 +148,10 @@ def _run(
     books = Books(journal, Ledger(), material.loads, History())
     write_names(request.source, folder / "pictures.csv")
     screen.say(f"replaying {request.source} into {request.settled or folder}")
-    outputs = make_outputs(About(config, folder, material.camera, ready.grid, material.start), books, screen)
+    about = About(
+        config, folder, material.camera, ready.grid, material.start, aside=request.settled is not None
+    )
+    outputs = make_outputs(about, books, screen)
     began, work = time.perf_counter(), ahead(bursts)
     try:
         _give_past(material, outputs)

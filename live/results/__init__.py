@@ -11,9 +11,11 @@ from live.results.info import ResultsInfo
 from live.results.quantities import MEANS, UNITLESS, Quantity, quantity_of
 from live.results.reader import Strain
 from live.results.row import gauge_columns
+from live.results.strain_h5 import FLUSH_S
 from live.results.writer import Results
 
 __all__ = [
+    "FLUSH_S",
     "MEANS",
     "UNITLESS",
     "Quantity",

@@ -1,7 +1,7 @@
 """``strain.h5``: the strain maps of a test, crash-safe and readable by NeXus viewers.
 
-Every dataset and attribute is made before SWMR mode is switched on, and rows are flushed four times a
-second: after a kill those are there (open with ``swmr=True``, as ``Strain.open`` does).
+Every dataset and attribute is made before SWMR mode is switched on, and rows are flushed soon: after a kill those are
+there (open with ``swmr=True``, as ``Strain.open`` does).
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from analysis.field import ZoiGrid
     from live.results.info import ResultsInfo
 
-FLUSH_S = 0.25  # a row waits for its flush no longer than this
+FLUSH_S = 0.25  # a row of a live test waits for its flush no longer than this
 _UNITS = {"time_s": "s", "force_N": "N", "noise_GL": "GL", "duration_s": "s", "u_px": "px", "v_px": "px"}
 _UNITS |= {
     "stress_Pa": "Pa",
@@ -60,6 +60,8 @@ class StrainWriter:
     path : Path
     grid : ZoiGrid
     info : ResultsInfo
+    flush_s : float, s
+        A row waits for its flush no longer than this.
     now : callable
         Gives seconds; paces the flushes.
 
@@ -71,11 +73,16 @@ class StrainWriter:
     """
 
     def __init__(
-        self, path: Path, grid: ZoiGrid, info: ResultsInfo, now: Callable[[], float] = time.monotonic
+        self,
+        path: Path,
+        grid: ZoiGrid,
+        info: ResultsInfo,
+        flush_s: float = FLUSH_S,
+        now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._path, self.failed, self._axis = path, False, info.axis
         self._flushed = 0  # rows
-        self._pace = Pace(FLUSH_S, now)
+        self._pace = Pace(flush_s, now)
         self._file = self._guard(lambda: _create(path, grid, info))
         entry = self._file["entry"]
         self._maps = {n: PictureStack(entry["strain"][n]) for n in layout.MAPS}
@@ -88,7 +95,7 @@ class StrainWriter:
         self.flush_when_due()
 
     def flush_when_due(self) -> float:
-        """Flush where a row has waited for ``FLUSH_S``; ``write`` does that too.
+        """Flush where a row has waited for ``flush_s``; ``write`` does that too.
 
         Returns
         -------

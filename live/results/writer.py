@@ -16,7 +16,7 @@ from live.measure import AxisFinder
 from live.results.info import ResultsInfo
 from live.results.row import Row
 from live.results.strain_csv import CsvWriter
-from live.results.strain_h5 import StrainWriter
+from live.results.strain_h5 import FLUSH_S, StrainWriter
 
 if TYPE_CHECKING:
     from analysis.field import ZoiGrid
@@ -32,6 +32,8 @@ class Results(Closing):
         Made where it does not exist; files in it are never overwritten.
     grid : ZoiGrid
     info : ResultsInfo
+    flush_s : float, s
+        A row waits no longer than this to be readable by others, and safe from a kill.
 
     Raises
     ------
@@ -39,7 +41,7 @@ class Results(Closing):
         A file exists already, or cannot be written.
     """
 
-    def __init__(self, folder: Path, grid: ZoiGrid, info: ResultsInfo) -> None:
+    def __init__(self, folder: Path, grid: ZoiGrid, info: ResultsInfo, flush_s: float = FLUSH_S) -> None:
         self._info, self._axis = info, AxisFinder(info.axis)
         self.h5_path, self.csv_path = folder / "strain.h5", folder / "strain.csv"
         self.written = 0
@@ -51,7 +53,7 @@ class Results(Closing):
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise DataError(f"{folder}: cannot be made ({error.strerror}); choose another --out") from error
-        self._h5 = StrainWriter(self.h5_path, grid, info)
+        self._h5 = StrainWriter(self.h5_path, grid, info, flush_s)
         try:
             self._csv = CsvWriter(self.csv_path, extras=info.extras, gauges=info.gauges)
         except DataError:

@@ -18,8 +18,11 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 
+from acquire.hdf5 import Pace
 from live.batch import Wanted, find_tests, run_campaign
+from live.batch.work import Task, perform
 from live.cli import main
+from live.results import strain_h5
 from live.tell import Screen
 from tests.live.batch.conftest import SETTINGS
 from tests.live.batch.running import datasets, differing, is_gone, parts, pid_of, rows, started, until
@@ -53,6 +56,21 @@ def test_bit_equal_to_a_replay(runs: Path, done: Path, tmp_path: Path, name: str
 def test_the_results_say_where_they_lie(done: Path) -> None:
     assert b".part" not in (done / "hole-1" / "strain.h5").read_bytes()
     assert b".part" not in (done / "hole-1" / "replay.txt").read_bytes()
+
+
+def test_rows_of_a_task_are_flushed_seldom(
+    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody would have them from a broken one; those of a replay can be followed."""
+    session, paces = str(runs / "hole-1" / "session.h5"), []
+    monkeypatch.setattr(strain_h5, "Pace", lambda every_s, now: paces.append(every_s) or Pace(every_s, now))
+    settings = {"measure.zoi": 48, "measure.step": 12}
+    row = perform(Task("task", str(tmp_path), session, overrides=settings))
+    assert row.values["outcome"] == "done"
+    assert (
+        main(["replay", session, *SETTINGS, "--no-view", "--no-rrd", "--out", str(tmp_path / "alone")]) == 0
+    )
+    assert paces == [10.0, strain_h5.FLUSH_S]
 
 
 def test_again_only_what_is_missing(runs: Path, done: Path, capsys: pytest.CaptureFixture[str]) -> None:

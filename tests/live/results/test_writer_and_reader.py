@@ -219,19 +219,20 @@ def test_time_of_the_kernel_and_latency_are_columns(tmp_path: Path) -> None:
     assert (second["kernel_s"], second["latency_s"]) == ("nan", "nan")
 
 
-def test_rows_are_flushed_together_and_on_time(tmp_path: Path) -> None:
+@pytest.mark.parametrize("flush_s", [FLUSH_S, 10.0])
+def test_rows_are_flushed_together_and_on_time(tmp_path: Path, flush_s: float) -> None:
     clock = Clock()
-    writer = StrainWriter(tmp_path / "strain.h5", make_grid(), INFO, now=clock)
+    writer = StrainWriter(tmp_path / "strain.h5", make_grid(), INFO, flush_s, now=clock)
     rows = [Row.of(make_measurement(k, 1e-3 * k), INFO) for k in range(3)]
     clock.now_s = 1.0
     writer.write(rows[0])
-    clock.now_s += FLUSH_S / 2
+    clock.now_s += flush_s / 2
     writer.write(rows[1])
     writer.write(rows[2])
-    assert writer.flush_when_due() == pytest.approx(FLUSH_S / 2)
+    assert writer.flush_when_due() == pytest.approx(flush_s / 2)
     with Strain.open(tmp_path / "strain.h5") as strain:
         assert strain.n == 1
-    clock.now_s += FLUSH_S
+    clock.now_s += flush_s
     assert writer.flush_when_due() == math.inf
     with Strain.open(tmp_path / "strain.h5") as strain:
         assert strain.n == 3
