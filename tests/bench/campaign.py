@@ -54,7 +54,7 @@ def peak_MB(pid: int) -> float:
 
 
 def replayed(out: Path, *words: object) -> dict[str, Any]:
-    """``phasedic batch`` with ``words``: seconds, CPU seconds, MB of the largest worker."""
+    """``phasedic batch`` with ``words``: seconds, CPU seconds, the one over the other, MB of the largest worker."""
     command = [sys.executable, "-m", "live.cli", "batch", *map(str, words), "--out", str(out)]
     before, began, most = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter(), 0.0
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
@@ -64,7 +64,9 @@ def replayed(out: Path, *words: object) -> dict[str, Any]:
     took, after = time.perf_counter() - began, resource.getrusage(resource.RUSAGE_CHILDREN)
     assert process.returncode == 0, f"exit code {process.returncode}"
     cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    return {"s": round(took, 2), "CPU s": round(cpu, 2), "MB a worker": round(most)}
+    return {
+        "s": round(took, 2), "CPU s": round(cpu, 2), "cores busy": round(cpu / took, 2), "MB a worker": round(most),
+    }  # fmt: skip
 
 
 def speed(folder: Path, seconds: float) -> list[dict[str, Any]]:
