@@ -120,7 +120,8 @@ def broken_at(stress: Floats) -> int | None:
     if not len(gone):
         return None
     k = top + int(gone[0])
-    usual = max(float(np.median(np.abs(np.diff(values[:k])))), 3 * noise(values[:k]))
+    steps = np.abs(np.diff(values[:k]))
+    usual = max(float(np.median(steps)), 3 * noise(values[:k])) if len(steps) else np.inf
     while k > top and values[k - 1] - values[k] > _FALL * usual:
         k -= 1
     return int(known[k])

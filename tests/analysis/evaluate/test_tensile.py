@@ -20,6 +20,7 @@ from analysis.evaluate import (
     load_axis,
     principal_direction,
 )
+from analysis.evaluate.curve import broken_at
 from tests.analysis.evaluate.curves import Truth, composite, linear, lueders, noisy, ramberg_osgood
 
 SEEDS = 60
@@ -207,3 +208,12 @@ def test_the_direction_of_the_load_is_found(degrees: float) -> None:
     assert inside >= 0.85 * SEEDS
     assert found[0].high - found[0].low < math.radians(0.5)
     assert not principal_direction(np.zeros(20), np.zeros(20), np.zeros(20)).known
+
+
+@pytest.mark.parametrize(
+    ("stress", "last"),
+    [([1.0, -0.5, 0.2], 1), ([*range(1, 11), 10, 0, 0], 10), ([1, 2], None), ([np.nan] * 4, None)],
+)
+def test_the_last_sample_before_a_break(stress: list[float], last: int | None) -> None:
+    """Also of a test that has hardly begun, whose first value was the highest: without a warning."""
+    assert broken_at(np.array(stress, float)) == last
