@@ -24,7 +24,7 @@ from live.tell import Screen
 
 log = logging.getLogger(__name__)
 RETRIES = 2  # of a task that raised; one whose worker died is given to another three times by Dask itself
-_ANSWER_S = 10
+_ANSWER_S, _STARTS = 10, 3
 _ROOM, _LEAST_ROOM = 4, 200
 """Tasks a worker, and of all at least, that the scheduler is given; ten thousand at once silence it."""
 
@@ -194,13 +194,17 @@ def _connected(address: str) -> Any:
             f"--scheduler {address}: no certificate is known here; set DASK_DISTRIBUTED__COMM__TLS__CA_FILE,"
             " ...CLIENT__CERT and ...CLIENT__KEY (docs/scale.md)"
         )
-    try:
-        return Client(address, timeout=_ANSWER_S, set_as_default=False)
-    except (OSError, ValueError, TypeError) as error:
-        why = printable(str(error))[:200]
-        raise ConfigError(
-            f"--scheduler {address}: nothing answers there ({why}); start one with 'dask scheduler'"
-        ) from None
+    for _ in range(_STARTS):
+        try:
+            return Client(address, timeout=_ANSWER_S, set_as_default=False)
+        except AssertionError:  # Dask waits ten seconds for a thread of its own, no longer
+            log.debug("Dask's own thread did not start")
+        except (OSError, ValueError, TypeError) as error:
+            why = printable(str(error))[:200]
+            raise ConfigError(
+                f"--scheduler {address}: nothing answers there ({why}); start one with 'dask scheduler'"
+            ) from None
+    raise ConfigError(f"--scheduler {address}: Dask does not start here; this machine is too busy, try again")
 
 
 def check(address: str, found: Mapping[str, Mapping[str, Any]]) -> None:

@@ -240,6 +240,27 @@ def test_a_worker_with_another_version_is_refused(
     assert not list((tmp_path / "out").iterdir())
 
 
+@pytest.mark.parametrize(("late", "reached"), [(2, True), (3, False)])
+def test_on_a_busy_machine_dask_is_started_again(
+    late: int, reached: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Dask gives up, with an AssertionError, when its own thread has not begun after ten seconds."""
+    client, tries = object(), list[str]()
+
+    def begin(address: str, **_options: object) -> object:
+        tries.append(address)
+        assert len(tries) > late
+        return client
+
+    monkeypatch.setattr("distributed.Client", begin)
+    if reached:
+        assert cluster._connected("tcp://127.0.0.1:9") is client
+    else:
+        with pytest.raises(ConfigError, match="too busy, try again"):
+            cluster._connected("tcp://127.0.0.1:9")
+    assert len(tries) == 3
+
+
 def test_a_worker_that_does_not_see_the_results_is_refused() -> None:
     with pytest.raises(ConfigError, match="does not see --out"):
         cluster.check("tcp://a:1", {"tcp://b:1": answer(sees=False)})
