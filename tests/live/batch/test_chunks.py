@@ -107,7 +107,7 @@ def changing(folder: Path) -> Path:
         mixed = share * first.render(moved, shape) + (1 - share) * other.render(moved, shape)
         return frozen(np.rint(4080 * np.asarray(mixed)).astype(np.uint16))
 
-    pictures = [picture(1.0, 0.0), picture(0.95, 0.02), picture(0.9, 0.03)]
+    pictures = [picture(1.0, 0.0), picture(0.96, 0.02), picture(0.92, 0.03)]
     with session_writer(folder / "changing", {"measure": measure}, {}) as writer:
         for k in range(230):
             image = pictures[(k >= 150) + (k >= 151)]

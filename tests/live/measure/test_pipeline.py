@@ -77,7 +77,7 @@ def test_a_renewed_reference_stays_composed(speckle: Speckle, on_demand: bool) -
     else:
         # Another pattern fades in: the first reference no longer fits the last picture.
         other = Speckle(SHAPE, radius=2.0, seed=6)
-        fading = zip((0.95, 0.9), ({"u": 2.0, "du_dx": 0.02}, {"u": 3.0, "du_dx": 0.03}), strict=True)
+        fading = zip((0.96, 0.92), ({"u": 2.0, "du_dx": 0.02}, {"u": 3.0, "du_dx": 0.03}), strict=True)
         mixed = [w * picture(speckle, **g) + (1 - w) * picture(other, **g) for w, g in fading]
         steps = [burst(image, i) for i, image in enumerate(mixed, 1)]
     found = list(measure(steps, kernel, LoadLog(), noise_GL=noise, renew_at=0.2, on_event=told.append))
