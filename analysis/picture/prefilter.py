@@ -61,14 +61,17 @@ def coefficients(image: NDArray[Any], offset: Any, taps: NDArray[np.float32], bo
 @helper
 def _filter_share(image: Any, offset: Any, taps: Any, box: Any, counters: Any, share: int, out: Any) -> None:
     """What one thread comes to do of all rows, a part after the other."""
+    parts = (box.bottom - box.top + PART - 1) // PART
+    part = next_piece(counters, share, parts)
+    if part < 0:  # as for most shares: nothing is left
+        return
     width = image.shape[1]
     line = np.zeros((width + GROUP - 1) // GROUP * GROUP + 2 * REACH, np.float32)
     # An odd number of cache lines a row, or the rows would displace each other.
     ring = np.empty((RING, line.size - 2 * REACH + LINE), np.float32)
     band = np.empty((BAND, line.size), np.float32)
     room = line, ring, band, np.empty(RING, np.intp)
-    parts = (box.bottom - box.top + PART - 1) // PART
-    ahead, part = -1, next_piece(counters, share, parts)
+    ahead = -1
     while part >= 0:
         top = box.top + part * PART
         if ahead != top + REACH:  # else the rows above are still in the ring
