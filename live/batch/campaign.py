@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from acquire.errors import ConfigError, PhasedicError
+from acquire.errors import ConfigError, DataError, PhasedicError
 from live.batch.course import Course
 from live.batch.cutting import Cut, cut, sweep_chunks
 from live.batch.listed import Listed
@@ -113,7 +113,14 @@ def run_campaign(wanted: Wanted, screen: Screen, stopping: threading.Event) -> C
 def _hands(wanted: Wanted) -> Hands:
     """Processes for what is missing at first sight: they load while this one plans."""
     missing = sum(not (wanted.out / test.name).exists() for test in wanted.tests)
-    return Hands(0 if wanted.scheduler else min(wanted.workers, missing))
+    try:
+        return Hands(0 if wanted.scheduler else min(wanted.workers, missing))
+    except OSError as error:
+        raise _no_process(error) from error
+
+
+def _no_process(error: OSError) -> DataError:
+    return DataError(f"no process can be started on this machine ({error.strerror}); end other programs")
 
 
 def _sweep(out: Path, rows: Mapping[str, Row], tasks: Sequence[Task]) -> None:
@@ -184,15 +191,12 @@ def _work(
     stopping: threading.Event,
     hands: Hands,
 ) -> None:
-    from analysis import PICTURE_KINDS
-
-    if wanted.scheduler is None:
-        compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
     standing = Standing(len(tasks), time.monotonic)
     course = Course(tasks, _cuts(tasks, screen), rows, standing, screen)
     first = course.first()
     workers: Pool | Cluster
     if wanted.scheduler is None:
+        _compile(hands, screen)
         workers = Pool(first, wanted.workers, course.told, course.done, hands)
     else:
         workers = Cluster(first, wanted.scheduler, course.told, course.done, screen)
@@ -202,6 +206,18 @@ def _work(
     finally:
         workers.close()
     screen.say(standing.words())
+
+
+def _compile(hands: Hands, screen: Screen) -> None:
+    """Have compiled what is missing, before workers need it."""
+    try:
+        ready = hands.are_ready()
+    except OSError as error:
+        raise _no_process(error) from error
+    if not ready:
+        from analysis import PICTURE_KINDS
+
+        compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
 
 
 def _cuts(tasks: Sequence[Task], screen: Screen) -> dict[str, Cut]:

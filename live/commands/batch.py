@@ -11,7 +11,7 @@ from pathlib import Path
 from acquire.errors import ConfigError
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import MEASURE, add_options, add_verbose, overrides
-from live.commands.run import signals
+from live.commands.signals import signals
 from live.tell import Screen
 
 OUTPUT = ("axis", "standard", "zero", "lag")

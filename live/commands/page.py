@@ -11,7 +11,8 @@ from acquire.printable import brief
 from live.commands.init import find_devices
 from live.commands.options import add_measure, add_options, overrides
 from live.commands.report import write_report
-from live.commands.run import OTHER_PROGRAMS, RECORDING, invite, signals, watched
+from live.commands.run import OTHER_PROGRAMS, RECORDING, invite, watched
+from live.commands.signals import signals
 from live.serve import DEFAULT_PORT, Desk, Draft
 from live.setup import load_config
 from live.tell import Screen

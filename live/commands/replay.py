@@ -9,7 +9,7 @@ from typing import Any
 
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, overrides
-from live.commands.run import signals
+from live.commands.signals import signals
 from live.tell import Screen, file_lines, summary_lines
 
 

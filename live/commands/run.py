@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import signal
 import sys
 import webbrowser
-from collections.abc import Callable, Iterator, Sequence
-from types import FrameType
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, add_options, configured
+from live.commands.signals import signals
 from live.operate import OrderPort, listen
 from live.outputs import Consumer
 from live.run import INTERRUPTED, LiveRun, Outcome, Stop, run_live
@@ -26,29 +25,6 @@ if TYPE_CHECKING:
 
 RECORDING = ("camera", "load", "no-record", "record", "armed", "start-above", "dark", "flat", "crop")
 OTHER_PROGRAMS = ("orders", "strain-out", "strain-format", "strain-channels", "token-file")
-
-
-@contextlib.contextmanager
-def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[None]:
-    """SIGINT and SIGTERM call ``stop`` (the third time they kill); a lost terminal is ignored."""
-    times = 0
-
-    def handle(number: int, frame: FrameType | None) -> None:
-        nonlocal times
-        times += 1
-        if times > 2:
-            signal.signal(number, signal.SIG_DFL)
-            signal.raise_signal(number)
-        say("closing the files ..." if times == 1 else "still closing; once more ends it at once")
-        stop()
-
-    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
-    before[signal.SIGHUP] = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

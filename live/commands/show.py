@@ -8,7 +8,7 @@ from pathlib import Path
 
 from acquire.errors import ConfigError
 from live.commands.options import add_gauge_option
-from live.commands.run import signals
+from live.commands.signals import signals
 from live.finished import add_gauges, open_run
 from live.show import Asked, show
 from live.tell import Screen

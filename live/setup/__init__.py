@@ -9,7 +9,7 @@ configuration, ``compiling`` has the loops compiled ahead, ``folder`` makes the 
 from live.setup.checks import ALL, AUTO, GIVEN
 from live.setup.compiling import compile_ahead
 from live.setup.config import Config, from_dict, load_config, options, settings_in
-from live.setup.folder import FILES, make_folder, other_digits, versions
+from live.setup.folder import FILES, installed, make_folder, other_digits, versions
 from live.setup.gauges import GaugeConfig, describe, gauges_for, outlines
 from live.setup.grid import grid_for, kernel_settings, whole_picture
 from live.setup.pictures import correction, read_mask, with_flat_field, with_mask
@@ -35,6 +35,7 @@ __all__ = [
     "from_dict",
     "gauges_for",
     "grid_for",
+    "installed",
     "kernel_settings",
     "load_config",
     "make_folder",

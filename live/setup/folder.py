@@ -26,6 +26,11 @@ def versions() -> dict[str, str]:
     """Versions of ourselves, of Python and of what we stand on, and what the last digits belong to."""
     from analysis import numerics
 
+    return installed() | numerics()
+
+
+def installed() -> dict[str, str]:
+    """Versions of ourselves, of Python and of what we stand on; loads nothing."""
     found = {
         "python": platform.python_version(),
         "machine": platform.machine(),
@@ -36,7 +41,7 @@ def versions() -> dict[str, str]:
             found[name] = version(name)
         except PackageNotFoundError:
             found[name] = "not installed"
-    return found | numerics()
+    return found
 
 
 _DIGITS = ("numba", "numpy", "machine", "processor", "vectors", "loops")

@@ -23,7 +23,7 @@ from typing import Any
 
 from live.batch.standing import Standing
 from live.batch.work import Row, Task, failed
-from live.batch.workers import Cluster, Pool
+from live.batch.workers import Cluster, Hands, Pool
 from live.cli import main as phasedic
 from live.tell import Screen
 from tests.bench import machine
@@ -96,7 +96,8 @@ def empty(folder: Path, count: int) -> list[dict[str, Any]]:
         task.folder.mkdir()
         row = failed(task.name, task.source, "", 0).values
         (task.folder / "batch.json").write_text(json.dumps({"key": task.key, "row": row}), encoding="utf-8")
-    found = [_emptied("pool", tasks, lambda told, done: Pool(tasks, 2, told, done))]
+    with contextlib.closing(Hands(0)) as hands:
+        found = [_emptied("pool", tasks, lambda told, done: Pool(tasks, 2, told, done, hands))]
     with running(folder) as cluster:
         screen = Screen(quiet=True)
         made = _emptied("Dask", tasks, lambda told, done: Cluster(tasks, cluster.address, told, done, screen))

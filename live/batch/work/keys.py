@@ -14,7 +14,7 @@ from acquire.addresses import parse_address
 from acquire.camera import with_scheme
 from acquire.errors import DataError
 from acquire.files import check_regular
-from live.setup import versions
+from live.setup import installed
 
 if TYPE_CHECKING:
     from live.batch.work.task import Task
@@ -69,7 +69,7 @@ def _bytes(task: Task) -> int:
 @cache
 def deciding_versions() -> Mapping[str, str]:
     """Of what the numbers depend on."""
-    found = versions()
+    found = installed()
     return {name: found[name] for name in _DECIDING}
 
 

@@ -19,7 +19,8 @@ from acquire.errors import ConfigError, DataError
 from acquire.printable import printable
 from live.batch.work import Progress, Row, Task, deciding_versions, failed, row_done
 from live.batch.workers import there
-from live.batch.workers.pool import Done, Told
+from live.batch.workers.hands import Told
+from live.batch.workers.pool import Done
 from live.tell import Screen
 
 log = logging.getLogger(__name__)

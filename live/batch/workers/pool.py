@@ -1,69 +1,35 @@
-"""Worker processes of this machine, one task at a time each; one that dies is replaced and its task done again.
-
-Each is a Python of its own with one thread for the numerics (the libraries read that before they are imported).
-"""
+"""Worker processes of this machine, one task at a time each; one that dies is replaced and its task done again."""
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
+import logging
 import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from live.batch.work import Progress, Row, Task, failed
-from live.batch.workers.there import ONE_THREAD
+from live.batch.work import Row, Task, failed
+from live.batch.workers.hands import Hand, Hands, Told
 
-# Of glibc: what one task leaves free goes back to the system before the next one.
-_LEAN = {
-    "MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "6000000", "MALLOC_TRIM_THRESHOLD_": "20000000",
-}  # fmt: skip
+log = logging.getLogger(__name__)
 MOST_DEATHS = 3
-_LAST_S = 5.0
 
-Told = Callable[[Task, Progress], object]
 Done = Callable[[Task, Row], Sequence[Task]]
 """Of a task that is done; gives those that can be done now."""
-
-
-class Hands:
-    """``count`` processes that load their libraries while it is found out what there is to do."""
-
-    def __init__(self, count: int) -> None:
-        self._idle = deque(_Worker() for _ in range(count))
-
-    def take(self) -> _Worker:
-        """One of them, or a new one where none is left."""
-        try:
-            return self._idle.popleft()
-        except IndexError:
-            return _Worker()
-
-    def close(self) -> None:
-        """Let go of those that nobody took."""
-        while self._idle:
-            worker = self._idle.popleft()
-            worker.kill()
-            worker.end()
 
 
 class Pool:
     """``workers`` processes at work on ``tasks``; ``told`` and ``done`` are called from threads.
 
-    A task whose worker died three times is a failed row; those of other workers go on untouched. The first
-    processes are those of ``hands``, whoever made them closes them.
+    A task whose worker died three times is a failed row; those of other workers go on untouched. The
+    processes come from ``hands``; whoever made that closes it.
     """
 
-    def __init__(
-        self, tasks: Sequence[Task], workers: int, told: Told, done: Done, hands: Hands | None = None
-    ) -> None:
-        self._hands = hands or Hands(0)
+    def __init__(self, tasks: Sequence[Task], workers: int, told: Told, done: Done, hands: Hands) -> None:
+        self._hands = hands
         self._waiting, self._deaths = deque(tasks), dict.fromkeys((task.title for task in tasks), 0)
         self._told, self._done = told, done
         self._stopped = threading.Event()
-        self._workers: set[_Worker] = set()
+        self._workers: set[Hand] = set()
         self._lock = threading.Lock()
         n = min(workers, len(tasks))
         self._threads = [threading.Thread(target=self._serve, name="worker", daemon=True) for _ in range(n)]
@@ -92,19 +58,18 @@ class Pool:
             thread.join()
 
     def _serve(self) -> None:
-        worker: _Worker | None = None
+        worker: Hand | None = None
         try:
             while (task := self._next()) is not None:
                 worker = worker or self._new()
-                row = worker.perform(task, self._told)
+                row = worker.perform(task, self._told) if worker is not None else None
                 if row is None:
                     self._end(worker)
                     worker, row = None, self._after_death(task)
                 if row is not None:
                     self._add(self._done(task, row))
         finally:
-            if worker is not None:
-                self._end(worker)
+            self._end(worker)
 
     def _next(self) -> Task | None:
         with self._lock:
@@ -115,15 +80,22 @@ class Pool:
             self._deaths |= dict.fromkeys((task.title for task in tasks), 0)
             self._waiting.extendleft(tasks)
 
-    def _new(self) -> _Worker:
-        worker = self._hands.take()
+    def _new(self) -> Hand | None:
+        """None where no process can be started."""
+        try:
+            worker = self._hands.take()
+        except OSError as error:
+            log.error("no worker could be started: %s", error)
+            return None
         with self._lock:
             self._workers.add(worker)
         if self._stopped.is_set():
             worker.kill()
         return worker
 
-    def _end(self, worker: _Worker) -> None:
+    def _end(self, worker: Hand | None) -> None:
+        if worker is None:
+            return
         worker.end()
         with self._lock:
             self._workers.discard(worker)
@@ -139,52 +111,3 @@ class Pool:
             return None
         words = f"its worker died {MOST_DEATHS} times; is there memory enough for --workers?"
         return failed(task.title, task.source, words, 1)
-
-
-class _Worker:
-    """One process."""
-
-    def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "live.batch.workers"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=_LEAN | os.environ | dict.fromkeys(ONE_THREAD, "1"),
-            text=True,
-            encoding="utf-8",
-        )
-        self.pid = self._process.pid
-
-    def perform(self, task: Task, told: Told) -> Row | None:
-        """The row of ``task``; None where the process died over it."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        try:
-            self._process.stdin.write(task.to_json() + "\n")
-            self._process.stdin.flush()
-            for line in self._process.stdout:
-                message = json.loads(line)
-                if "row" in message:
-                    return Row.of(message["row"])
-                told(task, Progress(**message["progress"]))
-        except (OSError, ValueError):  # half a line is the last word of a process that was killed
-            pass
-        return None
-
-    def kill(self) -> None:
-        """At once."""
-        self._process.kill()
-
-    def end(self) -> None:
-        """Let it go; it ends where nothing comes any more."""
-        for stream in (self._process.stdin, self._process.stdout):
-            if stream is not None:
-                try:
-                    stream.close()
-                except OSError:
-                    continue
-        try:
-            self._process.wait(_LAST_S)
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.wait()

@@ -15,7 +15,7 @@ import sys
 import threading
 from typing import TextIO
 
-from analysis import numerics
+from analysis import PICTURE_KINDS, not_compiled
 from live.batch.work import Progress, Task, perform
 
 
@@ -26,7 +26,7 @@ def main() -> int:
     answers = _answers()
     tasks: queue.Queue[str] = queue.Queue()
     threading.Thread(target=_listen, args=(tasks,), daemon=True).start()
-    numerics()  # loads numba, while the caller plans
+    _put(answers, {"compiled": not not_compiled(PICTURE_KINDS)})  # loads numba, while the caller plans
     while True:
         row = perform(Task.from_json(tasks.get()), lambda progress: _tell(answers, progress))
         _put(answers, {"row": dict(row.values)})

@@ -7,10 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DataError
+from analysis import PICTURE_KINDS, warm_up
 from live.batch import Wanted, campaign, find_tests, run_campaign
-from live.batch.work import Task, failed, longest_first
+from live.batch.work import Row, Task, failed, longest_first
 from live.batch.workers import Hands, Pool
+from live.batch.workers.hands import Hand
 from live.tell import Screen
 from tests.live.batch.running import is_gone
 
@@ -59,7 +61,8 @@ def test_they_are_there_before_it_is_known_what_they_do(
     run_campaign(wanted(tmp_path, 3), Screen(quiet=True), threading.Event())
     (made,) = Counted.made
     assert len(before) == 2
-    assert set(made.taken) == set(before), "others were started"
+    assert made.taken
+    assert set(made.taken) <= set(before), "others were started"
     assert all(map(is_gone, before))
 
 
@@ -95,6 +98,54 @@ def test_a_pool_starts_more_where_they_are_not_enough(tmp_path: Path) -> None:
     assert hands.pids[0] in hands.taken
     assert len(set(hands.taken)) == 2
     assert all(map(is_gone, hands.taken))
+
+
+def test_what_is_not_compiled_is_compiled_by_the_caller(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Workers say what they find; only then are they given anything."""
+    asked: list[tuple[object, int]] = []
+    monkeypatch.setattr(Hand, "is_ready", lambda hand: False)
+    monkeypatch.setattr(
+        campaign, "compile_ahead", lambda kinds, **more: asked.append((kinds, len(Counted.made[0].taken)))
+    )
+    run_campaign(wanted(tmp_path, 1), Screen(quiet=True), threading.Event())
+    assert asked == [(PICTURE_KINDS, 0)]
+
+
+def test_the_first_word_of_a_worker() -> None:
+    warm_up()
+    hands = Hands(1)
+    assert hands.are_ready()
+    killed = hands.take()
+    killed.end()
+    assert not killed.is_ready()
+
+
+def test_no_worker_can_be_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*words: object, **more: object) -> None:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    asked = wanted(tmp_path, 1)
+    monkeypatch.setattr("live.batch.workers.hands.subprocess.Popen", none)
+    with pytest.raises(DataError, match=r"no process can be started .* end other programs"):
+        run_campaign(asked, Screen(quiet=True), threading.Event())
+
+
+def test_no_worker_can_be_started_any_more(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Each task is a row with its error."""
+
+    class Empty(Hands):
+        def take(self) -> Hand:
+            raise BlockingIOError("too many")
+
+    rows: list[Row] = []
+    tasks = [Task(str(k), str(tmp_path), "nothing.h5", key="key") for k in range(3)]
+    pool = Pool(tasks, 2, lambda task, progress: None, lambda task, row: rows.append(row) or (), Empty(0))
+    assert pool.wait(10.0)
+    assert len(rows) == 3
+    assert all("memory enough" in str(row.values["error"]) for row in rows)
+    assert "too many" in caplog.text
 
 
 def test_the_longest_first(tmp_path: Path) -> None:
