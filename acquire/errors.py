@@ -30,3 +30,9 @@ class DataError(PhasedicError):
     """A file or its content: missing, truncated, foreign, or not what it says."""
 
     exit_code = 4
+
+
+class Interrupted(PhasedicError):
+    """A person or the system ended it before there was anything to close."""
+
+    exit_code = 130

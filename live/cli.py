@@ -13,16 +13,20 @@ from typing import TextIO
 from acquire.errors import PhasedicError
 from acquire.printable import brief, printable
 from live.commands.arguments import Command, parse
+from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.unhurried import unhurried_streams
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     _replace_closed_streams()
-    command, arguments = parse(sys.argv[1:] if argv is None else argv)
-    with unhurried_streams():
-        _set_up_logging(arguments)
-        code = _outcome(command, arguments)
+    try:
+        command, arguments = parse(sys.argv[1:] if argv is None else argv)
+        with unhurried_streams():
+            _set_up_logging(arguments)
+            code = _outcome(command, arguments)
+    except KeyboardInterrupt:  # before or after the command
+        code = _interrupted()
     _let_go_of_lost_streams()
     return code
 
@@ -83,13 +87,17 @@ def _outcome(command: Command, arguments: argparse.Namespace) -> int:
         print(f"phasedic: {printable(brief(error))}", file=sys.stderr)
         return error.exit_code
     except KeyboardInterrupt:
-        print("phasedic: interrupted", file=sys.stderr)
-        return 130
+        return _interrupted()
     except BrokenPipeError:
         return 0
     except Exception:
         logging.getLogger("live").exception("a defect of phasedic; please report it with this traceback")
         return 1
+
+
+def _interrupted() -> int:
+    print("phasedic: interrupted", file=sys.stderr)
+    return EXIT_INTERRUPTED
 
 
 if __name__ == "__main__":

@@ -196,7 +196,7 @@ def _work(
     first = course.first()
     workers: Pool | Cluster
     if wanted.scheduler is None:
-        _compile(hands, screen)
+        _compile(hands, screen, stopping)
         workers = Pool(first, wanted.workers, course.told, course.done, hands)
     else:
         workers = Cluster(first, wanted.scheduler, course.told, course.done, screen)
@@ -208,7 +208,7 @@ def _work(
     screen.say(standing.words())
 
 
-def _compile(hands: Hands, screen: Screen) -> None:
+def _compile(hands: Hands, screen: Screen, stopping: threading.Event) -> None:
     """Have compiled what is missing, before workers need it."""
     try:
         ready = hands.are_ready()
@@ -217,7 +217,7 @@ def _compile(hands: Hands, screen: Screen) -> None:
     if not ready:
         from analysis import PICTURE_KINDS
 
-        compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
+        compile_ahead(PICTURE_KINDS, phase=True, say=screen.status, stopped=stopping.is_set)
 
 
 def _cuts(tasks: Sequence[Task], screen: Screen) -> dict[str, Cut]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from acquire.errors import PhasedicError
 from acquire.printable import brief
+from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.init import find_devices
 from live.commands.options import add_measure, add_options, overrides
 from live.commands.report import write_report
@@ -18,7 +19,6 @@ from live.setup import load_config
 from live.tell import Screen
 
 RIG = "rig.toml"
-EXIT_INTERRUPTED = 130
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

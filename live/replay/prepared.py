@@ -70,7 +70,13 @@ class Prepared:
         )
 
 
-def prepared(material: Material, config: Config, source: str, screen: Screen) -> Prepared:
+def prepared(
+    material: Material,
+    config: Config,
+    source: str,
+    screen: Screen,
+    stopped: Callable[[], bool] = lambda: False,
+) -> Prepared:
     """Look for the specimen where that is asked for, and prepare the kernel; raises as ``replay``."""
     camera = material.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
@@ -80,7 +86,8 @@ def prepared(material: Material, config: Config, source: str, screen: Screen) ->
     grid = grid_for(config, camera.width, camera.height, mask)
     correct, gauges = correction(config, camera), gauges_for(config, grid)
     settings, stated = kernel_settings(config), config.measure.noise_GL
-    compile_ahead(kinds_of(camera), phase=settings.estimator == "phase", say=screen.status)
+    phase = settings.estimator == "phase"
+    compile_ahead(kinds_of(camera), phase=phase, say=screen.status, stopped=stopped)
     what = f"the reference of {source}"
     kernel, noise_GL = prepare(material.reference, grid, settings, stated, correct, what)
     return Prepared(config, mask, grid, kernel, noise_GL, correct, gauges)

@@ -139,7 +139,7 @@ def _run(
     stopping: threading.Event,
     journal: Journal,
 ) -> Replayed:
-    ready = prepared(material, config, request.source, screen)
+    ready = prepared(material, config, request.source, screen, stopping.is_set)
     stored = Recital.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements
     bursts = _not_empty(stored.bursts() if stored else material.bursts, request.source)

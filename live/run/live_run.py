@@ -304,7 +304,7 @@ def run_live(
     screen.say(f"opening {config.camera.address}")
     rig = open_rig(config.camera.address, config.load.address, books.journal, crop=config.camera.crop)
     try:
-        setting = set_up(config, rig, books.journal, screen)
+        setting = set_up(config, rig, books.journal, screen, stop)
         screen.announce(rig, setting.folder)
         about = About(setting.config, setting.folder, rig.camera.info, setting.grid, setting.start)
         outputs = make_outputs(about, books, screen, [*consumers, *signals_of(about, books, screen)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from acquire.clock import ClockPair
 from acquire.hdf5 import compile_loops
 from acquire.record_mode import RecordMode
 from live.measure import Correction, kinds_of, rehearse
+from live.run.stopping import Stop
 from live.setup import (
     DEFAULT_BURST,
     DEFAULT_REFERENCE_BURST,
@@ -70,13 +72,15 @@ class Setting:
     start: ClockPair
 
 
-def set_up(config: Config, rig: Rig, journal: Journal, screen: Screen) -> Setting:
+def set_up(config: Config, rig: Rig, journal: Journal, screen: Screen, stop: Stop) -> Setting:
     """Lay the grid, run everything once, and make the folder.
 
     Raises
     ------
     ConfigError, DataError
         Something does not fit, or cannot be read or made.
+    Interrupted
+        ``stop`` was asked while loops were compiled.
     """
     camera = rig.camera.info
     mask = _mask(config, rig)
@@ -84,7 +88,8 @@ def set_up(config: Config, rig: Rig, journal: Journal, screen: Screen) -> Settin
     gauges, settings = gauges_for(config, grid), kernel_settings(config)
     correct = correction(config, camera)
     bursts = _burst_lengths(config, camera.live)
-    _rehearse(rig, grid, settings, bursts, screen)
+    _compile(kinds_of(camera), settings, screen, stop)
+    rehearse(camera, grid, settings, bursts)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
     config = with_flat_field(with_mask(config, mask, folder), folder)
     return Setting(config, rig, grid, gauges, settings, correct, bursts, folder, _time_zero(rig, journal))
@@ -106,15 +111,12 @@ def _burst_lengths(config: Config, live: bool) -> tuple[int, int]:
     return reference, m.burst or (DEFAULT_BURST if live else 1)
 
 
-def _rehearse(
-    rig: Rig, grid: ZoiGrid, settings: KernelSettings, bursts: tuple[int, int], screen: Screen
-) -> None:
+def _compile(kinds: Sequence[str], settings: KernelSettings, screen: Screen, stop: Stop) -> None:
     phase = settings.estimator == "phase"
-    took = compile_ahead(kinds_of(rig.camera.info), phase=phase, say=screen.status)
+    took = compile_ahead(kinds, phase=phase, say=screen.status, stopped=lambda: stop.asked)
     if took > 0:
         screen.say(f"everything is compiled ({took:.0f} s)")
     compile_loops()
-    rehearse(rig.camera.info, grid, settings, bursts)
 
 
 def _time_zero(rig: Rig, journal: Journal) -> ClockPair:

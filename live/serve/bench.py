@@ -290,7 +290,8 @@ class Bench:
             self._told["busy"] = text
             self.refresh()
 
-        compile_ahead(kinds_of(info), phase=self.draft.config.measure.estimator == "phase", say=tell)
+        phase = self.draft.config.measure.estimator == "phase"
+        compile_ahead(kinds_of(info), phase=phase, say=tell, stopped=self._leave.is_set)
         self._told["busy"] = ""
 
     def _begin(self, info: CameraInfo) -> None:

@@ -7,20 +7,32 @@ itself, unless numba's cache cannot be written.
 
 from __future__ import annotations
 
+import contextlib
 import logging
+import signal
 import subprocess
 import sys
+import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from types import FrameType
 
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, Interrupted
+from acquire.held_back import held_back, let_through
 
 log = logging.getLogger(__name__)
 _POLL_S = 0.25
+_INTERRUPTED = (
+    "interrupted while the loops were compiled; what is compiled is kept, the next start goes on from there"
+)
 
 
 def compile_ahead(
-    kinds: Sequence[str], *, phase: bool = False, say: Callable[[str], object] = lambda text: None
+    kinds: Sequence[str],
+    *,
+    phase: bool = False,
+    say: Callable[[str], object] = lambda text: None,
+    stopped: Callable[[], bool] = lambda: False,
 ) -> float:
     """Have compiled what pictures of these kinds need, where it is not; the seconds that took.
 
@@ -32,6 +44,13 @@ def compile_ahead(
         Also for the estimator by phases.
     say : callable taking a text, optional
         Told again and again how far it is.
+    stopped : callable, optional
+        Asked again and again whether it shall end.
+
+    Raises
+    ------
+    Interrupted
+        So it was, or by Ctrl-C or SIGTERM; whoever handles these hears of them too.
     """
     from analysis import COMPILE_PARTS, not_compiled
 
@@ -40,13 +59,20 @@ def compile_ahead(
     began = time.monotonic()
     words = [",".join(kinds), "phase" if phase else "-"]
     commands = [[sys.executable, "-m", "live.setup", part, *words] for part in COMPILE_PARTS]
-    processes = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]
+    with held_back(signal.SIGINT):
+        processes = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]
     try:
-        while any(process.poll() is None for process in processes):
-            time.sleep(_POLL_S)
-            done = sum(process.poll() is not None for process in processes)
-            seconds = time.monotonic() - began
-            say(f"compiling for this processor, once: {seconds:.0f} s, {done} of {len(processes)} parts done")
+        with _interruptions() as interrupted:
+            while any(process.poll() is None for process in processes):
+                interrupted.wait(_POLL_S)
+                over = any(process.poll() == -signal.SIGINT for process in processes)
+                if over or interrupted.is_set() or stopped():
+                    raise Interrupted(_INTERRUPTED)
+                done = sum(process.poll() is not None for process in processes)
+                seconds = time.monotonic() - began
+                say(
+                    f"compiling for this processor, once: {seconds:.0f} s, {done} of {len(processes)} parts done"
+                )
     finally:
         for process in processes:
             if process.poll() is None:
@@ -57,8 +83,35 @@ def compile_ahead(
     return time.monotonic() - began
 
 
+@contextlib.contextmanager
+def _interruptions() -> Iterator[threading.Event]:
+    """Set by Ctrl-C and SIGTERM, beside what these do otherwise; outside the main thread by nothing."""
+    heard = threading.Event()
+    if threading.current_thread() is not threading.main_thread():
+        yield heard
+        return
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def hear(number: int, frame: FrameType | None) -> None:
+        heard.set()
+        handler = before[signal.Signals(number)]
+        if callable(handler):
+            handler(number, frame)
+
+    for number, handler in before.items():
+        if handler is not signal.SIG_IGN:
+            signal.signal(number, hear)
+    try:
+        yield heard
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
 def main(part: str, kinds: str, phase: str) -> int:
     """One of the processes."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # to end without a word
+    let_through(signal.SIGINT)
     from acquire import burst, hdf5
     from analysis import COMPILE_PARTS, warm_up
 

@@ -19,6 +19,7 @@ from collections import deque
 from collections.abc import Iterator
 from pathlib import Path
 
+from acquire.held_back import held_back
 from live.view.exchange.wire import Message, Reader, encoded
 
 _SEND_BYTES = 1 << 20
@@ -39,7 +40,7 @@ class Child:
 
     def __init__(self) -> None:
         ours, its = socket.socketpair()
-        with its, _held_back(signal.SIGINT, signal.SIGHUP):
+        with its, held_back(signal.SIGINT, signal.SIGHUP):
             # It lets them through once it ignores them.
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", _MODULE],
@@ -122,13 +123,3 @@ def _environment() -> dict[str, str]:
     """
     paths = [_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])]
     return {"MIMALLOC_PURGE_DELAY": "0", **os.environ, "PYTHONPATH": os.pathsep.join(paths)}
-
-
-@contextlib.contextmanager
-def _held_back(*signals: signal.Signals) -> Iterator[None]:
-    """Signals that a process started here does not get yet, however quick a hand is at Ctrl-C."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -9,11 +9,13 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections import deque
 from collections.abc import Callable
 
+from acquire.held_back import held_back
 from live.batch.work import Progress, Row, Task
 from live.batch.workers.there import ONE_THREAD
 
@@ -69,14 +71,15 @@ class Hand:
     """One process; raises OSError where it cannot be started."""
 
     def __init__(self) -> None:
-        self._process = subprocess.Popen(
-            [sys.executable, "-m", "live.batch.workers"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=_LEAN | os.environ | dict.fromkeys(ONE_THREAD, "1"),
-            text=True,
-            encoding="utf-8",
-        )
+        with held_back(signal.SIGINT):
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "live.batch.workers"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env=_LEAN | os.environ | dict.fromkeys(ONE_THREAD, "1"),
+                text=True,
+                encoding="utf-8",
+            )
         self.pid = self._process.pid
 
     def is_ready(self) -> bool:

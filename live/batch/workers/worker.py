@@ -15,6 +15,7 @@ import sys
 import threading
 from typing import TextIO
 
+from acquire.held_back import let_through
 from analysis import PICTURE_KINDS, not_compiled
 from live.batch.work import Progress, Task, perform
 
@@ -22,6 +23,7 @@ from live.batch.work import Progress, Task, perform
 def main() -> int:
     """Do what comes, until nothing comes any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the caller hears it, and ends us
+    let_through(signal.SIGINT)
     logging.basicConfig(level=logging.ERROR, format="%(levelname)s %(name)s: %(message)s")
     answers = _answers()
     tasks: queue.Queue[str] = queue.Queue()

@@ -5,11 +5,12 @@ from __future__ import annotations
 import signal
 import sys
 
+from acquire.held_back import let_through
+
 if __name__ == "__main__":
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    # They were held back until now (live.view.child).
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, (signal.SIGINT, signal.SIGHUP))
+    let_through(signal.SIGINT, signal.SIGHUP)  # held back by live.view.child
 
     from live.view.drawing.process import main
 

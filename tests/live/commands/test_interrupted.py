@@ -1,0 +1,147 @@
+"""Ctrl-C as a terminal sends it, to a command and all its processes, in its first moments: it ends soon, in words."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from acquire.errors import Interrupted
+from live import cli
+from live.setup import compile_ahead
+from tests.bench.soak import children
+from tests.live.batch.running import until
+
+ROOT = Path(__file__).parents[3]
+CAMERA = "sim:uniform?seconds=60&fps=20&width=160&height=128"
+
+
+def interrupted(
+    folder: Path, words: str, ready: Callable[[subprocess.Popen[str]], bool]
+) -> tuple[int, str, float]:
+    """The command gets Ctrl-C with all of its group once it is ``ready``: exit code, words, and seconds since."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache"), "PYTHONPATH": str(ROOT)}
+    with (folder / "said.txt").open("w+", encoding="utf-8") as said:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "live.cli", *words.split()], cwd=folder, env=environment, stdout=said,
+            stderr=subprocess.STDOUT, text=True, process_group=0,
+        )  # fmt: skip
+        while not ready(process):
+            assert process.poll() is None, (folder / "said.txt").read_text(encoding="utf-8")
+            time.sleep(0.01)
+        os.killpg(process.pid, signal.SIGINT)
+        began = time.monotonic()
+        code = process.wait(60)
+    return code, (folder / "said.txt").read_text(encoding="utf-8"), time.monotonic() - began
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words",
+    [f"run --camera {CAMERA} --no-view --no-rrd --out out", "batch run/session.h5 --out out --workers 1"],
+)
+def test_while_the_loops_are_compiled(tmp_path: Path, words: str) -> None:
+    """The first start on a machine: a minute in which nobody knows yet what it does."""
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "session.h5").write_bytes(b"nothing of a session")
+
+    def compiling(process: subprocess.Popen[str]) -> bool:
+        return any("live.setup" in command_of(pid) for pid in children(process.pid))
+
+    code, said, seconds = interrupted(tmp_path, words, compiling)
+    assert code == 130, said
+    assert "interrupted while the loops were compiled" in said
+    assert "Traceback" not in said
+    assert "everything is compiled" not in said
+    assert "could not be kept" not in said
+    assert seconds < 20, "it went on compiling"
+
+
+def command_of(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text(encoding="utf-8").replace("\0", " ")
+    except OSError:
+        return ""
+
+
+@pytest.mark.slow
+def test_while_workers_load(tmp_path: Path) -> None:
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "session.h5").write_bytes(b"nothing of a session")
+
+    def loading(process: subprocess.Popen[str]) -> bool:
+        return any("live.batch.workers" in command_of(pid) for pid in children(process.pid))
+
+    code, said, seconds = interrupted(tmp_path, "batch run/session.h5 --out out --workers 2", loading)
+    assert code == 130, said
+    assert "Traceback" not in said
+    assert seconds < 20, "it compiled first"
+
+
+def test_before_the_command_begins(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def pressed(words: list[str]) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "parse", pressed)
+    assert cli.main(["devices"]) == 130
+    assert capsys.readouterr().err == "phasedic: interrupted\n"
+
+
+def never_ending(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nothing is compiled, and compiling takes for ever."""
+    monkeypatch.setattr("analysis.not_compiled", lambda kinds, phase: True)
+    begin = subprocess.Popen
+    sleep = [sys.executable, "-c", "import time; time.sleep(60)"]
+    monkeypatch.setattr(subprocess, "Popen", lambda command, **more: begin(sleep, **more))
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_whoever_handles_a_signal_hears_of_it(
+    monkeypatch: pytest.MonkeyPatch, number: signal.Signals
+) -> None:
+    never_ending(monkeypatch)
+    heard: list[int] = []
+    before = signal.signal(number, lambda number, frame: heard.append(number))
+    threading.Timer(0.5, os.kill, (os.getpid(), number)).start()
+    try:
+        with pytest.raises(Interrupted, match="what is compiled is kept"):
+            compile_ahead(("uint8",))
+        assert heard == [number]
+        signal.raise_signal(number)
+        assert heard == [number, number], "the handler is not back"
+    finally:
+        signal.signal(number, before)
+
+
+def test_it_was_stopped_before(monkeypatch: pytest.MonkeyPatch) -> None:
+    never_ending(monkeypatch)
+    with pytest.raises(Interrupted):
+        compile_ahead(("uint8",), stopped=lambda: True)
+
+
+def test_a_process_that_was_interrupted_ends_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where a thread of the page compiles, which no signal reaches."""
+    monkeypatch.setattr("analysis.not_compiled", lambda kinds, phase: True)
+    begin, made = subprocess.Popen, list[subprocess.Popen[bytes]]()
+    let = "import signal as s, time; s.signal(s.SIGINT, s.SIG_DFL); s.pthread_sigmask(s.SIG_UNBLOCK, [s.SIGINT])"
+
+    def start(command: list[str], **more: object) -> subprocess.Popen[bytes]:
+        made.append(begin([sys.executable, "-c", f"{let}; time.sleep(60)"], **more))
+        return made[-1]
+
+    monkeypatch.setattr(subprocess, "Popen", start)
+    threading.Thread(
+        target=lambda: (until(lambda: len(made) == 2), made[0].send_signal(signal.SIGINT))
+    ).start()
+    with pytest.raises(Interrupted):
+        compile_ahead(("uint8",))
+    assert [process.returncode for process in made] == [-signal.SIGINT, -signal.SIGTERM]
