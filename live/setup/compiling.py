@@ -90,7 +90,8 @@ def _interruptions() -> Iterator[threading.Event]:
     if threading.current_thread() is not threading.main_thread():
         yield heard
         return
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    now = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    before = {number: handler for number, handler in now.items() if handler not in (signal.SIG_IGN, None)}
 
     def hear(number: int, frame: FrameType | None) -> None:
         heard.set()
@@ -98,9 +99,8 @@ def _interruptions() -> Iterator[threading.Event]:
         if callable(handler):
             handler(number, frame)
 
-    for number, handler in before.items():
-        if handler is not signal.SIG_IGN:
-            signal.signal(number, hear)
+    for number in before:
+        signal.signal(number, hear)
     try:
         yield heard
     finally:
