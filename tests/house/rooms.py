@@ -65,7 +65,7 @@ ROOMS = {
     "live.characterise.experiments": "acquire analysis analysis.field analysis.picture analysis.paper_estimator"
     " hw_mocks live.maps live.characterise",
     "live.commands": "*",
-    "live.cli": "acquire.errors acquire.printable live.commands.arguments live.unhurried",
+    "live.cli": "acquire.errors acquire.printable live.commands.arguments live.commands.exit_codes live.unhurried",
     # A finished run is its results and its recording, or the images it measured.
     "live.finished": "acquire acquire.camera acquire.session analysis.evaluate analysis.field live.results"
     " live.setup",
