@@ -411,7 +411,7 @@ def arguments() -> argparse.Namespace:
         "--accel", choices=["tcg", "kvm"], default="tcg", help="emulate (tcg), or share the processor"
     )
     parser.add_argument("--smp", type=int, default=2, help="processors (2)")
-    parser.add_argument("--memory", default="2G")
+    parser.add_argument("--memory", default="3G")
     parser.add_argument("--timeout", type=float, default=1800, metavar="S", help="for the whole run (1800)")
     parser.add_argument("-v", "--verbose", action="store_true", help="show the kernel's console")
     parser.add_argument("words", nargs="*", metavar="COMMAND | PYTEST ARGUMENT")
