@@ -57,15 +57,8 @@ def fold(
         Sum of the squared differences between successive frames, exact.
     """
     squares = np.uint64(0)
-    at_once = first and n == k and (k == 2 or k == 4 or k == 8)
     for start in range(0, previous.size, BLOCK):
         stop = min(start + BLOCK, previous.size)
-        if at_once:
-            _mean(frames, k, start, stop, mean)
-            _marks(frames, k, start, stop, saturation, clipped)
-            for i in range(1, k):
-                squares += _squares(frames[i][start:stop], frames[i - 1][start:stop])
-            continue
         part, top = sums[: stop - start], tops[: stop - start]
         fours = k // 4 * 4
         for i in range(0, fours, 4):
@@ -82,44 +75,6 @@ def fold(
         else:
             _keep(part, total[start:stop], first)
     return squares
-
-
-# The usual bursts, of 2, 4 or 8 frames: sums and maxima are never stored.
-@njit(cache=True, nogil=True, error_model="numpy")
-def _mean(frames: Any, k: int, start: int, stop: int, mean: NDArray[np.float32]) -> None:
-    """Of k frames. Their sum is exact in float32, and so is its share, k being a power of two."""
-    out, share = mean[start:stop], np.float32(1) / np.float32(k)
-    a, b, c, d = frames[0][start:stop], frames[1][start:stop], frames[2][start:stop], frames[3][start:stop]
-    e, f, g, h = frames[4][start:stop], frames[5][start:stop], frames[6][start:stop], frames[7][start:stop]
-    if k == 2:
-        for j in range(out.size):
-            out[j] = np.float32(np.int32(a[j]) + np.int32(b[j])) * share
-    elif k == 4:
-        for j in range(out.size):
-            out[j] = np.float32(np.int32(a[j]) + np.int32(b[j]) + np.int32(c[j]) + np.int32(d[j])) * share
-    else:
-        for j in range(out.size):
-            four = np.int32(a[j]) + np.int32(b[j]) + np.int32(c[j]) + np.int32(d[j])
-            more = np.int32(e[j]) + np.int32(f[j]) + np.int32(g[j]) + np.int32(h[j])
-            out[j] = np.float32(four + more) * share
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _marks(frames: Any, k: int, start: int, stop: int, saturation: int, flags: NDArray[np.bool_]) -> None:
-    """Where one of k frames is saturated."""
-    out, limit = flags[start:stop], frames[0].dtype.type(saturation)
-    a, b, c, d = frames[0][start:stop], frames[1][start:stop], frames[2][start:stop], frames[3][start:stop]
-    e, f, g, h = frames[4][start:stop], frames[5][start:stop], frames[6][start:stop], frames[7][start:stop]
-    if k == 2:
-        for j in range(out.size):
-            out[j] = max(a[j], b[j]) >= limit
-    elif k == 4:
-        for j in range(out.size):
-            out[j] = max(max(a[j], b[j]), max(c[j], d[j])) >= limit
-    else:
-        for j in range(out.size):
-            four, more = max(max(a[j], b[j]), max(c[j], d[j])), max(max(e[j], f[j]), max(g[j], h[j]))
-            out[j] = max(four, more) >= limit
 
 
 # One plain loop for each step: the compiler vectorises these, but not their union.
@@ -172,19 +127,13 @@ def _squares_8(image: NDArray[Any], before: NDArray[Any]) -> Any:
     return np.uint64(total)
 
 
-# The halves of the squares of a block fit into 32 bits too.
-@njit(
-    cache=True, nogil=True, error_model="numpy",
-    locals={"low": types.uint32, "high": types.uint32, "d": types.int32, "square": types.uint32},
-)  # fmt: skip
+@njit(cache=True, nogil=True, error_model="numpy")
 def _squares_16(image: NDArray[Any], before: NDArray[Any]) -> Any:
-    low = high = np.uint32(0)
+    total = np.uint64(0)
     for j in range(image.size):
         d = np.int32(image[j]) - np.int32(before[j])
-        square = d * d
-        low += square & np.uint32(0xFFFF)
-        high += square >> np.uint32(16)
-    return np.uint64(low) + (np.uint64(high) << np.uint64(16))
+        total += np.uint64(np.uint32(d * d))
+    return total
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

@@ -29,9 +29,9 @@ def tile_sums(first: NDArray[Any], last: NDArray[Any], rows: int, columns: int, 
     height, width = first.shape
     sums = np.zeros((rows, columns, 6))
     for r in range(rows):
-        for y in range(max(1, r * height // rows), min(height - 1, (r + 1) * height // rows), step):
-            for c in range(columns):  # whole rows one after the other, as they lie in memory
-                left, right = max(1, c * width // columns), min(width - 1, (c + 1) * width // columns)
+        for c in range(columns):
+            left, right = max(1, c * width // columns), min(width - 1, (c + 1) * width // columns)
+            for y in range(max(1, r * height // rows), min(height - 1, (r + 1) * height // rows), step):
                 _add_row(first, last, y, left, right, sums[r, c])
     return sums
 
