@@ -5,19 +5,11 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable
-from typing import Protocol
 
-from live.measure import AxisFinder, Instant, Measurement
+from live.measure import Instant, Measurement, Snapshot
 
 RATE_S = 1.0
 """The strain rate is the slope of the axial strain over this time."""
-
-
-class Sample(Protocol):
-    """What is used of a load sample."""
-
-    @property
-    def force(self) -> float: ...
 
 
 class Readings:
@@ -27,31 +19,26 @@ class Readings:
     ----------
     start : float, s
         Time zero, monotonic.
-    axis : "x", "y" or "auto"
-        Of the load; auto: as the strains tell it, y until then.
-    area_m2 : float or None, m^2
-    latest : callable giving LoadSample or None
+    snapshot : callable
+        Takes a time (s, monotonic) and an Instant, gives where the test stands (``live.tell.Books.snapshot``).
     """
 
-    def __init__(
-        self, start: float, axis: str, area_m2: float | None, latest: Callable[[], Sample | None]
-    ) -> None:
-        self._start, self._area_m2, self._latest = start, area_m2, latest
-        self._axis = AxisFinder(axis)
+    def __init__(self, start: float, snapshot: Callable[[float, Instant], Snapshot]) -> None:
+        self._start, self._snapshot = start, snapshot
         self._course: deque[tuple[float, float]] = deque()
 
     def read(self, measurement: Measurement) -> dict[str, float]:
         """All channels by name; NaN where one is not known."""
         i = measurement.instant
-        self._axis.add(i)
-        axial, sigma = self._axial(i)
+        now = self._snapshot(i.t, i)
         values = {
             "time_s": i.t - self._start,
             "frame": measurement.burst.first_index,
-            "axial": axial,
-            "sigma_axial": sigma,
-            "strain_rate": self._rate(i.t, axial),
-            **self.load(i.force),
+            "axial": now.axial,
+            "sigma_axial": now.sigma_axial,
+            "strain_rate": self._rate(i.t, now.axial),
+            "force_N": now.force_N,
+            "stress_MPa": now.stress_Pa * 1e-6,
             "lost_share": 1 - i.n_valid / max(i.n_zoi, 1),
         }
         values |= {
@@ -60,22 +47,6 @@ class Readings:
         for name, gauge in i.gauges.items():
             values |= {f"gauge_{name}": gauge.value, f"sigma_gauge_{name}": gauge.sigma}
         return values
-
-    def _axial(self, i: Instant) -> tuple[float, float]:
-        gauge = i.gauges.get("axial")
-        if gauge is not None:
-            return gauge.value, gauge.sigma
-        mean = f"e{self._axis.axis * 2}"
-        return getattr(i, mean), getattr(i, f"sigma_{mean}")
-
-    def load(self, without: float = math.nan) -> dict[str, float]:
-        """Force and stress of the newest sample; where there is none, of the force ``without`` (N)."""
-        sample = self._latest()
-        force = without if sample is None else sample.force
-        return {
-            "force_N": force,
-            "stress_MPa": force / self._area_m2 * 1e-6 if self._area_m2 else math.nan,
-        }
 
     def _rate(self, t: float, axial: float) -> float:
         """The slope of the least-squares line through the last second, three points or more."""

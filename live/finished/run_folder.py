@@ -26,6 +26,7 @@ from analysis.evaluate import LoadAxis, load_axis
 from analysis.field import StrainField
 from live.finished.fields import read_field
 from live.finished.pictures import Pictures, of_images, of_session
+from live.measure import AXIAL, TRANSVERSE, strains_along
 from live.results import Strain, gauge_columns
 from live.setup import SpecimenConfig, from_dict
 
@@ -190,16 +191,17 @@ class RunFolder(Closing):
     @property
     def axial_strain(self) -> NDArray[np.float64]:
         """Strain along the load, (T,): of the gauge ``axial`` where there is one, else the mean."""
-        return self._along("axial", self.axial)
+        return self._strain(strains_along(self.gauges, self.load_axis.axis)[0])
 
     @property
     def transverse_strain(self) -> NDArray[np.float64]:
         """Strain across the load, (T,): of the gauge ``transverse`` where there is one, else the mean."""
-        return self._along("transverse", self.transverse)
+        return self._strain(strains_along(self.gauges, self.load_axis.axis)[1])
 
-    def _along(self, gauge: str, mean: str) -> NDArray[np.float64]:
-        found = self.gauges.get(gauge)
-        return np.asarray(self.strain.values[mean], np.float64) if found is None else found.value
+    def _strain(self, name: str) -> NDArray[np.float64]:
+        if name in (AXIAL, TRANSVERSE):
+            return self.gauges[name].value
+        return np.asarray(self.strain.values[name], np.float64)
 
     def field(self, row: int) -> StrainField:
         """The strain field of one instant, as ``strain.h5`` holds it.

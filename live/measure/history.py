@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from acquire.load_cell import LoadLog
 from analysis.evaluate import LoadAxis, load_axis
-from live.measure.instant import Instant
+from live.measure.instant import AXIAL, TRANSVERSE, Instant, strains_along
 from live.measure.kept import Instants
+from live.measure.thinned import Thinned
 
 Array = NDArray[np.float64]
 MOST_INSTANTS = 2000
@@ -20,14 +21,26 @@ _FIRST, _GROWTH = 8, 1.1  # looked at first, and again whenever there are so man
 
 
 class History:
-    """All instants so far: added by one thread, read by any."""
+    """All instants so far: added by one thread, read by any.
 
-    def __init__(self) -> None:
-        self.instants = Instants()
+    Parameters
+    ----------
+    axis : "x", "y" or "auto"
+        Of the load, as given.
+    """
+
+    def __init__(self, axis: str = "y") -> None:
+        self.instants, self._finder = Instants(), AxisFinder(axis)
 
     def add(self, instant: Instant) -> None:
         """Keep ``instant``."""
         self.instants.append(instant)
+        self._finder.add(instant)
+
+    @property
+    def axis_by_now(self) -> Literal["x", "y"]:
+        """Of the load: as given, or as the strains so far show it; y until they do."""
+        return self._finder.axis
 
     @property
     def told_something(self) -> bool:
@@ -59,12 +72,12 @@ class History:
     def along(self, axis: str) -> tuple[Array, Array]:
         """Strain along and across the load: the gauges ``axial`` and ``transverse``, or else the means."""
         chosen = axis if axis in ("x", "y") else self.axis(axis).axis
-        names = ("eyy", "exx") if chosen == "y" else ("exx", "eyy")
-        axial, transverse = self.gauge("axial"), self.gauge("transverse")
-        return (
-            self.column(names[0]) if axial is None else axial,
-            self.column(names[1]) if transverse is None else transverse,
-        )
+        axial, transverse = strains_along(self.instants.gauges, chosen)
+        return self._strain(axial), self._strain(transverse)
+
+    def _strain(self, name: str) -> Array:
+        gauge = self.gauge(name) if name in (AXIAL, TRANSVERSE) else None
+        return self.column(name) if gauge is None else gauge
 
     def gauge(self, name: str) -> Array | None:
         """A gauge over time, (N,) float64; None where there is none of that name."""
@@ -87,25 +100,17 @@ class AxisFinder:
     def __init__(self, given: str) -> None:
         self.axis: Literal["x", "y"] = "x" if given == "x" else "y"
         self._seeks = given not in ("x", "y")
-        self._kept: list[tuple[float, float, float]] = []
-        self._count, self._every, self._next = 0, 1, _FIRST
+        self._strains: Thinned[tuple[float, float, float]] = Thinned(MOST_INSTANTS)
+        self._count, self._next = 0, _FIRST
         self._t = -math.inf
 
     def add(self, instant: Instant) -> Literal["x", "y"]:
         """The axis with one instant more; one that is told again counts once."""
         if self._seeks and instant.t > self._t:
-            self._t = instant.t
-            self._keep(instant)
+            self._t, self._count = instant.t, self._count + 1
+            self._strains.append((instant.exx, instant.eyy, instant.exy))
             if self._count >= self._next:
                 self._next = math.ceil(self._count * _GROWTH)
-                exx, eyy, exy = np.array(self._kept, np.float64).T
+                exx, eyy, exy = np.array(self._strains.kept, np.float64).T
                 self.axis = load_axis(exx, eyy, exy).axis
         return self.axis
-
-    def _keep(self, instant: Instant) -> None:
-        if self._count % self._every == 0:
-            self._kept.append((instant.exx, instant.eyy, instant.exy))
-        self._count += 1
-        if len(self._kept) > MOST_INSTANTS:
-            del self._kept[1::2]
-            self._every *= 2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,9 @@ if TYPE_CHECKING:
     from acquire.frame import Burst
     from analysis.evaluate import GaugeValue
     from analysis.field import StrainField
+
+AXIAL, TRANSVERSE = "axial", "transverse"
+"""Gauges of these names are the strain along and across the load."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +73,22 @@ class Instant:
     gauges: Mapping[str, GaugeValue] = field(default_factory=dict)
     force_raw: float = math.nan
     zero: float = 0.0
+
+    def axial(self, axis: str) -> tuple[float, float]:
+        """Strain along the load, which runs along ``axis`` ("x" or "y"), and its standard uncertainty."""
+        name, _ = strains_along(self.gauges, axis)
+        if name == AXIAL:
+            return self.gauges[name].value, self.gauges[name].sigma
+        return getattr(self, name), getattr(self, f"sigma_{name}")
+
+
+def strains_along(gauges: Container[str], axis: str) -> tuple[str, str]:
+    """What is read as strain along and across the load, which runs along ``axis`` ("x" or "y").
+
+    The gauges ``AXIAL`` and ``TRANSVERSE`` where they are among ``gauges``, else the mean strains.
+    """
+    along, across = ("exx", "eyy") if axis == "x" else ("eyy", "exx")
+    return AXIAL if AXIAL in gauges else along, TRANSVERSE if TRANSVERSE in gauges else across
 
 
 def instant_of(burst: Burst, field: StrainField, force: float, measure_s: float = 0.0) -> Instant:

@@ -48,6 +48,11 @@ class Instants(Sequence[Instant]):
         """One number over time, (N,) float64."""
         return _copied(self._numbers[name], self._count)
 
+    @property
+    def gauges(self) -> tuple[str, ...]:
+        """Names of the gauges that the first instant has."""
+        return tuple(name for name, column in list(self._gauges.items()) if not column.since)
+
     def gauge(self, name: str) -> Array | None:
         """Values of a gauge, (N,) float64; None where the first instant has none of that name."""
         column = self._gauges.get(name)

@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any, cast
 from acquire.clock import ClockPair
 from acquire.events import EventKind, Level
 from acquire.frame import CameraInfo
-from live.channels import Readings
-from live.measure import AxisFinder
 from live.outputs.consumer import Consumer
 from live.outputs.files import Files
 from live.outputs.outputs import Outputs
@@ -80,8 +78,7 @@ def make_outputs(about: About, books: Books, screen: Screen, more: Sequence[Cons
     view = _view(about, books, screen)
     if view is not None:
         card = StatusCard(config.specimen, books.loads)
-        figures = FiguresWriter(view, _readings(about, books), books)
-        consumers += [CardWriter(view, card, books.ledger), figures, Watching(view, books.journal.names)]
+        consumers += [CardWriter(view, card, books), FiguresWriter(view, books), Watching(view, books)]
     return Outputs([*consumers, *more], books.loads, books.journal, books.history)
 
 
@@ -114,19 +111,8 @@ def _view(about: About, books: Books, screen: Screen) -> View | None:
         books.vitals.view_port = view.port
         _announce(view, v.spawn, screen)
 
-    port, finder = v.port if v.enabled else None, AxisFinder(about.config.specimen.axis)
-    return View(setup, port=port, rrd=rrd, tell=tell, serving=serving, axis=finder)
-
-
-def _readings(about: About, books: Books) -> Readings:
-    """With the newest load while the test runs; in a replay with that of the measurement."""
-    specimen, loads, vitals = about.config.specimen, books.loads, books.vitals
-    return Readings(
-        about.start.monotonic,
-        specimen.axis,
-        specimen.area_m2,
-        lambda: loads.latest if vitals.state else None,
-    )
+    port = v.port if v.enabled else None
+    return View(setup, port=port, rrd=rrd, tell=tell, serving=serving)
 
 
 def _announce(view: View, spawn: bool, screen: Screen) -> None:

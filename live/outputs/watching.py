@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 
 from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
-from live.channels import Readings
-from live.measure import History, Instant, Measurement
+from live.measure import History, Instant, Measurement, Thinned
 from live.outputs.consumer import Consumer
-from live.tell import Books, Ledger, StatusCard
-from live.view import Figures, Thinned, View
+from live.tell import Books, StatusCard
+from live.view import View
 
 CLOSE_S = 10.0
 """For drawing what waits and closing the file at the end of a test."""
@@ -30,8 +28,8 @@ class Watching(Consumer):
     name = "view"
     blocks = False
 
-    def __init__(self, view: View, names: Mapping[str, str]) -> None:
-        self._view, self._names = view, names
+    def __init__(self, view: View, books: Books) -> None:
+        self._view, self._books = view, books
 
     def frame(self, frame: Frame) -> None:
         """Offer a frame; a few a second are taken."""
@@ -45,7 +43,8 @@ class Watching(Consumer):
 
     def settled(self, measurement: Measurement) -> None:
         """Offer a point of the curve."""
-        self._view.settled(measurement)
+        axial, _ = measurement.instant.axial(self._books.history.axis_by_now)
+        self._view.point(axial, measurement.force)
 
     def load(self, sample: LoadSample) -> None:
         """Offer a load sample."""
@@ -53,7 +52,7 @@ class Watching(Consumer):
 
     def event(self, event: Event) -> None:
         """Offer an event, a device by its name."""
-        self._view.event(replace(event, source=self._names.get(event.source, event.source)))
+        self._view.event(replace(event, source=self._books.journal.names.get(event.source, event.source)))
 
     def end(self) -> str:
         """Let it draw what waits, and close it."""
@@ -68,8 +67,8 @@ class CardWriter(Consumer):
 
     name = "status card"
 
-    def __init__(self, view: View, card: StatusCard, ledger: Ledger) -> None:
-        self._view, self._card, self._ledger = view, card, ledger
+    def __init__(self, view: View, card: StatusCard, books: Books) -> None:
+        self._view, self._card, self._books = view, card, books
         self._instants: Thinned[Instant] = Thinned(CARD_INSTANTS)
 
     def measurement(self, measurement: Measurement) -> None:
@@ -79,7 +78,8 @@ class CardWriter(Consumer):
             history = History()
             for instant in self._instants.items():
                 history.add(instant)
-            self._view.status(self._card.written(history, self._ledger))
+            snapshot = self._books.snapshot(measurement.t, measurement.instant)
+            self._view.status(self._card.written(snapshot, history))
 
 
 class FiguresWriter(Consumer):
@@ -87,14 +87,14 @@ class FiguresWriter(Consumer):
 
     name = "figures"
 
-    def __init__(self, view: View, readings: Readings, books: Books) -> None:
-        self._view, self._readings, self._books = view, readings, books
-        self._last: Measurement | None = None
+    def __init__(self, view: View, books: Books) -> None:
+        self._view, self._books = view, books
+        self._last: Instant | None = None
 
     def measurement(self, measurement: Measurement) -> None:
         """Show the newest."""
-        self._last = measurement
-        self._show(measurement.t)
+        self._last = measurement.instant
+        self._view.figures(self._books.snapshot(measurement.t, self._last))
 
     def event(self, event: Event) -> None:
         """Wake up: the first one comes before the first frame."""
@@ -103,22 +103,5 @@ class FiguresWriter(Consumer):
         """Show what has changed meanwhile, also before anything is measured."""
         vitals = self._books.vitals
         if vitals.state and not math.isnan(vitals.frame_t):
-            self._show(vitals.frame_t)
+            self._view.figures(self._books.snapshot(vitals.frame_t, self._last))
         return IDLE_S
-
-    def _show(self, t: float) -> None:
-        i = None if self._last is None else self._last.instant
-        read = self._readings.read(self._last) if self._last else self._readings.load()
-        self._view.figures(
-            Figures(
-                t=t,
-                state=self._books.vitals.state or "REPLAY",
-                axial=read.get("axial", math.nan),
-                sigma=read.get("sigma_axial", math.nan),
-                force_N=read["force_N"],
-                stress_MPa=read["stress_MPa"],
-                valid=0 if i is None else i.n_valid,
-                zois=0 if i is None else i.n_zoi,
-                alarms=self._books.alarms.texts,
-            )
-        )

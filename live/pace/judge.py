@@ -75,10 +75,12 @@ class Pace:
         self._lags.append(lag)
         while self._lags[0].t < lag.t - WINDOW_S:
             self._lags.popleft()
-        if lag.t - self._judged < 1.0 or len(self._lags) < FEWEST:
+        if lag.t - self._judged < 1.0:
+            return ""
+        self.p95_s = float(np.percentile([one.latency_s for one in self._lags], 95))
+        if len(self._lags) < FEWEST:
             return ""
         self._judged = lag.t
-        self.p95_s = float(np.percentile([one.latency_s for one in self._lags], 95))
         if not self.p95_s > LATE_PERIODS * period_s or lag.t - self._told < EVERY_S:
             self._before = None
             return ""
@@ -87,9 +89,8 @@ class Pace:
             self._before = now
             return ""
         self._told, self._before = lag.t, None
-        late, period = self.p95_s * 1e3, period_s * 1e3
         cause = self._cause(before, now, period_s)
-        return f"results come up to {late:.0f} ms late (p95), bursts every {period:.0f} ms: {cause}"
+        return f"results come up to {self.p95_s * 1e3:.0f} ms late (p95), bursts every {period_s * 1e3:.0f} ms: {cause}"
 
     def _cause(self, before: Use | None, now: Use | None, period_s: float) -> str:
         if self._backlog() > WAITING_SHARE:

@@ -145,7 +145,7 @@ def _run(
     bursts = _not_empty(stored.bursts() if stored else material.bursts, request.source)
     folder = make_folder(ready.config.output.dir, datetime.datetime.now(datetime.UTC))
     config = _settled(with_mask(ready.config, ready.mask, folder), request.settled)
-    books = Books(journal, Ledger(), material.loads, History())
+    books = Books(journal, Ledger(), material.loads, History(config.specimen.axis), specimen=config.specimen)
     write_names(request.source, folder / "pictures.csv")
     screen.say(f"replaying {request.source} into {request.settled or folder}")
     about = About(

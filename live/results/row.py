@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from live.measure import ordered_mean
+from live.measure import AXIAL, ordered_mean, strains_along
 
 if TYPE_CHECKING:
     from analysis.field import StrainField
@@ -115,11 +115,9 @@ def _stretch(
     measurement: Measurement, values: Mapping[str, float], measure: StrainMeasure, axis: str
 ) -> float:
     """Length over first length along the load: of the gauge ``axial``, or else of the mean strain."""
-    gauge = measurement.instant.gauges.get("axial")
-    if gauge is not None:
-        stretch = 1 + gauge.value
-    else:
-        stretch = _stretched(values["eyy" if axis == "y" else "exx"], measure)
+    gauges = measurement.instant.gauges
+    name, _ = strains_along(gauges, axis)
+    stretch = 1 + gauges[name].value if name == AXIAL else _stretched(values[name], measure)
     return stretch if stretch > 0 else math.nan
 
 

@@ -15,9 +15,8 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
-from acquire.events import Event, EventKind
+from acquire.events import EventKind
 from acquire.frame import Burst, Frame
-from live.measure import Instant
 from live.operate import OrderRefused
 from live.outputs import About, Consumer, Outputs, make_outputs
 from live.pace import Pace
@@ -31,7 +30,7 @@ from live.run.setting import Setting, set_up
 from live.run.stopping import Stop
 from live.setup import Config, open_rig
 from live.signals import signals_of
-from live.tell import Books, Screen, Standing
+from live.tell import Books, Screen
 
 _ARMED = "; nothing is recorded until start is ordered"
 _SILENT_S = 1.0
@@ -72,15 +71,13 @@ class LiveRun:
         self._deadline = math.inf if seconds is None else time.monotonic() + seconds + _GRACE_S
         plan = GrabPlan.of(setting.config, setting.bursts)
         self.grabber = Grabber(self._rig.camera, plan, books, self._take, self._averaged)
-        self._last: Instant | None = None
-        self._began, self._hinted = time.monotonic(), False
+        books.vitals.began_t, self._hinted = time.monotonic(), False
         self._has_recorded = recording.on
         self._feed = Feed(self.grabber, books.ledger, self._idle)
         self._load = LoadThread(self._rig.load, books, outputs, recording)
         self._tares = tare_orders(self._rig.load, books)
-        self._pace = Pace(lambda: recording.backlog)
-        books.journal.add_listener(self._heard)
-        self._measuring = Measuring(setting, books, outputs, self._feed, self._pace, self._show)
+        pace = Pace(lambda: recording.backlog)
+        self._measuring = Measuring(setting, books, outputs, self._feed, pace, self._show)
 
     # -- what may be called from other threads ------------------------------------------------
 
@@ -103,11 +100,6 @@ class LiveRun:
     def folder(self) -> Path:
         """Of the files."""
         return self._setting.folder
-
-    @property
-    def fps(self) -> float:
-        """Frames a second, as they come."""
-        return self.grabber.fps
 
     def stop(self, reason: str) -> None:
         """End the run cleanly, soon."""
@@ -144,13 +136,6 @@ class LiveRun:
         if not names:
             raise OrderRefused("no alarm is on")
         self._told(EventKind.ALARM, f"silenced: {', '.join(names)}")
-
-    def _heard(self, event: Event) -> None:
-        """An alarm may end the run, and rings the bell."""
-        if event.kind is EventKind.ALARM and event.data.get("on"):
-            self._screen.bell()
-            if event.data.get("end"):
-                self.stop(event.text)
 
     def _told(self, kind: EventKind, text: str) -> None:
         self._books.journal.tell(kind, "operator", text)
@@ -205,7 +190,8 @@ class LiveRun:
         return 5 if lossy or not ledger.adds_up or not self._books.history.told_something else 0
 
     def _take(self, frame: Frame) -> None:
-        self._books.vitals.frame_t = time.monotonic()
+        vitals = self._books.vitals
+        vitals.frame_t, vitals.fps = time.monotonic(), self.grabber.fps
         self._recording.frame(frame, needed=self.grabber.taking_reference)
         self._outputs.frame(frame)
 
@@ -215,8 +201,8 @@ class LiveRun:
     def _idle(self, words: str) -> None:
         """Between bursts; a camera that gives nothing must not keep a timed run alive for ever."""
         if words or self.paused:
-            silent = self._last is None or not time.monotonic() - self._books.vitals.frame_t < _SILENT_S
-            self._show(self._last, words if silent else "")
+            silent = not time.monotonic() - self._books.vitals.frame_t < _SILENT_S
+            self._show(words if silent or not self._has_measured else "")
         if words == TAKING:
             self._hint_once()
         if time.monotonic() > self._deadline and not self._stop.asked:
@@ -225,7 +211,7 @@ class LiveRun:
     def _hint_once(self) -> None:
         """A reference needs frames in a row: where they are lost again and again, say what helps."""
         n, ledger = self._setting.bursts[0], self._books.ledger
-        if self._hinted or self._last is not None or not ledger.lost or ledger.grabbed < _HINT_AFTER * n:
+        if self._hinted or self._has_measured or not ledger.lost or ledger.grabbed < _HINT_AFTER * n:
             return
         self._hinted = True
         text = (
@@ -234,30 +220,15 @@ class LiveRun:
         )
         self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "warning")
 
-    def _show(self, instant: Instant | None, words: str = "") -> None:
+    def _show(self, words: str = "") -> None:
         """Renew the status line; called with every measurement."""
-        self._last = instant
         self._books.vitals.state = self.state
         if self._screen.is_due:
-            self._screen.standing(self._standing(words))
+            self._screen.snapshot(self._books.snapshot(time.monotonic()), words)
 
-    def _standing(self, words: str) -> Standing:
-        books, specimen = self._books, self._setting.config.specimen
-        latest = books.loads.latest
-        return Standing(
-            ledger=books.ledger,
-            state=self.state,
-            elapsed_s=time.monotonic() - self._began,
-            fps=self.grabber.fps,
-            force_N=math.nan if latest is None else latest.force,
-            area_m2=specimen.area_m2,
-            instant=self._last,
-            p95_s=self._pace.p95_s,
-            disk_s=books.vitals.disk_s if self.recording else math.inf,
-            peak_N=books.vitals.peak_N,
-            alarms=books.alarms.texts,
-            words=words,
-        )
+    @property
+    def _has_measured(self) -> bool:
+        return bool(self._books.history.instants)
 
     @property
     def state(self) -> str:
@@ -299,7 +270,7 @@ def run_live(
     """
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (phasedic devices lists what is there)")
-    stop, books = stop or Stop(), Books.new(config.load.max_gap_s, config.load.lag_s)
+    stop, books = stop or Stop(), Books.new(config.load.max_gap_s, config.load.lag_s, config.specimen)
     books.journal.names |= device_names(config)
     screen.say(f"opening {config.camera.address}")
     rig = open_rig(config.camera.address, config.load.address, books.journal, crop=config.camera.crop)
@@ -307,7 +278,9 @@ def run_live(
         setting = set_up(config, rig, books.journal, screen, stop)
         screen.announce(rig, setting.folder)
         about = About(setting.config, setting.folder, rig.camera.info, setting.grid, setting.start)
-        outputs = make_outputs(about, books, screen, [*consumers, *signals_of(about, books, screen)])
+        outputs = make_outputs(
+            about, books, screen, [*consumers, *signals_of(about, books, screen, stop.ask)]
+        )
         code = _with_outputs(setting, books, outputs, screen, stop, hands)
     finally:
         rig.close()

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, cast
 from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
-from live.measure import Instant, Measurement, SmearGuard, measure
+from live.measure import Measurement, SmearGuard, measure
 from live.outputs import Outputs
 from live.pace import MEASURE, Lag, Pace, yield_to_others
 from live.run.feed import Feed
@@ -36,8 +36,8 @@ class Measuring:
     outputs : Outputs
     feed : Feed
     pace : Pace
-    show : callable taking an Instant
-        Told of every measurement.
+    show : callable
+        Called after every measurement.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Measuring:
         outputs: Outputs,
         feed: Feed,
         pace: Pace,
-        show: Callable[[Instant], None],
+        show: Callable[[], None],
     ) -> None:
         self._setting, self._books, self._outputs, self._feed = setting, books, outputs, feed
         self._pace, self._show = pace, show
@@ -108,7 +108,8 @@ class Measuring:
             self._books.ledger.add(measured=m.burst.n)
             journal.record(_measured(m.burst))
             m = self._timed(m)
-            self._show(self._outputs.add(m))
+            self._outputs.add(m)
+            self._show()
             guard.look(m.burst)
             self._keep_pace(m)
 
@@ -122,7 +123,9 @@ class Measuring:
         if math.isnan(m.instant.latency_s):
             return
         lag = Lag(m.t, m.instant.latency_s, m.instant.measure_s)
-        if warning := self._pace.look(lag, m.burst.n / max(self._feed.fps, 1e-3)):
+        warning = self._pace.look(lag, m.burst.n / max(self._feed.fps, 1e-3))
+        self._books.vitals.latency_p95_s = self._pace.p95_s
+        if warning:
             event = Event(m.t, EventKind.MEASUREMENT, "measurement", warning, "warning")
             self._books.journal.record(event)
 

@@ -6,6 +6,8 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
+from live.measure import Thinned
+
 MOST_POINTS = 4000
 
 
@@ -20,35 +22,27 @@ class Curve:
 
     def __init__(self, names: Sequence[str]) -> None:
         self._names = list(names)
-        self._rows: list[Sequence[float]] = []
-        self._every, self._count, self._edition = 1, 0, 0
+        self._rows: Thinned[Sequence[float]] = Thinned(MOST_POINTS)
         self._lock = threading.Lock()
 
     def add(self, row: Sequence[float]) -> None:
         """Take a row, or let it go where the curve has become long."""
         with self._lock:
-            self._count += 1
-            if (self._count - 1) % self._every:
-                return
             self._rows.append(row)
-            if len(self._rows) >= MOST_POINTS:
-                self._rows = self._rows[::2]
-                self._every *= 2
-                self._edition += 1
 
     @property
     def place(self) -> tuple[int, int]:
         """Edition (what a page has of another is of no use) and number of rows."""
         with self._lock:
-            return self._edition, len(self._rows)
+            return self._rows.halvings, len(self._rows.kept)
 
     def since(self, edition: int, count: int) -> dict[str, Any]:
         """What a page lacks that has ``count`` rows of ``edition``."""
         with self._lock:
-            first = count if edition == self._edition else 0
+            first = count if edition == self._rows.halvings else 0
             return {
                 "names": self._names,
-                "edition": self._edition,
+                "edition": self._rows.halvings,
                 "first": first,
-                "rows": self._rows[first:],
+                "rows": self._rows.kept[first:],
             }

@@ -7,20 +7,16 @@ thread, and the map is made only while a page is open.
 from __future__ import annotations
 
 import math
-import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
-import numpy as np
-
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
-from acquire.load_sample import LoadSample
 from acquire.printable import printable
-from live.measure import AxisFinder, Instant, Measurement
+from live.measure import Measurement, Snapshot
 from live.outputs import Consumer, Policy
 from live.serve.curve import Curve
 from live.serve.painting import COMPONENTS, Colours, as_jpeg, lay_cells, shrunk
@@ -31,7 +27,6 @@ from live.tell import Books, sentence
 STATE_S, PICTURE_S = 0.1, 0.25
 """Between states and between pictures."""
 MOST_EVENTS = 30
-_LATENCIES = 100
 
 
 class Running(Protocol):
@@ -48,9 +43,6 @@ class Running(Protocol):
 
     @property
     def folder(self) -> Path: ...
-
-    @property
-    def fps(self) -> float: ...
 
 
 class Watching(Consumer):
@@ -75,9 +67,9 @@ class Watching(Consumer):
 
     def __init__(self, hub: Hub, config: Config, now: Callable[[], float] = time.monotonic) -> None:
         self._hub, self._config, self._now = hub, config, now
-        self._finder = AxisFinder(config.specimen.axis)
-        self._component = f"e{self._finder.axis * 2}"
-        self._colours = Colours(self._finder.axis, config.view.strain_range)
+        axis = config.specimen.first_axis
+        self._component = f"e{axis * 2}"
+        self._colours = Colours(axis, config.view.strain_range)
         names = list(config.gauges) or ["exx", "eyy", "exy"]
         self.curve = Curve(["t", "stress" if config.specimen.area_m2 else "force", "axial", *names])
         self._names = names
@@ -88,17 +80,14 @@ class Watching(Consumer):
         self._newest: Measurement | None = None
         self._frame: Frame | None = None
         self._fresh = False
-        self._force, self._peak = math.nan, math.nan
         self._events: deque[tuple[float, dict[str, Any]]] = deque(maxlen=MOST_EVENTS)
-        self._late: deque[float] = deque(maxlen=_LATENCIES)
         self._began = now()
         self._t0 = math.nan
         self._due = {"state": 0.0, "picture": 0.0}
-        self._stopped = threading.Event()
 
     def attend(self, running: Running) -> None:
         """The run has begun, and can be asked."""
-        self._running, self._began = running, self._now()
+        self._running, self._began = running, running.books.vitals.began_t
 
     def choose(self, component: str) -> str:
         """Show another map; a refusal in words, or empty."""
@@ -112,29 +101,23 @@ class Watching(Consumer):
     def measurement(self, measurement: Measurement) -> None:
         """Keep the newest."""
         self._newest, self._fresh = measurement, True
-        self._late.append(measurement.instant.latency_s)
 
     def settled(self, measurement: Measurement) -> None:
         """A point of the curves."""
         i = measurement.instant
         if math.isnan(self._t0):
             self._t0 = i.t
-        axial, _ = axial_of(i, self._finder.add(i))
+        axis = self._running.books.history.axis_by_now if self._running else self._config.specimen.first_axis
         gauges = [
             i.gauges[name].value if name in i.gauges else getattr(i, name, math.nan) for name in self._names
         ]
-        self.curve.add([i.t - self._t0, i.force / (self._config.specimen.area_m2 or 1.0), axial, *gauges])
+        stress = i.force / (self._config.specimen.area_m2 or 1.0)
+        self.curve.add([i.t - self._t0, stress, i.axial(axis)[0], *gauges])
 
     def frame(self, frame: Frame) -> None:
         """Keep the newest, to be shown until something is measured."""
         if self._newest is None and not frame.damaged:
             self._frame, self._fresh = frame, True
-
-    def load(self, sample: LoadSample) -> None:
-        """Keep the newest and the largest."""
-        self._force = sample.force
-        if not abs(sample.force) <= abs(self._peak):
-            self._peak = sample.force if math.isfinite(sample.force) else self._peak
 
     def event(self, event: Event) -> None:
         """Keep the last ones."""
@@ -166,36 +149,31 @@ class Watching(Consumer):
 
     def state(self) -> dict[str, Any]:
         """Where the run stands."""
-        specimen, running = self._config.specimen, self._running
-        area = specimen.area_m2
+        running, now = self._running, self._now()
+        s = Snapshot(now, elapsed_s=now - self._began) if running is None else running.books.snapshot(now)
         told: dict[str, Any] = {
-            "state": self._word(),
-            "elapsed_s": self._now() - self._began,
-            "force_N": self._force,
-            "peak_N": self._peak,
-            "stress_Pa": self._force / area if area else None,
+            "state": self._word(s),
+            "elapsed_s": s.elapsed_s,
+            "force_N": s.force_N,
+            "peak_N": s.peak_N,
+            "stress_Pa": s.stress_Pa,
             "points": self.curve.place,
             "picture": {"n": self._shown, "of": self._component, **self._scale},
             "events": [{"s": max(at - self._began, 0.0), **event} for at, event in self._events],
-            "late_s": _p95(self._late),
+            "late_s": s.latency_p95_s,
+            "fps": s.fps,
+            "ledger": s.frames,
+            "alarms": [printable(text) for text in s.alarms],
+            "disk_min": s.disk_s / 60,
         }
-        if self._newest is not None:
-            told |= _measured(self._newest.instant, self._finder.axis)
         if running is not None:
-            told |= {
-                "fps": running.fps,
-                "ledger": running.books.ledger.as_dict(),
-                "recording": running.recording,
-                "alarms": [printable(text) for text in running.books.alarms.texts],
-                "disk_min": running.books.vitals.disk_s / 60,
-                "folder": str(running.folder),
-            }
-        return told
+            told |= {"recording": running.recording, "folder": str(running.folder)}
+        return told | _measured(s)
 
-    def _word(self) -> str:
+    def _word(self, s: Snapshot) -> str:
         if self._running is None:
             return "opening"
-        if self._newest is None:
+        if s.instant is None:
             return "reference"
         return "paused" if self._running.paused else "measuring"
 
@@ -218,36 +196,24 @@ class Watching(Consumer):
         self._shown += 1
 
 
-def axial_of(i: Instant, axis: str) -> tuple[float, float]:
-    """Strain along the load and its sigma: the gauge called axial, or else the mean."""
-    gauge = i.gauges.get("axial")
-    if gauge is not None:
-        return gauge.value, gauge.sigma
-    return (i.exx, i.sigma_exx) if axis == "x" else (i.eyy, i.sigma_eyy)
-
-
 def gauges_of(config: Config) -> dict[str, Any]:
     """The gauges of a configuration as the page draws them."""
     return {name: describe(table) for name, table in config.gauges.items()}
 
 
-def _measured(i: Instant, axis: str) -> dict[str, Any]:
-    value, sigma = axial_of(i, axis)
+def _measured(s: Snapshot) -> dict[str, Any]:
+    i = s.instant
+    if i is None:
+        return {}
     gauges = [
         {"name": name, "value": gauge.value, "sigma": gauge.sigma, "reason": gauge.reason}
         for name, gauge in i.gauges.items()
     ]
-    named = "axial" if "axial" in i.gauges else ("exx" if axis == "x" else "eyy")
     return {
-        "axial": {"name": named, "value": value, "sigma": sigma},
+        "axial": {"name": s.axial_name, "value": s.axial, "sigma": s.sigma_axial},
         "gauges": gauges,
-        "valid": i.n_valid,
-        "zois": i.n_zoi,
+        "valid": s.valid,
+        "zois": s.zois,
         "refused": i.refused,
         "kernel_s": i.measure_s,
     }
-
-
-def _p95(late: deque[float]) -> float:
-    known = [value for value in late if math.isfinite(value)]
-    return float(np.percentile(known, 95)) if known else math.nan

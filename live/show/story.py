@@ -160,7 +160,7 @@ def _curves(run: RunFolder) -> Iterator[Message]:
 def _points(run: RunFolder, start: int, stop: int) -> list[tuple[float, float]]:
     """Strain and N of some instants, for the curve that grows with the slider."""
     found = zip(run.axial_strain[start:stop].tolist(), run.force[start:stop].tolist(), strict=True)
-    return [point for point in found if all(map(math.isfinite, point))]
+    return list(found)
 
 
 def _events(run: RunFolder) -> Iterator[Message]:

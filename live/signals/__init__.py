@@ -1,6 +1,7 @@
 """Signals to the outside: alarms, and strain out.
 
-``alarm`` is one of the configuration with its hysteresis, ``watch`` looks at every measurement. ``lines`` writes
+``alarm`` is one of the configuration with its hysteresis, ``actions`` what it does when it comes,
+``watch`` looks at every measurement. ``lines`` writes
 a measurement as a line, ``strain_out`` sends it to TCP clients, by UDP or to a serial port. ``opening`` makes what
 a configuration asks for.
 """

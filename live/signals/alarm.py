@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from live.setup import AlarmConfig
+from live.signals.actions import Action
 
 
 class Alarm:
     """Follows one channel.
+
+    Parameters
+    ----------
+    config : AlarmConfig
+    actions : sequence of Action
+        What it does when it comes.
 
     Attributes
     ----------
@@ -18,8 +26,8 @@ class Alarm:
     on : bool
     """
 
-    def __init__(self, config: AlarmConfig) -> None:
-        self.config, self.on = config, False
+    def __init__(self, config: AlarmConfig, actions: Sequence[Action] = ()) -> None:
+        self.config, self.actions, self.on = config, actions, False
         c = config
         limit = f"above {c.above:g}" if c.above is not None else f"below {c.below:g}"
         self.name = c.name or f"{c.channel} {limit}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 
 from acquire.addresses import Options, parse_address
@@ -10,6 +11,8 @@ from live.channels import STANDARD, Readings
 from live.lines import Place, read_token
 from live.outputs import About, Consumer
 from live.setup import Config
+from live.signals.actions import Means, actions_of
+from live.signals.alarm import Alarm
 from live.signals.lines import Lines
 from live.signals.strain_out import SerialOut, StrainOut, TcpOut, UdpOut
 from live.signals.watch import AlarmWatch
@@ -18,42 +21,40 @@ from live.tell import Books, Screen
 WHAT = "strain out"
 
 
-def signals_of(about: About, books: Books, screen: Screen) -> list[Consumer]:
-    """Alarms and strain out.
+def signals_of(about: About, books: Books, screen: Screen, end: Callable[[str], None]) -> list[Consumer]:
+    """Alarms and strain out; ``end`` ends the run for a reason.
 
     Raises
     ------
     ConfigError, DeviceError
         A port is taken, not there, or needs a token.
     """
-    config = about.config
-    signals: list[Consumer] = []
-    if config.alarm:
-        alarms = AlarmWatch(
-            config.alarm, _readings(about, books), books.vitals.channels, books.alarms, books.journal
-        )
-        signals.append(alarms)
+    outs: list[StrainOut] = []
     with ExitStack() as opened:
         for make in (_tcp, _udp, _serial):
-            out = make(config, _lines(about, books))
+            out = make(about.config, _lines(about, books))
             if out is not None:
                 opened.callback(out.end)
-                signals.append(out)
+                outs.append(out)
                 screen.say(out.name)
         opened.pop_all()
-    return signals
+    means = Means(screen.bell, end, outs)
+    alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
+    return [*_watch(alarms, about, books), *outs]
 
 
-def _readings(about: About, books: Books) -> Readings:
-    specimen = about.config.specimen
-    return Readings(about.start.monotonic, specimen.axis, specimen.area_m2, lambda: books.loads.latest)
+def _watch(alarms: Sequence[Alarm], about: About, books: Books) -> list[Consumer]:
+    if not alarms:
+        return []
+    readings, vitals = Readings(about.start.monotonic, books.snapshot), books.vitals
+    return [AlarmWatch(alarms, readings, vitals.channels, books.alarms, books.journal)]
 
 
 def _lines(about: About, books: Books) -> Lines:
     config = about.config
     gauges = tuple(f"{prefix}gauge_{name}" for name in config.gauges for prefix in ("", "sigma_"))
     channels = config.strain_out.channels or (*STANDARD, *gauges)
-    return Lines(_readings(about, books), channels, config.strain_out.format)
+    return Lines(Readings(about.start.monotonic, books.snapshot), channels, config.strain_out.format)
 
 
 def _tcp(config: Config, lines: Lines) -> StrainOut | None:

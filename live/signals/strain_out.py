@@ -10,10 +10,11 @@ import contextlib
 import socket
 import time
 from abc import ABC, abstractmethod
+from collections import deque
 from typing import Any
 
 from acquire.errors import DeviceError, PhasedicError
-from acquire.events import Event, EventKind
+from acquire.events import Event
 from acquire.serial_line import LineSettings, open_port
 from live.lines import LineServer
 from live.measure import Measurement
@@ -33,15 +34,20 @@ class StrainOut(Consumer, ABC):
 
     def __init__(self, name: str, lines: Lines) -> None:
         self.name, self._lines = name, lines
+        self._posted: deque[str] = deque()
 
     def measurement(self, measurement: Measurement) -> None:
         """Send its line."""
         self.send(self._lines.of(measurement))
 
+    def post(self, line: str) -> None:
+        """Leave a line, from any thread; it goes out with the next event."""
+        self._posted.append(line)
+
     def event(self, event: Event) -> None:
-        """Send the line of an alarm that has one."""
-        if event.kind is EventKind.ALARM and event.data.get("line"):
-            self.send(str(event.data["line"]))
+        """Send the lines that were left."""
+        while self._posted:
+            self.send(self._posted.popleft())
 
     @abstractmethod
     def send(self, line: str) -> None:

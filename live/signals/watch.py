@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -11,9 +12,11 @@ from acquire.events import Event, EventKind, EventSink
 from live.channels import MACHINE, Readings
 from live.measure import Measurement
 from live.outputs import Consumer, Policy
-from live.setup import AlarmConfig
+from live.signals.actions import Action
 from live.signals.alarm import Alarm
 from live.tell import AlarmBoard
+
+log = logging.getLogger(__name__)
 
 EVERY_S = 0.2
 """What is silent is looked at so often."""
@@ -24,7 +27,7 @@ class AlarmWatch(Consumer):
 
     Parameters
     ----------
-    alarms : sequence of AlarmConfig
+    alarms : sequence of Alarm
     readings : Readings
     machine : callable
         The channels of the machine at a monotonic time.
@@ -39,14 +42,14 @@ class AlarmWatch(Consumer):
 
     def __init__(
         self,
-        alarms: Sequence[AlarmConfig],
+        alarms: Sequence[Alarm],
         readings: Readings,
         machine: Callable[[float], Mapping[str, float]],
         board: AlarmBoard,
         tell: EventSink,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._alarms = [Alarm(config) for config in alarms]
+        self._alarms = alarms
         self._readings, self._machine, self._board = readings, machine, board
         self._tell, self._clock = tell, clock
         self._came = 0
@@ -82,9 +85,20 @@ class AlarmWatch(Consumer):
         data: dict[str, Any] = {"alarm": alarm.name, "on": alarm.on, "value": value}
         if not math.isnan(stamp):
             data["after_s"] = now - stamp
-        if alarm.on and alarm.config.line:
-            data["line"] = alarm.config.line
-        if alarm.on and alarm.config.end:
-            data["end"] = True
-        text = f"ALARM {words}" if alarm.on else f"over: {words}"
-        self._tell(Event(now, EventKind.ALARM, "alarm", text, "warning" if alarm.on else "info", data))
+        if not alarm.on:
+            self._tell(Event(now, EventKind.ALARM, "alarm", f"over: {words}", "info", data))
+            return
+        data |= {action.key: getattr(alarm.config, action.key) for action in alarm.actions if action.key}
+        event = Event(now, EventKind.ALARM, "alarm", f"ALARM {words}", "warning", data)
+        for action in alarm.actions:
+            self._fire(action, event)
+        self._tell(event)
+
+    def _fire(self, action: Action, event: Event) -> None:
+        """One action; where it fails the others and the event go on."""
+        try:
+            action.fire(event)
+        except Exception as error:
+            log.exception("an action of an alarm failed")
+            text = f"{type(action).__name__} of an alarm failed: {error!r}"
+            self._tell(Event(event.t, EventKind.ALARM, "alarm", text, "error"))

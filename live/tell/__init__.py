@@ -20,7 +20,7 @@ from live.tell.figures import (
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen, say
-from live.tell.status_line import Standing, duration
+from live.tell.status_line import duration
 from live.tell.summary import file_lines, summary_lines
 
 __all__ = [
@@ -29,7 +29,6 @@ __all__ = [
     "Journal",
     "Ledger",
     "Screen",
-    "Standing",
     "StatusCard",
     "Vitals",
     "axis_words",

@@ -6,6 +6,8 @@ import math
 import threading
 from dataclasses import dataclass
 
+from live.measure import peak_force
+
 
 @dataclass(slots=True)
 class Vitals:
@@ -13,30 +15,36 @@ class Vitals:
 
     Attributes
     ----------
-    frame_t, load_t : float, s
-        When the last frame and the last load sample came, monotonic; NaN before the first.
+    began_t, frame_t, load_t : float, s
+        When the test began, and the last frame and the last load sample came, monotonic; NaN before.
+    fps : float, 1/s
+        As frames come.
     disk_s : float, s
         Until the disk is full; infinite where nothing is written.
     peak_N : float, N
-        The largest force so far; NaN before the first.
+        The force of largest magnitude so far, with its sign; NaN before the first.
+    latency_p95_s : float, s
+        Of the last seconds (``live.pace``).
     state : str
         What a live run does with its frames; empty in a replay.
     view_port : int or None
         Where viewers connect; None while they cannot.
     """
 
+    began_t: float = math.nan
     frame_t: float = math.nan
+    fps: float = 0.0
     load_t: float = math.nan
     disk_s: float = math.inf
     peak_N: float = math.nan
+    latency_p95_s: float = math.nan
     state: str = ""
     view_port: int | None = None
 
     def loaded(self, t: float, force_N: float) -> None:
         """A load sample came at ``t`` (s, monotonic)."""
         self.load_t = t
-        if not self.peak_N >= force_N and not math.isnan(force_N):
-            self.peak_N = force_N
+        self.peak_N = peak_force(self.peak_N, force_N)
 
     def channels(self, now: float) -> dict[str, float]:
         """The channels of the machine (``live.channels``) at ``now``, monotonic s."""

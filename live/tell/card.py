@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 from acquire.load_cell import LoadLog
-from live.measure import History
+from live.measure import History, Snapshot
 from live.setup import SpecimenConfig
 from live.tell.figures import elastic_lines, evaluate
-from live.tell.ledger import Ledger
 
 EVERY_S = 1.0  # of the test
 
@@ -27,12 +26,12 @@ class StatusCard:
         self._last = now
         return True
 
-    def written(self, history: History, ledger: Ledger) -> str:
+    def written(self, snapshot: Snapshot, history: History) -> str:
         """The card, from the last instant and the figures of all of ``history``."""
-        return "\n\n".join(self._lines(history, ledger))
+        return "\n\n".join(self._lines(snapshot, history))
 
-    def _lines(self, history: History, ledger: Ledger) -> list[str]:
-        i = history.instants[-1]
+    def _lines(self, snapshot: Snapshot, history: History) -> list[str]:
+        i, frames, lost = history.instants[-1], snapshot.frames, snapshot.lost
         lines = [
             f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
             f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, mean **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
@@ -41,9 +40,8 @@ class StatusCard:
         lines += [
             line.replace("  ", ", ").replace("+-", "±") for line in elastic_lines(figures, self._specimen)
         ]
-        lost = ledger.lost + ledger.unrecorded
         lines.append(
-            f"recorded {ledger.recorded}, measured {ledger.measured}, skipped {ledger.skipped},"
+            f"recorded {frames['recorded']}, measured {frames['measured']}, skipped {frames['skipped']},"
             f" lost {f'**{lost}**' if lost else 0}"
         )
         return lines

@@ -15,10 +15,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from acquire.printable import printable
-from live.tell.status_line import GAP, Standing, duration, force, gauge_words, status_line
+from live.tell.status_line import GAP, duration, force, gauge_words, status_line
 
 if TYPE_CHECKING:
-    from live.measure import Instant
+    from live.measure import Instant, Snapshot
     from live.setup import Rig
 
 _TERMINAL_EVERY_S, _FILE_EVERY_S = 0.25, 5.0
@@ -85,9 +85,9 @@ class Screen:
         except (OSError, ValueError):
             return _UNKNOWN_WIDTH
 
-    def standing(self, standing: Standing) -> None:
-        """Where a live run stands."""
-        self.status(status_line(standing, self._columns() if self._terminal else _FILE_WIDTH))
+    def snapshot(self, snapshot: Snapshot, words: str = "") -> None:
+        """Where a live run stands; ``words`` say what it waits for."""
+        self.status(status_line(snapshot, self._columns() if self._terminal else _FILE_WIDTH, words))
 
     def prompt(self, text: str | None) -> None:
         """What the operator types, in the place of the status line; None: no more."""

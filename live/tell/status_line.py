@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from live.measure import Instant
-    from live.tell.ledger import Ledger
+    from live.measure import Instant, Snapshot
 
 GAP = "  "
 MOST_GAUGES = 4
@@ -17,51 +15,9 @@ Part = tuple[int, str]
 """How soon it has to go where the line is too long (the highest first), and its words."""
 
 
-@dataclass(frozen=True, slots=True)
-class Standing:
-    """Where a test stands.
-
-    Attributes
-    ----------
-    ledger : Ledger
-    state : str
-        What is done with frames and bursts: "REC", "ARMED", "PAUSED" ...
-    elapsed_s : float, s
-    fps : float
-    force_N : float, N
-        The newest; NaN where there is none.
-    area_m2 : float or None, m^2
-    instant : Instant or None
-        The last that was measured.
-    p95_s : float, s
-        Latency; NaN where it is not known.
-    disk_s : float, s
-        Until the disk is full.
-    peak_N : float, N
-        The largest force so far.
-    alarms : sequence of str
-        Words of those that are on.
-    words : str
-        What is waited for.
-    """
-
-    ledger: Ledger
-    state: str
-    elapsed_s: float
-    fps: float = 0.0
-    force_N: float = math.nan
-    area_m2: float | None = None
-    instant: Instant | None = None
-    p95_s: float = math.nan
-    disk_s: float = math.inf
-    peak_N: float = math.nan
-    alarms: Sequence[str] = ()
-    words: str = ""
-
-
-def status_line(s: Standing, width: int) -> str:
-    """The line, at most ``width`` letters."""
-    return fitted([*_test(s), *_strain(s.instant), *_machine(s)], width)
+def status_line(s: Snapshot, width: int, words: str = "") -> str:
+    """The line, at most ``width`` letters; ``words`` say what is waited for."""
+    return fitted([*_test(s), (3, words), *_strain(s.instant), *_machine(s)], width)
 
 
 def fitted(parts: Sequence[Part], width: int) -> str:
@@ -72,12 +28,12 @@ def fitted(parts: Sequence[Part], width: int) -> str:
     return GAP.join(text for _, text in left)[: max(width, 0)]
 
 
-def _test(s: Standing) -> list[Part]:
+def _test(s: Snapshot) -> list[Part]:
     alarm = " ".join(f"ALARM {text}" for text in s.alarms)
-    stress = f"{s.force_N / s.area_m2 * 1e-6:.1f} MPa" if s.area_m2 and not math.isnan(s.force_N) else ""
+    stress = "" if math.isnan(s.stress_Pa) else f"{s.stress_Pa * 1e-6:.1f} MPa"
     peak = "" if math.isnan(s.peak_N) else f"peak {force(s.peak_N)}"
     load = [(0, force(s.force_N)), (4, stress), (12, peak)]
-    return [(1, alarm), (2, s.state), (7, duration(s.elapsed_s)), *load, (3, s.words)]
+    return [(1, alarm), (2, s.state), (7, duration(s.elapsed_s)), *load]
 
 
 def _strain(i: Instant | None) -> list[Part]:
@@ -88,16 +44,15 @@ def _strain(i: Instant | None) -> list[Part]:
     return [*parts, (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
 
 
-def _machine(s: Standing) -> list[Part]:
-    ledger = s.ledger
-    lost = ledger.lost + ledger.unrecorded
-    late = "" if math.isnan(s.p95_s) else f"p95 {s.p95_s * 1e3:.0f} ms"
-    measured = f"measured {ledger.measured}" if s.instant is not None else f"{ledger.grabbed} frames"
+def _machine(s: Snapshot) -> list[Part]:
+    frames = s.frames
+    late = "" if math.isnan(s.latency_p95_s) else f"p95 {s.latency_p95_s * 1e3:.0f} ms"
+    measured = f"measured {frames['measured']}" if s.instant is not None else f"{frames['grabbed']} frames"
     return [
         (9, f"{s.fps:.0f} fps"),
         (12, measured),
-        (11, f"skipped {ledger.skipped}"),
-        (6, f"LOST {lost}") if lost else (13, "lost 0"),
+        (11, f"skipped {frames['skipped']}"),
+        (6, f"LOST {s.lost}") if s.lost else (13, "lost 0"),
         (12, late),
         (14, "" if math.isinf(s.disk_s) else f"disk {s.disk_s / 60:.0f} min"),
     ]

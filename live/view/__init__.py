@@ -5,10 +5,8 @@
 there alone. ``viewer`` finds rerun's program.
 """
 
-from live.view.exchange.figures import Figures
 from live.view.exchange.setup import ViewSetup
-from live.view.exchange.thinned import Thinned
 from live.view.view import View
 from live.view.viewer import has_display, rerun_command, spawn_viewer
 
-__all__ = ["Figures", "Thinned", "View", "ViewSetup", "has_display", "rerun_command", "spawn_viewer"]
+__all__ = ["View", "ViewSetup", "has_display", "rerun_command", "spawn_viewer"]

@@ -9,6 +9,7 @@ from live.view.exchange.messages import (
     Where,
     events_message,
     field_message,
+    figures_message,
     picture_message,
     rows_message,
     setup_message,
@@ -85,7 +86,7 @@ class Supply:
             return Message(Kind.STATUS, {"markdown": past.status})
         if waiting.figures is not None:
             figures, waiting.figures = waiting.figures, None
-            return Message(Kind.FIGURES, figures.as_meta())
+            return figures_message(figures)
         return None
 
     def _large(self, now: float) -> Message | None:

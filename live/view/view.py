@@ -15,8 +15,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from live.measure import AxisFinder
-from live.view.exchange.figures import Figures
 from live.view.exchange.messages import Where, row_of
 from live.view.exchange.setup import ViewSetup
 from live.view.exchange.wire import Kind
@@ -28,7 +26,7 @@ from live.view.waiting import Waiting
 if TYPE_CHECKING:
     from acquire.events import Event
     from acquire.frame import Frame
-    from live.measure import Measurement
+    from live.measure import Measurement, Snapshot
 
 LOAD_STEP_S = 0.02
 """Of load samples that come faster, one in so long is shown."""
@@ -51,8 +49,6 @@ class View:
         must anew, since the process was.
     story : callable
         Gives messages (``live.view.exchange``) that are all shown, from the beginning, of a finished test.
-    axis : AxisFinder, optional
-        Of the curve; without, as in ``setup``.
     """
 
     def __init__(
@@ -64,10 +60,8 @@ class View:
         tell: Tell = lambda text, level: None,
         serving: Callable[[View], None] = lambda view: None,
         story: Story = lambda: (),
-        axis: AxisFinder | None = None,
     ) -> None:
         self._setup, self._waiting = setup, Waiting()
-        self._axis = axis or AxisFinder(setup.axis)
         self._supply = Supply(setup, self._waiting, story)
         where = Where(port, None if rrd is None else str(rrd.absolute()), str(uuid.uuid4()))
         self._keeper = Keeper(self._supply, where, tell, lambda: serving(self))
@@ -87,14 +81,9 @@ class View:
         self._waiting.row(Kind.MEANS, row_of(measurement))
         self._waiting.field = measurement.t, measurement.field
 
-    def settled(self, measurement: Measurement) -> None:
-        """Offer a point of the curve: a measurement whose force is final."""
-        i = measurement.instant
-        strain = i.eyy if self._axis.add(i) == "y" else i.exx
-        if (gauge := i.gauges.get("axial")) is not None:
-            strain = gauge.value
-        if math.isfinite(strain) and math.isfinite(measurement.force):
-            self._waiting.row(Kind.POINTS, (strain, measurement.force))
+    def point(self, axial: float, force: float) -> None:
+        """Offer a point of the curve: strain along the load, and its final force (N); NaN is not drawn."""
+        self._waiting.row(Kind.POINTS, (axial, force))
 
     def load(self, t: float, force: float) -> None:
         """Offer a load sample (monotonic s, N); 50 a second are shown."""
@@ -110,9 +99,9 @@ class View:
         """Set the status card."""
         self._waiting.status = text_markdown
 
-    def figures(self, figures: Figures) -> None:
+    def figures(self, snapshot: Snapshot) -> None:
         """Set the large figures."""
-        self._waiting.figures = figures
+        self._waiting.figures = snapshot
 
     def close(self, seconds: float) -> None:
         """Draw what waits, finish the file and end; a process that takes longer is killed, and it is told."""

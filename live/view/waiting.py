@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections import deque
 from typing import TYPE_CHECKING, Any
 
-from live.view.exchange.figures import Figures
+from live.measure import Snapshot, Thinned
 from live.view.exchange.messages import Row
-from live.view.exchange.thinned import Thinned
 from live.view.exchange.wire import Kind
 
 if TYPE_CHECKING:
@@ -35,7 +34,7 @@ class Waiting:
     picture : Frame or None
     status : str or None
         Markdown.
-    figures : Figures or None
+    figures : Snapshot or None
     dropped : int
         Rows and events that were too many.
     """
@@ -46,7 +45,7 @@ class Waiting:
         self.field: tuple[float, StrainField] | None = None
         self.picture: Frame | None = None
         self.status: str | None = None
-        self.figures: Figures | None = None
+        self.figures: Snapshot | None = None
         self.dropped = 0
 
     def row(self, kind: Kind, row: Row) -> None:

@@ -47,10 +47,10 @@ ROOMS = {
     "live.recording": "acquire live.operate live.tell",
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",
-    "live.view.painting": "acquire analysis.field live.maps live.view.exchange",
-    "live.view.drawing": "acquire analysis.field live.maps live.view.exchange live.view.painting",
+    "live.view.painting": "acquire analysis.field live.maps live.measure live.view.exchange",
+    "live.view.drawing": "acquire analysis.field live.maps live.measure live.view.exchange live.view.painting",
     "live.view": "acquire analysis.field live.measure live.pace live.view.exchange",
-    "live.outputs": "acquire acquire.load_cell analysis live.channels live.measure live.pace live.setup live.tell"
+    "live.outputs": "acquire acquire.load_cell analysis live.measure live.pace live.setup live.tell"
     " live.results live.view",
     "live.signals": "acquire acquire.serial_line live.channels live.lines live.measure live.outputs live.setup"
     " live.tell",
@@ -67,8 +67,8 @@ ROOMS = {
     "live.commands": "*",
     "live.cli": "acquire.errors acquire.printable live.commands.arguments live.commands.exit_codes live.unhurried",
     # A finished run is its results and its recording, or the images it measured.
-    "live.finished": "acquire acquire.camera acquire.session analysis.evaluate analysis.field live.results"
-    " live.setup",
+    "live.finished": "acquire acquire.camera acquire.session analysis.evaluate analysis.field live.measure"
+    " live.results live.setup",
     "live.export": "acquire analysis.field live.results live.maps live.tell live.finished",
     "live.report": "acquire analysis.field analysis.evaluate analysis.picture live.results live.maps live.tell"
     " live.setup live.finished live.export",

@@ -38,9 +38,10 @@ class CurveDrawing:
         self._axes = None
 
     def draw(self, points: NDArray[np.float64]) -> None:
-        """Draw (N, 2) pairs of strain and force (N)."""
+        """Draw (N, 2) pairs of strain and force (N); those that have both."""
         import rerun as rr
 
+        points = points[np.isfinite(points).all(axis=1)]
         if not len(points):
             return
         area = self._setup.area_m2

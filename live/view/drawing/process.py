@@ -13,8 +13,15 @@ from typing import Any
 from live.view.drawing.guard import follow, memory_MiB
 from live.view.drawing.places import FINISHED_MIB, Place, serve, write
 from live.view.drawing.scene import Scene
-from live.view.exchange.figures import Figures
-from live.view.exchange.messages import Where, events_of, field_of, picture_of, rows_of, setup_of
+from live.view.exchange.messages import (
+    Where,
+    events_of,
+    field_of,
+    figures_of,
+    picture_of,
+    rows_of,
+    setup_of,
+)
 from live.view.exchange.setup import ViewSetup
 from live.view.exchange.wire import Kind, Message, Reader, encoded
 
@@ -128,4 +135,4 @@ def _show(scene: Scene, message: Message) -> None:
     elif kind is Kind.STATUS:
         scene.status(str(message.meta.get("markdown", "")))
     elif kind is Kind.FIGURES:
-        scene.figures(Figures.from_meta(message.meta))
+        scene.figures(figures_of(message))

@@ -15,6 +15,7 @@ import numpy as np
 from acquire.events import Event, EventKind
 from analysis.field import Status
 from live.maps import MICROSTRAIN, number, ramp
+from live.measure import Snapshot, Thinned
 from live.view.drawing.curve import MAX_POINTS
 from live.view.drawing.curve_drawing import CurveDrawing
 from live.view.drawing.layout import (
@@ -39,10 +40,8 @@ from live.view.drawing.shapes import (
     value_dots,
     with_heads,
 )
-from live.view.exchange.figures import Figures
 from live.view.exchange.messages import Picture, Row
 from live.view.exchange.setup import MAPS, STRAINS, ViewSetup
-from live.view.exchange.thinned import Thinned
 from live.view.painting import FieldMaps, Painted, paint
 
 if TYPE_CHECKING:
@@ -276,8 +275,9 @@ class Scene:
         """Time (s), and mean and sigma of each strain."""
         for t, *values in rows:
             if any(math.isfinite(value) for value in values[::2]):
-                self._strains.append((self._since_start(t), *values))
-                self._add_strains(t, self._strains.newest)
+                row = (self._since_start(t), *values)
+                self._strains.append(row)
+                self._add_strains(t, row)
         self._repeat()
 
     def _add_strains(self, t: float, row: Row) -> None:
@@ -314,14 +314,14 @@ class Scene:
         text = f"{self._since_start(event.t):.1f} s  {source}: {event.text}"
         self._log("events", rr.TextLog(text, level=_LEVELS[event.level]))
 
-    def figures(self, figures: Figures) -> None:
+    def figures(self, snapshot: Snapshot) -> None:
         """The large figures, no more often than the rates say."""
         import rerun as rr
 
-        self._due = [place for place in self._places if place.takes("figures", figures.t)]
+        self._due = [place for place in self._places if place.takes("figures", snapshot.t)]
         if self._due:
-            data = encode(".jpg", paint(figures), FIGURES_QUALITY)
-            self._at(figures.t)
+            data = encode(".jpg", paint(snapshot), FIGURES_QUALITY)
+            self._at(snapshot.t)
             self._log_due("figures", rr.EncodedImage(contents=data, media_type="image/jpeg"))
 
     def status(self, markdown: str) -> None:

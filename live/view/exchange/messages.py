@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from analysis.field import Measure, StrainField, ZoiGrid
-from live.measure import Measurement
+from live.measure import Measurement, Snapshot
 from live.view.exchange.setup import STRAINS, ViewSetup
 from live.view.exchange.wire import Kind, Message, WireError
 
@@ -27,6 +27,8 @@ To slice 20 megapixels costs the test 0.7 ms, to send them whole 4 ms, to reduce
 
 COLUMNS = {Kind.MEANS: 1 + 2 * len(STRAINS), Kind.LOADS: 2, Kind.POINTS: 2, Kind.GAUGE: 3}
 """Numbers in a row: t and mean, sigma of each strain; t and N; strain and N; t and strain, sigma of a gauge."""
+
+_NUMBERS = ("t", "axial", "sigma_axial", "force_N", "stress_Pa")
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,6 +166,24 @@ def events_of(message: Message) -> list[Event]:
         ]
     except (KeyError, TypeError, ValueError) as error:
         raise WireError(f"events to the view are damaged: {error}") from error
+
+
+def figures_message(snapshot: Snapshot) -> Message:
+    """What is shown large of ``snapshot``."""
+    shown = {name: getattr(snapshot, name) for name in (*_NUMBERS, "valid", "zois", "state", "alarms")}
+    return Message(Kind.FIGURES, {k: v for k, v in shown.items() if v == v})  # NaN is no JSON
+
+
+def figures_of(message: Message) -> Snapshot:
+    """What ``figures_message`` was made of, as far as it is shown large."""
+    meta = message.meta
+    try:
+        shown: dict[str, Any] = {name: float(meta.get(name, math.nan)) for name in _NUMBERS}
+        shown |= {name: int(meta[name]) for name in ("valid", "zois")}
+        alarms = tuple(str(alarm) for alarm in meta["alarms"])
+        return Snapshot(**shown, state=str(meta["state"]), alarms=alarms)
+    except (KeyError, TypeError, ValueError) as error:
+        raise WireError(f"figures to the view are damaged: {error}") from error
 
 
 def _measure(message: Message) -> Measure:

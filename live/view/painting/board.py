@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
-from live.view.exchange.figures import Figures
+from live.measure import Snapshot
 
 WIDTH, HEIGHT = 1600, 168
 """px of the picture; the digits are nearly half of the height."""
@@ -28,27 +28,27 @@ _LABEL_Y, _VALUE_Y, _LINE_Y = 28, 116, 157  # base lines
 _STATES = {"REC": RED, "ARMED": AMBER, "REPLAY": GREY}
 
 
-def paint(figures: Figures) -> NDArray[np.uint8]:
+def paint(snapshot: Snapshot) -> NDArray[np.uint8]:
     """(HEIGHT, WIDTH, 3) uint8, blue, green, red."""
-    alarmed = bool(figures.alarms)
+    alarmed = bool(snapshot.alarms)
     picture = np.empty((HEIGHT, WIDTH, 3), np.uint8)
     picture[:] = RED if alarmed else BACKGROUND
     labels = WHITE if alarmed else GREY
-    for (x, width), (label, value, colour) in zip(_CELLS, _cells(figures), strict=True):
+    for (x, width), (label, value, colour) in zip(_CELLS, _cells(snapshot), strict=True):
         _write(picture, label, (x, _LABEL_Y), 24, width, labels)
         _write(picture, value, (x, _VALUE_Y), 76, width, WHITE if alarmed else colour)
-    _write(picture, _line(figures), (14, _LINE_Y), 29, WIDTH - 28, labels)
+    _write(picture, _line(snapshot), (14, _LINE_Y), 29, WIDTH - 28, labels)
     return picture
 
 
-def _cells(f: Figures) -> tuple[tuple[str, str, Colour], ...]:
-    sigma = "" if math.isnan(f.sigma) else f"+- {f.sigma * 1e6:.0f} "
-    state = f.state.partition(",")[0]
+def _cells(s: Snapshot) -> tuple[tuple[str, str, Colour], ...]:
+    sigma = "" if math.isnan(s.sigma_axial) else f"+- {s.sigma_axial * 1e6:.0f} "
+    state = s.state.partition(",")[0]
     return (
-        ("STATE", "PAUSED" if "PAUSED" in f.state else state, _STATES.get(state, GREEN)),
-        (f"STRAIN {sigma}um/m", _known(f.axial * 1e6, "+,.0f"), WHITE),
-        ("FORCE N" if abs(f.force_N) < 1e4 else "FORCE kN", _force(f.force_N), WHITE),
-        ("STRESS MPa", _known(f.stress_MPa, ".1f"), WHITE),
+        ("STATE", "PAUSED" if "PAUSED" in s.state else state, _STATES.get(state, GREEN)),
+        (f"STRAIN {sigma}um/m", _known(s.axial * 1e6, "+,.0f"), WHITE),
+        ("FORCE N" if abs(s.force_N) < 1e4 else "FORCE kN", _force(s.force_N), WHITE),
+        ("STRESS MPa", _known(s.stress_Pa * 1e-6, ".1f"), WHITE),
     )
 
 
@@ -60,13 +60,13 @@ def _known(value: float, form: str) -> str:
     return "-" if math.isnan(value) else format(value, form).replace(",", " ")
 
 
-def _line(f: Figures) -> str:
-    if f.alarms:
-        return "ALARM  " + "   ".join(f.alarms)
-    if not f.zois:
+def _line(s: Snapshot) -> str:
+    if s.alarms:
+        return "ALARM  " + "   ".join(s.alarms)
+    if not s.zois:
         return "nothing measured yet"
-    lost = f.zois - f.valid
-    return f"{f.valid} of {f.zois} ZOIs" + (f", {lost} LOST" if lost else "")
+    lost = s.zois - s.valid
+    return f"{s.valid} of {s.zois} ZOIs" + (f", {lost} LOST" if lost else "")
 
 
 def _write(

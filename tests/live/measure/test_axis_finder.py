@@ -29,7 +29,7 @@ def test_y_until_the_strains_tell(monkeypatch: pytest.MonkeyPatch, most: int) ->
     finder, course = AxisFinder("auto"), instants(300)
     told = [finder.add(i) for i in course]
     assert set(told[:100]) == {"y"} and set(told[130:]) == {"x"}
-    assert len(finder._kept) <= most
+    assert len(finder._strains.kept) <= most
     again = AxisFinder("auto")
     assert [again.add(i) for i in course for _ in range(2)][::2] == told, "told twice it counts once"
 

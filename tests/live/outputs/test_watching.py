@@ -9,13 +9,11 @@ import pytest
 
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
-from live.channels import Readings
-from live.measure import History
+from live.measure import Snapshot
 from live.outputs import Outputs
 from live.outputs.watching import CARD_INSTANTS, CardWriter, FiguresWriter, Watching
 from live.setup import SpecimenConfig
-from live.tell import Books, Journal, Ledger, StatusCard
-from live.view import Figures
+from live.tell import Books, Journal, StatusCard
 from tests.live.made_up import START, make_frame, make_loads, make_measurement
 
 
@@ -38,10 +36,9 @@ class KeptView:
 
 
 def watched(*views: KeptView) -> tuple[Outputs, Journal]:
-    journal = Journal()
-    return Outputs(
-        [Watching(v, {}) for v in views], make_loads(10.0, lambda t: t), journal, History()
-    ), journal  # type: ignore[arg-type]
+    books = Books.new(1.0)
+    watching = [Watching(view, books) for view in views]  # type: ignore[arg-type]
+    return Outputs(watching, make_loads(10.0, lambda t: t), books.journal, books.history), books.journal
 
 
 def test_everything_is_offered() -> None:
@@ -52,7 +49,8 @@ def test_everything_is_offered() -> None:
     out.load(LoadSample(START, 5.0))
     journal.tell(EventKind.NOTE, "operator", "hello")
     out.end()
-    assert {name for name, _ in view.given} == {"show", "settled", "picture", "load", "event"}
+    assert {name for name, _ in view.given} == {"show", "point", "picture", "load", "event"}
+    assert [what for name, what in view.given if name == "point"] == [(0.001, 0.0)]
     assert view.closed
     assert out.reports[0].words == "all drawn"
 
@@ -73,8 +71,8 @@ def test_a_view_that_has_failed_is_told_once_and_all_else_goes_on() -> None:
 def test_the_card_is_written_once_a_second_from_a_bounded_history(monkeypatch: pytest.MonkeyPatch) -> None:
     view, seen = KeptView(), []
     card = StatusCard(SpecimenConfig(), make_loads(1.0, lambda t: t))
-    monkeypatch.setattr(card, "written", lambda history, ledger: seen.append(history.instants) or "card")
-    writer = CardWriter(view, card, Ledger())  # type: ignore[arg-type]
+    monkeypatch.setattr(card, "written", lambda now, history: seen.append(history.instants) or "card")
+    writer = CardWriter(view, card, Books.new(1.0))  # type: ignore[arg-type]
     last = make_measurement(0)
     for number in range(3 * CARD_INSTANTS):
         last = make_measurement(number) if number % 1000 == 0 else last
@@ -87,7 +85,9 @@ def test_the_card_is_written_once_a_second_from_a_bounded_history(monkeypatch: p
 
 def test_the_card_says_where_the_test_stands() -> None:
     view = KeptView()
-    writer = CardWriter(view, StatusCard(SpecimenConfig(), make_loads(10.0, lambda t: 1e3 * t)), Ledger())  # type: ignore[arg-type]
+    writer = CardWriter(
+        view, StatusCard(SpecimenConfig(), make_loads(10.0, lambda t: 1e3 * t)), Books.new(1.0)
+    )  # type: ignore[arg-type]
     begin = time.perf_counter()
     for number in range(100):
         writer.measurement(make_measurement(number, 1e-5 * number))
@@ -100,20 +100,19 @@ class FakeView:
     """Keeps the large figures."""
 
     def __init__(self) -> None:
-        self.shown: list[Figures] = []
+        self.shown: list[Snapshot] = []
 
-    def figures(self, figures: Figures) -> None:
-        self.shown.append(figures)
+    def figures(self, snapshot: Snapshot) -> None:
+        self.shown.append(snapshot)
 
 
 @pytest.mark.parametrize("state", ["ARMED", ""])
 def test_the_large_figures_before_and_after_the_first_measurement(state: str) -> None:
     """Live the load is shown from the first frame on; a replay (no state) shows the force of each measurement."""
-    books, view = Books.new(1.0), FakeView()
+    books, view = Books.new(1.0, specimen=SpecimenConfig(area_mm2=40.0)), FakeView()
     books.loads.append(LoadSample(START, 800.0))
     books.vitals.state, books.vitals.frame_t = state, START + 1
-    readings = Readings(START, "y", 40e-6, lambda: books.loads.latest if state else None)
-    writer = FiguresWriter(view, readings, books)  # type: ignore[arg-type]
+    writer = FiguresWriter(view, books)  # type: ignore[arg-type]
     writer.idle()
     assert [(f.state, f.force_N, f.zois) for f in view.shown] == ([("ARMED", 800.0, 0)] if state else [])
     books.alarms.put("limit", "limit: too much")
@@ -121,4 +120,4 @@ def test_the_large_figures_before_and_after_the_first_measurement(state: str) ->
     last = view.shown[-1]
     assert (last.state, last.force_N) == (("ARMED", 800.0) if state else ("REPLAY", 500.0))
     assert last.axial == pytest.approx(1e-3) and last.alarms == ("limit: too much",)
-    assert last.stress_MPa == pytest.approx(last.force_N / 40)
+    assert last.stress_Pa == pytest.approx(last.force_N / 40e-6)

@@ -47,6 +47,12 @@ def test_a_lost_pace_is_told_once_with_its_cause(cause: dict[str, float], says: 
     assert says in warning
 
 
+def test_bursts_that_come_seldom_have_a_latency_and_no_warning() -> None:
+    pace = Pace(lambda: 0.0, lambda: Use(0.0, 0.0, 0.0, 0.0))
+    assert [pace.look(Lag(2.0 * k, 9.0, 0.01), 2.0) for k in range(20)] == [""] * 20
+    assert pace.p95_s == pytest.approx(9.0)
+
+
 def test_the_bursts_that_waited_for_the_first_result_tell_nothing() -> None:
     pace = Pace(lambda: 0.0, lambda: Use(0.0, 0.0, 0.0, 0.0))
     late = [max(0.8 - 0.3 * k * PERIOD_S, 0.02) for k in range(150)]

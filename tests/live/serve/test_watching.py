@@ -7,6 +7,7 @@ import math
 import time
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -22,6 +23,7 @@ from live.serve.curve import MOST_POINTS, Curve
 from live.serve.watching import Watching
 from live.serve.web import Hub
 from live.setup import Config, load_config
+from live.tell import Books
 from tests.live.made_up import make_frame, make_measurement
 
 
@@ -49,21 +51,34 @@ def config() -> Config:
     return load_config(None, {"specimen.area_mm2": 40.0})
 
 
+class Run:
+    """A run that is asked how it stands."""
+
+    paused, recording, folder = False, True, Path("run")
+
+    def __init__(self, config: Config) -> None:
+        self.books = Books.new(1.0, specimen=config.specimen)
+        self.books.vitals.state, self.books.vitals.began_t = "REC", 0.0
+
+
 def ready(watching: Watching) -> Watching:
     watching.begin()
     return watching
 
 
 def test_what_is_told(config: Config) -> None:
-    hub = Hub()
+    hub, run = Hub(), Run(config)
     told, watching = Told(hub), ready(Watching(hub, config))
+    watching.attend(run)
     m = measurement()
     i = replace(
         m.instant, gauges={"axial": GaugeValue(0.001, 2e-6), "b": GaugeValue(math.nan, math.nan, "lost")}
     )
     watching.measurement(replace(m, instant=i))
-    watching.load(LoadSample(0.0, 500.0))
-    watching.load(LoadSample(0.1, -400.0))
+    run.books.history.add(i)
+    for t, force in enumerate((500.0, -400.0)):
+        run.books.loads.append(LoadSample(t, force))
+        run.books.vitals.loaded(t, force)
     watching.event(Event(0.0, EventKind.DEVICE, "camera", "a \x1b[31mfault", "error"))
     watching.idle()
     state = told["run"]

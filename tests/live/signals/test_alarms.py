@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from acquire.session import Session
 from live.operate import answer
 from live.setup import AlarmConfig, from_dict, load_config
 from live.signals import Alarm, AlarmWatch
+from live.signals.actions import ACTIONS, Means, actions_of
 from live.tell import AlarmBoard, Vitals
 from tests.live.test_end_to_end import live_run
 
@@ -35,20 +37,35 @@ def test_without_hysteresis_the_limit_itself_is_off() -> None:
     assert changes(Alarm(AlarmConfig(channel="x", above=1.0)), 1.0, 1.1, 1.0, 0.9) == [True, False]
 
 
+class Kept:
+    """A strain output that keeps what it is left."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def post(self, line: str) -> None:
+        self.lines.append(line)
+
+
 class Bench:
     """A watch with readings and a machine that say what they are told."""
 
     def __init__(self, *alarms: AlarmConfig) -> None:
         self.events: list[Event] = []
         self.board, self.values, self.now = AlarmBoard(), dict[str, float](), 100.0
+        self.rung, self.ended, self.sent = 0, list[str](), Kept()
+        means = Means(self._ring, self.ended.append, [self.sent])  # type: ignore[list-item]
         self.watch = AlarmWatch(
-            alarms,
+            [Alarm(config, actions_of(config, means)) for config in alarms],
             None,
             self._machine,
             self.board,
             self.events.append,
             lambda: self.now,  # type: ignore[arg-type]
         )
+
+    def _ring(self) -> None:
+        self.rung += 1
 
     def _machine(self, now: float) -> Mapping[str, float]:
         return self.values
@@ -72,6 +89,28 @@ def test_what_comes_is_told_stands_on_the_board_and_goes() -> None:
     assert bench.board.texts == ()
     assert [event.level for event in bench.events] == ["warning", "info"]
     assert bench.watch.end() == "1 came"
+    assert (bench.rung, bench.ended) == (1, ["ALARM camera: silent_s is 2.5"])
+    assert bench.sent.lines == ["HALT"]
+
+
+def test_an_alarm_does_only_what_it_is_asked_for() -> None:
+    bench = Bench(AlarmConfig(channel="silent_s", above=2.0))
+    bench.look(silent_s=3.0)
+    assert (bench.rung, bench.ended, bench.sent.lines) == (1, [], [])
+
+
+def test_every_key_of_an_alarm_is_what_it_looks_at_or_an_action() -> None:
+    looked_at = {"channel", "above", "below", "hysteresis", "name"}
+    assert {field.name for field in fields(AlarmConfig)} == looked_at | {kind.key for kind in ACTIONS} - {""}
+
+
+def test_an_action_that_fails_keeps_nothing_else_from_being_done() -> None:
+    bench = Bench(AlarmConfig(channel="silent_s", above=2.0, line="HALT", end=True))
+    bench.sent.post = lambda line: 1 / 0  # type: ignore[method-assign, assignment, return-value]
+    bench.look(silent_s=3.0)
+    failed, came = bench.events
+    assert failed.level == "error" and "SendLine of an alarm failed: ZeroDivisionError" in failed.text
+    assert came.data["on"] is True and bench.ended == [came.text]
 
 
 def test_a_silenced_alarm_comes_again_only_after_it_has_gone() -> None:

@@ -21,8 +21,9 @@ from acquire.serial_line import LineSettings
 from hw_mocks.pty_port import PtyPort
 from live.channels import Readings
 from live.lines import Place
-from live.setup import load_config
+from live.setup import SpecimenConfig, load_config
 from live.signals import Lines, SerialOut, TcpOut, UdpOut
+from live.tell import Books
 from tests.live.lines.test_server import Caller
 from tests.live.made_up import START, make_measurement
 from tests.live.test_end_to_end import SIM, live_run
@@ -31,7 +32,10 @@ CHANNELS = ("time_s", "frame", "axial", "force_N", "stress_MPa", "lost_share", "
 
 
 def readings(force: float = 800.0) -> Readings:
-    return Readings(START, "y", 40e-6, lambda: LoadSample(START, force))
+    books = Books.new(1.0, specimen=SpecimenConfig(axis="y", area_mm2=40.0))
+    books.vitals.state = "REC"
+    books.loads.append(LoadSample(START, force))
+    return Readings(START, books.snapshot)
 
 
 def test_a_measurement_as_json_and_as_csv() -> None:
@@ -62,7 +66,8 @@ def test_to_any_number_of_clients() -> None:
     assert {client.lines.readline() for client in clients} == {"frame,axial\n"}
     for k in range(4):
         out.measurement(make_measurement(k, 1e-3 * k))
-    out.event(Event(1.0, EventKind.ALARM, "alarm", "ALARM", "warning", {"on": True, "line": "HALT"}))
+    out.post("HALT")
+    out.event(Event(1.0, EventKind.ALARM, "alarm", "ALARM", "warning"))
     for client in clients:
         lines = [client.lines.readline() for _ in range(5)]
         assert lines == ["0,0\n", "8,0.001\n", "16,0.002\n", "24,0.003\n", "HALT\n"]

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 from acquire.events import Event, EventKind
-from live.measure import Instant
+from live.measure import Instant, Snapshot
 from live.tell.figures import quantity
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen
-from live.tell.status_line import Standing, status_line
+from live.tell.status_line import status_line
 
 
 class Terminal(io.StringIO):
@@ -62,14 +62,16 @@ def instant() -> Instant:
     return Instant(**told)
 
 
-def standing(**more: Any) -> Standing:
+def snapshot(**more: Any) -> Snapshot:
     ledger = Ledger()
     ledger.add(grabbed=200, measured=120, skipped=8)
-    return Standing(ledger, "REC", 75.0, 29.9, 1234.5, 40e-6, instant(), 0.0421, 7200.0, **more)
+    known = {"force_N": 1234.5, "stress_Pa": 1234.5 / 40e-6, "latency_p95_s": 0.0421, "disk_s": 7200.0}
+    told: Any = known | more
+    return Snapshot(0.0, "REC", 75.0, 29.9, frames=ledger.as_dict(), instant=instant(), **told)
 
 
 def test_the_status_line_has_everything_where_there_is_room() -> None:
-    assert status_line(standing(peak_N=1500.0), 200) == (
+    assert status_line(snapshot(peak_N=1500.0), 200) == (
         "REC  1:15  1234.5 N  30.9 MPa  peak 1500.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs"
         "  30 fps  measured 120  skipped 8  lost 0  p95 42 ms  disk 120 min"
     )
@@ -77,7 +79,7 @@ def test_the_status_line_has_everything_where_there_is_room() -> None:
 
 @pytest.mark.parametrize("width", [0, 3, 20, 40, 80, 100, 120])
 def test_the_status_line_fits_any_width_and_force_and_alarm_go_last(width: int) -> None:
-    line = status_line(standing(alarms=("axial: axial is 0.021",)), width)
+    line = status_line(snapshot(alarms=("axial: axial is 0.021",)), width)
     assert len(line) <= width
     assert width < 40 or line.startswith("ALARM axial: axial is 0.021")
     assert width < 40 or "1234.5 N" in line

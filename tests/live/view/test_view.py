@@ -73,7 +73,7 @@ def show(view: View, first: int = 0, count: int = 30) -> None:
         for j in range(10):
             view.load(START + 0.1 * k + 0.01 * j, 10.0 * k)
         view.show(make_measurement(k, 1e-4 * k))
-        view.settled(make_measurement(k, 1e-4 * k, force=10.0 * k))
+        view.point(1e-4 * k, 10.0 * k)
 
 
 def is_gone(pid: int) -> bool:

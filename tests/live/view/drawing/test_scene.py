@@ -14,7 +14,8 @@ import pytest
 
 from acquire.events import Event, EventKind
 from analysis.field import StrainField
-from live.view import Figures, ViewSetup
+from live.measure import Snapshot
+from live.view import ViewSetup
 from live.view.drawing.layout import blueprint
 from live.view.drawing.marks import reduced
 from live.view.drawing.places import Place, Rates
@@ -62,7 +63,7 @@ def draw_a_test(scene: Scene, seconds: float = 3.0) -> None:
         scene.points([(1e-4 * k, 10.0 * k)])
         scene.means([row_of(measurement)])
         scene.field(measurement.t, measurement.field)
-        scene.figures(Figures(measurement.t, "REC", 1e-3, 1e-6, 10.0 * k, math.nan, 12, 12))
+        scene.figures(Snapshot(measurement.t, "REC", axial=1e-3, force_N=10.0 * k, valid=12, zois=12))
 
 
 STATIC = 1

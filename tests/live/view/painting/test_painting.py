@@ -11,24 +11,29 @@ import numpy as np
 import pytest
 
 from analysis.field import Status
-from live.view import Figures
+from live.measure import Snapshot
+from live.view.exchange.messages import figures_message, figures_of
 from live.view.exchange.setup import MAPS
-from live.view.exchange.wire import WireError
+from live.view.exchange.wire import Kind, Message, WireError
 from live.view.painting import HEIGHT, WIDTH, FieldMaps, paint
 from live.view.painting.field_maps import FreeSpan
 from tests.live.made_up import make_field, make_grid
 from tests.live.view.drawing.test_scene import make_setup
 
-NOW = Figures(1.0, "REC", 2.271e-3, 9e-6, 5757.6, 143.9, 1008, 1008)
+NOW = Snapshot(
+    1.0, "REC", axial=2.271e-3, sigma_axial=9e-6, force_N=5757.6, stress_Pa=143.9e6, valid=1008, zois=1008
+)
 
 
 def test_figures_come_back_from_a_message() -> None:
-    some = replace(NOW, stress_MPa=math.nan, alarms=("strain limit: axial is 0.02",))
-    back = Figures.from_meta(json.loads(json.dumps(some.as_meta(), allow_nan=False)))
-    assert math.isnan(back.stress_MPa)
-    assert replace(back, stress_MPa=0.0) == replace(some, stress_MPa=0.0)
-    with pytest.raises(WireError):
-        Figures.from_meta({"state": "REC"})
+    some = replace(NOW, stress_Pa=math.nan, alarms=("strain limit: axial is 0.02",))
+    meta = json.loads(json.dumps(figures_message(some).meta, allow_nan=False))
+    back = figures_of(Message(Kind.FIGURES, meta))
+    assert math.isnan(back.stress_Pa)
+    assert paint(back).tobytes() == paint(some).tobytes()
+    for damaged in ({"state": "REC"}, meta | {"zois": "many"}, meta | {"axial": [1]}):
+        with pytest.raises(WireError):
+            figures_of(Message(Kind.FIGURES, damaged))
 
 
 def test_an_alarm_is_red_and_digits_are_large() -> None:
@@ -44,7 +49,7 @@ def test_an_alarm_is_red_and_digits_are_large() -> None:
     "more",
     [
         {"force_N": math.nan},
-        {"axial": math.nan, "sigma": math.nan},
+        {"axial": math.nan, "sigma_axial": math.nan},
         {"force_N": -1e7, "state": "\u2603" * 40},
     ],
 )
