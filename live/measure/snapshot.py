@@ -48,7 +48,7 @@ class Snapshot:
     t: float
     state: str = ""
     elapsed_s: float = math.nan
-    fps: float = 0.0
+    fps: float = math.nan
     force_N: float = math.nan
     stress_Pa: float = math.nan
     peak_N: float = math.nan
