@@ -60,8 +60,8 @@ Row = tuple[str, ...]
 
 def table(head: Row, rows: Iterable[Row]) -> str:
     """Markdown."""
-    lines = [head, ("---",) * len(head), *rows]
-    return "\n".join("| " + " | ".join(cells) + " |" for cells in lines)
+    first, *others = ("| " + " | ".join(cells) + " |" for cells in (head, *rows))
+    return "\n".join([first, "|" + "---|" * len(head), *others])
 
 
 def session_layout() -> str:
