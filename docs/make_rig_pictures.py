@@ -1,4 +1,4 @@
-"""Makes the pictures of docs/rig.md and of the report: ``python -m docs.make_rig_pictures``.
+"""Makes the pictures of docs/guide.md and of the report: ``python -m docs.make_rig_pictures``.
 
 The patterns are rendered by the simulator; what stands below each is the strain noise of one ZOI that the kernel
 predicts for it. The report is that of the demo, as a browser shows it.

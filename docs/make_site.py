@@ -37,7 +37,7 @@ def lay_out() -> None:
     shutil.rmtree(PAGES, ignore_errors=True)
     PAGES.mkdir(parents=True)
     shutil.copy(ROOT / "README.md", PAGES / "index.md")
-    for name in ("CHANGELOG.md", "CITATION.cff", "LICENSE"):
+    for name in ("CHANGELOG.md", "CONTRIBUTING.md", "CITATION.cff", "LICENSE"):
         shutil.copy(ROOT / name, PAGES / name)
     for folder in ("docs", "examples"):
         shutil.copytree(ROOT / folder, PAGES / folder, ignore=shutil.ignore_patterns(*HIDDEN))

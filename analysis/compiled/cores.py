@@ -2,7 +2,8 @@
 
 It stays there while another core is idle: the scheduler looks again only some milliseconds later, and a frame is
 measured in that time. On two cores, a frame every 30 ms, nine of ten were measured on one of them.
-Elsewhere nothing is done.
+Elsewhere nothing is done. OMP_PROC_BIND has the same effect, but it binds the calling thread too, and every thread and
+process that it starts.
 """
 
 from __future__ import annotations

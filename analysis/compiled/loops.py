@@ -19,7 +19,7 @@ from typing import Any
 
 # Threads that wait by spinning keep the other threads of a live test, and other programs, from their cores: with
 # another program at work a frame took twice as long as with threads that soon fall asleep. Read when GNU OpenMP is
-# loaded; about 20 us.
+# loaded; about 20 us. 22 ms in place of 43 beside another program, 11.3 in place of 10.8 alone (November 2026).
 os.environ.setdefault("GOMP_SPINCOUNT", "5000")
 
 import numba
@@ -43,7 +43,11 @@ def helper(function: Callable[..., Any]) -> Any:
 
 
 def parallel(function: Callable[..., Any]) -> Any:
-    """A loop over ZOIs or rows, shared among the threads; each item is done by one of them."""
+    """A loop over ZOIs or rows, shared among the threads; each item is done by one of them.
+
+    Make the body of the loop a function of its own: numba analyses the bodies of such loops twice (19 s of processor
+    time in place of 25 for the iteration).
+    """
     options = {"error_model": "numpy", "fastmath": FAST, "cache": True, "nogil": True, "parallel": True}
     return InTurn(_stamped(numba.njit(function, **options)))
 

@@ -4,6 +4,10 @@ numba gives each thread its half beforehand; beside another busy program, or the
 that lost its core for a while is waited for. Here too each begins with a half of its own, since pieces side by side
 have much in common that is in its cache by then; but it takes a piece at a time, and goes on with what others have
 left. A thread that is held up has done less in the end. What is computed does not depend on who does it.
+
+980 ZOIs of 64 px beside a program that takes half of one core: 22 ms a frame (median) in place of 69; beside one that
+takes a whole core 27 in place of 90; alone the same (2 cores, November 2026). Loops of some nanoseconds a ZOI are not
+shared: each start of the threads is one more wait for the slower.
 """
 
 from __future__ import annotations

@@ -5,6 +5,10 @@ which for a row of 32 pixels takes as long as the row, and uses half of a 512-bi
 functions a compiled loop handles ``LANES`` pixels at a time, with + - * between vectors. Any array is
 taken as flat memory, C order, and nothing is checked: the caller sees to it that index .. index + LANES
 lies inside.
+
+A row of 32 px took 62 ns in place of 175 (Xeon with AVX-512, numba 0.68, November 2026). Tried and rejected: 512-bit
+vectors made by the compiler against LLVM's preference (3 to 10 % faster without rotation, 10 % slower with it); helpers
+left to the compiler to inline (5.3 us an iteration, inlined by numba 3.3).
 """
 
 from __future__ import annotations

@@ -2,6 +2,10 @@
 
 One compiled loop over ZOIs; each is done by one thread from start to end, so its numbers depend
 neither on the number of threads nor on the other ZOIs.
+
+A step of d px leaves about d (0.003 + 1.15 sigma_u + 0.03 d): the iteration stops by this measured law. A fixed share
+(0.12) in its place asked for two iterations where one was enough. The law holds for affine ZOIs with a uniform or
+Gaussian window; measure it again for another window.
 """
 
 from __future__ import annotations
@@ -44,7 +48,9 @@ LONGEST_STEP = 3.0
 CHUNK = 32
 """ZOIs that a thread takes at a time, where there are many."""
 AHEAD, BEYOND = 16, 3
-"""ZOIs ahead of the present one whose pixels are asked for; taps beyond the pixel that they make."""
+"""ZOIs ahead of the present one whose pixels are asked for; taps beyond the pixel that they make. Waiting for memory
+was 35 % of the time of the iteration without it and is 18 %; rows of the next ZOI, asked for once more, save another
+4 to 13 % (November 2026)."""
 
 
 @helper

@@ -4,6 +4,10 @@ An affine fit leaves the bending and the jumps of a displacement in the differen
 in each of five shapes, orthonormal polynomials P of the window, tells how far the displacement at the
 centre can be believed: (P2(x) + P2(y)) / sqrt 2, whose share is the error of u at the centre if the
 field is a parabola, and the four of third degree, which a crack or an edge through the centre has.
+
+Of the ZOIs across a slip line of 1.5 px the residual alone refuses 79 %, residual and shapes 99.8 %, for 2 to 8 % of
+the time of a frame. Tried and rejected: the same without an allowance for strain (refused the neck of a polymer bar);
+all shapes of second degree in place of their sum (refused 5 % of the ZOIs around a real open hole, not 3 %).
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from acquire.errors import DataError
-from live.characterise.outcome import Outcome, Verdict, Word
+from live.characterise.outcome import Outcome, Table, Verdict, Word
 
 WORDS: tuple[Word, ...] = ("better", "equal", "worse")
 LIBRARIES = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless")
@@ -26,7 +26,7 @@ being "the radius", with a standard deviation of 18 % of full scale and no clipp
 its standard deviation unless a section says otherwise; a frequency is usable from 5 % of the largest amplitude of its
 ZOI; the pseudo-inverse is unweighted; the strain comes from the derivatives of the phases of all usable frequencies
 together, by least squares with six in-situ sensitivities. Truth is rendered analytically in the deformed place, no
-picture is interpolated. How the estimators work is derived in [method.md](method.md).
+picture is interpolated. How the estimators work is derived in docs/method.md.
 
 What your own pattern can give: `phasedic characterise --pattern reference.tif --noise GL --out DIR`. One ZOI of a
 recorded session: `phasedic inspect session.h5 --zoi R,C --frame N`.
@@ -108,14 +108,20 @@ def _line(verdict: Verdict) -> str:
     return f"- {verdict.subject} ({verdict.against})"
 
 
+def _table(verdicts: Sequence[Verdict]) -> Table:
+    rows = [(v.word, v.subject, v.against) for word in reversed(WORDS) for v in verdicts if v.word == word]
+    return Table("verdicts", ("verdict", "ours against the other", "the other"), tuple(rows))
+
+
 def write_page(
     outcomes: list[Outcome], target: Path, folder: Path, typed: str, intro: str | None = None
 ) -> None:
-    """Write the Markdown page; figures are linked from where it stands."""
-
+    """Write the Markdown page, its figures linked from where it stands, and the verdicts as CSV beside them."""
     images = os.path.relpath(folder, target.parent)
     text = page(outcomes, typed, "" if images == "." else images, INTRODUCTION if intro is None else intro)
     try:
         target.write_text(text, encoding="utf-8")
+        if verdicts := [v for outcome in outcomes for v in outcome.verdicts]:
+            (folder / "verdicts.csv").write_text(_table(verdicts).csv(), encoding="utf-8")
     except OSError as error:
         raise DataError(f"{target} cannot be written: {error.strerror}; give another --page") from error

@@ -246,7 +246,7 @@ class StrainOutConfig:
     channels: tuple[str, ...] | None = key(
         NAMES,
         None,
-        "what is told (docs/signals.md); without, the axial strain, load, gauges and what belongs to them",
+        "what is told (docs/guide.md); without, the axial strain, load, gauges and what belongs to them",
         Option("strain-channels", "NAME,NAME"),
         optional=True,
     )
@@ -256,7 +256,7 @@ class StrainOutConfig:
 class AlarmConfig:
     """[[alarm]]: any number of them; exactly one of above and below."""
 
-    channel: str = key(TEXT, "", "what is looked at: a channel (docs/signals.md)")
+    channel: str = key(TEXT, "", "what is looked at: a channel (docs/guide.md)")
     above: float | None = key(number(), None, "the alarm is on above this", optional=True)
     below: float | None = key(number(), None, "the alarm is on below this", optional=True)
     hysteresis: float = key(number(0), 0.0, "it goes when the channel is back by this much")

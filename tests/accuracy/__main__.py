@@ -1,6 +1,6 @@
-"""``make accuracy``: every accuracy figure of the README, from the kernel as it is shipped.
+"""``make accuracy``: every accuracy figure of the documents, from the kernel as it is shipped.
 
-Writes docs/accuracy.md and prints the same. ``--quick`` takes fewer cases and writes nothing;
+Writes docs/data/accuracy.md and prints the same. ``--quick`` takes fewer cases and writes nothing;
 ``--only NAME`` prints one section. The pictures of the DIC Challenge need PHASEDIC_DATA.
 """
 
@@ -27,7 +27,7 @@ from tests.accuracy.real import star, star_field, wave
 from tests.accuracy.runs import SHAPE, errors, grid, level, measure
 from tests.accuracy.truth import Speckle, digitise, field, pixels
 
-PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
+PAGE = Path(__file__).parents[2] / "docs" / "data" / "accuracy.md"
 ESTIMATORS = ("spectral", "phase")
 Lines = Iterator[str]
 
@@ -393,7 +393,7 @@ def main() -> None:
         lines.append(line)
     print(f"\n{time.monotonic() - started:.0f} s")
     if not options.quick and not options.only:
-        PAGE.parent.mkdir(exist_ok=True)
+        PAGE.parent.mkdir(parents=True, exist_ok=True)
         PAGE.write_text("\n".join(lines) + "\n", encoding="utf-8")
         print(f"written: {PAGE}")
 

@@ -2,7 +2,8 @@
 
 1024 x 1024 px, 8 bit, 1 % noise, r = 2 px. Tracking: 0.23 px and 1e-4 strain a frame; every figure includes the
 prefilter of the frame, sigma, residual and status. OpenCV's engines run beside it always, pyvale and SUN-DIC where
-installed (the extra ``peers``). ``--json`` prints one JSON object instead.
+installed (the extra ``peers``). The tables are printed and written to docs/data/bench.md, with ``--live`` to
+docs/data/live.md. ``--json`` prints one JSON object instead; it and ``--only`` write nothing.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import time
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -27,6 +29,7 @@ from tests.accuracy.truth import Speckle, affine, digitise
 from tests.bench import live, machine
 from tests.bench.peers import HOW_TO_ADD, Peer, Points, missing, peers
 
+DATA = Path(__file__).parents[2] / "docs" / "data"
 SHAPE = (1024, 1024)
 NOISE = 0.01
 FRAMES = 12
@@ -58,13 +61,19 @@ class Report:
 
     quiet: bool
     values: dict[str, Any] = field(default_factory=dict)
+    lines: list[str] = field(default_factory=list)
+
+    def emit(self, *lines: str) -> None:
+        """Keep lines for the page, and print them unless quiet."""
+        self.lines += lines
+        if not self.quiet:
+            print(*lines, sep="\n", flush=True)
 
     def add(self, section: str, row: dict[str, Any]) -> None:
         rows = self.values.setdefault(section, [])
-        if not self.quiet:
-            if not rows:
-                print(f"\n## {section}\n\n| " + " | ".join(row) + " |\n|" + "---|" * len(row))
-            print("| " + " | ".join(_shown(v) for v in row.values()) + " |", flush=True)
+        if not rows:
+            self.emit("", f"## {section}", "", "| " + " | ".join(row) + " |", "|" + "---|" * len(row))
+        self.emit("| " + " | ".join(_shown(v) for v in row.values()) + " |")
         rows.append(row)
 
 
@@ -193,8 +202,7 @@ def other_engines(report: Report) -> None:
         _peer(report, peer)
     if missing():
         report.values["not installed"] = missing()
-        if not report.quiet:
-            print(f"\nNot installed here, so not run: {', '.join(missing())}. {HOW_TO_ADD}")
+        report.emit("", f"Not installed here, so not run: {', '.join(missing())}. {HOW_TO_ADD}")
 
 
 def _peer(report: Report, peer: Peer) -> None:
@@ -291,6 +299,18 @@ SECTIONS = (throughput, counts, first_frame, scaling, bursts, start_up, other_en
 """Other people's programs last: the threads and processes they start disturb no other row."""
 
 
+def write(report: Report, live: bool, folder: Path = DATA) -> None:
+    """The tables as a page of docs/data."""
+    name, title, command = (
+        ("live.md", "Speed of the running program", "python -m tests.bench --live")
+        if live
+        else ("bench.md", "Speed of the kernel", "make bench")
+    )
+    text = "\n".join([f"# {title}", "", f"Written by `{command}`.", "", *report.lines, ""])
+    (folder / name).write_text(text, encoding="utf-8")
+    print(f"written: {folder / name}")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.bench", description=__doc__)
     parser.add_argument("--json", action="store_true", help="one JSON object instead of tables")
@@ -301,13 +321,14 @@ def main() -> None:
     report = Report(quiet=options.json)
     report.values["machine"] = machine.describe()
     report.values["date"] = f"{datetime.now(UTC):%Y-%m-%d}"
-    if not options.json:
-        print(f"{report.values['machine']}; {report.values['date']}")
+    report.emit(f"{report.values['machine']}; {report.values['date']}")
     for section in (running,) if options.live else SECTIONS:
         if not options.only or section.__name__ in options.only:
             section(report)
     if options.json:
         print(json.dumps(report.values, indent=1))
+    elif not options.only:
+        write(report, options.live)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from importlib.util import find_spec
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,6 +35,16 @@ def test_row_of_an_engine_that_is_wrong_and_misses_a_point() -> None:
     assert row["mean error px"] == pytest.approx(0.01)
     assert row["scatter px"] == pytest.approx(0, abs=1e-9)
     assert row["note"] == "as called"
+
+
+def test_the_tables_are_written_as_a_page(tmp_path: Path) -> None:
+    report = bench.Report(quiet=True)
+    report.add("Command line", {"phasedic --help s": 0.0625})
+    report.add("Command line", {"phasedic --help s": 1234.5})
+    bench.write(report, live=False, folder=tmp_path)
+    lines = (tmp_path / "bench.md").read_text(encoding="utf-8").splitlines()
+    assert lines[0] == "# Speed of the kernel"
+    assert lines[-4:] == ["| phasedic --help s |", "|---|", "| 0.0625 |", "| 1,234 |"]
 
 
 def test_a_program_that_fails_leaves_its_row(capsys: pytest.CaptureFixture[str]) -> None:

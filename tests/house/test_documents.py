@@ -1,16 +1,18 @@
-"""The documents speak of the house as it is: names, paths, and the picture of the rooms."""
+"""The documents describe the code as it is: names, paths, options, tables, and the picture of the packages."""
 
 from __future__ import annotations
 
 import importlib
 import re
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from docs import make_site
+from docs import make_formats, make_site
 from docs.make_architecture import PICTURE, drawing
+from live.commands.arguments import COMMANDS, parser_of
 from tests.house.links import dead_links
 from tests.house.messages import quoted, spoken, unsaid
 from tests.house.references import dead_in, dead_references, words
@@ -20,6 +22,7 @@ from tests.house.sources import read_house
 ROOT = Path(__file__).parents[2]
 PAGES = [
     ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
     *sorted((ROOT / "docs").rglob("*.md")),
     *sorted((ROOT / "examples").rglob("*.md")),
 ]
@@ -53,6 +56,50 @@ def test_a_dead_link_is_found(tmp_path: Path, link: str, dead: bool) -> None:
     (tmp_path / "b.md").write_text("# B\n\n## The second part\n", encoding="utf-8")
     (tmp_path / "a.md").write_text(f"# Here\n\n{link}\n", encoding="utf-8")
     assert bool(list(dead_links(tmp_path, tmp_path / "a.md"))) is dead
+
+
+def test_pages_named_in_the_code_are_there() -> None:
+    named = {
+        (found, path.relative_to(ROOT).as_posix())
+        for place in (*PACKAGES, "tests", "docs", "examples")
+        for path in (ROOT / place).rglob("*.py")
+        for found in re.findall(r"docs/[\w/-]+\.(?:md|csv)", path.read_text(encoding="utf-8"))
+    }
+    assert len(named) > 20
+    assert not [f"{path} names {page}" for page, path in sorted(named) if not (ROOT / page).is_file()]
+
+
+@pytest.mark.parametrize("page", make_formats.PAGES, ids=lambda page: page.name)
+def test_the_tables_of_the_formats_are_of_today(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert "<!-- table" in text
+    assert text == make_formats.filled(text), "the files have changed: python -m docs.make_formats"
+
+
+def test_options_in_the_pages_exist() -> None:
+    known = {command: set(parser_of(command)._option_string_actions) for command in COMMANDS}
+    used = [
+        (page.name, command, option)
+        for page in PAGES
+        for command, options in commands_in(page.read_text(encoding="utf-8"))
+        for option in options
+    ]
+    assert len(used) > 80
+    assert not [f"{name}: {c} has no {option}" for name, c, option in used if option not in known[c]]
+
+
+def commands_in(text: str) -> Iterator[tuple[str, list[str]]]:
+    """Each ``phasedic COMMAND ...`` of a page, as a line of its own or between backquotes, and its options."""
+    whole = text.replace("\\\n", " ")
+    for line in re.findall(r"(?:^|`)phasedic ([a-z-]+[^`\n]*)", whole, re.MULTILINE):
+        command, _, rest = line.partition("#")[0].partition(" ")
+        if command in COMMANDS:
+            yield command, re.findall(r"(?<!\S)--[a-z-]+", rest)
+
+
+def test_commands_are_found_in_a_page() -> None:
+    page = "phasedic run --zoi 32 \\\n  --report  # --gone\n`phasedic show --rrd FILE`, `--alone`; phasedic is --none\n"
+    assert list(commands_in(page)) == [("run", ["--zoi", "--report"]), ("show", ["--rrd"])]
 
 
 @pytest.mark.parametrize("module", make_site.REFERENCE.values())

@@ -43,7 +43,16 @@ def backend_is_here() -> bool:
         return False
 
 
-FILES = ("pyproject.toml", "README.md", "LICENSE", "MANIFEST.in", "CHANGELOG.md", "CITATION.cff", "Makefile")
+FILES = (
+    "pyproject.toml",
+    "README.md",
+    "LICENSE",
+    "MANIFEST.in",
+    "CHANGELOG.md",
+    "CITATION.cff",
+    "CONTRIBUTING.md",
+    "Makefile",
+)
 SDIST = (
     "import os, sys; from setuptools import build_meta; os.makedirs('dist'); build_meta.build_sdist('dist')"
 )

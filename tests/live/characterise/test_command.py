@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import io
-import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,8 +16,8 @@ from acquire.frame import frozen
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.characterise.command import EXPERIMENTS, add_arguments, chosen, command, run
-from live.characterise.outcome import Bench, Outcome
-from live.characterise.page import page, standing
+from live.characterise.outcome import Bench, Outcome, Verdict
+from live.characterise.page import page, standing, write_page
 from live.characterise.progress import Progress
 from live.commands.inspect import add_arguments as add_inspect
 from live.commands.inspect import command as inspect
@@ -96,8 +95,6 @@ def test_fig1_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
 
 
 def test_the_page_says_where_we_are_worse_first() -> None:
-    from live.characterise.outcome import Verdict
-
     outcome = Outcome("a", "A", "t", verdicts=(Verdict("x", "p", "better"), Verdict("y", "q", "worse")))
     said = standing([outcome])
     assert said.index("**Worse**") < said.index("**Better**")
@@ -202,11 +199,17 @@ def test_inspect_refuses(session: Path, tmp_path: Path, words: list[str], said: 
         inspect(inspected(str(session), *words, "--out", str(tmp_path / "new.png")))
 
 
-def test_the_committed_page_links_to_what_is_there() -> None:
+def test_the_verdicts_lie_beside_the_figures(tmp_path: Path) -> None:
+    outcome = Outcome("a", "A", "t", verdicts=(Verdict("x, y", "p", "better"), Verdict("z", "q", "worse")))
+    write_page([outcome], tmp_path / "page.md", tmp_path, "phasedic characterise --out a")
+    lines = (tmp_path / "verdicts.csv").read_text(encoding="utf-8").splitlines()
+    assert lines == ["verdict,ours against the other,the other", "worse,z,q", 'better,"x, y",p']
+
+
+def test_the_committed_tables_are_those_of_the_page_how_well() -> None:
     docs = Path(__file__).parents[3] / "docs"
-    text = (docs / "characterisation.md").read_text(encoding="utf-8")
-    targets = re.findall(r"\]\(([^)]+)\)", text)
-    assert len(targets) > 20
-    for target in targets:
-        assert (docs / target).is_file(), target
-    assert "## Where we stand" in text
+    text = (docs / "how-well.md").read_text(encoding="utf-8")
+    rows = (docs / "data" / "characterisation" / "verdicts.csv").read_text(encoding="utf-8").splitlines()[1:]
+    counts = [sum(row.startswith(f"{word},") for row in rows) for word in ("better", "equal", "worse")]
+    assert f"Of {len(rows)} comparisons" in text
+    assert "better in {}, equal in {}, worse in {}".format(*counts) in text

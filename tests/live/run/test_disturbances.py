@@ -1,6 +1,6 @@
 """What disturbs a test is counted, and over within a second; what could be recorded is recorded.
 
-At small scale, with the camera from memory; docs/bench.md has what the same did at full scale.
+At small scale, with the camera from memory; docs/data/disturbances.csv has what the same did at full scale.
 """
 
 from __future__ import annotations

@@ -163,7 +163,7 @@ def test_from_the_stamp_of_the_frame_to_the_read_of_the_client(tmp_path: Path) -
     assert len(late) > 0.9 * len(stamps) > 30
     assert (
         np.percentile(late, 95) < 2 / 20
-    )  # of a machine that does other things too; docs/signals.md has figures
+    )  # of a machine that does other things too; as docs/guide.md has it
     (report,) = [r for r in outcome.outputs.reports if r.name.startswith("strain out")]
     assert report.words.startswith("2 clients") and not report.failed
 
