@@ -63,9 +63,21 @@ class Declared:
 
     def outside(self, values: NDArray[Any]) -> NDArray[np.bool_]:
         """Where values leave the range."""
-        if values.dtype.kind not in "iuf" or (self.low, self.high) == (-math.inf, math.inf):
+        if values.dtype.kind not in "iuf" or not self.is_bounded:
             return np.zeros(values.shape, np.bool_)
         return (values < self.low) | (values > self.high)
+
+    def takes_value(self, value: Any) -> bool:
+        """Whether one value is within the range; NaN is in no range."""
+        one = np.asarray(value)
+        if one.dtype.kind not in "iuf" or not self.is_bounded:
+            return True
+        return bool(np.all((self.low <= one) & (one <= self.high)))
+
+    @property
+    def is_bounded(self) -> bool:
+        """Whether a range is demanded at all."""
+        return (self.low, self.high) != (-math.inf, math.inf)
 
     def words(self) -> str:
         """For a person."""
@@ -173,7 +185,7 @@ def _rows_before_a_hole(dataset: h5py.Dataset, rows: int, across: int) -> int:
 def read_scalar(dataset: h5py.Dataset, declared: Declared) -> Any:
     """The one value of a dataset that ``open_dataset`` gave; raises DataError where it leaves its range."""
     value = dataset[()]
-    if np.any(declared.outside(np.asarray(value))):
+    if not declared.takes_value(value):
         raise _wrong(
             dataset.parent, dataset.name, f"is {value}; it must be {declared.low:g} to {declared.high:g}"
         )
@@ -195,7 +207,7 @@ def read_attribute(item: h5py.Group | h5py.Dataset, name: str, declared: Declare
     if not (declared.takes_type(held.dtype) and declared.takes_shape(shape)):
         raise _wrong(item, f"@{name}", f"is {held.dtype} of shape {shape}; it must be {declared.words()}")
     value = item.attrs[name]
-    if np.any(declared.outside(np.asarray(value))):
+    if not declared.takes_value(value):
         raise _wrong(item, f"@{name}", f"is {value}; it must be {declared.low:g} to {declared.high:g}")
     return value
 

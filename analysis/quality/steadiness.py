@@ -33,20 +33,20 @@ class Steadiness:
         Standard deviation about that line, noise included.
     noise : float
         What of ``rms`` the measurement itself explains.
-    frequency : float, Hz
-        Where most of ``rms`` is; NaN where no frequency stands out, or the series has no times. What is
+    frequency : float or None, Hz
+        Where most of ``rms`` is; None where no frequency stands out, or the series has no times. What is
         faster than half the rate shows here at a lower frequency.
     seconds : float, s
-    rate : float, 1/s
-        Of the series; NaN without times.
+    rate : float or None, 1/s
+        Of the series; None without times.
     """
 
     drift: float
     rms: float
     noise: float
-    frequency: float
+    frequency: float | None
     seconds: float
-    rate: float
+    rate: float | None
 
     @property
     def vibration(self) -> float:
@@ -68,24 +68,24 @@ def steadiness(times: ArrayLike, values: ArrayLike, noise: float = 0.0) -> Stead
     good = np.isfinite(x)
     t, x = t[good], x[good]
     if len(x) < FEWEST:
-        return Steadiness(math.nan, math.nan, noise, math.nan, math.nan, math.nan)
+        return Steadiness(math.nan, math.nan, noise, None, math.nan, None)
     span = float(t[-1] - t[0])
     timed = span > 0
     place = (t - t[0]) / span if timed else np.linspace(0, 1, len(t))
     slope, offset = np.polyfit(place, x, 1)
     rest = x - slope * place - offset
     rms = math.sqrt(float(rest @ rest) / (len(x) - 2))
-    peak = main_frequency(t, rest) if timed else math.nan
-    rate = 1 / float(np.median(np.diff(t))) if timed else math.nan
+    peak = main_frequency(t, rest) if timed else None
+    rate = 1 / float(np.median(np.diff(t))) if timed else None
     return Steadiness(float(slope), rms, noise, peak, span, rate)
 
 
-def main_frequency(times: Floats, values: Floats) -> float:
-    """The strongest frequency, Hz; NaN where it does not stand out of what noise does by chance."""
+def main_frequency(times: Floats, values: Floats) -> float | None:
+    """The strongest frequency, Hz; None where it does not stand out of what noise does by chance."""
     n, span = len(times), float(times[-1] - times[0])
     first, last = 1 / span, 0.5 / float(np.median(np.diff(times)))
     if not last > first or not values.any():
-        return math.nan
+        return None
     frequencies = np.arange(first, last * (1 + 1e-9), first / FINE)
     waves = np.exp(-2j * math.pi * np.outer(frequencies, times - times[0]))
     power = np.abs(waves @ values) ** 2
@@ -93,7 +93,7 @@ def main_frequency(times: Floats, values: Floats) -> float:
     # Without the peak and what lies beside it, so that a single line does not raise its own threshold.
     others = power[np.abs(frequencies - frequencies[k]) > 2 * first]
     usual = float(others.mean()) if others.size >= FEWEST else float(values @ values)
-    return float(frequencies[k]) if power[k] > (math.log(n / 2) + BY_CHANCE) * usual else math.nan
+    return float(frequencies[k]) if power[k] > (math.log(n / 2) + BY_CHANCE) * usual else None
 
 
 def aliased(frequency: float, rate: float) -> float:
@@ -101,14 +101,15 @@ def aliased(frequency: float, rate: float) -> float:
     return abs(frequency - rate * round(frequency / rate))
 
 
-def mains_of(found: Steadiness, harmonic: int) -> float:
-    """The mains frequency (50 or 60 Hz) whose ``harmonic`` shows at the main frequency; NaN for none.
+def mains_of(found: Steadiness, harmonic: int) -> float | None:
+    """The mains frequency (50 or 60 Hz) whose ``harmonic`` shows at the main frequency; None for none.
 
     Lamps flicker at twice the mains (harmonic 2), motors and fields shake at once.
     """
-    if not math.isfinite(found.frequency):
-        return math.nan
+    frequency, rate = found.frequency, found.rate
+    if frequency is None or rate is None:
+        return None
     near = 0.75 / found.seconds
-    off = {mains: abs(aliased(harmonic * mains, found.rate) - found.frequency) for mains in MAINS_HZ}
+    off = {mains: abs(aliased(harmonic * mains, rate) - frequency) for mains in MAINS_HZ}
     best = min(off, key=lambda mains: off[mains])
-    return best if off[best] < near else math.nan
+    return best if off[best] < near else None

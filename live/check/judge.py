@@ -139,12 +139,12 @@ def _flicker(f: Figures) -> Line:
     value = f"{s.rms:.2%} of the level, drift {s.drift:+.2%}"
     words = "use a steady lamp, or an exposure of whole periods of the mains"
     mains = mains_of(s, 2)
-    if math.isfinite(mains):
+    if mains is not None:
         value += f": lamps on {mains:.0f} Hz mains ({2 * mains:.0f} Hz, seen at {s.frequency:.1f} Hz)"
         words = f"a lamp on direct current, or an exposure of a multiple of {500 / mains:.1f} ms"
-    elif math.isfinite(s.frequency):
+    elif s.frequency is not None:
         value += f", mainly at {s.frequency:.1f} Hz"
-    standing = [m for m in (50.0, 60.0) if s.rate > 0 and aliased(2 * m, s.rate) < 0.02 * s.rate]
+    standing = [m for m in (50.0, 60.0) if s.rate and aliased(2 * m, s.rate) < 0.02 * s.rate]
     if standing:
         value += f" (at {s.rate:.3g} fps that of {standing[0]:.0f} Hz mains stands still and is not seen)"
     return Line("flicker", value, max(s.rms, abs(s.drift)) <= MOST_FLICKER or math.isnan(s.rms), words)
@@ -221,10 +221,10 @@ def _seen(s: Steadiness, unit: float, name: str, digits: int) -> str:
     if not s.vibration > s.noise / 2:
         return f"less than {s.noise * unit:.{digits}f} {name}"
     text = f"{s.vibration * unit:.{digits}f} {name} rms"
-    if not math.isfinite(s.frequency):
+    if s.frequency is None:
         return text
     mains = mains_of(s, 1)
-    told = f", as {mains:.0f} Hz mains would" if math.isfinite(mains) else ""
+    told = f", as {mains:.0f} Hz mains would" if mains is not None else ""
     return f"{text}, mainly at {s.frequency:.1f} Hz{told}"
 
 

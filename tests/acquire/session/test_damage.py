@@ -5,13 +5,16 @@ Many more cases: ``python -m tests.acquire.session.fuzz --cases 20000``.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
+import h5py
 import pytest
 
 from acquire.errors import DataError
 from acquire.hdf5 import child
 from acquire.session import Session
+from tests.acquire.session.fixtures import frame, writer
 from tests.acquire.session.fuzz import fuzz, whole_session
 
 
@@ -30,4 +33,16 @@ def test_a_damaged_unfinished_file_is_tried_in_a_child_with_a_time_limit(
         child.probe(path, "acquire.session", timeout_s=2.0)
     monkeypatch.setattr(child, "PROBE_S", 2.0)
     with pytest.raises(DataError):
+        Session.open(path)
+
+
+@pytest.mark.parametrize("start", [math.nan, math.inf, 2e12])
+def test_a_session_without_a_start_is_refused(tmp_path: Path, start: float) -> None:
+    """All its times would be wrong, and its first clock reading would not be that of the start."""
+    path = tmp_path / "session.h5"
+    with writer(path) as session:
+        session.write_frame(frame(0))
+    with h5py.File(path, "r+") as file:
+        file["entry/start_monotonic_s"][()] = start
+    with pytest.raises(DataError, match=r"start_monotonic_s is .*; it must be -1e\+12 to 1e\+12"):
         Session.open(path)

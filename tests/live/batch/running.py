@@ -4,18 +4,20 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import json
 import os
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
+from unittest.mock import patch
 
 import h5py
 import numpy as np
 
-from live.batch.workers import there
+from live.batch.workers import cluster, there
 
 ROOT = Path(__file__).parents[3]
 
@@ -74,6 +76,9 @@ def is_gone(pid: int) -> bool:
 # -- a cluster ----------------------------------------------------------------------------------
 
 HERE = ["--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"]
+PATIENCE_S = 200.0
+"""Within pytest-timeout's; only a machine that is stuck takes so long."""
+
 ONE_THREAD = dict.fromkeys(there.NEEDED, "1")
 
 
@@ -96,21 +101,29 @@ def dask(role: str, *words: object, **more: str) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, cwd=ROOT, env=os.environ | more, **nothing)
 
 
+def address_in(told: Path) -> str:
+    """Where the scheduler is to be reached; empty until it has written all of its file."""
+    try:
+        return str(json.loads(told.read_bytes())["address"])
+    except (OSError, ValueError):
+        return ""
+
+
 @contextmanager
 def running(folder: Path, workers: int = 2, **more: str) -> Iterator[Running]:
-    """As docs/scale.md says to start them."""
-    from distributed import Client
-
+    """As docs/scale.md says to start them, once all of them are there; on a busy machine that may take long."""
     told = folder / "scheduler.json"
     scheduler = dask("scheduler", *HERE, "--port", 0, "--scheduler-file", told)
-    one = ["--scheduler-file", told, "--nthreads", 1, "--no-nanny", *HERE, "--local-directory", folder]
-    made = [dask("worker", *one, **(more or ONE_THREAD)) for _ in range(workers)]
+    made: list[subprocess.Popen[bytes]] = []
     try:
-        until(told.exists)
-        with Client(scheduler_file=str(told), set_as_default=False, timeout=30) as client:
-            client.wait_for_workers(workers, timeout=60) if workers else None
-            address = client.scheduler.address
-        yield Running(address, scheduler, made)
+        until(lambda: address_in(told) != "", PATIENCE_S)
+        address = address_in(told)
+        one = [address, "--nthreads", 1, "--no-nanny", *HERE, "--local-directory", folder]
+        made += [dask("worker", *one, **(more or ONE_THREAD)) for _ in range(workers)]
+        with patch.object(cluster, "_ANSWER_S", PATIENCE_S):
+            with closing(cluster._connected(address)) as client:
+                client.wait_for_workers(workers, timeout=PATIENCE_S) if workers else None
+            yield Running(address, scheduler, made)
     finally:
         for process in (*made, scheduler):
             process.kill()

@@ -118,11 +118,14 @@ def test_what_a_server_forgets_is_sent_again(tmp_path: Path) -> None:
 def test_what_does_not_change_is_not_drawn_again(tmp_path: Path) -> None:
     with scene_into({tmp_path / "a.rrd": Rates(math.inf, math.inf)}) as (scene, _):
         for number in range(10):
+            scene.points([(1.9e-3 if number else 2e-3, 100.0)])
             scene.field(START + 0.1 * number, make_measurement(number // 5).field)
             scene.status("the same")
     rows = rows_in(tmp_path / "a.rrd")
     assert rows["/specimen/zoi/rejected"] == rows["/specimen/zoi/plain"] == rows["/zoi/words"] == 1
     assert rows["/zoi/displacement"] == rows["/status"] == 10
+    assert rows["/curve/grid"] == rows["/bar/exx/ticks"] == rows["/bar/status/ticks"] == 1
+    assert rows["/curve/line"] == 10
 
 
 def test_a_thinned_picture_keeps_its_size_on_the_screen(tmp_path: Path) -> None:
