@@ -32,6 +32,12 @@ class DataError(PhasedicError):
     exit_code = 4
 
 
+class MachineUnfit(PhasedicError):
+    """This machine computes wrong numbers: not ready, whatever is measured with whatever device."""
+
+    exit_code = 6
+
+
 class Interrupted(PhasedicError):
     """A person or the system ended it before there was anything to close."""
 

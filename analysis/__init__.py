@@ -6,7 +6,8 @@
 >>> field.mean("exx")
 
 Nothing here knows of files, threads, devices or the clock. Compiled code (numba) is loaded when
-the first ``PhaseKernel`` is made; ``warm_up`` does that ahead of a test.
+the first ``PhaseKernel`` is made; ``warm_up`` does that ahead of a test. The first kernel of a process measures a
+known pattern first, and a machine that measures it wrong is refused (``MachineError``).
 """
 
 from analysis.field import Roi, Status, StrainField, ZoiGrid
@@ -18,16 +19,19 @@ from analysis.kernel import (
     NoiseModel,
     PatternError,
     PhaseKernel,
+    check_machine,
     not_compiled,
     numerics,
     warm_up,
 )
+from analysis.self_test import MachineError
 
 __all__ = [
     "COMPILE_PARTS",
     "PICTURE_KINDS",
     "Estimator",
     "KernelSettings",
+    "MachineError",
     "NoiseModel",
     "PatternError",
     "PhaseKernel",
@@ -35,6 +39,7 @@ __all__ = [
     "Status",
     "StrainField",
     "ZoiGrid",
+    "check_machine",
     "not_compiled",
     "numerics",
     "warm_up",

@@ -94,7 +94,10 @@ def fit(points: Sequence[Point], now: datetime | None = None) -> Calibration:
     if np.ptp(value) <= 5 * scatter:
         raise DataError("the readings do not change with the load; check the cell and its wiring")
     # The loads are known and the readings scatter: readings against loads, not the reverse.
-    slope, zero = np.polyfit(force, value, 1)
+    # In closed form: no wrong force may come from a wrong linear algebra library.
+    middle = force.mean()
+    slope = np.sum((force - middle) * value) / np.sum((force - middle) ** 2)
+    zero = value.mean() - slope * middle
     residual = float(np.abs((value - zero) / slope - force).max())
     date = (now or datetime.now(UTC)).isoformat(timespec="seconds")
     return Calibration(float(1 / slope), float(zero), residual, tuple(points), date)

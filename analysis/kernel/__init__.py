@@ -6,7 +6,7 @@ for the paper's estimator) and measures by an ``attempt``, ``rescue`` and ``resu
 """
 
 from analysis.kernel.noise import NoiseModel
-from analysis.kernel.phase_kernel import PhaseKernel
+from analysis.kernel.phase_kernel import PhaseKernel, check_machine
 from analysis.kernel.prepared import PatternError
 from analysis.kernel.settings import Estimator, KernelSettings
 from analysis.kernel.warm_up import COMPILE_PARTS, PICTURE_KINDS, not_compiled, numerics, warm_up
@@ -19,6 +19,7 @@ __all__ = [
     "NoiseModel",
     "PatternError",
     "PhaseKernel",
+    "check_machine",
     "not_compiled",
     "numerics",
     "warm_up",

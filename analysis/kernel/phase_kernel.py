@@ -21,7 +21,8 @@ from analysis.kernel.noise import Noise, as_model
 from analysis.kernel.reference import Reference
 from analysis.kernel.rescue import rescue
 from analysis.kernel.result import Expected, field_of
-from analysis.kernel.settings import KernelSettings
+from analysis.kernel.settings import Estimator, KernelSettings
+from analysis.self_test import Way, check
 
 Floats = NDArray[np.float64]
 
@@ -55,6 +56,8 @@ class PhaseKernel:
         The grid leaves the image, or an array of the wrong kind.
     PatternError
         No ZOI has a pattern.
+    MachineError
+        This machine measures a known pattern wrong (``check_machine``, once a process and kind of ZOI).
     """
 
     reference: Reference
@@ -70,6 +73,7 @@ class PhaseKernel:
         THREADS.use()
         image = as_image(reference, "the reference")
         self.reference = Reference.first(image, grid, settings or KernelSettings(), noise, clipped)
+        check_machine(self.settings, grid.size)
 
     @property
     def grid(self) -> ZoiGrid:
@@ -185,3 +189,38 @@ class PhaseKernel:
         if motion is not None and motion.fits(index, modes):
             return motion
         return Motion.none(index, modes)
+
+
+def check_machine(settings: KernelSettings, size: int) -> None:
+    """Refuse a machine that measures a known pattern wrong, once a process and kind of ZOI; a few ms.
+
+    Every ``PhaseKernel`` asks for it. Tolerances, the limit of the iterations and ``bending_px`` are the usual
+    ones, whatever the settings say.
+
+    Parameters
+    ----------
+    settings : KernelSettings
+    size : int, px
+        Side of a ZOI.
+
+    Raises
+    ------
+    MachineError
+        Motion or strain is out of limits. The message says what is wrong and names the libraries.
+    """
+    THREADS.use()
+    check(
+        _measure_known, Way(settings.window, settings.estimator, settings.order, settings.interpolant, size)
+    )
+
+
+def _measure_known(
+    reference: NDArray[np.float32], deformed: NDArray[np.float32], grid: ZoiGrid, way: Way
+) -> StrainField:
+    """As a new kernel measures its first picture."""
+    estimator: Estimator = "phase" if way.estimator == "phase" else "spectral"
+    settings = KernelSettings(way.window, estimator, way.order, way.interpolant)
+    made = Reference.first(reference, grid, settings, None, None)
+    attempt = Attempt(made, as_recorded(deformed, "the pattern"), None, made.searched(deformed))
+    rescue(attempt, None)
+    return field_of(attempt)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.compiled.forked import THREADS
 from analysis.field import Motion, Roi, ZoiGrid, profile
 from analysis.picture import Box
 
@@ -64,6 +65,11 @@ def warm_up(part: str = ALL, kinds: Sequence[str] = PICTURE_KINDS, *, phase: boo
         Of the pictures that will come.
     phase : bool
         Also for the estimator by phases.
+
+    Raises
+    ------
+    MachineError
+        What is compiled measures a known pattern wrong; of "all" alone.
     """
     if part == ITERATION:
         _iteration()
@@ -158,13 +164,16 @@ def _rest() -> None:
     from analysis.fit.clipping import clipped_share
     from analysis.fit.verdict import judge
     from analysis.follow.prediction import motion_after
-    from analysis.kernel.phase_kernel import PhaseKernel
+    from analysis.kernel.reference import Reference
+    from analysis.kernel.settings import KernelSettings
 
     image, grid = _small()
-    kernel = PhaseKernel(image, grid)
-    kernel.reference.searched(image)
-    if kernel.reference.sums is not None:
-        kernel.reference.sums.factor("exx", grid.active)
+    THREADS.use()
+    # No PhaseKernel: its self-test would compile the iteration.
+    reference = Reference.first(image, grid, KernelSettings(), None, None)
+    reference.searched(image)
+    if reference.sums is not None:
+        reference.sums.factor("exx", grid.active)
     line = profile("gaussian", 32)
     clipped_share(np.zeros((32, 32), np.bool_), np.zeros((1, 2), np.int64), line)
     none, pairs, single = np.empty(0), np.empty((0, 2)), np.empty(0, np.float32)

@@ -7,6 +7,7 @@ Source: M. Unser, A. Aldroubi, M. Eden, B-spline signal processing, IEEE Trans. 
 
 from __future__ import annotations
 
+from fractions import Fraction
 from functools import lru_cache
 from math import comb, factorial
 from typing import NamedTuple
@@ -61,14 +62,27 @@ def tap_table(degree: int) -> NDArray[np.float32]:
     The weights of a pair of taps at equal distance are E(tau^2) -+ tau O(tau^2); per pair, from
     the outside in: E0, O0, E2, O2, E4, O4. Lower degrees leave the outer pairs zero.
     """
-    tau = np.linspace(-0.5, 0.5, 2 * TAPS - 1)
     table = np.zeros((3, TAPS))
     for pair in range(3):
         right = 3 - pair
         if right <= (degree + 1) // 2:
-            weights = basis(degree, tau + 0.5 - right)
-            table[pair] = np.polynomial.polynomial.polyfit(tau, weights, TAPS - 1)
+            table[pair] = [float(c) for c in _piece(degree, right)]
     return np.asarray(table.ravel(), np.float32)
+
+
+def _piece(degree: int, right: int) -> list[Fraction]:
+    """The centred B-spline between the knots at x = -right and 1 - right, as a polynomial of x + right - 1/2.
+
+    Exact, so that no linear algebra library has a part in it; the lowest power first, (6,).
+    """
+    out = [Fraction(0)] * TAPS
+    for k in range(degree + 2):
+        offset = Fraction(degree + 2 - 2 * right - 2 * k, 2)
+        if offset > 0:  # the power (x + (degree + 1) / 2 - k)_+ is on
+            factor = Fraction((-1) ** k * comb(degree + 1, k), factorial(degree))
+            for p in range(degree + 1):
+                out[p] += factor * comb(degree, p) * offset ** (degree - p)
+    return out
 
 
 @lru_cache(maxsize=8)

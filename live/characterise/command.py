@@ -22,6 +22,7 @@ from acquire.errors import ConfigError, DataError
 from live.characterise.outcome import Bench, Outcome, figure, read_outcome, write_outcome
 from live.characterise.page import write_page
 from live.characterise.progress import Progress
+from live.measure import on_fit_machine
 
 Experiment = Callable[[Bench], Outcome]
 EXPERIMENTS: Mapping[str, tuple[str, str]] = MappingProxyType({
@@ -72,7 +73,14 @@ def command(arguments: argparse.Namespace) -> int:
         An unknown name, or no matplotlib.
     DataError
         A folder that cannot be written, or a picture that cannot be read.
+    MachineUnfit
+        The machine measures a known pattern wrong.
     """
+    with on_fit_machine():
+        return _characterised(arguments)
+
+
+def _characterised(arguments: argparse.Namespace) -> int:
     figure(1, 1)  # a missing matplotlib is told before the work
     folder = _made(Path(arguments.out))
     if arguments.pattern:

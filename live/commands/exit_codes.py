@@ -6,7 +6,7 @@ NOT_READY, EXIT_INTERRUPTED = 6, 130
 
 EXIT_CODES = """exit codes:
   0 well   1 a defect of phasedic   2 usage or configuration   3 device   4 file or data
-  5 finished with loss, or nothing measured   6 not ready (checks)   130 interrupted, everything closed cleanly
+  5 finished with loss, or nothing measured   6 not ready (check, self-test)   130 interrupted, closed cleanly
 """
 
 EXIT_WORDS = {

@@ -1,12 +1,16 @@
-"""``phasedic warm-up``: compile everything ahead, for all kinds of pictures and estimators."""
+"""``phasedic warm-up``: compile everything ahead, for all kinds of pictures and estimators; the self-test."""
 
 from __future__ import annotations
 
 import argparse
 
-from analysis import PICTURE_KINDS
+from analysis import PICTURE_KINDS, KernelSettings, check_machine
+from live.measure import on_fit_machine
 from live.setup import compile_ahead
 from live.tell import Screen
+
+TESTED_PX = 64
+"""The ZOI of the self-test; those of a test are tested when it begins."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -14,8 +18,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def command(arguments: argparse.Namespace) -> int:
-    """0 once all is there."""
+    """0 once all is there; MachineUnfit where a known pattern is measured wrong."""
     screen = Screen()
     took = compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
     screen.say(f"everything is compiled ({took:.0f} s)" if took else "everything was compiled already")
+    with on_fit_machine():
+        for settings in (KernelSettings(), KernelSettings(order=2), KernelSettings(estimator="phase")):
+            check_machine(settings, TESTED_PX)
+    screen.say("self-test: a known pattern is measured right")
     return 0

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.errors import ConfigError, DataError, MachineUnfit, PhasedicError
 from acquire.frame import Burst
 from analysis.field import Status, StrainField
 
@@ -25,6 +26,17 @@ def usable(error: ValueError, what: str) -> PhasedicError:
 
     kind = DataError if isinstance(error, PatternError) else ConfigError
     return kind(f"{what}: {error}")
+
+
+@contextlib.contextmanager
+def on_fit_machine() -> Iterator[None]:
+    """Where kernels are made: a machine that measures a known pattern wrong raises MachineUnfit."""
+    from analysis import MachineError
+
+    try:
+        yield
+    except MachineError as error:
+        raise MachineUnfit(str(error)) from error
 
 
 Correction = Callable[[Burst], Burst]
@@ -66,13 +78,16 @@ def prepare(
         The grid leaves the picture.
     DataError
         The reference, called ``what`` for a person, has no pattern.
+    MachineUnfit
+        The machine measures a known pattern wrong.
     """
     from analysis import PhaseKernel
 
     noise_GL = frame_noise(reference, stated_noise_GL)
     noise = averaged(noise_GL, reference.n)
     try:
-        return PhaseKernel(correct(reference).mean, grid, settings, noise=noise), noise_GL
+        with on_fit_machine():
+            return PhaseKernel(correct(reference).mean, grid, settings, noise=noise), noise_GL
     except ValueError as error:
         raise usable(error, what) from error
 

@@ -14,7 +14,7 @@ from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
 from live.measure.history import History
 from live.measure.pipeline import measure
-from live.measure.preparation import motion_between, prepare
+from live.measure.preparation import motion_between, on_fit_machine, prepare
 from live.measure.reference import Reference, ReferenceTaker
 
 if TYPE_CHECKING:
@@ -36,10 +36,16 @@ def rehearse(camera: CameraInfo, grid: ZoiGrid, settings: KernelSettings, bursts
     settings : KernelSettings
     bursts : (reference, measured)
         Frames in each.
+
+    Raises
+    ------
+    MachineUnfit
+        The machine measures a known pattern wrong.
     """
     from analysis import warm_up
 
-    warm_up(kinds=kinds_of(camera), phase=settings.estimator == "phase")
+    with on_fit_machine():
+        warm_up(kinds=kinds_of(camera), phase=settings.estimator == "phase")
     images = [_image(camera, seed) for seed in (1, 2)]
     reference, *_ = [_averaged(camera, images, n) for n in bursts]
     kernel, noise_GL = prepare(reference.burst, grid, settings, None, what="measure")

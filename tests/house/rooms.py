@@ -27,8 +27,10 @@ ROOMS = {
     "analysis.paper_estimator": "analysis.field",
     "analysis.quality": "analysis.field analysis.picture",
     "analysis.fit": "analysis.field analysis.compiled analysis.picture",
-    "analysis.kernel": "analysis.field analysis.compiled analysis.picture analysis.fit analysis.follow",
-    "analysis": "analysis.field analysis.kernel",
+    "analysis.self_test": "analysis.field analysis.compiled",
+    "analysis.kernel": "analysis.field analysis.compiled analysis.picture analysis.fit analysis.follow"
+    " analysis.self_test",
+    "analysis": "analysis.field analysis.kernel analysis.self_test",
     "hw_mocks": "acquire acquire.camera acquire.load_cell",
     "live": "",
     "live.lines": "acquire",
@@ -61,7 +63,7 @@ ROOMS = {
     " acquire.protocols acquire.session analysis"
     " live.measure live.setup live.specimen live.tell live.outputs",
     "live.characterise": "acquire acquire.opencv analysis analysis.field analysis.picture analysis.paper_estimator"
-    " hw_mocks live.maps",
+    " hw_mocks live.maps live.measure",
     "live.characterise.experiments": "acquire analysis analysis.field analysis.picture analysis.paper_estimator"
     " hw_mocks live.maps live.characterise",
     "live.commands": "*",

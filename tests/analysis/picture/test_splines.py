@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import comb
+
 import numpy as np
 import pytest
 from scipy import ndimage
@@ -30,6 +32,26 @@ def test_tap_weights_are_the_spline(degree: int) -> None:
         expected = basis(degree, fraction - np.arange(-2.0, 4.0))
         assert np.allclose(found, expected, atol=1e-6)
         assert np.sum(found) == pytest.approx(1, abs=1e-6)
+
+
+def test_taps_are_exact() -> None:
+    """The outermost piece of the quintic spline is (1/2 + tau)^5 / 120; of lower degrees nothing is left over."""
+    outer = [np.float32(comb(5, p) / 2 ** (5 - p) / 120) for p in range(6)]
+    assert np.array_equal(tap_table(5)[:6], outer)
+    assert np.array_equal(tap_table(1), [0] * 12 + [0.5, 1, 0, 0, 0, 0])
+    assert not tap_table(3).reshape(3, 6)[:, 4:].any()
+
+
+def test_taps_need_no_linear_algebra(monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*arguments: object, **named: object) -> None:
+        raise AssertionError("least squares are used")
+
+    expected = [tap_table(degree) for degree in (1, 3, 5)]
+    for place in (np.linalg, np.polynomial.polynomial):
+        for name in ("lstsq", "solve", "inv", "pinv", "polyfit"):
+            monkeypatch.setattr(place, name, broken, raising=False)
+    tap_table.cache_clear()
+    assert all(np.array_equal(tap_table(d), e) for d, e in zip((1, 3, 5), expected, strict=True))
 
 
 @pytest.mark.parametrize("shape", [(70, 90), (9, 11), (2 * PART + 33, 40), (PART, 2 * GROUP)])

@@ -1,0 +1,114 @@
+"""A machine that measures a known pattern wrong: every command that measures refuses, with the libraries' versions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from analysis.kernel import attempt
+from analysis.picture import tap_table
+from analysis.self_test import machine
+from hw_mocks.deformation import Affine
+from hw_mocks.speckle import Speckle
+from live.batch.work import Task, perform
+from live.cli import main
+
+
+@pytest.fixture
+def break_taps(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
+    """From then on the taps of the spline are wrong as those of an emulated machine were, in a new process."""
+
+    def forget() -> None:
+        machine._check_algebra.cache_clear()
+        machine._check_measuring.cache_clear()
+
+    def wrong(degree: int) -> object:
+        return (tap_table(degree) * np.linspace(0.8, 1.1, 18)).astype(np.float32)
+
+    def spoil() -> None:
+        forget()
+        monkeypatch.setattr(attempt, "tap_table", wrong)
+
+    yield spoil
+    forget()
+
+
+@pytest.fixture
+def shots(tmp_path: Path) -> Path:
+    folder = tmp_path / "shots"
+    folder.mkdir()
+    speckle = Speckle((128, 160), radius=2.0, seed=3)
+    for k in range(10):
+        seen = 255 * speckle.render(Affine(dv_dy=1e-4 * k, x0=80, y0=64), (128, 160))
+        cv2.imwrite(str(folder / f"{k:02}.png"), np.rint(seen).astype(np.uint8))
+    return folder
+
+
+def refused(capsys: pytest.CaptureFixture[str], *words: str) -> None:
+    assert main(words) == 6
+    said = capsys.readouterr().err
+    assert "does not measure a known pattern right (self-test with ZOIs of" in said
+    assert f"nothing is measured with numpy {np.__version__} (BLAS and LAPACK: " in said
+    assert "Traceback" not in said
+
+
+QUIET = ("--no-view", "--no-rrd")
+
+
+@pytest.mark.parametrize("command", ["run", "replay"])
+def test_nothing_is_measured(
+    command: str,
+    shots: Path,
+    tmp_path: Path,
+    break_taps: Callable[[], None],
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    source = ["--camera", str(shots)] if command == "run" else [str(shots)]
+    words = [command, *source, "--zoi", "48", "--burst", "1", *QUIET, "--out", str(tmp_path / "out")]
+    break_taps()
+    refused(capsys, *words)
+    assert not list(tmp_path.rglob("strain.h5"))
+
+
+def test_a_check_is_not_go(
+    shots: Path, break_taps: Callable[[], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    break_taps()
+    refused(capsys, "check", "--camera", f"files:{shots}", "--zoi", "48")
+
+
+def test_nor_is_a_study(
+    shots: Path, tmp_path: Path, break_taps: Callable[[], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    break_taps()
+    times = ["--static", "0,2", "--loaded", "5,8"]
+    refused(capsys, "study", str(shots), "--zoi", "32,48", *times, "--out", str(tmp_path / "out"))
+
+
+def test_a_worker_of_a_batch(shots: Path, tmp_path: Path, break_taps: Callable[[], None]) -> None:
+    break_taps()
+    row = perform(Task("a", str(tmp_path / "out"), str(shots), overrides={"measure.zoi": 48})).values
+    assert row["exit_code"] == 6 and "known pattern" in str(row)
+    assert not list(tmp_path.rglob("strain.h5"))
+
+
+def test_warming_up(break_taps: Callable[[], None], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["warm-up"]) == 0
+    assert "self-test: a known pattern is measured right" in capsys.readouterr().out
+    break_taps()
+    refused(capsys, "warm-up")
+
+
+def test_characterise(
+    tmp_path: Path, break_taps: Callable[[], None], capsys: pytest.CaptureFixture[str]
+) -> None:
+    pattern = tmp_path / "pattern.png"
+    cv2.imwrite(
+        str(pattern), np.rint(255 * Speckle((128, 160), radius=2.0, seed=3).render(Affine(), (128, 160)))
+    )
+    break_taps()
+    refused(capsys, "characterise", "--pattern", str(pattern), "--quick", "--out", str(tmp_path / "out"))
