@@ -18,5 +18,7 @@ def give_start_lock(threads: Any) -> None:
     """Give ``threads`` (``numba.np.ufunc.parallel``) the nameless lock, where it has none yet and there is one."""
     if getattr(threads, _NAME, threads) is not None:
         return
-    with contextlib.suppress(ValueError, OSError):  # no fork on this system, or no semaphores: numba sees to it
+    with contextlib.suppress(
+        ValueError, OSError
+    ):  # no fork on this system, or no semaphores: numba sees to it
         setattr(threads, _NAME, multiprocessing.get_context("fork").RLock())
