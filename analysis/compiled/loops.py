@@ -23,7 +23,11 @@ from typing import Any
 os.environ.setdefault("GOMP_SPINCOUNT", "5000")
 
 import numba
+from numba.np.ufunc import parallel as numba_threads
 
+from analysis.compiled.start_lock import give_start_lock
+
+give_start_lock(numba_threads)
 log = logging.getLogger("analysis")
 
 _PACKAGE = Path(__file__).parents[1]

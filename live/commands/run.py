@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import queue
 import sys
 import webbrowser
 from collections.abc import Callable, Sequence
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from live.serve import Desk
 
 RECORDING = ("camera", "load", "no-record", "record", "armed", "start-above", "dark", "flat", "crop")
+VIEWER_OPENS_S = 1.5  # where it cannot, it ends sooner than that
 OTHER_PROGRAMS = ("orders", "strain-out", "strain-format", "strain-channels", "token-file")
 
 
@@ -75,9 +77,12 @@ def invite(desk: Desk, screen: Screen) -> None:
 
 
 def _open_viewer(port: int) -> str:
-    """The viewer of the view, in a window of its own."""
-    if spawn_viewer(port) is None:
+    """The viewer of the view, in a window of its own; what keeps it from opening comes soon."""
+    trouble: queue.Queue[str] = queue.Queue()
+    if spawn_viewer(port, trouble.put) is None:
         return "no: no window can be opened here; the folder of the run has view.rrd"
+    with contextlib.suppress(queue.Empty):
+        return f"no: {trouble.get(timeout=VIEWER_OPENS_S)}"
     return "ok"
 
 

@@ -157,7 +157,8 @@ def _view(config: Config, figures: Figures, grid: ZoiGrid, notes: list[str]) -> 
     setup = ViewSetup("phasedic check", camera.width, camera.height, camera.bits, grid, start)
 
     def serving(view: View) -> None:
-        if not (config.view.spawn and view.port is not None and spawn_viewer(view.port) is not None):
+        port = view.port if config.view.spawn else None
+        if port is None or spawn_viewer(port, notes.append) is None:
             notes.extend(view.address.splitlines())
 
     def tell(text: str, level: str) -> None:

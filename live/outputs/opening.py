@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -109,17 +109,18 @@ def _view(about: About, books: Books, screen: Screen) -> View | None:
 
     def serving(view: View) -> None:
         books.vitals.view_port = view.port
-        _announce(view, v.spawn, screen)
+        _announce(view, v.spawn, screen, lambda text: tell(text, "warning"))
 
     port = v.port if v.enabled else None
     return View(setup, port=port, rrd=rrd, tell=tell, serving=serving)
 
 
-def _announce(view: View, spawn: bool, screen: Screen) -> None:
+def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], None]) -> None:
     """Open the viewer where there is a display; else say how to look."""
-    if spawn and view.port is not None and spawn_viewer(view.port) is not None:
+    if spawn and view.port is not None and spawn_viewer(view.port, trouble) is not None:
         screen.say("the viewer opens in a window of its own")
         return
-    screen.say("no viewer is opened here (no display); it runs without, and this shows it:")
+    why = "no display" if spawn else "view.spawn is off"
+    screen.say(f"no viewer is opened here ({why}); it runs without, and this shows it:")
     for line in view.address.splitlines():
         screen.say(f"  {line}")

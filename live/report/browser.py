@@ -14,7 +14,11 @@ _NAMES = (
     *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge"),
     "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
 )
-NO_BROWSER = "no browser was found (chromium, Chrome or Edge); print the page from yours, or install one"
+_INSTALL = "`apt install chromium` on Debian"
+NO_BROWSER = (
+    f"no browser was found (chromium, Chrome or Edge); print the page from yours, or install one: {_INSTALL}"
+)
+NO_PNG = f"no browser was found to make PNG of the figures; SVG and CSV are there ({_INSTALL} brings one)"
 _TIME_S = 120
 
 

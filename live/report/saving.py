@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from live.export import new_file, new_folder
-from live.report.browser import find_browser, to_pdf, to_png
+from live.report.browser import NO_PNG, find_browser, to_pdf, to_png
 from live.report.report import Report
 from live.report.svg import HEIGHT, WIDTH, Figure, draw
 from live.tell import Screen
@@ -37,7 +37,7 @@ def save_figures(figures: Sequence[Figure], folder: Path, screen: Screen) -> Non
             if browser is not None:
                 to_png(svg, svg.with_suffix(".png"), WIDTH, HEIGHT)
     if browser is None:
-        screen.say("no browser was found to make PNG of the figures; SVG and CSV are there")
+        screen.say(NO_PNG)
 
 
 def as_csv(figure: Figure) -> str:

@@ -96,8 +96,9 @@ def _announce(view: View, screen: Screen) -> None:
     """Open the viewer where there is a display; else say how to look."""
     if view.port is None:
         return
-    if spawn_viewer(view.port) is not None:
+    if spawn_viewer(view.port, screen.say) is not None:
         screen.say("the viewer opens in a window of its own; Ctrl-C here ends it")
         return
     screen.say("no viewer is opened here (no display); this shows it, Ctrl-C ends it:")
-    screen.say(f"  {view.address}")
+    for line in view.address.splitlines():
+        screen.say(f"  {line}")

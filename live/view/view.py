@@ -20,7 +20,7 @@ from live.view.exchange.setup import ViewSetup
 from live.view.exchange.wire import Kind
 from live.view.keeper import Keeper, Tell
 from live.view.supply import Story, Supply
-from live.view.viewer import rerun_command, url
+from live.view.viewer import from_elsewhere, has_display, rerun_command, url
 from live.view.waiting import Waiting
 
 if TYPE_CHECKING:
@@ -147,6 +147,8 @@ class View:
         lines = []
         if self.port is not None:
             lines.append(f"watch: {rerun_command()} --connect {url(self.port)}")
+            if not has_display():
+                lines.append(f"watch from a machine with a display: {from_elsewhere(self.port)}")
         if self.rrd is not None:
             lines.append(f"later: {rerun_command()} {self.rrd}")
         return "\n".join(lines)

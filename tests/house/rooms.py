@@ -127,7 +127,7 @@ NEVER = {
     "live": "pickle marshal shelve dill",
 }  # fmt: skip
 # Where a room may have what the house around it does without, and what for.
-EXCEPT = {"analysis.compiled": "threading"}  # the lock that lets one loop run at a time, and no thread
+EXCEPT = {"analysis.compiled": "threading multiprocessing"}  # locks of the loops; no thread and no process
 # Numba takes half a second to import: loaded with these rooms (and */*_loops.py), by others when first used.
 COMPILED = ("analysis.compiled", "analysis.picture", "analysis.fit", "analysis.follow")
 # Whose modules may read another's private attributes: numba's cache has no public face.

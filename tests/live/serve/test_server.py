@@ -11,6 +11,7 @@ import pytest
 
 from live.serve.web import Hub, PageServer, of_json
 from live.serve.web.hub import MOST_STREAMS
+from tests.live.batch.running import until
 
 
 @pytest.fixture
@@ -167,12 +168,12 @@ def test_a_ninth_page_is_refused_until_one_goes(page: PageServer) -> None:
     assert {one.status for one in streams} == {200}
     assert ask(page, "/events").status == 503
     streams[0].close()
-    page.hub.tell("state", "x" * 10)
-    for _ in range(50):
-        if page.hub.watched < MOST_STREAMS:
-            break
-        page.hub.tell("state", "x" * 1000)
-        streams[1].fp.readline()
+
+    def gone() -> bool:
+        page.hub.tell("state", "x" * 10)  # the server sees that a page has gone when it writes to it
+        return page.hub.watched < MOST_STREAMS
+
+    until(gone)
     again = stream(page)
     assert again.status == 200
     for one in [*streams[1:], again]:

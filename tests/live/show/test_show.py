@@ -112,7 +112,7 @@ def test_it_serves_until_it_is_enough(run: RunFolder) -> None:
                 enough.set()
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("live.show.showing.spawn_viewer", lambda port: None)
+        patch.setattr("live.show.showing.spawn_viewer", lambda port, tell: None)
         show(run, Asked(every=40), Heard(), enough, port=19876)
     assert any("this shows it, Ctrl-C ends it" in line for line in said)
     assert said[0] == "3 of 96 instants are shown; --from, --to and --every choose others"
