@@ -93,11 +93,6 @@ class BurstAccumulator:
         self._lost = 0
         self._first = self._last = -1
 
-    @property
-    def pending(self) -> int:
-        """Frames of the burst that is not complete yet."""
-        return len(self._times)
-
     def add(self, frame: Frame) -> Burst | None:
         """Take a frame; the burst when this one completes it.
 

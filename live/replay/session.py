@@ -25,7 +25,7 @@ from live.replay.store import Store, open_store
 from live.setup import Config, from_dict, settings_in
 
 LIVE_ONLY = ("output", "record", "operate", "strain_out", "alarm")
-"""Sections of the configuration that a replay does not take over."""
+"""Sections of the configuration that a replay leaves out."""
 
 
 def session_path(source: str) -> Path | None:
@@ -42,11 +42,7 @@ def session_path(source: str) -> Path | None:
 
 def session_config(session: Session, request: ReplayRequest, extra: Mapping[str, Any], path: Path) -> Config:
     """The configuration in force when the session was recorded, overridden by file and command line."""
-    stored = {
-        k: v
-        for k, v in session.config.items()
-        if k not in ("output", "record", "operate", "strain_out", "alarm")
-    }
+    stored = {k: v for k, v in session.config.items() if k not in LIVE_ONLY}
     stored["metadata"] = dict(session.metadata)
     stored["measure"] = {"strain": "small", **stored.get("measure", {})}  # of those that could not choose
     for section, keys in (("measure", ("mask",)), ("camera", ("dark", "flat"))):

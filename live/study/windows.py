@@ -28,14 +28,10 @@ class Windows:
     ----------
     still, loaded : tuple of Burst
         At least two each; no still ones where there were none.
-    still_s, loaded_s : (float, float), s
-        Since the start, as they were taken.
     """
 
     still: tuple[Burst, ...]
     loaded: tuple[Burst, ...]
-    still_s: Seconds
-    loaded_s: Seconds
 
 
 NEVER: Seconds = (math.inf, -math.inf)
@@ -68,7 +64,7 @@ def take_windows(material: Material, still: Seconds | None, loaded: Seconds | No
             raise DataError(
                 f"{len(bursts)} bursts from {low:.3g} to {high:.3g} s, {least} are needed; give --{name} A,B"
             )
-    return Windows(_spread(found[0], MOST_STILL), _spread(found[1], MOST_LOADED), *told)
+    return Windows(_spread(found[0], MOST_STILL), _spread(found[1], MOST_LOADED))
 
 
 def _forces(material: Material, option: str) -> tuple[np.ndarray, np.ndarray]:
