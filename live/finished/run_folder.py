@@ -219,8 +219,7 @@ class RunFolder(Closing):
     @property
     def force_one_zero(self) -> NDArray[np.float64]:
         """The force as if the zero of the first instant had held to the end, (T,) N: no tare in mid-test."""
-        zero = self.strain.values.get("zero_N")
-        return self.force if zero is None else self.force + np.asarray(zero - zero[0], np.float64)
+        return self.strain.force_one_zero
 
     @property
     def stress(self) -> NDArray[np.float64] | None:

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from acquire.printable import printable
 from analysis.evaluate import Figure, TensileFigures
-from live.batch.work.noise import measured_noise
 from live.measure import History
 from live.replay import Replayed
+from live.results import Strain, still_phase_of
 from live.setup import Config
 from live.tell import evaluate
 
@@ -90,7 +91,7 @@ def row_of(name: str, source: str, done: Replayed, seconds: float) -> Row:
             **_counts(history),
             **_figures(evaluate(history, done.books.loads, done.config.specimen), done.config),
             **_noise(history),
-            **measured_noise(done.folder / "strain.h5", history.forces(done.books.loads)),
+            **_noise_floor(done.folder / "strain.h5"),
             "frames_lost": done.books.ledger.lost,
             "pictures_left_out": done.left_out,
             "seconds": round(seconds, 3),
@@ -136,6 +137,14 @@ def _noise(history: History) -> dict[str, float]:
     """Typical of the test: of one frame, of one ZOI's strain and of the mean strain, as predicted."""
     columns = {"noise_GL": "noise_GL", "strain_noise": "zoi_sigma", "mean_strain_noise": "sigma_eyy"}
     return {name: _median(history, column) for name, column in columns.items()}
+
+
+def _noise_floor(results: Path) -> dict[str, Any]:
+    """The still phase, and the scatter of one ZOI's eyy in it."""
+    with Strain.open(results) as strain:
+        still = still_phase_of(strain, ("eyy",))
+    floor = still.floors.get("eyy")
+    return {"still_instants": still.instants, "strain_noise_measured": floor and floor.measured}
 
 
 def _median(history: History, column: str) -> float:
