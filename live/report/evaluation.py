@@ -9,10 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate import Curve as Measured
 from analysis.evaluate import Figure, TensileFigures, Track, evaluate_test, find_lag
 from live.finished import RunFolder
-from live.setup import from_dict
 from live.tell import options_of
 
 Array = NDArray[np.float64]
@@ -45,13 +43,10 @@ class Curve:
     @classmethod
     def of(cls, run: RunFolder) -> Curve:
         """The curve of ``run``."""
-        stress = run.stress
-        load = run.force_one_zero if stress is None else stress
-        axial, transverse = run.axial_strain, run.transverse_strain
-        specimen = from_dict({"specimen": run.section("specimen")}, {}, str(run.path)).specimen
-        measured = Measured(np.asarray(run.strain.time_s, np.float64), axial, load, transverse)
-        figures = evaluate_test(measured, options_of(specimen))
-        return cls(axial, transverse, load, stress is not None, figures, _intercept(axial, load, figures))
+        measured, is_stress = run.curve, run.specimen.area_m2 is not None
+        figures = evaluate_test(measured, options_of(run.specimen))
+        axial, load = measured.strain, measured.stress
+        return cls(axial, run.transverse_strain, load, is_stress, figures, _intercept(axial, load, figures))
 
     @property
     def has_load(self) -> bool:

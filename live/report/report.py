@@ -18,7 +18,7 @@ from live.report.practice import Known, reporting_table
 from live.report.record import definitions, events, gauges, hashes, ledger, times, version_table
 from live.report.svg import Figure, draw
 from live.results import StillPhase, still_phase_of
-from live.tell import Screen, axis_words, figure_lines, interval
+from live.tell import Screen, axis_words, figure_lines, headline
 
 MOST_BYTES = 5_000_000
 _SIDES = (720, 480, 320, 200)  # px, of the pictures: smaller ones where the page would be too large
@@ -134,20 +134,8 @@ def _head(run: RunFolder, curve: Curve) -> Part:
 
 def tensile(curve: Curve) -> dict[str, str]:
     """E, nu and the strengths by name, each with its uncertainty; what the curve does not tell is left out."""
-    found, figures, load = {}, curve.figures, curves.load_unit(curve)
-    if figures.E.known:
-        name, one, unit = ("E", 1e9, "GPa") if curve.is_stress else ("EA", 1e3, "kN per unit strain")
-        found[name] = interval(figures.E, one, unit).replace("+-", "±")
-    if figures.nu.known:
-        found["nu"] = interval(figures.nu).replace("+-", "±")
-    if figures.Rp02.known:
-        proof = interval(figures.Rp02, 1 / load.factor, load.name).replace("+-", "±")
-        found["Rp0.2" if curve.is_stress else "Fp0.2"] = proof
-    if curve.has_load:
-        found["Rm" if curve.is_stress else "highest force"] = (
-            f"{np.nanmax(curve.load) * load.factor:.4g} {load.name}"
-        )
-    return found
+    rows = headline(curve.figures, stresses=curve.is_stress)
+    return {row.name: row.text.replace("+-", "±") for row in rows if row.figure.known}
 
 
 def _extent(run: RunFolder, curve: Curve) -> dict[str, str]:

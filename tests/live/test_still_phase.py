@@ -1,4 +1,4 @@
-"""Report, batch and study find the same still phase in the same run, and the same noise floor."""
+"""Report, batch and study find the same in the same run: still phase, noise floor, tensile figures."""
 
 from __future__ import annotations
 
@@ -13,9 +13,10 @@ from live.cli import main
 from live.finished import open_run
 from live.replay import ReplayRequest, open_material
 from live.report import Wanted, make_report
+from live.report.evaluation import Curve
 from live.results import still_phase_of
 from live.study.windows import still_window
-from live.tell import Screen
+from live.tell import Screen, headline
 from tests.live.made_run import make_run, noisy
 
 CAMERA = "sim:hole?lockstep=yes&seconds=6&fps=10&width=320&height=288&bits=12&hole=24&hold=2&end=1"
@@ -32,7 +33,7 @@ def reported(folder: Path) -> tuple[int, str]:
     return int(instants[1]), eyy[1]
 
 
-def test_one_still_phase_in_report_batch_and_study(tmp_path: Path) -> None:
+def test_one_still_phase_and_one_table_in_report_batch_and_study(tmp_path: Path) -> None:
     words = ["--zoi", "32", "--step", "16", "--burst", "2", "--reference-burst", "6", "--no-view", "--no-rrd"]
     assert main(["run", "--camera", CAMERA, "--load", "sim:", *words, "--out", str(tmp_path / "run")]) == 0
     session = str(tmp_path / "run" / "session.h5")
@@ -41,6 +42,12 @@ def test_one_still_phase_in_report_batch_and_study(tmp_path: Path) -> None:
         assert material.times is not None
         low, high = (material.start.monotonic + limit for limit in still_window(material))
         studied = np.count_nonzero((material.times >= low) & (material.times <= high))
+    with open_run(tmp_path / "again") as run:
+        found = headline(Curve.of(run).figures, stresses=False)
+    for figure in found:
+        value = pytest.approx(figure.figure.value) if figure.figure.known else None
+        assert row[figure.column] == value, figure.name
+    assert [figure.name for figure in found if figure.figure.known] == ["Fm"]
     instants, noise = reported(tmp_path / "again")
     assert instants == row["still_instants"] == studied == 7
     assert reported(tmp_path / "run") == (instants, noise)

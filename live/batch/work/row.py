@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from acquire.printable import printable
-from analysis.evaluate import Figure, TensileFigures
+from analysis.evaluate import TensileFigures
 from live.measure import History
 from live.replay import Replayed
 from live.results import Strain, still_phase_of
 from live.setup import Config
-from live.tell import evaluate
+from live.tell import evaluate, headline
 
 Value = str | int | float | None
 COLUMNS: dict[str, type] = {
@@ -118,19 +118,11 @@ def _counts(history: History) -> dict[str, Any]:
     return found if last is None else {**found, "zois": last.n_zoi, "valid_last": last.n_valid}
 
 
-def _figures(figures: TensileFigures, config: Config) -> dict[str, Any]:
+def _figures(figures: TensileFigures, config: Config) -> dict[str, float]:
     """Stresses where the section is known, else forces."""
-    if config.specimen.area_m2 is None:
-        known = {"EA_kN": figures.E.over(1e3), "nu": figures.nu, "Fp0.2_kN": figures.Rp02.over(1e3)}
-        known["Fm_kN"] = figures.Rm.over(1e3)
-    else:
-        known = {"E_GPa": figures.E.over(1e9), "nu": figures.nu, "Rp0.2_MPa": figures.Rp02.over(1e6)}
-        known["Rm_MPa"] = figures.Rm.over(1e6)
-    return {key: value for name, figure in known.items() for key, value in _interval(name, figure).items()}
-
-
-def _interval(name: str, figure: Figure) -> dict[str, float]:
-    return {name: figure.value, f"{name}_low": figure.low, f"{name}_high": figure.high}
+    rows = headline(figures, stresses=config.specimen.area_m2 is not None)
+    parts = {"": "value", "_low": "low", "_high": "high"}
+    return {row.column + end: getattr(row.figure, part) for row in rows for end, part in parts.items()}
 
 
 def _noise(history: History) -> dict[str, float]:
