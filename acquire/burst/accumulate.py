@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.burst.smear import motion_between_frames, shortened
+from acquire.burst.smear import motion_between_frames
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Burst, Frame, frozen
 
@@ -65,15 +65,6 @@ class BurstAccumulator:
     not_before : float, s
         Frames whose time is earlier are left out: those that lay in the driver's buffers
         when the burst was asked for.
-    shorten_above_px : float or None, px
-        Motion during a burst above which the next ones have fewer frames, and up to n again
-        when it allows; None: always n. It depends on the pictures alone, so that a replay of
-        the same frames gives the same bursts.
-
-    Attributes
-    ----------
-    length : int
-        Frames of the burst that is being taken.
 
     Raises
     ------
@@ -81,22 +72,14 @@ class BurstAccumulator:
         An impossible n.
     """
 
-    def __init__(
-        self, n: int, *, not_before: float = -math.inf, shorten_above_px: float | None = None
-    ) -> None:
+    def __init__(self, n: int, *, not_before: float = -math.inf) -> None:
         if not 1 <= n <= MOST_FRAMES:
             raise ConfigError(f"a burst of {n} frames is not possible; allowed: 1 to {MOST_FRAMES}")
-        self._n, self._not_before, self._shorten_above_px = n, not_before, shorten_above_px
-        self.length = n
+        self._n, self._not_before = n, not_before
         self._times: list[float] = []
         self._sums: _Sums | None = None
         self._lost = 0
         self._first = self._last = -1
-
-    @property
-    def pending(self) -> int:
-        """Frames of the burst that is not complete yet."""
-        return len(self._times)
 
     def add(self, frame: Frame) -> Burst | None:
         """Take a frame; the burst when this one completes it.
@@ -113,14 +96,14 @@ class BurstAccumulator:
             self._start_anew()
             self._lost += frame.damaged
             return None
-        if self.length == 1:
+        if self._n == 1:
             return self._alone(frame)
         if self._sums is None:
             self._sums, self._first = _Sums(frame), frame.index
         self._last = frame.index
         self._times.append(frame.t)
-        done = len(self._times) == self.length
-        self._sums.add(frame, self.length if done else 0)
+        done = len(self._times) == self._n
+        self._sums.add(frame, self._n if done else 0)
         return self._finish(self._sums, frame) if done else None
 
     def _gap_before(self, frame: Frame) -> bool:
@@ -137,11 +120,10 @@ class BurstAccumulator:
             lost=self._lost, clock=frame.clock,
         )  # fmt: skip
         self._times, self._lost = [], 0
-        self._adapt(burst)
         return burst
 
     def _finish(self, sums: _Sums, frame: Frame) -> Burst:
-        start, times, n = self._times[0], self._times, self.length
+        start, times, n = self._times[0], self._times, self._n
         noise = sums.noise(n)
         burst = Burst(
             mean=frozen(sums.mean),
@@ -158,13 +140,7 @@ class BurstAccumulator:
             motion_px=sums.motion(frame, n, noise),
         )
         self._times, self._sums, self._lost = [], None, 0
-        self._adapt(burst)
         return burst
-
-    def _adapt(self, burst: Burst) -> None:
-        """The length of the next burst, where the motion decides it."""
-        if self._shorten_above_px is not None:
-            self.length = shortened(burst.n, burst.motion_px, self._n, self._shorten_above_px)
 
 
 class _Sums:

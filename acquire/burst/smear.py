@@ -60,22 +60,3 @@ def _solve(xx: float, xy: float, yy: float, xd: float, yd: float, n: float, *, n
     u, v = (yy * xd - xy * yd) / determinant, (xx * yd - xy * xd) / determinant
     # Without what noise alone would show; the variance of a difference is twice that of a frame.
     return math.sqrt(max(0.0, u * u + v * v - 2 * noise**2 * (xx + yy) / determinant))
-
-
-def shortened(length: int, motion_px: float, longest: int, limit_px: float = LIMIT_PX) -> int:
-    """How many frames the next burst should have so that its motion stays below the limit.
-
-    Parameters
-    ----------
-    length : int
-        Frames of the burst that moved by ``motion_px``.
-    motion_px : float, px
-        NaN: nothing is known, the length stays.
-    longest : int
-        Never more than this; at most doubled at once, and never fewer than two, from which on
-        motion can be told.
-    """
-    if math.isnan(motion_px):
-        return length
-    fitting = longest if motion_px == 0 else int(min(longest, length * limit_px / motion_px))
-    return max(2, min(longest, fitting, 2 * length)) if longest > 1 else 1

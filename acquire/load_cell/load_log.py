@@ -13,6 +13,7 @@ import math
 import threading
 from array import array
 from bisect import bisect_left, bisect_right
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -95,6 +96,12 @@ class LoadLog:
             last sample, across a gap longer than ``max_gap_s`` and beside a NaN sample.
         """
         return self._at(t + self.lag_s)
+
+    def forces_one_zero(self, times: Iterable[float]) -> NDArray[np.float64]:
+        """``force_at`` each of ``times``, (N,) N, as if the zero of the first had held: a tare is no unloading."""
+        times = list(times)
+        zero = self.zero_at(times[0]) if times else 0.0
+        return np.array([self.force_at(t) + self.zero_at(t) - zero for t in times], np.float64)
 
     def raw_force_at(self, t: float) -> float:
         """The same with the samples as they are stamped; NaN where no lag is taken off."""

@@ -185,12 +185,6 @@ def _saturation(fields: list[_Field]) -> LoadFlag:
     return next((SATURATED[f.value] for f in fields if f.value in SATURATED), LoadFlag.NONE)
 
 
-def _decimal(options: Options) -> bool | None:
-    said = any(key == "decimal" for key, _ in options.address.settings)
-    comma = options.choice("decimal", ("point", "comma"), "point") == "comma"
-    return comma if said else None
-
-
 def make_parser(options: Options) -> Parser:
     """Takes ``column``, ``millis`` and ``decimal`` out of the address."""
     settings = AsciiSettings(

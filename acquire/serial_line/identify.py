@@ -6,7 +6,6 @@ an unknown machine may move.
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import time
 from collections.abc import Callable, Iterator
@@ -233,8 +232,3 @@ def _answer(question: Question, heard: bytes) -> Finding | None:
     return Finding(
         f"{line.url}?{'&'.join(parts)}", question.protocol, 1.0, (readings[0].raw,), _remark(readings)
     )
-
-
-def at_speed(question: Question, baud: int) -> Question:
-    """The same question at another speed."""
-    return dataclasses.replace(question, line=dataclasses.replace(question.line, baud=baud))

@@ -87,7 +87,7 @@ class V4L2Camera(CameraBase):
         self._t = float("-inf")
         self._running = False
         self._guard = threading.RLock()  # whoever closes must not take the buffers from under a reader
-        self._short, self._damaged = Muffler(), Muffler()
+        self._short = Muffler()
         self._last_sign = self._last_picture = self._not_before = 0.0
         self._stalled = self._late = False
         self._stale = self._wakes = 0

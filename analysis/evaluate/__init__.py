@@ -3,13 +3,15 @@
 ``gauges`` are virtual gauges and extensometers on a field, by the ``extension`` of two ends. ``tensile``
 evaluates a test: a ``curve`` by one of the ``standards``, its ``elastic`` line and its ``strengths``, each a
 ``figure`` with an interval, from ``series`` of noisy values. ``lag`` tells how late the
-load comes beside the frames. ``deconvolution`` takes the blur of the ZOI off a map.
+load comes beside the frames. ``floor`` has the still phase of a test and the noise floor in it.
+``deconvolution`` takes the blur of the ZOI off a map.
 """
 
 from analysis.evaluate.curve import Curve, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import LoadAxis, load_axis, principal_direction
 from analysis.evaluate.figure import CONFIDENCE, Figure
+from analysis.evaluate.floor import FEWEST_STILL, NoiseFloor, evenly, noise_floor, still_phase
 from analysis.evaluate.gauges import (
     AreaGauge,
     Gauge,
@@ -26,6 +28,7 @@ from analysis.evaluate.tensile import Options, Span, TensileFigures, Zero, ZeroB
 
 __all__ = [
     "CONFIDENCE",
+    "FEWEST_STILL",
     "STANDARDS",
     "AreaGauge",
     "Band",
@@ -36,6 +39,7 @@ __all__ = [
     "Interval",
     "LineGauge",
     "LoadAxis",
+    "NoiseFloor",
     "Options",
     "Span",
     "Standard",
@@ -48,11 +52,14 @@ __all__ = [
     "deconvolved",
     "effect",
     "evaluate_test",
+    "evenly",
     "find_lag",
     "free",
     "gauge_zois",
     "load_axis",
     "measure_gauge",
+    "noise_floor",
     "principal_direction",
+    "still_phase",
     "true_curve",
 ]

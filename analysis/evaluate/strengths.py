@@ -6,11 +6,11 @@ The interval of a highest stress holds the noise of one value and what may lie b
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.evaluate.curve import Loading
+from analysis.evaluate.curve import Curve, Loading
 from analysis.evaluate.elastic import Line
 from analysis.evaluate.figure import Figure, quantile
 from analysis.evaluate.series import Floats, first_crossing, noise, reading, smoothed
@@ -69,6 +69,18 @@ def yield_point(loading: Loading, line: Line) -> Yield:
             return Yield(highest_stress(loading, at), _lower(loading, at, end), at)
     why = "no yield point: nowhere does the stress fall by 0.5 % for 0.05 % strain, and rise again"
     return Yield(Figure.none(why), Figure.none(why))
+
+
+def tensile_strength(curve: Curve) -> Figure:
+    """Rm: the highest stress up to the break (3.10.1), whether strain is known there or not, Pa."""
+    loading = Loading.of(replace(curve, strain=np.zeros_like(curve.stress)))
+    if not loading.n:
+        return Figure.none("no stress is known")
+    if loading.stress[loading.top] <= 0:
+        return Figure.none("no tensile stress is known")
+    found = highest_stress(loading, loading.top)
+    rises = not loading.broke and loading.level[-1] >= loading.level.max() - 3 * loading.noise_stress
+    return replace(found, why="so far: the test ended while the stress still rose") if rises else found
 
 
 def highest_stress(loading: Loading, at: int) -> Figure:

@@ -19,10 +19,10 @@ from analysis.evaluate.series import first_crossing, reading
 from analysis.evaluate.standards import STANDARDS, Band, Standard
 from analysis.evaluate.strengths import (
     Yield,
-    highest_stress,
     proof_strength,
     strain_at_break,
     strain_at_top,
+    tensile_strength,
     yield_point,
 )
 
@@ -135,13 +135,14 @@ def evaluate_test(curve: Curve, options: Options | None = None) -> TensileFigure
     TensileFigures
     """
     options = options or Options()
-    loading = Loading.of(curve)
+    loading, strength = Loading.of(curve), tensile_strength(curve)
     if loading.n < FEWEST or loading.stress[loading.top] <= 0:
-        return _nothing(f"strain and a tensile stress are known together at {loading.n} points", options)
+        words = f"strain and a tensile stress are known together at {loading.n} points"
+        return replace(_nothing(words, options), Rm=strength)
     elastic = _elastic(loading, options)
     if isinstance(elastic, str):
-        return _without_line(loading, options, elastic)
-    return _with_line(loading, options, elastic)
+        return replace(_without_line(loading, options, elastic), Rm=strength)
+    return _with_line(loading, options, elastic, strength)
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,7 +197,7 @@ def _zero(loading: Loading, options: Options, line: Line) -> Zero:
     return Zero(value, "where the stress first reached the preload")
 
 
-def _with_line(loading: Loading, options: Options, elastic: _Elastic) -> TensileFigures:
+def _with_line(loading: Loading, options: Options, elastic: _Elastic, strength: Figure) -> TensileFigures:
     line, flow, zero = elastic.line, elastic.flow, elastic.zero.strain
     rp01, rp02, rp1 = (proof_strength(loading, line, offset) for offset in (0.001, 0.002, 0.01))
     agt, at = (_from_zero(f(loading), zero) for f in (strain_at_top, strain_at_break))
@@ -211,7 +212,7 @@ def _with_line(loading: Loading, options: Options, elastic: _Elastic) -> Tensile
         Rp1=rp1,
         ReH=flow.upper,
         ReL=flow.lower,
-        Rm=_strength(loading),
+        Rm=strength,
         Agt=agt,
         Ag=_plastic(agt, ends[0], line),
         At=at,
@@ -236,7 +237,6 @@ def _without_line(loading: Loading, options: Options, why: str) -> TensileFigure
     how = "as measured" if options.zero != "preload" else "the first value"
     return replace(
         _nothing(f"no elastic line: {why}", options),
-        Rm=_strength(loading),
         Agt=_from_zero(strain_at_top(loading), zero),
         At=_from_zero(strain_at_break(loading), zero),
         seconds=_seconds(loading, options.standard),
@@ -253,12 +253,6 @@ def _nothing(why: str, options: Options) -> TensileFigures:
     }
     names = [f.name for f in fields(TensileFigures) if f.name not in texts]
     return TensileFigures(**dict.fromkeys(names, Figure.none(why)), **texts)  # type: ignore[arg-type]
-
-
-def _strength(loading: Loading) -> Figure:
-    found = highest_stress(loading, loading.top)
-    rises = not loading.broke and loading.level[-1] >= loading.level.max() - 3 * loading.noise_stress
-    return replace(found, why="so far: the test ended while the stress still rose") if rises else found
 
 
 def _from_zero(strain: Figure, zero: float) -> Figure:

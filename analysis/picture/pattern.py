@@ -1,13 +1,11 @@
 """What a picture of a pattern is worth before it is measured: size, contrast, gradient, noise, spectrum.
 
-Everything comes from one picture, or its noise from a burst of pictures of the same scene. No
-estimate of displacement is made here; ``predicted_sigma`` turns the figures into what a Gaussian ZOI
-can reach at best (docs/method.md, closed forms).
+Everything comes from one picture. No estimate of displacement is made here; ``predicted_sigma`` turns
+the figures into what a Gaussian ZOI can reach at best (docs/method.md, closed forms).
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from dataclasses import dataclass
 
@@ -18,7 +16,6 @@ from analysis.picture.spectrum import NOISE_BAND, filtered_pattern, radial_spect
 
 Floats = NDArray[np.float64]
 
-BURST_LEAST = 2
 SIGNAL_OVER_NOISE = 2.0
 """A frequency carries pattern where its power is at least this many times that of the noise."""
 SMALLEST_PICTURE = 16
@@ -141,29 +138,6 @@ def _half_width(line: Floats, noise: float) -> float:
     high, low = math.log(values[k - 1]), math.log(max(values[k], 1e-6))
     share = (high - math.log(0.5)) / (high - low)
     return math.sqrt((k - 1) ** 2 + share * (k**2 - (k - 1) ** 2))
-
-
-def noise_of_burst(images: ArrayLike) -> float:
-    """Temporal noise of one frame, GL, from successive differences of frames of a still scene.
-
-    Parameters
-    ----------
-    images : (N, H, W), N >= 2, GL
-
-    Raises
-    ------
-    ValueError
-        Fewer than two frames.
-    """
-    frames = np.asarray(images)
-    if frames.ndim != 3 or len(frames) < BURST_LEAST:
-        raise ValueError(
-            f"noise needs a stack of at least {BURST_LEAST} frames, got the shape {frames.shape}"
-        )
-    total = 0.0
-    for first, second in itertools.pairwise(frames):
-        total += float(np.mean((second.astype(np.float64) - first) ** 2))
-    return math.sqrt(total / (2 * (len(frames) - 1)))
 
 
 def noise_of_picture(image: ArrayLike) -> float:

@@ -8,7 +8,7 @@ from analysis.quality.exposure import Depth, Exposure, depth, exposure
 from analysis.quality.pattern import ZoiPattern, speckle_radius, zoi_pattern
 from analysis.quality.specimen import Specimen, find_specimen
 from analysis.quality.steadiness import Steadiness, aliased, mains_of, steadiness
-from analysis.quality.transfer import gauge_length, l10_displacement, l10_strain
+from analysis.quality.transfer import gauge_length, l10_strain
 
 __all__ = [
     "Depth",
@@ -21,7 +21,6 @@ __all__ = [
     "exposure",
     "find_specimen",
     "gauge_length",
-    "l10_displacement",
     "l10_strain",
     "mains_of",
     "speckle_radius",

@@ -9,9 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-PILED = 1e-3
-"""Share of pixels at one and the same highest level, below the top of the scale, that is no chance."""
-
 
 @dataclass(frozen=True, slots=True)
 class Exposure:

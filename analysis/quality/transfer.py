@@ -1,4 +1,4 @@
-"""What a window and an order of shape do to a displacement that varies: l_10% and the size of the VSG.
+"""What a window does to a strain that varies: l_10% and the size of the VSG.
 
 Both follow from the least-squares weight alone (docs/method.md, closed forms), here by sums over the
 pixels of a ZOI, so that they hold for every window and for order 1 and 2.
@@ -20,17 +20,7 @@ def l10_strain(size: int, window: Window = "gaussian") -> float:
     """l_10% of a strain, px. The same for order 1 and 2: a quadratic term is even, a gradient odd."""
     x = _pixels(size)
     weight = profile(window, size) * x
-    return _period(x, weight / (weight @ x), slope=True)
-
-
-def l10_displacement(size: int, window: Window = "gaussian", order: int = 1) -> float:
-    """l_10% of a displacement, px."""
-    x, w = _pixels(size), profile(window, size)
-    if order == 1:
-        return _period(x, w / w.sum(), slope=False)
-    second = (w * x**2).sum() / w.sum()
-    weight = w * ((w * x**4).sum() / w.sum() - second * x**2)
-    return _period(x, weight / weight.sum(), slope=False)
+    return _period(x, weight / (weight @ x))
 
 
 def gauge_length(size: int, window: Window = "gaussian") -> float:
@@ -45,13 +35,12 @@ def _pixels(size: int) -> np.ndarray:
     return np.arange(size) - (size - 1) / 2
 
 
-def _period(x: np.ndarray, weight: np.ndarray, slope: bool) -> float:
+def _period(x: np.ndarray, weight: np.ndarray) -> float:
     """The longest period whose response is 1 - LOSS, by bisection from periods without loss."""
 
     def response(period: float) -> float:
         k = 2 * math.pi / period
-        wave = np.sin(k * x) / k if slope else np.cos(k * x)
-        return float(weight @ wave)
+        return float(weight @ np.sin(k * x) / k)
 
     long, short = 1000.0 * len(x), 1000.0 * len(x)
     while response(short) > 1 - LOSS:

@@ -42,8 +42,8 @@ def cut(task: Task) -> Cut:
             times = material.times
     except PhasedicError:
         return Cut()  # the replay will tell
-    if times is None:
-        return Cut(why="with shorten_bursts the places of bursts are not known before all is read")
+    if times is None:  # --as-measured, which the command refuses beside --chunk
+        return Cut()
     edges = [0, *_edges(times, task.chunk_s), len(times)]
     pairs = list(itertools.pairwise(edges))
     return Cut(tuple(_chunk(task, k, a, b) for k, (a, b) in enumerate(pairs)) if len(pairs) > 1 else ())

@@ -149,11 +149,6 @@ class Scene:
         along_y = (fast(Affine(0, -h)).astype(float) - fast(Affine(0, h))) / (2 * h)
         return np.asarray(along_x, float), np.asarray(along_y, float)
 
-    @property
-    def slope_rms(self) -> float:
-        """g, part of full scale per px."""
-        return float(np.sqrt(np.mean(np.square(self.slopes))))
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limit:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from acquire.frame import Burst
-from analysis.quality import gauge_length, l10_displacement, l10_strain
+from analysis.quality import gauge_length, l10_strain
 from live.check.ground import Bench
 from live.measure import averaged, prepare
 
@@ -50,8 +50,8 @@ class Floor:
     ----------
     zoi : int, px
     order : int
-    l10, l10_u, vsg : float, px
-        l_10% of the strain and of the displacement; side of the virtual strain gauge.
+    l10, vsg : float, px
+        l_10% of the strain; side of the virtual strain gauge.
     zois : int
         ZOIs that were measured; 0: none fits, or none has pattern.
     noises : tuple of Noise
@@ -63,7 +63,6 @@ class Floor:
     zoi: int
     order: int
     l10: float
-    l10_u: float
     vsg: float
     zois: int
     noises: tuple[Noise, ...]
@@ -105,7 +104,7 @@ def _bursts(bench: Bench, n: int) -> Iterator[Burst]:
 
 def _floor(bench: Bench, size: int, order: int, reference: Burst, bursts: dict[int, list[Burst]]) -> Floor:
     window = bench.settings.window
-    lengths = l10_strain(size, window), l10_displacement(size, window, order), gauge_length(size, window)
+    lengths = l10_strain(size, window), gauge_length(size, window)
     nothing = Floor(size, order, *lengths, 0, (), bench.reference)
     grid = _grid(bench, size)
     if grid is None:

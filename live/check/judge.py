@@ -14,7 +14,7 @@ from live.check.figures import Figures, median
 from live.check.shots import FEWEST
 
 MOST_SATURATED, MOST_DARK, MOST_PILED = 1e-4, 0.01, 1e-3
-LEAST_LIGHT, MOST_LIGHT = 0.3, 0.95  # of full scale, 99th percentile
+LEAST_LIGHT = 0.3  # of full scale, 99th percentile
 LEAST_CONTRAST = 0.05  # of full scale
 RADIUS_PX = (
     0.9,

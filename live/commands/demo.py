@@ -22,7 +22,7 @@ from live.measure import Measurement
 from live.outputs import Consumer
 from live.run import Outcome
 from live.setup import Config
-from live.tell import Screen, evaluate, interval
+from live.tell import Screen, evaluate, tensile_table
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid
@@ -182,8 +182,9 @@ def compare(outcome: Outcome, kept: Kept, config: Config, say: Callable[[str], N
     agreed = _say_strain(np.array(ratios), np.array(errors), say)
     _say_force(outcome, specimen, say)
     figures = evaluate(outcome.books.history, outcome.books.loads, config.specimen)
-    say(f"  E  {interval(figures.E, 1e9, 'GPa')}, true {specimen.E / 1e9:g} GPa")
-    say(f"  nu {interval(figures.nu)}, true {specimen.nu:g}")
+    rows = tensile_table(figures, stresses=True)
+    say(f"  E  {rows['E'].text}, true {specimen.E / 1e9:g} GPa")
+    say(f"  nu {rows['nu'].text}, true {specimen.nu:g}")
     return agreed
 
 

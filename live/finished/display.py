@@ -90,6 +90,3 @@ class Display:
         if quantity.unit == "px" and self.mm_per_px is not None:
             return sign * self.mm_per_px
         return sign * (100.0 if self.unit(quantity.name) == "%" else 1.0)
-
-
-PLAIN = Display()

@@ -22,7 +22,7 @@ from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event, EventKind
 from acquire.record_mode import Crop
 from acquire.session import Session
-from analysis.evaluate import LoadAxis, load_axis
+from analysis.evaluate import Curve, LoadAxis, load_axis
 from analysis.field import StrainField
 from live.finished.fields import read_field
 from live.finished.pictures import Pictures, of_images, of_session
@@ -221,14 +221,20 @@ class RunFolder(Closing):
     @property
     def force_one_zero(self) -> NDArray[np.float64]:
         """The force as if the zero of the first instant had held to the end, (T,) N: no tare in mid-test."""
-        zero = self.strain.values.get("zero_N")
-        return self.force if zero is None else self.force + np.asarray(zero - zero[0], np.float64)
+        return self.strain.force_one_zero
 
     @property
     def stress(self) -> NDArray[np.float64] | None:
         """Force over the section, (T,) Pa; None where the section is not known."""
         area = self.specimen.area_m2
         return None if area is None else self.force_one_zero / area
+
+    @property
+    def curve(self) -> Curve:
+        """Stress over axial strain, to be evaluated; force (N) where the section is not known."""
+        load = self.force_one_zero if self.stress is None else self.stress
+        times = np.asarray(self.strain.time_s, np.float64)
+        return Curve(times, self.axial_strain, load, self.transverse_strain)
 
     @cached_property
     def events(self) -> list[Event]:

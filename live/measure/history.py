@@ -56,9 +56,7 @@ class History:
 
         As if the zero of the first instant had held to the end: a tare in mid-test is no unloading.
         """
-        t = self.column("t").tolist()
-        zero = loads.zero_at(t[0]) if t else 0.0
-        return np.array([loads.force_at(one) + loads.zero_at(one) - zero for one in t], np.float64)
+        return loads.forces_one_zero(self.column("t").tolist())
 
     def tared_in_mid_test(self, loads: LoadLog) -> float:
         """What tares after the first instant have taken off the force by the last one, N."""

@@ -34,8 +34,19 @@ def _notes(session: Session, request: ReplayRequest) -> Iterator[str]:
         yield session.recovered
     if session.mode.every > 1:
         yield f"one frame in {session.mode.every} was recorded; measured as a slower camera"
+    elif session.mode.kind == "all" and not request.as_measured and _were_shortened(session):
+        yield (
+            "the run shortened its bursts while the picture moved; here they have one length, with --as-measured"
+            " they are those of the run"
+        )
     if request.as_measured and (otherwise := other_digits(session.versions)):
         yield f"recorded with {', '.join(otherwise)}; the last digits of the results may differ"
+
+
+def _were_shortened(session: Session) -> bool:
+    """Whether the version that recorded it fitted the length of bursts to the motion (``shorten_bursts``)."""
+    measure = session.config.get("measure")
+    return isinstance(measure, dict) and measure.get("shorten_bursts") is True
 
 
 @contextmanager

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.addresses import parse_address
-from acquire.burst import LIMIT_PX
 from acquire.camera import CAMERAS, with_scheme
 from acquire.clock import ClockPair
 from acquire.errors import ConfigError, DataError
@@ -25,7 +24,7 @@ from live.replay.store import Store, open_store
 from live.setup import Config, from_dict, settings_in
 
 LIVE_ONLY = ("output", "record", "operate", "strain_out", "alarm")
-"""Sections of the configuration that a replay does not take over."""
+"""Sections of the configuration that a replay leaves out."""
 
 
 def session_path(source: str) -> Path | None:
@@ -42,11 +41,7 @@ def session_path(source: str) -> Path | None:
 
 def session_config(session: Session, request: ReplayRequest, extra: Mapping[str, Any], path: Path) -> Config:
     """The configuration in force when the session was recorded, overridden by file and command line."""
-    stored = {
-        k: v
-        for k, v in session.config.items()
-        if k not in ("output", "record", "operate", "strain_out", "alarm")
-    }
+    stored = {k: v for k, v in session.config.items() if k not in LIVE_ONLY}
     stored["metadata"] = dict(session.metadata)
     stored["measure"] = {"strain": "small", **stored.get("measure", {})}  # of those that could not choose
     for section, keys in (("measure", ("mask",)), ("camera", ("dark", "flat"))):
@@ -104,8 +99,7 @@ def session_material(session: Session, request: ReplayRequest, config: Config, p
         found = _measured_then(stored, events, window)
     else:
         n = config.measure.burst if session.mode.kind == "all" else request.overrides.get("measure.burst")
-        limit_px = LIMIT_PX if config.measure.shorten_bursts else None
-        found = _all_after(stored, after, n, limit_px, window, request.numbers)
+        found = _all_after(stored, after, n, window, request.numbers)
     start = ClockPair(session.start_monotonic, session.start_utc)
     bursts = window.part(found.bursts)
     return Material(
@@ -122,12 +116,8 @@ class _Found:
     times: NDArray[np.float64] | None = None
 
 
-def _all_after(
-    stored: Store, after: int, n: int | None, limit_px: float | None, window: Window, numbers: range | None
-) -> _Found:
-    """Every burst; where the pictures decide on their lengths, all must be read."""
-    if limit_px is not None:
-        return _Found(stored.shortened_after(after, n, limit_px))
+def _all_after(stored: Store, after: int, n: int | None, window: Window, numbers: range | None) -> _Found:
+    """Every burst."""
     places = stored.places_after(after, n)
     found = window.numbers(places.t)
     if numbers is not None:

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from acquire.burst import BurstAccumulator, average_bursts, burst_of
+from acquire.burst import average_bursts, burst_of
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Burst, Frame
 from acquire.session import Session
@@ -36,10 +36,6 @@ class Store(Protocol):
 
     def bursts_at(self, places: Places, numbers: range) -> Iterator[Burst]:
         """Those of ``places`` with these numbers, one after the other; nothing else is read."""
-        ...
-
-    def shortened_after(self, last: int, n: int | None, limit_px: float) -> Iterator[Burst]:
-        """All bursts of at most n frames, fewer where the picture moves by more than ``limit_px``."""
         ...
 
 
@@ -82,11 +78,6 @@ class _Frames:
     def bursts_at(self, places: Places, numbers: range) -> Iterator[Burst]:
         return average_bursts(self._session.frames(*places.rows(numbers)), places.n)
 
-    def shortened_after(self, last: int, n: int | None, limit_px: float) -> Iterator[Burst]:
-        frames = self._between(last + 1, self._indices[-1])
-        accumulator = BurstAccumulator(n or DEFAULT_BURST, shorten_above_px=limit_px)
-        return (burst for burst in map(accumulator.add, frames) if burst is not None)
-
     def _between(self, first: int, last: int) -> Iterator[Frame]:
         start, stop = bisect_left(self._indices, first), bisect_right(self._indices, last)
         return self._session.frames(start, stop)
@@ -121,11 +112,6 @@ class _EveryKth(_Frames):
                 " give --burst 1"
             )
         return super().places_after(last, 1)
-
-    def shortened_after(self, last: int, n: int | None, limit_px: float) -> Iterator[Burst]:
-        """A frame cannot be shortened."""
-        places = self.places_after(last, n)
-        return self.bursts_at(places, range(len(places.t)))
 
 
 def _averaged(frames: Sequence[Frame]) -> Burst:
@@ -170,8 +156,3 @@ class _Bursts:
 
     def bursts_at(self, places: Places, numbers: range) -> Iterator[Burst]:
         return map(self._session.burst, places.starts[numbers.start : numbers.stop].tolist())
-
-    def shortened_after(self, last: int, n: int | None, limit_px: float) -> Iterator[Burst]:
-        """They are as they were recorded."""
-        places = self.places_after(last, n)
-        return self.bursts_at(places, range(len(places.t)))

@@ -10,14 +10,15 @@ from typing import TextIO
 import numpy as np
 
 from acquire.errors import ConfigError, DataError
-from analysis.evaluate import Figure as Evaluated
+from analysis.evaluate import CONFIDENCE
 from live.finished import RunFolder
 from live.report.curves import load_unit, strain_unit
 from live.report.evaluation import Curve
-from live.report.page import Part, element, joined, page, paragraph, section, table
+from live.report.page import Part, element, joined, page, paragraph, safe, section, table
 from live.report.report import Report, plots
 from live.report.svg import Curve as Line
 from live.report.svg import Figure
+from live.tell import TensileRow, headline, quantity
 
 _FEWEST = 2
 _ROOM = 50  # letters above the curves; numbers stand for longer names
@@ -56,32 +57,10 @@ def tests_of(runs: Sequence[RunFolder]) -> list[Test]:
     return found
 
 
-def quantities(tests: Sequence[Test]) -> dict[str, list[float]]:
-    """Name with unit -> value of each test; NaN where it tells nothing."""
-    stress = tests[0].curve.is_stress
-    figures = [test.curve.figures for test in tests]
-    if stress:
-        return {
-            "E_GPa": [f.E.value / 1e9 for f in figures],
-            "half_E_GPa": [_half(f.E) / 1e9 for f in figures],
-            "nu": [f.nu.value for f in figures],
-            "half_nu": [_half(f.nu) for f in figures],
-            "Rp0.2_MPa": [f.Rp02.value / 1e6 for f in figures],
-            "Rm_MPa": [f.Rm.value / 1e6 for f in figures],
-        }
-    return {
-        "EA_kN": [f.E.value / 1e3 for f in figures],
-        "half_EA_kN": [_half(f.E) / 1e3 for f in figures],
-        "nu": [f.nu.value for f in figures],
-        "half_nu": [_half(f.nu) for f in figures],
-        "Fp0.2_kN": [f.Rp02.value / 1e3 for f in figures],
-        "Fm_kN": [f.Rm.value / 1e3 for f in figures],
-    }
-
-
-def _half(figure: Evaluated) -> float:
-    """Half of the interval of confidence."""
-    return (figure.high - figure.low) / 2
+def _rows(tests: Sequence[Test]) -> list[tuple[TensileRow, ...]]:
+    """Of each figure the rows of all tests."""
+    found = (headline(test.curve.figures, stresses=test.curve.is_stress) for test in tests)
+    return list(zip(*found, strict=True))
 
 
 def summary(values: Sequence[float]) -> tuple[float, float, int]:
@@ -95,7 +74,8 @@ def compare(tests: Sequence[Test]) -> Report:
     """The page; the curves over one pair of axes, and the table."""
     figures = (_together(tests),)
     words = (
-        "E, nu and the strengths of each test as its own report has them; the scatter is that between tests."
+        "E, nu and the strengths of each test as its own report has them, with half of the interval"
+        f" ({CONFIDENCE:.0%}); mean and scatter are those between tests."
     )
     parts = [
         element("h1", f"Comparison of {len(tests)} tests"),
@@ -106,18 +86,16 @@ def compare(tests: Sequence[Test]) -> Report:
 
 
 def write_table(tests: Sequence[Test], file: TextIO) -> None:
-    """The figures as CSV: a line a test, then mean, standard deviation and number."""
-    found = quantities(tests)
-    file.write("test,path," + ",".join(found) + "\n")
+    """The figures as CSV, each beside half of its interval: a line a test, then mean, standard deviation and n."""
+    figures = _rows(tests)
+    heads = [f"{end}{row.column}" for row, *_ in figures for end in ("", "half_")]
+    file.write(f"test,path,{','.join(heads)}\n")
     for k, test in enumerate(tests):
-        values = ",".join(f"{column[k]:.8g}" for column in found.values())
+        values = ",".join(f"{rows[k].figure.value:.8g},{rows[k].half:.8g}" for rows in figures)
         file.write(f"{_quoted(test.title)},{_quoted(test.path)},{values}\n")
+    found = [summary([row.figure.value for row in rows]) for rows in figures]
     for name, part in (("mean", 0), ("standard deviation", 1), ("n", 2)):
-        values = ",".join(
-            "" if column.startswith("sigma") else f"{summary(numbers)[part]:.8g}"
-            for column, numbers in found.items()
-        )
-        file.write(f"{name},,{values}\n")
+        file.write(f"{name},,{','.join(f'{one[part]:.8g},' for one in found)}\n")
 
 
 def _quoted(words: str) -> str:
@@ -142,17 +120,24 @@ def _together(tests: Sequence[Test]) -> Figure:
 
 
 def _table(tests: Sequence[Test]) -> Part:
-    found = {name: column for name, column in quantities(tests).items() if not name.startswith("sigma")}
-    heads = ["", *(name.replace("_", ", ") for name in found)]
-    rows = [
-        [f"{k + 1} {test.title}", *(_number(column[k]) for column in found.values())]
+    figures = _rows(tests)
+    heads = ["", *(row.column.replace("_", ", ") for row, *_ in figures)]
+    rows: list[list[object]] = [
+        [f"{k + 1} {test.title}", *(_cell(of_tests[k]) for of_tests in figures)]
         for k, test in enumerate(tests)
     ]
-    told = [summary(column) for column in found.values()]
-    rows.append(["mean", *(_number(mean) for mean, _, _ in told)])
-    rows.append(["standard deviation", *(_number(deviation) for _, deviation, _ in told)])
-    rows.append(["n", *(str(n) for _, _, n in told)])
+    found = [summary([row.figure.value for row in of_tests]) for of_tests in figures]
+    rows.append(["mean", *(_number(mean) for mean, _, _ in found)])
+    rows.append(["standard deviation", *(_number(deviation) for _, deviation, _ in found)])
+    rows.append(["n", *(str(n) for _, _, n in found)])
     return joined([table(heads, rows, tuple(range(1, len(heads))))])
+
+
+def _cell(row: TensileRow) -> Part:
+    """Value and half of the interval in the unit of the column; where it is not known, the reason when pointed at."""
+    if not row.figure.known:
+        return element("span", "not known", title=row.figure.why)
+    return safe(quantity(row.figure.value, row.half, "").replace("+-", "±"))
 
 
 def _number(value: float) -> str:

@@ -1,4 +1,4 @@
-"""What a finished run tells: tensile figures with their line, the instants worth showing, the still phase."""
+"""What a finished run tells: tensile figures with their line, and the instants worth showing."""
 
 from __future__ import annotations
 
@@ -9,15 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate import Curve as Measured
 from analysis.evaluate import Figure, TensileFigures, Track, evaluate_test, find_lag
 from live.finished import RunFolder
-from live.setup import from_dict
 from live.tell import options_of
 
 Array = NDArray[np.float64]
-_STILL_FORCE, _STILL_SIGMAS = 0.01, 5.0
-STILL_LEAST = 3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,13 +43,10 @@ class Curve:
     @classmethod
     def of(cls, run: RunFolder) -> Curve:
         """The curve of ``run``."""
-        stress = run.stress
-        load = run.force_one_zero if stress is None else stress
-        axial, transverse = run.axial_strain, run.transverse_strain
-        specimen = from_dict({"specimen": run.section("specimen")}, {}, str(run.path)).specimen
-        measured = Measured(np.asarray(run.strain.time_s, np.float64), axial, load, transverse)
-        figures = evaluate_test(measured, options_of(specimen))
-        return cls(axial, transverse, load, stress is not None, figures, _intercept(axial, load, figures))
+        measured, is_stress = run.curve, run.specimen.area_m2 is not None
+        figures = evaluate_test(measured, options_of(run.specimen))
+        axial, load = measured.strain, measured.stress
+        return cls(axial, run.transverse_strain, load, is_stress, figures, _intercept(axial, load, figures))
 
     @property
     def has_load(self) -> bool:
@@ -121,66 +114,3 @@ def nearest_rows(run: RunFolder, times: Sequence[float]) -> dict[int, str]:
     """Row -> "chosen" of the instants nearest to ``times``, s."""
     t = run.strain.time_s
     return {int(np.argmin(np.abs(t - time))): "chosen" for time in sorted(times)}
-
-
-def still_rows(run: RunFolder) -> NDArray[np.intp]:
-    """The instants at the start in which nothing moves: force within 1 % of its range, strain within noise."""
-    values, force = run.strain.values, run.force
-    still = np.ones(run.strain.n, bool)
-    for name in ("exx", "eyy", "exy"):
-        mean, sigma = np.asarray(values[name], np.float64), np.asarray(values[f"sigma_{name}"], np.float64)
-        still &= np.abs(mean) <= _STILL_SIGMAS * sigma
-    if np.isfinite(force).any():
-        first = force[np.isfinite(force)][0]
-        room = _STILL_FORCE * float(np.nanmax(force) - np.nanmin(force))
-        still &= np.abs(force - first) <= room
-    moved = np.flatnonzero(~still)
-    return np.arange(moved[0] if len(moved) else len(still))
-
-
-@dataclass(frozen=True, slots=True)
-class Noise:
-    """Scatter of single ZOIs in the still phase, and what was predicted.
-
-    Attributes
-    ----------
-    name : str
-    measured, predicted : float
-        rms, px or strain.
-    """
-
-    name: str
-    measured: float
-    predicted: float
-
-
-def noise_floor(run: RunFolder, rows: NDArray[np.intp]) -> list[Noise]:
-    """Over the ZOIs of each still instant: displacements about a plane, strains about their mean.
-
-    Taking off the plane leaves rigid motion and the vibration of the rig out; what is left holds the
-    noise of the picture and of the reference, as the stored uncertainties do.
-    """
-    found = []
-    for name in ("u", "v", "exx", "eyy", "exy"):
-        squares, expected, n = 0.0, 0.0, 0
-        for row in rows:
-            values = np.asarray(run.strain.maps(name, int(row)), np.float64)
-            sigma = np.asarray(run.strain.maps(f"sigma_{name}", int(row)), np.float64)
-            known = np.isfinite(values) & np.isfinite(sigma)
-            terms = 3 if name in ("u", "v") else 1
-            if known.sum() <= terms + 1:
-                continue
-            rest = _without_plane(values, known) if terms == 3 else values[known] - values[known].mean()
-            squares += float(rest @ rest) * known.sum() / (known.sum() - terms)
-            expected += float((sigma[known] ** 2).sum())
-            n += int(known.sum())
-        if n:
-            found.append(Noise(name, math.sqrt(squares / n), math.sqrt(expected / n)))
-    return found
-
-
-def _without_plane(values: Array, known: NDArray[np.bool_]) -> Array:
-    y, x = np.nonzero(known)
-    plane = np.stack([np.ones(len(x)), x, y], axis=1)
-    factors = np.linalg.lstsq(plane, values[known], rcond=None)[0]
-    return np.asarray(values[known] - plane @ factors)

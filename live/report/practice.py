@@ -8,7 +8,7 @@ section on reporting requirements, doi:10.32720/idics/gpg.ed1. What nobody recor
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from acquire.events import EventKind
 from acquire.frame import CameraInfo
+from analysis.evaluate import NoiseFloor
 from analysis.picture import describe_pattern
 from live.finished import RunFolder
-from live.report.evaluation import Noise
 from live.report.page import Part, element, table
 
 _MICRO = 1e6
@@ -34,15 +34,15 @@ class Known:
     camera : CameraInfo or None
     reference : (H, W) array or None
         A picture of the pattern.
-    noise : list of Noise
-        Of the still phase; empty where there is none.
+    noise : mapping of str to NoiseFloor
+        Of the still phase by map; empty where there is none.
     mm_per_px : float or None
     """
 
     run: RunFolder
     camera: CameraInfo | None
     reference: NDArray[np.generic] | None
-    noise: list[Noise]
+    noise: Mapping[str, NoiseFloor]
     mm_per_px: float | None
 
 
@@ -149,6 +149,6 @@ def _events(run: RunFolder) -> list[dict[str, object]]:
     return [dict(event.data) for event in run.events if event.kind is EventKind.REFERENCE]
 
 
-def _floor(noise: list[Noise], names: tuple[str, ...], factor: float, unit: str) -> str:
-    found = [f"{n.name} {n.measured * factor:.3g}" for n in noise if n.name in names]
+def _floor(noise: Mapping[str, NoiseFloor], names: tuple[str, ...], factor: float, unit: str) -> str:
+    found = [f"{name} {noise[name].measured * factor:.3g}" for name in names if name in noise]
     return f"{', '.join(found)} {unit} (1 standard deviation of one ZOI, still phase)" if found else ""

@@ -6,27 +6,19 @@ import datetime
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from analysis.evaluate import CONFIDENCE
 from live.finished import RunFolder
 from live.report import curves
-from live.report.evaluation import (
-    STILL_LEAST,
-    Curve,
-    Noise,
-    instants,
-    nearest_rows,
-    noise_floor,
-    still_rows,
-)
+from live.report.evaluation import Curve, instants, nearest_rows
 from live.report.maps import Shots, maps, shots, statuses
 from live.report.page import Part, captioned, element, facts, joined, page, paragraph, section, table, tiles
 from live.report.practice import Known, reporting_table
 from live.report.record import definitions, events, gauges, hashes, ledger, times, version_table
 from live.report.svg import Figure, draw
-from live.tell import Screen, axis_words, figure_lines, interval
+from live.results import StillPhase, still_phase_of
+from live.tell import Screen, axis_words, figure_lines, headline
 
 MOST_BYTES = 5_000_000
 _SIDES = (720, 480, 320, 200)  # px, of the pictures: smaller ones where the page would be too large
@@ -67,8 +59,7 @@ class _Content:
     figures: tuple[Figure, ...]
     instants: dict[int, str]
     shots: Shots
-    still: NDArray[np.intp]
-    noise: list[Noise]
+    still: StillPhase
     files: Part
 
 
@@ -93,10 +84,9 @@ def make_report(run: RunFolder, wanted: Wanted, screen: Screen) -> Report:
 def _content(run: RunFolder, wanted: Wanted, screen: Screen) -> _Content:
     curve = Curve.of(run)
     chosen = nearest_rows(run, wanted.times) if wanted.times else instants(run, curve)
-    still = still_rows(run)
-    noise = noise_floor(run, still) if len(still) >= STILL_LEAST else []
+    still = still_phase_of(run.strain)
     return _Content(
-        run, curve, _figures(run, curve), chosen, shots(run, list(chosen)), still, noise, hashes(run, screen)
+        run, curve, _figures(run, curve), chosen, shots(run, list(chosen)), still, hashes(run, screen)
     )
 
 
@@ -110,7 +100,7 @@ def _parts(content: _Content, wanted: Wanted, side: int) -> list[Part]:
     run, taken, chosen = content.run, content.shots, content.instants
     fields = wanted.fields or (run.axial,)
     reference = next((image for image in taken.images.values() if image is not None), None)
-    known = Known(run, taken.camera, reference, content.noise, wanted.mm_per_px)
+    known = Known(run, taken.camera, reference, content.still.floors, wanted.mm_per_px)
     return [
         _head(run, content.curve),
         section("Specimen and rig", facts(_rig(run, taken))),
@@ -144,20 +134,8 @@ def _head(run: RunFolder, curve: Curve) -> Part:
 
 def tensile(curve: Curve) -> dict[str, str]:
     """E, nu and the strengths by name, each with its uncertainty; what the curve does not tell is left out."""
-    found, figures, load = {}, curve.figures, curves.load_unit(curve)
-    if figures.E.known:
-        name, one, unit = ("E", 1e9, "GPa") if curve.is_stress else ("EA", 1e3, "kN per unit strain")
-        found[name] = interval(figures.E, one, unit).replace("+-", "±")
-    if figures.nu.known:
-        found["nu"] = interval(figures.nu).replace("+-", "±")
-    if figures.Rp02.known:
-        proof = interval(figures.Rp02, 1 / load.factor, load.name).replace("+-", "±")
-        found["Rp0.2" if curve.is_stress else "Fp0.2"] = proof
-    if curve.has_load:
-        found["Rm" if curve.is_stress else "highest force"] = (
-            f"{np.nanmax(curve.load) * load.factor:.4g} {load.name}"
-        )
-    return found
+    rows = headline(curve.figures, stresses=curve.is_stress)
+    return {row.name: row.text.replace("+-", "±") for row in rows if row.figure.known}
 
 
 def _extent(run: RunFolder, curve: Curve) -> dict[str, str]:
@@ -229,20 +207,18 @@ def figure_table(run: RunFolder, curve: Curve) -> list[Part]:
 
 
 def _noise_section(content: _Content) -> list[Part]:
-    n = len(content.still)
-    if not content.noise:
+    n = content.still.instants
+    if not content.still.floors:
         words = (
-            "No still phase was found: fewer than three instants before anything moves. With the specimen at rest"
+            "No still phase was found: fewer than two instants before anything moves. With the specimen at rest"
             " for a few seconds at the start of a test the noise floor is measured there."
         )
         return [paragraph(words, "open")]
     rows = []
-    for noise in content.noise:
-        factor, unit = (1.0, "px") if noise.name in ("u", "v") else (1e6, "µm/m")
+    for name, noise in content.still.floors.items():
+        factor, unit = (1.0, "px") if name in ("u", "v") else (1e6, "µm/m")
         ratio = f"{noise.measured / noise.predicted:.2f}" if noise.predicted else "not known"
-        rows.append(
-            (noise.name, f"{noise.measured * factor:.3g}", f"{noise.predicted * factor:.3g}", unit, ratio)
-        )
+        rows.append((name, f"{noise.measured * factor:.3g}", f"{noise.predicted * factor:.3g}", unit, ratio))
     words = (
         f"Standard deviation of single ZOIs in the first {n} instants (to {content.run.strain.time_s[n - 1]:.4g} s),"
         " in which nothing moves yet: displacements about a plane, strains about their mean. Predicted: from the"

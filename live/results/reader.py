@@ -137,6 +137,12 @@ class Strain(Closing):
         except (OSError, RuntimeError) as error:
             raise DataError(f"{self.path}: map {name!r} cannot be read ({error}); make it again") from error
 
+    @property
+    def force_one_zero(self) -> NDArray[np.float64]:
+        """The force as if the zero of the first instant had held to the end, (T,) N: no tare in mid-test."""
+        force, zero = np.asarray(self.values["force_N"], np.float64), self.values.get("zero_N")
+        return force if zero is None else force + np.asarray(zero - zero[:1], np.float64)
+
     def to_xarray(self, *fields: str) -> Any:
         """Maps and means as an ``xarray.Dataset`` with coordinates ``time`` (s), ``y`` and ``x`` (px) and units.
 

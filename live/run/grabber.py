@@ -13,7 +13,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from acquire.burst import LIMIT_PX, BurstAccumulator
+from acquire.burst import BurstAccumulator
 from acquire.camera import Camera
 from acquire.errors import PhasedicError
 from acquire.events import EventKind, Muffler
@@ -38,21 +38,18 @@ class GrabPlan:
         Frames in each.
     seconds : float, s
         End after this time of frames.
-    shorten_above_px : float or None, px
-        Shorten bursts within which the picture moves by more.
     """
 
     burst: int
     reference_burst: int
     seconds: float = math.inf
-    shorten_above_px: float | None = None
 
     @classmethod
     def of(cls, config: Config, bursts: tuple[int, int]) -> GrabPlan:
         """The plan of a configuration; ``bursts`` are the frames in the reference and in a measured burst."""
         reference, burst = bursts
         seconds = math.inf if config.output.seconds is None else config.output.seconds
-        return cls(burst, reference, seconds, LIMIT_PX if config.measure.shorten_bursts else None)
+        return cls(burst, reference, seconds)
 
 
 def _held_at_first(camera: CameraInfo) -> int:
@@ -100,16 +97,13 @@ class Grabber:
         self.error: Exception | None = None
         self.fps = 0.0
         self._taker: ReferenceTaker | None = ReferenceTaker(plan.reference_burst)
-        self._accumulator = self._new_accumulator()
+        self._accumulator = BurstAccumulator(plan.burst)
         self._fed = 0
         self._muffler, self._unsaid = Muffler(), 0
         self._first_t: float | None = None
         self._last_t: float | None = None
         self._retake = threading.Event()
         self._thread = threading.Thread(target=self._work, name="grab", daemon=True)
-
-    def _new_accumulator(self) -> BurstAccumulator:
-        return BurstAccumulator(self._plan.burst, shorten_above_px=self._plan.shorten_above_px)
 
     def start(self) -> None:
         """Begin to drain the camera, which must have been entered."""
@@ -186,7 +180,7 @@ class Grabber:
         self._used(reference.burst.n)
         self._on_burst(reference.burst)
         self._ledger.add(reference=reference.burst.n)
-        self._taker, self._accumulator = None, self._new_accumulator()
+        self._taker, self._accumulator = None, BurstAccumulator(self._plan.burst)
         self.references.put(reference)
 
     def _used(self, n: int) -> None:

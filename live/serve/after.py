@@ -5,13 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from analysis.evaluate import Figure, TensileFigures
+from analysis.evaluate import TensileFigures
 from live.setup import SpecimenConfig
-from live.tell import Books, evaluate, interval, sentence, summary_lines
-
-_PLAIN = (("nu", "nu", 1.0, ""),)
-_STRESSES = (("E", "E", 1e9, "GPa"), ("Rp0.2", "Rp02", 1e6, "MPa"), ("Rm", "Rm", 1e6, "MPa"))
-_FORCES = (("EA", "E", 1e3, "kN"), ("Fp0.2", "Rp02", 1.0, "N"), ("Fm", "Rm", 1.0, "N"))
+from live.tell import Books, TensileRow, evaluate, headline, sentence, summary_lines
 
 
 def ended(books: Books, specimen: SpecimenConfig, folder: Path, words: str) -> dict[str, Any]:
@@ -29,12 +25,10 @@ def ended(books: Books, specimen: SpecimenConfig, folder: Path, words: str) -> d
 
 
 def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str, Any]]:
-    known = _FORCES if specimen.area_m2 is None else _STRESSES
-    ordered = (known[0], *_PLAIN, *known[1:])
-    return [_figure(name, getattr(figures, key), unit_is, unit) for name, key, unit_is, unit in ordered]
+    return [_figure(row) for row in headline(figures, stresses=specimen.area_m2 is not None)]
 
 
-def _figure(name: str, figure: Figure, unit_is: float, unit: str) -> dict[str, Any]:
-    if not figure.known:
-        return {"name": name, "text": None, "why": figure.why}
-    return {"name": name, "text": interval(figure, unit_is, unit).replace("+-", "±"), "why": ""}
+def _figure(row: TensileRow) -> dict[str, Any]:
+    if not row.figure.known:
+        return {"name": row.name, "text": None, "why": row.figure.why}
+    return {"name": row.name, "text": row.text.replace("+-", "±"), "why": ""}

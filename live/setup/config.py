@@ -38,6 +38,11 @@ from live.setup.sections import (
 
 Section = TypeVar("Section")
 MOST_BYTES = 10**6  # of a configuration file
+_WITHDRAWN = {
+    ("measure", "shorten_bursts"): "a burst keeps its length; leave it out, and take a smaller measure.burst"
+    " where the picture moves",
+}
+"""Keys of earlier versions, with what to do: left out of a stored configuration, refused in a new one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +102,15 @@ def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
 
 
 def from_dict(stored: Mapping[str, Any], overrides: Mapping[str, Any], where: str) -> Config:
-    """The configuration stored in a file, with ``overrides`` laid over it; raises ConfigError."""
-    return _overlaid(_without_none(stored), overrides, where)
+    """The configuration stored in a file, with ``overrides`` laid over it; raises ConfigError.
+
+    Keys of earlier versions that are withdrawn are left out.
+    """
+    tree = _without_none(stored)
+    for section, key in _WITHDRAWN:
+        if isinstance(tree.get(section), dict):
+            tree[section].pop(key, None)
+    return _overlaid(tree, overrides, where)
 
 
 def settings_in(path: Path) -> dict[str, Any]:
@@ -189,6 +201,8 @@ def _section(
     fields = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
     values = {}
     for key, value in content.items():
+        if (name, key) in _WITHDRAWN:
+            raise ConfigError(f"{where}: {name}.{key} is withdrawn: {_WITHDRAWN[name, key]}")
         if key not in fields:
             raise ConfigError(f"{where}: unknown key {name}.{key}{_meant(key, list(fields))}")
         try:

@@ -141,7 +141,6 @@ class MeasureConfig:
         Option("noise", "GL"),
         optional=True,
     )
-    shorten_bursts: bool = key(FLAG, False, "shorten bursts while the picture moves more than 0.05 px in one")
     renew_at: float = key(
         number(0, 1), 0.2, "share of ZOIs lost from one burst to the next that renews the reference; 1 never"
     )

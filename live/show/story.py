@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Frame, frozen
-from analysis.evaluate import Curve, evaluate_test
+from analysis.evaluate import evaluate_test
 from live.finished import RunFolder
 from live.setup import from_dict, outlines
 from live.tell import figure_lines, options_of
@@ -169,9 +169,7 @@ def _events(run: RunFolder) -> Iterator[Message]:
 
 def _status(run: RunFolder) -> str:
     """The figures of the test and the gauges at its end, as Markdown."""
-    load = run.force / (run.specimen.area_m2 or 1.0)
-    curve = Curve(np.asarray(run.strain.time_s, np.float64), run.axial_strain, load, run.transverse_strain)
-    lines = figure_lines(evaluate_test(curve, options_of(run.specimen)), run.specimen)
+    lines = figure_lines(evaluate_test(run.curve, options_of(run.specimen)), run.specimen)
     lines += [
         f"gauge **{name}** {gauge.value[-1] * 1e6:+.0f} ± {gauge.sigma[-1] * 1e6:.0f} µm/m at the end"
         for name, gauge in run.gauges.items()

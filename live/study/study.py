@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
 from acquire.frame import Burst
+from analysis.evaluate import noise_floor
 from analysis.quality import gauge_length, l10_strain
 from live.measure import averaged, prepare
 from live.replay import Material
@@ -141,7 +142,8 @@ def _found(setting: Setting, axis: str, still: list[StrainField], loaded: list[S
         raise ConfigError(f"{setting.words}: fewer than two ZOIs have a value in both windows; leave it out")
     sigmas = _stacked(still or loaded, f"sigma_{name}")
     predicted = math.sqrt(float(np.mean(sigmas[:, known] ** 2)))
-    noise = math.sqrt(float(np.mean([np.var(one[known], ddof=1) for one in at_rest]))) if still else predicted
+    floor = noise_floor(zip(np.where(known, at_rest, np.nan), sigmas, strict=True)) if still else None
+    noise = predicted if floor is None else floor.measured
     first, second = (np.where(known, pulled[k::2].mean(0) - at_rest[k::2].mean(0), np.nan) for k in (0, 1))
     grid = loaded[0].grid
     share = 1 / len(pulled[1::2]) + (1 / len(still[1::2]) if still else 0)

@@ -10,12 +10,12 @@ import numpy as np
 
 from acquire.errors import DataError
 from acquire.frame import Burst
+from analysis.evaluate import FEWEST_STILL, evenly, still_phase
 from live.replay import Material
 
-_STILL_FORCE = 0.01  # of the range of the force
 _LOADED_FORCE = 0.98  # of the highest
 MOST_STILL, MOST_LOADED = 8, 6
-LEAST_STILL, LEAST_LOADED = 2, 2
+LEAST_STILL, LEAST_LOADED = FEWEST_STILL, 2
 
 Seconds = tuple[float, float]
 
@@ -28,14 +28,10 @@ class Windows:
     ----------
     still, loaded : tuple of Burst
         At least two each; no still ones where there were none.
-    still_s, loaded_s : (float, float), s
-        Since the start, as they were taken.
     """
 
     still: tuple[Burst, ...]
     loaded: tuple[Burst, ...]
-    still_s: Seconds
-    loaded_s: Seconds
 
 
 NEVER: Seconds = (math.inf, -math.inf)
@@ -50,7 +46,7 @@ def take_windows(material: Material, still: Seconds | None, loaded: Seconds | No
     DataError
         There are not enough bursts in one, or no force tells it.
     """
-    told = (still or _still(material), loaded or _loaded(material))
+    told = (still or still_window(material), loaded or _loaded(material))
     found: tuple[list[Burst], list[Burst]] = ([], [])
     for item in material.bursts:
         if not isinstance(item, Burst):
@@ -68,22 +64,33 @@ def take_windows(material: Material, still: Seconds | None, loaded: Seconds | No
             raise DataError(
                 f"{len(bursts)} bursts from {low:.3g} to {high:.3g} s, {least} are needed; give --{name} A,B"
             )
-    return Windows(_spread(found[0], MOST_STILL), _spread(found[1], MOST_LOADED), *told)
+    return Windows(_spread(found[0], MOST_STILL), _spread(found[1], MOST_LOADED))
+
+
+def _untold(option: str) -> DataError:
+    return DataError(f"no force tells when it was still and when loaded; give --{option} A,B in seconds")
 
 
 def _forces(material: Material, option: str) -> tuple[np.ndarray, np.ndarray]:
     t, force = material.loads.arrays()
     if not len(t) or not np.isfinite(force).any():
-        raise DataError(f"no force tells when it was still and when loaded; give --{option} A,B in seconds")
+        raise _untold(option)
     return t - material.start.monotonic, force
 
 
-def _still(material: Material) -> Seconds:
-    """Until the force has left its first value."""
-    t, force = _forces(material, "static")
-    first = force[np.isfinite(force)][0]
-    left = np.abs(force - first) > _STILL_FORCE * (np.nanmax(force) - np.nanmin(force))
-    return (-math.inf, float(t[int(np.argmax(left))]) if left.any() else float(t[-1]))
+def still_window(material: Material) -> Seconds:
+    """The still phase by the force at the bursts, as report and batch find it once they are measured.
+
+    Raises
+    ------
+    DataError
+        No force tells it.
+    """
+    times = np.zeros(0) if material.times is None else material.times
+    count = still_phase(material.loads.forces_one_zero(times.tolist()))
+    if not count:
+        raise _untold("static")
+    return -math.inf, float(times[count - 1]) - material.start.monotonic
 
 
 def _loaded(material: Material) -> Seconds:
@@ -100,5 +107,4 @@ def _loaded(material: Material) -> Seconds:
 
 def _spread(bursts: Sequence[Burst], most: int) -> tuple[Burst, ...]:
     """At most ``most`` of them, evenly."""
-    rows = np.unique(np.linspace(0, len(bursts) - 1, min(most, len(bursts))).round().astype(int))
-    return tuple(bursts[row] for row in rows)
+    return tuple(bursts[row] for row in evenly(len(bursts), most))

@@ -2,26 +2,20 @@
 
 ``books`` holds what is kept of a test: ``journal`` has every event, ``ledger`` the fate of every frame,
 ``board`` the alarms that are on, ``screen`` the terminal, ``status_line`` its last line, ``card`` the status in
-the view, ``figures`` those of a tensile test in words, ``summary`` all that is said at the end.
+the view, ``tensile_table`` the figures of a tensile test with their units, ``figures`` all of them in words,
+``summary`` all that is said at the end.
 """
 
 from live.tell.board import AlarmBoard, Vitals
 from live.tell.books import Books
 from live.tell.card import StatusCard
-from live.tell.figures import (
-    axis_words,
-    elastic_lines,
-    evaluate,
-    figure_lines,
-    interval,
-    options_of,
-    quantity,
-)
+from live.tell.figures import axis_words, elastic_lines, evaluate, figure_lines, options_of
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen, say
 from live.tell.status_line import duration
 from live.tell.summary import file_lines, summary_lines
+from live.tell.tensile_table import TensileRow, headline, interval, quantity, tensile_table
 
 __all__ = [
     "AlarmBoard",
@@ -30,6 +24,7 @@ __all__ = [
     "Ledger",
     "Screen",
     "StatusCard",
+    "TensileRow",
     "Vitals",
     "axis_words",
     "duration",
@@ -37,10 +32,12 @@ __all__ = [
     "evaluate",
     "figure_lines",
     "file_lines",
+    "headline",
     "interval",
     "options_of",
     "quantity",
     "say",
     "sentence",
     "summary_lines",
+    "tensile_table",
 ]

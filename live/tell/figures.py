@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 
 from acquire.load_cell import LoadLog
 from analysis.evaluate import (
     CONFIDENCE,
     STANDARDS,
     Curve,
-    Figure,
     Interval,
     LoadAxis,
     Options,
@@ -21,32 +21,10 @@ from analysis.evaluate import (
 )
 from live.measure import History
 from live.setup import SpecimenConfig
+from live.tell.tensile_table import TensileRow, interval, tensile_table
 
-_STRENGTHS = (
-    ("Rp0.1", "Rp01"),
-    ("Rp0.2", "Rp02"),
-    ("Rp1", "Rp1"),
-    ("ReH", "ReH"),
-    ("ReL", "ReL"),
-    ("Rm", "Rm"),
-)
+_STRENGTHS = ("Rp01", "Rp02", "Rp1", "ReH", "ReL", "Rm")
 _EXTENSIONS = ("Ag", "Agt", "A", "At")
-
-
-def quantity(value: float, sigma: float, unit: str) -> str:
-    """``value +- sigma unit`` with as many digits as the uncertainty deserves."""
-    if not math.isfinite(value):
-        return "not known"
-    if not math.isfinite(sigma) or sigma <= 0:
-        return f"{value:.4g} {unit}".rstrip()
-    digits = max(0, min(6, 1 - math.floor(math.log10(sigma))))
-    return f"{value:.{digits}f} +- {sigma:.{digits}f} {unit}".rstrip()
-
-
-def interval(figure: Figure, unit_is: float = 1.0, unit: str = "") -> str:
-    """A figure with the larger half of its interval, in a unit that is ``unit_is`` of ours."""
-    half = max(figure.high - figure.value, figure.value - figure.low)
-    return quantity(figure.value / unit_is, half / unit_is, unit)
 
 
 def evaluate(history: History, loads: LoadLog, specimen: SpecimenConfig) -> TensileFigures:
@@ -109,55 +87,50 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
     """E, nu and the strengths in words; nothing where the curve told nothing."""
     if not figures.E.known or figures.span is None:
         return []
-    if specimen.area_m2 is None:
-        stiffness = interval(figures.E, 1e3, "kN per unit strain")
-        first = f"EA = {stiffness} (give [specimen] width_mm and thickness_mm for E)"
-        second = f"highest force {figures.Rm.value:.4g} N"
-    else:
-        first = f"E = {interval(figures.E, 1e9, 'GPa')}"
-        second = "  ".join(strengths(figures))
-    nu = f"nu = {interval(figures.nu)}"
-    return [f"{first}  {nu}  ({figures.span.n} points, +-: {CONFIDENCE:.0%} interval)", second]
+    rows = _rows(figures, specimen)
+    hint = "" if specimen.area_m2 else " (give [specimen] width_mm and thickness_mm for E)"
+    words = f"  {_said(rows, 'nu')}  ({figures.span.n} points, +-: {CONFIDENCE:.0%} interval)"
+    return [_said(rows, "E") + hint + words, _known(rows, _STRENGTHS)]
 
 
-def strengths(figures: TensileFigures) -> list[str]:
-    """Those that are known, MPa."""
-    found = [(words, getattr(figures, name)) for words, name in _STRENGTHS]
-    return [f"{words} = {interval(figure, 1e6, 'MPa')}" for words, figure in found if figure.known]
+def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> dict[str, TensileRow]:
+    return tensile_table(figures, stresses=specimen.area_m2 is not None)
+
+
+def _said(rows: Mapping[str, TensileRow], key: str) -> str:
+    return f"{rows[key].name} = {rows[key].text}"
+
+
+def _known(rows: Mapping[str, TensileRow], keys: Sequence[str]) -> str:
+    return "  ".join(_said(rows, key) for key in keys if rows[key].figure.known)
 
 
 def figure_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]:
     """All of a test: what ``elastic_lines`` says, how it was had, extensions, rates, and what cannot be had."""
-    lines, span = elastic_lines(figures, specimen), figures.span
-    if span is None:
+    rows, span = _rows(figures, specimen), figures.span
+    lines = elastic_lines(figures, specimen) or [line for line in [_known(rows, _STRENGTHS)] if line]
+    if not lines:
         return []
-    low, high = span.strain
-    lines.append(
-        f"  {figures.standard}: strains {100 * low:.3f} to {100 * high:.3f} %, R2 = {figures.r2:.5f}, by chord"
-        f" {_chord(figures, specimen)}; strain counts {figures.zero.how}"
-    )
-    known = [(name, getattr(figures, name)) for name in _EXTENSIONS if getattr(figures, name).known]
-    if known:
+    if span is not None:
+        low, high = span.strain
+        lines.append(
+            f"  {figures.standard}: strains {100 * low:.3f} to {100 * high:.3f} %, R2 = {figures.r2:.5f}, by chord"
+            f" {rows['E_chord'].text}; strain counts {figures.zero.how}"
+        )
+    if extensions := _known(rows, _EXTENSIONS):
         length = f"  (gauge length {specimen.gauge_length_mm:g} mm)" if specimen.gauge_length_mm else ""
-        lines.append("  ".join(f"{name} = {interval(figure, 0.01, '%')}" for name, figure in known) + length)
+        lines.append(extensions + length)
     if figures.rate_elastic.known:
         words = f" ({figures.rate_elastic.why})" if figures.rate_elastic.why else ""
         lines.append(f"strain rate {figures.rate_elastic.value:.3g} 1/s in the elastic part{words}")
-    return lines + _unknown(figures)
+    return lines + _unknown(rows)
 
 
-def _chord(figures: TensileFigures, specimen: SpecimenConfig) -> str:
-    if specimen.area_m2 is None:
-        return interval(figures.E_chord, 1e3, "kN per unit strain")
-    return interval(figures.E_chord, 1e9, "GPa")
-
-
-def _unknown(figures: TensileFigures) -> list[str]:
+def _unknown(rows: Mapping[str, TensileRow]) -> list[str]:
     """Which figures of the standard are not known, and why, a line for each reason."""
-    names = [*(_STRENGTHS), *((name, name) for name in _EXTENSIONS), ("nu", "nu")]
     reasons: dict[str, list[str]] = {}
-    for words, name in names:
-        figure: Figure = getattr(figures, name)
+    for key in ("E", *_STRENGTHS, *_EXTENSIONS, "nu"):
+        figure = rows[key].figure
         if not figure.known and not figure.why.startswith("not a figure of"):
-            reasons.setdefault(figure.why, []).append(words)
+            reasons.setdefault(figure.why, []).append(rows[key].name)
     return [f"not known: {', '.join(words)} ({why})" for why, words in reasons.items()]

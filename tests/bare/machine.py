@@ -111,7 +111,9 @@ def mirror() -> str:
     for site in sites:
         if site.rstrip("/").endswith("/debian"):
             return site
-    raise NoMachine("apt has no mirror of Debian; `apt-get update` on a Debian machine shows whether it has one")
+    raise NoMachine(
+        "apt has no mirror of Debian; `apt-get update` on a Debian machine shows whether it has one"
+    )
 
 
 def recipe(suite: str) -> list[str | Path]:

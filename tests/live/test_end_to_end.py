@@ -304,7 +304,6 @@ def test_an_armed_run_records_from_a_little_before_the_order_to_the_end_of_it(
         {"record.mode": "bursts"},
         {"camera.crop": (16, 8, 160, 152)},
         {"record.mode": "bursts", "camera.crop": (16, 8, 160, 152)},
-        {"measure.shorten_bursts": True, "measure.burst": 6},
     ],
 )
 def test_what_is_recorded_in_part_replays_bit_equal(tmp_path: Path, how: dict[str, Any]) -> None:

@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from acquire.printable import printable
-from analysis.evaluate import Figure, TensileFigures
-from live.batch.work.noise import measured_noise
+from analysis.evaluate import TensileFigures
 from live.measure import History
 from live.replay import Replayed
+from live.results import Strain, still_phase_of
 from live.setup import Config
-from live.tell import evaluate
+from live.tell import evaluate, headline
 
 Value = str | int | float | None
 COLUMNS: dict[str, type] = {
@@ -90,7 +91,7 @@ def row_of(name: str, source: str, done: Replayed, seconds: float) -> Row:
             **_counts(history),
             **_figures(evaluate(history, done.books.loads, done.config.specimen), done.config),
             **_noise(history),
-            **measured_noise(done.folder / "strain.h5", history.forces(done.books.loads)),
+            **_noise_floor(done.folder / "strain.h5"),
             "frames_lost": done.books.ledger.lost,
             "pictures_left_out": done.left_out,
             "seconds": round(seconds, 3),
@@ -117,25 +118,25 @@ def _counts(history: History) -> dict[str, Any]:
     return found if last is None else {**found, "zois": last.n_zoi, "valid_last": last.n_valid}
 
 
-def _figures(figures: TensileFigures, config: Config) -> dict[str, Any]:
+def _figures(figures: TensileFigures, config: Config) -> dict[str, float]:
     """Stresses where the section is known, else forces."""
-    if config.specimen.area_m2 is None:
-        known = {"EA_kN": figures.E.over(1e3), "nu": figures.nu, "Fp0.2_kN": figures.Rp02.over(1e3)}
-        known["Fm_kN"] = figures.Rm.over(1e3)
-    else:
-        known = {"E_GPa": figures.E.over(1e9), "nu": figures.nu, "Rp0.2_MPa": figures.Rp02.over(1e6)}
-        known["Rm_MPa"] = figures.Rm.over(1e6)
-    return {key: value for name, figure in known.items() for key, value in _interval(name, figure).items()}
-
-
-def _interval(name: str, figure: Figure) -> dict[str, float]:
-    return {name: figure.value, f"{name}_low": figure.low, f"{name}_high": figure.high}
+    rows = headline(figures, stresses=config.specimen.area_m2 is not None)
+    parts = {"": "value", "_low": "low", "_high": "high"}
+    return {row.column + end: getattr(row.figure, part) for row in rows for end, part in parts.items()}
 
 
 def _noise(history: History) -> dict[str, float]:
     """Typical of the test: of one frame, of one ZOI's strain and of the mean strain, as predicted."""
     columns = {"noise_GL": "noise_GL", "strain_noise": "zoi_sigma", "mean_strain_noise": "sigma_eyy"}
     return {name: _median(history, column) for name, column in columns.items()}
+
+
+def _noise_floor(results: Path) -> dict[str, Any]:
+    """The still phase, and the scatter of one ZOI's eyy in it."""
+    with Strain.open(results) as strain:
+        still = still_phase_of(strain, ("eyy",))
+    floor = still.floors.get("eyy")
+    return {"still_instants": still.instants, "strain_noise_measured": floor and floor.measured}
 
 
 def _median(history: History, column: str) -> float:

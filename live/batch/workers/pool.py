@@ -36,12 +36,6 @@ class Pool:
         for thread in self._threads:
             thread.start()
 
-    @property
-    def pids(self) -> list[int]:
-        """Of the processes at work."""
-        with self._lock:
-            return [worker.pid for worker in self._workers]
-
     def wait(self, seconds: float) -> bool:
         """Whether all is done within ``seconds``."""
         for thread in self._threads:

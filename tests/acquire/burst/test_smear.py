@@ -1,17 +1,14 @@
 from __future__ import annotations
 
-import itertools
 import math
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from acquire.burst.accumulate import BurstAccumulator, average_bursts, burst_of
-from acquire.burst.smear import motion_between_frames, shortened
+from acquire.burst.accumulate import burst_of
+from acquire.burst.smear import motion_between_frames
 from acquire.frame import Frame, frozen
 
 
@@ -69,26 +66,3 @@ def test_a_burst_tells_its_motion_over_the_whole_of_its_frames() -> None:
     burst = burst_of([frame(waves(u=0.02 * k), k) for k in range(4)])
     assert burst.motion_px == pytest.approx(0.08, rel=0.15)
     assert math.isnan(burst_of([frame(waves(), 0)]).motion_px)
-
-
-def test_bursts_are_shortened_while_the_picture_moves_and_grow_again() -> None:
-    speeds = [0.0] * 8 + [0.02] * 24 + [0.0] * 24
-    places = itertools.accumulate(speeds, initial=0.0)
-    frames = [frame(waves(u=place), k) for k, place in enumerate(places)]
-    accumulator = BurstAccumulator(8, shorten_above_px=0.05)
-    lengths = [burst.n for burst in map(accumulator.add, frames) if burst]
-    assert lengths[0] == 8
-    assert min(lengths) == 2
-    assert lengths[-1] == 8
-    again = BurstAccumulator(8, shorten_above_px=0.05)
-    assert [burst.n for burst in map(again.add, frames) if burst] == lengths
-    assert {burst.n for burst in average_bursts(frames, 8)} == {8}
-
-
-@given(st.integers(1, 64), st.one_of(st.just(math.nan), st.floats(0, 1e3)), st.integers(1, 64))
-def test_the_next_length_is_always_possible(length: int, motion: float, longest: int) -> None:
-    length = min(length, longest)
-    following = shortened(length, motion, longest)
-    assert 1 <= following <= longest
-    if motion > 0.05 and length > 2:
-        assert following < length

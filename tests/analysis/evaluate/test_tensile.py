@@ -217,3 +217,16 @@ def test_the_direction_of_the_load_is_found(degrees: float) -> None:
 def test_the_last_sample_before_a_break(stress: list[float], last: int | None) -> None:
     """Also of a test that has hardly begun, whose first value was the highest: without a warning."""
     assert broken_at(np.array(stress, float)) == last
+
+
+def test_the_highest_stress_needs_no_strain() -> None:
+    """Where strain is lost before the highest stress, and where there are too few points for anything else."""
+    curve = noisy(ramberg_osgood(), 0)
+    top = int(np.argmax(curve.stress))
+    lost = replace(curve, strain=np.where(np.arange(len(curve.t)) < top - 5, curve.strain, math.nan))
+    assert evaluate_test(lost).Rm.value == curve.stress[top]
+    few = evaluate_test(Curve(np.arange(3.0), np.full(3, math.nan), np.array([0.0, 2e6, 1e6])))
+    assert few.Rm.value == 2e6
+    assert known(few) == {"Rm"}
+    pressed = evaluate_test(Curve(np.arange(3.0), np.zeros(3), np.array([0.0, -2e6, -1e6])))
+    assert pressed.Rm.why == "no tensile stress is known"

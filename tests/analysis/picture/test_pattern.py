@@ -11,7 +11,6 @@ from analysis.picture.pattern import (
     autocorrelation_fwhm,
     clipped_share,
     describe_pattern,
-    noise_of_burst,
     noise_of_picture,
     predicted_sigma,
     resolution_length,
@@ -55,14 +54,10 @@ def test_nothing_but_noise_has_no_size() -> None:
     assert math.isnan(autocorrelation_fwhm(noise, 1.1 * noise.std()))
 
 
-def test_noise_of_a_burst_and_of_a_picture(speckle: Speckle) -> None:
-    rng = np.random.default_rng(3)
+def test_noise_of_a_picture(speckle: Speckle) -> None:
     light = speckle.reference() * FULL
-    frames = light + 20 * rng.standard_normal((4, *light.shape))
-    assert noise_of_burst(frames) == pytest.approx(20, rel=0.02)
-    assert noise_of_picture(frames[0]) == pytest.approx(20, rel=0.05)
-    with pytest.raises(ValueError, match="at least 2"):
-        noise_of_burst(frames[:1])
+    picture = light + 20 * np.random.default_rng(3).standard_normal(light.shape)
+    assert noise_of_picture(picture) == pytest.approx(20, rel=0.05)
 
 
 def test_clipped_share() -> None:

@@ -1,4 +1,4 @@
-"""Instants, elastic line, still phase and noise floor of tests whose truth is known."""
+"""Instants and elastic line of tests whose truth is known."""
 
 from __future__ import annotations
 
@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.field.strain_field import StrainField
 from live.finished import open_run
 from live.report.comparison import summary
-from live.report.evaluation import Curve, instants, nearest_rows, noise_floor, still_rows
-from tests.live.made_run import CONFIG, E_PA, PULLED, YIELD, make_run, noisy
+from live.report.evaluation import Curve, instants, nearest_rows
+from tests.live.made_run import CONFIG, E_PA, PULLED, YIELD, make_run
 
 
 def test_the_line_and_the_instants(run_dir: Path) -> None:
@@ -34,24 +33,6 @@ def test_the_line_and_the_instants(run_dir: Path) -> None:
 def test_chosen_instants(run_dir: Path) -> None:
     with open_run(run_dir) as run:
         assert nearest_rows(run, (2.04, 0.0)) == {0: "chosen", 20: "chosen"}
-
-
-def test_the_still_phase_ends_where_the_pull_begins(run_dir: Path) -> None:
-    with open_run(run_dir) as run:
-        assert list(still_rows(run)) == list(range(8))
-
-
-@pytest.mark.parametrize("share", [1.0, 0.5])
-def test_the_noise_floor_is_that_of_the_maps(tmp_path: Path, share: float) -> None:
-    def field(number: int, strain: float) -> StrainField:
-        return noisy(number, strain, sigma=1e-5, stated=share * 1e-5)
-
-    with open_run(make_run(tmp_path, [0.0] * 60, session=False, field_of=field)) as run:
-        found = {n.name: n for n in noise_floor(run, np.arange(60))}
-    for name in ("u", "v", "exx", "eyy"):
-        assert found[name].measured == pytest.approx(1e-5, rel=0.06), name
-        assert found[name].predicted == pytest.approx(share * 1e-5, rel=1e-3)
-    assert found["exy"].measured == pytest.approx(1e-5 / np.sqrt(2), rel=0.06)
 
 
 def test_without_section_there_are_forces(tmp_path: Path) -> None:

@@ -45,6 +45,14 @@ def test_stored_configuration_comes_back() -> None:
     assert from_dict(config.as_dict(), {}, "a session") == config
 
 
+@pytest.mark.parametrize("value", [False, True, "x"])
+def test_a_withdrawn_key_of_an_older_version_is_left_out(value: Any) -> None:
+    config = load_config(None, {"measure.burst": 3})
+    stored = config.as_dict()
+    stored["measure"]["shorten_bursts"] = value
+    assert from_dict(stored, {}, "a session") == config
+
+
 def test_gauges_come_back_and_are_added_to() -> None:
     said = {"gauges.axial": {"start": [10, 20.5], "end": [10, 90]}}
     config = load_config(None, said)
@@ -83,6 +91,10 @@ def test_a_file_sets_only_what_it_says(tmp_path: Path) -> None:
         ("[gauges.hole]\ncorners = [[1, 2], [3, 4]]\n", "3 to 100 corners"),
         ("[load]\nmax_gap_s = inf\n", "load.max_gap_s"),
         ("measure = 3\n", "must be a section"),
+        (
+            "[measure]\nshorten_bursts = true\n",
+            "measure.shorten_bursts is withdrawn: a burst keeps its length",
+        ),
         ("[metadata]\nx = [1]\n", "metadata.x"),
         ("[measure\n", "not valid TOML"),
     ],

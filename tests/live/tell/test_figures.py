@@ -90,8 +90,8 @@ def test_without_a_section_forces_stand_for_stresses() -> None:
     history, loads = kept(ramberg_osgood())
     specimen = SpecimenConfig(zero="preload")
     lines = elastic_lines(evaluate(history, loads, specimen), specimen)
-    assert lines[0].startswith("EA = 1") and "kN per unit strain" in lines[0]
-    assert "highest force" in lines[1]
+    assert lines[0].startswith("EA = 1") and " kN (give [specimen]" in lines[0]
+    assert "Fp0.2 = " in lines[1] and "Fm = " in lines[1]
 
 
 def test_the_lag_of_the_load_is_told() -> None:

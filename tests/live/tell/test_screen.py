@@ -11,11 +11,11 @@ import pytest
 
 from acquire.events import Event, EventKind
 from live.measure import Instant, Snapshot
-from live.tell.figures import quantity
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
 from live.tell.screen import Screen
 from live.tell.status_line import status_line
+from live.tell.tensile_table import quantity
 
 
 class Terminal(io.StringIO):

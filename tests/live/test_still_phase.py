@@ -1,0 +1,84 @@
+"""Report, batch and study find the same in the same run: still phase, noise floor, tensile figures."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from live.batch.work import Task, perform
+from live.cli import main
+from live.finished import open_run
+from live.replay import ReplayRequest, open_material
+from live.report import Wanted, make_report
+from live.report.evaluation import Curve
+from live.results import still_phase_of
+from live.study.windows import still_window
+from live.tell import Screen, headline
+from tests.live.made_run import make_run, noisy
+
+CAMERA = "sim:hole?lockstep=yes&seconds=6&fps=10&width=320&height=288&bits=12&hole=24&hold=2&end=1"
+SETTINGS = {"measure.zoi": 32, "measure.step": 16, "measure.burst": 2, "measure.reference_burst": 6}
+
+
+def reported(folder: Path) -> tuple[int, str]:
+    """Still instants, and the noise of eyy in um/m, as the page has them."""
+    with open_run(folder) as run:
+        html = make_report(run, Wanted(), Screen(quiet=True)).html
+    instants = re.search(r"in the first (\d+) instants", html)
+    eyy = re.search(r"<td>eyy</td><td[^>]*>([\d.]+)</td>", html)
+    assert instants is not None and eyy is not None
+    return int(instants[1]), eyy[1]
+
+
+def test_one_still_phase_and_one_table_in_report_batch_and_study(tmp_path: Path) -> None:
+    words = ["--zoi", "32", "--step", "16", "--burst", "2", "--reference-burst", "6", "--no-view", "--no-rrd"]
+    assert main(["run", "--camera", CAMERA, "--load", "sim:", *words, "--out", str(tmp_path / "run")]) == 0
+    session = str(tmp_path / "run" / "session.h5")
+    row = perform(Task("again", str(tmp_path), session, overrides=SETTINGS)).values
+    with open_material(ReplayRequest(session, False, None, None, None, None, SETTINGS)) as (material, _):
+        assert material.times is not None
+        low, high = (material.start.monotonic + limit for limit in still_window(material))
+        studied = np.count_nonzero((material.times >= low) & (material.times <= high))
+    with open_run(tmp_path / "again") as run:
+        found = headline(Curve.of(run).figures, stresses=False)
+    for figure in found:
+        value = pytest.approx(figure.figure.value) if figure.figure.known else None
+        assert row[figure.column] == value, figure.name
+    assert [figure.name for figure in found if figure.figure.known] == ["Fm"]
+    instants, noise = reported(tmp_path / "again")
+    assert instants == row["still_instants"] == studied == 7
+    assert reported(tmp_path / "run") == (instants, noise)
+    assert isinstance(row["strain_noise_measured"], float)
+    assert float(noise) == pytest.approx(1e6 * row["strain_noise_measured"], rel=5e-3)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5])
+def test_the_noise_floor_is_that_of_the_maps(tmp_path: Path, share: float) -> None:
+    """A rig that shakes, and strain that varies later, are not taken for noise."""
+    strains = (*[0.0] * 60, *np.linspace(1e-4, 3e-3, 20))
+    folder = make_run(
+        tmp_path, strains, session=False, field_of=lambda k, strain: noisy(k, strain, 1e-5, share * 1e-5)
+    )
+    with open_run(folder) as run:
+        still = still_phase_of(run.strain)
+    assert still.instants == 60
+    for name in ("u", "v", "exx", "eyy"):
+        assert still.floors[name].measured == pytest.approx(1e-5, rel=0.06), name
+        assert still.floors[name].predicted == pytest.approx(share * 1e-5, rel=1e-3)
+    assert still.floors["exy"].measured == pytest.approx(1e-5 / np.sqrt(2), rel=0.06)
+
+
+def test_without_a_force_the_strains_tell(tmp_path: Path) -> None:
+    strains = (*[0.0] * 10, *np.linspace(1e-4, 3e-3, 20))
+    with open_run(make_run(tmp_path, strains, session=False)) as run:
+        run.strain.values["force_N"][:] = np.nan
+        assert still_phase_of(run.strain).instants == 10
+
+
+def test_one_still_instant_gives_no_floor(tmp_path: Path) -> None:
+    with open_run(make_run(tmp_path, [0.0, *np.linspace(1e-4, 3e-3, 20)], session=False)) as run:
+        still = still_phase_of(run.strain)
+    assert (still.instants, still.floors) == (1, {})
