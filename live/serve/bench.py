@@ -20,12 +20,13 @@ from acquire.files import write_picture
 from acquire.frame import CameraInfo, Frame
 from acquire.printable import brief, printable
 from live.check import Figures, Line, Watch, examine, judge
+from live.maps import lay_cells
 from live.measure import kinds_of
 from live.pace import OUTPUT, yield_to_others
 from live.serve.draft import Draft
 from live.serve.eye import RECENT, Eye
 from live.serve.judged import camera_values, figure_values, line_values, quality, shots_of, table_values
-from live.serve.painting import as_jpeg, as_png, lay_cells, mark_saturated, shrunk
+from live.serve.painting import as_jpeg, as_png, mark_saturated, shrunk
 from live.serve.region import Drawn
 from live.serve.watching import gauges_of
 from live.serve.web import Hub

@@ -20,10 +20,11 @@ from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
 from acquire.printable import printable
+from live.maps import FIELD_MAPS, FieldMaps, Painted, lay_cells
 from live.measure import AxisFinder, Instant, Measurement
 from live.outputs import Consumer, Policy
 from live.serve.curve import Curve
-from live.serve.painting import COMPONENTS, Colours, as_jpeg, lay_cells, shrunk
+from live.serve.painting import as_jpeg, shrunk
 from live.serve.web import Hub
 from live.setup import Config, describe
 from live.tell import Books, sentence
@@ -77,7 +78,7 @@ class Watching(Consumer):
         self._hub, self._config, self._now = hub, config, now
         self._finder = AxisFinder(config.specimen.axis)
         self._component = f"e{self._finder.axis * 2}"
-        self._colours = Colours(self._finder.axis, config.view.strain_range)
+        self._maps = FieldMaps(self._finder.axis, config.view.strain_range)
         names = list(config.gauges) or ["exx", "eyy", "exy"]
         self.curve = Curve(["t", "stress" if config.specimen.area_m2 else "force", "axial", *names])
         self._names = names
@@ -102,8 +103,8 @@ class Watching(Consumer):
 
     def choose(self, component: str) -> str:
         """Show another map; a refusal in words, or empty."""
-        if component not in COMPONENTS:
-            return f"there is no map {component!r}; there are {', '.join(COMPONENTS)}"
+        if component not in FIELD_MAPS:
+            return f"there is no map {component!r}; there are {', '.join(FIELD_MAPS)}"
         self._component, self._fresh = component, True
         return ""
 
@@ -204,9 +205,9 @@ class Watching(Consumer):
         m, frame = self._newest, self._frame
         if m is not None:
             picture, scale = shrunk(m.burst.mean, m.burst.bits)
-            cells, of = self._colours.of(m.field, self._component)
-            lay_cells(picture, scale, m.field.grid, cells, (m.instant.u, m.instant.v))
-            self._scale = {"low": of.low, "high": of.high, "unit": of.unit}
+            painted = self._maps.paint(m.field, (self._component,))[self._component]
+            lay_cells(picture, scale, m.field.grid, painted.rgba, (m.instant.u, m.instant.v))
+            self._scale = _scale_of(painted)
             size = m.burst.mean.shape
         elif frame is not None:
             picture, scale = shrunk(frame.image, frame.bits)
@@ -224,6 +225,15 @@ def axial_of(i: Instant, axis: str) -> tuple[float, float]:
     if gauge is not None:
         return gauge.value, gauge.sigma
     return (i.exx, i.sigma_exx) if axis == "x" else (i.eyy, i.sigma_eyy)
+
+
+def _scale_of(painted: Painted) -> dict[str, Any]:
+    """What the colours of a map stand for, as the page shows it."""
+    scale = painted.scale
+    if scale is not None:
+        return {"low": scale.low, "high": scale.high, "unit": scale.unit}
+    legend = [{"text": f"{one.name} {one.count}", "colour": f"rgb{one.rgb}"} for one in painted.legend]
+    return {"legend": legend}
 
 
 def gauges_of(config: Config) -> dict[str, Any]:

@@ -47,7 +47,7 @@ ROOMS = {
     "live.recording": "acquire live.operate live.tell",
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",
-    "live.view.painting": "acquire analysis.field live.maps live.view.exchange",
+    "live.view.painting": "acquire live.view.exchange",
     "live.view.drawing": "acquire analysis.field live.maps live.view.exchange live.view.painting",
     "live.view": "acquire analysis.field live.measure live.pace live.view.exchange",
     "live.outputs": "acquire acquire.load_cell analysis live.channels live.measure live.pace live.setup live.tell"
@@ -107,6 +107,7 @@ LIBRARIES = {
     "fcntl": "acquire.v4l2",
     "h5py": "acquire.hdf5 acquire.session live.results",
     "llvmlite": "analysis.compiled",
+    "matplotlib": "live.characterise",
     "rerun": "live.view.drawing",
     "serial": "acquire.serial_line",
     "tomlkit": "live.setup",

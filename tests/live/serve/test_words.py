@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import live.serve
-from live.serve.painting import COMPONENTS
+from live.maps import FIELD_MAPS
 
 STATIC = Path(live.serve.__file__).parent / "static"
 SCRIPTS = [
@@ -41,7 +41,7 @@ def words() -> set[str]:
 def test_every_word_is_there(name: str) -> None:
     known = set(entries(name))
     assert not words() - known
-    assert not known - words() - set(COMPONENTS)
+    assert not known - words() - set(FIELD_MAPS)
 
 
 def test_the_library_has_its_licence_and_origin() -> None:
