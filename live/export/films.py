@@ -15,7 +15,7 @@ from acquire.errors import ConfigError, DataError
 from live.export.job import Job
 from live.export.target import new_file, new_folder
 from live.finished import Pictures
-from live.maps import Levels, Painter, Scale, caption
+from live.maps import ColourScale, Levels, Painter, caption
 
 # What the encoders in OpenCV's wheel make, and who does not play it.
 _CODECS = {
@@ -109,7 +109,7 @@ def _frames(job: Job, longest: int = 1280) -> Iterator[tuple[int, NDArray[np.uin
     scale = None
     if name != "status":
         display = job.display
-        scale = Scale.of_run(
+        scale = ColourScale.of_run(
             job.strain, name, job.rows, job.options.limit, display.unit(name), display.factor(name)
         )
     painter = Painter(job.strain, name, scale, _size(job, pictures), longest)

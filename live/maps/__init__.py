@@ -7,18 +7,18 @@ from live.maps.display_filter import PAPER_LOW_PASS, for_display
 from live.maps.field_maps import FIELD_MAPS, FieldMaps, Painted
 from live.maps.map import Picture, draw, save
 from live.maps.painting import Levels, Painter, caption, lay_cells
-from live.maps.scale import Scale, status_colours, status_legend
+from live.maps.scale import ColourScale, status_colours, status_legend
 
 __all__ = [
     "FIELD_MAPS",
     "MICROSTRAIN",
     "PAPER_LOW_PASS",
+    "ColourScale",
     "FieldMaps",
     "Levels",
     "Painted",
     "Painter",
     "Picture",
-    "Scale",
     "Unit",
     "caption",
     "draw",

@@ -13,8 +13,8 @@ from analysis.field import StrainField
 from live.maps.scale import (
     OPACITY,
     AutoRange,
+    ColourScale,
     Kind,
-    Scale,
     StatusCount,
     kind_of,
     status_colours,
@@ -33,14 +33,14 @@ class Painted:
     Attributes
     ----------
     rgba : (R, C, 4) uint8
-    scale : Scale or None
+    scale : ColourScale or None
         Of the colours; None where they have no order (status).
     legend : tuple of StatusCount
         What the colours mean where they have no order.
     """
 
     rgba: NDArray[np.uint8]
-    scale: Scale | None
+    scale: ColourScale | None
     legend: tuple[StatusCount, ...] = ()
 
 
@@ -95,5 +95,5 @@ class FieldMaps:
             values, sigmas = field.value(name), field.sigma(name)
         else:
             sigmas = field.sigma(self._along)
-        scale = Scale.of(name, self._ranges[name].update(values, sigmas))
+        scale = ColourScale.of(name, self._ranges[name].update(values, sigmas))
         return Painted(scale.colours(values, self._alpha), scale)

@@ -21,7 +21,7 @@ from analysis.evaluate import deconvolved, effect
 from analysis.field import ZoiGrid
 from live.maps.display_filter import for_display
 from live.maps.painting import Image, Painter
-from live.maps.scale import AutoRange, Scale, kind_of
+from live.maps.scale import AutoRange, ColourScale, kind_of
 from live.results import Strain
 
 DISPLACEMENTS = ("u", "v")
@@ -99,7 +99,7 @@ def draw(strain: Strain, picture: Picture, background: NDArray[Any] | None) -> I
     scale = None
     if name != "status":
         span = AutoRange(kind_of(name), picture.limit).update(values, _sigma(strain, name, row))
-        scale = Scale.of(name, span)
+        scale = ColourScale.of(name, span)
     size = (2 * grid.roi.x + grid.roi.width, 2 * grid.roi.y + grid.roi.height)
     if background is not None:
         size = background.shape[1], background.shape[0]

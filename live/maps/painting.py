@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from analysis.field import ZoiGrid
 from live.maps.colours import number, ramp, ticks
-from live.maps.scale import OPACITY, Scale, StatusCount, status_colours, status_legend
+from live.maps.scale import OPACITY, ColourScale, StatusCount, status_colours, status_legend
 from live.results import Strain
 
 Image = NDArray[np.uint8]
@@ -98,7 +98,7 @@ class Painter:
     ----------
     strain : Strain
     name : str
-    scale : Scale or None
+    scale : ColourScale or None
         None for the map of statuses.
     size : (width, height), px
         Of the pictures.
@@ -107,7 +107,12 @@ class Painter:
     """
 
     def __init__(
-        self, strain: Strain, name: str, scale: Scale | None, size: tuple[int, int], longest: int = _LONGEST
+        self,
+        strain: Strain,
+        name: str,
+        scale: ColourScale | None,
+        size: tuple[int, int],
+        longest: int = _LONGEST,
     ) -> None:
         self._strain, self._name, self._scale = strain, name, scale
         bigger = max(size)
@@ -194,7 +199,7 @@ def _even(side: int) -> int:
     return side + side % 2
 
 
-def _bar(full: Image, place: tuple[int, int, int], name: str, scale: Scale) -> None:
+def _bar(full: Image, place: tuple[int, int, int], name: str, scale: ColourScale) -> None:
     """The colours with ticks and their unit; mixed with middle grey as a map is with its picture."""
     cv2 = load_cv2()
     left, top, bottom = place

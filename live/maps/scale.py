@@ -102,7 +102,7 @@ def _rounded(kind: Kind, span: Span) -> Span:
 
 
 @dataclass(frozen=True, slots=True)
-class Scale:
+class ColourScale:
     """What the colours of a map stand for.
 
     Attributes
@@ -120,7 +120,7 @@ class Scale:
     factor: float
 
     @classmethod
-    def of(cls, name: str, span: Span, unit: str = "", factor: float = 1.0) -> Scale:
+    def of(cls, name: str, span: Span, unit: str = "", factor: float = 1.0) -> ColourScale:
         """Of the map ``name`` with colours from ``span[0]`` to ``span[1]`` of its values.
 
         ``unit`` and the ``factor`` to it are those of the map, or as it reads well.
@@ -141,7 +141,7 @@ class Scale:
         limit: float | None = None,
         unit: str = "",
         factor: float = 1.0,
-    ) -> Scale:
+    ) -> ColourScale:
         """One scale for the map ``name`` at all ``rows``; ``limit`` fixes it, in the unit of the file."""
         picked = [rows[k] for k in np.unique(np.linspace(0, len(rows) - 1, _SAMPLE).astype(int))]
         sigma = f"sigma_{name}"

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from acquire.frame import CameraInfo
 from live.finished import RunFolder, quantity_of
-from live.maps import Levels, Painter, Scale, caption, number, ramp, status_legend, ticks
+from live.maps import ColourScale, Levels, Painter, caption, number, ramp, status_legend, ticks
 from live.report.page import Part, captioned, element, joined, safe
 
 _QUALITY = 80
@@ -61,7 +61,7 @@ def shots(run: RunFolder, rows: list[int]) -> Shots:
 
 def maps(run: RunFolder, name: str, instants: Mapping[int, str], taken: Shots, longest: int) -> Part:
     """One map at all instants beside its picture."""
-    scale = Scale.of_run(run.strain, name, list(instants))
+    scale = ColourScale.of_run(run.strain, name, list(instants))
     painter = Painter(run.strain, name, scale, taken.size, longest)
     pairs = []
     for row, words in instants.items():
@@ -104,7 +104,7 @@ def _picture(image: NDArray[np.uint8], words: str) -> Part:
     return Part(f'<img src="{source}" width="{width}" height="{height}" alt="{safe(words)}">')
 
 
-def _bar(name: str, scale: Scale) -> Part:
+def _bar(name: str, scale: ColourScale) -> Part:
     """The colours from low to high with their numbers, as SVG."""
     colours = ramp(_STEPS, 1)[::-1, 0]
     boxes = "".join(

@@ -37,7 +37,6 @@ from live.setup import (
     GIVEN,
     Config,
     compile_ahead,
-    describe,
     gauges_for,
     grid_for,
     read_mask,
@@ -153,7 +152,7 @@ class Bench:
         height, width = drawn.mask.shape
         box = replace(config, measure=replace(config.measure, roi=drawn.box, mask=None))
         placed = auto_gauges(grid_for(box, width, height, drawn.mask), config.specimen.first_axis)
-        gauges = {f"gauges.{name}": describe(table) for name, table in placed.items()}
+        gauges = {f"gauges.{name}": table for name, table in placed.items()}
         self.draft.change_all(gauges | {"measure.gauges": GIVEN})
 
     def save(self) -> None:

@@ -26,7 +26,7 @@ from live.outputs import Consumer, Policy
 from live.serve.curve import Curve
 from live.serve.painting import as_jpeg, shrunk
 from live.serve.web import Hub
-from live.setup import Config, describe
+from live.setup import Config, complete_gauges
 from live.tell import Books, sentence
 
 STATE_S, PICTURE_S = 0.1, 0.25
@@ -237,8 +237,17 @@ def _scale_of(painted: Painted) -> dict[str, Any]:
 
 
 def gauges_of(config: Config) -> dict[str, Any]:
-    """The gauges of a configuration as the page draws them."""
-    return {name: describe(table) for name, table in config.gauges.items()}
+    """The gauges of a configuration as the page draws them: kind, handles and lines, px."""
+    found = complete_gauges(config.gauges, config.specimen.first_axis)
+    zoi = config.measure.zoi
+    return {
+        one.name: {
+            "kind": one.kind,
+            "handles": one.handles(),
+            "outline": [[(round(x, 1), round(y, 1)) for x, y in line] for line in one.outline(zoi)],
+        }
+        for one in found
+    }
 
 
 def _measured(i: Instant, axis: str) -> dict[str, Any]:

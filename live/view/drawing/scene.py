@@ -153,7 +153,8 @@ class Scene:
         for name in MAPS:
             place = rr.Transform3D(translation=corner, scale=(step, step, 1.0))
             self._log(f"specimen/map/{name}", place, static=True)
-        strips = [[[x + 0.5, y + 0.5] for x, y in strip] for strip in self._setup.outlines.values()]
+        lines = [[np.array(line) + 0.5 for line in lines] for lines in self._setup.outlines.values()]
+        strips = [strip for gauge in lines for strip in gauge]
         if strips:
             gauges = rr.LineStrips2D(
                 strips,
@@ -162,7 +163,7 @@ class Scene:
                 draw_order=50,
             )
             self._log("specimen/gauges", gauges, static=True)
-            names = words([strip[0] for strip in strips], list(self._setup.outlines), GAUGE_NAME)
+            names = words([gauge[0][0] for gauge in lines], list(self._setup.outlines), GAUGE_NAME)
             self._log("specimen/gauges/names", names, static=True)
         boxes = sample_boxes(grid)
         self._log(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.field import Status
-from live.maps import FIELD_MAPS, FieldMaps, Scale, status_colours, status_legend
+from live.maps import FIELD_MAPS, ColourScale, FieldMaps, status_colours, status_legend
 from live.maps.colours import diverging_table
 from live.maps.scale import AutoRange, kind_of
 from tests.live.made_up import make_field, make_grid
@@ -73,19 +73,19 @@ def test_where_the_colours_lie(name: str, kind: str) -> None:
 def test_the_colours_run_from_one_end_of_the_scale_to_the_other() -> None:
     table = diverging_table()
     for name, span in (("eyy", (-1e-3, 1e-3)), ("sigma_eyy", (0.0, 2e-5)), ("u", (3.0, 5.0))):
-        scale = Scale.of(name, span)
+        scale = ColourScale.of(name, span)
         ends = scale.colours(np.array([[*span, np.nan]]))[0]
         assert (ends[0, :3] == table[0]).all() and (ends[1, :3] == table[-1]).all(), name
         assert ends[2, 3] == 0
 
 
 def test_units() -> None:
-    assert Scale.of("eyy", (-0.03, 0.03)) == Scale(-3.0, 3.0, "%", 100.0)
-    assert Scale.of("sigma_eyy", (0.0, 2e-5)) == Scale(0.0, 20.0, "µm/m", 1e6)
-    assert Scale.of("v", (1.0, 2.0)) == Scale(1.0, 2.0, "px", 1.0)
-    assert Scale.of("v", (1.0, 2.0), "mm", -0.5) == Scale(-1.0, -0.5, "mm", -0.5)
-    assert Scale.of("exy", (-1e-3, 1e-3), factor=-1.0) == Scale(-1000.0, 1000.0, "µm/m", -1e6)
-    assert Scale.of("residual", (0.0, 3.0)).unit == "chi²"
+    assert ColourScale.of("eyy", (-0.03, 0.03)) == ColourScale(-3.0, 3.0, "%", 100.0)
+    assert ColourScale.of("sigma_eyy", (0.0, 2e-5)) == ColourScale(0.0, 20.0, "µm/m", 1e6)
+    assert ColourScale.of("v", (1.0, 2.0)) == ColourScale(1.0, 2.0, "px", 1.0)
+    assert ColourScale.of("v", (1.0, 2.0), "mm", -0.5) == ColourScale(-1.0, -0.5, "mm", -0.5)
+    assert ColourScale.of("exy", (-1e-3, 1e-3), factor=-1.0) == ColourScale(-1000.0, 1000.0, "µm/m", -1e6)
+    assert ColourScale.of("residual", (0.0, 3.0)).unit == "chi²"
 
 
 def test_every_map_has_colours_and_a_scale_or_a_legend() -> None:
