@@ -110,6 +110,8 @@ LIBRARIES = {
     "matplotlib": "live.characterise",
     "rerun": "live.view.drawing",
     "serial": "acquire.serial_line",
+    "tifffile": "live.export",
+    "PIL": "live.export",
     "tomlkit": "live.setup",
 }
 # Room (and all in it) -> what it never imports.
