@@ -1,6 +1,6 @@
 """Figures from fields: what a test engineer or a map wants of them.
 
-``gauges`` are virtual gauges and extensometers on a field, by the ``extension`` of two ends. ``tensile``
+``gauge_kinds`` are virtual ``gauges`` and extensometers on a field, by the ``extension`` of two ends. ``tensile``
 evaluates a test: a ``curve`` by one of the ``standards``, its ``elastic`` line and its ``strengths``, each a
 ``figure`` with an interval, from ``series`` of noisy values. ``lag`` tells how late the
 load comes beside the frames. ``floor`` has the still phase of a test and the noise floor in it.
@@ -12,16 +12,8 @@ from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import LoadAxis, load_axis, principal_direction
 from analysis.evaluate.figure import CONFIDENCE, Figure
 from analysis.evaluate.floor import FEWEST_STILL, NoiseFloor, evenly, noise_floor, still_phase
-from analysis.evaluate.gauges import (
-    AreaGauge,
-    Gauge,
-    GaugeValue,
-    LineGauge,
-    TransverseGauge,
-    ZoiGauge,
-    gauge_zois,
-    measure_gauge,
-)
+from analysis.evaluate.gauge_kinds import GAUGE_KINDS, AreaGauge, LineGauge, TransverseGauge, ZoiGauge
+from analysis.evaluate.gauges import Gauge, GaugeValue, Parameter, inside_polygon
 from analysis.evaluate.lag import Track, find_lag
 from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
 from analysis.evaluate.tensile import Options, Span, TensileFigures, Zero, ZeroBy, evaluate_test
@@ -29,6 +21,7 @@ from analysis.evaluate.tensile import Options, Span, TensileFigures, Zero, ZeroB
 __all__ = [
     "CONFIDENCE",
     "FEWEST_STILL",
+    "GAUGE_KINDS",
     "STANDARDS",
     "AreaGauge",
     "Band",
@@ -41,6 +34,7 @@ __all__ = [
     "LoadAxis",
     "NoiseFloor",
     "Options",
+    "Parameter",
     "Span",
     "Standard",
     "TensileFigures",
@@ -55,9 +49,8 @@ __all__ = [
     "evenly",
     "find_lag",
     "free",
-    "gauge_zois",
+    "inside_polygon",
     "load_axis",
-    "measure_gauge",
     "noise_floor",
     "principal_direction",
     "still_phase",

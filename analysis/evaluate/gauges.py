@@ -1,19 +1,18 @@
-"""Virtual gauges on a strain field: a point, an area, an extensometer along a line or across a strip.
+"""What a virtual gauge is: a name and a geometry in px of the reference picture, read from a strain field.
 
-A gauge is a name and a geometry in px of the reference picture. ``measure_gauge`` gives its value with its
-standard uncertainty, or NaN with the reason. Uncertainties contain the noise of the reference and the
-correlation of overlapping ZOIs.
-
-Extensions come from displacements, not from gradients: the mean displacement of the ZOIs around each end,
-and the change of the distance between the two. A rigid rotation changes nothing.
+A kind of gauge is one class in ``gauge_kinds``: its parameters with their bounds, the ZOIs it takes, its value, its
+outline, and how it is made from the places that a person drags on a picture. Uncertainties contain the noise of the
+reference and the correlation of overlapping ZOIs.
 """
 
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections import Counter
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Mapping, Sequence
+from dataclasses import MISSING, dataclass, fields
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,142 +21,50 @@ from analysis.evaluate.extension import Ends, extension
 from analysis.field import VALUES, Status, StrainField, ZoiGrid
 
 Point = tuple[float, float]
+Box = tuple[float, float, float, float]
+Line = tuple[Point, ...]
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 Statistic = Literal["mean", "largest", "smallest"]
 
 LEAST_SHARE = 0.5
 """A gauge has a value as long as this share of the ZOIs of an area, or of each of its ends, has one."""
+_ROUND = 24  # corners of a circle that is drawn
 
 
 @dataclass(frozen=True, slots=True)
-class ZoiGauge:
-    """One value of the ZOI whose centre is nearest to a point.
+class Parameter:
+    """What a parameter of a gauge may be; it stands in the metadata of its field.
 
     Attributes
     ----------
-    name : str
-    x, y : float, px
-        At most one step of the grid away from the centre of a ZOI.
-    value : str
-        One of ``analysis.field.VALUES``.
+    kind : "point", "box", "corners", "length" or "choice"
+        (x, y); (x, y, width, height); at least three (x, y); a number; a word. Places and lengths in px.
+    words : str
+        Its meaning.
+    low, high : float, px
+        Bounds of a length.
+    choices : tuple of str
+    by_axis : mapping of "x" and "y" to a word
+        What it is by the axis of the load where it is not given.
     """
 
-    name: str
-    x: float
-    y: float
-    value: str = "eyy"
+    kind: Literal["point", "box", "corners", "length", "choice"]
+    words: str
+    low: float = 0.0
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
+    by_axis: Mapping[str, str] | None = None
 
-    def __post_init__(self) -> None:
-        _check_value(self.name, self.value)
-
-
-@dataclass(frozen=True, slots=True)
-class AreaGauge:
-    """Mean, largest or smallest value of the ZOIs whose centres lie in a polygon.
-
-    Of the largest and the smallest, sigma is that of the ZOI which has it: right for a peak that stands
-    out of the noise. In a flat field noise alone lifts the largest of n values above the mean, by 2 to 3
-    sigma for 20 to 400 of them.
-
-    Attributes
-    ----------
-    name : str
-    corners : tuple of (x, y), px
-        At least three; ``rectangle`` makes one of a box.
-    value : str
-        One of ``analysis.field.VALUES``.
-    statistic : "mean", "largest" or "smallest"
-        By sign, not by magnitude.
-    """
-
-    name: str
-    corners: tuple[Point, ...]
-    value: str = "eyy"
-    statistic: Statistic = "mean"
-
-    def __post_init__(self) -> None:
-        _check_value(self.name, self.value)
-        if len(self.corners) < 3:
-            raise ValueError(f"gauge {self.name}: an area needs at least 3 corners, got {len(self.corners)}")
-        if self.statistic not in ("mean", "largest", "smallest"):
-            raise ValueError(
-                f"gauge {self.name}: unknown statistic {self.statistic!r}; known: mean, largest, smallest"
-            )
-
-    @classmethod
-    def rectangle(
-        cls,
-        name: str,
-        box: tuple[float, float, float, float],
-        value: str = "eyy",
-        statistic: Statistic = "mean",
-    ) -> AreaGauge:
-        """The area of a box x, y, width, height (px)."""
-        return cls(name, _corners(*box), value, statistic)
-
-
-@dataclass(frozen=True, slots=True)
-class LineGauge:
-    """An extensometer: (L - L0)/L0 between two points.
-
-    Each end is the ZOIs whose centres lie within ``radius`` of the point (without: half the side of a
-    ZOI), at least the nearest one; L0 is the distance of their mean places, so that a uniform strain is met exactly.
-
-    Attributes
-    ----------
-    name : str
-    start, end : (x, y), px
-    radius : float or None, px
-    """
-
-    name: str
-    start: Point
-    end: Point
-    radius: float | None = None
-
-    def __post_init__(self) -> None:
-        if self.start == self.end:
-            raise ValueError(f"gauge {self.name}: the two ends of a line are one point, {self.start}")
-        if self.radius is not None and not self.radius > 0:
-            raise ValueError(f"gauge {self.name}: the radius must be positive, got {self.radius}")
-
-
-@dataclass(frozen=True, slots=True)
-class TransverseGauge:
-    """An extensometer across a strip: the mean extension of a box between its first and its last third.
-
-    Thirds are the division that loses the least against a straight line through all points
-    (M. S. Bartlett, Biometrics 5 (1949) 207-212, doi:10.2307/3001936).
-
-    Attributes
-    ----------
-    name : str
-    x, y, width, height : float, px
-    along : "x" or "y"
-        The direction whose extension is measured, across the load.
-    """
-
-    name: str
-    x: float
-    y: float
-    width: float
-    height: float
-    along: Literal["x", "y"] = "x"
-
-    def __post_init__(self) -> None:
-        if not (self.width > 0 and self.height > 0):
-            raise ValueError(f"gauge {self.name}: width and height must be positive")
-        if self.along not in ("x", "y"):
-            raise ValueError(f"gauge {self.name}: along is x or y, got {self.along!r}")
-
-
-Gauge = ZoiGauge | AreaGauge | LineGauge | TransverseGauge
+    @property
+    def metadata(self) -> dict[str, Any]:
+        """Of its field."""
+        return {"parameter": self}
 
 
 @dataclass(frozen=True, slots=True)
 class GaugeValue:
-    """What a gauge says of one field.
+    """What a gauge reads from one field.
 
     Attributes
     ----------
@@ -172,54 +79,102 @@ class GaugeValue:
     reason: str = ""
 
 
-def measure_gauge(gauge: Gauge, field: StrainField) -> GaugeValue:
-    """The value of a gauge on a field, with its standard uncertainty.
+@dataclass(frozen=True, slots=True)
+class Gauge(ABC):
+    """A virtual gauge; raises ValueError where its parameters are impossible.
 
-    Parameters
+    Attributes
     ----------
-    gauge : ZoiGauge, AreaGauge, LineGauge or TransverseGauge
-    field : StrainField
-
-    Returns
-    -------
-    GaugeValue
-        NaN with a reason where fewer than ``LEAST_SHARE`` of its ZOIs, or of those of one end, have a value.
+    name : str
+    kind : str
+        As a configuration has it.
+    label, hint : str
+        Of its button on a page, and what to do with the mouse.
+    gesture : "click", "line" or "box"
+        How it is drawn: at one place, from one place to another, or between two opposite corners.
+    usual : str
+        The name of a new one.
     """
-    match gauge:
-        case ZoiGauge():
-            return _of_zoi(gauge, field)
-        case AreaGauge():
-            return _of_area(gauge, field)
-        case _:
-            return _of_ends(gauge_zois(gauge, field.grid), field)
+
+    name: str
+    kind: ClassVar[str]
+    label: ClassVar[str]
+    hint: ClassVar[str]
+    gesture: ClassVar[Literal["click", "line", "box"]]
+    usual: ClassVar[str]
+
+    @abstractmethod
+    def chosen(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        """The ZOIs that lie where the gauge is, (R, C) bool: one mask, or one for each of its two ends."""
+
+    @abstractmethod
+    def measure(self, field: StrainField) -> GaugeValue:
+        """Its value with its standard uncertainty.
+
+        NaN with a reason where fewer than ``LEAST_SHARE`` of its ZOIs, or of those of one end, have a value.
+        """
+
+    @abstractmethod
+    def outline(self, zoi: float) -> tuple[Line, ...]:
+        """Lines to be drawn, px, with ZOIs of a side of ``zoi`` px; a closed one ends where it begins."""
+
+    @abstractmethod
+    def handles(self) -> tuple[Point, ...]:
+        """The places that a person can drag, px."""
+
+    @classmethod
+    @abstractmethod
+    def placed(cls, handles: Sequence[Point]) -> dict[str, Any]:
+        """The parameters of a gauge with these handles, or drawn from the first to the second of them."""
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """By their names, as a configuration has them."""
+        return {f.name: f.metadata["parameter"] for f in fields(cls) if "parameter" in f.metadata}
+
+    @classmethod
+    def of(cls, name: str, table: Mapping[str, Any], axis: str) -> Gauge:
+        """Made of the keys of ``table`` that are its own, with what follows from the ``axis`` of the load.
+
+        Raises
+        ------
+        ValueError
+            One is missing or impossible.
+        """
+        known = cls.parameters()
+        given = {key: value for key, value in table.items() if key in known and value is not None}
+        usual = {key: one.by_axis[axis] for key, one in known.items() if one.by_axis is not None}
+        needed = (f.name for f in fields(cls) if f.name in known and f.default is MISSING)
+        for key in needed:
+            if key not in given:
+                raise ValueError(f"a gauge of kind {cls.kind!r} needs {key!r}")
+        return cls(name, **(usual | given))
+
+    def zois(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        """The active ZOIs that it takes, (R, C) bool: one mask, or one for each of its two ends."""
+        return tuple(mask & grid.active for mask in self.chosen(grid))
 
 
-def gauge_zois(gauge: Gauge, grid: ZoiGrid) -> tuple[Mask, ...]:
-    """The active ZOIs that a gauge takes, (R, C) bool each: one mask, or one for each of its two ends."""
-    return tuple(mask & grid.active for mask in _chosen(gauge, grid))
+# -- what kinds are made of ------------------------------------------------------------------------
 
 
-def _of_zoi(gauge: ZoiGauge, field: StrainField) -> GaugeValue:
-    (chosen,) = gauge_zois(gauge, field.grid)
+def read_area(chosen: Mask, field: StrainField, value: str, statistic: Statistic = "mean") -> GaugeValue:
+    """Mean, largest or smallest value of some ZOIs."""
     if missing := _missing(chosen, field):
         return GaugeValue(math.nan, math.nan, missing)
-    k = np.unravel_index(int(np.argmax(chosen)), chosen.shape)
-    return GaugeValue(float(field.value(gauge.value)[k]), float(field.sigma(gauge.value)[k]))
-
-
-def _of_area(gauge: AreaGauge, field: StrainField) -> GaugeValue:
-    (chosen,) = gauge_zois(gauge, field.grid)
-    if missing := _missing(chosen, field):
-        return GaugeValue(math.nan, math.nan, missing)
-    if gauge.statistic == "mean":
-        return GaugeValue(*field.mean(gauge.value, chosen))
-    sign = 1 if gauge.statistic == "largest" else -1
-    values = np.where(chosen & field.ok, sign * field.value(gauge.value), -np.inf)
+    if statistic == "mean":
+        return GaugeValue(*field.mean(value, chosen))
+    sign = 1 if statistic == "largest" else -1
+    values = np.where(chosen & field.ok, sign * field.value(value), -np.inf)
     k = np.unravel_index(int(np.argmax(values)), values.shape)
-    return GaugeValue(float(sign * values[k]), float(field.sigma(gauge.value)[k]))
+    return GaugeValue(float(sign * values[k]), float(field.sigma(value)[k]))
 
 
-def _of_ends(chosen: tuple[Mask, ...], field: StrainField) -> GaugeValue:
+def read_ends(chosen: Sequence[Mask], field: StrainField) -> GaugeValue:
+    """The change of the distance between the mean places of two groups of ZOIs, over that distance.
+
+    From displacements, not from gradients: a rigid rotation changes nothing.
+    """
     for number, end in enumerate(chosen, 1):
         if missing := _missing(end, field):
             return GaugeValue(math.nan, math.nan, f"end {number}: {missing}")
@@ -245,27 +200,15 @@ def _missing(chosen: Mask, field: StrainField) -> str:
     return f"{lost.total()} of {total} ZOIs have no value ({words})"
 
 
-def _check_value(name: str, value: str) -> None:
+def check_value(name: str, value: str) -> None:
+    """Raises ValueError unless ``value`` is one of a strain field."""
     if value not in VALUES:
         raise ValueError(f"gauge {name}: unknown value {value!r}; known: {', '.join(VALUES)}")
 
 
-def _chosen(gauge: Gauge, grid: ZoiGrid) -> tuple[Mask, ...]:
-    x, y = np.meshgrid(grid.x, grid.y)
-    match gauge:
-        case ZoiGauge():
-            return (_near(grid, x, y, (gauge.x, gauge.y), 0),)
-        case AreaGauge():
-            return (_inside(x, y, gauge.corners),)
-        case LineGauge():
-            reach = gauge.radius or grid.size / 2
-            return tuple(_near(grid, x, y, end, reach) for end in (gauge.start, gauge.end))
-        case TransverseGauge():
-            return tuple(_inside(x, y, _corners(*box)) for box in _outer_thirds(gauge))
-
-
-def _near(grid: ZoiGrid, x: Floats, y: Floats, place: Point, reach: float) -> Mask:
+def zois_near(grid: ZoiGrid, place: Point, reach: float) -> Mask:
     """Centres within ``reach``, or else the nearest one if it is at most a step away along x and y."""
+    x, y = np.meshgrid(grid.x, grid.y)
     distance = np.hypot(x - place[0], y - place[1])
     here = distance <= reach
     if not here.any():
@@ -274,19 +217,13 @@ def _near(grid: ZoiGrid, x: Floats, y: Floats, place: Point, reach: float) -> Ma
     return np.asarray(here)
 
 
-def _corners(x: float, y: float, width: float, height: float) -> tuple[Point, ...]:
-    return (x, y), (x + width, y), (x + width, y + height), (x, y + height)
+def zois_inside(grid: ZoiGrid, corners: Sequence[Point]) -> Mask:
+    """Centres inside a polygon."""
+    x, y = np.meshgrid(grid.x, grid.y)
+    return inside_polygon(x, y, corners)
 
 
-def _outer_thirds(g: TransverseGauge) -> tuple[tuple[float, float, float, float], ...]:
-    if g.along == "x":
-        third = g.width / 3
-        return (g.x, g.y, third, g.height), (g.x + 2 * third, g.y, third, g.height)
-    third = g.height / 3
-    return (g.x, g.y, g.width, third), (g.x, g.y + 2 * third, g.width, third)
-
-
-def _inside(x: Floats, y: Floats, corners: tuple[Point, ...]) -> Mask:
+def inside_polygon(x: Floats, y: Floats, corners: Sequence[Point] | Floats) -> Mask:
     """Points inside a polygon: a ray to the left crosses its sides an odd number of times."""
     odd = np.zeros(x.shape, bool)
     for (x0, y0), (x1, y1) in zip(corners, (*corners[1:], corners[0]), strict=True):
@@ -295,3 +232,32 @@ def _inside(x: Floats, y: Floats, corners: tuple[Point, ...]) -> Mask:
         between = (np.minimum(y0, y1) <= y) & (y < np.maximum(y0, y1))
         odd ^= between & (x0 + (y - y0) * (x1 - x0) / (y1 - y0) <= x)
     return odd
+
+
+def corners_of(box: Box) -> tuple[Point, ...]:
+    """Of x, y, width, height."""
+    x, y, width, height = box
+    return (x, y), (x + width, y), (x + width, y + height), (x, y + height)
+
+
+def closed(corners: Line) -> Line:
+    """A line around ``corners``."""
+    return (*corners, corners[0])
+
+
+def circle(place: Point, radius: float) -> Line:
+    """A closed line around ``place``."""
+    angles = np.linspace(0, 2 * math.pi, _ROUND + 1)
+    return tuple((place[0] + radius * math.cos(a), place[1] + radius * math.sin(a)) for a in angles)
+
+
+def near_px(place: Point) -> Point:
+    """To a tenth of a pixel: as exact as a person drags."""
+    return round(float(place[0]), 1), round(float(place[1]), 1)
+
+
+def box_between(one: Point, other: Point) -> Box:
+    """The box between two opposite corners, whole px within the picture."""
+    (x0, x1), (y0, y1) = (sorted((round(one[k]), round(other[k]))) for k in (0, 1))
+    x0, y0 = max(x0, 0), max(y0, 0)
+    return float(x0), float(y0), float(max(x1 - x0, 1)), float(max(y1 - y0, 1))

@@ -224,3 +224,26 @@ def _from_dict(values: dict[str, Any]) -> Outcome:
         values["name"], values["title"], values["text"], tables,
         tuple(values["figures"]), verdicts, float(values["seconds"]),
     )  # fmt: skip
+
+
+def save_new(drawn: Any, path: Path) -> None:
+    """Write a figure to a new file, in the format that its name ends in.
+
+    Raises
+    ------
+    ConfigError
+        The file exists, or has another ending than .png, .svg and .pdf.
+    DataError
+        It cannot be written.
+    """
+    if path.suffix.lower() not in (".png", ".svg", ".pdf"):
+        raise ConfigError(f"{path}: choose a name that ends in .png, .svg or .pdf")
+    try:
+        with path.open("xb") as file:
+            drawn.savefig(file, dpi=110, format=path.suffix.lower()[1:])
+    except FileExistsError:
+        raise ConfigError(f"{path} exists and is not overwritten; choose another name") from None
+    except OSError as error:
+        raise DataError(
+            f"{path}: cannot be written: {error.strerror}; look at the folder and the disk"
+        ) from None

@@ -78,12 +78,11 @@ def _half_on_half(bench: Bench) -> StrainField | None:
 
 
 def _gauges(config: Config, field: StrainField, factor: float) -> Iterator[GaugeNoise]:
-    from analysis.evaluate import measure_gauge
 
     if not field.n_valid:
         return
     along = "exx" if config.specimen.first_axis == "x" else "eyy"
     yield GaugeNoise("", factor * field.mean(along)[1])
     for gauge in gauges_for(with_auto_gauges(config, field.grid), field.grid):
-        value = measure_gauge(gauge, field)
+        value = gauge.measure(field)
         yield GaugeNoise(gauge.name, factor * value.sigma, value.reason)

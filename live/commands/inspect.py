@@ -33,9 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic inspect SESSION --zoi R,C --frame N``."""
     from acquire.session import Session
-    from live.characterise.outcome import figure
+    from live.characterise.outcome import figure, save_new
     from live.characterise.spectrum import draw_spectrum, zoi_spectrum
-    from live.maps import save
 
     row, column = _place(arguments.zoi)
     out = Path(arguments.out)
@@ -53,7 +52,7 @@ def command(arguments: argparse.Namespace) -> int:
     where = f"ZOI {row},{column} ({grid.size} px at x {left}, y {top})"
     title = f"{Path(arguments.session).name}: {where}, frame {arguments.frame}"
     draw_spectrum(drawn, spectrum, title)
-    save(drawn, out)
+    save_new(drawn, out)
     say(f"{title}\nu = {spectrum.u:.4f} px, v = {spectrum.v:.4f} px from {spectrum.used.sum()} frequencies")
     say(f"figure: {out}")
     return 0

@@ -1,4 +1,4 @@
-"""``phasedic map``: a map of the results over a picture, as a PNG (needs matplotlib)."""
+"""``phasedic map``: a map of the results over a picture, as a PNG."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _SEEN_PX = 2.0
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic map``."""
     parser.add_argument("results", help="strain.h5")
-    parser.add_argument("png", help="the picture to write (or an SVG or PDF)")
+    parser.add_argument("png", help="the picture to write, .png or .jpg")
     parser.add_argument("--field", default="eyy", help="u, v, exx, eyy, exy, sigma_eyy, residual, status ...")
     parser.add_argument("--row", type=int, default=-1, help="which measured instant (default: the last)")
     parser.add_argument("--over", metavar="FILE", help="image to draw over")

@@ -7,12 +7,15 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
 from live.export.job import Job
-from live.export.painting import Image, Levels, Painter, Scale, caption
 from live.export.target import new_file, new_folder
 from live.finished import Pictures
+from live.maps import ColourScale, Levels, Painter, caption
 
 # What the encoders in OpenCV's wheel make, and who does not play it.
 _CODECS = {
@@ -77,13 +80,13 @@ def write_gif(job: Job, path: Path) -> None:
     Raises
     ------
     ConfigError
-        Pillow, which comes with matplotlib, is not installed.
+        Pillow is not installed.
     """
     try:
         from PIL import Image as Pillow
     except ImportError:
         raise ConfigError(
-            "--to gif needs Pillow: pip install 'phasedic[plots]'; --to mp4 does without"
+            "--to gif needs Pillow: pip install 'phasedic[export]'; --to mp4 does without"
         ) from None
     with new_file(path) as part:
         pages = [Pillow.fromarray(image[..., ::-1].copy()).quantize() for _, image in _frames(job, 640)]
@@ -97,7 +100,7 @@ def write_gif(job: Job, path: Path) -> None:
         )
 
 
-def _frames(job: Job, longest: int = 1280) -> Iterator[tuple[int, Image]]:
+def _frames(job: Job, longest: int = 1280) -> Iterator[tuple[int, NDArray[np.uint8]]]:
     """(k, BGR image) of each instant."""
     (name,) = job.fields
     pictures = job.run.pictures if job.options.picture else None
@@ -105,8 +108,11 @@ def _frames(job: Job, longest: int = 1280) -> Iterator[tuple[int, Image]]:
         job.screen.say("the pictures are not here any more; maps are painted on plain grey")
     scale = None
     if name != "status":
-        scale = Scale.of(job.strain, name, job.rows, job.display, job.options.limit)
-    painter = Painter(job.strain, name, job.display, scale, _size(job, pictures), longest)
+        display = job.display
+        scale = ColourScale.of_run(
+            job.strain, name, job.rows, job.options.limit, display.unit(name), display.factor(name)
+        )
+    painter = Painter(job.strain, name, scale, _size(job, pictures), longest)
     levels: Levels | None = None
     with closing(_images(job, pictures)) as images:
         for k, row in job.steps():
@@ -114,7 +120,7 @@ def _frames(job: Job, longest: int = 1280) -> Iterator[tuple[int, Image]]:
             if picture is not None and levels is None:
                 levels = Levels.of(picture)
             image = painter.over(painter.picture(picture, levels), row)
-            yield k, painter.framed(image, caption(job.strain, row))
+            yield k, painter.framed(image, [caption(job.strain, row)], row)
 
 
 def _images(job: Job, pictures: Pictures | None) -> Generator[Any]:

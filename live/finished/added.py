@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 
 from acquire.errors import ConfigError
-from analysis.evaluate import Gauge, measure_gauge
+from analysis.evaluate import Gauge
 from live.finished.run_folder import RunFolder
 from live.results import gauge_columns
-from live.setup import describe, gauges_for, load_config
+from live.setup import gauges_for, load_config
 
 
 def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
@@ -33,8 +33,7 @@ def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
     gauges, strain = gauges_for(config, run.strain.grid), run.strain
     values, sigmas = _read(run, gauges)
     stored = run.section("gauges")
-    described = {name: describe(table) for name, table in config.gauges.items()}
-    strain.config["gauges"] = {**stored, **described}
+    strain.config["gauges"] = {**stored, **config.gauges}
     for k, gauge in enumerate(gauges):
         strain.values |= dict(zip(gauge_columns(gauge.name), (values[:, k], sigmas[:, k]), strict=True))
     run.__dict__.pop("gauges", None)  # worked out anew when it is asked for
@@ -48,6 +47,6 @@ def _read(run: RunFolder, gauges: tuple[Gauge, ...]) -> tuple[np.ndarray, np.nda
     for row in range(run.strain.n):
         field = run.field(row)
         for k, gauge in enumerate(gauges):
-            read = measure_gauge(gauge, field)
+            read = gauge.measure(field)
             values[row, k], sigmas[row, k] = read.value, read.sigma
     return values, sigmas

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
 from analysis.field import ZoiGrid
-from live.results import Quantity, quantity_of
+from live.results import quantity_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,7 +64,7 @@ class Display:
 
     def shown(self, name: str, values: NDArray[Any]) -> NDArray[Any]:
         """Values of a map or column as they come out; whole numbers stay as they are."""
-        factor = self._factor(quantity_of(name))
+        factor = self.factor(name)
         return values if factor == 1 else values * values.dtype.type(factor)
 
     def x(self, grid: ZoiGrid) -> NDArray[np.float64]:
@@ -85,7 +85,9 @@ class Display:
         scale = "" if self.mm_per_px is None else f"; 1 px = {self.mm_per_px:g} mm"
         return f"x right, y {y}, from the centre of the first pixel; all values lie on the reference picture{scale}"
 
-    def _factor(self, quantity: Quantity) -> float:
+    def factor(self, name: str) -> float:
+        """From the values of a map or column as they are kept to those that come out."""
+        quantity = quantity_of(name)
         sign = -1.0 if self.y_up and quantity.turns else 1.0
         if quantity.unit == "px" and self.mm_per_px is not None:
             return sign * self.mm_per_px

@@ -1,4 +1,4 @@
-"""Strain to colour: a diverging table, an automatic range that does not flicker, ticks and units.
+"""Numbers to colours: a diverging table, round numbers, ticks and units.
 
 numpy only. Blue is compression, red is tension, white is zero, transparent is not measured.
 """
@@ -124,49 +124,6 @@ def nice_above(value: float) -> float:
         if step * decade >= value * (1 - 1e-9):
             return float(f"{step * decade:.3g}")
     return 10.0 * decade
-
-
-class AutoRange:
-    """A symmetric range that follows the data in steps that read well, and does not flicker.
-
-    It grows at once, and shrinks only when the data have stayed small for ``patience``
-    measurements. Noise alone does not fill the colours: the range is never below
-    ``noise_factor`` times the typical sigma.
-
-    Parameters
-    ----------
-    fixed : float or None
-        Always this, where given.
-    """
-
-    def __init__(self, fixed: float | None = None, *, patience: int = 20, noise_factor: float = 4.0) -> None:
-        self._fixed, self._patience, self._noise_factor = fixed, patience, noise_factor
-        self._limit, self._small = fixed or 0.0, 0
-
-    @property
-    def limit(self) -> float:
-        """The range in force, dimensionless strain; 0.0 before the first data."""
-        return self._limit
-
-    def update(self, values: NDArray[np.floating], sigmas: NDArray[np.floating]) -> float:
-        """Take a map and its uncertainty; returns the limit now in force."""
-        if self._fixed is None:
-            wanted = self._wanted(values, sigmas)
-            if wanted > 0:
-                self._follow(wanted)
-        return self._limit or 1e-4
-
-    def _wanted(self, values: NDArray[np.floating], sigmas: NDArray[np.floating]) -> float:
-        found, noise = np.abs(values[np.isfinite(values)]), sigmas[np.isfinite(sigmas)]
-        if not found.size:
-            return 0.0
-        floor = self._noise_factor * float(np.median(noise)) if noise.size else 0.0
-        return max(1.05 * float(np.percentile(found, 98)), floor)
-
-    def _follow(self, wanted: float) -> None:
-        self._small = self._small + 1 if wanted < 0.55 * self._limit else 0
-        if wanted > self._limit or self._small >= self._patience:
-            self._limit, self._small = nice_above(wanted), 0
 
 
 def ticks(low: float, high: float, about: int = 5) -> list[float]:

@@ -1,8 +1,7 @@
-"""A map of the results over a picture, as a figure to put into a report.
+"""A map of the results over the reference picture, to put into a report.
 
 Values are drawn as they were measured, one square a ZOI; filters and deconvolution are options, and
 the title names them. A ZOI that was rejected stays transparent, and the field "status" shows why.
-Needs matplotlib (``pip install phasedic[plots]``).
 """
 
 from __future__ import annotations
@@ -16,21 +15,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
 from analysis.evaluate import deconvolved, effect
-from analysis.field import Status, ZoiGrid
-from live.maps.colours import diverging_table, unit_for
+from analysis.field import ZoiGrid
 from live.maps.display_filter import for_display
+from live.maps.painting import Image, Painter
+from live.maps.scale import AutoRange, ColourScale, kind_of
 from live.results import Strain
 
 DISPLACEMENTS = ("u", "v")
 MOST_MEDIAN, MOST_STEPS = 51, 100
-FORMATS = (".png", ".svg", ".pdf")
-STATUS_COLOURS = (
-    "#2a9d4b", "#00000000", "#7f7f7f", "#f2c80f", "#9467bd", "#d62728", "#ff7f0e", "#1f77b4",
-    "#8c564b", "#e377c2", "#17becf", "#bcbd22",
-)  # fmt: skip
-"""Of the members of ``Status``, in their order; what was not asked for is transparent."""
+FORMATS = (".png", ".jpg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,53 +83,35 @@ class Picture:
         return ", ".join(words)
 
 
-def pyplot() -> Any:
-    """matplotlib without a screen; raises ConfigError where it is not installed."""
-    try:
-        import matplotlib as mpl
-
-        mpl.use("Agg")
-        import matplotlib.pyplot as plt
-    except ImportError:
-        raise ConfigError("drawing needs matplotlib: pip install 'phasedic[plots]'") from None
-    return plt
-
-
-def draw(strain: Strain, picture: Picture, background: NDArray[Any] | None) -> Any:
-    """The map over ``background`` (H, W), with a colour bar; a matplotlib figure.
+def draw(strain: Strain, picture: Picture, background: NDArray[Any] | None) -> Image:
+    """The map over ``background`` (H, W) with title, axes and colour bar, (h, w, 3) uint8: blue, green, red.
 
     Raises
     ------
     DataError
         There is no such map or row.
     ConfigError
-        matplotlib is not installed, or ``picture`` asks for what is impossible.
+        ``picture`` asks for what is impossible.
     """
-    plt = pyplot()
     picture.check(strain.grid)
+    name, row, grid = picture.field, picture.row, strain.grid
     values = _treated(strain, picture)
-    x, y, step = strain.grid.x, strain.grid.y, strain.grid.step
-    extent = (x[0] - step / 2, x[-1] + step / 2, y[-1] + step / 2, y[0] - step / 2)
-    shape = background.shape if background is not None else (int(extent[2]) + 1, int(extent[1]) + 1)
-    height = 7.0
-    wide = min(max(shape[1] / shape[0], 0.1), 10)
-    figure, axes = plt.subplots(figsize=(height * wide + 1.9, height), layout="constrained")
+    scale = None
+    if name != "status":
+        span = AutoRange(kind_of(name), picture.limit).update(values, _sigma(strain, name, row))
+        scale = ColourScale.of(name, span)
+    size = (2 * grid.roi.x + grid.roi.width, 2 * grid.roi.y + grid.roi.height)
     if background is not None:
-        axes.imshow(background, cmap="gray", alpha=0.9)
-    axes.set(xlim=(-0.5, shape[1] - 0.5), ylim=(shape[0] - 0.5, -0.5), xlabel="x, px", ylabel="y, px")
-    if picture.field == "status":
-        _draw_status(figure, axes, values, extent)
-    else:
-        _draw_values(figure, axes, values, extent, picture)
-    time = strain.time_s[picture.row]
-    title = picture.title or f"{picture.field}, {time:.2f} s, ZOI {strain.grid.size} px"
-    treatment = picture.treatment(strain.grid)
-    axes.set_title(f"{title}\n({treatment})" if treatment else title, fontsize=10, parse_math=False)
-    return figure
+        size = background.shape[1], background.shape[0]
+    painter = Painter(strain, name, scale, size)
+    painted = painter.over(painter.picture(background), row, values, moved=False)
+    treatment = picture.treatment(grid)
+    title = picture.title or f"{name}, {strain.time_s[row]:.2f} s, ZOI {grid.size} px"
+    return painter.framed(painted, [title, treatment] if treatment else [title], row, axes=True)
 
 
-def save(figure: Any, path: Path) -> None:
-    """Write the figure to a new file, in the format that its name ends in.
+def save(image: Image, path: Path) -> None:
+    """Write the picture to a new file, in the format that its name ends in.
 
     Raises
     ------
@@ -144,15 +122,20 @@ def save(figure: Any, path: Path) -> None:
     """
     if path.suffix.lower() not in FORMATS:
         raise ConfigError(f"{path}: choose a name that ends in {', '.join(FORMATS)}")
+    _, data = load_cv2().imencode(path.suffix.lower(), image)
     try:
         with path.open("xb") as file:
-            figure.savefig(file, dpi=110, format=path.suffix.lower().lstrip("."))
+            file.write(bytes(data))
     except FileExistsError:
         raise ConfigError(f"{path} exists and is not overwritten; choose another name") from None
     except OSError as error:
         raise DataError(
             f"{path}: cannot be written: {error.strerror}; look at the folder and the disk"
         ) from None
+
+
+def _sigma(strain: Strain, name: str, row: int) -> NDArray[Any] | None:
+    return strain.maps(f"sigma_{name}", row) if f"sigma_{name}" in strain.names else None
 
 
 def _treated(strain: Strain, picture: Picture) -> NDArray[np.float64]:
@@ -179,54 +162,3 @@ def _check_blur(measure: Mapping[str, Any], field: str) -> None:
             raise ConfigError(
                 f"only maps measured with {key} = {value} can be deconvolved, not with {measure[key]}"
             )
-
-
-def _draw_values(figure: Any, axes: Any, values: NDArray[Any], extent: Any, picture: Picture) -> None:
-    from matplotlib.colors import ListedColormap
-
-    valid = values[np.isfinite(values)]
-    limit = picture.limit or (float(np.percentile(np.abs(valid), 98)) if valid.size else 1.0)
-    factor, label = 1.0, f"{picture.field}, px"
-    symmetric = not picture.field.startswith(("sigma", "residual"))
-    if picture.field not in DISPLACEMENTS and picture.field != "residual":
-        unit = unit_for(limit)
-        factor, label = unit.factor, f"{picture.field}, {unit.name}"
-    low = -limit if symmetric else 0.0
-    if picture.field in DISPLACEMENTS and valid.size and picture.limit is None:
-        low, limit = float(np.percentile(valid, 1)), float(np.percentile(valid, 99))
-    shown = axes.imshow(
-        values * factor,
-        extent=extent,
-        cmap=ListedColormap(diverging_table() / 255.0) if symmetric else "viridis",
-        vmin=low * factor,
-        vmax=limit * factor,
-        interpolation="nearest",
-        alpha=0.8,
-    )
-    figure.colorbar(shown, ax=axes, label=label, shrink=0.8, extend="both")
-
-
-def _draw_status(figure: Any, axes: Any, values: NDArray[Any], extent: Any) -> None:
-    from matplotlib.colors import BoundaryNorm, ListedColormap
-    from matplotlib.patches import Patch
-
-    states = list(Status)
-    colours = [STATUS_COLOURS[i % len(STATUS_COLOURS)] for i in range(len(states))]
-    bounds = np.arange(len(states) + 1) - 0.5
-    place = {int(state): i for i, state in enumerate(states)}
-    indices = np.vectorize(lambda value: place.get(int(value), 0))(values)
-    axes.imshow(
-        indices,
-        extent=extent,
-        cmap=ListedColormap(colours),
-        norm=BoundaryNorm(bounds, len(states)),
-        interpolation="nearest",
-        alpha=0.75,
-    )
-    counts = [int((indices == i).sum()) for i in range(len(states))]
-    handles = [
-        Patch(color=colours[i], label=f"{state.name} ({counts[i]})")
-        for i, state in enumerate(states)
-        if counts[i] and state is not Status.NOT_MEASURED
-    ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=2, fontsize=8)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from acquire.frame import Burst
-from analysis.evaluate import Gauge, measure_gauge
+from analysis.evaluate import Gauge
 from analysis.field import StrainField
 from live.measure.instant import Instant, instant_of
 
@@ -39,7 +39,7 @@ class Measurement:
 
         ``force`` (N) is NaN where it is not known, ``measure_s`` (s) the kernel's time.
         """
-        read = {gauge.name: measure_gauge(gauge, field) for gauge in gauges}
+        read = {gauge.name: gauge.measure(field) for gauge in gauges}
         return cls(number, burst, field, replace(instant_of(burst, field, force, measure_s), gauges=read))
 
     @property

@@ -15,7 +15,7 @@ from live.outputs.files import Files
 from live.outputs.outputs import Outputs
 from live.outputs.watching import CardWriter, FiguresWriter, Watching
 from live.results import FLUSH_S, Results, ResultsInfo
-from live.setup import Config, describe, outlines, versions
+from live.setup import Config, outlines, versions
 from live.tell import Books, Screen, StatusCard
 from live.view import View, ViewSetup, spawn_viewer
 
@@ -68,7 +68,7 @@ def make_outputs(about: About, books: Books, screen: Screen, more: Sequence[Cons
         about.camera,
         strain_measure=cast(Any, config.measure.strain),
         area_m2=config.specimen.area_m2,
-        gauges={name: describe(table) for name, table in config.gauges.items()},
+        gauges=dict(config.gauges),
         axis=config.specimen.axis,
         lagged=config.load.lag_s != 0,
     )
@@ -97,7 +97,7 @@ def _view(about: About, books: Books, screen: Screen) -> View | None:
         axis=about.config.specimen.first_axis,
         strain_range=v.strain_range,
         with_load=about.config.load.address != "none:",
-        outlines=outlines(about.config.gauges),
+        outlines=outlines(about.config.gauges, about.grid.size),
         light=v.light,
         picture_hz=1.0 if v.light else 5.0,
         scale="automatic" if v.scale == "automatic" else "symmetric",

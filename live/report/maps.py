@@ -12,10 +12,8 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from acquire.frame import CameraInfo
-from analysis.field import Status
-from live.export import Levels, Painter, Scale, caption, status_table
-from live.finished import Display, RunFolder, quantity_of
-from live.maps import number, ramp, ticks
+from live.finished import RunFolder, quantity_of
+from live.maps import ColourScale, Levels, Painter, caption, number, ramp, status_legend, ticks
 from live.report.page import Part, captioned, element, joined, safe
 
 _QUALITY = 80
@@ -63,9 +61,8 @@ def shots(run: RunFolder, rows: list[int]) -> Shots:
 
 def maps(run: RunFolder, name: str, instants: Mapping[int, str], taken: Shots, longest: int) -> Part:
     """One map at all instants beside its picture."""
-    display = Display()
-    scale = Scale.of(run.strain, name, list(instants), display)
-    painter = Painter(run.strain, name, display, scale, taken.size, longest)
+    scale = ColourScale.of_run(run.strain, name, list(instants))
+    painter = Painter(run.strain, name, scale, taken.size, longest)
     pairs = []
     for row, words in instants.items():
         base = painter.picture(taken.images[row], taken.levels)
@@ -88,17 +85,13 @@ def maps(run: RunFolder, name: str, instants: Mapping[int, str], taken: Shots, l
 
 def statuses(run: RunFolder, row: int, taken: Shots, longest: int) -> Part:
     """Why ZOIs have no value at an instant: the map and the counts."""
-    painter = Painter(run.strain, "status", Display(), None, taken.size, longest)
+    painter = Painter(run.strain, "status", None, taken.size, longest)
     base = painter.picture(taken.images.get(row), taken.levels)
     picture = _picture(painter.over(base, row), "status of each ZOI")
-    found, counts = np.unique(run.strain.maps("status", row)[run.strain.grid.active], return_counts=True)
-    known = {int(status): status for status in Status}
-    table, lines = status_table(), []
-    for value, count in zip(found.tolist(), counts.tolist(), strict=True):
-        words = f"{known[value].name}: {known[value].text}" if value in known else f"status {value}"
-        red, green, blue, _ = table[min(value, len(table) - 1)]
-        key = Part(f'<span class="key" style="background:rgb({red},{green},{blue})"></span>')
-        lines.append(Part(f"<p>{key}{count} {safe(words)}</p>"))
+    lines = []
+    for one in status_legend(run.strain.maps("status", row)[run.strain.grid.active]):
+        key = Part(f'<span class="key" style="background:rgb{one.rgb}"></span>')
+        lines.append(Part(f"<p>{key}{one.count} {safe(f'{one.name}: {one.text}')}</p>"))
     return joined([captioned(element("div", picture), caption(run.strain, row), "pair"), *lines])
 
 
@@ -111,7 +104,7 @@ def _picture(image: NDArray[np.uint8], words: str) -> Part:
     return Part(f'<img src="{source}" width="{width}" height="{height}" alt="{safe(words)}">')
 
 
-def _bar(name: str, scale: Scale) -> Part:
+def _bar(name: str, scale: ColourScale) -> Part:
     """The colours from low to high with their numbers, as SVG."""
     colours = ramp(_STEPS, 1)[::-1, 0]
     boxes = "".join(

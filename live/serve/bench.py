@@ -20,12 +20,13 @@ from acquire.files import write_picture
 from acquire.frame import CameraInfo, Frame
 from acquire.printable import brief, printable
 from live.check import Figures, Line, Watch, examine, judge
+from live.maps import lay_cells
 from live.measure import kinds_of
 from live.pace import OUTPUT, yield_to_others
 from live.serve.draft import Draft
 from live.serve.eye import RECENT, Eye
 from live.serve.judged import camera_values, figure_values, line_values, quality, shots_of, table_values
-from live.serve.painting import as_jpeg, as_png, lay_cells, mark_saturated, shrunk
+from live.serve.painting import as_jpeg, as_png, mark_saturated, shrunk
 from live.serve.region import Drawn
 from live.serve.watching import gauges_of
 from live.serve.web import Hub
@@ -36,7 +37,6 @@ from live.setup import (
     GIVEN,
     Config,
     compile_ahead,
-    describe,
     gauges_for,
     grid_for,
     read_mask,
@@ -152,7 +152,7 @@ class Bench:
         height, width = drawn.mask.shape
         box = replace(config, measure=replace(config.measure, roi=drawn.box, mask=None))
         placed = auto_gauges(grid_for(box, width, height, drawn.mask), config.specimen.first_axis)
-        gauges = {f"gauges.{name}": describe(table) for name, table in placed.items()}
+        gauges = {f"gauges.{name}": table for name, table in placed.items()}
         self.draft.change_all(gauges | {"measure.gauges": GIVEN})
 
     def save(self) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
+from itertools import count
 from typing import Any, TypeGuard
 
 import numpy as np
 
 from acquire.errors import ConfigError, DataError
+from analysis.evaluate import GAUGE_KINDS
 from live.serve.bench import OVERLAYS, Bench
 from live.serve.draft import with_setting
 from live.serve.region import Drawn
@@ -15,6 +17,7 @@ from live.specimen import Board, from_points
 
 Said = Mapping[str, Any]
 LONGEST_MM = 1e5
+MOST_POINTS = 100  # of a gauge
 SLIDERS = ("exposure_us", "gain", "brightness")
 
 
@@ -90,17 +93,41 @@ def put(bench: Bench, said: Said) -> None:
 
 
 def gauge(bench: Bench, said: Said) -> None:
-    """A gauge made, moved, named anew (``was``), or, without ``gauge``, taken away."""
-    name, was, table = said.get("name"), said.get("was"), said.get("gauge")
+    """A gauge made of a table or of places (``kind`` and ``points``), moved to others, or taken away.
+
+    ``was`` is its name so far; a new one without a name gets the usual one of its kind.
+    """
+    gauges, name = bench.draft.config.gauges, said.get("name")
+    was = said.get("was", name)
+    before = dict(gauges[was]) if isinstance(was, str) and was in gauges else {}
+    table = said.get("gauge", before)
+    if "points" in said:
+        kind = said.get("kind", before.get("kind"))
+        table = before | {"kind": kind, **_placed(kind, said["points"])}
+        name = name or _unused(GAUGE_KINDS[kind].usual, gauges)
     if not isinstance(name, str) or not isinstance(table, dict | None):
         raise ConfigError("a gauge has a name and a table")
     changes: dict[str, Any] = {}
-    if isinstance(was, str) and was != name and was in bench.draft.config.gauges:
-        if name in bench.draft.config.gauges:
+    if before and was != name:
+        if name in gauges:
             raise ConfigError(f"there is a gauge {name} already")
         changes[f"gauges.{was}"] = None
-    changes[f"gauges.{name}"] = table
-    bench.draft.change_all(changes)
+    bench.draft.change_all(changes | {f"gauges.{name}": table})
+
+
+def _placed(kind: object, points: object) -> dict[str, Any]:
+    """The parameters of a gauge of ``kind`` at the places that a page has sent."""
+    if not isinstance(kind, str) or kind not in GAUGE_KINDS:
+        raise ConfigError(f"there is no such kind of gauge; there are {', '.join(GAUGE_KINDS)}")
+    if not _are_points(points, 1, MOST_POINTS):
+        raise ConfigError(f"a gauge has 1 to {MOST_POINTS} places, x and y in px")
+    return GAUGE_KINDS[kind].placed([(float(x), float(y)) for x, y in points])
+
+
+def _unused(usual: str, taken: Container[str]) -> str:
+    """The first of axial, axial2 ... that is free."""
+    names = (usual if n == 1 else f"{usual}{n}" for n in count(1))
+    return next(name for name in names if name not in taken)
 
 
 def place(bench: Bench, said: Said) -> None:
@@ -111,11 +138,10 @@ def place(bench: Bench, said: Said) -> None:
 def scale(bench: Bench, said: Said) -> None:
     """mm per px from two points and their distance."""
     points, length = said.get("points"), said.get("mm")
-    numbers = [*(v for point in points for v in point), length] if _are_points(points) else []
-    if len(numbers) != 5 or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in numbers):
+    if not _are_points(points) or not _is_place(length):
         raise ConfigError("a scale is two points in px and their distance in mm")
-    x1, y1, x2, y2, mm = (float(v) for v in numbers)
-    bench.draft.change_all(from_points((x1, y1, x2, y2), mm).changes())
+    (x1, y1), (x2, y2) = points
+    bench.draft.change_all(from_points((x1, y1, x2, y2), float(length)).changes())
     bench.scaled()
     bench.region_changed()
 
@@ -140,10 +166,16 @@ def _is_length(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < LONGEST_MM
 
 
-def _are_points(said: object) -> TypeGuard[list[list[Any]]]:
+def _are_points(said: object, fewest: int = 2, most: int = 2) -> TypeGuard[list[list[Any]]]:
     return (
-        isinstance(said, list) and len(said) == 2 and all(isinstance(p, list) and len(p) == 2 for p in said)
+        isinstance(said, list)
+        and fewest <= len(said) <= most
+        and all(isinstance(p, list) and len(p) == 2 and all(map(_is_place, p)) for p in said)
     )
+
+
+def _is_place(value: object) -> TypeGuard[float]:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6
 
 
 def check(bench: Bench, said: Said) -> None:

@@ -19,11 +19,13 @@ import numpy as np
 
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.printable import brief, printable
+from analysis.evaluate import GAUGE_KINDS
+from live.maps import FIELD_MAPS
 from live.operate import Orders, answer
 from live.serve.bench import Bench
 from live.serve.changes import CHANGES
 from live.serve.draft import Draft, counted_up
-from live.serve.painting import COMPONENTS, RAMP, as_png
+from live.serve.painting import RAMP, as_png
 from live.serve.region import Drawn
 from live.serve.watching import Running, Watching
 from live.serve.web import ALONE, DEFAULT_PORT, Answer, Hub, PageServer, Refused, jpeg, of_json
@@ -182,7 +184,11 @@ class Desk:
 
     def _tell_stage(self) -> None:
         said = {"stage": self.stage, "words": self._said, "alone": self.draft is None}
-        self._hub.tell("stage", said | {"components": COMPONENTS, "ramp": RAMP})
+        kinds = [
+            {"kind": name, "label": one.label, "hint": one.hint, "gesture": one.gesture}
+            for name, one in GAUGE_KINDS.items()
+        ]
+        self._hub.tell("stage", said | {"components": FIELD_MAPS, "ramp": RAMP, "kinds": kinds})
 
     # -- what a page asks ---------------------------------------------------------------------
 

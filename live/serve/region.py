@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
+from analysis.evaluate import inside_polygon
 
 TOOLS = ("rectangle", "polygon", "brush", "eraser")
 MOST_POINTS = 5000
@@ -87,17 +88,6 @@ class Stroke:
 
 def _is_place(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6
-
-
-def inside_polygon(x: Floats, y: Floats, corners: Floats) -> Bools:
-    """Whether the points lie inside, by the number of edges to their right."""
-    inside = np.zeros(x.shape, bool)
-    for (x0, y0), (x1, y1) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
-        if y0 == y1:
-            continue
-        crosses = (y0 > y) != (y1 > y)
-        inside ^= crosses & (x < (x1 - x0) * (y - y0) / (y1 - y0) + x0)
-    return inside
 
 
 def near_way(x: Floats, y: Floats, way: Floats, radius: float) -> Bools:

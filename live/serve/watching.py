@@ -16,12 +16,13 @@ from typing import Any, Protocol
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.printable import printable
+from live.maps import FIELD_MAPS, FieldMaps, Painted, lay_cells
 from live.measure import Measurement, Snapshot
 from live.outputs import Consumer, Policy
 from live.serve.curve import Curve
-from live.serve.painting import COMPONENTS, Colours, as_jpeg, lay_cells, shrunk
+from live.serve.painting import as_jpeg, shrunk
 from live.serve.web import Hub
-from live.setup import Config, describe
+from live.setup import Config, complete_gauges
 from live.tell import Books, sentence
 
 STATE_S, PICTURE_S = 0.1, 0.25
@@ -69,7 +70,7 @@ class Watching(Consumer):
         self._hub, self._config, self._now = hub, config, now
         axis = config.specimen.first_axis
         self._component = f"e{axis * 2}"
-        self._colours = Colours(axis, config.view.strain_range)
+        self._maps = FieldMaps(axis, config.view.strain_range)
         names = list(config.gauges) or ["exx", "eyy", "exy"]
         self.curve = Curve(["t", "stress" if config.specimen.area_m2 else "force", "axial", *names])
         self._names = names
@@ -91,8 +92,8 @@ class Watching(Consumer):
 
     def choose(self, component: str) -> str:
         """Show another map; a refusal in words, or empty."""
-        if component not in COMPONENTS:
-            return f"there is no map {component!r}; there are {', '.join(COMPONENTS)}"
+        if component not in FIELD_MAPS:
+            return f"there is no map {component!r}; there are {', '.join(FIELD_MAPS)}"
         self._component, self._fresh = component, True
         return ""
 
@@ -182,9 +183,9 @@ class Watching(Consumer):
         m, frame = self._newest, self._frame
         if m is not None:
             picture, scale = shrunk(m.burst.mean, m.burst.bits)
-            cells, of = self._colours.of(m.field, self._component)
-            lay_cells(picture, scale, m.field.grid, cells, (m.instant.u, m.instant.v))
-            self._scale = {"low": of.low, "high": of.high, "unit": of.unit}
+            painted = self._maps.paint(m.field, (self._component,))[self._component]
+            lay_cells(picture, scale, m.field.grid, painted.rgba, (m.instant.u, m.instant.v))
+            self._scale = _scale_of(painted)
             size = m.burst.mean.shape
         elif frame is not None:
             picture, scale = shrunk(frame.image, frame.bits)
@@ -196,9 +197,27 @@ class Watching(Consumer):
         self._shown += 1
 
 
+def _scale_of(painted: Painted) -> dict[str, Any]:
+    """What the colours of a map stand for, as the page shows it."""
+    scale = painted.scale
+    if scale is not None:
+        return {"low": scale.low, "high": scale.high, "unit": scale.unit}
+    legend = [{"text": f"{one.name} {one.count}", "colour": f"rgb{one.rgb}"} for one in painted.legend]
+    return {"legend": legend}
+
+
 def gauges_of(config: Config) -> dict[str, Any]:
-    """The gauges of a configuration as the page draws them."""
-    return {name: describe(table) for name, table in config.gauges.items()}
+    """The gauges of a configuration as the page draws them: kind, handles and lines, px."""
+    found = complete_gauges(config.gauges, config.specimen.first_axis)
+    zoi = config.measure.zoi
+    return {
+        one.name: {
+            "kind": one.kind,
+            "handles": one.handles(),
+            "outline": [[(round(x, 1), round(y, 1)) for x, y in line] for line in one.outline(zoi)],
+        }
+        for one in found
+    }
 
 
 def _measured(s: Snapshot) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from live.setup.checks import ALL, AUTO, GIVEN
 from live.setup.compiling import compile_ahead
 from live.setup.config import Config, from_dict, load_config, options, settings_in
 from live.setup.folder import FILES, installed, make_folder, other_digits, versions
-from live.setup.gauges import GaugeConfig, describe, gauges_for, outlines
+from live.setup.gauges import GaugeTable, complete_gauges, gauges_for, outlines
 from live.setup.grid import grid_for, kernel_settings, whole_picture
 from live.setup.pictures import correction, read_mask, with_flat_field, with_mask
 from live.setup.rig import Rig, open_load, open_rig
@@ -26,12 +26,12 @@ __all__ = [
     "GIVEN",
     "AlarmConfig",
     "Config",
-    "GaugeConfig",
+    "GaugeTable",
     "Rig",
     "SpecimenConfig",
     "compile_ahead",
+    "complete_gauges",
     "correction",
-    "describe",
     "from_dict",
     "gauges_for",
     "grid_for",

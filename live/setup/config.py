@@ -20,8 +20,8 @@ from typing import Any, TypeVar
 from acquire.errors import ConfigError, DataError
 from acquire.files import read_bytes
 from live.channels import channel_names
-from live.setup.checks import AUTO, Option, Refused, in_px
-from live.setup.gauges import NAME, GaugeConfig
+from live.setup.checks import AUTO, Check, Option, Refused, in_px
+from live.setup.gauges import NAME, USUAL, GaugeTable, gauge_checks
 from live.setup.sections import (
     AlarmConfig,
     CameraConfig,
@@ -60,7 +60,7 @@ class Config:
     specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
     output: OutputConfig = field(default_factory=OutputConfig)
     alarm: tuple[AlarmConfig, ...] = ()
-    gauges: Mapping[str, GaugeConfig] = field(default_factory=dict)
+    gauges: Mapping[str, GaugeTable] = field(default_factory=dict)
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
@@ -198,31 +198,37 @@ def _section(
     where: str,
     px_per_mm: float | None = None,
 ) -> Section:
-    fields = {f.name: f for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    checks = {f.name: f.metadata["check"] for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    return kind(**_accepted(checks, name, content, where, px_per_mm))
+
+
+def _accepted(
+    checks: Mapping[str, Check], name: str, content: Mapping[str, Any], where: str, px_per_mm: float | None
+) -> dict[str, Any]:
     values = {}
     for key, value in content.items():
         if (name, key) in _WITHDRAWN:
             raise ConfigError(f"{where}: {name}.{key} is withdrawn: {_WITHDRAWN[name, key]}")
-        if key not in fields:
-            raise ConfigError(f"{where}: unknown key {name}.{key}{_meant(key, list(fields))}")
+        if key not in checks:
+            raise ConfigError(f"{where}: unknown key {name}.{key}{_meant(key, list(checks))}")
         try:
-            check = fields[key].metadata["check"]
-            values[key] = check.accept(in_px(value, check, px_per_mm))
+            values[key] = checks[key].accept(in_px(value, checks[key], px_per_mm))
         except Refused as allowed:
             raise ConfigError(
                 f"{where}: {name}.{key} = {_shown(value)} is not possible; allowed: {allowed}"
             ) from None
-    return kind(**values)
+    return values
 
 
-def _gauge(name: str, table: Any, where: str, px_per_mm: float | None) -> GaugeConfig:
+def _gauge(name: str, table: Any, where: str, px_per_mm: float | None) -> GaugeTable:
     if not NAME.fullmatch(name):
         raise ConfigError(
             f"{where}: gauges.{name}: a name has up to 32 letters, digits and _, a letter first"
         )
     if not isinstance(table, Mapping):
         raise ConfigError(f"{where}: gauges.{name} must be a table, [gauges.{name}] with keys below it")
-    return _section(GaugeConfig, f"gauges.{name}", table, where, px_per_mm)
+    values = _accepted(gauge_checks(table.get("kind")), f"gauges.{name}", table, where, px_per_mm)
+    return {"kind": USUAL, **values}
 
 
 def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:

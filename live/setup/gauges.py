@@ -1,54 +1,55 @@
-"""Virtual gauges of the configuration: a table ``[gauges.NAME]`` each, made into gauges on a grid."""
+"""Virtual gauges of the configuration: a table ``[gauges.NAME]`` each, made into gauges on a grid.
+
+The keys of a table are the parameters of its kind of gauge (``analysis.evaluate.GAUGE_KINDS``). The gauges called
+``axial`` and ``transverse`` make the stress-strain curve.
+"""
 
 from __future__ import annotations
 
-import dataclasses
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal, cast
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
 
 from acquire.errors import ConfigError
-from live.setup.checks import CORNERS, POINT, RECTANGLE, choice, key, length, number
+from analysis.evaluate import GAUGE_KINDS, Gauge, Parameter
+from live.setup.checks import CORNERS, POINT, RECTANGLE, Check, choice, length, number
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid
-    from analysis.evaluate import Gauge
     from live.setup.config import Config
 
 Point = tuple[float, float]
+GaugeTable = Mapping[str, Any]
+"""``kind`` and the parameters given of one gauge, fit for JSON."""
 
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 """A gauge's name stands in the columns of files."""
+USUAL = "line"
+"""The kind of a gauge that names none."""
+_PLACES = {"point": POINT, "box": RECTANGLE, "corners": CORNERS}
 
 
-@dataclass(frozen=True, slots=True)
-class GaugeConfig:
-    """[gauges.NAME]; the gauges called ``axial`` and ``transverse`` make the stress-strain curve."""
+def gauge_checks(kind: object) -> dict[str, Check]:
+    """What the keys of a gauge may be; those of other kinds are checked too, and do nothing."""
+    own = [one for name, one in GAUGE_KINDS.items() if name == kind]
+    checks = {"kind": choice(*GAUGE_KINDS)}
+    for one in (*GAUGE_KINDS.values(), *own):
+        checks |= {key: _check(found) for key, found in one.parameters().items()}
+    return checks
 
-    kind: str = key(choice("zoi", "area", "line", "transverse"), "line", "kind of gauge")
-    at: tuple[float, float] | None = key(POINT, None, "x, y of the ZOI of a zoi, px", optional=True)
-    start: tuple[float, float] | None = key(POINT, None, "x, y of one end of a line, px", optional=True)
-    end: tuple[float, float] | None = key(POINT, None, "x, y of the other", optional=True)
-    radius_px: float | None = key(
-        length(number(0.1, 1e5)), None, "ZOIs this far around an end of a line (half a ZOI)", optional=True
-    )
-    box: tuple[float, float, float, float] | None = key(
-        RECTANGLE, None, "x, y, width, height of an area or transverse gauge, px", optional=True
-    )
-    corners: tuple[tuple[float, float], ...] | None = key(
-        CORNERS, None, "x, y of the corners of an area, px", optional=True
-    )
-    value: str | None = key(
-        choice("exx", "eyy", "exy", "gamma_xy"),
-        None,
-        "strain of a zoi or area (along the load)",
-        optional=True,
-    )
-    statistic: str = key(choice("mean", "largest", "smallest"), "mean", "of an area")
-    along: str | None = key(
-        choice("x", "y"), None, "direction of a transverse gauge (across the load)", optional=True
-    )
+
+def _check(one: Parameter) -> Check:
+    if one.kind == "choice":
+        return choice(*one.choices)
+    return length(number(one.low, one.high)) if one.kind == "length" else _PLACES[one.kind]
+
+
+def make_gauge(name: str, table: GaugeTable, axis: str) -> Gauge:
+    """The gauge of a table with what follows from the ``axis`` of the load; raises ConfigError."""
+    try:
+        return GAUGE_KINDS[table.get("kind", USUAL)].of(name, table, axis)
+    except ValueError as error:
+        raise ConfigError(f"gauges.{name}: {error}") from None
 
 
 def gauges_for(config: Config, grid: ZoiGrid) -> tuple[Gauge, ...]:
@@ -59,49 +60,15 @@ def gauges_for(config: Config, grid: ZoiGrid) -> tuple[Gauge, ...]:
     ConfigError
         A key is missing or impossible, or no ZOI lies where a gauge is.
     """
-    gauges = tuple(_gauge(name, table, config.specimen.first_axis) for name, table in config.gauges.items())
+    axis = config.specimen.first_axis
+    gauges = tuple(make_gauge(name, table, axis) for name, table in config.gauges.items())
     for gauge in gauges:
         _check_place(gauge, grid)
     return gauges
 
 
-def describe(table: GaugeConfig) -> dict[str, Any]:
-    """What was said of a gauge, fit for JSON."""
-    return {name: value for name, value in dataclasses.asdict(table).items() if value is not None}
-
-
-def _gauge(name: str, g: GaugeConfig, axis: str) -> Gauge:
-    from analysis.evaluate import AreaGauge, LineGauge, TransverseGauge, ZoiGauge
-
-    value = g.value or ("exx" if axis == "x" else "eyy")
-    try:
-        if g.kind == "zoi":
-            x, y = _said(name, g, "at")
-            return ZoiGauge(name, x, y, value)
-        if g.kind == "line":
-            return LineGauge(name, _said(name, g, "start"), _said(name, g, "end"), g.radius_px)
-        if g.kind == "transverse":
-            x, y, width, height = _said(name, g, "box")
-            across = cast(Literal["x", "y"], g.along or ("y" if axis == "x" else "x"))
-            return TransverseGauge(name, x, y, width, height, across)
-        if g.corners:
-            return AreaGauge(name, g.corners, value, cast(Any, g.statistic))
-        return AreaGauge.rectangle(name, _said(name, g, "box"), value, cast(Any, g.statistic))
-    except ValueError as error:
-        raise ConfigError(f"gauges.{name}: {error}") from None
-
-
-def _said(name: str, g: GaugeConfig, field: str) -> Any:
-    value = getattr(g, field)
-    if value is None:
-        raise ConfigError(f"gauges.{name}: a gauge of kind {g.kind!r} needs {field!r}")
-    return value
-
-
 def _check_place(gauge: Gauge, grid: ZoiGrid) -> None:
-    from analysis.evaluate import gauge_zois
-
-    if all(mask.any() for mask in gauge_zois(gauge, grid)):
+    if all(mask.any() for mask in gauge.zois(grid)):
         return
     raise ConfigError(
         f"gauges.{gauge.name}: no ZOI is there; the centres of ZOIs reach from {grid.x[0]:g}, {grid.y[0]:g} to"
@@ -109,22 +76,15 @@ def _check_place(gauge: Gauge, grid: ZoiGrid) -> None:
     )
 
 
-def outlines(gauges: Mapping[str, GaugeConfig]) -> dict[str, tuple[Point, ...]]:
-    """Where gauges lie, as lines to be drawn, px: an extensometer, the outline of an area, a cross on a ZOI."""
-    drawn = {name: _outline(gauge) for name, gauge in gauges.items()}
-    return {name: points for name, points in drawn.items() if points}
+def complete_gauges(gauges: Mapping[str, GaugeTable], axis: str = "y") -> Iterator[Gauge]:
+    """Those of which nothing is missing, to be drawn."""
+    for name, table in gauges.items():
+        try:
+            yield make_gauge(name, table, axis)
+        except ConfigError:
+            continue
 
 
-def _outline(gauge: GaugeConfig) -> tuple[Point, ...]:
-    if gauge.start is not None and gauge.end is not None:
-        return gauge.start, gauge.end
-    if gauge.at is not None:
-        (x, y), r = gauge.at, 8.0
-        return (x - r, y), (x + r, y), (x, y), (x, y - r), (x, y + r)
-    if gauge.corners is not None:
-        return (*gauge.corners, gauge.corners[0])
-    if gauge.box is not None:
-        x0, y0, width, height = gauge.box
-        x1, y1 = x0 + width, y0 + height
-        return (x0, y0), (x1, y0), (x1, y1), (x0, y1), (x0, y0)
-    return ()
+def outlines(gauges: Mapping[str, GaugeTable], zoi: float) -> dict[str, tuple[tuple[Point, ...], ...]]:
+    """The lines to be drawn for each gauge, px, with ZOIs of a side of ``zoi`` px."""
+    return {gauge.name: gauge.outline(zoi) for gauge in complete_gauges(gauges)}

@@ -108,11 +108,12 @@ def setup_of(run: RunFolder) -> ViewSetup:
     )
 
 
-def _outlines(run: RunFolder) -> dict[str, tuple[tuple[float, float], ...]]:
+def _outlines(run: RunFolder) -> dict[str, tuple[tuple[tuple[float, float], ...], ...]]:
     """Where the gauges lie; of one whose place the file does not tell, nothing."""
     described = {name: gauge.described for name, gauge in run.gauges.items()}
     try:
-        return outlines(from_dict({"gauges": described}, {}, str(run.path)).gauges)
+        gauges = from_dict({"gauges": described}, {}, str(run.path)).gauges
+        return outlines(gauges, run.strain.grid.size)
     except ConfigError:
         return {}
 

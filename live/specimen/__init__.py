@@ -5,7 +5,7 @@ the rig down. ``scale`` and ``board`` take the scale of the picture.
 """
 
 from live.specimen.board import Board, from_board
-from live.specimen.drawing import Overlay, outline, snapshot
+from live.specimen.drawing import Overlay, snapshot
 from live.specimen.placing import auto_gauges, with_auto_gauges
 from live.specimen.proposal import Proposal, propose, rig_text
 from live.specimen.region import (
@@ -38,7 +38,6 @@ __all__ = [
     "is_sought",
     "look",
     "mask_picture",
-    "outline",
     "placed_on",
     "propose",
     "region_of",

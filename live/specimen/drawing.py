@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
-from live.setup import GaugeConfig
+from live.setup import GaugeTable, complete_gauges
 from live.specimen.region import Region
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ class Overlay:
     ----------
     region : Region
     grid : ZoiGrid
-    gauges : mapping of name to GaugeConfig
+    gauges : mapping of name to its table
     sigma : (R, C) or None
         Strain noise of each ZOI, NaN without pattern; None: not drawn.
     wanted : float
@@ -51,7 +51,7 @@ class Overlay:
 
     region: Region
     grid: ZoiGrid
-    gauges: Mapping[str, GaugeConfig] = field(default_factory=dict)
+    gauges: Mapping[str, GaugeTable] = field(default_factory=dict)
     sigma: NDArray[np.float64] | None = None
     wanted: float = 1e-3
     px_per_mm: float | None = None
@@ -63,8 +63,8 @@ def snapshot(picture: NDArray[Any], overlay: Overlay) -> Canvas:
     drawing.region(overlay)
     if overlay.sigma is not None:
         drawing.quality(overlay, overlay.sigma)
-    for name, gauge in overlay.gauges.items():
-        drawing.gauge(name, gauge, overlay.grid.size)
+    for gauge in complete_gauges(overlay.gauges):
+        drawing.gauge(gauge.name, gauge.outline(overlay.grid.size))
     return drawing.framed(overlay)
 
 
@@ -115,24 +115,13 @@ class _Drawing:
                 self.cv2.line(self.canvas, *corners, POOR, 2)
                 self.cv2.line(self.canvas, (x - half, y + half), (x + half, y - half), POOR, 2)
 
-    def gauge(self, name: str, g: GaugeConfig, zoi: int) -> None:
+    def gauge(self, name: str, outline: tuple[tuple[tuple[float, float], ...], ...]) -> None:
         """Its outline and its name."""
-        cv2 = self.cv2
-        if g.kind == "line" and g.start and g.end:
-            ends = self.at(*g.start), self.at(*g.end)
-            cv2.line(self.canvas, *ends, GAUGE, 2, cv2.LINE_AA)
-            for end in ends:
-                cv2.circle(
-                    self.canvas, end, round((g.radius_px or zoi / 2) * self.zoom), GAUGE, 2, cv2.LINE_AA
-                )
-            self.text(name, ends[0][0] + 8, ends[0][1] + 5, GAUGE)
-            return
-        corners = outline(g, zoi)
-        if corners:
-            points = np.array([self.at(*corner) for corner in corners], np.int32)
-            cv2.polylines(self.canvas, [points], True, GAUGE, 2, cv2.LINE_AA)
-            left, low = points.min(axis=0)[0], points.max(axis=0)[1]
-            self.text(name, int(left) + 5, int(low) - 6, GAUGE)
+        for line in outline:
+            points = np.array([self.at(*place) for place in line], np.int32)
+            self.cv2.polylines(self.canvas, [points], False, GAUGE, 2, self.cv2.LINE_AA)
+        left, low = self.at(*outline[0][0])
+        self.text(name, left + 8, low - 6, GAUGE)
 
     def text(self, words: str, x: int, y: int, colour: Colour) -> None:
         """Readable on any ground."""
@@ -162,21 +151,6 @@ class _Drawing:
     def _label(self, words: str, x: int, y: int) -> None:
         cv2 = self.cv2
         cv2.putText(self.canvas, words, (x, y), cv2.FONT_HERSHEY_SIMPLEX, FONT, INK, 1, cv2.LINE_AA)
-
-
-def outline(gauge: GaugeConfig, zoi: int) -> tuple[tuple[float, float], ...]:
-    """The corners of a gauge that has an area, px; empty for a line."""
-    if gauge.corners:
-        return gauge.corners
-    if gauge.kind == "zoi" and gauge.at:
-        (x, y), half = gauge.at, zoi / 2
-        x0, y0, x1, y1 = x - half, y - half, x + half, y + half
-    elif gauge.box:
-        x0, y0, width, height = gauge.box
-        x1, y1 = x0 + width, y0 + height
-    else:
-        return ()
-    return (x0, y0), (x1, y0), (x1, y1), (x0, y1)
 
 
 def _ticks(length: int, zoom: float) -> Iterator[tuple[str, int]]:

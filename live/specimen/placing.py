@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
-from live.setup import AUTO, GIVEN, Config, GaugeConfig
+from live.setup import AUTO, GIVEN, Config, GaugeTable
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid
@@ -40,7 +40,7 @@ def with_auto_gauges(config: Config, grid: ZoiGrid) -> Config:
     return replace(config, gauges=gauges, measure=replace(config.measure, gauges=GIVEN))
 
 
-def auto_gauges(grid: ZoiGrid, axis: str) -> dict[str, GaugeConfig]:
+def auto_gauges(grid: ZoiGrid, axis: str) -> dict[str, GaugeTable]:
     """``axial`` over 80 % of the specimen, ``transverse`` across it, ``area`` between the ends of axial.
 
     Parameters
@@ -52,7 +52,7 @@ def auto_gauges(grid: ZoiGrid, axis: str) -> dict[str, GaugeConfig]:
 
     Returns
     -------
-    dict of name to GaugeConfig, px
+    dict of name to table, px
         Without ``transverse`` where a single ZOI fits across.
 
     Raises
@@ -68,8 +68,8 @@ def auto_gauges(grid: ZoiGrid, axis: str) -> dict[str, GaugeConfig]:
     band = _band(frame, first, last)
     across = np.flatnonzero(frame.active[band].any(axis=0))
     if len(across) > 1:
-        gauges["transverse"] = GaugeConfig(kind="transverse", box=frame.box(band, across))
-    gauges["area"] = GaugeConfig(kind="area", box=frame.box(np.arange(first, last + 1), columns))
+        gauges["transverse"] = {"kind": "transverse", "box": frame.box(band, across)}
+    gauges["area"] = {"kind": "area", "box": frame.box(np.arange(first, last + 1), columns)}
     return gauges
 
 
@@ -120,14 +120,14 @@ def _ends(frame: _Frame) -> tuple[int, int]:
     return (first, last) if first < last else (int(rows[0]), int(rows[-1]))
 
 
-def _axial(frame: _Frame, first: int, last: int) -> GaugeConfig:
+def _axial(frame: _Frame, first: int, last: int) -> GaugeTable:
     """On the middle line of the specimen, or as near to it as both ends have a ZOI."""
     middle = float(np.average(frame.across, weights=frame.active.sum(axis=0)))
     both = frame.active[first] & frame.active[last]
     ends = [both, both] if both.any() else [frame.active[first], frame.active[last]]
     columns = [_nearest(np.flatnonzero(end), frame.across, middle) for end in ends]
     start, end = frame.point(first, columns[0]), frame.point(last, columns[1])
-    return GaugeConfig(kind="line", start=start, end=end)
+    return {"kind": "line", "start": start, "end": end}
 
 
 def _nearest(columns: NDArray[np.intp], across: Floats, middle: float) -> int:

@@ -13,7 +13,7 @@ import numpy as np
 
 from acquire.errors import ConfigError
 from acquire.printable import printable
-from live.setup import AUTO, Config, GaugeConfig
+from live.setup import AUTO, Config, GaugeTable
 from live.specimen.placing import with_auto_gauges
 from live.specimen.region import Look, Region, is_sought, region_of
 
@@ -196,13 +196,12 @@ def _gauges(p: Proposal, fixed: bool) -> Iterator[str]:
         yield from ("", *(lead + line for line in _gauge(name, gauge)))
 
 
-def _gauge(name: str, g: GaugeConfig) -> Iterator[str]:
+def _gauge(name: str, g: GaugeTable) -> Iterator[str]:
     yield f"[gauges.{name}]"
-    yield f"kind = {_quoted(g.kind)}"
+    yield f"kind = {_quoted(g['kind'])}"
     for key in ("start", "end", "box"):
-        value = getattr(g, key)
-        if value is not None:
-            yield f"{key} = {_numbers(value)}"
+        if key in g:
+            yield f"{key} = {_numbers(g[key])}"
 
 
 def _remark(words: str) -> str:

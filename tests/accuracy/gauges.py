@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis import PhaseKernel, Roi, ZoiGrid
-from analysis.evaluate import AreaGauge, Gauge, LineGauge, TransverseGauge, ZoiGauge, measure_gauge
+from analysis.evaluate import AreaGauge, Gauge, LineGauge, TransverseGauge, ZoiGauge
 from tests.accuracy.truth import Speckle, affine, digitise, field
 
 SHAPE = (176, 272)
@@ -21,18 +21,18 @@ PEAK, WIDTH, PEAK_NOISE = 0.04, 36.0, 0.002  # of a hill of exx, and its sigma, 
 
 
 def point(value: str) -> list[Gauge]:
-    return [ZoiGauge("", x, y, value) for x in range(40, 240, 32) for y in range(40, 150, 32)]
+    return [ZoiGauge("", (x, y), value) for x in range(40, 240, 32) for y in range(40, 150, 32)]
 
 
 def mean(value: str) -> list[Gauge]:
     return [
-        AreaGauge.rectangle("", (x, y, 70, 70), value) for x in range(16, 200, 48) for y in range(16, 100, 48)
+        AreaGauge("", (x, y, 70, 70), value=value) for x in range(16, 200, 48) for y in range(16, 100, 48)
     ]
 
 
 def peak(statistic: str) -> list[Gauge]:
     box = (0, 0, SIDE, SIDE)
-    return [AreaGauge.rectangle("", box, "exx", statistic)]  # type: ignore[arg-type]
+    return [AreaGauge("", box, value="exx", statistic=statistic)]  # type: ignore[arg-type]
 
 
 def line(length: float, angle: float, radius: float | None = None) -> list[Gauge]:
@@ -47,7 +47,7 @@ def line(length: float, angle: float, radius: float | None = None) -> list[Gauge
 
 def across(along: str) -> list[Gauge]:
     return [
-        TransverseGauge("", x, y, 100, 60, along)  # type: ignore[arg-type]
+        TransverseGauge("", (x, y, 100, 60), along)  # type: ignore[arg-type]
         for x in range(16, 160, 64) for y in range(16, 104, 32)
     ]  # fmt: skip
 
@@ -105,7 +105,7 @@ def ratio(
     for _ in range(pairs):
         before, after = (digitise(picture, BITS, noise, rng) for picture in pictures)
         found = PhaseKernel(before, zois, noise=share).measure(after, noise=share)
-        read = [measure_gauge(gauge, found) for gauge in gauges]
+        read = [gauge.measure(found) for gauge in gauges]
         values.append([r.value for r in read])
         sigmas.append([r.sigma for r in read])
     deviation = np.array(values) - np.mean(values, axis=0)

@@ -49,7 +49,7 @@ ROOMS = {
     "live.recording": "acquire live.operate live.tell",
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",
-    "live.view.painting": "acquire analysis.field live.maps live.measure live.view.exchange",
+    "live.view.painting": "acquire live.measure live.view.exchange",
     "live.view.drawing": "acquire analysis.field live.maps live.measure live.view.exchange live.view.painting",
     "live.view": "acquire analysis.field live.measure live.pace live.view.exchange",
     "live.outputs": "acquire acquire.load_cell analysis live.measure live.pace live.setup live.tell"
@@ -109,8 +109,11 @@ LIBRARIES = {
     "fcntl": "acquire.v4l2",
     "h5py": "acquire.hdf5 acquire.session live.results",
     "llvmlite": "analysis.compiled",
+    "matplotlib": "live.characterise",
     "rerun": "live.view.drawing",
     "serial": "acquire.serial_line",
+    "tifffile": "live.export",
+    "PIL": "live.export",
     "tomlkit": "live.setup",
 }
 # Room (and all in it) -> what it never imports.

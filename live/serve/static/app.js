@@ -17,6 +17,7 @@ const shown = {
     for (const item of $("stages").children) item.classList.toggle("here", item.dataset.of === value.stage);
     if (value.words) { put($("answer"), value.words); $("answer").classList.add("no"); }
     if (moved && value.stage === "run") showRun.begin(value);
+    if (moved && value.stage === "setup") showSetup.begin(value);
   },
   setup: (value) => { if (stage.stage === "setup") showSetup(value); },
   run: (value) => { if (stage.stage === "run") showRun(value); },

@@ -136,8 +136,15 @@ function picture(told) {
   image.onload = image.onerror = () => { loading = false; };
   image.src = `/picture?run=${told.n}`;
   if ($("component") !== document.activeElement) $("component").value = told.of;
-  const some = told.high != null && told.of !== "status";
-  $("ramp").classList.toggle("none", !some);
+  const some = told.high != null;
+  $("ramp").parentElement.classList.toggle("status", Boolean(told.legend));
+  $("ramp").style.visibility = some ? "" : "hidden";
+  $("statuses").replaceChildren(...(told.legend ?? []).map((one) => {
+    const item = document.createElement("span"), key = document.createElement("i");
+    key.style.background = one.colour;
+    item.append(key, one.text);
+    return item;
+  }));
   put($("low"), some ? fixed(told.low, told.unit === "µm/m" ? 0 : 3) : "");
   put($("high"), some ? fixed(told.high, told.unit === "µm/m" ? 0 : 3) : "");
   put($("unit"), some ? told.unit : "");

@@ -1,6 +1,6 @@
 // Setting up: light and focus, region and gauges with the mouse, scale, the check, the rig file.
 import { $, change, put } from "./base.js";
-import { drawGauges, make, place, placed, places, shape } from "./draw.js";
+import { drawGauges, make, place } from "./draw.js";
 import { t } from "./words.js";
 
 const svg = $("drawing");
@@ -11,41 +11,57 @@ const HINTS = {
   polygon: "Click the corners; Enter or a double click closes it, Escape forgets it.",
   brush: "Paint what is measured.",
   eraser: "Paint what is not measured.",
-  line: "Drag from one end of the extensometer to the other.",
-  transverse: "Drag a rectangle: strain across the load.",
-  area: "Drag a rectangle: its mean strain.",
-  zoi: "Click a place.",
   move: "Drag the handles; with the keyboard Tab and the arrows.",
   scale: "Click two points whose distance you know.",
   board: "Hold the board where the specimen will be. Of a checkerboard count the inner corners, of a ChArUco board the squares.",
 };
-const GAUGES = ["line", "transverse", "area", "zoi"];
-const DRAGGED = ["rectangle", "line", "transverse", "area"];
+let kinds = {};  // of gauges, as the server lists them
+const dragged = () => tool === "rectangle" || ["line", "box"].includes(kinds[tool]?.gesture);
+const clicked = () => kinds[tool]?.gesture === "click";
 
 function choose(name) {
   tool = name;
   points = [];
   drag = null;
   for (const button of document.querySelectorAll("[data-tool]")) button.setAttribute("aria-pressed", String(button.dataset.tool === name));
-  $("hint").dataset.t = HINTS[name];
-  put($("hint"), t(HINTS[name]));
+  $("hint").dataset.t = HINTS[name] ?? kinds[name].hint;
+  put($("hint"), t($("hint").dataset.t));
   svg.style.cursor = name === "move" ? "default" : "crosshair";
   sketch();
 }
 for (const button of document.querySelectorAll("[data-tool]")) button.addEventListener("click", () => choose(button.dataset.tool));
+
+// A button for each kind of gauge; the first ones have the keys 5 to 8.
+showSetup.begin = (stage) => {
+  kinds = Object.fromEntries(stage.kinds.map((one) => [one.kind, one]));
+  $("kinds").replaceChildren(...stage.kinds.map((one, i) => {
+    const button = document.createElement("button"), name = document.createElement("span"), key = document.createElement("kbd");
+    button.type = "button";
+    button.dataset.tool = one.kind;
+    name.dataset.t = one.label;
+    name.textContent = t(one.label);
+    button.append(name);
+    if (i < 4) {
+      button.dataset.key = key.textContent = String(i + 5);
+      button.append(key);
+    }
+    button.addEventListener("click", () => choose(one.kind));
+    return button;
+  }));
+};
 
 // -- the mouse ---------------------------------------------------------------------------------
 
 svg.addEventListener("pointerdown", (event) => {
   if (event.button !== 0 || !told.camera) return;
   const at = place(svg, event), handle = event.target.dataset?.handle;
-  if (handle && (tool === "move" || GAUGES.includes(tool))) {
+  if (handle && (tool === "move" || tool in kinds)) {
     const [name, index] = handle.split(" ");
     drag = { name, index: Number(index) };
     pending = told.gauges[name];
-  } else if (tool === "polygon" || tool === "zoi" || tool === "scale") {
+  } else if (tool === "polygon" || clicked() || tool === "scale") {
     points.push(at);
-    if (tool === "zoi" || (tool === "scale" && points.length === 2)) finish(false);
+    if (clicked() || (tool === "scale" && points.length === 2)) finish(false);
   } else if (tool !== "move") {
     points = [at];
     drag = { tool };
@@ -63,9 +79,8 @@ svg.addEventListener("pointermove", (event) => {
 
 function moved(at) {
   if (drag.name) {
-    const now = places[pending.kind](pending).map((p, i) => (i === drag.index ? at : p));
-    pending = placed(pending, now);
-  } else if (DRAGGED.includes(tool)) {
+    pending = { ...pending, handles: pending.handles.map((p, i) => (i === drag.index ? at : p)) };
+  } else if (dragged()) {
     points = [points[0], at];
   } else {
     points.push(at);
@@ -78,7 +93,7 @@ svg.addEventListener("pointerup", (event) => {
   const was = drag;
   drag = null;
   if (was.name) {
-    change({ do: "gauge", name: was.name, gauge: pending });
+    change({ do: "gauge", name: was.name, points: pending.handles });
     told.gauges[was.name] = pending;
     pending = null;
   } else {
@@ -91,7 +106,7 @@ svg.addEventListener("dblclick", () => { if (tool === "polygon") { points.pop();
 function finish(add) {
   const drawn = points;
   points = [];
-  if (GAUGES.includes(tool)) newGauge(drawn);
+  if (tool in kinds) newGauge(drawn);
   else if (tool === "scale") askLength(drawn);
   else if (tool !== "polygon" || drawn.length > 2) change({ do: "draw", strokes: strokes(drawn, add) });
   sketch();
@@ -104,15 +119,9 @@ function strokes(drawn, add) {
   return found;
 }
 
-const NAMES = { line: "axial", transverse: "transverse", area: "area", zoi: "point" };
 function newGauge(drawn) {
-  const kind = tool, base = NAMES[kind];
-  let name = base;
-  for (let n = 2; name in told.gauges; n++) name = `${base}${n}`;
-  if (kind !== "zoi" && (drawn.length < 2 || Math.hypot(drawn[1][0] - drawn[0][0], drawn[1][1] - drawn[0][1]) < 3)) return;
-  const empty = { line: { kind }, zoi: { kind }, transverse: { kind, box: [] }, area: { kind, box: [] } }[kind];
-  const gauge = placed(empty, drawn);
-  change({ do: "gauge", name, gauge });
+  if (!clicked() && (drawn.length < 2 || Math.hypot(drawn[1][0] - drawn[0][0], drawn[1][1] - drawn[0][1]) < 3)) return;
+  change({ do: "gauge", kind: tool, points: drawn });
 }
 
 let scaled = null;
@@ -175,22 +184,26 @@ function labelled(input, words) {
 function sketch() {
   for (const old of svg.querySelectorAll(".sketch")) old.remove();
   const group = make("g", { class: "sketch" }), last = points.at(-1);
-  if (pending) group.append(shape(pending));
+  if (pending) group.append(preview(kinds[pending.kind]?.gesture, pending.handles));
   if (scaled ?? (tool === "scale" && points.length > 1)) {
     const [a, b] = scaled ?? points;
     group.append(make("line", { class: "drawn", x1: a[0], y1: a[1], x2: b[0], y2: b[1] }));
   } else if (points.length && (tool === "brush" || tool === "eraser")) {
     group.append(make("polyline", { class: "stroke", points: points.join(" "), "stroke-width": 2 * $("radius").value }));
-  } else if (points.length > 1 && tool === "line") {
-    group.append(make("line", { class: "drawn", x1: points[0][0], y1: points[0][1], x2: last[0], y2: last[1] }));
   } else if (points.length && (tool === "polygon" || tool === "scale")) {
     group.append(make("polygon", { class: "drawn", points: points.join(" ") }));
     for (const p of points) group.append(make("circle", { class: "drawn", cx: p[0], cy: p[1], r: 2 }));
   } else if (points.length > 1) {
-    const [x0, y0] = points[0];
-    group.append(make("rect", { class: "drawn", x: Math.min(x0, last[0]), y: Math.min(y0, last[1]), width: Math.abs(last[0] - x0), height: Math.abs(last[1] - y0) }));
+    group.append(preview(kinds[tool]?.gesture ?? "box", [points[0], last]));
   }
   if (group.children.length) svg.append(group);
+}
+
+// What is dragged, until the server gives its outline.
+function preview(gesture, at) {
+  if (gesture !== "box" || at.length !== 2) return make(at.length > 2 ? "polygon" : "polyline", { class: "drawn", points: at.join(" ") });
+  const [[x0, y0], [x1, y1]] = at;
+  return make("rect", { class: "drawn", x: Math.min(x0, x1), y: Math.min(y0, y1), width: Math.abs(x1 - x0), height: Math.abs(y1 - y0) });
 }
 
 // Keys of the set-up; true where one was used.
@@ -199,9 +212,9 @@ export function setupKeys(event) {
   const handle = document.activeElement?.dataset?.handle, arrow = ARROWS[event.key];
   if (handle && arrow) {
     const [name, index] = handle.split(" "), step = event.shiftKey ? 10 : 1, gauge = told.gauges[name];
-    const now = places[gauge.kind](gauge).map((p, i) => (i === Number(index) ? p.map((v, k) => v + step * arrow[k]) : p));
-    told.gauges[name] = placed(gauge, now);
-    change({ do: "gauge", name, gauge: told.gauges[name] });
+    const now = gauge.handles.map((p, i) => (i === Number(index) ? p.map((v, k) => v + step * arrow[k]) : p));
+    told.gauges[name] = { ...gauge, handles: now };
+    change({ do: "gauge", name, points: now });
     gaugesOver();
     event.preventDefault();
     return true;
@@ -216,9 +229,9 @@ export function setupKeys(event) {
 const percent = (value) => (value == null ? "–" : value > 0 && value < 1e-4 ? "<0.01 %" : `${(value * 100).toFixed(2)} %`);
 
 export function showSetup(value) {
-  const dragged = drag?.name ? told.gauges[drag.name] : null;
+  const held = drag?.name ? told.gauges[drag.name] : null;
   told = value;
-  if (dragged) told.gauges[drag.name] = dragged;
+  if (held) told.gauges[drag.name] = held;
   put($("trouble"), value.trouble || value.doubt);
   put($("busy"), value.busy);
   put($("sharpness"), value.sharpness == null ? "–" : value.sharpness.toFixed(3));
@@ -271,7 +284,7 @@ function gaugeList(gauges) {
     input.maxLength = 32;
     input.setAttribute("aria-label", t("Name"));
     input.addEventListener("change", async () => {
-      const said = await change({ do: "gauge", name: input.value, was: name, gauge: told.gauges[name] });
+      const said = await change({ do: "gauge", name: input.value, was: name });
       if (!said.startsWith("ok")) input.value = name;
       input.blur();
       list.dataset.names = "";

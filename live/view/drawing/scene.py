@@ -14,7 +14,7 @@ import numpy as np
 
 from acquire.events import Event, EventKind
 from analysis.field import Status
-from live.maps import MICROSTRAIN, number, ramp
+from live.maps import MICROSTRAIN, FieldMaps, Painted, number, ramp
 from live.measure import Snapshot, Thinned
 from live.view.drawing.curve import MAX_POINTS
 from live.view.drawing.curve_drawing import CurveDrawing
@@ -42,7 +42,7 @@ from live.view.drawing.shapes import (
 )
 from live.view.exchange.messages import Picture, Row
 from live.view.exchange.setup import MAPS, STRAINS, ViewSetup
-from live.view.painting import FieldMaps, Painted, paint
+from live.view.painting import paint
 
 if TYPE_CHECKING:
     from analysis.field import StrainField, ZoiGrid
@@ -57,6 +57,7 @@ QUALITY, LONGEST_PX = 80, 1280
 FIGURES_QUALITY = 70
 LIGHT_QUALITY, LIGHT_LONGEST_PX = 50, 640
 """Of the JPEG, 1..100; larger pictures are reduced by a whole factor."""
+_ALPHA = 225  # of the maps, 0..255
 _MORE = tuple(name for name in MAPS if name not in STRAINS)
 
 
@@ -72,7 +73,8 @@ class Scene:
     def __init__(self, places: Sequence[Place], setup: ViewSetup) -> None:
         self._places, self._setup = places, setup
         self._due: Sequence[Place] = places
-        self._maps = FieldMaps(setup)
+        symmetric = setup.scale == "symmetric"
+        self._maps = FieldMaps(setup.axis, setup.strain_range, about_zero=symmetric, alpha=_ALPHA)
         self._drawn: dict[str, object] = {}
         self._curve: Thinned[Row] = Thinned(MAX_POINTS)
         self._drawn_curve = CurveDrawing(self._log_due, self._log, setup)
@@ -150,7 +152,8 @@ class Scene:
         for name in MAPS:
             place = rr.Transform3D(translation=corner, scale=(step, step, 1.0))
             self._log(f"specimen/map/{name}", place, static=True)
-        strips = [[[x + 0.5, y + 0.5] for x, y in strip] for strip in self._setup.outlines.values()]
+        lines = [[np.array(line) + 0.5 for line in lines] for lines in self._setup.outlines.values()]
+        strips = [strip for gauge in lines for strip in gauge]
         if strips:
             gauges = rr.LineStrips2D(
                 strips,
@@ -159,7 +162,7 @@ class Scene:
                 draw_order=50,
             )
             self._log("specimen/gauges", gauges, static=True)
-            names = words([strip[0] for strip in strips], list(self._setup.outlines), GAUGE_NAME)
+            names = words([gauge[0][0] for gauge in lines], list(self._setup.outlines), GAUGE_NAME)
             self._log("specimen/gauges/names", names, static=True)
         boxes = sample_boxes(grid)
         self._log(
@@ -214,7 +217,7 @@ class Scene:
             picture = rr.EncodedImage(contents=data, media_type="image/png", draw_order=10)
             self._log_due(f"specimen/map/{name}", picture)
             self._count(data)
-            if self._changed(f"bar/{name}", painted.span or painted.legend):
+            if self._changed(f"bar/{name}", painted.scale or painted.legend):
                 self._log(f"bar/{name}/ticks", self._ticks(painted))
 
     def _changed(self, what: str, says: object) -> bool:
@@ -243,14 +246,15 @@ class Scene:
     def _ticks(self, painted: Painted) -> Any:
         length, height = bar_unit(self._setup), self._setup.height
         x, top = self._setup.width + BAR_LABEL * length, BAR_TOP * height
-        if painted.span is None:
+        if painted.scale is None:
             places = [[x, top + 0.1 * k * length] for k in range(len(painted.legend))]
-            return words(places, [text for text, _ in painted.legend], [c for _, c in painted.legend])
-        (low, high), share = painted.span, np.array([1.0, 0.75, 0.5, 0.25, 0.0])
+            texts = [f"{one.name} {one.count}" for one in painted.legend]
+            return words(places, texts, [one.rgb for one in painted.legend])
+        scale, share = painted.scale, np.array([1.0, 0.75, 0.5, 0.25, 0.0])
         y = (BAR_TOP + BAR_HEIGHT * (1 - share)) * height - LETTER * length
         points = [*([x, yk] for yk in y), [x - 0.04 * length, top - 0.09 * length]]
-        values = (low + share * (high - low)) * painted.unit.factor
-        return words(points, [*(number(float(f"{v:.6g}")) for v in values), painted.unit.name])
+        values = scale.low + share * (scale.high - scale.low)
+        return words(points, [*(number(float(f"{v:.6g}")) for v in values), scale.unit])
 
     # -- curves -------------------------------------------------------------------------------
 

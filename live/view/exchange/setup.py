@@ -41,7 +41,7 @@ class ViewSetup:
         A test of the past: all that is told is shown, kept for the slider of time, and every ZOI tells its values.
     with_load : bool
         Whether there is a load to show.
-    outlines : mapping of name to ((x, y), ...), px
+    outlines : mapping of name to (((x, y), ...), ...), px
         Lines drawn on the picture: gauges.
     gauges : sequence of str
         Those whose strain is drawn over time.
@@ -63,7 +63,7 @@ class ViewSetup:
     picture_hz: float = 5.0
     finished: bool = False
     with_load: bool = True
-    outlines: Mapping[str, tuple[tuple[float, float], ...]] = field(default_factory=dict)
+    outlines: Mapping[str, tuple[tuple[tuple[float, float], ...], ...]] = field(default_factory=dict)
     gauges: Sequence[str] = ()
     light: bool = False
     scale: Literal["symmetric", "automatic"] = "symmetric"

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 
 from analysis import Roi, Status, StrainField, ZoiGrid
-from analysis.evaluate import AreaGauge, LineGauge, TransverseGauge, ZoiGauge, gauge_zois, measure_gauge
+from analysis.evaluate import GAUGE_KINDS, AreaGauge, Gauge, LineGauge, TransverseGauge, ZoiGauge
 from tests.accuracy.gauges import line, point, ratio
 from tests.accuracy.truth import Speckle, affine
 
 GRID = ZoiGrid.cover(Roi(0, 0, 208, 176), 32, 16)
 LINE = LineGauge("axial", (90.0, 30.0), (90.0, 140.0))
 EVERY = (
-    ZoiGauge("point", 80, 80, "eyy"),
-    AreaGauge.rectangle("mean", (40, 40, 90, 60)),
-    AreaGauge("largest", ((40, 40), (150, 50), (90, 130)), statistic="largest"),
+    ZoiGauge("point", (80, 80), "eyy"),
+    AreaGauge("mean", (40, 40, 90, 60)),
+    AreaGauge("largest", corners=((40, 40), (150, 50), (90, 130)), statistic="largest"),
     LINE,
     LineGauge("skew", (40.0, 40.0), (150.0, 130.0), 20.0),
-    TransverseGauge("width", 30, 30, 130, 80, "x"),
+    TransverseGauge("width", (30, 30, 130, 80), "x"),
 )
 
 
@@ -32,7 +32,7 @@ def field(status: np.ndarray | None = None, **gradients: float) -> StrainField:
 
 
 def test_a_uniform_strain_is_met_exactly() -> None:
-    found = {g.name: measure_gauge(g, field(du_dx=-3e-4, dv_dy=1e-3)) for g in EVERY}
+    found = {g.name: g.measure(field(du_dx=-3e-4, dv_dy=1e-3)) for g in EVERY}
     for name in ("point", "mean", "largest", "axial"):
         assert found[name].value == pytest.approx(1e-3, rel=1e-9), name
     assert found["width"].value == pytest.approx(-3e-4, rel=1e-9)
@@ -43,20 +43,20 @@ def test_an_extensometer_does_not_see_a_rotation() -> None:
     c, s = math.cos(0.2), math.sin(0.2)
     turned = field(du_dx=c - 1, du_dy=-s, dv_dx=s, dv_dy=c - 1)
     for gauge in EVERY[3:]:
-        assert measure_gauge(gauge, turned).value == pytest.approx(0, abs=1e-12)
+        assert gauge.measure(turned).value == pytest.approx(0, abs=1e-12)
 
 
 def test_what_a_gauge_takes() -> None:
-    (box,) = gauge_zois(AreaGauge.rectangle("", (40, 40, 32, 16)), GRID)
+    (box,) = AreaGauge("", (40, 40, 32, 16)).zois(GRID)
     assert box.sum() == 2
-    (triangle,) = gauge_zois(AreaGauge("", ((0, 0), (208, 0), (0, 176))), GRID)
+    (triangle,) = AreaGauge("", corners=((0, 0), (208, 0), (0, 176))).zois(GRID)
     assert not triangle[-1, -1] and triangle[0, 0]
-    first, second = gauge_zois(LINE, GRID)
+    first, second = LINE.zois(GRID)
     assert first.sum() >= 3 and not (first & second).any()
-    left, right = gauge_zois(TransverseGauge("", 0, 0, 207, 176, "y"), GRID)
+    left, right = TransverseGauge("", (0, 0, 207, 176), "y").zois(GRID)
     assert np.flatnonzero(left.any(axis=1)).max() < np.flatnonzero(right.any(axis=1)).min()
     # However small its radius, an end is at least the nearest ZOI.
-    assert [end.sum() for end in gauge_zois(LineGauge("", (50, 50), (90, 90), 0.1), GRID)] == [1, 1]
+    assert [end.sum() for end in LineGauge("", (50, 50), (90, 90), 0.1).zois(GRID)] == [1, 1]
 
 
 def lost(*, share: float) -> np.ndarray:
@@ -69,43 +69,42 @@ def lost(*, share: float) -> np.ndarray:
 def test_lost_zois_give_a_reason() -> None:
     broken = field(lost(share=0.5), dv_dy=1e-3)
     for gauge, says in (
-        (ZoiGauge("", 80, 20), "1 of 1 ZOIs have no value (1 LOST)"),
-        (AreaGauge.rectangle("", (0, 0, 200, 60)), "ZOIs have no value"),
+        (ZoiGauge("", (80, 20)), "1 of 1 ZOIs have no value (1 LOST)"),
+        (AreaGauge("", (0, 0, 200, 60)), "ZOIs have no value"),
         (LINE, "end 1: "),
-        (TransverseGauge("", 0, 0, 200, 200, "y"), "end 1: "),
+        (TransverseGauge("", (0, 0, 200, 200), "y"), "end 1: "),
     ):
-        found = measure_gauge(gauge, broken)
+        found = gauge.measure(broken)
         assert math.isnan(found.value) and math.isnan(found.sigma)
         assert says in found.reason
     some = lost(share=0.0)
     some[3, 4] = Status.UNEVEN
-    assert measure_gauge(
-        AreaGauge.rectangle("", (0, 0, 200, 200)), field(some, dv_dy=1e-3)
-    ).value == pytest.approx(1e-3)
+    whole = AreaGauge("", (0, 0, 200, 200)).measure(field(some, dv_dy=1e-3))
+    assert whole.value == pytest.approx(1e-3)
 
 
 def test_a_gauge_beside_the_grid_says_where_the_grid_is() -> None:
     for gauge in (
-        ZoiGauge("", 500, 80),
-        AreaGauge.rectangle("", (500, 0, 9, 9)),
+        ZoiGauge("", (500, 80)),
+        AreaGauge("", (500, 0, 9, 9)),
         LineGauge("", (0, 0), (80, 500)),
     ):
-        found = measure_gauge(gauge, field())
+        found = gauge.measure(field())
         assert "no ZOI is there; their centres reach from 15.5, 15.5 to 191.5" in found.reason
-    same = measure_gauge(LineGauge("", (80, 80), (81, 80), 1), field())
+    same = LineGauge("", (80, 80), (81, 80), 1).measure(field())
     assert "make the gauge longer" in same.reason
 
 
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: ZoiGauge("a", 0, 0, "ezz"), "gauge a: unknown value 'ezz'; known: u, v"),
-        (lambda: AreaGauge("a", ((0, 0), (1, 1))), "at least 3 corners"),
-        (lambda: AreaGauge.rectangle("a", (0, 0, 9, 9), statistic="median"), "known: mean, largest"),  # type: ignore[arg-type]
+        (lambda: ZoiGauge("a", (0, 0), "ezz"), "gauge a: unknown value 'ezz'; known: u, v"),
+        (lambda: AreaGauge("a", corners=((0, 0), (1, 1))), "at least 3 corners"),
+        (lambda: AreaGauge("a", (0, 0, 9, 9), statistic="median"), "known: mean, largest"),  # type: ignore[arg-type]
         (lambda: LineGauge("a", (3, 3), (3, 3)), "one point"),
         (lambda: LineGauge("a", (3, 3), (3, 9), 0), "radius must be positive"),
-        (lambda: TransverseGauge("a", 0, 0, 0, 5), "must be positive"),
-        (lambda: TransverseGauge("a", 0, 0, 5, 5, "z"), "along is x or y"),  # type: ignore[arg-type]
+        (lambda: TransverseGauge("a", (0, 0, 0, 5)), "must be positive"),
+        (lambda: TransverseGauge("a", (0, 0, 5, 5), "z"), "along is x or y"),  # type: ignore[arg-type]
     ],
 )
 def test_impossible_gauges_are_refused(make, says: str) -> None:
@@ -115,9 +114,9 @@ def test_impossible_gauges_are_refused(make, says: str) -> None:
 
 def test_far_ends_are_independent_and_near_ones_are_not() -> None:
     one = 1e-2 * math.sqrt(2)
-    far = measure_gauge(LineGauge("", (15.5, 79.5), (175.5, 79.5), 1), field())
+    far = LineGauge("", (15.5, 79.5), (175.5, 79.5), 1).measure(field())
     assert far.sigma == pytest.approx(one / 160, rel=1e-6)
-    near = measure_gauge(LineGauge("", (79.5, 79.5), (95.5, 79.5), 1), field())
+    near = LineGauge("", (79.5, 79.5), (95.5, 79.5), 1).measure(field())
     assert near.sigma < 0.96 * one / 16
 
 
@@ -131,3 +130,53 @@ def test_sigma_is_the_scatter() -> None:
     for name, part in zip(kinds, np.split(z, np.cumsum([len(some) for some in kinds.values()])[:-1], axis=1),
                           strict=True):  # fmt: skip
         assert np.sqrt(np.mean(part**2)) == pytest.approx(1, abs=0.15), name
+
+
+@pytest.mark.parametrize("kind", GAUGE_KINDS.values(), ids=GAUGE_KINDS)
+class TestEveryKind:
+    """What configuration, view and page take from the class of a kind."""
+
+    DRAWN = ((60.0, 40.0), (130.0, 110.0))
+
+    def test_it_is_made_of_what_is_dragged_and_of_its_own_handles(self, kind: type[Gauge]) -> None:
+        gauge = kind.of("g", kind.placed(self.DRAWN), "y")
+        assert kind.of("g", kind.placed(gauge.handles()), "y") == gauge
+        assert kind.of("g", {**kind.placed(self.DRAWN), "of another": 1}, "y") == gauge
+        assert set(kind.placed(self.DRAWN)) <= set(kind.parameters())
+
+    def test_it_takes_zois_and_reads_a_strain(self, kind: type[Gauge]) -> None:
+        gauge = kind.of("g", kind.placed(self.DRAWN), "y")
+        assert all(mask.any() and mask.dtype == bool for mask in gauge.zois(GRID))
+        found = gauge.measure(field(du_dx=1e-3, dv_dy=1e-3))
+        assert found.value == pytest.approx(1e-3, rel=1e-9) and found.sigma > 0
+        assert math.isnan(gauge.measure(field(lost(share=1.0))).value)
+
+    def test_its_outline_follows_its_handles(self, kind: type[Gauge]) -> None:
+        gauge = kind.of("g", kind.placed(self.DRAWN), "y")
+        moved = kind.of("g", kind.placed([(x + 7, y + 3) for x, y in gauge.handles()]), "y")
+        for before, after in zip(gauge.outline(32), moved.outline(32), strict=True):
+            assert len(before) > 1
+            np.testing.assert_allclose(np.array(after) - before, [(7, 3)] * len(before), atol=0.2)
+
+    def test_it_says_what_it_needs(self, kind: type[Gauge]) -> None:
+        with pytest.raises(ValueError, match=f"a gauge of kind '{kind.kind}' needs '"):
+            kind.of("g", {}, "y")
+        assert kind.label and kind.hint and kind.usual.isidentifier()
+        assert kind.gesture in ("click", "line", "box")
+
+
+def test_what_follows_from_the_axis_of_the_load() -> None:
+    for axis, value, along in (("y", "eyy", "x"), ("x", "exx", "y")):
+        assert ZoiGauge.of("g", {"at": (1, 2)}, axis) == ZoiGauge("g", (1, 2), value)
+        assert TransverseGauge.of("g", {"box": (1, 2, 3, 4)}, axis) == TransverseGauge(
+            "g", (1, 2, 3, 4), along
+        )
+    assert ZoiGauge.of("g", {"at": (1, 2), "value": "exy"}, "y") == ZoiGauge("g", (1, 2), "exy")
+
+
+def test_a_box_is_drawn_in_whole_px_within_the_picture() -> None:
+    assert AreaGauge.placed([(30.4, 20.2), (-3.0, 10.6)]) == {"box": (0, 11, 30, 9)}
+    assert AreaGauge.placed([(5, 5), (5, 5)]) == {"box": (5, 5, 1, 1)}
+    corners = ((1.0, 2.0), (9.0, 2.0), (4.0, 8.0))
+    assert AreaGauge.placed(AreaGauge("g", corners=corners).handles()) == {"corners": corners}
+    assert LineGauge.placed([(1.234, 5), (9, 7.77)]) == {"start": (1.2, 5), "end": (9, 7.8)}

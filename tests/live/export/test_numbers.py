@@ -147,6 +147,8 @@ def test_tiff(run_dir: Path, tmp_path: Path) -> None:
 def test_tiff_says_its_units_to_imagej(run_dir: Path, tmp_path: Path) -> None:
     pillow = pytest.importorskip("PIL.Image")
     units = ("--mm", "--scale", str(SCALE))
+    one = exported(run_dir, tmp_path / "one.tif", "--to", "tiff", "--from", "0.45", "--until", "0.55")
+    assert len(cv2.imreadmulti(str(one), flags=cv2.IMREAD_UNCHANGED)[1]) == 1
     out = exported(run_dir, tmp_path / "e.tif", "--to", "tiff", "--fields", "v", *units)
     with pillow.open(out) as image:
         tags = image.tag_v2

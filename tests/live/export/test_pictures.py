@@ -10,8 +10,8 @@ import pytest
 
 from analysis.field.strain_field import StrainField
 from live.cli import main
-from live.export import Levels, Painter, Scale
 from live.finished import Display, open_run
+from live.maps import ColourScale, Levels, Painter
 from tests.live.made_run import make_run
 from tests.live.made_up import make_grid
 
@@ -73,8 +73,8 @@ def moved(number: int, strain: float) -> StrainField:
 
 def test_a_map_moves_with_its_specimen(tmp_path: Path) -> None:
     with open_run(make_run(tmp_path, [0.0], session=False, field_of=moved)) as run:
-        scale = Scale.of(run.strain, "eyy", [0], Display(), limit=0.01)
-        painter = Painter(run.strain, "eyy", Display(), scale, (128, 96))
+        scale = ColourScale.of_run(run.strain, "eyy", [0], limit=0.01)
+        painter = Painter(run.strain, "eyy", scale, (128, 96))
         assert painter.size == SIZE
         base = painter.picture(np.full((96, 128), 100, np.uint8), Levels(0, 255))
         painted = painter.over(base, 0)
@@ -90,9 +90,12 @@ def test_a_map_moves_with_its_specimen(tmp_path: Path) -> None:
 def test_scales_are_in_the_unit_that_is_shown(run_dir: Path) -> None:
     with open_run(run_dir) as run:
         rows = range(run.strain.n)
-        plain = Scale.of(run.strain, "eyy", rows, Display())
-        percent = Scale.of(run.strain, "eyy", rows, Display(percent=True))
-        shift = Scale.of(run.strain, "v", rows, Display(mm_per_px=0.5, y_up=True))
+
+        def scale_of(name: str, shown: Display) -> ColourScale:
+            return ColourScale.of_run(run.strain, name, rows, None, shown.unit(name), shown.factor(name))
+
+        plain, percent = scale_of("eyy", Display()), scale_of("eyy", Display(percent=True))
+        shift = scale_of("v", Display(mm_per_px=0.5, y_up=True))
         v = run.strain.maps("v")
     assert (plain.unit, percent.unit, shift.unit) == ("µm/m", "%", "mm")
     assert plain.low == -plain.high

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from pathlib import Path
 
 import pytest
@@ -107,3 +108,13 @@ def test_a_map_of_statuses_has_no_missing_values(run_dir: Path, tmp_path: Path) 
     with open_run(run_dir) as run:
         export(run, ExportRequest("tiff", tmp_path / "s.tif", "status"), Screen(quiet=True))
     assert (tmp_path / "s.tif").stat().st_size > 12 * 4 * 5 * 7
+
+
+@pytest.mark.parametrize(("form", "library"), [("tiff", "tifffile"), ("gif", "PIL")])
+def test_without_its_library_a_format_says_what_to_install(
+    run_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, form: str, library: str
+) -> None:
+    monkeypatch.setitem(sys.modules, library, None)
+    with open_run(run_dir) as run, pytest.raises(ConfigError, match=r"pip install 'phasedic\[export\]'"):
+        export(run, ExportRequest(form, tmp_path / "x"), Screen(quiet=True))
+    assert not list(tmp_path.iterdir())

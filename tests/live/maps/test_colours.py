@@ -1,4 +1,4 @@
-"""Colours, ranges and ticks of the strain maps."""
+"""Colours, units and ticks of the strain maps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from live.maps.colours import (
     MICROSTRAIN,
     PERCENT,
-    AutoRange,
     colour,
     diverging_table,
     nice_above,
@@ -19,10 +18,6 @@ from live.maps.colours import (
     ticks,
     unit_for,
 )
-
-
-def full(value: float) -> np.ndarray:
-    return np.full((4, 4), value)
 
 
 def test_the_table_runs_from_blue_over_near_white_to_red_without_jumps() -> None:
@@ -77,28 +72,3 @@ def test_numbers_read_well(value: float, text: str) -> None:
 def test_percent_from_two_percent_on() -> None:
     assert unit_for(0.0199) == MICROSTRAIN
     assert unit_for(0.02) == PERCENT
-
-
-def test_the_range_grows_at_once_and_shrinks_only_after_a_while() -> None:
-    auto = AutoRange(patience=3)
-    none = full(0.0)
-    assert auto.update(full(1e-3), none) == 1.2e-3
-    assert auto.update(full(-2.1e-3), none) == 2.5e-3
-    assert [auto.update(full(1e-4), none) for _ in range(3)] == [2.5e-3, 2.5e-3, 1.2e-4]
-
-
-def test_small_changes_do_not_move_the_range() -> None:
-    auto = AutoRange(patience=3)
-    limits = {auto.update(full(value), full(0.0)) for value in (1e-3, 0.9e-3, 1.1e-3, 0.7e-3) * 5}
-    assert limits == {1.2e-3}
-
-
-def test_noise_alone_does_not_fill_the_colours() -> None:
-    rng = np.random.default_rng(1)
-    limit = AutoRange().update(1e-4 * rng.normal(size=(30, 30)), full(1e-4))
-    assert limit >= 4e-4
-
-
-def test_a_fixed_range_and_an_empty_map() -> None:
-    assert AutoRange(5e-3).update(full(1.0), full(0.0)) == 5e-3
-    assert AutoRange().update(full(np.nan), full(np.nan)) > 0

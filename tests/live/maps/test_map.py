@@ -13,6 +13,7 @@ from analysis import Roi, ZoiGrid
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
+from live.maps import painting
 from live.maps.map import Picture, draw
 from live.results.reader import Strain
 
@@ -124,7 +125,17 @@ def test_places_that_cannot_be_written(
     assert [path.name for path in tmp_path.iterdir()] == ["taken.png"]
 
 
-def test_a_title_is_no_formula(results: Path, tmp_path: Path) -> None:
-    arguments = [str(results / "out" / "strain.h5"), str(tmp_path / "x.svg"), "--title", r"$\frac$"]
-    assert main(["map", *arguments]) == 0
-    assert (tmp_path / "x.svg").stat().st_size > 1000
+def test_a_title_fits_however_long_it_is_and_whatever_is_in_it(results: Path, tmp_path: Path) -> None:
+    sizes = []
+    for k, title in enumerate(("a", r"$\frac$ ± 3 µm/m Prüfung \U0001f600" * 9)):
+        png = tmp_path / f"{k}.png"
+        assert main(["map", str(results / "out" / "strain.h5"), str(png), "--title", title]) == 0
+        picture = cv2.imread(str(png))
+        sizes.append(picture.shape)
+        assert (picture[:, -10:] == 255).all(), "nothing runs over the edge"
+    assert sizes[0] == sizes[1]
+
+
+def test_letters_that_an_older_opencv_has_not_are_written_plainly(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(cv2, "FontFace", raising=False)
+    assert painting._letters("Prüfung, −3 ± 1 µm/m, 2×2") == "Prufung, -3 +- 1 um/m, 2x2"

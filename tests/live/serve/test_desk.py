@@ -94,6 +94,24 @@ def test_set_up_changed_saved_and_started(at: At, tmp_path: Path) -> None:
     assert at.change(do="gauge", name="tip", was="axial", gauge={"kind": "zoi", "at": [1, 1]}).startswith(
         "no:"
     )
+    assert at.change(do="gauge", kind="line", points=[[50.04, 40], [50, 120]]) == "ok"
+    assert at.change(do="gauge", name="axial2", points=[[60, 40], [60, 130]]) == "ok", "moved by its handles"
+    assert at.change(do="gauge", name="long", was="axial2") == "ok"
+    assert bench.draft.config.gauges["long"] == {"kind": "line", "start": (60, 40), "end": (60, 130)}
+    drawn = bench.state()["gauges"]["long"]
+    assert drawn["handles"] == ((60, 40), (60, 130)) and drawn["outline"][0] == [(60, 40), (60, 130)]
+    for wrong in (
+        {"kind": "spiral"},
+        {"kind": ["line"]},
+        {"points": [[1, "a"]]},
+        {"points": []},
+        {"points": None},
+    ):
+        assert at.change(do="gauge", **{"kind": "line", "points": [[1, 2], [3, 4]], **wrong}).startswith(
+            "no:"
+        )
+    assert at.change(do="gauge", name="long", was=["axial"], gauge=3).startswith("no:")
+    assert at.change(do="gauge", name="long", gauge=None) == "ok"
     assert at.change(do="set", key="measure.zoi", value=4).startswith("no:")
     assert at.change(do="set", key="output.dir", value="/").startswith("no:")
     assert at.change(do="scale", points=[[10, 10], [110, 10]], mm=5) == "ok"

@@ -39,7 +39,7 @@ def test_saved_with_its_comments_and_loaded_again(draft: Draft) -> None:
     assert draft.path.with_name("rig.toml.bak").read_text() == RIG
     config = load_config(draft.path, {})
     assert (config.measure.zoi, config.measure.step, config.measure.burst) == (48, 12, 8)
-    assert config.gauges["axial"].end == (10, 90)
+    assert config.gauges["axial"]["end"] == (10, 90)
     assert np.array_equal(read_mask(config.measure.mask, 50, 40), mask)
     assert draft.changes == {} and draft.config == config
 

@@ -122,9 +122,9 @@ def check_saved(page: Page, folder: Path) -> None:
     assert set(config.gauges) == {"axial", "transverse", "middle"}
     assert config.scale.px_per_mm == pytest.approx(20, rel=0.01)
     axial, across, middle = (config.gauges[name] for name in ("axial", "transverse", "middle"))
-    assert np.allclose([axial.start, axial.end], [(240, 100), (240, 290)], atol=1)
-    assert np.allclose(across.box, (160, 150, 160, 100), atol=1)
-    assert np.allclose(middle.at, (300, 200), atol=1)
+    assert np.allclose([axial["start"], axial["end"]], [(240, 100), (240, 290)], atol=1)
+    assert np.allclose(across["box"], (160, 150, 160, 100), atol=1)
+    assert np.allclose(middle["at"], (300, 200), atol=1)
     strokes = [one["strokes"][0] for one in page.posted if one.get("do") == "draw"]
     erased = next(one for one in strokes if one["tool"] == "eraser")
     mask = read_mask(config.measure.mask, WIDTH, HEIGHT)

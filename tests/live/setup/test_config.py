@@ -56,7 +56,7 @@ def test_a_withdrawn_key_of_an_older_version_is_left_out(value: Any) -> None:
 def test_gauges_come_back_and_are_added_to() -> None:
     said = {"gauges.axial": {"start": [10, 20.5], "end": [10, 90]}}
     config = load_config(None, said)
-    assert config.gauges["axial"].start == (10.0, 20.5)
+    assert config.gauges["axial"]["start"] == (10.0, 20.5)
     stored = json.loads(json.dumps(config.as_dict()))
     assert from_dict(stored, {}, "a session") == config
     both = from_dict(stored, {"gauges.point": {"kind": "zoi", "at": [3, 4]}}, "a session")
@@ -161,10 +161,10 @@ def test_lengths_in_mm() -> None:
         },
     )
     assert (config.measure.zoi, config.measure.roi) == (64, (100, 100, 400, 600))
-    assert config.gauges["axial"].start == pytest.approx((200.2, 100))
-    assert config.gauges["axial"].end == pytest.approx((200, 400))
-    assert config.gauges["area"].corners == ((20, 20), (40, 20), (40, 50.5))
-    assert config.gauges["box"].box == pytest.approx((20, 40, 60.2, 80))
+    assert config.gauges["axial"]["start"] == pytest.approx((200.2, 100))
+    assert config.gauges["axial"]["end"] == pytest.approx((200, 400))
+    assert config.gauges["area"]["corners"] == ((20, 20), (40, 20), (40, 50.5))
+    assert config.gauges["box"]["box"] == pytest.approx((20, 40, 60.2, 80))
     assert from_dict(config.as_dict(), {"measure.step": "0.8mm"}, "a session").measure.step == 16
 
 

@@ -50,7 +50,7 @@ def test_gauges_come_and_go(rig: Path) -> None:
     point = {"kind": "zoi", "at": (30.5, 40), "value": None}
     config = write_rig(rig, {"gauges.point": point, "gauges.axial": None})
     assert list(config.gauges) == ["point"]
-    assert config.gauges["point"].at == (30.5, 40.0)
+    assert config.gauges["point"]["at"] == (30.5, 40.0)
     assert list(write_rig(rig, {"gauges.point": None}).gauges) == []
 
 

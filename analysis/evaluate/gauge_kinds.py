@@ -1,0 +1,246 @@
+"""The kinds of virtual gauges: a point, an area, an extensometer along a line or across a strip.
+
+A new kind is a class here and its name in ``GAUGE_KINDS``; configuration, report, view and page take it from there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from analysis.evaluate.gauges import (
+    Box,
+    Gauge,
+    GaugeValue,
+    Line,
+    Mask,
+    Parameter,
+    Point,
+    Statistic,
+    box_between,
+    check_value,
+    circle,
+    closed,
+    corners_of,
+    near_px,
+    read_area,
+    read_ends,
+    zois_inside,
+    zois_near,
+)
+from analysis.field import StrainField, ZoiGrid
+
+_VALUE = Parameter(
+    "choice",
+    "strain of a zoi or area (along the load)",
+    choices=("exx", "eyy", "exy", "gamma_xy"),
+    by_axis={"x": "exx", "y": "eyy"},
+)
+_STATISTIC = Parameter("choice", "of an area", choices=("mean", "largest", "smallest"))
+_AT = Parameter("point", "x, y of a zoi")
+_BOX = Parameter("box", "x, y, width, height of an area or transverse gauge")
+_CORNERS = Parameter("corners", "x, y of the corners of an area")
+_START, _END = Parameter("point", "x, y of one end of a line"), Parameter("point", "x, y of the other")
+_RADIUS = Parameter("length", "ZOIs this far around an end of a line (half a ZOI)", 0.1, 1e5)
+_ALONG = Parameter(
+    "choice",
+    "direction of a transverse gauge (across the load)",
+    choices=("x", "y"),
+    by_axis={"x": "y", "y": "x"},
+)
+
+
+@dataclass(frozen=True, slots=True)
+class ZoiGauge(Gauge):
+    """One value of the ZOI whose centre is nearest to a point.
+
+    Attributes
+    ----------
+    at : (x, y), px
+        At most one step of the grid away from the centre of a ZOI.
+    value : str
+        One of ``analysis.field.VALUES``.
+    """
+
+    at: Point = field(metadata=_AT.metadata)
+    value: str = field(default="eyy", metadata=_VALUE.metadata)
+    kind, label, usual, gesture = "zoi", "Point", "point", "click"
+    hint = "Click a place."
+
+    def __post_init__(self) -> None:
+        check_value(self.name, self.value)
+
+    def chosen(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        return (zois_near(grid, self.at, 0),)
+
+    def measure(self, field: StrainField) -> GaugeValue:
+        return read_area(self.zois(field.grid)[0], field, self.value, "largest")
+
+    def outline(self, zoi: float) -> tuple[Line, ...]:
+        x, y = self.at
+        return (closed(corners_of((x - zoi / 2, y - zoi / 2, zoi, zoi))),)
+
+    def handles(self) -> tuple[Point, ...]:
+        return (self.at,)
+
+    @classmethod
+    def placed(cls, handles: Sequence[Point]) -> dict[str, Any]:
+        return {"at": near_px(handles[0])}
+
+
+@dataclass(frozen=True, slots=True)
+class AreaGauge(Gauge):
+    """Mean, largest or smallest value of the ZOIs whose centres lie in a box or polygon.
+
+    Of the largest and the smallest, sigma is that of the ZOI which has it: right for a peak that stands
+    out of the noise. In a flat field noise alone lifts the largest of n values above the mean, by 2 to 3
+    sigma for 20 to 400 of them.
+
+    Attributes
+    ----------
+    box : (x, y, width, height), px
+    corners : tuple of (x, y), px
+        At least three, in place of the box.
+    value : str
+        One of ``analysis.field.VALUES``.
+    statistic : "mean", "largest" or "smallest"
+        By sign, not by magnitude.
+    """
+
+    box: Box | None = field(default=None, metadata=_BOX.metadata)
+    corners: tuple[Point, ...] | None = field(default=None, metadata=_CORNERS.metadata)
+    value: str = field(default="eyy", metadata=_VALUE.metadata)
+    statistic: Statistic = field(default="mean", metadata=_STATISTIC.metadata)
+    kind, label, usual, gesture = "area", "Area", "area", "box"
+    hint = "Drag a rectangle: its mean strain."
+
+    def __post_init__(self) -> None:
+        check_value(self.name, self.value)
+        if self.box is None and self.corners is None:
+            raise ValueError("a gauge of kind 'area' needs 'box' or 'corners'")
+        if self.corners is not None and len(self.corners) < 3:
+            raise ValueError(f"gauge {self.name}: an area needs at least 3 corners, got {len(self.corners)}")
+        if self.statistic not in _STATISTIC.choices:
+            known = ", ".join(_STATISTIC.choices)
+            raise ValueError(f"gauge {self.name}: unknown statistic {self.statistic!r}; known: {known}")
+
+    def chosen(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        return (zois_inside(grid, self._polygon()),)
+
+    def measure(self, field: StrainField) -> GaugeValue:
+        return read_area(self.zois(field.grid)[0], field, self.value, self.statistic)
+
+    def outline(self, zoi: float) -> tuple[Line, ...]:
+        return (closed(self._polygon()),)
+
+    def handles(self) -> tuple[Point, ...]:
+        return self.corners or self._polygon()[::2]
+
+    @classmethod
+    def placed(cls, handles: Sequence[Point]) -> dict[str, Any]:
+        if len(handles) == 2:
+            return {"box": box_between(*handles)}
+        return {"corners": tuple(near_px(place) for place in handles)}
+
+    def _polygon(self) -> Line:
+        return self.corners or corners_of(self.box or (0, 0, 0, 0))
+
+
+@dataclass(frozen=True, slots=True)
+class LineGauge(Gauge):
+    """An extensometer: (L - L0)/L0 between two points.
+
+    Each end is the ZOIs whose centres lie within ``radius_px`` of the point (without: half the side of a
+    ZOI), at least the nearest one; L0 is the distance of their mean places, so that a uniform strain is met exactly.
+
+    Attributes
+    ----------
+    start, end : (x, y), px
+    radius_px : float or None, px
+    """
+
+    start: Point = field(metadata=_START.metadata)
+    end: Point = field(metadata=_END.metadata)
+    radius_px: float | None = field(default=None, metadata=_RADIUS.metadata)
+    kind, label, usual, gesture = "line", "Extensometer", "axial", "line"
+    hint = "Drag from one end of the extensometer to the other."
+
+    def __post_init__(self) -> None:
+        if self.start == self.end:
+            raise ValueError(f"gauge {self.name}: the two ends of a line are one point, {self.start}")
+        if self.radius_px is not None and not self.radius_px > 0:
+            raise ValueError(f"gauge {self.name}: the radius must be positive, got {self.radius_px}")
+
+    def chosen(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        reach = self.radius_px or grid.size / 2
+        return tuple(zois_near(grid, end, reach) for end in (self.start, self.end))
+
+    def measure(self, field: StrainField) -> GaugeValue:
+        return read_ends(self.zois(field.grid), field)
+
+    def outline(self, zoi: float) -> tuple[Line, ...]:
+        reach = self.radius_px or zoi / 2
+        return (self.start, self.end), circle(self.start, reach), circle(self.end, reach)
+
+    def handles(self) -> tuple[Point, ...]:
+        return self.start, self.end
+
+    @classmethod
+    def placed(cls, handles: Sequence[Point]) -> dict[str, Any]:
+        return {"start": near_px(handles[0]), "end": near_px(handles[-1])}
+
+
+@dataclass(frozen=True, slots=True)
+class TransverseGauge(Gauge):
+    """An extensometer across a strip: the mean extension of a box between its first and its last third.
+
+    Thirds are the division that loses the least against a straight line through all points
+    (M. S. Bartlett, Biometrics 5 (1949) 207-212, doi:10.2307/3001936).
+
+    Attributes
+    ----------
+    box : (x, y, width, height), px
+    along : "x" or "y"
+        The direction whose extension is measured, across the load.
+    """
+
+    box: Box = field(metadata=_BOX.metadata)
+    along: Literal["x", "y"] = field(default="x", metadata=_ALONG.metadata)
+    kind, label, usual, gesture = "transverse", "Transverse", "transverse", "box"
+    hint = "Drag a rectangle: strain across the load."
+
+    def __post_init__(self) -> None:
+        if not (self.box[2] > 0 and self.box[3] > 0):
+            raise ValueError(f"gauge {self.name}: width and height must be positive")
+        if self.along not in ("x", "y"):
+            raise ValueError(f"gauge {self.name}: along is x or y, got {self.along!r}")
+
+    def chosen(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        x, y, width, height = self.box
+        if self.along == "x":
+            third = width / 3
+            boxes = (x, y, third, height), (x + 2 * third, y, third, height)
+        else:
+            third = height / 3
+            boxes = (x, y, width, third), (x, y + 2 * third, width, third)
+        return tuple(zois_inside(grid, corners_of(box)) for box in boxes)
+
+    def measure(self, field: StrainField) -> GaugeValue:
+        return read_ends(self.zois(field.grid), field)
+
+    def outline(self, zoi: float) -> tuple[Line, ...]:
+        return (closed(corners_of(self.box)),)
+
+    def handles(self) -> tuple[Point, ...]:
+        return corners_of(self.box)[::2]
+
+    @classmethod
+    def placed(cls, handles: Sequence[Point]) -> dict[str, Any]:
+        return {"box": box_between(handles[0], handles[-1])}
+
+
+GAUGE_KINDS: Mapping[str, type[Gauge]] = {
+    kind.kind: kind for kind in (LineGauge, TransverseGauge, AreaGauge, ZoiGauge)
+}
+"""By their names in a configuration, in the order of the buttons on a page."""
