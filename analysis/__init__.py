@@ -20,6 +20,7 @@ from analysis.kernel import (
     PhaseKernel,
     not_compiled,
     numerics,
+    threads,
     warm_up,
 )
 
@@ -37,5 +38,6 @@ __all__ = [
     "ZoiGrid",
     "not_compiled",
     "numerics",
+    "threads",
     "warm_up",
 ]

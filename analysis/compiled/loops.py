@@ -24,6 +24,8 @@ os.environ.setdefault("GOMP_SPINCOUNT", "5000")
 
 import numba
 
+from analysis.compiled.layer import threading_layer
+
 log = logging.getLogger("analysis")
 
 _PACKAGE = Path(__file__).parents[1]
@@ -56,6 +58,7 @@ class InTurn:
     """
 
     _turn = Lock()
+    _started = False
 
     def __init__(self, dispatcher: Any) -> None:
         self.dispatcher = dispatcher
@@ -63,6 +66,9 @@ class InTurn:
     def __call__(self, *arguments: Any) -> Any:
         """Run the loop, once no other one runs."""
         with InTurn._turn:
+            if not InTurn._started:
+                threading_layer()
+                InTurn._started = True
             return self.dispatcher(*arguments)
 
 

@@ -9,7 +9,7 @@ from analysis.kernel.noise import NoiseModel
 from analysis.kernel.phase_kernel import PhaseKernel
 from analysis.kernel.prepared import PatternError
 from analysis.kernel.settings import Estimator, KernelSettings
-from analysis.kernel.warm_up import COMPILE_PARTS, PICTURE_KINDS, not_compiled, numerics, warm_up
+from analysis.kernel.warm_up import COMPILE_PARTS, PICTURE_KINDS, not_compiled, numerics, threads, warm_up
 
 __all__ = [
     "COMPILE_PARTS",
@@ -21,5 +21,6 @@ __all__ = [
     "PhaseKernel",
     "not_compiled",
     "numerics",
+    "threads",
     "warm_up",
 ]
