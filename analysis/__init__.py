@@ -22,6 +22,7 @@ from analysis.kernel import (
     check_machine,
     not_compiled,
     numerics,
+    threads,
     warm_up,
 )
 from analysis.self_test import MachineError
@@ -42,5 +43,6 @@ __all__ = [
     "check_machine",
     "not_compiled",
     "numerics",
+    "threads",
     "warm_up",
 ]

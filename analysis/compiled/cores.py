@@ -1,7 +1,8 @@
 """Keeping the threads of a loop apart: on Linux a worker that wakes up may be put on the core of the one that woke it.
 
 It stays there while another core is idle: the scheduler looks again only some milliseconds later, and a frame is
-measured in that time. On two cores, a frame every 30 ms, nine of ten were measured on one of them.
+measured in that time. On two cores, a frame every 30 ms, nine of ten were measured on one of them. Where the caller
+only waits (``layer``) its core is as good as any: there a thread leaves the core on which another one has begun.
 Elsewhere nothing is done. OMP_PROC_BIND has the same effect, but it binds the calling thread too, and every thread and
 process that it starts.
 """
@@ -16,6 +17,7 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.extending import intrinsic
 
+from analysis.compiled.layer import caller_works
 from analysis.compiled.loops import helper
 
 LINUX = sys.platform == "linux"
@@ -65,18 +67,29 @@ _get_cores, _set_cores = _affinity("sched_getaffinity"), _affinity("sched_setaff
 
 @helper
 def caller() -> Any:
-    """The thread that calls a loop, its core, and the cores that it may use; for ``keep_apart``."""
-    cores = np.zeros(_WORDS, np.uint64)
+    """The thread that calls a loop, its cores, and which thread has which of them; for ``keep_apart``."""
+    cores, taken = np.zeros(_WORDS, np.uint64), np.zeros(64 * _WORDS, np.int64)
     if not LINUX or _get_cores(cores) != 0:
-        return np.int64(0), np.int32(-1), cores
-    return _thread(), _core(), cores
+        return np.int64(0), cores, taken[:0]
+    thread = _thread()
+    if caller_works():
+        taken[_core()] = thread
+    return thread, cores, taken
 
 
 @helper
 def keep_apart(calling: Any) -> None:
-    """Go to another core, if this is another thread than the caller, on its core; and stay off that one."""
-    thread, core, cores = calling
-    if not LINUX or core < 0 or _core() != core or _thread() == thread:
+    """Go to another core, if this is another thread than the one that has this core; and stay off that one.
+
+    A caller that works has its core. One that only waits has none: its threads have the cores that they begin on.
+    """
+    thread, cores, taken = calling
+    if not LINUX or taken.size == 0 or _thread() == thread:
+        return
+    core, this = _core(), _thread()
+    if taken[core] == 0 and not caller_works():
+        taken[core] = this
+    if taken[core] == 0 or taken[core] == this:
         return
     others = cores.copy()
     others[core // 64] &= ~(np.uint64(1) << np.uint64(core % 64))

@@ -25,6 +25,7 @@ os.environ.setdefault("GOMP_SPINCOUNT", "5000")
 import numba
 from numba.np.ufunc import parallel as numba_threads
 
+from analysis.compiled.layer import threading_layer
 from analysis.compiled.start_lock import give_start_lock
 
 give_start_lock(numba_threads)
@@ -64,6 +65,7 @@ class InTurn:
     """
 
     _turn = Lock()
+    _started = False
 
     def __init__(self, dispatcher: Any) -> None:
         self.dispatcher = dispatcher
@@ -71,6 +73,9 @@ class InTurn:
     def __call__(self, *arguments: Any) -> Any:
         """Run the loop, once no other one runs."""
         with InTurn._turn:
+            if not InTurn._started:
+                threading_layer()
+                InTurn._started = True
             return self.dispatcher(*arguments)
 
 

@@ -9,7 +9,7 @@ from analysis.kernel.noise import NoiseModel
 from analysis.kernel.phase_kernel import PhaseKernel, check_machine
 from analysis.kernel.prepared import PatternError
 from analysis.kernel.settings import Estimator, KernelSettings
-from analysis.kernel.warm_up import COMPILE_PARTS, PICTURE_KINDS, not_compiled, numerics, warm_up
+from analysis.kernel.warm_up import COMPILE_PARTS, PICTURE_KINDS, not_compiled, numerics, threads, warm_up
 
 __all__ = [
     "COMPILE_PARTS",
@@ -22,5 +22,6 @@ __all__ = [
     "check_machine",
     "not_compiled",
     "numerics",
+    "threads",
     "warm_up",
 ]

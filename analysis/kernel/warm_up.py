@@ -53,6 +53,16 @@ def numerics() -> dict[str, str]:
     return {"processor": PROCESSOR, "vectors": f"{LANES} float32", "loops": digest()}
 
 
+def threads() -> str:
+    """How many threads the loops have, and by which library: "2 by OpenMP", "2 by TBB" or "2 by numba's workqueue"."""
+    import numba
+
+    from analysis.compiled.layer import threading_layer
+
+    by = {"omp": "OpenMP", "tbb": "TBB", "workqueue": "numba's workqueue"}[threading_layer()]
+    return f"{numba.get_num_threads()} by {by}"
+
+
 def warm_up(part: str = ALL, kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) -> None:
     """Compile, or load from numba's cache, every loop that a kernel can need.
 

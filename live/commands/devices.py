@@ -1,4 +1,4 @@
-"""``phasedic devices``: cameras with their formats, and serial ports."""
+"""``phasedic devices``: cameras with their formats, serial ports, and the threads that measure."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic devices``."""
     from acquire.serial_line import list_serial_ports
     from acquire.v4l2 import list_cameras
+    from analysis import threads
 
     cameras, ports = list_cameras(), list_serial_ports()
     say("cameras:" if cameras else "cameras: none found (V4L2 devices are /dev/video*)")
@@ -23,4 +24,5 @@ def command(arguments: argparse.Namespace) -> int:
     say("serial ports:" if ports else "serial ports: none found")
     for port in ports:
         say(port.text())
+    say(f"threads that measure: {threads()}")
     return 0

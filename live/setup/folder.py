@@ -23,10 +23,10 @@ _PACKAGES = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless", "h
 
 
 def versions() -> dict[str, str]:
-    """Versions of ourselves, of Python and of what we stand on, and what the last digits belong to."""
-    from analysis import numerics
+    """Versions of ourselves, of Python and of what we stand on, what the last digits belong to, and the threads."""
+    from analysis import numerics, threads
 
-    return installed() | numerics()
+    return installed() | numerics() | {"threads": threads()}
 
 
 def installed() -> dict[str, str]:

@@ -1,0 +1,40 @@
+"""Which of numba's threading layers runs the loops, and whether the thread that calls a loop works on it too.
+
+With OpenMP and TBB the caller is one of the threads. With numba's own workqueue, which is all there is where neither
+of them is installed, it only waits: its core is free for the threads of the loop.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numba
+from llvmlite import binding, ir
+from numba.core import types
+from numba.extending import intrinsic
+
+_INT = ir.IntType(32)
+_NAME = "phasedic_caller_works"
+_WORKS = ctypes.c_int32(1)
+# Compiled code is kept for the next process, where the layer may be another one: it reads this by its name.
+binding.add_symbol(_NAME, ctypes.addressof(_WORKS))
+
+
+def threading_layer() -> str:
+    """Start the threads, where they are not, and name the layer: "omp", "tbb" or "workqueue"."""
+    numba.get_num_threads()
+    layer: str = numba.threading_layer()
+    _WORKS.value = layer != "workqueue"
+    return layer
+
+
+@intrinsic
+def caller_works(_typing: Any) -> Any:
+    """In a loop: whether the thread that calls it works on it, 1 or 0; once ``threading_layer`` was asked."""
+
+    def generate(_context: Any, builder: Any, _signature: Any, _arguments: Any) -> Any:
+        value = builder.module.globals.get(_NAME) or ir.GlobalVariable(builder.module, _INT, _NAME)
+        return builder.load(value)
+
+    return types.int32(), generate
