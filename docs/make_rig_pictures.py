@@ -19,7 +19,7 @@ from analysis import KernelSettings, PhaseKernel, Roi, ZoiGrid
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
-from live.report import find_browser
+from live.report import NO_BROWSER, find_browser
 
 IMAGES = Path(__file__).parent / "images"
 SIDE, SHOWN, ZOI, NOISE_GL = 320, 160, 64, 1.3
@@ -82,7 +82,7 @@ def report(work: Path) -> None:
     main(["demo", "--no-view", "--no-rrd", "--report", "--out", str(work / "demo")])
     browser = find_browser()
     if browser is None:
-        sys.exit("the picture of the report needs a browser")
+        sys.exit(f"the picture of the report: {NO_BROWSER}")
     window = ["--headless", "--no-sandbox", "--hide-scrollbars", "--window-size=1280,1180"]
     shot = f"--screenshot={work / 'report.png'}"
     page = (work / "demo" / "report.html").absolute().as_uri()
