@@ -6,26 +6,26 @@ of them is installed, it only waits: its core is free for the threads of the loo
 
 from __future__ import annotations
 
-import ctypes
 from typing import Any
 
 import numba
+import numpy as np
 from llvmlite import binding, ir
 from numba.core import types
 from numba.extending import intrinsic
 
 _INT = ir.IntType(32)
 _NAME = "phasedic_caller_works"
-_WORKS = ctypes.c_int32(1)
+_WORKS = np.ones(1, np.int32)
 # Compiled code is kept for the next process, where the layer may be another one: it reads this by its name.
-binding.add_symbol(_NAME, ctypes.addressof(_WORKS))
+binding.add_symbol(_NAME, _WORKS.ctypes.data)
 
 
 def threading_layer() -> str:
     """Start the threads, where they are not, and name the layer: "omp", "tbb" or "workqueue"."""
     numba.get_num_threads()
     layer: str = numba.threading_layer()
-    _WORKS.value = layer != "workqueue"
+    _WORKS[0] = layer != "workqueue"
     return layer
 
 
