@@ -220,7 +220,8 @@ def _measure_known(
     """As a new kernel measures its first picture."""
     estimator: Estimator = "phase" if way.estimator == "phase" else "spectral"
     settings = KernelSettings(way.window, estimator, way.order, way.interpolant)
-    made = Reference.first(reference, grid, settings, None, None)
-    attempt = Attempt(made, as_recorded(deformed, "the pattern"), None, made.searched(deformed))
+    made = Reference.first(as_image(reference, "the pattern"), grid, settings, None, None)
+    moved = as_recorded(deformed, "the moved pattern")
+    attempt = Attempt(made, moved, None, made.searched(moved))
     rescue(attempt, None)
     return field_of(attempt)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from analysis.compiled.forked import THREADS
 from analysis.field import Motion, Roi, ZoiGrid, profile
+from analysis.kernel.images import as_image
 from analysis.picture import Box
 
 if TYPE_CHECKING:
@@ -180,7 +181,7 @@ def _rest() -> None:
     image, grid = _small()
     THREADS.use()
     # No PhaseKernel: its self-test would compile the iteration.
-    reference = Reference.first(image, grid, KernelSettings(), None, None)
+    reference = Reference.first(as_image(image, "the pattern"), grid, KernelSettings(), None, None)
     reference.searched(image)
     if reference.sums is not None:
         reference.sums.factor("exx", grid.active)

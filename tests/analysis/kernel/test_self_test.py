@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -163,3 +165,14 @@ def test_what_passed_is_not_tested_again(untested: None, monkeypatch: pytest.Mon
         PhaseKernel(IMAGE, GRID, KernelSettings(bending_px=bending))
     PhaseKernel(IMAGE, GRID, KernelSettings(order=2))
     assert seen == [Way("gaussian", "spectral", order, 5, 32) for order in (1, 2)]
+
+
+def test_the_process_that_compiles_the_rest_leaves_the_iteration_alone() -> None:
+    """Else both processes would compile what takes longest."""
+    code = (
+        "from analysis import warm_up\n"
+        "from analysis.fit.iteration import track\n"
+        "warm_up('rest', ['float32'])\n"
+        "assert not track.dispatcher.signatures\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
