@@ -14,6 +14,7 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from live.commands.consumers import standard_consumers
 from live.operate import OrderPort
 from live.run import LiveRun, Outcome, run_live
 from live.setup import load_config
@@ -121,7 +122,7 @@ def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> 
         threading.Thread(target=control, args=(rate, until), daemon=True).start()
 
     try:
-        return run_live(config, screen, hands=hands)
+        return run_live(config, screen, consumers=standard_consumers(screen), hands=hands)
     finally:
         port.close()
 

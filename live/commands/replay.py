@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic replay``."""
+    from live.commands.consumers import standard_consumers
     from live.replay import ReplayRequest, replay
 
     request = ReplayRequest(
@@ -41,7 +42,7 @@ def command(arguments: argparse.Namespace) -> int:
     )
     screen, stopping = Screen(), threading.Event()
     with signals(stopping.set, screen.say):
-        done = replay(request, screen, stopping)
+        done = replay(request, screen, stopping, standard_consumers(screen))
     screen.say()
     summary = summary_lines(done.books, done.config.specimen)
     for line in [*summary, *done.lines, *file_lines(done.folder)]:

@@ -9,6 +9,7 @@ import webbrowser
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from live.commands.consumers import standard_consumers
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, add_options, configured
 from live.commands.signals import signals
@@ -103,7 +104,9 @@ def run_to_the_end(
         if port is not None:
             stack.callback(port.close)
         stack.enter_context(signals(lambda: stop.ask(INTERRUPTED), screen.say))
-        return run_live(config, screen, stop=stop, consumers=consumers, hands=hands)
+        return run_live(
+            config, screen, stop=stop, consumers=standard_consumers(screen, consumers), hands=hands
+        )
 
 
 def conclude(outcome: Outcome, screen: Screen) -> None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from acquire.errors import ConfigError, PhasedicError
 from acquire.events import EventKind
 from acquire.frame import Burst, Frame
 from live.operate import OrderRefused
-from live.outputs import About, Consumer, Outputs, make_outputs
+from live.outputs import About, Compose, Outputs, write_results
 from live.pace import Pace
 from live.run.feed import TAKING, Feed
 from live.run.grabber import Grabber, GrabPlan
@@ -29,7 +29,6 @@ from live.run.recorder import Recording, open_recording
 from live.run.setting import Setting, set_up
 from live.run.stopping import Stop
 from live.setup import Config, open_rig
-from live.signals import signals_of
 from live.tell import Books, Screen
 
 _ARMED = "; nothing is recorded until start is ordered"
@@ -247,7 +246,7 @@ def run_live(
     screen: Screen,
     *,
     stop: Stop | None = None,
-    consumers: Sequence[Consumer] = (),
+    consumers: Compose = write_results,
     hands: Callable[[LiveRun], object] = lambda live: None,
 ) -> Outcome:
     """Run a test from opening the devices to closing the files.
@@ -258,8 +257,8 @@ def run_live(
     screen : Screen
     stop : Stop, optional
         Ends the test from anywhere, also while the devices are being opened.
-    consumers : sequence of Consumer
-        Beside results and view.
+    consumers : callable taking About and Books
+        Makes the consumers of the test; ``live.commands.consumers`` has the standard ones.
     hands : callable taking the LiveRun
         Called once when the test has begun, for a keyboard and the like.
 
@@ -277,10 +276,8 @@ def run_live(
     try:
         setting = set_up(config, rig, books.journal, screen, stop)
         screen.announce(rig, setting.folder)
-        about = About(setting.config, setting.folder, rig.camera.info, setting.grid, setting.start)
-        outputs = make_outputs(
-            about, books, screen, [*consumers, *signals_of(about, books, screen, stop.ask)]
-        )
+        about = About(setting.config, setting.folder, rig.camera.info, setting.grid, setting.start, stop.ask)
+        outputs = Outputs(consumers(about, books), books.loads, books.journal, books.history)
         code = _with_outputs(setting, books, outputs, screen, stop, hands)
     finally:
         rig.close()

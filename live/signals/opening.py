@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 
 from acquire.addresses import Options, parse_address
@@ -21,14 +21,16 @@ from live.tell import Books, Screen
 WHAT = "strain out"
 
 
-def signals_of(about: About, books: Books, screen: Screen, end: Callable[[str], None]) -> list[Consumer]:
-    """Alarms and strain out; ``end`` ends the run for a reason.
+def signals_of(about: About, books: Books, screen: Screen) -> list[Consumer]:
+    """Alarms and strain out of a live run; none of a replay.
 
     Raises
     ------
     ConfigError, DeviceError
         A port is taken, not there, or needs a token.
     """
+    if about.end is None:
+        return []
     outs: list[StrainOut] = []
     with ExitStack() as opened:
         for make in (_tcp, _udp, _serial):
@@ -38,7 +40,7 @@ def signals_of(about: About, books: Books, screen: Screen, end: Callable[[str], 
                 outs.append(out)
                 screen.say(out.name)
         opened.pop_all()
-    means = Means(screen.bell, end, outs)
+    means = Means(screen.bell, about.end, outs)
     alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
     return [*_watch(alarms, about, books), *outs]
 

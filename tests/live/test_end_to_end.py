@@ -17,6 +17,7 @@ from acquire.events import EventKind
 from acquire.frame import Frame
 from acquire.session.reader import Session
 from live.cli import main
+from live.commands.consumers import standard_consumers
 from live.measure.measurement import Measurement
 from live.operate import answer
 from live.outputs import Consumer
@@ -45,10 +46,11 @@ def live_run(
     """A run; ``each`` is called with it and every measurement, in the measuring thread."""
     overrides = {"camera.address": camera, "load.address": "sim:", "output.dir": str(folder), **SMALL, **more}
     watcher = Watcher(each) if each else None
+    screen = Screen(quiet=True)
     return run_live(
         load_config(None, overrides),
-        Screen(quiet=True),
-        consumers=[watcher] if watcher else [],
+        screen,
+        consumers=standard_consumers(screen, [watcher] if watcher else []),
         hands=watcher.lives.append if watcher else lambda live: None,
     )
 

@@ -19,6 +19,7 @@ import pytest
 from acquire.load_cell.none import NoLoadCell
 from acquire.load_sample import LoadSample
 from acquire.session import SessionWriter
+from live.commands.consumers import standard_consumers
 from live.measure import Measurement
 from live.outputs import Consumer
 from live.run import Outcome, run_live
@@ -61,7 +62,8 @@ def disturbed(
         **more,
     }
     watch = Watch(each)
-    outcome = run_live(load_config(None, settings), Screen(quiet=True), consumers=[watch])
+    screen = Screen(quiet=True)
+    outcome = run_live(load_config(None, settings), screen, consumers=standard_consumers(screen, [watch]))
     assert outcome.books.ledger.adds_up
     return outcome, np.array(watch.late)
 
