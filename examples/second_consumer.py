@@ -12,7 +12,7 @@ from live.measure import Measurement
 from live.outputs import Consumer
 from live.run import run_live
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 
 class Largest(Consumer):
@@ -39,7 +39,7 @@ def main(folder: str | None = None) -> int:
         "output.dir": folder,
     }
     given = {key: value for key, value in settings.items() if value is not None}
-    screen = Screen()
+    screen = TerminalScreen()
     consumers = standard_consumers(screen, [Largest()])
     outcome = run_live(load_config(None, given), screen, consumers=consumers)
     for report in outcome.outputs.reports:

@@ -18,7 +18,7 @@ from live.commands.consumers import standard_consumers
 from live.operate import OrderPort
 from live.run import LiveRun, Outcome, run_live
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 STRAIN, ORDERS, MACHINE = 5610, 5611, 5612
 
@@ -114,7 +114,7 @@ def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> 
         "output.dir": folder,
     }
     config = load_config(None, {key: value for key, value in settings.items() if value is not None})
-    screen = Screen()
+    screen = TerminalScreen()
     port = OrderPort(str(ORDERS), None, screen)
 
     def hands(live: LiveRun) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from acquire.events import EventKind, Level
+from live.measure import Screen
 from live.outputs import About, Compose, Consumer, write_results
 from live.setup import outlines
 from live.signals import signals_of
-from live.tell import Books, Screen, StatusCard
+from live.tell import Books, StatusCard
 from live.view import View, ViewSetup, spawn_viewer
 from live.view.consumers import CardWriter, FiguresWriter, Watching
 

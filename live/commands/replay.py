@@ -10,7 +10,7 @@ from typing import Any
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, overrides
 from live.commands.signals import signals
-from live.tell import Screen, file_lines, summary_lines
+from live.tell import TerminalScreen, file_lines, summary_lines
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,7 +40,7 @@ def command(arguments: argparse.Namespace) -> int:
         overrides=_overrides(arguments),
         forces=Path(arguments.forces) if arguments.forces else None,
     )
-    screen, stopping = Screen(), threading.Event()
+    screen, stopping = TerminalScreen(), threading.Event()
     with signals(stopping.set, screen.say):
         done = replay(request, screen, stopping, standard_consumers(screen))
     screen.say()

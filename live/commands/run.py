@@ -13,12 +13,13 @@ from live.commands.consumers import standard_consumers
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, add_options, configured
 from live.commands.signals import signals
+from live.measure import Screen
 from live.operate import OrderPort, listen
 from live.outputs import Consumer
 from live.run import INTERRUPTED, LiveRun, Outcome, Stop, run_live
 from live.setup import Config
 from live.specimen import searched
-from live.tell import Screen, file_lines, sentence, summary_lines
+from live.tell import TerminalScreen, file_lines, sentence, summary_lines
 from live.view import has_display, rerun_command, spawn_viewer
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
-    screen = Screen()
+    screen = TerminalScreen()
     with searched(configured(arguments), screen.say) as config:
         outcome = run_beside_page(config, screen) if arguments.page else run_to_the_end(config, screen)
     if not arguments.page:

@@ -6,7 +6,7 @@ import argparse
 
 from analysis import PICTURE_KINDS
 from live.setup import compile_ahead
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -15,7 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """0 once all is there."""
-    screen = Screen()
+    screen = TerminalScreen()
     took = compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
     screen.say(f"everything is compiled ({took:.0f} s)" if took else "everything was compiled already")
     return 0

@@ -19,7 +19,7 @@ from acquire.camera import with_scheme
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
 from acquire.opencv import picture_times
-from live.measure import History
+from live.measure import History, Screen
 from live.outputs import About, Compose, Outputs, write_results
 from live.replay.ahead import ahead
 from live.replay.forces import read_forces
@@ -38,7 +38,7 @@ from live.setup import (
     with_mask,
 )
 from live.specimen import is_sought
-from live.tell import Books, Journal, Ledger, Screen
+from live.tell import Books, Journal, Ledger
 
 _MOST_TOLD = 5  # pictures that were left out, in the summary
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from acquire.errors import DataError
 from analysis.evaluate import CONFIDENCE
 from live.finished import RunFolder
+from live.measure import Screen
 from live.report import curves
 from live.report.evaluation import (
     STILL_LEAST,
@@ -26,7 +27,7 @@ from live.report.page import Part, captioned, element, facts, joined, page, para
 from live.report.practice import Known, reporting_table
 from live.report.record import definitions, events, gauges, hashes, ledger, times, version_table
 from live.report.svg import Figure, draw
-from live.tell import Screen, axis_words, figure_lines, interval
+from live.tell import axis_words, figure_lines, interval
 
 MOST_BYTES = 5_000_000
 _SIDES = (720, 480, 320, 200)  # px, of the pictures: smaller ones where the page would be too large

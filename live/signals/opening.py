@@ -9,6 +9,7 @@ from acquire.addresses import Options, parse_address
 from acquire.serial_line import LineSettings
 from live.channels import STANDARD, Readings
 from live.lines import Place, read_token
+from live.measure import Screen
 from live.outputs import About, Consumer
 from live.setup import Config
 from live.signals.actions import Means, actions_of
@@ -16,7 +17,7 @@ from live.signals.alarm import Alarm
 from live.signals.lines import Lines
 from live.signals.strain_out import SerialOut, StrainOut, TcpOut, UdpOut
 from live.signals.watch import AlarmWatch
-from live.tell import Books, Screen
+from live.tell import Books
 
 WHAT = "strain out"
 

@@ -19,8 +19,7 @@ from live.tell.figures import (
 )
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
-from live.tell.screen import Screen, say
-from live.tell.status_line import duration
+from live.tell.screen import TerminalScreen, say
 from live.tell.summary import file_lines, summary_lines
 
 __all__ = [
@@ -28,11 +27,10 @@ __all__ = [
     "Books",
     "Journal",
     "Ledger",
-    "Screen",
     "StatusCard",
+    "TerminalScreen",
     "Vitals",
     "axis_words",
-    "duration",
     "elastic_lines",
     "evaluate",
     "figure_lines",

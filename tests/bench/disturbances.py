@@ -31,7 +31,7 @@ from live.commands.consumers import standard_consumers
 from live.measure import Measurement
 from live.run import live_run, run_live
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.bench.live_case import PORT, Watch, attached
 from tests.bench.soak import children, status
 
@@ -165,7 +165,7 @@ def run(name: str, folder: Path) -> dict[str, Any]:
     })  # fmt: skip
     watch = CASES[name]()
     with attached(folder) if "viewer" in name else contextlib.nullcontext():
-        screen = Screen(quiet=True)
+        screen = TerminalScreen(quiet=True)
         outcome = run_live(config, screen, consumers=standard_consumers(screen, [watch]))
     rows, ledger = watch.rows(), outcome.books.ledger
     after = rows[rows[:, 0] > watch.over_t]

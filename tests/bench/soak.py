@@ -22,7 +22,7 @@ import numpy as np
 from live.commands.consumers import standard_consumers
 from live.run import run_live
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.bench.live_case import Watch, skipped_share
 
 WARM_S = 300.0
@@ -109,7 +109,7 @@ def run(case: argparse.Namespace, folder: Path) -> tuple[dict[str, object], Curv
     watch, curve, ended = Watch(), Curve(), threading.Event()
     thread = threading.Thread(target=attend, args=(folder, curve, ended), daemon=True)
     thread.start()
-    screen = Screen(quiet=True)
+    screen = TerminalScreen(quiet=True)
     outcome = run_live(config, screen, consumers=standard_consumers(screen, [watch]))
     ended.set()
     thread.join()

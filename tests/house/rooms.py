@@ -43,7 +43,7 @@ ROOMS = {
     " live.measure live.setup",
     "live.check": "acquire acquire.camera acquire.load_cell analysis analysis.evaluate analysis.field analysis.picture"
     " analysis.quality live.measure live.setup live.specimen",
-    "live.operate": "acquire live.lines live.tell",
+    "live.operate": "acquire live.lines live.measure",
     "live.recording": "acquire live.operate live.tell",
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",
@@ -69,15 +69,16 @@ ROOMS = {
     # A finished run is its results and its recording, or the images it measured.
     "live.finished": "acquire acquire.camera acquire.session analysis.evaluate analysis.field live.measure"
     " live.results live.setup",
-    "live.export": "acquire analysis.field live.results live.maps live.tell live.finished",
-    "live.report": "acquire analysis.field analysis.evaluate analysis.picture live.results live.maps live.tell"
-    " live.setup live.finished live.export",
+    "live.export": "acquire analysis.field live.measure live.results live.maps live.finished",
+    "live.report": "acquire analysis.field analysis.evaluate analysis.picture live.measure live.results live.maps"
+    " live.tell live.setup live.finished live.export",
     "live.show": "acquire analysis analysis.field analysis.evaluate live.measure live.setup live.tell live.finished"
     " live.view live.view.exchange",
     "live.batch.work": "acquire acquire.camera acquire.files analysis.evaluate live.measure live.replay live.results"
     " live.setup live.tell",
-    "live.batch.workers": "acquire analysis live.setup live.tell live.batch.work",
-    "live.batch": "acquire acquire.files analysis live.replay live.setup live.tell live.batch.work live.batch.workers",
+    "live.batch.workers": "acquire analysis live.measure live.setup live.tell live.batch.work",
+    "live.batch": "acquire acquire.files analysis live.measure live.replay live.setup live.tell live.batch.work"
+    " live.batch.workers",
     "live.study": "acquire analysis.field analysis.quality live.measure live.replay live.setup",
     "live.serve.web": "acquire live.pace",
     "live.serve": "acquire acquire.camera acquire.files analysis.field analysis.evaluate live.measure live.setup"

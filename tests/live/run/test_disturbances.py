@@ -25,7 +25,7 @@ from live.outputs import Consumer
 from live.run import Outcome, run_live
 from live.run import live_run as live_module
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.live.test_end_to_end import live_run
 
 FPS = 40.0
@@ -62,7 +62,7 @@ def disturbed(
         **more,
     }
     watch = Watch(each)
-    screen = Screen(quiet=True)
+    screen = TerminalScreen(quiet=True)
     outcome = run_live(load_config(None, settings), screen, consumers=standard_consumers(screen, [watch]))
     assert outcome.books.ledger.adds_up
     return outcome, np.array(watch.late)
