@@ -1,4 +1,4 @@
-"""Words of others made harmless for a terminal: what is read from a file or a device may hold anything."""
+"""Text for a terminal: words of others made harmless (a file or a device may give anything), times in words."""
 
 from __future__ import annotations
 
@@ -26,6 +26,13 @@ _ADDRESS = re.compile(r"^([^\s?]+)\?[A-Za-z_]\w*=\S*(?=: |$)")
 def brief(text: object) -> str:
     """A sentence that begins with an address, without the settings of that address."""
     return _ADDRESS.sub(r"\1", str(text))
+
+
+def duration(seconds: float) -> str:
+    """As 1:23 or 1:02:03."""
+    minutes, rest = divmod(max(0, round(seconds)), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
 def _escaped(found: re.Match[str]) -> str:

@@ -13,7 +13,7 @@ import numpy as np
 from live.export import ExportRequest, export
 from live.finished import Display, open_run
 from live.report import Wanted, make_report, save_page
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 
 def main(folder: str) -> int:
@@ -41,8 +41,8 @@ def main(folder: str) -> int:
                 f"pictures: {first.shape[1]} x {first.shape[0]} px, mean {first.mean():.0f} and {final.mean():.0f} GL"
             )
 
-        export(run, ExportRequest("npz", out / "strain.npz", display=display), Screen(quiet=True))
-        save_page(make_report(run, Wanted(), Screen(quiet=True)), out / "report.html")
+        export(run, ExportRequest("npz", out / "strain.npz", display=display), TerminalScreen(quiet=True))
+        save_page(make_report(run, Wanted(), TerminalScreen(quiet=True)), out / "report.html")
         print(f"largest mean strain {np.nanmax(np.abs(strain)) * 1e6:.0f} um/m; files in {out}")
     return 0
 

@@ -71,8 +71,8 @@ else:
 
 # %% A page to show to others.
 from live.report import Wanted, make_report, save_page  # noqa: E402
-from live.tell import Screen  # noqa: E402
+from live.tell import TerminalScreen  # noqa: E402
 
-save_page(make_report(run, Wanted(fields=("eyy",)), Screen(quiet=True)), folder / "report.html")
+save_page(make_report(run, Wanted(fields=("eyy",)), TerminalScreen(quiet=True)), folder / "report.html")
 run.close()
 print(f"look at {folder / 'report.html'}")

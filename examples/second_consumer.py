@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import sys
 
+from live.commands.consumers import standard_consumers
 from live.measure import Measurement
 from live.outputs import Consumer
 from live.run import run_live
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 
 class Largest(Consumer):
@@ -38,7 +39,9 @@ def main(folder: str | None = None) -> int:
         "output.dir": folder,
     }
     given = {key: value for key, value in settings.items() if value is not None}
-    outcome = run_live(load_config(None, given), Screen(), consumers=[Largest()])
+    screen = TerminalScreen()
+    consumers = standard_consumers(screen, [Largest()])
+    outcome = run_live(load_config(None, given), screen, consumers=consumers)
     for report in outcome.outputs.reports:
         print(report.line())
     return outcome.exit_code

@@ -14,10 +14,11 @@ import threading
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from live.commands.consumers import standard_consumers
 from live.operate import OrderPort
 from live.run import LiveRun, Outcome, run_live
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 STRAIN, ORDERS, MACHINE = 5610, 5611, 5612
 
@@ -113,7 +114,7 @@ def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> 
         "output.dir": folder,
     }
     config = load_config(None, {key: value for key, value in settings.items() if value is not None})
-    screen = Screen()
+    screen = TerminalScreen()
     port = OrderPort(str(ORDERS), None, screen)
 
     def hands(live: LiveRun) -> None:
@@ -121,7 +122,7 @@ def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> 
         threading.Thread(target=control, args=(rate, until), daemon=True).start()
 
     try:
-        return run_live(config, screen, hands=hands)
+        return run_live(config, screen, consumers=standard_consumers(screen), hands=hands)
     finally:
         port.close()
 

@@ -19,8 +19,8 @@ from live.batch.standing import Standing
 from live.batch.summary import write_summary
 from live.batch.work import Row, Task, failed, key_of, longest_first, row_done, sweep, sweep_whole
 from live.batch.workers import Cluster, Hands, Pool
+from live.measure import Screen
 from live.setup import compile_ahead, load_config
-from live.tell import Screen
 
 _LOOK_S = 0.1
 

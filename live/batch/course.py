@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from live.batch.cutting import Cut, joined
 from live.batch.standing import Standing
 from live.batch.work import RENEWED, Progress, Row, Task, failed
-from live.tell import Screen
+from live.measure import Screen
 
 
 class Course:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 
+from acquire.printable import duration
 from live.batch.work import Progress
-from live.tell import duration
 
 
 class Standing:

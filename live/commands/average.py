@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from live.commands.options import add_options
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,7 +24,7 @@ def command(arguments: argparse.Namespace) -> int:
     from live.measure import kinds_of
     from live.setup import open_rig
 
-    screen = Screen()
+    screen = TerminalScreen()
     given = getattr(arguments, "camera.crop")
     crop = tuple(given) if given else None
     rig = open_rig(arguments.camera, "none:", lambda event: screen.say(event.text), crop=crop)

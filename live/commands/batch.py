@@ -12,7 +12,7 @@ from acquire.errors import ConfigError
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import MEASURE, add_options, add_verbose, overrides
 from live.commands.signals import signals
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 OUTPUT = ("axis", "standard", "zero", "lag")
 
@@ -65,7 +65,7 @@ def command(arguments: argparse.Namespace) -> int:
         chunk_s=_chunk_s(arguments),
         scheduler=arguments.scheduler,
     )
-    screen, stopping = Screen(), threading.Event()
+    screen, stopping = TerminalScreen(), threading.Event()
     with signals(stopping.set, screen.say):
         done = run_campaign(wanted, screen, stopping)
     for path in done.files:

@@ -18,7 +18,7 @@ from live.commands.options import PICTURES, add_measure, add_options, configured
 from live.commands.watching import interrupts, watch
 from live.setup import Config, open_load
 from live.specimen import Overlay, snapshot, troubles, with_auto_gauges
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 LISTEN_S = 3.0
 
@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """Run the check; 0 for GO, 6 for NO-GO."""
-    screen = Screen()
+    screen = TerminalScreen()
     config = configured(arguments)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")

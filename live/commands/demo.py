@@ -22,7 +22,7 @@ from live.measure import Measurement
 from live.outputs import Consumer
 from live.run import Outcome
 from live.setup import Config
-from live.tell import Screen, evaluate, tensile_table
+from live.tell import TerminalScreen, evaluate, tensile_table
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid
@@ -45,7 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """Run the demo; the exit code of the run, or 1 where it missed the truth."""
-    screen = Screen()
+    screen = TerminalScreen()
     config = configured(arguments, _defaults(arguments))
     kept = Kept()
     outcome = run_to_the_end(config, screen, [kept])

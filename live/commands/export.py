@@ -9,7 +9,7 @@ from acquire.errors import ConfigError
 from live.commands.options import add_gauge_option
 from live.export import FORMATS, ExportRequest, Options, export
 from live.finished import Display, RunFolder, add_gauges, open_run
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -60,7 +60,7 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic export``."""
     if not 0.1 <= arguments.fps <= 240:
         raise ConfigError(f"--fps {arguments.fps:g} is not possible; give 0.1 to 240")
-    screen = Screen()
+    screen = TerminalScreen()
     with open_run(arguments.run) as run:
         if arguments.more_gauges:
             add_gauges(run, Path(arguments.more_gauges))

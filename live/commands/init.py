@@ -13,9 +13,10 @@ from acquire.errors import DeviceError
 from acquire.files import write_picture
 from acquire.printable import printable
 from live.commands.options import PICTURES, add_options, add_verbose, overrides, to_be_new
+from live.measure import Screen
 from live.setup import load_config, new_rig
 from live.specimen import Overlay, Proposal, look, mask_picture, propose, rig_text, snapshot
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 RECORDED = ("files", "video", "session")
 MEASURE = (
@@ -45,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic init``."""
-    screen = Screen()
+    screen = TerminalScreen()
     rig = Path(arguments.file)
     png = Path(arguments.snapshot) if arguments.snapshot else rig.with_suffix(".png")
     mask = rig.with_name(f"{rig.stem}-mask.png") if arguments.fixed else None

@@ -14,9 +14,10 @@ from live.commands.options import add_measure, add_options, overrides
 from live.commands.report import write_report
 from live.commands.run import OTHER_PROGRAMS, RECORDING, invite, watched
 from live.commands.signals import signals
+from live.measure import Screen
 from live.serve import DEFAULT_PORT, Desk, Draft
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 RIG = "rig.toml"
 
@@ -32,7 +33,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic page``; 0 when it is ended from the page, 130 when it is interrupted."""
-    screen = Screen()
+    screen = TerminalScreen()
     path, said = Path(arguments.config or RIG), overrides(arguments)
     draft = Draft(load_config(path if path.exists() else None, said), path, said)
     if not draft.config.camera.address:

@@ -10,7 +10,7 @@ from typing import Any
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, overrides
 from live.commands.signals import signals
-from live.tell import Screen, file_lines, summary_lines
+from live.tell import TerminalScreen, file_lines, summary_lines
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic replay``."""
+    from live.commands.consumers import standard_consumers
     from live.replay import ReplayRequest, replay
 
     request = ReplayRequest(
@@ -39,9 +40,9 @@ def command(arguments: argparse.Namespace) -> int:
         overrides=_overrides(arguments),
         forces=Path(arguments.forces) if arguments.forces else None,
     )
-    screen, stopping = Screen(), threading.Event()
+    screen, stopping = TerminalScreen(), threading.Event()
     with signals(stopping.set, screen.say):
-        done = replay(request, screen, stopping)
+        done = replay(request, screen, stopping, standard_consumers(screen))
     screen.say()
     summary = summary_lines(done.books, done.config.specimen)
     for line in [*summary, *done.lines, *file_lines(done.folder)]:

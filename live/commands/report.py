@@ -10,6 +10,7 @@ from acquire.errors import ConfigError, PhasedicError
 from live.commands.options import add_gauge_option
 from live.export import check_free, new_file
 from live.finished import Display, RunFolder, add_gauges, open_run
+from live.measure import Screen
 from live.report import (
     NO_BROWSER,
     Report,
@@ -23,7 +24,7 @@ from live.report import (
     tests_of,
     write_table,
 )
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,7 +54,7 @@ def command(arguments: argparse.Namespace) -> int:
     runs = [*([arguments.run] if arguments.run else []), *arguments.compare]
     if not runs:
         raise ConfigError("give the folder of a run, or several after --compare")
-    screen = Screen()
+    screen = TerminalScreen()
     if arguments.pdf and find_browser() is None:
         raise ConfigError(f"--pdf: {NO_BROWSER}")
     default = Path("comparison.html") if arguments.compare else None

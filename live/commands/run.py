@@ -10,15 +10,17 @@ import webbrowser
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from live.commands.consumers import standard_consumers
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, add_options, configured
 from live.commands.signals import signals
+from live.measure import Screen
 from live.operate import OrderPort, listen
 from live.outputs import Consumer
 from live.run import INTERRUPTED, LiveRun, Outcome, Stop, run_live
 from live.setup import Config
 from live.specimen import searched
-from live.tell import Screen, file_lines, sentence, summary_lines
+from live.tell import TerminalScreen, file_lines, sentence, summary_lines
 from live.view import has_display, rerun_command, spawn_viewer
 
 if TYPE_CHECKING:
@@ -40,7 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
-    screen = Screen()
+    screen = TerminalScreen()
     with searched(configured(arguments), screen.say) as config:
         outcome = run_beside_page(config, screen) if arguments.page else run_to_the_end(config, screen)
     if not arguments.page:
@@ -108,7 +110,9 @@ def run_to_the_end(
         if port is not None:
             stack.callback(port.close)
         stack.enter_context(signals(lambda: stop.ask(INTERRUPTED), screen.say))
-        return run_live(config, screen, stop=stop, consumers=consumers, hands=hands)
+        return run_live(
+            config, screen, stop=stop, consumers=standard_consumers(screen, consumers), hands=hands
+        )
 
 
 def conclude(outcome: Outcome, screen: Screen) -> None:

@@ -11,6 +11,7 @@ from typing import TypeVar
 
 from acquire.errors import ConfigError
 from live.commands.options import add_options, add_verbose, configured
+from live.measure import Screen
 from live.setup import AUTO, Config, write_rig
 from live.specimen import (
     OUT_OF_PLANE_MM,
@@ -23,7 +24,7 @@ from live.specimen import (
     look,
     region_of,
 )
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 Number = TypeVar("Number", int, float)
 OF_THE_RIG = -1.0  # --width without a number
@@ -64,7 +65,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic scale``."""
-    screen = Screen()
+    screen = TerminalScreen()
     _check(arguments)
     config = configured(arguments)
     stand_off = arguments.stand_off or config.scale.stand_off_mm

@@ -11,7 +11,7 @@ from live.commands.options import add_gauge_option
 from live.commands.signals import signals
 from live.finished import add_gauges, open_run
 from live.show import Asked, show
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic show``."""
     _check(arguments)
-    screen, enough = Screen(), threading.Event()
+    screen, enough = TerminalScreen(), threading.Event()
     asked = Asked(arguments.start_s, arguments.end_s, arguments.every)
     rrd = Path(arguments.rrd) if arguments.rrd else None
     with signals(enough.set, lambda text: None), open_run(arguments.run) as run:

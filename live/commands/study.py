@@ -16,7 +16,7 @@ from live.commands.options import add_options, add_verbose, overrides
 from live.export import check_free, new_folder
 from live.report import Figure, Line, save_figures
 from live.setup import AUTO, compile_ahead
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 if TYPE_CHECKING:
     from live.study import Advice, Found, Setting
@@ -58,7 +58,7 @@ def command(arguments: argparse.Namespace) -> int:
     from live.replay import ReplayRequest, open_material
     from live.study import recommended, study, take_windows
 
-    screen, out = Screen(), Path(arguments.folder)
+    screen, out = TerminalScreen(), Path(arguments.folder)
     check_free(out)
     settings, found = _settings(arguments), []
     config_file = Path(arguments.config) if arguments.config else None

@@ -7,7 +7,7 @@ import argparse
 from analysis import PICTURE_KINDS, KernelSettings, check_machine
 from live.measure import on_fit_machine
 from live.setup import compile_ahead
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 TESTED_PX = 64
 """The ZOI of the self-test; those of a test are tested when it begins."""
@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """0 once all is there; MachineUnfit where a known pattern is measured wrong."""
-    screen = Screen()
+    screen = TerminalScreen()
     took = compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
     screen.say(f"everything is compiled ({took:.0f} s)" if took else "everything was compiled already")
     with on_fit_machine():

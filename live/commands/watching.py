@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, TextIO
 from acquire.printable import printable
 from live.check import GLANCE, Figures, Glance, Rolling, Watch, judge
 from live.check.judge import Line
+from live.measure import Screen
 from live.setup import DEFAULT_REFERENCE_BURST, Config, open_rig
 from live.specimen import troubles
-from live.tell import Screen
 from live.view import View, ViewSetup, spawn_viewer
 
 if TYPE_CHECKING:

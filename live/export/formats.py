@@ -15,7 +15,7 @@ from live.export.tables import write_csv
 from live.export.tiff import write_tiff
 from live.export.vtk import write_vtk
 from live.finished import Display, RunFolder
-from live.tell import Screen
+from live.measure import Screen
 
 PLACE = "export"  # in the folder of the run
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from acquire.errors import ConfigError
 from analysis.field import Status
 from live.finished import Display, RunFolder
+from live.measure import Screen
 from live.results import Strain
-from live.tell import Screen
 
 USUAL = ("u", "v", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy", "status")
 _SAME_S = 1e-6  # times that were typed are rounded

@@ -2,8 +2,8 @@
 
 ``preparation`` makes a kernel of a reference burst (``reference``), ``pipeline`` measures burst after burst
 with a ``tracker``, ``measurement`` is what comes out with its means (``instant``, kept in ``history`` and ``kept``),
-``settling`` waits for its force, ``snapshot`` is where a test stands; ``guards`` warn of motion within a burst and of
-strains that are no longer small.
+``settling`` waits for its force, ``snapshot`` is where a test stands, ``screen`` where a person reads it;
+``guards`` warn of motion within a burst and of strains that are no longer small.
 """
 
 from live.measure.guards import SmearGuard
@@ -23,6 +23,7 @@ from live.measure.preparation import (
 )
 from live.measure.reference import Reference, ReferenceTaker
 from live.measure.rehearsal import kinds_of, rehearse
+from live.measure.screen import Screen
 from live.measure.settling import HOLD_S, Loads, Settling
 from live.measure.snapshot import Snapshot, peak_force
 from live.measure.thinned import Thinned
@@ -40,6 +41,7 @@ __all__ = [
     "NewReference",
     "Reference",
     "ReferenceTaker",
+    "Screen",
     "Settling",
     "SmearGuard",
     "Snapshot",

@@ -10,9 +10,9 @@ import threading
 from collections.abc import Iterator
 from typing import Any, TextIO
 
+from live.measure import Screen
 from live.operate.keys import HELP, Keys
 from live.operate.orders import Orders, answer
-from live.tell import Screen
 
 LINES = (
     "keys (with Enter): r new reference, t tare (t! whatever the load does, u undo it), p pause/go on,"

@@ -6,8 +6,8 @@ import math
 import time
 from collections.abc import Callable
 
+from live.measure import Screen
 from live.operate.orders import ENDED, Orders, answer
-from live.tell import Screen
 
 HELP = (
     "keys: r new reference, t tare (T whatever the load does, u undo it), p pause/go on, s start recording,"

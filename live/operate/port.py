@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from live.lines import LineServer, Place, read_token
+from live.measure import Screen
 from live.operate.orders import Orders, answer
-from live.tell import Screen
 
 WHAT = "the port for orders"
 

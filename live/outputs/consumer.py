@@ -7,14 +7,22 @@ Results, view, status card, strain out and report are all consumers. To write on
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING
 
+from acquire.clock import ClockPair
 from acquire.events import Event
-from acquire.frame import Frame
+from acquire.frame import CameraInfo, Frame
 from acquire.load_sample import LoadSample
 from live.measure import Measurement
+from live.setup import Config
+from live.tell import Books
+
+if TYPE_CHECKING:
+    from analysis import ZoiGrid
 
 
 class Policy(Enum):
@@ -91,6 +99,37 @@ class Consumer:
         """Close everything; a few words for the ledger, empty where there is nothing to say."""
         return ""
 
+
+@dataclass(frozen=True, slots=True, eq=False)
+class About:
+    """What a consumer may read of a test before it begins.
+
+    Attributes
+    ----------
+    config : Config
+    folder : Path
+        Of the files.
+    camera : CameraInfo
+    grid : ZoiGrid
+    start : ClockPair
+        Time zero of the files and curves.
+    end : callable or None
+        Ends a live run cleanly, for the reason it is given; None in a replay.
+    aside : bool
+        Nobody looks into ``folder`` before all is done, and it counts for nothing until then.
+    """
+
+    config: Config
+    folder: Path
+    camera: CameraInfo
+    grid: ZoiGrid
+    start: ClockPair
+    end: Callable[[str], None] | None = None
+    aside: bool = False
+
+
+Compose = Callable[[About, Books], Sequence[Consumer]]
+"""Makes the consumers of a test, once its folder is there and before its first frame."""
 
 KINDS = ("event", "load", "frame", "settled", "measurement")
 """Names of the methods that take something, in the order in which what waits is handed over."""

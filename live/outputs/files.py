@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any, cast
+
 from live.measure import Measurement
-from live.outputs.consumer import Consumer, Policy
-from live.results import Results
+from live.outputs.consumer import About, Consumer, Policy
+from live.results import FLUSH_S, Results, ResultsInfo
+from live.setup import versions
+from live.tell import Books
+
+SELDOM_S = 10.0  # a row may wait for its flush where nobody would have it from a broken run
 
 
 class Files(Consumer):
@@ -33,3 +40,28 @@ class Files(Consumer):
         """Close the files."""
         self._results.close()
         return ""
+
+
+def write_results(about: About, books: Books) -> Sequence[Consumer]:
+    """The results alone.
+
+    Raises
+    ------
+    DataError
+        A file of the results exists already, or cannot be made.
+    """
+    config = about.config
+    info = ResultsInfo(
+        about.start.monotonic,
+        about.start.utc.isoformat(),
+        config.as_dict(),
+        dict(config.metadata),
+        versions(),
+        about.camera,
+        strain_measure=cast(Any, config.measure.strain),
+        area_m2=config.specimen.area_m2,
+        gauges=dict(config.gauges),
+        axis=config.specimen.axis,
+        lagged=config.load.lag_s != 0,
+    )
+    return [Files(Results(about.folder, about.grid, info, SELDOM_S if about.aside else FLUSH_S))]

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from acquire.events import ignore_event
 from acquire.session import Session
+from live.measure import Screen
 from live.replay.material import Material, ReplayRequest, check_window
 from live.replay.pictures import picture_material
 from live.replay.session import session_config, session_material, session_path
 from live.setup import AUTO, Config, load_config, open_rig, other_digits
-from live.tell import Screen
 
 
 @contextmanager

@@ -20,13 +20,12 @@ from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst, frozen
 from analysis import StrainField
-from live.measure import Measurement, unchanged
+from live.measure import Measurement, Screen, unchanged
 from live.replay.ahead import ahead
 from live.replay.material import ReplayRequest, check_window
 from live.replay.opened import opened_session
 from live.replay.prepared import Prepared, prepared
 from live.replay.session import session_path
-from live.tell import Screen
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acquire.events import EventSink
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
-from live.measure import Correction, Measurement, averaged, kinds_of, measure, prepare
+from live.measure import Correction, Measurement, Screen, averaged, kinds_of, measure, prepare
 from live.replay.material import Material, Work
 from live.setup import (
     AUTO,
@@ -26,7 +26,6 @@ from live.setup import (
     read_mask,
 )
 from live.specimen import Look, placed_on
-from live.tell import Screen
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel, ZoiGrid

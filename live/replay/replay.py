@@ -19,8 +19,8 @@ from acquire.camera import with_scheme
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
 from acquire.opencv import picture_times
-from live.measure import History
-from live.outputs import About, Outputs, make_outputs
+from live.measure import History, Screen
+from live.outputs import About, Compose, Outputs, write_results
 from live.replay.ahead import ahead
 from live.replay.forces import read_forces
 from live.replay.material import Material, ReplayRequest, Work, check_window
@@ -38,7 +38,7 @@ from live.setup import (
     with_mask,
 )
 from live.specimen import is_sought
-from live.tell import Books, Journal, Ledger, Screen
+from live.tell import Books, Journal, Ledger
 
 _MOST_TOLD = 5  # pictures that were left out, in the summary
 
@@ -67,8 +67,10 @@ class Replayed:
     left_out: int = 0
 
 
-def replay(request: ReplayRequest, screen: Screen, stopping: threading.Event) -> Replayed:
-    """Replay ``request.source``; setting ``stopping`` ends it early and cleanly.
+def replay(
+    request: ReplayRequest, screen: Screen, stopping: threading.Event, consumers: Compose = write_results
+) -> Replayed:
+    """Replay ``request.source`` into ``consumers``; setting ``stopping`` ends it early and cleanly.
 
     Raises
     ------
@@ -78,16 +80,18 @@ def replay(request: ReplayRequest, screen: Screen, stopping: threading.Event) ->
     path = session_path(request.source)
     check_window(request)
     if path is None:
-        return _replay_pictures(request, screen, stopping)
+        return _replay_pictures(request, screen, stopping, consumers)
     with opened_session(path, request, screen) as (found, config):
         material = _with_forces(found, request, config)
-        return _run(material, config, request, screen, stopping, Journal())
+        return _run(material, config, request, screen, stopping, Journal(), consumers)
 
 
 # -- pictures -----------------------------------------------------------------------------------
 
 
-def _replay_pictures(request: ReplayRequest, screen: Screen, stopping: threading.Event) -> Replayed:
+def _replay_pictures(
+    request: ReplayRequest, screen: Screen, stopping: threading.Event, consumers: Compose
+) -> Replayed:
     if request.as_measured:
         raise ConfigError(f"{request.source}: --as-measured needs a session; pictures have none")
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
@@ -102,7 +106,7 @@ def _replay_pictures(request: ReplayRequest, screen: Screen, stopping: threading
     try:
         with rig.camera as camera:
             material = _with_forces(picture_material(camera, request, config), request, config)
-            return _run(material, config, request, screen, stopping, journal)
+            return _run(material, config, request, screen, stopping, journal, consumers)
     finally:
         rig.close()
 
@@ -138,6 +142,7 @@ def _run(
     screen: Screen,
     stopping: threading.Event,
     journal: Journal,
+    consumers: Compose,
 ) -> Replayed:
     ready = prepared(material, config, request.source, screen, stopping.is_set)
     stored = Recital.of(request.parts, ready)
@@ -151,7 +156,7 @@ def _run(
     about = About(
         config, folder, material.camera, ready.grid, material.start, aside=request.settled is not None
     )
-    outputs = make_outputs(about, books, screen)
+    outputs = Outputs(consumers(about, books), books.loads, journal, books.history)
     began, work = time.perf_counter(), ahead(bursts)
     try:
         _give_past(material, outputs)

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from analysis.evaluate import CONFIDENCE
 from live.finished import MEANS, RunFolder, quantity_of
 from live.maps import unit_for
+from live.measure import Screen
 from live.report.evaluation import lag_of
 from live.report.page import Part, element, facts, joined, paragraph, table
 from live.setup import versions
-from live.tell import Screen, interval, quantity
+from live.tell import interval, quantity
 
 _MOST_EVENTS = 3000
 _KINDS = (".h5", ".csv", ".json", ".png", ".tif")

@@ -10,6 +10,7 @@ import numpy as np
 from acquire.errors import DataError
 from analysis.evaluate import CONFIDENCE
 from live.finished import RunFolder
+from live.measure import Screen
 from live.report import curves
 from live.report.evaluation import Curve, instants, nearest_rows
 from live.report.maps import Shots, maps, shots, statuses
@@ -18,7 +19,7 @@ from live.report.practice import Known, reporting_table
 from live.report.record import definitions, events, gauges, hashes, ledger, times, version_table
 from live.report.svg import Figure, draw
 from live.results import StillPhase, still_phase_of
-from live.tell import Screen, axis_words, figure_lines, headline
+from live.tell import axis_words, figure_lines, headline
 
 MOST_BYTES = 5_000_000
 _SIDES = (720, 480, 320, 200)  # px, of the pictures: smaller ones where the page would be too large

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from live.export import new_file, new_folder
+from live.measure import Screen
 from live.report.browser import NO_PNG, find_browser, to_pdf, to_png
 from live.report.report import Report
 from live.report.svg import HEIGHT, WIDTH, Figure, draw
-from live.tell import Screen
 
 
 def save_page(report: Report, path: Path) -> None:

@@ -10,15 +10,16 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
 from acquire.events import EventKind
 from acquire.frame import Burst, Frame
+from live.measure import Screen
 from live.operate import OrderRefused
-from live.outputs import About, Consumer, Outputs, make_outputs
+from live.outputs import About, Compose, Outputs, write_results
 from live.pace import Pace
 from live.run.feed import TAKING, Feed
 from live.run.grabber import Grabber, GrabPlan
@@ -28,9 +29,8 @@ from live.run.outcome import Outcome
 from live.run.recorder import Recording, open_recording
 from live.run.setting import Setting, set_up
 from live.run.stopping import Stop
-from live.setup import Config, open_rig
-from live.signals import signals_of
-from live.tell import Books, Screen
+from live.setup import Config, Rig, open_rig
+from live.tell import Books
 
 _ARMED = "; nothing is recorded until start is ordered"
 _SILENT_S = 1.0
@@ -247,7 +247,7 @@ def run_live(
     screen: Screen,
     *,
     stop: Stop | None = None,
-    consumers: Sequence[Consumer] = (),
+    consumers: Compose = write_results,
     hands: Callable[[LiveRun], object] = lambda live: None,
 ) -> Outcome:
     """Run a test from opening the devices to closing the files.
@@ -258,8 +258,8 @@ def run_live(
     screen : Screen
     stop : Stop, optional
         Ends the test from anywhere, also while the devices are being opened.
-    consumers : sequence of Consumer
-        Beside results and view.
+    consumers : callable taking About and Books
+        Makes the consumers of the test; ``live.commands.consumers`` has the standard ones.
     hands : callable taking the LiveRun
         Called once when the test has begun, for a keyboard and the like.
 
@@ -276,15 +276,24 @@ def run_live(
     rig = open_rig(config.camera.address, config.load.address, books.journal, crop=config.camera.crop)
     try:
         setting = set_up(config, rig, books.journal, screen, stop)
-        screen.announce(rig, setting.folder)
-        about = About(setting.config, setting.folder, rig.camera.info, setting.grid, setting.start)
-        outputs = make_outputs(
-            about, books, screen, [*consumers, *signals_of(about, books, screen, stop.ask)]
-        )
+        for line in announcement(rig, setting.folder):
+            screen.say(line)
+        about = About(setting.config, setting.folder, rig.camera.info, setting.grid, setting.start, stop.ask)
+        outputs = Outputs(consumers(about, books), books.loads, books.journal, books.history)
         code = _with_outputs(setting, books, outputs, screen, stop, hands)
     finally:
         rig.close()
     return Outcome(setting.folder, setting.config, books, outputs, rig, setting.grid, code)
+
+
+def announcement(rig: Rig, folder: Path) -> Iterator[str]:
+    """The devices, what is to be said of them, and where the files will lie."""
+    c, cell = rig.camera.info, rig.load.info
+    fps = f", {c.fps:g} fps" if c.fps else ""
+    yield f"camera: {c.name}, {c.width} x {c.height} px, {c.bits} bits{fps}"
+    yield f"load cell: {cell.name}"
+    yield from (f"warning: {warning}" for warning in (*c.warnings, *cell.warnings))
+    yield f"files: {folder}"
 
 
 def device_names(config: Config) -> dict[str, str]:

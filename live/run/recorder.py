@@ -22,13 +22,14 @@ from acquire.hdf5 import forecast, network_share
 from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import RotatingWriter, SessionInfo, SessionWriter
+from live.measure import Screen
 from live.operate import OrderRefused
 from live.recording import Gate, Keep
 from live.run.channels import ByteBuffer
 from live.run.setting import Setting
 from live.run.stopping import Stop
 from live.setup import versions
-from live.tell import Books, Journal, Ledger, Screen, Vitals
+from live.tell import Books, Journal, Ledger, Vitals
 
 log = logging.getLogger(__name__)
 _SMALL = 512  # bytes counted for a sample or an event

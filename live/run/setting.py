@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from acquire.clock import ClockPair
 from acquire.hdf5 import compile_loops
 from acquire.record_mode import RecordMode
-from live.measure import Correction, kinds_of, rehearse
+from live.measure import Correction, Screen, kinds_of, rehearse
 from live.run.stopping import Stop
 from live.setup import (
     DEFAULT_BURST,
@@ -31,7 +31,7 @@ from live.setup import (
     with_flat_field,
     with_mask,
 )
-from live.tell import Journal, Screen
+from live.tell import Journal
 
 if TYPE_CHECKING:
     from analysis import KernelSettings, ZoiGrid

@@ -9,8 +9,8 @@ from pathlib import Path
 from acquire.errors import DataError, PhasedicError
 from acquire.events import Level
 from live.finished import RunFolder
+from live.measure import Screen
 from live.show.story import Asked, chosen, setup_of, story
-from live.tell import Screen
 from live.view import View, spawn_viewer
 from live.view.exchange.wire import Kind, Message
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 
 from acquire.addresses import Options, parse_address
 from acquire.serial_line import LineSettings
 from live.channels import STANDARD, Readings
 from live.lines import Place, read_token
+from live.measure import Screen
 from live.outputs import About, Consumer
 from live.setup import Config
 from live.signals.actions import Means, actions_of
@@ -16,19 +17,21 @@ from live.signals.alarm import Alarm
 from live.signals.lines import Lines
 from live.signals.strain_out import SerialOut, StrainOut, TcpOut, UdpOut
 from live.signals.watch import AlarmWatch
-from live.tell import Books, Screen
+from live.tell import Books
 
 WHAT = "strain out"
 
 
-def signals_of(about: About, books: Books, screen: Screen, end: Callable[[str], None]) -> list[Consumer]:
-    """Alarms and strain out; ``end`` ends the run for a reason.
+def signals_of(about: About, books: Books, screen: Screen) -> list[Consumer]:
+    """Alarms and strain out of a live run; none of a replay.
 
     Raises
     ------
     ConfigError, DeviceError
         A port is taken, not there, or needs a token.
     """
+    if about.end is None:
+        return []
     outs: list[StrainOut] = []
     with ExitStack() as opened:
         for make in (_tcp, _udp, _serial):
@@ -38,7 +41,7 @@ def signals_of(about: About, books: Books, screen: Screen, end: Callable[[str], 
                 outs.append(out)
                 screen.say(out.name)
         opened.pop_all()
-    means = Means(screen.bell, end, outs)
+    means = Means(screen.bell, about.end, outs)
     alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
     return [*_watch(alarms, about, books), *outs]
 

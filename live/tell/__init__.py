@@ -12,8 +12,7 @@ from live.tell.card import StatusCard
 from live.tell.figures import axis_words, elastic_lines, evaluate, figure_lines, options_of
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
-from live.tell.screen import Screen, say
-from live.tell.status_line import duration
+from live.tell.screen import TerminalScreen, say
 from live.tell.summary import file_lines, summary_lines
 from live.tell.tensile_table import TensileRow, headline, interval, quantity, tensile_table
 
@@ -22,12 +21,11 @@ __all__ = [
     "Books",
     "Journal",
     "Ledger",
-    "Screen",
     "StatusCard",
     "TensileRow",
+    "TerminalScreen",
     "Vitals",
     "axis_words",
-    "duration",
     "elastic_lines",
     "evaluate",
     "figure_lines",

@@ -11,15 +11,14 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from acquire.printable import printable
-from live.tell.status_line import GAP, duration, force, gauge_words, status_line
+from acquire.printable import duration, printable
+from live.measure import Screen
+from live.tell.status_line import GAP, force, gauge_words, status_line
 
 if TYPE_CHECKING:
     from live.measure import Instant, Snapshot
-    from live.setup import Rig
 
 _TERMINAL_EVERY_S, _FILE_EVERY_S = 0.25, 5.0
 _UNKNOWN_WIDTH, _FILE_WIDTH = 119, 1000
@@ -27,10 +26,10 @@ _UNKNOWN_WIDTH, _FILE_WIDTH = 119, 1000
 
 def say(text: str = "") -> None:
     """A line on standard output, made harmless; for commands that need no status line."""
-    Screen().say(text)
+    TerminalScreen().say(text)
 
 
-class Screen:
+class TerminalScreen(Screen):
     """Prints to ``stream``; the status line at most four times a second (a log: every 5 s)."""
 
     def __init__(
@@ -105,16 +104,6 @@ class Screen:
         self.status(
             f"{done}{of} bursts{_load(i)}  {GAP.join(gauge_words(i))} um/m  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}"
         )
-
-    def announce(self, rig: Rig, folder: Path) -> None:
-        """What is about to happen."""
-        c, cell = rig.camera.info, rig.load.info
-        fps = f", {c.fps:g} fps" if c.fps else ""
-        self.say(f"camera: {c.name}, {c.width} x {c.height} px, {c.bits} bits{fps}")
-        self.say(f"load cell: {cell.name}")
-        for warning in (*c.warnings, *cell.warnings):
-            self.say(f"warning: {warning}")
-        self.say(f"files: {folder}")
 
     def _write(self, text: str) -> None:
         coding = getattr(self._stream, "encoding", None) or "utf-8"

@@ -6,6 +6,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from acquire.printable import duration
+
 if TYPE_CHECKING:
     from live.measure import Instant, Snapshot
 
@@ -61,13 +63,6 @@ def _machine(s: Snapshot) -> list[Part]:
 def force(value: float) -> str:
     """A force in words; nothing where it is not known."""
     return "" if math.isnan(value) else f"{value:.1f} N"
-
-
-def duration(seconds: float) -> str:
-    """As 1:23 or 1:02:03."""
-    minutes, rest = divmod(max(0, round(seconds)), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02}:{rest:02}" if hours else f"{minutes}:{rest:02}"
 
 
 def gauge_words(i: Instant) -> list[str]:

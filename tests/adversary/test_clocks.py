@@ -26,7 +26,7 @@ from live.run import live_run as live_module
 from live.run import run_live
 from live.run.outcome import Outcome
 from live.setup import Rig, load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 SHAPE = (64, 80)
 SMALL = {
@@ -62,7 +62,8 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Outcom
 
         monkeypatch.setattr(live_module, "open_rig", rig)
         return run_live(
-            load_config(None, {**SMALL, "output.dir": str(tmp_path / "out"), **more}), Screen(quiet=True)
+            load_config(None, {**SMALL, "output.dir": str(tmp_path / "out"), **more}),
+            TerminalScreen(quiet=True),
         )
 
     return running

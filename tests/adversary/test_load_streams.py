@@ -17,7 +17,7 @@ from acquire.protocols import find_protocol
 from acquire.protocols.modbus import crc16, frame
 from live.run import Outcome, run_live
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.acquire.protocols.conversation import parser
 from tests.adversary.peers import PEERS, TALKS, Peer, SocketPeer, leave, stamped
 
@@ -78,7 +78,7 @@ def run_beside(load: str, folder: Path) -> Outcome:
         "view.rrd": False,
         "output.dir": str(folder),
     }
-    return run_live(load_config(None, settings), Screen(quiet=True))
+    return run_live(load_config(None, settings), TerminalScreen(quiet=True))
 
 
 @pytest.fixture(scope="module")

@@ -15,7 +15,7 @@ import pytest
 
 from acquire.session import Session
 from live.cli import main
-from live.tell import Screen
+from live.tell import TerminalScreen
 from live.unhurried import Unhurried
 
 SIM = "sim:uniform?lockstep=yes&seconds=1&fps=15&width=160&height=128&bits=12"
@@ -95,7 +95,7 @@ def test_a_stream_that_fails_is_let_go() -> None:
 
 def test_a_narrow_encoding_does_not_silence_the_screen() -> None:
     raw = io.BytesIO()
-    screen = Screen(io.TextIOWrapper(raw, encoding="ascii"))
+    screen = TerminalScreen(io.TextIOWrapper(raw, encoding="ascii"))
     screen.say("5 µm/m")
     screen.say("next")
     assert raw.getvalue() == b"5 \\xb5m/m\nnext\n"

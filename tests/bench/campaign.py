@@ -25,7 +25,7 @@ from live.batch.standing import Standing
 from live.batch.work import Row, Task, failed
 from live.batch.workers import Cluster, Hands, Pool
 from live.cli import main as phasedic
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.bench import machine
 from tests.bench.soak import children, status
 from tests.live.batch.running import running
@@ -99,7 +99,7 @@ def empty(folder: Path, count: int) -> list[dict[str, Any]]:
     with contextlib.closing(Hands(0)) as hands:
         found = [_emptied("pool", tasks, lambda told, done: Pool(tasks, 2, told, done, hands))]
     with running(folder) as cluster:
-        screen = Screen(quiet=True)
+        screen = TerminalScreen(quiet=True)
         made = _emptied("Dask", tasks, lambda told, done: Cluster(tasks, cluster.address, told, done, screen))
         found.append(made | {"MB scheduler": round(peak_MB(cluster.scheduler.pid))})
     return found

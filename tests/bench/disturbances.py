@@ -27,10 +27,11 @@ import numpy as np
 from acquire.load_cell import LoadCell
 from acquire.load_sample import LoadSample
 from acquire.session import SessionWriter
+from live.commands.consumers import standard_consumers
 from live.measure import Measurement
 from live.run import live_run, run_live
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.bench.live_case import PORT, Watch, attached
 from tests.bench.soak import children, status
 
@@ -164,7 +165,8 @@ def run(name: str, folder: Path) -> dict[str, Any]:
     })  # fmt: skip
     watch = CASES[name]()
     with attached(folder) if "viewer" in name else contextlib.nullcontext():
-        outcome = run_live(config, Screen(quiet=True), consumers=[watch])
+        screen = TerminalScreen(quiet=True)
+        outcome = run_live(config, screen, consumers=standard_consumers(screen, [watch]))
     rows, ledger = watch.rows(), outcome.books.ledger
     after = rows[rows[:, 0] > watch.over_t]
     late = after[after[:, 3] > IN_TIME_S]

@@ -23,11 +23,12 @@ from typing import Any
 
 import numpy as np
 
+from live.commands.consumers import standard_consumers
 from live.measure import Measurement
 from live.outputs import Consumer
 from live.run import Outcome, run_live
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 from live.view.viewer import url, viewer_binary
 
 PORT = 19_876
@@ -96,7 +97,8 @@ def run(case: argparse.Namespace, folder: Path) -> tuple[Outcome, np.ndarray]:
     config = load_config(None, {key: value for key, value in settings.items() if value is not None})
     watch = Watch()
     with attached(folder) if case.viewer else contextlib.nullcontext():
-        outcome = run_live(config, Screen(quiet=not case.loud), consumers=[watch])
+        screen = TerminalScreen(quiet=not case.loud)
+        outcome = run_live(config, screen, consumers=standard_consumers(screen, [watch]))
     return outcome, watch.rows()
 
 

@@ -19,9 +19,10 @@ from pathlib import Path
 
 import numpy as np
 
+from live.commands.consumers import standard_consumers
 from live.run import run_live
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.bench.live_case import Watch, skipped_share
 
 WARM_S = 300.0
@@ -108,7 +109,8 @@ def run(case: argparse.Namespace, folder: Path) -> tuple[dict[str, object], Curv
     watch, curve, ended = Watch(), Curve(), threading.Event()
     thread = threading.Thread(target=attend, args=(folder, curve, ended), daemon=True)
     thread.start()
-    outcome = run_live(config, Screen(quiet=True), consumers=[watch])
+    screen = TerminalScreen(quiet=True)
+    outcome = run_live(config, screen, consumers=standard_consumers(screen, [watch]))
     ended.set()
     thread.join()
     rows = watch.rows()

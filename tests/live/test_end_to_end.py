@@ -17,6 +17,7 @@ from acquire.events import EventKind
 from acquire.frame import Frame
 from acquire.session.reader import Session
 from live.cli import main
+from live.commands.consumers import standard_consumers
 from live.measure.measurement import Measurement
 from live.operate import answer
 from live.outputs import Consumer
@@ -25,7 +26,7 @@ from live.run import live_run as live_module
 from live.run.outcome import Outcome
 from live.setup.config import load_config
 from live.setup.rig import Rig
-from live.tell.screen import Screen
+from live.tell.screen import TerminalScreen
 
 SIM = "sim:woven?lockstep=yes&seconds=3&fps=15&width=224&height=192&bits=12"
 SMALL = {
@@ -45,10 +46,11 @@ def live_run(
     """A run; ``each`` is called with it and every measurement, in the measuring thread."""
     overrides = {"camera.address": camera, "load.address": "sim:", "output.dir": str(folder), **SMALL, **more}
     watcher = Watcher(each) if each else None
+    screen = TerminalScreen(quiet=True)
     return run_live(
         load_config(None, overrides),
-        Screen(quiet=True),
-        consumers=[watcher] if watcher else [],
+        screen,
+        consumers=standard_consumers(screen, [watcher] if watcher else []),
         hands=watcher.lives.append if watcher else lambda live: None,
     )
 
@@ -360,7 +362,7 @@ def test_a_rotated_recording_is_one_session(tmp_path: Path) -> None:
         None, {"camera.address": SIM, "load.address": "sim:", "output.dir": str(folder), **SMALL}
     )
     object.__setattr__(config.record, "rotate_MB", 1.0)  # smaller than the configuration allows
-    assert run_live(config, Screen(quiet=True)).exit_code == 0
+    assert run_live(config, TerminalScreen(quiet=True)).exit_code == 0
     assert len(list(folder.glob("session*.h5"))) > 2
     session = str(folder / "session.001.h5")
     assert main(["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]) == 0

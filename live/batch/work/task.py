@@ -13,10 +13,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from acquire.errors import PhasedicError
+from acquire.printable import printable
 from live.batch.work import places
 from live.batch.work.row import Row, failed, row_of, row_of_chunk
+from live.measure import Screen
 from live.replay import ReplayRequest, measure_part, replay
-from live.tell import Screen, summary_lines
+from live.tell import summary_lines
 
 if TYPE_CHECKING:
     from live.measure import Instant
@@ -124,12 +126,12 @@ class _Telling(Screen):
     """Keeps the sentences of a replay in a file, and tells its progress."""
 
     def __init__(self, stream: TextIO, tell: Tell) -> None:
-        super().__init__(stream)
-        self._tell, self._told, self._zois = tell, 0.0, 0
+        self._stream, self._tell, self._told, self._zois = stream, tell, 0.0, 0
         self.last = Progress(0, None, 0)
 
-    def status(self, text: str) -> None:
-        """Nothing: a file needs no status line."""
+    def say(self, text: str = "") -> None:
+        """A line of the file."""
+        print(printable(text), file=self._stream, flush=True)
 
     def progress(self, i: Instant, done: int, expected: int | None, elapsed_s: float) -> None:
         """Told to whoever waits, four times a second."""

@@ -21,7 +21,7 @@ from live.batch.work import Progress, Row, Task, deciding_versions, failed, row_
 from live.batch.workers import there
 from live.batch.workers.hands import Told
 from live.batch.workers.pool import Done
-from live.tell import Screen
+from live.measure import Screen
 
 log = logging.getLogger(__name__)
 RETRIES = 2  # of a task that raised; one whose worker died is given to another three times by Dask itself

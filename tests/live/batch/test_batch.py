@@ -23,7 +23,7 @@ from live.batch import Wanted, find_tests, run_campaign
 from live.batch.work import Task, perform
 from live.cli import main
 from live.results import strain_h5
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.live.batch.conftest import SETTINGS
 from tests.live.batch.running import datasets, differing, is_gone, parts, pid_of, rows, started, until
 
@@ -174,7 +174,7 @@ def test_one_that_always_kills_its_worker(runs: Path, tmp_path: Path) -> None:
     tests = find_tests([str(runs / "hole-[12]" / "session.h5")])
     tests[0] = dataclasses.replace(tests[0], overrides={"measure.step": 1})  # takes seconds
     try:
-        found = run_campaign(Wanted(tests, out, 2), Screen(quiet=True), threading.Event())
+        found = run_campaign(Wanted(tests, out, 2), TerminalScreen(quiet=True), threading.Event())
     finally:
         over.set()
     assert found.exit_code == 5

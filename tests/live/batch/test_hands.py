@@ -13,7 +13,7 @@ from live.batch import Wanted, campaign, find_tests, run_campaign
 from live.batch.work import Row, Task, failed, longest_first
 from live.batch.workers import Hands, Pool
 from live.batch.workers.hands import Hand
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.live.batch.running import is_gone
 
 
@@ -58,7 +58,7 @@ def test_they_are_there_before_it_is_known_what_they_do(
         return planned(asked)
 
     monkeypatch.setattr(campaign, "_planned", plan)
-    run_campaign(wanted(tmp_path, 3), Screen(quiet=True), threading.Event())
+    run_campaign(wanted(tmp_path, 3), TerminalScreen(quiet=True), threading.Event())
     (made,) = Counted.made
     assert len(before) == 2
     assert made.taken
@@ -70,7 +70,7 @@ def test_those_that_nobody_needs_are_let_go_of(tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "0").mkdir()  # of other settings
     with pytest.raises(ConfigError, match="nothing is overwritten"):
-        run_campaign(wanted(tmp_path, 2), Screen(quiet=True), threading.Event())
+        run_campaign(wanted(tmp_path, 2), TerminalScreen(quiet=True), threading.Event())
     (made,) = Counted.made
     assert len(made.pids) == 1
     assert not made.taken
@@ -80,7 +80,7 @@ def test_those_that_nobody_needs_are_let_go_of(tmp_path: Path) -> None:
 def test_a_cluster_needs_none(tmp_path: Path) -> None:
     with pytest.raises(ConfigError):
         run_campaign(
-            wanted(tmp_path, 1, scheduler="tcp://127.0.0.1:9x"), Screen(quiet=True), threading.Event()
+            wanted(tmp_path, 1, scheduler="tcp://127.0.0.1:9x"), TerminalScreen(quiet=True), threading.Event()
         )
     assert not Counted.made[0].pids
 
@@ -109,7 +109,7 @@ def test_what_is_not_compiled_is_compiled_by_the_caller(
     monkeypatch.setattr(
         campaign, "compile_ahead", lambda kinds, **more: asked.append((kinds, len(Counted.made[0].taken)))
     )
-    run_campaign(wanted(tmp_path, 1), Screen(quiet=True), threading.Event())
+    run_campaign(wanted(tmp_path, 1), TerminalScreen(quiet=True), threading.Event())
     assert asked == [(PICTURE_KINDS, 0)]
 
 
@@ -129,7 +129,7 @@ def test_no_worker_can_be_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     asked = wanted(tmp_path, 1)
     monkeypatch.setattr("live.batch.workers.hands.subprocess.Popen", none)
     with pytest.raises(DataError, match=r"no process can be started .* end other programs"):
-        run_campaign(asked, Screen(quiet=True), threading.Event())
+        run_campaign(asked, TerminalScreen(quiet=True), threading.Event())
 
 
 def test_no_worker_can_be_started_any_more(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -24,7 +24,7 @@ from live.commands import watching
 from live.commands.watching import Display, card, peak_line
 from live.setup import load_config
 from live.specimen import Region
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 STILL = "sim:uniform?bits=8&fps=50&width=224&height=192"
 SMALL = ["--zoi", "48", "--reference-burst", "8"]
@@ -177,7 +177,7 @@ class Terminal(io.StringIO):
 def test_lines_are_renewed_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shutil.get_terminal_size", lambda: (20, 24))
     stream = Terminal()
-    show = Display(Screen(), stream)
+    show = Display(TerminalScreen(), stream)
     show.lines(["one", "z" * 50, "bad\x1b[31m"], "")
     show.lines(["two"], "")
     assert stream.getvalue().count("z") == 19

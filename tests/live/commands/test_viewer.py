@@ -12,9 +12,10 @@ import pytest
 
 from acquire.clock import ClockPair
 from live.commands import run
-from live.outputs import About, make_outputs
+from live.commands.consumers import standard_consumers
+from live.outputs import About, Outputs
 from live.setup import load_config
-from live.tell import Books, Screen
+from live.tell import Books, TerminalScreen
 from live.view import viewer
 from tests.live.batch.running import until
 from tests.live.made_up import CAMERA, START, make_grid
@@ -28,7 +29,8 @@ def test_the_port_that_is_told_is_the_one_that_is_served(tmp_path: Path) -> None
         wanted = taken.getsockname()[1]
         config = load_config(None, {"view.port": wanted, "view.rrd": False, "view.spawn": False})
         about = About(config, tmp_path, CAMERA, make_grid(), ClockPair(START, datetime.now(UTC)))
-        outputs = make_outputs(about, books, Screen())
+        consumers = standard_consumers(TerminalScreen())(about, books)
+        outputs = Outputs(consumers, books.loads, books.journal, books.history)
         try:
             end = time.monotonic() + 60
             while books.vitals.view_port is None and time.monotonic() < end:

@@ -13,7 +13,7 @@ from live.cli import main
 from live.export import FORMATS, ExportRequest, export, new_file
 from live.export.job import Job, Options, chosen_rows
 from live.finished import Display, open_run
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.live.made_run import make_run
 
 
@@ -94,7 +94,7 @@ def test_progress_is_told_after_two_seconds(run_dir: Path, capsys: pytest.Captur
         return 0.5 * next(clock)
 
     ticks = itertools.count(0, 10)
-    screen = Screen(now=lambda: next(ticks))
+    screen = TerminalScreen(now=lambda: next(ticks))
     with open_run(run_dir) as run:
         rows = chosen_rows(run.strain, None, None)
         job = Job(run, ("eyy",), rows, Display(), screen, Options())
@@ -106,7 +106,7 @@ def test_progress_is_told_after_two_seconds(run_dir: Path, capsys: pytest.Captur
 
 def test_a_map_of_statuses_has_no_missing_values(run_dir: Path, tmp_path: Path) -> None:
     with open_run(run_dir) as run:
-        export(run, ExportRequest("tiff", tmp_path / "s.tif", "status"), Screen(quiet=True))
+        export(run, ExportRequest("tiff", tmp_path / "s.tif", "status"), TerminalScreen(quiet=True))
     assert (tmp_path / "s.tif").stat().st_size > 12 * 4 * 5 * 7
 
 
@@ -116,5 +116,5 @@ def test_without_its_library_a_format_says_what_to_install(
 ) -> None:
     monkeypatch.setitem(sys.modules, library, None)
     with open_run(run_dir) as run, pytest.raises(ConfigError, match=r"pip install 'phasedic\[export\]'"):
-        export(run, ExportRequest(form, tmp_path / "x"), Screen(quiet=True))
+        export(run, ExportRequest(form, tmp_path / "x"), TerminalScreen(quiet=True))
     assert not list(tmp_path.iterdir())

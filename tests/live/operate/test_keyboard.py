@@ -15,7 +15,7 @@ from typing import Any
 from acquire.events import EventKind
 from live.operate import ENDED, FORCED, UNDO, listen
 from live.operate.keys import Keys
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.live.operate.test_orders import FakeLive
 
 
@@ -26,7 +26,7 @@ class Terminal(io.StringIO):
 
 def test_what_nobody_knows_is_answered_with_the_orders() -> None:
     live, screen = FakeLive(), io.StringIO()
-    thread = listen(live, Terminal("\nx\nn\n?\n"), Screen(screen))
+    thread = listen(live, Terminal("\nx\nn\n?\n"), TerminalScreen(screen))
     assert thread is not None
     thread.join(5)
     assert live.calls == []
@@ -36,10 +36,10 @@ def test_what_nobody_knows_is_answered_with_the_orders() -> None:
 
 
 def test_only_a_terminal_is_listened_to() -> None:
-    assert listen(FakeLive(), io.StringIO("q\n"), Screen(io.StringIO())) is None
-    assert listen(FakeLive(), None, Screen(io.StringIO())) is None
+    assert listen(FakeLive(), io.StringIO("q\n"), TerminalScreen(io.StringIO())) is None
+    assert listen(FakeLive(), None, TerminalScreen(io.StringIO())) is None
     live = FakeLive()
-    thread = listen(live, Terminal("q\n"), Screen(io.StringIO()))
+    thread = listen(live, Terminal("q\n"), TerminalScreen(io.StringIO()))
     assert thread is not None
     thread.join(5)
     assert live.calls == [("stop", ENDED)]
@@ -50,7 +50,7 @@ class Typed:
 
     def __init__(self) -> None:
         self.live, self.now, self.stream = FakeLive(), 0.0, io.StringIO()
-        self.keys = Keys(self.live, Screen(self.stream), lambda: self.now)
+        self.keys = Keys(self.live, TerminalScreen(self.stream), lambda: self.now)
 
     def type(self, *texts: str) -> list[Any]:
         for text in texts:
@@ -90,9 +90,9 @@ def test_other_keys_are_answered_with_the_keys_and_arrows_with_nothing() -> None
 def test_a_true_terminal_gives_single_keys_and_is_put_back_as_it_was() -> None:
     """In a program of its own, since a terminal has one foreground."""
     program = (
-        "import sys, termios; from live.operate import listen; from live.tell import Screen;"
+        "import sys, termios; from live.operate import listen; from live.tell import TerminalScreen;"
         "from tests.live.operate.test_orders import FakeLive; live = FakeLive();"
-        "before = termios.tcgetattr(0); k = listen(live, sys.stdin, Screen());"
+        "before = termios.tcgetattr(0); k = listen(live, sys.stdin, TerminalScreen());"
         "during = termios.tcgetattr(0)\n"
         "import time\n"
         "while not live.calls: time.sleep(0.01)\n"
@@ -123,9 +123,9 @@ def test_a_true_terminal_gives_single_keys_and_is_put_back_as_it_was() -> None:
 def test_a_terminal_gives_single_keys_again_after_ctrl_z() -> None:
     """The test is the shell: stops the program, has lines itself, and lets it go on."""
     program = (
-        "import sys, time; from live.operate import listen; from live.tell import Screen;"
+        "import sys, time; from live.operate import listen; from live.tell import TerminalScreen;"
         "from tests.live.operate.test_orders import FakeLive; live = FakeLive();"
-        "k = listen(live, sys.stdin, Screen())\n"
+        "k = listen(live, sys.stdin, TerminalScreen())\n"
         "while not live.calls: time.sleep(0.01)\n"
         "k.close()\n"
         "print('CALLS', live.calls[0][0])"

@@ -17,7 +17,7 @@ from hw_mocks.speckle import Speckle
 from live.cli import main
 from live.replay import ReplayRequest, replay
 from live.results import Strain
-from live.tell import Screen
+from live.tell import TerminalScreen
 
 SHAPE = (128, 160)
 STRAINS = (0.0, 0.001, 0.002, 0.003, 0.004, 0.005)
@@ -155,7 +155,7 @@ def test_a_part_is_cut_as_configured(shots: Path, tmp_path: Path) -> None:
         str(shots), False, None, None, None, tmp_path / "a.toml",
         {"measure.zoi": 48, "measure.step": 24, "output.dir": str(tmp_path / "out")},
     )  # fmt: skip
-    assert replay(request, Screen(quiet=True), threading.Event()).exit_code == 0
+    assert replay(request, TerminalScreen(quiet=True), threading.Event()).exit_code == 0
     with Strain.open(tmp_path / "out" / "strain.h5") as strain:
         assert strain.grid.x[-1] < 120
 

@@ -15,7 +15,7 @@ from live.finished import open_run
 from live.report import Wanted, make_report
 from live.report.evaluation import Curve
 from live.report.record import times
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.live.made_run import CONFIG, GAUGES, make_run
 
 
@@ -26,7 +26,7 @@ def gauged(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_report_shows_every_gauge_with_its_band(gauged: Path) -> None:
     with open_run(gauged) as run:
-        report = make_report(run, Wanted(), Screen(quiet=True))
+        report = make_report(run, Wanted(), TerminalScreen(quiet=True))
         axial = run.gauges["axial"]
     figure = next(figure for figure in report.figures if figure.name == "gauges-time")
     assert [curve.label for curve in figure.curves] == ["axial", "shear"]

@@ -18,7 +18,7 @@ from live.finished import open_run
 from live.report import Wanted, find_browser, make_report
 from live.report.page import Part, safe
 from live.report.svg import MOST_POINTS, Curve, Figure, draw
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.live.made_run import CONFIG, PULLED, make_run
 
 VOID = {"meta", "img", "br", "line", "path", "rect", "circle", "polygon"}
@@ -61,7 +61,7 @@ class Reader(HTMLParser):
 @pytest.fixture(scope="module")
 def text(run_dir: Path) -> str:
     with open_run(run_dir) as run:
-        return make_report(run, Wanted(("eyy", "exx"), (), 0.05), Screen(quiet=True)).html
+        return make_report(run, Wanted(("eyy", "exx"), (), 0.05), TerminalScreen(quiet=True)).html
 
 
 def test_it_stands_alone(text: str) -> None:
@@ -107,7 +107,7 @@ def test_a_run_without_force_recording_and_section(tmp_path: Path) -> None:
     make_run(tmp_path, [1e-3, 2e-3], session=False, config=config, metadata={})
     with open_run(tmp_path) as run:
         run.strain.values["force_N"][:] = np.nan
-        said = " ".join(Reader(make_report(run, Wanted(), Screen(quiet=True)).html).words)
+        said = " ".join(Reader(make_report(run, Wanted(), TerminalScreen(quiet=True)).html).words)
     assert "there is no stress-strain curve" in said
     assert "No still phase was found" in said
     assert "No ledger was recorded" in said
@@ -116,9 +116,9 @@ def test_a_run_without_force_recording_and_section(tmp_path: Path) -> None:
 
 def test_a_large_page_takes_smaller_pictures(run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_run(run_dir) as run:
-        full = make_report(run, Wanted(), Screen(quiet=True)).html
+        full = make_report(run, Wanted(), TerminalScreen(quiet=True)).html
         monkeypatch.setattr("live.report.report.MOST_BYTES", len(full) - 10)
-        assert len(make_report(run, Wanted(), Screen(quiet=True)).html) < len(full) - 10
+        assert len(make_report(run, Wanted(), TerminalScreen(quiet=True)).html) < len(full) - 10
 
 
 def test_files(run_dir: Path, tmp_path: Path) -> None:
@@ -141,7 +141,7 @@ def test_a_run_that_has_just_ended_gets_its_page(tmp_path: Path, capsys: pytest.
     make_run(tmp_path / "full")
     make_run(tmp_path / "empty", [], session=False)
     for name in ("full", "empty", "full"):
-        command.write_report(tmp_path / name, Screen())
+        command.write_report(tmp_path / name, TerminalScreen())
     said = capsys.readouterr().out
     assert Reader((tmp_path / "full" / "report.html").read_text(encoding="utf-8")).seen["svg"] > 3
     assert "warning: no report was made: " in said
@@ -223,10 +223,10 @@ def test_nothing_is_overwritten(run_dir: Path, tmp_path: Path, capsys: pytest.Ca
 
 def test_at_the_end_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = make_run(tmp_path)
-    command.write_report(folder, Screen())
+    command.write_report(folder, TerminalScreen())
     assert "Noise floor" in (folder / "report.html").read_text(encoding="utf-8")
-    command.write_report(folder, Screen())
-    command.write_report(tmp_path / "nowhere", Screen())
+    command.write_report(folder, TerminalScreen())
+    command.write_report(tmp_path / "nowhere", TerminalScreen())
     said = capsys.readouterr().out.splitlines()
     assert [line[:12] for line in said if "hash" not in line] == [
         "  " + str(folder)[:10],

@@ -19,12 +19,13 @@ import pytest
 from acquire.load_cell.none import NoLoadCell
 from acquire.load_sample import LoadSample
 from acquire.session import SessionWriter
+from live.commands.consumers import standard_consumers
 from live.measure import Measurement
 from live.outputs import Consumer
 from live.run import Outcome, run_live
 from live.run import live_run as live_module
 from live.setup import load_config
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.live.test_end_to_end import live_run
 
 FPS = 40.0
@@ -61,7 +62,8 @@ def disturbed(
         **more,
     }
     watch = Watch(each)
-    outcome = run_live(load_config(None, settings), Screen(quiet=True), consumers=[watch])
+    screen = TerminalScreen(quiet=True)
+    outcome = run_live(load_config(None, settings), screen, consumers=standard_consumers(screen, [watch]))
     assert outcome.books.ledger.adds_up
     return outcome, np.array(watch.late)
 

@@ -12,9 +12,9 @@ import pytest
 
 from live.cli import main
 from live.finished import RunFolder, open_run
+from live.measure import Screen
 from live.show import Asked, show
 from live.show.story import chosen, setup_of, story
-from live.tell import Screen
 from live.view.exchange.messages import events_of, field_of, picture_of, rows_of
 from live.view.exchange.wire import Kind
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run

@@ -14,7 +14,7 @@ from acquire.events import EventKind
 from hw_mocks.pty_port import PtyPort
 from live.cli import main
 from live.operate import OrderPort
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.live.lines.test_server import Caller
 from tests.live.signals.test_strain_out import Listener, free_port, read
 from tests.live.test_end_to_end import live_run
@@ -30,7 +30,11 @@ GAUGES = {
 
 def test_a_test_with_all_that_there_is(tmp_path: Path) -> None:
     folder, again, port, serial = tmp_path / "run", tmp_path / "again", free_port(), PtyPort()
-    orders, listeners, answers = OrderPort("0", None, Screen(quiet=True)), list[Listener](), list[str]()
+    orders, listeners, answers = (
+        OrderPort("0", None, TerminalScreen(quiet=True)),
+        list[Listener](),
+        list[str](),
+    )
 
     def order(live: Any, m: Any) -> None:
         if m.number == 3:

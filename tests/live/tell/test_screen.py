@@ -13,7 +13,7 @@ from acquire.events import Event, EventKind
 from live.measure import Instant, Snapshot
 from live.tell.journal import Journal, sentence
 from live.tell.ledger import Ledger
-from live.tell.screen import Screen
+from live.tell.screen import TerminalScreen
 from live.tell.status_line import status_line
 from live.tell.tensile_table import quantity
 
@@ -31,7 +31,7 @@ class Gone(Terminal):
 def test_the_status_line_is_renewed_in_place_and_not_too_often() -> None:
     now = [0.0]
     stream = Terminal()
-    screen = Screen(stream, now=lambda: now[0])
+    screen = TerminalScreen(stream, now=lambda: now[0])
     screen.status("one long line")
     screen.status("too early")
     now[0] = 1.0
@@ -43,7 +43,7 @@ def test_the_status_line_is_renewed_in_place_and_not_too_often() -> None:
 def test_the_progress_of_a_replay_is_one_line() -> None:
     stream = io.StringIO()
     now = iter(range(0, 100, 10))
-    screen = Screen(stream, now=lambda: next(now))
+    screen = TerminalScreen(stream, now=lambda: next(now))
     screen.progress(instant(), 5, 20, 2.5)
     screen.progress(instant(), 5, None, 0.0)
     screen.progress(instant(), 21, 20, 2.5)
@@ -89,7 +89,7 @@ def test_the_status_line_fits_any_width_and_force_and_alarm_go_last(width: int) 
 def test_what_is_typed_is_not_overwritten() -> None:
     now = [0.0]
     stream = Terminal()
-    screen = Screen(stream, now=lambda: now[0])
+    screen = TerminalScreen(stream, now=lambda: now[0])
     screen.status("status")
     screen.prompt(": note sl_")
     now[0] = 9.0
@@ -123,7 +123,7 @@ def test_an_address_is_told_once_and_without_its_settings() -> None:
 
 
 def test_a_lost_terminal_does_not_matter() -> None:
-    screen = Screen(Gone())
+    screen = TerminalScreen(Gone())
     screen.say("nobody reads this")
     screen.say("nor this")
 

@@ -11,9 +11,9 @@ from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from live.measure import Snapshot
 from live.outputs import Outputs
-from live.outputs.watching import CARD_INSTANTS, CardWriter, FiguresWriter, Watching
 from live.setup import SpecimenConfig
 from live.tell import Books, Journal, StatusCard
+from live.view.consumers import CARD_INSTANTS, CardWriter, FiguresWriter, Watching
 from tests.live.made_up import START, make_frame, make_loads, make_measurement
 
 

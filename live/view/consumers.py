@@ -10,7 +10,7 @@ from acquire.events import Event
 from acquire.frame import Frame
 from acquire.load_sample import LoadSample
 from live.measure import History, Instant, Measurement, Thinned
-from live.outputs.consumer import Consumer
+from live.outputs import Consumer
 from live.tell import Books, StatusCard
 from live.view import View
 
