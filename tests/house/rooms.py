@@ -109,6 +109,7 @@ LIBRARIES = {
     "llvmlite": "analysis.compiled",
     "rerun": "live.view.drawing",
     "serial": "acquire.serial_line",
+    "shtab": "live.commands",
     "tomlkit": "live.setup",
 }
 # Room (and all in it) -> what it never imports.
