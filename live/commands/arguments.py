@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 import importlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from live.commands.examples import example_of
@@ -72,6 +72,13 @@ Command = Callable[[argparse.Namespace], int]
 
 def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
     """The command that was asked for, and its arguments; help and bad usage end the program (exit code 2)."""
+    arguments = full_parser([word for word in argv if word in COMMANDS][:1]).parse_args(argv)
+    command: Command = importlib.import_module(COMMANDS[arguments.command].module).command
+    return command, arguments
+
+
+def full_parser(known: Iterable[str]) -> argparse.ArgumentParser:
+    """The parser of ``phasedic``; of the commands ``known`` with all their arguments."""
     parser = argparse.ArgumentParser(
         prog="phasedic",
         description="Live strain measurement by phase-DIC: frames, load, strain maps while the specimen is pulled.",
@@ -80,22 +87,13 @@ def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
     )
     parser.add_argument("--version", action="version", version=_version())
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    asked = next((word for word in argv if word in COMMANDS), "")
+    asked = set(known)
     for name, entry in COMMANDS.items():
         own = subparsers.add_parser(
             name, help=entry.words, epilog=example_of(name) + EXIT_CODES, formatter_class=_Plain
         )
-        if name == asked:
+        if name in asked:
             importlib.import_module(entry.module).add_arguments(own)
-    arguments = parser.parse_args(argv)
-    command: Command = importlib.import_module(COMMANDS[arguments.command].module).command
-    return command, arguments
-
-
-def parser_of(command: str) -> argparse.ArgumentParser:
-    """A parser that knows all of one command."""
-    parser = argparse.ArgumentParser(prog=f"phasedic {command}")
-    importlib.import_module(COMMANDS[command].module).add_arguments(parser)
     return parser
 
 

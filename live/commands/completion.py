@@ -1,74 +1,43 @@
-"""``phasedic completion``: what a shell needs to complete commands and options, as a script for bash (and zsh)."""
+"""``phasedic completion``: the script with which a shell completes commands, options and file names."""
 
 from __future__ import annotations
 
 import argparse
-import re
-import shlex
 
-_OPTION = re.compile(r"--[a-z][\w-]*")
-_CHOICES = re.compile(r"(--[a-z][\w-]*) \{([^}]*)\}")
-
-_SCRIPT = """# bash completion of phasedic, made by: phasedic completion
-# zsh: autoload -U +X bashcompinit && bashcompinit, then source this file
-_phasedic() {{
-    local word="${{COMP_WORDS[COMP_CWORD]}}" before="${{COMP_WORDS[COMP_CWORD-1]}}" known=""
-    if [ "$COMP_CWORD" -eq 1 ]; then
-        COMPREPLY=($(compgen -W {commands} -- "$word"))
-        return
-    fi
-    case "${{COMP_WORDS[1]}} $before" in
-{choices}
-    esac
-    if [ -z "$known" ] && [ "${{word:0:1}}" = "-" ]; then
-        case "${{COMP_WORDS[1]}}" in
-{options}
-        esac
-    fi
-    if [ -n "$known" ]; then
-        COMPREPLY=($(compgen -W "$known" -- "$word"))
-    else
-        COMPREPLY=($(compgen -f -- "$word"))
-    fi
-}}
-complete -o filenames -F _phasedic phasedic
-"""
+SHELLS = ("bash", "zsh", "tcsh")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic completion``."""
+    parser.add_argument(
+        "shell", nargs="?", choices=SHELLS, default=SHELLS[0], help="which shell (default bash)"
+    )
 
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic completion``."""
-    print(script(), end="")
+    print(script(arguments.shell))
     return 0
 
 
-def script() -> str:
-    """Commands, the options of each, and the words that some options allow."""
-    from live.commands.arguments import COMMANDS, parser_of
+def script(shell: str) -> str:
+    """The script of one of ``SHELLS``, from the parsers of all commands."""
+    import shtab
 
-    parsers = {name: parser_of(name) for name in COMMANDS}
-    options = "\n".join(
-        f"            {name}) known={shlex.quote(' '.join(_options(parser)))} ;;"
-        for name, parser in parsers.items()
-    )
-    choices = "\n".join(
-        f"        {shlex.quote(f'{name} {option}')}) known={shlex.quote(words)} ;;"
-        for name, parser in parsers.items()
-        for option, words in _choices(parser)
-    )
-    return _SCRIPT.format(commands=shlex.quote(" ".join(COMMANDS)), options=options, choices=choices)
+    from live.commands.arguments import COMMANDS, full_parser
+
+    parser = full_parser(COMMANDS)
+    for own in _subparsers(parser).choices.values():
+        _complete_files(own, shtab.FILE)
+    return str(shtab.complete(parser, shell))
 
 
-def _options(parser: argparse.ArgumentParser) -> list[str]:
-    """What the help lists: lines that begin with an option, up to their explanation."""
-    heads = (line.strip().split("  ")[0] for line in parser.format_help().splitlines() if line[:3] == "  -")
-    return [option for head in heads for option in _OPTION.findall(head)]
+def _subparsers(parser: argparse.ArgumentParser) -> argparse._SubParsersAction[argparse.ArgumentParser]:
+    return next(action for action in parser._actions if isinstance(action, argparse._SubParsersAction))
 
 
-def _choices(parser: argparse.ArgumentParser) -> list[tuple[str, str]]:
-    """Options and the words that they allow, as the usage shows them."""
-    usage = " ".join(parser.format_usage().split())
-    return [(option, words.replace(",", " ")) for option, words in _CHOICES.findall(usage)]
+def _complete_files(parser: argparse.ArgumentParser, files: object) -> None:
+    """What takes a value of any kind may be a file: the attribute ``complete`` is where shtab looks."""
+    for action in parser._actions:
+        if action.nargs != 0 and action.choices is None:
+            action.complete = files  # type: ignore[attr-defined]

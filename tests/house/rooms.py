@@ -115,6 +115,7 @@ LIBRARIES = {
     "serial": "acquire.serial_line",
     "tifffile": "live.export",
     "PIL": "live.export",
+    "shtab": "live.commands",
     "tomlkit": "live.setup",
 }
 # Room (and all in it) -> what it never imports.

@@ -8,10 +8,11 @@ import subprocess
 from pathlib import Path
 
 import pytest
+import shtab
 
 from live.cli import main
-from live.commands.arguments import COMMANDS, parser_of
-from live.commands.completion import script
+from live.commands.arguments import COMMANDS, parse
+from live.commands.completion import SHELLS, script
 from live.commands.examples import EXAMPLES
 
 
@@ -24,7 +25,7 @@ def test_the_help_ends_with_an_example_that_works(name: str, capsys: pytest.Capt
     assert f"example:\n  {EXAMPLES[name]}\n" in said
     words = shlex.split(EXAMPLES[name].partition(" > ")[0])
     assert words[:2] == ["phasedic", name]
-    parser_of(name).parse_args(words[2:])
+    assert parse(words[1:])[1].command == name
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="no bash here")
@@ -40,12 +41,23 @@ def test_the_help_ends_with_an_example_that_works(name: str, capsys: pytest.Capt
 )
 def test_bash_completes(tmp_path: Path, typed: str, found: list[str]) -> None:
     (tmp_path / "shots").mkdir()
-    (tmp_path / "phasedic.bash").write_text(script(), encoding="utf-8")
+    (tmp_path / "phasedic.bash").write_text(script("bash"), encoding="utf-8")
     words = [*shlex.split(typed), *([""] if typed.endswith(" ") else [])]
     asked = (
         f"source ./phasedic.bash; COMP_WORDS=({' '.join(map(shlex.quote, words))}); COMP_CWORD={len(words) - 1};"
-        ' _phasedic; printf "%s\\n" "${COMPREPLY[@]}"'
+        ' _shtab_phasedic; printf "%s\\n" "${COMPREPLY[@]}"'
     )
     done = subprocess.run(["bash", "-c", asked], cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stderr == ""
     assert set(done.stdout.split()) == set(found)
+
+
+@pytest.mark.parametrize("shell", SHELLS)
+def test_a_script_names_every_command(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["completion", shell]) == 0
+    said = capsys.readouterr().out
+    assert [name for name in COMMANDS if name not in said] == []
+
+
+def test_the_shells_are_known_to_shtab() -> None:
+    assert set(SHELLS) <= set(shtab.SUPPORTED_SHELLS)
