@@ -83,6 +83,7 @@ def _gauges(config: Config, field: StrainField, factor: float) -> Iterator[Gauge
         return
     along = "exx" if config.specimen.first_axis == "x" else "eyy"
     yield GaugeNoise("", factor * field.mean(along)[1])
-    for gauge in gauges_for(with_auto_gauges(config, field.grid), field.grid):
+    config = with_auto_gauges(config, field.grid)
+    for gauge in gauges_for(config.gauges, config.specimen.first_axis, field.grid):
         value = gauge.measure(field)
         yield GaugeNoise(gauge.name, factor * value.sigma, value.reason)

@@ -83,7 +83,7 @@ def prepared(
         seen = Look(material.reference.mean, _noise_of(material.reference), camera)
         config, mask = placed_on(config, seen, screen.say)
     grid = grid_for(config, camera.width, camera.height, mask)
-    correct, gauges = correction(config, camera), gauges_for(config, grid)
+    correct, gauges = correction(config, camera), gauges_for(config.gauges, config.specimen.first_axis, grid)
     settings, stated = kernel_settings(config), config.measure.noise_GL
     phase = settings.estimator == "phase"
     compile_ahead(kinds_of(camera), phase=phase, say=screen.status, stopped=stopped)

@@ -85,7 +85,7 @@ def set_up(config: Config, rig: Rig, journal: Journal, screen: Screen, stop: Sto
     camera = rig.camera.info
     mask = _mask(config, rig)
     grid = grid_for(config, camera.width, camera.height, mask)
-    gauges, settings = gauges_for(config, grid), kernel_settings(config)
+    gauges, settings = gauges_for(config.gauges, config.specimen.first_axis, grid), kernel_settings(config)
     correct = correction(config, camera)
     bursts = _burst_lengths(config, camera.live)
     _compile(kinds_of(camera), settings, screen, stop)

@@ -198,7 +198,7 @@ class Bench:
         grid = grid_for(config, width, height, self.drawn.mask)
         if not grid.n_active:
             raise DataError("no ZOI lies in the region: draw a larger one, or take smaller ZOIs")
-        gauges_for(config, grid)
+        gauges_for(config.gauges, config.specimen.first_axis, grid)
         return config
 
     def state(self) -> dict[str, Any]:

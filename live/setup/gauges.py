@@ -16,7 +16,6 @@ from live.setup.checks import CORNERS, POINT, RECTANGLE, Check, choice, length, 
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid
-    from live.setup.config import Config
 
 Point = tuple[float, float]
 GaugeTable = Mapping[str, Any]
@@ -52,16 +51,15 @@ def make_gauge(name: str, table: GaugeTable, axis: str) -> Gauge:
         raise ConfigError(f"gauges.{name}: {error}") from None
 
 
-def gauges_for(config: Config, grid: ZoiGrid) -> tuple[Gauge, ...]:
-    """The gauges of the configuration, in its order.
+def gauges_for(tables: Mapping[str, GaugeTable], axis: str, grid: ZoiGrid) -> tuple[Gauge, ...]:
+    """The gauges of a configuration on a grid, in its order; ``axis`` ("x" or "y") is that of the load.
 
     Raises
     ------
     ConfigError
         A key is missing or impossible, or no ZOI lies where a gauge is.
     """
-    axis = config.specimen.first_axis
-    gauges = tuple(make_gauge(name, table, axis) for name, table in config.gauges.items())
+    gauges = tuple(make_gauge(name, table, axis) for name, table in tables.items())
     for gauge in gauges:
         _check_place(gauge, grid)
     return gauges

@@ -12,7 +12,7 @@ import pytest
 
 from docs import make_formats, make_site
 from docs.make_architecture import PICTURE, drawing
-from live.commands.arguments import COMMANDS, parser_of
+from live.commands.arguments import COMMANDS, full_parser
 from tests.house.links import dead_links
 from tests.house.messages import quoted, spoken, unsaid
 from tests.house.references import dead_in, dead_references, words
@@ -77,7 +77,8 @@ def test_the_tables_of_the_formats_are_of_today(page: Path) -> None:
 
 
 def test_options_in_the_pages_exist() -> None:
-    known = {command: set(parser_of(command)._option_string_actions) for command in COMMANDS}
+    commands = full_parser(COMMANDS)._subparsers._group_actions[0].choices
+    known = {command: set(parser._option_string_actions) for command, parser in commands.items()}
     used = [
         (page.name, command, option)
         for page in PAGES

@@ -92,7 +92,9 @@ def _write_results(
         area_m2=area,
         gauges=config.get("gauges", {}),
     )
-    gauges = gauges_for(from_dict({"gauges": config.get("gauges", {})}, {}, "made up"), make_grid())
+    gauges = gauges_for(
+        from_dict({"gauges": config.get("gauges", {})}, {}, "made up").gauges, "y", make_grid()
+    )
     with Results(folder, make_grid(), info) as results:
         for k, strain in enumerate(strains):
             burst = make_measurement(k, strain).burst

@@ -103,4 +103,4 @@ def test_the_status_line_shows_gauges() -> None:
 )
 def test_gauges_that_cannot_be_are_refused(gauge: dict, says: str) -> None:
     with pytest.raises(ConfigError, match=says.replace(".", r"\.")):
-        gauges_for(load_config(None, {"gauges.g": gauge}), make_grid())
+        gauges_for(load_config(None, {"gauges.g": gauge}).gauges, "y", make_grid())

@@ -16,7 +16,7 @@ from live.report import Wanted, make_report
 from live.report.evaluation import Curve
 from live.results import still_phase_of
 from live.study.windows import still_window
-from live.tell import Screen, headline
+from live.tell import TerminalScreen, headline
 from tests.live.made_run import make_run, noisy
 
 CAMERA = "sim:hole?lockstep=yes&seconds=6&fps=10&width=320&height=288&bits=12&hole=24&hold=2&end=1"
@@ -26,7 +26,7 @@ SETTINGS = {"measure.zoi": 32, "measure.step": 16, "measure.burst": 2, "measure.
 def reported(folder: Path) -> tuple[int, str]:
     """Still instants, and the noise of eyy in um/m, as the page has them."""
     with open_run(folder) as run:
-        html = make_report(run, Wanted(), Screen(quiet=True)).html
+        html = make_report(run, Wanted(), TerminalScreen(quiet=True)).html
     instants = re.search(r"in the first (\d+) instants", html)
     eyy = re.search(r"<td>eyy</td><td[^>]*>([\d.]+)</td>", html)
     assert instants is not None and eyy is not None

@@ -54,7 +54,7 @@ def test_all_are_on_zois_and_read_the_strain(mask: np.ndarray, axis: str) -> Non
     field = make_field(grid, 1e-3)
     across = "exx" if axis == "y" else "eyy"
     along = "eyy" if axis == "y" else "exx"
-    values = {g.name: g.measure(field) for g in gauges_for(config, grid)}
+    values = {g.name: g.measure(field) for g in gauges_for(config.gauges, config.specimen.first_axis, grid)}
     assert list(values) == ["axial", "transverse", "area"]
     assert values["area"].value == pytest.approx(field.mean(along)[0], abs=1e-9)
     # The ends of a line on a leaning strip stand aslant.
