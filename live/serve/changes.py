@@ -15,7 +15,6 @@ from live.specimen import Board, from_points
 
 Said = Mapping[str, Any]
 LONGEST_MM = 1e5
-SLIDERS = ("exposure_us", "gain", "brightness")
 
 
 def _drawn(bench: Bench) -> Drawn:
@@ -63,8 +62,10 @@ def overlay(bench: Bench, said: Said) -> None:
 def camera(bench: Bench, said: Said) -> None:
     """A setting of the camera's address; the camera is opened anew and tells what is in force."""
     key, value = said.get("key"), said.get("value")
-    if key not in SLIDERS or not isinstance(value, int | float) or isinstance(value, bool):
-        raise ConfigError(f"a number for one of {', '.join(SLIDERS)}")
+    info = bench.eye.info
+    known = [] if info is None else [setting.key for setting in info.settings]
+    if key not in known or not isinstance(value, int | float) or isinstance(value, bool):
+        raise ConfigError(f"a number for one of {', '.join(known) or 'the settings of an open camera'}")
     bench.eye.reopen(with_setting(bench.draft.config.camera.address, str(key), float(value)))
 
 
