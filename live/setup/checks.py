@@ -30,11 +30,14 @@ class Check:
         From a word of the command line to what ``accept`` takes; raises ValueError.
     length : "", "px" or "whole px"
         Whether it is a length in the picture, which may be said in mm; whole ones are rounded.
+    words : tuple of str
+        All that is accepted, where that is a few words.
     """
 
     accept: Callable[[Any], Any]
     read: Callable[[str], Any] = str
     length: str = ""
+    words: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +49,13 @@ class Option:
     name : str
         Without its dashes.
     metavar : str
-    choices : tuple of str
+        "": the words of the check.
     off, on : bool
         A switch that turns the key off, or on.
     """
 
     name: str
     metavar: str = ""
-    choices: tuple[str, ...] = ()
     off: bool = False
     on: bool = False
 
@@ -61,9 +63,8 @@ class Option:
 def key(
     check: Check, default: Any, help_text: str, option: Option | None = None, *, optional: bool = False
 ) -> Any:
-    """A field of a section: its check, its default, its meaning; None is allowed where ``optional``."""
-    metadata = {"check": check, "help": help_text, "optional": optional, "option": option}
-    return field(default=default, metadata=metadata)
+    """A field of a section: its check, its default, its meaning; ``optional`` is for the reader alone."""
+    return field(default=default, metadata={"check": check, "help": help_text, "option": option})
 
 
 def number(low: float = -math.inf, high: float = math.inf) -> Check:
@@ -135,7 +136,7 @@ def choice(*allowed: str) -> Check:
             raise Refused("one of " + ", ".join(repr(word) for word in allowed))
         return str(value)
 
-    return Check(accept)
+    return Check(accept, words=allowed)
 
 
 def _text(value: Any) -> str:
