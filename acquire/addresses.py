@@ -9,6 +9,7 @@ entries are openers named after their scheme; what lists the devices of a scheme
 from __future__ import annotations
 
 import importlib
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from importlib.metadata import entry_points
 from typing import Any, Generic, TypeVar, overload
 from urllib.parse import unquote
 
+from acquire.bounds import NotAllowed, as_integer, as_number
 from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 
@@ -107,8 +109,8 @@ class Options:
         key: str,
         default: float | None = None,
         *,
-        minimum: float = float("-inf"),
-        maximum: float = float("inf"),
+        minimum: float = -math.inf,
+        maximum: float = math.inf,
     ) -> float | None:
         """A finite number within bounds, or ``default`` where it is not given."""
         value = self.text(key)
@@ -117,10 +119,11 @@ class Options:
         try:
             number = float(value)
         except ValueError:
-            number = float("nan")
-        if not minimum <= number <= maximum or number in (float("inf"), float("-inf")):
-            raise self._wrong(key, value, f"a number{_bounds(minimum, maximum)}")
-        return number
+            number = math.nan
+        try:
+            return as_number(math.nan if math.isinf(number) else number, minimum, maximum)
+        except NotAllowed as allowed:
+            raise self._wrong(key, value, str(allowed)) from None
 
     @overload
     def integer(self, key: str, default: int, *, minimum: int = ..., maximum: int = ...) -> int: ...
@@ -133,8 +136,8 @@ class Options:
         key: str,
         default: int | None = None,
         *,
-        minimum: float = float("-inf"),
-        maximum: float = float("inf"),
+        minimum: float = -math.inf,
+        maximum: float = math.inf,
     ) -> int | None:
         """A whole number within bounds, or ``default`` where it is not given."""
         value = self.text(key)
@@ -144,9 +147,10 @@ class Options:
             number: int | None = int(value)
         except ValueError:
             number = None
-        if number is None or not minimum <= number <= maximum:
-            raise self._wrong(key, value, f"a whole number{_bounds(minimum, maximum)}")
-        return number
+        try:
+            return as_integer(number, minimum, maximum)
+        except NotAllowed as allowed:
+            raise self._wrong(key, value, str(allowed)) from None
 
     def flag(self, key: str, default: bool = False) -> bool:
         """Yes or no."""
@@ -178,14 +182,6 @@ class Options:
 
     def _wrong(self, key: str, value: object, allowed: str) -> ConfigError:
         return ConfigError(f"{self.address.text}: {key}={value} is not possible; allowed: {allowed}")
-
-
-def _bounds(low: float, high: float) -> str:
-    if low == float("-inf") and high == float("inf"):
-        return ""
-    if high == float("inf"):
-        return f" from {low:g}"
-    return f" from {low:g} to {high:g}"
 
 
 Device = TypeVar("Device")

@@ -17,10 +17,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files import read_bytes
 from live.channels import channel_names
-from live.setup.checks import AUTO, Option, Refused, in_px
+from live.setup.checks import AUTO, Option, in_px
 from live.setup.gauges import NAME, GaugeConfig
 from live.setup.sections import (
     AlarmConfig,
@@ -194,7 +195,7 @@ def _section(
         try:
             check = fields[key].metadata["check"]
             values[key] = check.accept(in_px(value, check, px_per_mm))
-        except Refused as allowed:
+        except NotAllowed as allowed:
             raise ConfigError(
                 f"{where}: {name}.{key} = {_shown(value)} is not possible; allowed: {allowed}"
             ) from None
