@@ -3,19 +3,21 @@
 ``parse_address`` splits them, ``Options`` hands out the settings with their types and bounds and
 refuses what nobody asked for, ``Registry`` finds who opens a scheme. Devices of other packages
 register through the entry point groups ``phasedic.cameras`` and ``phasedic.load_cells``, whose
-entries are openers named after their scheme.
+entries are openers named after their scheme; what lists the devices of a scheme stands in a group of its own.
 """
 
 from __future__ import annotations
 
 import importlib
+import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import Generic, TypeVar, overload
+from typing import Any, Generic, TypeVar, overload
 from urllib.parse import unquote
 
+from acquire.bounds import NotAllowed, as_integer, as_number
 from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 
@@ -107,8 +109,8 @@ class Options:
         key: str,
         default: float | None = None,
         *,
-        minimum: float = float("-inf"),
-        maximum: float = float("inf"),
+        minimum: float = -math.inf,
+        maximum: float = math.inf,
     ) -> float | None:
         """A finite number within bounds, or ``default`` where it is not given."""
         value = self.text(key)
@@ -117,10 +119,11 @@ class Options:
         try:
             number = float(value)
         except ValueError:
-            number = float("nan")
-        if not minimum <= number <= maximum or number in (float("inf"), float("-inf")):
-            raise self._wrong(key, value, f"a number{_bounds(minimum, maximum)}")
-        return number
+            number = math.nan
+        try:
+            return as_number(math.nan if math.isinf(number) else number, minimum, maximum)
+        except NotAllowed as allowed:
+            raise self._wrong(key, value, str(allowed)) from None
 
     @overload
     def integer(self, key: str, default: int, *, minimum: int = ..., maximum: int = ...) -> int: ...
@@ -133,8 +136,8 @@ class Options:
         key: str,
         default: int | None = None,
         *,
-        minimum: float = float("-inf"),
-        maximum: float = float("inf"),
+        minimum: float = -math.inf,
+        maximum: float = math.inf,
     ) -> int | None:
         """A whole number within bounds, or ``default`` where it is not given."""
         value = self.text(key)
@@ -144,9 +147,10 @@ class Options:
             number: int | None = int(value)
         except ValueError:
             number = None
-        if number is None or not minimum <= number <= maximum:
-            raise self._wrong(key, value, f"a whole number{_bounds(minimum, maximum)}")
-        return number
+        try:
+            return as_integer(number, minimum, maximum)
+        except NotAllowed as allowed:
+            raise self._wrong(key, value, str(allowed)) from None
 
     def flag(self, key: str, default: bool = False) -> bool:
         """Yes or no."""
@@ -180,14 +184,6 @@ class Options:
         return ConfigError(f"{self.address.text}: {key}={value} is not possible; allowed: {allowed}")
 
 
-def _bounds(low: float, high: float) -> str:
-    if low == float("-inf") and high == float("inf"):
-        return ""
-    if high == float("inf"):
-        return f" from {low:g}"
-    return f" from {low:g} to {high:g}"
-
-
 Device = TypeVar("Device")
 Opener = Callable[[Address, EventSink], Device]
 
@@ -205,10 +201,24 @@ class Registry(Generic[Device]):
         Imported when first used, so that asking for help stays fast.
     fallback : str or None
         "module:function" that takes every scheme nobody else knows (a pyserial URL).
+    lists_group : str
+        Entry point group of what lists the devices that are there, by scheme; "": none.
+    lists : mapping of scheme to "module:function"
+        Those of our own; a function without arguments that gives a list.
     """
 
-    def __init__(self, what: str, group: str, builtin: dict[str, str], fallback: str | None = None) -> None:
+    def __init__(
+        self,
+        what: str,
+        group: str,
+        builtin: dict[str, str],
+        fallback: str | None = None,
+        *,
+        lists_group: str = "",
+        lists: Mapping[str, str] | None = None,
+    ) -> None:
         self._what, self._group, self._fallback = what, group, fallback
+        self._lists_group, self._lists = lists_group, dict(lists or {})
         self._openers: dict[str, str | Opener[Device]] = dict(builtin)
 
     def register(self, scheme: str, opener: Opener[Device]) -> None:
@@ -218,6 +228,13 @@ class Registry(Generic[Device]):
     def schemes(self) -> list[str]:
         """All known schemes, those of other packages included."""
         return sorted({*self._openers, *(entry.name for entry in entry_points(group=self._group))})
+
+    def listers(self) -> Iterator[tuple[str, Callable[[], list[Any]]]]:
+        """Scheme, and what lists its devices; our own first. What is not ours is imported when it is called."""
+        for scheme, path in self._lists.items():
+            yield scheme, lambda path=path: _load(path)()  # type: ignore[misc]
+        for entry in sorted(entry_points(group=self._lists_group)):
+            yield entry.name, lambda entry=entry: entry.load()()  # type: ignore[misc]
 
     def open(self, text: str, on_event: EventSink = ignore_event) -> Device:
         """Open what ``text`` names; see ``Camera`` and ``LoadCell`` for what is raised."""

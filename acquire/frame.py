@@ -94,6 +94,30 @@ class Burst:
     motion_px: float = math.nan
 
 
+@dataclass(frozen=True, slots=True)
+class CameraSetting:
+    """A number in the address of a camera that can be changed while one looks at the picture.
+
+    Attributes
+    ----------
+    key : str
+        As the address has it: ``exposure_us``, ``gain``, or a name of the camera's own.
+    value, low, high : float
+        In force, and its bounds.
+    step : float
+        Between values that the camera takes, from ``low``; 0: any value.
+    log : bool
+        Ratios matter and not differences; ``low`` is above 0 then.
+    """
+
+    key: str
+    value: float
+    low: float
+    high: float
+    step: float = 0.0
+    log: bool = False
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraInfo:
     """What is known of a camera once it is open.
@@ -119,6 +143,8 @@ class CameraInfo:
         All settings in force, as read back.
     warnings : tuple of str
         What a person should know before trusting the picture.
+    settings : tuple of CameraSetting
+        What of the address can be changed while one looks, with its bounds; in no file.
     """
 
     address: str
@@ -133,6 +159,7 @@ class CameraInfo:
     pixel_format: str = ""
     controls: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    settings: tuple[CameraSetting, ...] = ()
 
 
 def frozen(image: NDArray[Any]) -> NDArray[Any]:

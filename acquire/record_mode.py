@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Any, Literal, Self
 
@@ -10,6 +11,8 @@ from numpy.typing import NDArray
 from acquire.errors import ConfigError
 
 Crop = tuple[int, int, int, int]
+RECORD_MODES = "'all', 'bursts' or 'every=K' with K from 1"
+_EVERY = re.compile("every=([1-9][0-9]{0,8})")
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,12 +45,10 @@ class RecordMode:
             return cls("all", 1, crop)
         if text == "bursts":
             return cls("bursts", 1, crop)
-        count = text.removeprefix("every=")
-        if count != text and count.isdecimal() and int(count) >= 1:
-            return cls("every", int(count), crop)
-        raise ConfigError(
-            f"record mode {text!r} is not possible; allowed: all, bursts, every=K with K from 1"
-        )
+        every = _EVERY.fullmatch(text)
+        if every:
+            return cls("every", int(every[1]), crop)
+        raise ConfigError(f"record mode {text!r} is not possible; allowed: {RECORD_MODES}")
 
     def keeps(self, number: int) -> bool:
         """Whether the ``number``-th frame (from 0) of the test is recorded as a frame."""

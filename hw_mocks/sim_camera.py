@@ -23,7 +23,7 @@ from acquire.addresses import Address, Options
 from acquire.closing import Closing
 from acquire.errors import DeviceError
 from acquire.events import EventSink, device_event
-from acquire.frame import CameraInfo, Clock, Frame, frozen
+from acquire.frame import CameraInfo, CameraSetting, Clock, Frame, frozen
 from hw_mocks.faults import CAMERA_FAULTS, FaultPlan, parse_faults
 from hw_mocks.frame_plan import Planned, plan_frames
 from hw_mocks.scene import Scene
@@ -181,7 +181,15 @@ class SimCamera(Closing):
             pixel_format=FORMATS[sensor.bits],
             controls=controls,
             warnings=("simulated: no camera and no specimen",),
+            settings=self._changeable(),
         )
+
+    def _changeable(self) -> tuple[CameraSetting, ...]:
+        now, most = self._settings.exposure_s * 1e6, 1e6 / self._settings.fps
+        brightness = CameraSetting("brightness", self._settings.sensor.brightness, 0.1, 4.0)
+        if now <= 0:
+            return (brightness,)
+        return CameraSetting("exposure_us", now, min(50.0, now), most, log=True), brightness
 
     @property
     def scene(self) -> Scene:

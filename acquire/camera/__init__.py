@@ -8,15 +8,17 @@ from acquire.camera.base import CameraBase
 from acquire.camera.contract import Camera
 from acquire.camera.cropped import CroppedCamera
 from acquire.camera.guards import FailureGuard, RepeatGuard, missing_between
-from acquire.camera.opening import CAMERAS, open_camera, with_scheme
+from acquire.camera.opening import CAMERAS, CameraListing, list_cameras, open_camera, with_scheme
 
 __all__ = [
     "CAMERAS",
     "Camera",
     "CameraBase",
+    "CameraListing",
     "CroppedCamera",
     "FailureGuard",
     "RepeatGuard",
+    "list_cameras",
     "missing_between",
     "open_camera",
     "with_scheme",

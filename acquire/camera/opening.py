@@ -1,12 +1,16 @@
-"""Opening the camera that an address names."""
+"""Opening the camera that an address names, and listing the cameras that are there."""
 
 from __future__ import annotations
 
+import logging
+from dataclasses import dataclass
 from pathlib import Path
 
 from acquire.addresses import Registry, parse_address
 from acquire.camera.contract import Camera
 from acquire.events import EventSink, ignore_event
+
+log = logging.getLogger(__name__)
 
 CAMERAS: Registry[Camera] = Registry(
     "camera",
@@ -18,7 +22,51 @@ CAMERAS: Registry[Camera] = Registry(
         "files": "acquire.opencv.images:open_files",
         "session": "acquire.session.devices:open_session_camera",
     },
+    lists_group="phasedic.camera_lists",
+    lists={"": "acquire.v4l2.listing:list_cameras"},
 )
+
+
+@dataclass(frozen=True, slots=True)
+class CameraListing:
+    """A camera that is there.
+
+    Attributes
+    ----------
+    address : str
+        What to give to ``--camera``.
+    name : str
+    trouble : str
+        Why it cannot be used, and what to do; "" when all is well.
+    stable_address : str
+        The same camera under a name that plugging does not change; "" where there is none.
+    details : tuple of str
+        Lines for a person: formats, sizes, rates, controls.
+    """
+
+    address: str
+    name: str
+    trouble: str = ""
+    stable_address: str = ""
+    details: tuple[str, ...] = ()
+
+    def text(self) -> str:
+        """Several lines for a person."""
+        stays = f"stays the same when replugged: {self.stable_address}" if self.stable_address else ""
+        lines = (line for line in (self.trouble, stays, *self.details) if line)
+        return "\n      ".join((f"  {self.address}  {self.name}".rstrip(), *lines))
+
+
+def list_cameras() -> list[CameraListing]:
+    """The cameras of every source that can list its own; those that cannot be used say why."""
+    found: list[CameraListing] = []
+    for scheme, listed in CAMERAS.listers():
+        try:
+            found += listed()
+        except Exception as error:  # the library of one maker must not hide the cameras of all others
+            log.debug("the cameras of %s: cannot be listed", scheme, exc_info=True)
+            found.append(CameraListing(f"{scheme}:", "", f"its cameras cannot be listed: {error}"))
+    return found
 
 
 _VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm")

@@ -8,33 +8,17 @@ What cannot be detected: an overload has no mark on the line (say ``capacity=``)
 
 from __future__ import annotations
 
-import re
-
 from acquire.addresses import Options
-from acquire.protocols.base import Parser, Protocol, Reading
-from acquire.protocols.line_buffer import Line
-from acquire.protocols.line_parser import LineParser, bad, number
+from acquire.protocols.base import Parser, Protocol
+from acquire.protocols.lines import parser_from
 
-_LINE = re.compile(rb" *([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?: *(lbF|ozF|kgF|gF|kN|mN|N))? *", re.IGNORECASE)
-
+PATTERN = r"(?i) *(?P<value>[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?: *(?P<unit>lbF|ozF|kgF|gF|kN|mN|N))? *"
 RATES = (2, 5, 10, 25, 50, 125, 250)
 
 
-class Mark10Parser(LineParser):
-    """See the module."""
-
-    def parse(self, line: Line) -> Reading | None:
-        """The reading of a line."""
-        found = _LINE.fullmatch(line.data)
-        if not found:
-            return bad(line)
-        unit = found[2].decode() if found[2] else None
-        return Reading(number(found[1].decode()), unit, line.data, line.start)
-
-
 def make_parser(options: Options) -> Parser:
-    """No settings of its own."""
-    return Mark10Parser()
+    """Lines of one pattern; no settings of its own."""
+    return parser_from({"pattern": PATTERN})
 
 
 PROTOCOL = Protocol(

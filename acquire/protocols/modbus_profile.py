@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from acquire.bounds import NotAllowed, as_integer
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
 
@@ -163,11 +164,10 @@ def _known_keys(said: Mapping[str, Any], known: tuple[str, ...], where: str) -> 
 
 
 def _whole(value: Any, low: int, high: int, where: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise ConfigError(
-            f"{where} = {value!r} is not possible; allowed: a whole number from {low} to {high}"
-        )
-    return value
+    try:
+        return as_integer(value, low, high)
+    except NotAllowed as allowed:
+        raise ConfigError(f"{where} = {value!r} is not possible; allowed: {allowed}") from None
 
 
 def _one_of(value: Any, allowed: tuple[str, ...], where: str) -> str:

@@ -131,6 +131,7 @@ class V4L2Camera(CameraBase):
             pixel_format=mode.fourcc,
             controls=setup.controls,
             warnings=setup.warnings,
+            settings=setup.settings,
         )
 
     def _start(self) -> None:

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from acquire.errors import ConfigError
+from acquire.frame import CameraSetting
 from acquire.v4l2 import api
 from acquire.v4l2.device import V4L2Device
 
@@ -272,3 +273,17 @@ def exposure_s(controls: Mapping[int, Control]) -> float | None:
     if automatic is not None and automatic.value not in (1, 2):  # manual, shutter priority
         return None
     return control.value * 1e-4
+
+
+def changeable(controls: Mapping[int, Control], fps: float | None) -> tuple[CameraSetting, ...]:
+    """Exposure and gain where they can be set, in the units of the address; an exposure within one picture."""
+    found, now_s = [], exposure_s(controls)
+    if now_s and controls[EXPOSURE_100US].writable:
+        control, now = controls[EXPOSURE_100US], now_s * 1e6
+        low, most = 100.0 * max(1, control.minimum), 100.0 * control.maximum
+        high = max(now, min(most, 1e6 / fps if fps else most))
+        found.append(CameraSetting("exposure_us", now, min(low, now), high, 100.0, log=True))
+    gain = controls.get(GAIN) or controls.get(ANALOGUE_GAIN)
+    if gain is not None and gain.writable and not gain.inactive:
+        found.append(CameraSetting("gain", gain.value, gain.minimum, gain.maximum, max(1, gain.step)))
+    return tuple(found)

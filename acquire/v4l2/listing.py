@@ -8,9 +8,9 @@ from __future__ import annotations
 import contextlib
 import platform
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 
+from acquire.camera import CameraListing
 from acquire.v4l2.api import Kernel
 from acquire.v4l2.controls import Control, list_controls, still_automatic
 from acquire.v4l2.device import NotACamera, V4L2Device
@@ -19,73 +19,6 @@ from acquire.v4l2.formats import FORMATS, preferred
 
 BY_ID = Path("/dev/v4l/by-id")
 OPENCV_NUMBERS = range(4)
-
-
-@dataclass(frozen=True, slots=True)
-class FormatListing:
-    """A pixel format and its sizes with their frame rates.
-
-    Attributes
-    ----------
-    fourcc, description : str
-    remark : str
-        "" for raw grey levels; else what to know.
-    modes : tuple of str
-        ``"640x480 at 60, 30 1/s"``.
-    """
-
-    fourcc: str
-    description: str
-    remark: str
-    modes: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class CameraListing:
-    """A camera.
-
-    Attributes
-    ----------
-    address : str
-        What to give to ``--camera``.
-    name : str
-    formats : tuple of FormatListing
-    controls : tuple of Control
-    trouble : str
-        Why nothing more is known; "" when all is well.
-    stable_address : str
-        The same camera under a name that plugging does not change; "" where there is none.
-    inputs : tuple of str
-    """
-
-    address: str
-    name: str
-    formats: tuple[FormatListing, ...] = ()
-    controls: tuple[Control, ...] = ()
-    trouble: str = ""
-    stable_address: str = ""
-    inputs: tuple[str, ...] = field(default=())
-
-    def text(self) -> str:
-        """Several lines for a person."""
-        return "\n".join(self._lines())
-
-    def _lines(self) -> Iterator[str]:
-        yield f"  {self.address}  {self.name}".rstrip()
-        if self.trouble:
-            yield f"      {self.trouble}"
-        if self.stable_address:
-            yield f"      stays the same when replugged: {self.stable_address}"
-        if len(self.inputs) > 1:
-            yield "      inputs: " + ", ".join(f"input={k} ({name})" for k, name in enumerate(self.inputs))
-        for listing in self.formats:
-            yield f"      format={listing.fourcc:5} {listing.remark or listing.description}"
-            yield from (f"          {mode}" for mode in listing.modes)
-        if self.controls:
-            yield "      controls: " + ", ".join(_control_words(control) for control in self.controls)
-        automatic = still_automatic({control.id: control for control in self.controls})
-        if automatic:
-            yield f"      automatic now, put on manual when opened: {', '.join(automatic)}"
 
 
 def _control_words(control: Control) -> str:
@@ -113,21 +46,28 @@ def _look_at(node: str, kernel: Kernel) -> CameraListing | None:
 
 
 def _listing(node: str, device: V4L2Device) -> CameraListing:
-    offers = device.formats()
-    best = preferred([offer.fourcc for offer in offers])
+    best = preferred([offer.fourcc for offer in device.formats()])
     return CameraListing(
         address=node if best is None else f"{node}?format={best}",
         name=str(device.identity),
-        formats=tuple(
-            FormatListing(
-                offer.fourcc, offer.description, _remark(offer.fourcc), _modes(device, offer.fourcc)
-            )
-            for offer in offers
-        ),
-        controls=tuple(control for control in list_controls(device).values() if control.writable),
         stable_address=_stable(node),
-        inputs=tuple(device.inputs()),
+        details=tuple(_details(device)),
     )
+
+
+def _details(device: V4L2Device) -> Iterator[str]:
+    inputs = device.inputs()
+    if len(inputs) > 1:
+        yield "inputs: " + ", ".join(f"input={k} ({name})" for k, name in enumerate(inputs))
+    for offer in device.formats():
+        yield f"format={offer.fourcc:5} {_remark(offer.fourcc) or offer.description}"
+        yield from (f"    {mode}" for mode in _modes(device, offer.fourcc))
+    controls = [control for control in list_controls(device).values() if control.writable]
+    if controls:
+        yield "controls: " + ", ".join(_control_words(control) for control in controls)
+    automatic = still_automatic({control.id: control for control in controls})
+    if automatic:
+        yield f"automatic now, put on manual when opened: {', '.join(automatic)}"
 
 
 def _modes(device: V4L2Device, fourcc: str) -> tuple[str, ...]:

@@ -6,7 +6,15 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from acquire.errors import ConfigError, DeviceError
-from acquire.v4l2.controls import Control, ControlWishes, apply_controls, exposure_s, still_automatic
+from acquire.frame import CameraSetting
+from acquire.v4l2.controls import (
+    Control,
+    ControlWishes,
+    apply_controls,
+    changeable,
+    exposure_s,
+    still_automatic,
+)
 from acquire.v4l2.device import Mode, V4L2Device
 from acquire.v4l2.formats import FORMATS, PixelFormat, Plane, preferred, warning_of
 
@@ -51,6 +59,7 @@ class Setup:
     format : PixelFormat
     controls : mapping of str to JSON value
     exposure_s : float or None, s
+    settings : tuple of CameraSetting
     warnings : tuple of str
     """
 
@@ -58,6 +67,7 @@ class Setup:
     format: PixelFormat
     controls: dict[str, Any]
     exposure_s: float | None
+    settings: tuple[CameraSetting, ...]
     warnings: tuple[str, ...]
 
 
@@ -160,5 +170,6 @@ def _in_force(device: V4L2Device, settings: V4L2Settings, controls: dict[int, Co
         format=pixel_format,
         controls={control.name: control.shown() for control in controls.values()},
         exposure_s=exposure_s(controls),
+        settings=changeable(controls, mode.fps),
         warnings=tuple(text for text in warnings if text),
     )

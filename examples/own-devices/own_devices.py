@@ -16,11 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from acquire.addresses import Address, Options
+from acquire.camera import CameraListing
 from acquire.closing import Closing
 from acquire.errors import DataError
 from acquire.events import Event, EventKind, EventSink, device_event
-from acquire.frame import CameraInfo, Frame, frozen
+from acquire.frame import CameraInfo, CameraSetting, Frame, frozen
 from acquire.load_sample import LoadCellInfo, LoadSample
+
+LOWEST_FPS, HIGHEST_FPS = 1e-3, 1e7
 
 
 class _Source(Closing):
@@ -78,6 +81,7 @@ class RawDump(_Source):
             clock="nominal",
             fps=fps,
             pixel_format="raw",
+            settings=(CameraSetting("fps", fps, LOWEST_FPS, HIGHEST_FPS, log=True),),
         )
 
     def __iter__(self) -> Iterator[Frame]:
@@ -110,9 +114,26 @@ def open_raw(address: Address, on_event: EventSink) -> RawDump:
         bits=options.integer("bits", 8, minimum=1, maximum=16),
         skip=options.integer("skip", 0, minimum=0),
     )
-    fps = options.number("fps", 1.0, minimum=1e-3)
+    fps = options.number("fps", 1.0, minimum=LOWEST_FPS, maximum=HIGHEST_FPS)
     options.done()
     return RawDump(address.text, Path(address.target), layout, fps, on_event)
+
+
+def list_raw() -> list[CameraListing]:
+    """The dumps in this folder; a camera's maker has a call that finds what is plugged in."""
+    layout = Layout(640, 480, 8, 0)
+    return [
+        CameraListing(
+            f"raw:{path}",
+            "raw dump",
+            trouble=""
+            if path.stat().st_size % layout.frame_bytes == 0
+            else "not 640x480 of 8 bits: say what it is",
+            details=(f"{path.stat().st_size} bytes",),
+        )
+        for path in sorted(Path().glob("*.raw"))
+        if path.stat().st_size
+    ]
 
 
 class CsvForces(_Source):

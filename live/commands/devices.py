@@ -13,14 +13,16 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic devices``."""
+    from acquire.camera import list_cameras
+    from acquire.printable import printable
     from acquire.serial_line import list_serial_ports
-    from acquire.v4l2 import list_cameras
     from analysis import threads
 
     cameras, ports = list_cameras(), list_serial_ports()
     say("cameras:" if cameras else "cameras: none found (V4L2 devices are /dev/video*)")
     for camera in cameras:
-        say(camera.text())
+        for line in camera.text().splitlines():
+            say(printable(line))
     say("serial ports:" if ports else "serial ports: none found")
     for port in ports:
         say(port.text())

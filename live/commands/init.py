@@ -105,7 +105,7 @@ def find_devices(said: dict[str, object], screen: Screen) -> Found:
 
 def _camera() -> tuple[str, str, tuple[str, ...]]:
     """The first camera that can be opened, its name, and the others."""
-    from acquire.v4l2 import list_cameras
+    from acquire.camera import list_cameras
 
     cameras = list_cameras()
     usable = [camera for camera in cameras if not camera.trouble]

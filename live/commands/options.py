@@ -36,7 +36,7 @@ def add_options(parser: argparse.ArgumentParser, title: str, *names: str) -> Non
             continue
         if field.default not in (None, ""):
             words += f" (default {field.default})"
-        shape = {"choices": option.choices} if option.choices else {"metavar": option.metavar}
+        shape = {"metavar": option.metavar} if option.metavar else {"choices": check.words}
         group.add_argument(f"--{name}", dest=key, type=_reader(check.read), help=words, **shape)
 
 

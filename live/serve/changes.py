@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Container, Mapping
 from itertools import count
 from typing import Any, TypeGuard
 
 import numpy as np
 
+from acquire.bounds import NotAllowed, as_number
 from acquire.errors import ConfigError, DataError
 from analysis.evaluate import GAUGE_KINDS
 from live.serve.bench import OVERLAYS, Bench
@@ -18,7 +20,6 @@ from live.specimen import Board, from_points
 Said = Mapping[str, Any]
 LONGEST_MM = 1e5
 MOST_POINTS = 100  # of a gauge
-SLIDERS = ("exposure_us", "gain", "brightness")
 
 
 def _drawn(bench: Bench) -> Drawn:
@@ -66,9 +67,12 @@ def overlay(bench: Bench, said: Said) -> None:
 def camera(bench: Bench, said: Said) -> None:
     """A setting of the camera's address; the camera is opened anew and tells what is in force."""
     key, value = said.get("key"), said.get("value")
-    if key not in SLIDERS or not isinstance(value, int | float) or isinstance(value, bool):
-        raise ConfigError(f"a number for one of {', '.join(SLIDERS)}")
-    bench.eye.reopen(with_setting(bench.draft.config.camera.address, str(key), float(value)))
+    info = bench.eye.info
+    known = [] if info is None else [setting.key for setting in info.settings]
+    if key not in known:
+        raise ConfigError(f"a number for one of {', '.join(known) or 'the settings of an open camera'}")
+    number = _number(str(key), value)
+    bench.eye.reopen(with_setting(bench.draft.config.camera.address, str(key), number))
 
 
 def address(bench: Bench, said: Said) -> None:
@@ -137,11 +141,12 @@ def place(bench: Bench, said: Said) -> None:
 
 def scale(bench: Bench, said: Said) -> None:
     """mm per px from two points and their distance."""
-    points, length = said.get("points"), said.get("mm")
-    if not _are_points(points) or not _is_place(length):
+    points = said.get("points")
+    if not _are_points(points):
         raise ConfigError("a scale is two points in px and their distance in mm")
-    (x1, y1), (x2, y2) = points
-    bench.draft.change_all(from_points((x1, y1, x2, y2), float(length)).changes())
+    x1, y1, x2, y2 = (_number("a point", v) for point in points for v in point)
+    mm = _number("a distance", said.get("mm"))
+    bench.draft.change_all(from_points((x1, y1, x2, y2), mm).changes())
     bench.scaled()
     bench.region_changed()
 
@@ -149,21 +154,23 @@ def scale(bench: Bench, said: Said) -> None:
 def board(bench: Bench, said: Said) -> None:
     """mm per px from a board that is held where the specimen will be; without ``marker`` a checkerboard."""
     columns, rows = said.get("columns"), said.get("rows")
-    square, marker = said.get("square"), said.get("marker", 0)
     words = said.get("dictionary", "4X4_50")
     if type(columns) is not int or type(rows) is not int or not isinstance(words, str) or len(words) > 40:
         raise ConfigError(
             "a board has whole numbers of columns and rows, and a dictionary where it has markers"
         )
-    if not (_is_length(square) and _is_length(marker)):
-        raise ConfigError("squares and markers of a board are lengths in mm")
-    seen = Board(columns, rows, float(square), float(marker), words)
+    square = _number("a square in mm", said.get("square"), 0, LONGEST_MM)
+    marker = _number("a marker in mm", said.get("marker", 0), 0, LONGEST_MM)
+    seen = Board(columns, rows, square, marker, words)
     bench.draft.change_all(bench.scale_from(seen).changes())
     bench.region_changed()
 
 
-def _is_length(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < LONGEST_MM
+def _number(what: str, value: object, low: float = -math.inf, high: float = math.inf) -> float:
+    try:
+        return as_number(value, low, high)
+    except NotAllowed as allowed:
+        raise ConfigError(f"{what} is {allowed}") from None
 
 
 def _are_points(said: object, fewest: int = 2, most: int = 2) -> TypeGuard[list[list[Any]]]:

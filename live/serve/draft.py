@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DataError
 from acquire.files import write_picture
-from acquire.frame import CameraInfo
 from live.setup import Config, from_dict, load_config, settings_in, write_rig
 
 CHANGEABLE = frozenset(
@@ -120,25 +119,6 @@ def still(address: str) -> str:
     for key, value in (("max_strain", 0.0), ("seconds", 3600.0), ("hold", 1.0), ("end", 1.0)):
         address = with_setting(address, key, value)
     return address
-
-
-def sliders(info: CameraInfo) -> list[dict[str, Any]]:
-    """What can be turned at this camera: setting of its address, value as read back, and bounds."""
-    scheme, found = parse_address(info.address).scheme, []
-    if scheme not in ("", "sim"):
-        return []
-    if info.exposure_s:
-        now = info.exposure_s * 1e6
-        most = 1e6 / info.fps if info.fps else 16 * now
-        found.append(
-            {"key": "exposure_us", "value": now, "low": min(50.0, now), "high": max(most, now), "log": True}
-        )
-    for key in ("gain", "brightness") if scheme == "sim" else ("gain",):
-        value = info.controls.get(key)
-        if isinstance(value, int | float):
-            low, high = (0.1, 4.0) if key == "brightness" else (0.0, max(255.0, 2.0 * value))
-            found.append({"key": key, "value": float(value), "low": low, "high": high, "log": False})
-    return found
 
 
 NUMBERED = re.compile(r"^(.*?)-?(\d{1,6})$")

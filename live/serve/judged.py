@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from numpy.typing import NDArray
 from acquire.frame import CameraInfo, Frame
 from acquire.printable import printable
 from live.check import Figures, Line, Shots
-from live.serve.draft import sliders
 from live.serve.painting import traffic_light
 
 GOOD, BAD = 50e-6, 1000e-6
@@ -39,7 +39,7 @@ def camera_values(info: CameraInfo) -> dict[str, Any]:
         "height": info.height,
         "bits": info.bits,
         "fps": info.fps,
-        "sliders": sliders(info),
+        "sliders": [asdict(setting) for setting in info.settings],
         "warnings": [printable(text) for text in info.warnings],
     }
 

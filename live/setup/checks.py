@@ -11,11 +11,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+from acquire.bounds import NotAllowed, as_integer, as_number
+from acquire.errors import ConfigError
+from acquire.record_mode import RECORD_MODES, RecordMode
 from live.lines import Place
-
-
-class Refused(ValueError):
-    """Says what is allowed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,16 +24,19 @@ class Check:
     Attributes
     ----------
     accept : callable
-        The value as it is used; raises ``Refused``.
+        The value as it is used; raises ``NotAllowed``.
     read : callable
         From a word of the command line to what ``accept`` takes; raises ValueError.
     length : "", "px" or "whole px"
         Whether it is a length in the picture, which may be said in mm; whole ones are rounded.
+    words : tuple of str
+        All that is accepted, where that is a few words.
     """
 
     accept: Callable[[Any], Any]
     read: Callable[[str], Any] = str
     length: str = ""
+    words: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +48,13 @@ class Option:
     name : str
         Without its dashes.
     metavar : str
-    choices : tuple of str
+        "": the words of the check.
     off, on : bool
         A switch that turns the key off, or on.
     """
 
     name: str
     metavar: str = ""
-    choices: tuple[str, ...] = ()
     off: bool = False
     on: bool = False
 
@@ -61,35 +62,18 @@ class Option:
 def key(
     check: Check, default: Any, help_text: str, option: Option | None = None, *, optional: bool = False
 ) -> Any:
-    """A field of a section: its check, its default, its meaning; None is allowed where ``optional``."""
-    metadata = {"check": check, "help": help_text, "optional": optional, "option": option}
-    return field(default=default, metadata=metadata)
+    """A field of a section: its check, its default, its meaning; ``optional`` is for the reader alone."""
+    return field(default=default, metadata={"check": check, "help": help_text, "option": option})
 
 
 def number(low: float = -math.inf, high: float = math.inf) -> Check:
     """A number within bounds."""
-    bounds = "" if low == -math.inf else f" from {low:g}" + (f" to {high:g}" * (high < math.inf))
-
-    def accept(value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
-            raise Refused(f"a number{bounds}")
-        try:
-            return float(value)
-        except OverflowError:
-            raise Refused(f"a number{bounds} of fewer digits") from None
-
-    return Check(accept, float)
+    return Check(lambda value: as_number(value, low, high), float)
 
 
 def integer(low: int, high: int) -> Check:
     """A whole number within bounds."""
-
-    def accept(value: Any) -> int:
-        if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            raise Refused(f"a whole number from {low} to {high}")
-        return value
-
-    return Check(accept, int)
+    return Check(lambda value: as_integer(value, low, high), int)
 
 
 _NUMBER = r"[-+]?(?:[0-9]+[.]?[0-9]*|[.][0-9]+)"
@@ -112,17 +96,17 @@ def length(check: Check, *, whole: bool = False) -> Check:
 
 
 def in_px(value: Any, check: Check, px_per_mm: float | None) -> Any:
-    """What was said in mm in px, all else as it is; raises ``Refused`` where the scale is not known."""
+    """What was said in mm in px, all else as it is; raises ``NotAllowed`` where the scale is not known."""
     if isinstance(value, list | tuple):
         return [in_px(v, check, px_per_mm) for v in value]
     found = _IN_MM.fullmatch(value) if check.length and isinstance(value, str) else None
     if found is None:
         return value
     if px_per_mm is None:
-        raise Refused("px; for mm the scale must be known: phasedic scale, or mm_per_px in [scale]")
+        raise NotAllowed("px; for mm the scale must be known: phasedic scale, or mm_per_px in [scale]")
     lengths = [float(number) * px_per_mm for number in found[1].split(",")]
     if not all(abs(px) < 1e9 for px in lengths):
-        raise Refused("a length within the picture")
+        raise NotAllowed("a length within the picture")
     said = [round(px) if check.length == "whole px" else px for px in lengths]
     return said if len(said) > 1 else said[0]
 
@@ -132,15 +116,15 @@ def choice(*allowed: str) -> Check:
 
     def accept(value: Any) -> str:
         if value not in allowed:
-            raise Refused("one of " + ", ".join(repr(word) for word in allowed))
+            raise NotAllowed("one of " + ", ".join(repr(word) for word in allowed))
         return str(value)
 
-    return Check(accept)
+    return Check(accept, words=allowed)
 
 
 def _text(value: Any) -> str:
     if not isinstance(value, str) or "\0" in value:
-        raise Refused("a text in quotes, without a zero byte")
+        raise NotAllowed("a text in quotes, without a zero byte")
     return value
 
 
@@ -148,22 +132,22 @@ def _place(value: Any) -> str:
     try:
         Place.parse(_text(value))
     except ValueError as allowed:
-        raise Refused(str(allowed)) from None
+        raise NotAllowed(str(allowed)) from None
     return str(value)
 
 
 def _flag(value: Any) -> bool:
     if not isinstance(value, bool):
-        raise Refused("true or false")
+        raise NotAllowed("true or false")
     return value
 
 
 def _box(value: Any) -> tuple[int, int, int, int]:
     if not isinstance(value, list | tuple) or len(value) != 4 or not all(type(v) is int for v in value):
-        raise Refused("four whole numbers: x, y, width, height in px")
+        raise NotAllowed("four whole numbers: x, y, width, height in px")
     x, y, width, height = value
     if x < 0 or y < 0 or width < 1 or height < 1:
-        raise Refused("x and y from 0, width and height from 1 (px)")
+        raise NotAllowed("x and y from 0, width and height from 1 (px)")
     return x, y, width, height
 
 
@@ -176,14 +160,11 @@ def _read_box(word: str) -> list[int]:
 
 def _rectangle(value: Any) -> tuple[float, float, float, float]:
     if not isinstance(value, list | tuple) or len(value) != 4 or not all(_finite(v) for v in value):
-        raise Refused("four numbers: x, y, width, height in px")
+        raise NotAllowed("four numbers: x, y, width, height in px")
     x, y, width, height = (float(v) for v in value)
     if x < 0 or y < 0 or width <= 0 or height <= 0:
-        raise Refused("x and y from 0, width and height above 0 (px)")
+        raise NotAllowed("x and y from 0, width and height above 0 (px)")
     return x, y, width, height
-
-
-_EVERY = re.compile("[1-9][0-9]{0,8}")
 
 
 def _region(value: Any) -> tuple[int, int, int, int] | str:
@@ -191,8 +172,8 @@ def _region(value: Any) -> tuple[int, int, int, int] | str:
         return str(value)
     try:
         return _box(value)
-    except Refused as allowed:
-        raise Refused(f"{allowed}; or {' or '.join(map(repr, REGIONS))}") from None
+    except NotAllowed as allowed:
+        raise NotAllowed(f"{allowed}; or {' or '.join(map(repr, REGIONS))}") from None
 
 
 def _read_region(word: str) -> list[int] | str:
@@ -200,16 +181,15 @@ def _read_region(word: str) -> list[int] | str:
 
 
 def _record_mode(value: Any) -> str:
-    text = _text(value)
-    every = text.removeprefix("every=")
-    if text in ("all", "bursts") or (every != text and _EVERY.fullmatch(every)):
-        return text
-    raise Refused("'all', 'bursts' or 'every=K' with K from 1")
+    try:
+        return RecordMode.parse(_text(value)).text()
+    except ConfigError:
+        raise NotAllowed(RECORD_MODES) from None
 
 
 def _point(value: Any) -> tuple[float, float]:
     if not isinstance(value, list | tuple) or len(value) != 2 or not all(_finite(v) for v in value):
-        raise Refused("two numbers: x, y in px")
+        raise NotAllowed("two numbers: x, y in px")
     return float(value[0]), float(value[1])
 
 
@@ -219,7 +199,7 @@ def _finite(value: Any) -> bool:
 
 def _corners(value: Any) -> tuple[tuple[float, float], ...]:
     if not isinstance(value, list | tuple) or not 3 <= len(value) <= 100:
-        raise Refused("3 to 100 corners [x, y], px")
+        raise NotAllowed("3 to 100 corners [x, y], px")
     return tuple(_point(corner) for corner in value)
 
 
@@ -229,16 +209,16 @@ def _strains(value: Any) -> tuple[float, float]:
         or len(value) != 2
         or any(type(v) not in (int, float) for v in value)
     ):
-        raise Refused("two strains, from and to, as [0.0005, 0.0025]")
+        raise NotAllowed("two strains, from and to, as [0.0005, 0.0025]")
     low, high = float(value[0]), float(value[1])
     if not 0 <= low < high <= 1:
-        raise Refused("two strains with 0 <= from < to <= 1")
+        raise NotAllowed("two strains with 0 <= from < to <= 1")
     return low, high
 
 
 def _names(value: Any) -> tuple[str, ...]:
     if not isinstance(value, list | tuple) or not 1 <= len(value) <= 64:
-        raise Refused("1 to 64 names in brackets")
+        raise NotAllowed("1 to 64 names in brackets")
     return tuple(_text(name) for name in value)
 
 

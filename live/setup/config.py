@@ -17,10 +17,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
+from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files import read_bytes
 from live.channels import channel_names
-from live.setup.checks import AUTO, Check, Option, Refused, in_px
+from live.setup.checks import AUTO, Check, Option, in_px
 from live.setup.gauges import NAME, USUAL, GaugeTable, gauge_checks
 from live.setup.sections import (
     AlarmConfig,
@@ -213,7 +214,7 @@ def _accepted(
             raise ConfigError(f"{where}: unknown key {name}.{key}{_meant(key, list(checks))}")
         try:
             values[key] = checks[key].accept(in_px(value, checks[key], px_per_mm))
-        except Refused as allowed:
+        except NotAllowed as allowed:
             raise ConfigError(
                 f"{where}: {name}.{key} = {_shown(value)} is not possible; allowed: {allowed}"
             ) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 from acquire.addresses import parse_address
+from acquire.camera import CameraListing, list_cameras
 from acquire.camera.contract import Camera
 from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DataError, DeviceError, PhasedicError
@@ -22,6 +24,12 @@ from acquire.frame import Frame
 from acquire.opencv.webcam import OpenCVCamera, OpenCVSettings
 from acquire.v4l2.camera import V4L2Camera
 from acquire.v4l2.setup import V4L2Settings
+from live.cli import main
+from live.commands.init import find_devices
+from live.serve.draft import with_setting
+from live.serve.judged import camera_values
+from live.setup import open_rig
+from live.tell import Screen
 from tests.acquire.session import fixtures as session_fixtures
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeKernel
 from tests.contracts.entry_points import install_example
@@ -134,6 +142,59 @@ def test_info_is_complete_before_the_stream(camera: Camera) -> None:
     assert isinstance(info.live, bool)
     assert info.fps is None or info.fps > 0
     assert all(isinstance(text, str) for text in info.warnings)
+
+
+def test_what_can_be_changed_is_within_its_bounds(camera: Camera) -> None:
+    for setting in camera.info.settings:
+        assert setting.low <= setting.value <= setting.high
+        assert setting.low > 0 or not setting.log
+    assert len({setting.key for setting in camera.info.settings}) == len(camera.info.settings)
+
+
+@pytest.mark.parametrize("opener", [sim, somebody_elses])
+def test_the_page_has_a_slider_for_what_can_be_changed(
+    opener: Opener, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with contextlib.closing(opener(tmp_path, monkeypatch)) as before:
+        info = before.info
+    assert [one["key"] for one in camera_values(info)["sliders"]] == [one.key for one in info.settings] != []
+    for setting in info.settings:
+        wanted = (setting.value + setting.high) / 2
+        rig = open_rig(with_setting(info.address, setting.key, wanted), "none:")
+        now = {one.key: one.value for one in rig.camera.info.settings}
+        rig.close()
+        assert now[setting.key] == pytest.approx(wanted, rel=1e-5)
+
+
+def test_cameras_of_somebody_else_are_listed_with_ours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    install_example(tmp_path, monkeypatch)
+    ours = CameraListing("/dev/video7", "", "this user may not open it")
+    monkeypatch.setattr("acquire.v4l2.listing.list_cameras", lambda: [ours])
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "good.raw").write_bytes(bytes(640 * 480 * 2))
+    (tmp_path / "odd.raw").write_bytes(bytes(7))
+    found = list_cameras()
+    assert [one.address for one in found] == ["/dev/video7", "raw:good.raw", "raw:odd.raw"]
+    assert [bool(one.trouble) for one in found] == [True, False, True]
+    open_camera(found[1].address).close()
+    assert main(["devices"]) == 0
+    assert "  raw:good.raw  raw dump\n      614400 bytes\n" in capsys.readouterr().out
+    assert find_devices({}, Screen()).camera == "raw:good.raw"
+
+
+def test_a_list_that_fails_hides_no_other_camera(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    install_example(tmp_path, monkeypatch)
+
+    def broken() -> list[CameraListing]:
+        raise RuntimeError("no such library")
+
+    monkeypatch.setattr("acquire.v4l2.listing.list_cameras", lambda: [CameraListing("/dev/video7", "a")])
+    monkeypatch.setattr("own_devices.list_raw", broken)
+    good, bad = list_cameras()
+    assert (good.address, good.trouble) == ("/dev/video7", "")
+    assert bad.address == "raw:" and "no such library" in bad.trouble
 
 
 def test_frames_are_what_info_promised(camera: Camera) -> None:

@@ -305,8 +305,8 @@ function sliders(wanted) {
     box.dataset.keys = wanted.map((one) => one.key).join();
     box.replaceChildren(...wanted.map((one) => {
       const label = document.createElement("label"), name = document.createElement("span"), input = document.createElement("input"), value = document.createElement("output");
-      name.dataset.t = LABELS[one.key];
-      name.textContent = t(LABELS[one.key]);
+      name.dataset.t = LABELS[one.key] ?? one.key;
+      name.textContent = t(name.dataset.t);
       Object.assign(input, { type: "range", min: 0, max: 1000, step: 1 });
       input.dataset.key = one.key;
       input.addEventListener("change", () => change({ do: "camera", key: one.key, value: at(input, input.value) }));
@@ -317,7 +317,7 @@ function sliders(wanted) {
   }
   wanted.forEach((one, i) => {
     const [, input, value] = box.children[i].children;
-    Object.assign(input.dataset, { low: one.low, high: one.high, log: one.log });
+    Object.assign(input.dataset, { low: one.low, high: one.high, log: one.log, step: one.step });
     if (input === document.activeElement && input.matches(":active")) return;
     const share = one.log ? Math.log(one.value / one.low) / Math.log(one.high / one.low) : (one.value - one.low) / (one.high - one.low);
     input.value = Math.round(1000 * share);
@@ -327,7 +327,8 @@ function sliders(wanted) {
 
 function at(input, place) {
   const low = Number(input.dataset.low), high = Number(input.dataset.high), share = place / 1000;
-  return Number((input.dataset.log === "true" ? low * (high / low) ** share : low + share * (high - low)).toPrecision(3));
+  const value = input.dataset.log === "true" ? low * (high / low) ** share : low + share * (high - low), step = Number(input.dataset.step);
+  return step ? low + Math.min(Math.round((value - low) / step), Math.floor((high - low) / step)) * step : Number(value.toPrecision(3));
 }
 const number = (value) => (value >= 100 ? value.toFixed(0) : value.toPrecision(3));
 

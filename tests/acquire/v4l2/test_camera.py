@@ -12,7 +12,7 @@ import pytest
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event
-from acquire.frame import Frame
+from acquire.frame import CameraSetting, Frame
 from acquire.v4l2 import api
 from acquire.v4l2.camera import V4L2Camera, v4l2_settings
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
@@ -392,6 +392,19 @@ def test_automatic_controls_are_put_on_manual_first() -> None:
         "brightness": 10,
     }
     assert camera.info.warnings == ()
+
+
+def test_what_can_be_changed_has_the_bounds_of_the_driver() -> None:
+    controls = exposure_controls()
+    camera = Bench(FakeCamera(controls=controls), address="/dev/video0?exposure_us=8000&fps=20").open()
+    exposure, gain = camera.info.settings
+    assert exposure == CameraSetting("exposure_us", pytest.approx(8000), 100, 50_000, 100, log=True)
+    assert gain == CameraSetting("gain", 16, 0, 100, 4)
+
+
+def test_what_an_automatic_control_holds_cannot_be_changed() -> None:
+    bench = Bench(FakeCamera(controls=exposure_controls()), address="/dev/video0?manual=no")
+    assert bench.open().info.settings == ()
 
 
 def test_controls_left_automatic_are_named() -> None:

@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
-from acquire.v4l2.listing import CameraListing
+from acquire.camera import CameraListing
 from live.cli import main
 from live.setup import load_config
 
@@ -129,7 +129,7 @@ def test_devices_are_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     ]
     finding = SimpleNamespace(address="/dev/ttyUSB0?protocol=ascii", remark="say the unit", protocol="ascii")
     port = SimpleNamespace(device="/dev/ttyUSB0", accessible=True)
-    monkeypatch.setattr("acquire.v4l2.list_cameras", lambda: cameras)
+    monkeypatch.setattr("acquire.v4l2.listing.list_cameras", lambda: cameras)
     monkeypatch.setattr("acquire.serial_line.list_serial_ports", lambda: [port])
     monkeypatch.setattr("acquire.serial_line.identify.listen", lambda device: [(9600, b"1 N", finding)])
     look = init.look
@@ -151,7 +151,7 @@ def test_no_camera_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     denied = CameraListing("/dev/video0", "", trouble="this user may not open it")
-    monkeypatch.setattr("acquire.v4l2.list_cameras", lambda: [denied])
+    monkeypatch.setattr("acquire.v4l2.listing.list_cameras", lambda: [denied])
     assert main(["init", str(tmp_path / "rig.toml")]) == 3
     assert "/dev/video0: this user may not open it" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []

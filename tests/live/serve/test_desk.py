@@ -116,6 +116,10 @@ def test_set_up_changed_saved_and_started(at: At, tmp_path: Path) -> None:
     assert at.change(do="set", key="output.dir", value="/").startswith("no:")
     assert at.change(do="scale", points=[[10, 10], [110, 10]], mm=5) == "ok"
     assert at.change(do="scale", points=[[10, 10], [10, 10]], mm=5).startswith("no:")
+    assert at.change(do="scale", points=[[10, 10], [110, 10**400]], mm=5).startswith("no:")
+    assert at.change(do="scale", points=[[10, 10], [110, 10]], mm=True) == "no: a distance is a number"
+    board = {"do": "board", "columns": 5, "rows": 4}
+    assert at.change(**board, square=-1) == "no: a square in mm is a number from 0 to 100000"
     assert at.change(do="overlay", name="quality", on=True) == "ok"
     assert at.change(do="save") == "ok"
     saved = load_config(at.rig, {})

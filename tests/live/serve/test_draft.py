@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from acquire.errors import ConfigError
-from acquire.frame import CameraInfo
-from live.serve.draft import Draft, counted_up, sliders, still, with_setting
+from live.serve.draft import Draft, counted_up, still, with_setting
 from live.setup import load_config, read_mask
 
 RIG = """# the rig of bench 3
@@ -93,14 +92,6 @@ def test_only_a_simulated_specimen_has_to_be_held() -> None:
     assert "max_strain=0" in still("sim:hole?max_strain=0.01") and "max_strain=0.01" not in still(
         "sim:?max_strain=0.01"
     )
-
-
-def test_sliders_only_where_there_is_something_to_turn() -> None:
-    info = CameraInfo("/dev/video0", "a camera", 8, 6, 8, True, "device", 25.0, 0.004, controls={"gain": 7})
-    exposure, gain = sliders(info)
-    assert (exposure["key"], exposure["value"], exposure["high"]) == ("exposure_us", 4000.0, 40000.0)
-    assert (gain["key"], gain["value"]) == ("gain", 7.0)
-    assert sliders(CameraInfo("files:a", "pictures", 8, 6, 8, False, "nominal", 25.0, 0.004)) == []
 
 
 @pytest.mark.parametrize(

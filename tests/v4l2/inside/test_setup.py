@@ -26,8 +26,9 @@ SMALL = "/dev/video0?format=GREY&width=640&height=360"
 def test_it_is_listed_with_all_it_offers() -> None:
     listing = next(one for one in list_cameras() if one.address.startswith(vivid.CAMERA))
     assert "vivid" in listing.name
-    assert {"GREY", "Y10", "Y12", "Y16", "YUYV", "UYVY", "RGGB"} <= {one.fourcc for one in listing.formats}
     text = listing.text()
+    offered = {"GREY", "Y10", "Y12", "Y16", "YUYV", "UYVY", "RGGB"}
+    assert offered <= {line.split()[0].removeprefix("format=") for line in text.splitlines()}
     assert "640x360 at " in text
     assert "input=1 (HDMI 0)" in text
     assert "gain_automatic" in text

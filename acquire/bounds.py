@@ -1,0 +1,35 @@
+"""Numbers within bounds, whoever gives them: an address, a configuration, the page, a profile."""
+
+from __future__ import annotations
+
+import math
+
+
+class NotAllowed(ValueError):
+    """A value is not possible; the text is what is allowed. Who asks adds the key and the value."""
+
+
+def as_number(value: object, low: float = -math.inf, high: float = math.inf) -> float:
+    """A number from ``low`` to ``high``, never NaN and no boolean; raises ``NotAllowed``."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        raise NotAllowed(f"a number{_between(low, high)}")
+    try:
+        return float(value)
+    except OverflowError:
+        raise NotAllowed(f"a number{_between(low, high)} of fewer digits") from None
+
+
+def as_integer(value: object, low: float = -math.inf, high: float = math.inf) -> int:
+    """A whole number from ``low`` to ``high``, and no boolean; raises ``NotAllowed``."""
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise NotAllowed(f"a whole number{_between(low, high)}")
+    return value
+
+
+def _between(low: float, high: float) -> str:
+    start = "" if low == -math.inf else f" from {_shown(low)}"
+    return start if high == math.inf else f"{start} to {_shown(high)}"
+
+
+def _shown(bound: float) -> str:
+    return str(bound) if isinstance(bound, int) else f"{bound:g}"
