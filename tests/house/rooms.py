@@ -44,7 +44,6 @@ ROOMS = {
     "live.check": "acquire acquire.camera acquire.load_cell analysis analysis.evaluate analysis.field analysis.picture"
     " analysis.quality live.measure live.setup live.specimen",
     "live.operate": "acquire live.lines live.measure",
-    "live.recording": "acquire live.operate live.tell",
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",
     "live.view.painting": "acquire analysis.field live.maps live.measure live.view.exchange",
@@ -55,7 +54,7 @@ ROOMS = {
     "live.signals": "acquire acquire.serial_line live.channels live.lines live.measure live.outputs live.setup"
     " live.tell",
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
-    " analysis.evaluate live.channels live.measure live.operate live.pace live.recording live.setup"
+    " analysis.evaluate live.channels live.measure live.operate live.pace live.setup"
     " live.tell live.outputs",
     "live.replay": "acquire acquire.burst acquire.camera acquire.files acquire.load_cell acquire.opencv"
     " acquire.protocols acquire.session analysis"
