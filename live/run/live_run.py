@@ -285,12 +285,14 @@ def run_live(
         setting = set_up(config, rig, books.journal, screen, stop)
         for line in announcement(rig, setting.folder):
             screen.say(line)
-        about = About(setting.config, setting.folder, rig.camera.info, setting.grid, setting.start, stop.ask)
+        about = About(
+            setting.config, setting.folder, rig.camera.info, setting.plan.grid, setting.start, stop.ask
+        )
         outputs = Outputs(consumers(about, books), books.loads, books.journal, books.history)
         code = _with_outputs(setting, books, outputs, screen, stop, hands)
     finally:
         rig.close()
-    return Outcome(setting.folder, setting.config, books, outputs, rig, setting.grid, code)
+    return Outcome(setting.folder, setting.config, books, outputs, rig, setting.plan.grid, code)
 
 
 def announcement(rig: Rig, folder: Path) -> Iterator[str]:
