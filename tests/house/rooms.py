@@ -47,7 +47,8 @@ ROOMS = {
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",
     "live.view.painting": "acquire analysis.field live.maps live.measure live.view.exchange",
-    "live.view.drawing": "acquire analysis.field live.maps live.measure live.view.exchange live.view.painting",
+    "live.view.drawing": "acquire analysis.field live.lines live.maps live.measure live.view.exchange"
+    " live.view.painting",
     "live.view": "acquire analysis.field live.measure live.pace live.view.exchange",
     "live.view.consumers": "acquire live.measure live.outputs live.tell live.view",
     "live.outputs": "acquire acquire.load_cell analysis live.measure live.pace live.results live.setup live.tell",
@@ -79,7 +80,7 @@ ROOMS = {
     "live.batch": "acquire acquire.files analysis live.measure live.replay live.setup live.tell live.batch.work"
     " live.batch.workers",
     "live.study": "acquire analysis.field analysis.quality live.measure live.replay live.setup",
-    "live.serve.web": "acquire live.pace",
+    "live.serve.web": "acquire live.lines live.pace",
     "live.serve": "acquire acquire.camera acquire.files analysis.field analysis.evaluate live.measure live.setup"
     " live.specimen live.check live.maps live.pace live.operate live.tell live.outputs live.serve.web",
 }
