@@ -15,7 +15,8 @@ from acquire.load_cell.check import LoadReport
 from live.check import WITHOUT_TARGET, Figures, examine, judge, table_lines, take
 from live.commands.exit_codes import NOT_READY
 from live.commands.options import PICTURES, add_measure, add_options, configured, to_be_new
-from live.commands.watching import interrupts, watch
+from live.commands.signals import interrupts
+from live.commands.watching import watch
 from live.setup import Config, open_load
 from live.specimen import Overlay, snapshot, troubles, with_auto_gauges
 from live.tell import TerminalScreen

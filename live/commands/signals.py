@@ -1,11 +1,14 @@
-"""What Ctrl-C and the end of a terminal do to a command."""
+"""What Ctrl-C, SIGTERM and the end of a terminal do to a command."""
 
 from __future__ import annotations
 
 import contextlib
 import signal
+import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
+
+from acquire.held_back import handled
 
 
 @contextlib.contextmanager
@@ -22,10 +25,19 @@ def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[No
         say("closing the files ..." if times == 1 else "still closing; once more ends it at once")
         stop()
 
-    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
-    before[signal.SIGHUP] = signal.signal(signal.SIGHUP, signal.SIG_IGN)
-    try:
+    with handled(handle, signal.SIGINT, signal.SIGTERM), handled(signal.SIG_IGN, signal.SIGHUP):
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
+
+
+@contextlib.contextmanager
+def interrupts() -> Iterator[threading.Event]:
+    """Set by the first Ctrl-C or SIGTERM; the second ends the program, for nothing is lost with it."""
+    stop = threading.Event()
+
+    def handle(number: int, frame: FrameType | None) -> None:
+        if stop.is_set():
+            raise KeyboardInterrupt
+        stop.set()
+
+    with handled(handle, signal.SIGINT, signal.SIGTERM):
+        yield stop

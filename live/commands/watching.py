@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 import shutil
-import signal
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from types import FrameType
 from typing import TYPE_CHECKING, TextIO
 
 from acquire.printable import printable
@@ -106,24 +103,6 @@ class Display:
         """The next lines stand below."""
         if self._terminal:
             self._stream.write("\n")
-
-
-@contextmanager
-def interrupts() -> Iterator[threading.Event]:
-    """Set by the first Ctrl-C or SIGTERM; the second ends the program."""
-    stop = threading.Event()
-
-    def handle(number: int, frame: FrameType | None) -> None:
-        if stop.is_set():
-            raise KeyboardInterrupt
-        stop.set()
-
-    before = {number: signal.signal(number, handle) for number in (signal.SIGINT, signal.SIGTERM)}
-    try:
-        yield stop
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 Shown = Callable[[Rolling, Glance, list[Line]], None]

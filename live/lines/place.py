@@ -49,18 +49,37 @@ class Place:
         ConfigError
             The port is taken, or the address is not one of this machine.
         """
-        listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
-            listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            listening.bind((self.host, self.port))
-            listening.listen()
+            found = listening(self.host, self.port)
         except OSError as error:
-            listening.close()
             raise ConfigError(
                 f"{what}: {self.host}:{self.port} cannot be listened to ({error.strerror}); choose another port"
             ) from None
-        listening.setblocking(False)
-        return listening
+        found.setblocking(False)
+        return found
+
+
+def listening(host: str, port: int, tries: int = 1) -> socket.socket:
+    """A socket that listens at ``port``, or the next free one of as many as ``tries``.
+
+    Raises
+    ------
+    OSError
+        None is free; the error of the last.
+    """
+    failed = OSError(f"there is no port {port}")
+    for candidate in range(port, min(port + tries, 65536)):
+        found = socket.socket()
+        try:
+            # A port in TIME_WAIT is free.
+            found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            found.bind((host, candidate))
+            found.listen()
+            return found
+        except OSError as error:
+            found.close()
+            failed = error
+    raise failed
 
 
 def _may_be(port: int) -> bool:

@@ -1,6 +1,6 @@
 """A recorded session, or any folder of pictures, through the same measuring path.
 
-``replay`` runs it (``prepared`` before the first burst, ``parts`` of a long session); ``session`` and ``pictures``
+``replay`` runs it (``opened`` before the first burst, ``parts`` of a long session); ``session`` and ``pictures``
 make the ``material`` (reference, bursts, loads), ``store`` finds the bursts of a session whatever it holds, and
 ``places`` tells where they lie.
 """

@@ -1,19 +1,30 @@
-"""A source opened for those who measure parts of it in their own way."""
+"""A source opened, and the kernel prepared on its reference."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
 from acquire.events import ignore_event
+from acquire.frame import Burst
 from acquire.session import Session
-from live.measure import Screen
+from live.measure import Screen, averaged
 from live.replay.material import Material, ReplayRequest, check_window
 from live.replay.pictures import picture_material
 from live.replay.session import session_config, session_material, session_path
-from live.setup import AUTO, Config, load_config, open_rig, other_digits
+from live.setup import (
+    AUTO,
+    Config,
+    MeasurePlan,
+    PreparedKernel,
+    load_config,
+    open_rig,
+    other_digits,
+    read_mask,
+)
+from live.specimen import Look, placed_on
 
 
 @contextmanager
@@ -67,3 +78,26 @@ def open_material(request: ReplayRequest) -> Iterator[tuple[Material, Config]]:
             yield picture_material(camera, request, config), config
     finally:
         rig.close()
+
+
+def prepared(
+    material: Material,
+    config: Config,
+    source: str,
+    screen: Screen,
+    stopped: Callable[[], bool] = lambda: False,
+) -> PreparedKernel:
+    """Look for the specimen where that is asked for, and prepare the kernel; raises as ``replay``."""
+    camera = material.camera
+    mask = read_mask(config.measure.mask, camera.width, camera.height)
+    if AUTO in (config.measure.roi, config.measure.gauges):
+        seen = Look(material.reference.mean, _noise_of(material.reference), camera)
+        config, mask = placed_on(config, seen, screen.say)
+    plan = MeasurePlan.of(config, camera, mask)
+    plan.compile(camera, screen.status, stopped)
+    return plan.on(material.reference, f"the reference of {source}")
+
+
+def _noise_of(reference: Burst) -> float | None:
+    """Of the mean, GL; None where one frame tells nothing."""
+    return averaged(reference.noise, reference.n) if reference.noise > 0 else None

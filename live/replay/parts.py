@@ -23,9 +23,9 @@ from analysis import StrainField
 from live.measure import Measurement, Screen, unchanged
 from live.replay.ahead import ahead
 from live.replay.material import ReplayRequest, check_window
-from live.replay.opened import opened_session
-from live.replay.prepared import Prepared, prepared
+from live.replay.opened import opened_session, prepared
 from live.replay.session import session_path
+from live.setup import PreparedKernel
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
@@ -95,16 +95,19 @@ class _Stored:
 class Recital:
     """Stands where a kernel does, and says of each burst what was found of it."""
 
-    def __init__(self, parts: Sequence[Path], ready: Prepared) -> None:
+    def __init__(self, parts: Sequence[Path], ready: PreparedKernel) -> None:
         self._parts, self._ready = parts, ready
         self._fields: deque[StrainField] = deque()
         told = dataclasses.replace(
-            ready, kernel=cast("PhaseKernel", self), correct=unchanged, timer=lambda: 0.0
+            ready,
+            plan=dataclasses.replace(ready.plan, correct=unchanged),
+            kernel=cast("PhaseKernel", self),
+            timer=lambda: 0.0,
         )
         self.measurements = told.measurements
 
     @classmethod
-    def of(cls, parts: Sequence[Path], ready: Prepared) -> Recital | None:
+    def of(cls, parts: Sequence[Path], ready: PreparedKernel) -> Recital | None:
         """Of ``parts``; None without any."""
         return cls(parts, ready) if parts else None
 
@@ -124,7 +127,7 @@ class Recital:
         raise ValueError("no reference was renewed")
 
 
-def _read(path: Path, ready: Prepared) -> Iterator[_Stored]:
+def _read(path: Path, ready: PreparedKernel) -> Iterator[_Stored]:
     try:
         with path.open("rb") as file:
             while file.peek(1):
@@ -134,11 +137,11 @@ def _read(path: Path, ready: Prepared) -> Iterator[_Stored]:
         raise DataError(f"{path}: cannot be read ({error}); remove it and call again") from error
 
 
-def _stored(described: NDArray[Any], arrays: dict[str, Any], ready: Prepared) -> _Stored:
+def _stored(described: NDArray[Any], arrays: dict[str, Any], ready: PreparedKernel) -> _Stored:
     values = dict(zip(_BURST.names or (), described.item(), strict=True))
     noise = values.pop("field_noise")
     field = StrainField(
-        grid=ready.grid,
+        grid=ready.plan.grid,
         covariance_reference=np.zeros_like(arrays["covariance"]),  # only a renewal asks for it
         noise=noise,
         window=ready.kernel.reference.settings.window,

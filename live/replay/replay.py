@@ -24,10 +24,9 @@ from live.outputs import About, Compose, Outputs, write_results
 from live.replay.ahead import ahead
 from live.replay.forces import read_forces
 from live.replay.material import Material, ReplayRequest, Work, check_window
-from live.replay.opened import opened_session
+from live.replay.opened import opened_session, prepared
 from live.replay.parts import Recital
 from live.replay.pictures import picture_material, picture_of, write_names
-from live.replay.prepared import prepared
 from live.replay.session import session_path
 from live.setup import (
     AUTO,
@@ -148,13 +147,13 @@ def _run(
     stored = Recital.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements
     bursts = _not_empty(stored.bursts() if stored else material.bursts, request.source)
-    folder = make_folder(ready.config.output.dir, datetime.datetime.now(datetime.UTC))
-    config = _settled(with_mask(ready.config, ready.mask, folder), request.settled)
+    folder = make_folder(ready.plan.config.output.dir, datetime.datetime.now(datetime.UTC))
+    config = _settled(with_mask(ready.plan.config, ready.plan.mask, folder), request.settled)
     books = Books(journal, Ledger(), material.loads, History(config.specimen.axis), specimen=config.specimen)
     write_names(request.source, folder / "pictures.csv")
     screen.say(f"replaying {request.source} into {request.settled or folder}")
     about = About(
-        config, folder, material.camera, ready.grid, material.start, aside=request.settled is not None
+        config, folder, material.camera, ready.plan.grid, material.start, aside=request.settled is not None
     )
     outputs = Outputs(consumers(about, books), books.loads, journal, books.history)
     began, work = time.perf_counter(), ahead(bursts)

@@ -1,7 +1,7 @@
 """The threads of a live test.
 
-``run_live`` opens everything: ``setting``, ``recorder``, and a ``live_run``
-that joins the threads: ``grabber`` drains the camera, ``load_thread`` the load cell, ``measuring`` measures
+``run_live`` opens everything: ``setting``, ``recorder`` behind its ``gate``, and a ``live_run`` that
+joins the threads: ``grabber`` drains the camera, ``load_thread`` the load cell, ``measuring`` measures
 what comes through ``feed`` and ``channels`` once ``reference_step`` has a reference. ``stopping`` is the
 wish to end, ``outcome`` what is left behind.
 """

@@ -22,11 +22,12 @@ from live.operate import OrderRefused
 from live.outputs import About, Compose, Outputs, write_results
 from live.pace import Pace
 from live.run.feed import TAKING, Feed
+from live.run.gate import Gate
 from live.run.grabber import Grabber, GrabPlan
 from live.run.load_thread import LoadThread, tare_orders
 from live.run.measuring import Measuring
 from live.run.outcome import Outcome
-from live.run.recorder import Recording, open_recording
+from live.run.recorder import open_recording
 from live.run.setting import Setting, set_up
 from live.run.stopping import Stop
 from live.setup import Config, Rig, open_rig
@@ -50,7 +51,8 @@ class LiveRun:
     setting : Setting
     books : Books
     outputs : Outputs
-    recording : Recording
+    recording : Gate or None
+        None: nothing is recorded.
     screen : Screen
     stop : Stop
     """
@@ -60,7 +62,7 @@ class LiveRun:
         setting: Setting,
         books: Books,
         outputs: Outputs,
-        recording: Recording,
+        recording: Gate | None,
         screen: Screen,
         stop: Stop,
     ) -> None:
@@ -72,11 +74,11 @@ class LiveRun:
         plan = GrabPlan.of(setting.config, setting.bursts)
         self.grabber = Grabber(self._rig.camera, plan, books, self._take, self._averaged)
         books.vitals.began_t, self._hinted = time.monotonic(), False
-        self._has_recorded = recording.on
+        self._has_recorded = self.recording
         self._feed = Feed(self.grabber, books.ledger, self._idle)
         self._load = LoadThread(self._rig.load, books, outputs, recording)
         self._tares = tare_orders(self._rig.load, books)
-        pace = Pace(lambda: recording.backlog)
+        pace = Pace(lambda: recording.backlog if recording else 0.0)
         self._measuring = Measuring(setting, books, outputs, self._feed, pace, self._show)
 
     # -- what may be called from other threads ------------------------------------------------
@@ -89,7 +91,7 @@ class LiveRun:
     @property
     def recording(self) -> bool:
         """Whether frames are recorded."""
-        return self._recording.on
+        return self._recording is not None and self._recording.on
 
     @property
     def books(self) -> Books:
@@ -119,6 +121,8 @@ class LiveRun:
         elif kind is EventKind.ALARM:
             self._silence()
         elif kind is EventKind.RECORD:
+            if self._recording is None:
+                raise OrderRefused("this run records nothing, as it was asked (--no-record)")
             said = self._recording.order(note)
             self._has_recorded = True
             return said
@@ -147,7 +151,7 @@ class LiveRun:
             stack.enter_context(self._rig.camera)
             stack.enter_context(self._rig.load)
             self._stop.then(self._rig.camera.stop)
-            waits = "" if self._recording.on or not self._setting.config.record.enabled else _ARMED
+            waits = "" if self.recording or self._recording is None else _ARMED
             self._books.vitals.state = self.state
             self._books.journal.tell(EventKind.START, "phasedic", f"the test begins{waits}")
             self._load.start()
@@ -186,17 +190,20 @@ class LiveRun:
         if self._stop.reason == INTERRUPTED:
             return 130
         ledger = self._books.ledger
-        lossy = ledger.loss or self._outputs.failed or self._recording.failed is not None
+        unwritten = self._recording is not None and self._recording.failed is not None
+        lossy = ledger.loss or self._outputs.failed or unwritten
         return 5 if lossy or not ledger.adds_up or not self._books.history.told_something else 0
 
     def _take(self, frame: Frame) -> None:
         vitals = self._books.vitals
         vitals.frame_t, vitals.fps = time.monotonic(), self.grabber.fps
-        self._recording.frame(frame, needed=self.grabber.taking_reference)
+        if self._recording is not None:
+            self._recording.frame(frame, needed=self.grabber.taking_reference)
         self._outputs.frame(frame)
 
     def _averaged(self, burst: Burst) -> None:
-        self._recording.burst(burst, needed=self.grabber.taking_reference)
+        if self._recording is not None:
+            self._recording.burst(burst, needed=self.grabber.taking_reference)
 
     def _idle(self, words: str) -> None:
         """Between bursts; a camera that gives nothing must not keep a timed run alive for ever."""
@@ -235,7 +242,7 @@ class LiveRun:
         """What is done with the frames, in a word or two."""
         if self.recording:
             state = "REC"
-        elif self._setting.config.record.enabled:
+        elif self._recording is not None:
             state = "NOT RECORDING" if self._has_recorded else "ARMED"
         else:
             state = "not recorded"
@@ -278,12 +285,14 @@ def run_live(
         setting = set_up(config, rig, books.journal, screen, stop)
         for line in announcement(rig, setting.folder):
             screen.say(line)
-        about = About(setting.config, setting.folder, rig.camera.info, setting.grid, setting.start, stop.ask)
+        about = About(
+            setting.config, setting.folder, rig.camera.info, setting.plan.grid, setting.start, stop.ask
+        )
         outputs = Outputs(consumers(about, books), books.loads, books.journal, books.history)
         code = _with_outputs(setting, books, outputs, screen, stop, hands)
     finally:
         rig.close()
-    return Outcome(setting.folder, setting.config, books, outputs, rig, setting.grid, code)
+    return Outcome(setting.folder, setting.config, books, outputs, rig, setting.plan.grid, code)
 
 
 def announcement(rig: Rig, folder: Path) -> Iterator[str]:
@@ -325,8 +334,9 @@ def _with_outputs(
     return live.exit_code
 
 
-def _close(recording: Recording, books: Books, outputs: Outputs, stop: Stop) -> None:
+def _close(recording: Gate | None, books: Books, outputs: Outputs, stop: Stop) -> None:
     outputs.end()
     reason = stop.reason or "camera ended"
     books.journal.tell(EventKind.STOP, "phasedic", f"the test ends: {reason}")
-    recording.close({"stop_reason": reason})
+    if recording is not None:
+        recording.close({"stop_reason": reason})

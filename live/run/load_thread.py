@@ -12,7 +12,7 @@ from acquire.load_cell import LoadCell
 from live.operate import TareOrders
 from live.outputs import Outputs
 from live.pace import LOAD, yield_to_others
-from live.run.recorder import Recording
+from live.run.gate import Gate
 from live.tell import Books
 
 log = logging.getLogger(__name__)
@@ -26,7 +26,7 @@ class LoadThread:
     cell : LoadCell
     books : Books
     outputs : Outputs
-    recording : Recording
+    recording : Gate or None
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class LoadThread:
         The exit code of what ended the load; 0 where all was well.
     """
 
-    def __init__(self, cell: LoadCell, books: Books, outputs: Outputs, recording: Recording) -> None:
+    def __init__(self, cell: LoadCell, books: Books, outputs: Outputs, recording: Gate | None) -> None:
         self._cell, self._books, self._outputs, self._recording = cell, books, outputs, recording
         self.failure = 0
         self._thread = threading.Thread(target=self._work, name="load", daemon=True)
@@ -56,7 +56,8 @@ class LoadThread:
                 self._books.loads.append(sample)
                 self._books.vitals.loaded(time.monotonic(), sample.force)
                 self._books.ledger.add(load_samples=1)
-                self._recording.sample(sample)
+                if self._recording is not None:
+                    self._recording.sample(sample)
                 self._outputs.load(sample)
         except Exception as error:
             if not isinstance(error, PhasedicError):

@@ -7,21 +7,18 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, cast
 
 from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
-from live.measure import Measurement, SmearGuard, measure
+from live.measure import Measurement, SmearGuard
 from live.outputs import Outputs
 from live.pace import MEASURE, Lag, Pace, yield_to_others
 from live.run.feed import Feed
 from live.run.reference_step import ReferenceStep
 from live.run.setting import Setting
+from live.setup import PreparedKernel
 from live.tell import Books
-
-if TYPE_CHECKING:
-    from analysis import PhaseKernel
 
 log = logging.getLogger(__name__)
 
@@ -76,11 +73,11 @@ class Measuring:
     def _work(self) -> None:
         yield_to_others(MEASURE)
         try:
-            prepared = ReferenceStep(self._setting, self._books, self._feed).take()
-            if prepared is None:
+            ready = ReferenceStep(self._setting, self._books, self._feed).take()
+            if ready is None:
                 self._feed.let_pass()
             else:
-                self._measure(*prepared)
+                self._measure(ready)
         except PhasedicError as error:
             self._refused = error
         except Exception as error:
@@ -90,21 +87,10 @@ class Measuring:
             self._books.journal.tell(EventKind.MEASUREMENT, "measurement", text, "error")
             self._feed.let_pass()
 
-    def _measure(self, kernel: PhaseKernel, noise_GL: float | None) -> None:
+    def _measure(self, ready: PreparedKernel) -> None:
         journal = self._books.journal
         guard = SmearGuard(journal.record)
-        for m in measure(
-            self._feed.bursts(),
-            kernel,
-            self._books.loads,
-            noise_GL=noise_GL,
-            correct=self._setting.correct,
-            gauges=self._setting.gauges,
-            renew_at=self._setting.config.measure.renew_at,
-            strain=cast(Any, self._setting.config.measure.strain),
-            on_event=journal.record,
-            timer=time.perf_counter,
-        ):
+        for m in ready.measurements(self._feed.bursts(), self._books.loads, journal.record):
             self._books.ledger.add(measured=m.burst.n)
             journal.record(_measured(m.burst))
             m = self._timed(m)

@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from acquire.clock import ClockPair
 from acquire.errors import DataError
@@ -23,9 +23,8 @@ from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import RotatingWriter, SessionInfo, SessionWriter
 from live.measure import Screen
-from live.operate import OrderRefused
-from live.recording import Gate, Keep
 from live.run.channels import ByteBuffer
+from live.run.gate import Gate, Keep
 from live.run.setting import Setting
 from live.run.stopping import Stop
 from live.setup import versions
@@ -41,61 +40,8 @@ _DISK_WARN_S = 180.0
 Item = Frame | Burst | LoadSample | Event
 
 
-class Recording(Protocol):
-    """What a run gives to its recording, from any thread; nothing here waits for the disk."""
-
-    @property
-    def on(self) -> bool:
-        """Whether what comes is recorded."""
-        ...
-
-    @property
-    def failed(self) -> str | None:
-        """Why nothing more is written; None while all is well."""
-        ...
-
-    @property
-    def backlog(self) -> float:
-        """Share of the buffer that waits for the disk."""
-        ...
-
-    def frame(self, frame: Frame, *, needed: bool) -> None: ...
-
-    def burst(self, burst: Burst, *, needed: bool) -> None: ...
-
-    def sample(self, sample: LoadSample) -> None: ...
-
-    def order(self, what: str) -> str: ...
-
-    def close(self, ledger: dict[str, Any]) -> None: ...
-
-
-class NoRecording:
-    """The recording of a run that wants none."""
-
-    on = False
-    failed: str | None = None
-    backlog = 0.0
-
-    def frame(self, frame: Frame, *, needed: bool) -> None:
-        """Let it go."""
-
-    def burst(self, burst: Burst, *, needed: bool) -> None:
-        """Let it go."""
-
-    def sample(self, sample: LoadSample) -> None:
-        """Let it go."""
-
-    def order(self, what: str) -> str:
-        """Refuse it."""
-        raise OrderRefused("this run records nothing, as it was asked (--no-record)")
-
-    def close(self, ledger: dict[str, Any]) -> None:
-        """Nothing is open."""
-
-
-def open_recording(setting: Setting, books: Books, screen: Screen, stop: Stop) -> Recording:
-    """The recording that the configuration asks for, in the folder of the run.
+def open_recording(setting: Setting, books: Books, screen: Screen, stop: Stop) -> Gate | None:
+    """The recording that the configuration asks for, in the folder of the run; None where it asks for none.
 
     Raises
     ------
@@ -104,7 +50,7 @@ def open_recording(setting: Setting, books: Books, screen: Screen, stop: Stop) -
     """
     record, camera = setting.config.record, setting.rig.camera.info
     if not record.enabled:
-        return NoRecording()
+        return None
     path, mode = setting.folder / "session.h5", RecordMode.parse(record.mode)
     writer = _open_writer(path, setting, mode)
     books.vitals.disk_s = _tell_room(path, camera, mode, screen)

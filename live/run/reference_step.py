@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from typing import TYPE_CHECKING
 
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
-from live.measure import Reference, motion_between, prepare
+from live.measure import Reference, motion_between
 from live.run.feed import Feed
 from live.run.setting import Setting
+from live.setup import PreparedKernel
 from live.tell import Books
-
-if TYPE_CHECKING:
-    from analysis import PhaseKernel
 
 TRIES = 3
 
@@ -32,8 +29,8 @@ class ReferenceStep:
     def __init__(self, setting: Setting, books: Books, feed: Feed) -> None:
         self._setting, self._books, self._feed = setting, books, feed
 
-    def take(self) -> tuple[PhaseKernel, float | None] | None:
-        """A kernel and the noise of one frame, GL; None where the run ended before there was a reference.
+    def take(self) -> PreparedKernel | None:
+        """The kernel on it; None where the run ended before there was a reference.
 
         Raises
         ------
@@ -47,9 +44,10 @@ class ReferenceStep:
             text = f"the camera ended before the reference was complete ({self._books.ledger.grabbed} frames)"
             self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "error")
             return None
+        what = f"the reference from {self._setting.config.camera.address}"
         for attempt in itertools.count(1):
-            kernel, noise_GL = self._kernel(reference)
-            moved = self._moved(kernel, reference)
+            ready = self._setting.plan.on(reference.burst, what)
+            moved = _moved(ready, reference)
             if moved <= self._setting.config.measure.reference_shift_px:
                 break
             again = self._another(moved, attempt)
@@ -64,18 +62,7 @@ class ReferenceStep:
             self._books.ledger.add(reference=-reference.burst.n, left_out=reference.burst.n)
             reference = again
         self._tell(reference.burst, moved)
-        return kernel, noise_GL
-
-    def _moved(self, kernel: PhaseKernel, reference: Reference) -> float:
-        """How far it moved within the burst, px; NaN where it cannot be measured, which is not still."""
-        if reference.halves is None:
-            return 0.0
-        return motion_between(kernel, *reference.halves, self._setting.correct)
-
-    def _kernel(self, reference: Reference) -> tuple[PhaseKernel, float | None]:
-        s = self._setting
-        what = f"the reference from {s.config.camera.address}"
-        return prepare(reference.burst, s.grid, s.settings, s.config.measure.noise_GL, s.correct, what)
+        return ready
 
     def _another(self, moved: float, attempt: int) -> Reference | None:
         """The next one; None where the run ends, or where a reference that moved has to do.
@@ -107,6 +94,13 @@ class ReferenceStep:
         noise = f", noise of one {burst.noise:.2f} GL, motion {moved:.4f} px" if burst.n > 1 else ""
         text = f"reference: {burst.n} frames{noise}" + (f", force {force:.2f} N" if n else "")
         self._books.journal.record(Event(burst.t, EventKind.REFERENCE, "measurement", text, "info", data))
+
+
+def _moved(ready: PreparedKernel, reference: Reference) -> float:
+    """How far it moved within the burst, px; NaN where it cannot be measured, which is not still."""
+    if reference.halves is None:
+        return 0.0
+    return motion_between(ready.kernel, *reference.halves, ready.plan.correct)
 
 
 def _plain(value: float) -> float | None:

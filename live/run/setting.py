@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import datetime
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,28 +12,20 @@ from numpy.typing import NDArray
 from acquire.clock import ClockPair
 from acquire.hdf5 import compile_loops
 from acquire.record_mode import RecordMode
-from live.measure import Correction, Screen, kinds_of, rehearse
+from live.measure import Screen, rehearse
 from live.run.stopping import Stop
 from live.setup import (
     DEFAULT_BURST,
     DEFAULT_REFERENCE_BURST,
     Config,
+    MeasurePlan,
     Rig,
-    compile_ahead,
-    correction,
-    gauges_for,
-    grid_for,
-    kernel_settings,
     make_folder,
     read_mask,
     with_flat_field,
     with_mask,
 )
 from live.tell import Journal
-
-if TYPE_CHECKING:
-    from analysis import KernelSettings, ZoiGrid
-    from analysis.evaluate import Gauge
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,15 +34,10 @@ class Setting:
 
     Attributes
     ----------
-    config : Config
-        In force; mask, dark and flat frame lie in ``folder``.
     rig : Rig
         Open, not yet entered.
-    grid : ZoiGrid
-    gauges : tuple of Gauge
-    settings : KernelSettings
-    correct : callable
-        Takes the fixed pattern of the sensor out of a burst.
+    plan : MeasurePlan
+        Its configuration is in force; mask, dark and flat frame lie in ``folder``.
     bursts : (reference, measured)
         Frames in each.
     folder : Path
@@ -61,15 +46,16 @@ class Setting:
         Time zero of all files.
     """
 
-    config: Config
     rig: Rig
-    grid: ZoiGrid
-    gauges: tuple[Gauge, ...]
-    settings: KernelSettings
-    correct: Correction
+    plan: MeasurePlan
     bursts: tuple[int, int]
     folder: Path
     start: ClockPair
+
+    @property
+    def config(self) -> Config:
+        """In force."""
+        return self.plan.config
 
 
 def set_up(config: Config, rig: Rig, journal: Journal, screen: Screen, stop: Stop) -> Setting:
@@ -83,16 +69,16 @@ def set_up(config: Config, rig: Rig, journal: Journal, screen: Screen, stop: Sto
         ``stop`` was asked while loops were compiled.
     """
     camera = rig.camera.info
-    mask = _mask(config, rig)
-    grid = grid_for(config, camera.width, camera.height, mask)
-    gauges, settings = gauges_for(config.gauges, config.specimen.first_axis, grid), kernel_settings(config)
-    correct = correction(config, camera)
+    plan = MeasurePlan.of(config, camera, _mask(config, rig))
     bursts = _burst_lengths(config, camera.live)
-    _compile(kinds_of(camera), settings, screen, stop)
-    rehearse(camera, grid, settings, bursts)
+    took = plan.compile(camera, screen.status, lambda: stop.asked)
+    if took > 0:
+        screen.say(f"everything is compiled ({took:.0f} s)")
+    compile_loops()
+    rehearse(camera, plan.grid, plan.settings, bursts)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
-    config = with_flat_field(with_mask(config, mask, folder), folder)
-    return Setting(config, rig, grid, gauges, settings, correct, bursts, folder, _time_zero(rig, journal))
+    in_force = with_flat_field(with_mask(config, plan.mask, folder), folder)
+    return Setting(rig, replace(plan, config=in_force), bursts, folder, _time_zero(rig, journal))
 
 
 def _mask(config: Config, rig: Rig) -> NDArray[np.bool_] | None:
@@ -109,14 +95,6 @@ def _burst_lengths(config: Config, live: bool) -> tuple[int, int]:
     m = config.measure
     reference = m.reference_burst or (DEFAULT_REFERENCE_BURST if live else 1)
     return reference, m.burst or (DEFAULT_BURST if live else 1)
-
-
-def _compile(kinds: Sequence[str], settings: KernelSettings, screen: Screen, stop: Stop) -> None:
-    phase = settings.estimator == "phase"
-    took = compile_ahead(kinds, phase=phase, say=screen.status, stopped=lambda: stop.asked)
-    if took > 0:
-        screen.say(f"everything is compiled ({took:.0f} s)")
-    compile_loops()
 
 
 def _time_zero(rig: Rig, journal: Journal) -> ClockPair:

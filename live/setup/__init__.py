@@ -2,8 +2,9 @@
 
 ``sections`` are the keys of the configuration with their ``checks`` and options, ``config`` reads and
 overlays it, ``rig`` opens the devices (and is the one door to the simulated ones), ``grid`` lays the ZOIs,
-``gauges`` the virtual gauges on it, ``pictures`` reads mask, dark and flat, ``rigfile`` writes a
-configuration, ``compiling`` has the loops compiled ahead, ``folder`` makes the place for the files.
+``gauges`` the virtual gauges on it, ``pictures`` reads mask, dark and flat, ``prepared`` joins these
+and the kernel, ``rigfile`` writes a configuration, ``compiling`` has the loops compiled ahead, ``folder`` makes the
+place for the files.
 """
 
 from live.setup.checks import ALL, AUTO, GIVEN
@@ -13,6 +14,7 @@ from live.setup.folder import FILES, installed, make_folder, other_digits, versi
 from live.setup.gauges import GaugeTable, complete_gauges, gauges_for, outlines
 from live.setup.grid import grid_for, kernel_settings, whole_picture
 from live.setup.pictures import correction, read_mask, with_flat_field, with_mask
+from live.setup.prepared import MeasurePlan, PreparedKernel
 from live.setup.rig import Rig, open_load, open_rig
 from live.setup.rigfile import new_rig, write_rig
 from live.setup.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST, AlarmConfig, SpecimenConfig
@@ -27,6 +29,8 @@ __all__ = [
     "AlarmConfig",
     "Config",
     "GaugeTable",
+    "MeasurePlan",
+    "PreparedKernel",
     "Rig",
     "SpecimenConfig",
     "compile_ahead",

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from types import FrameType
 
 from acquire.errors import ConfigError, Interrupted
-from acquire.held_back import held_back, let_through
+from acquire.held_back import handled, held_back, let_through
 
 log = logging.getLogger(__name__)
 _POLL_S = 0.25
@@ -99,13 +99,8 @@ def _interruptions() -> Iterator[threading.Event]:
         if callable(handler):
             handler(number, frame)
 
-    for number in before:
-        signal.signal(number, hear)
-    try:
+    with handled(hear, *before):
         yield heard
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 def main(part: str, kinds: str, phase: str) -> int:

@@ -20,9 +20,9 @@ from acquire.errors import ConfigError
 from acquire.frame import Burst
 from analysis.evaluate import noise_floor
 from analysis.quality import gauge_length, l10_strain
-from live.measure import averaged, prepare
+from live.measure import averaged
 from live.replay import Material
-from live.setup import Config, correction, grid_for, kernel_settings, read_mask
+from live.setup import Config, MeasurePlan, read_mask
 from live.study.windows import Windows
 
 if TYPE_CHECKING:
@@ -107,7 +107,7 @@ def study(
     """
     for setting in settings:
         measure = dataclasses.replace(config.measure, **dataclasses.asdict(setting))
-        one = dataclasses.replace(config, measure=measure)
+        one = dataclasses.replace(config, measure=measure, gauges={})  # none is read
         yield _found(setting, one.specimen.axis, *_fields(material, windows, one))
 
 
@@ -116,17 +116,13 @@ def _fields(
 ) -> tuple[list[StrainField], list[StrainField]]:
     camera = material.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
-    grid, correct = grid_for(config, camera.width, camera.height, mask), correction(config, camera)
-    kernel, noise_GL = prepare(
-        material.reference, grid, kernel_settings(config), config.measure.noise_GL, correct
-    )
+    ready = MeasurePlan.of(config, camera, mask).on(material.reference)
 
     def measured(bursts: Sequence[Burst]) -> list[StrainField]:
         start, found = None, []
-        for burst in map(correct, bursts):
-            start = kernel.measure(
-                burst.mean, start=start, noise=averaged(noise_GL, burst.n), clipped=burst.clipped
-            )
+        for burst in map(ready.plan.correct, bursts):
+            noise = averaged(ready.noise_GL, burst.n)
+            start = ready.kernel.measure(burst.mean, start=start, noise=noise, clipped=burst.clipped)
             found.append(dataclasses.replace(start, measure=cast(Any, config.measure.strain)))
         return found
 

@@ -46,18 +46,18 @@ ROOMS = {
     "live.check": "acquire acquire.camera acquire.load_cell analysis analysis.evaluate analysis.field analysis.picture"
     " analysis.quality live.measure live.setup live.specimen",
     "live.operate": "acquire live.lines live.measure",
-    "live.recording": "acquire live.operate live.tell",
     "live.pace": "",
     "live.view.exchange": "acquire analysis.field live.measure",
     "live.view.painting": "acquire live.measure live.view.exchange",
-    "live.view.drawing": "acquire analysis.field live.maps live.measure live.view.exchange live.view.painting",
+    "live.view.drawing": "acquire analysis.field live.lines live.maps live.measure live.view.exchange"
+    " live.view.painting",
     "live.view": "acquire analysis.field live.measure live.pace live.view.exchange",
     "live.view.consumers": "acquire live.measure live.outputs live.tell live.view",
     "live.outputs": "acquire acquire.load_cell analysis live.measure live.pace live.results live.setup live.tell",
     "live.signals": "acquire acquire.serial_line live.channels live.lines live.measure live.outputs live.setup"
     " live.tell",
     "live.run": "acquire acquire.burst acquire.camera acquire.hdf5 acquire.load_cell acquire.session analysis"
-    " analysis.evaluate live.channels live.measure live.operate live.pace live.recording live.setup"
+    " analysis.evaluate live.channels live.measure live.operate live.pace live.setup"
     " live.tell live.outputs",
     "live.replay": "acquire acquire.burst acquire.camera acquire.files acquire.load_cell acquire.opencv"
     " acquire.protocols acquire.session analysis"
@@ -82,7 +82,7 @@ ROOMS = {
     "live.batch": "acquire acquire.files analysis live.measure live.replay live.setup live.tell live.batch.work"
     " live.batch.workers",
     "live.study": "acquire analysis.evaluate analysis.field analysis.quality live.measure live.replay live.setup",
-    "live.serve.web": "acquire live.pace",
+    "live.serve.web": "acquire live.lines live.pace",
     "live.serve": "acquire acquire.camera acquire.files analysis.field analysis.evaluate live.measure live.setup"
     " live.specimen live.check live.maps live.pace live.operate live.tell live.outputs live.serve.web",
 }

@@ -17,6 +17,7 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from acquire.errors import DeviceError
+from live.lines import listening
 from live.pace import OUTPUT, yield_to_others
 from live.serve.web.answers import OURS, Answer, of_json, static
 from live.serve.web.door import Door, Refused
@@ -25,7 +26,7 @@ from live.serve.web.hub import Hub
 log = logging.getLogger(__name__)
 
 HOST = "127.0.0.1"
-DEFAULT_PORT = 8765
+DEFAULT_PORT, TRIES = 8765, 10
 BEAT_S = 0.5
 """Between heartbeats; the page says NO LINK after 2 s without."""
 _UNREAD_BYTES = 2**14  # held for a page that does not read; more would be old when it reads again
@@ -62,7 +63,7 @@ class PageServer:
     ) -> None:
         self.hub, self.gets, self.posts = hub, gets, posts
         self._closed = threading.Event()
-        self._server = _bound(port)
+        self._server = _open_server(port)
         self.door = Door(self._server.server_address[1], secrets.token_urlsafe(24))
         self._server.page = self
         self._threads = [
@@ -93,20 +94,22 @@ class PageServer:
 
 class _Server(ThreadingHTTPServer):
     daemon_threads = True
-    allow_reuse_address = True
     page: PageServer
 
+    def server_bind(self) -> None:
+        """At the port that is wanted or one of the next."""
+        self.socket.close()
+        self.socket = listening(HOST, int(self.server_address[1]), TRIES)
+        self.server_address = self.socket.getsockname()
 
-def _bound(port: int) -> _Server:
-    last: OSError | None = None
-    for candidate in range(port, port + (10 if port else 1)):
-        try:
-            return _Server((HOST, candidate), _Handler)
-        except OSError as error:
-            last = error
-    raise DeviceError(
-        f"the page: no port from {port} to {port + 9} is free on {HOST} ({last}); end what holds them"
-    )
+
+def _open_server(port: int) -> _Server:
+    try:
+        return _Server((HOST, port), _Handler)
+    except OSError as error:
+        raise DeviceError(
+            f"the page: no port from {port} to {port + TRIES - 1} is free on {HOST} ({error}); end what holds them"
+        ) from None
 
 
 class _Handler(BaseHTTPRequestHandler):

@@ -22,6 +22,8 @@ import threading
 import time
 from collections.abc import Callable
 
+from live.lines import listening
+
 HOST, TRIES = "127.0.0.1", 50
 PATIENCE_S, PATIENCE_BYTES = 10.0, 500_000
 """A viewer that took nothing for so long while so much was drawn has stopped."""
@@ -149,18 +151,10 @@ def is_welcome(head: bytes) -> bool:
 
 
 def _listening(wanted: int) -> socket.socket:
-    for port in range(wanted, min(wanted + TRIES, 65536)):
-        candidate = socket.socket()
-        # A port in TIME_WAIT is free.
-        candidate.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            candidate.bind((HOST, port))
-            candidate.listen()
-        except OSError:
-            candidate.close()
-            continue
-        return candidate
-    raise OSError(f"no free port from {wanted} on; set another view.port")
+    try:
+        return listening(HOST, wanted, TRIES)
+    except OSError:
+        raise OSError(f"no free port from {wanted} on; set another view.port") from None
 
 
 def hidden() -> tuple[str, int]:

@@ -11,7 +11,7 @@ import pytest
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from live.operate import START, STOP, OrderRefused
-from live.recording import Gate, Keep
+from live.run.gate import Gate, Keep
 from live.tell import Journal, Ledger
 from tests.live.fakes import frame
 
