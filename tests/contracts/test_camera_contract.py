@@ -29,7 +29,7 @@ from live.commands.init import find_devices
 from live.serve.draft import with_setting
 from live.serve.judged import camera_values
 from live.setup import open_rig
-from live.tell import Screen
+from live.tell import TerminalScreen
 from tests.acquire.session import fixtures as session_fixtures
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeKernel
 from tests.contracts.entry_points import install_example
@@ -181,7 +181,7 @@ def test_cameras_of_somebody_else_are_listed_with_ours(
     open_camera(found[1].address).close()
     assert main(["devices"]) == 0
     assert "  raw:good.raw  raw dump\n      614400 bytes\n" in capsys.readouterr().out
-    assert find_devices({}, Screen()).camera == "raw:good.raw"
+    assert find_devices({}, TerminalScreen()).camera == "raw:good.raw"
 
 
 def test_a_list_that_fails_hides_no_other_camera(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
