@@ -1,7 +1,5 @@
-"""Device to frames, load samples and recordings. Knows nothing of strain or of the screen.
+"""Cameras, load cells and recordings: from a device to ``Frame``, ``LoadSample`` and back from a file.
 
-``acquire.camera.open_camera`` and ``acquire.load_cell.open_load_cell`` open anything that has an address;
-``Frame`` and ``Burst`` of ``acquire.frame`` and ``LoadSample`` of ``acquire.load_sample`` are what comes
-out, ``acquire.session`` keeps them. Nothing is imported here, since ``phasedic --help`` needs the errors
-and must not wait for numpy.
+``acquire.camera.open_camera`` and ``acquire.load_cell.open_load_cell`` open any address. ``acquire.session``
+records and reads. Nothing is imported here: ``phasedic --help`` needs the errors and does not wait for numpy.
 """

@@ -73,7 +73,7 @@ def device_event(sink: EventSink, source: str, text: str, level: Level = "warnin
     sink(Event(time.monotonic(), EventKind.DEVICE, source, text, level, data))
 
 
-class Muffler:
+class RateLimiter:
     """Lets a fault that may come with every frame be told at once, then as a count once a while.
 
     Parameters

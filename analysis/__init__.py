@@ -11,20 +11,11 @@ known pattern first, and a machine that measures it wrong is refused (``MachineE
 """
 
 from analysis.field import Roi, Status, StrainField, ZoiGrid
-from analysis.kernel import (
-    COMPILE_PARTS,
-    PICTURE_KINDS,
-    Estimator,
-    KernelSettings,
-    NoiseModel,
-    PatternError,
-    PhaseKernel,
-    check_machine,
-    not_compiled,
-    numerics,
-    threads,
-    warm_up,
-)
+from analysis.kernel.images import NoiseModel
+from analysis.kernel.phase_kernel import PhaseKernel, check_machine
+from analysis.kernel.prepared import PatternError
+from analysis.kernel.settings import Estimator, KernelSettings
+from analysis.kernel.warm_up import COMPILE_PARTS, PICTURE_KINDS, not_compiled, numerics, threads, warm_up
 from analysis.self_test import MachineError
 
 __all__ = [

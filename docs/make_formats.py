@@ -24,8 +24,8 @@ from acquire.load_sample import LoadFlag
 from acquire.session import SessionInfo, SessionWriter
 from analysis import Roi, ZoiGrid
 from analysis.field import Status
-from live.results.info import ResultsInfo
 from live.results.quantities import quantity_of
+from live.results.row import ResultsInfo
 from live.results.strain_csv import COLUMNS
 from live.results.writer import Results
 

@@ -19,7 +19,7 @@ from analysis import KernelSettings, PhaseKernel, Roi, ZoiGrid
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
-from live.report import NO_BROWSER, find_browser
+from live.results.report.saving import NO_BROWSER, find_browser
 
 IMAGES = Path(__file__).parent / "images"
 SIDE, SHOWN, ZOI, NOISE_GL = 320, 160, 64, 1.3

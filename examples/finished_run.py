@@ -10,10 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from live.export import ExportRequest, export
-from live.finished import Display, open_run
-from live.report import Wanted, make_report, save_page
-from live.tell import TerminalScreen
+from live.results.export.formats import ExportRequest, export
+from live.results.quantities import Display
+from live.results.report.report import ReportRequest, make_report
+from live.results.report.saving import save_page
+from live.results.run_folder import open_run
+from live.ui.terminal.screen import TerminalScreen
 
 
 def main(folder: str) -> int:
@@ -42,7 +44,7 @@ def main(folder: str) -> int:
             )
 
         export(run, ExportRequest("npz", out / "strain.npz", display=display), TerminalScreen(quiet=True))
-        save_page(make_report(run, Wanted(), TerminalScreen(quiet=True)), out / "report.html")
+        save_page(make_report(run, ReportRequest(), TerminalScreen(quiet=True)), out / "report.html")
         print(f"largest mean strain {np.nanmax(np.abs(strain)) * 1e6:.0f} um/m; files in {out}")
     return 0
 

@@ -46,8 +46,8 @@ quiet = ["--no-view", "--no-rrd", "--out", str(folder / "run")]
 assert main(["replay", str(folder / "shots"), *arguments, *quiet]) == 0
 
 # %% The results: numbers an instant, maps, uncertainties.
-from live.finished import open_run  # noqa: E402
 from live.results import Strain  # noqa: E402
+from live.results.run_folder import open_run  # noqa: E402
 
 run = open_run(folder / "run")
 print(run.strain)
@@ -70,9 +70,12 @@ else:
     print(data["eyy"].mean(("y", "x")).values)
 
 # %% A page to show to others.
-from live.report import Wanted, make_report, save_page  # noqa: E402
-from live.tell import TerminalScreen  # noqa: E402
+from live.results.report.report import ReportRequest, make_report  # noqa: E402
+from live.results.report.saving import save_page  # noqa: E402
+from live.ui.terminal.screen import TerminalScreen  # noqa: E402
 
-save_page(make_report(run, Wanted(fields=("eyy",)), TerminalScreen(quiet=True)), folder / "report.html")
+save_page(
+    make_report(run, ReportRequest(fields=("eyy",)), TerminalScreen(quiet=True)), folder / "report.html"
+)
 run.close()
 print(f"look at {folder / 'report.html'}")

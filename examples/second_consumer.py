@@ -8,11 +8,11 @@ from __future__ import annotations
 import sys
 
 from live.commands.consumers import standard_consumers
-from live.measure import Measurement
-from live.outputs import Consumer
-from live.run import run_live
-from live.setup import load_config
-from live.tell import TerminalScreen
+from live.config.loading import load_config
+from live.pipeline.consumer import Consumer
+from live.pipeline.measurement import Measurement
+from live.run.live_run import run_live
+from live.ui.terminal.screen import TerminalScreen
 
 
 class Largest(Consumer):

@@ -15,10 +15,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from live.commands.consumers import standard_consumers
-from live.operate import OrderPort
-from live.run import LiveRun, Outcome, run_live
-from live.setup import load_config
-from live.tell import TerminalScreen
+from live.config.loading import load_config
+from live.run.control import ControlPort
+from live.run.live_run import LiveRun, run_live
+from live.run.outcome import Outcome
+from live.ui.terminal.screen import TerminalScreen
 
 STRAIN, ORDERS, MACHINE = 5610, 5611, 5612
 
@@ -115,7 +116,7 @@ def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> 
     }
     config = load_config(None, {key: value for key, value in settings.items() if value is not None})
     screen = TerminalScreen()
-    port = OrderPort(str(ORDERS), None, screen)
+    port = ControlPort(str(ORDERS), None, screen)
 
     def hands(live: LiveRun) -> None:
         port.open(live)

@@ -2,6 +2,8 @@
 
 A dialect says how a reading looks on the line and what it answers; ``hw_mocks.sim_indicators`` has
 those of real devices. Pure: bytes in, bytes out, no clock.
+
+The free text of microcontroller sketches: talks by itself, understands nothing.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ LONGEST_COMMAND = 256
 
 
 @dataclass(frozen=True, slots=True)
-class Shown:
+class IndicatorReading:
     """What the indicator has to say at one instant.
 
     Attributes
@@ -78,14 +80,14 @@ class Indicator(ABC):
         self.offset = 0.0
 
     @abstractmethod
-    def render(self, shown: Shown) -> bytes:
+    def render(self, shown: IndicatorReading) -> bytes:
         """A reading as it goes over the line, its end included."""
 
-    def answer(self, command: bytes, shown: Shown) -> bytes:
+    def answer(self, command: bytes, shown: IndicatorReading) -> bytes:
         """The answer to a command (without its end); b"" for none."""
         return b""
 
-    def receive(self, data: bytes, shown: Shown) -> bytes:
+    def receive(self, data: bytes, shown: IndicatorReading) -> bytes:
         """Take bytes from the host in any pieces; the answers to the commands they complete."""
         answers = []
         for byte in data:
@@ -97,18 +99,18 @@ class Indicator(ABC):
                 self._partial = (self._partial + bytes([byte]))[-LONGEST_COMMAND:]
         return b"".join(answers)
 
-    def net(self, shown: Shown) -> float:
+    def net(self, shown: IndicatorReading) -> float:
         """Force less tare, rounded to the display, N."""
         steps = round((shown.force - self.offset) / self.resolution)
         return steps * self.resolution
 
-    def displayed(self, shown: Shown) -> tuple[str, str]:
+    def displayed(self, shown: IndicatorReading) -> tuple[str, str]:
         """The number as text and its unit."""
         unit = self.foreign if shown.foreign_unit else self.unit
         step = self.resolution / NEWTONS[unit]
         return f"{self.net(shown) / NEWTONS[unit]:.{decimals(step)}f}", unit
 
-    def tare(self, shown: Shown) -> None:
+    def tare(self, shown: IndicatorReading) -> None:
         """Make the present load zero."""
         self.offset = shown.force
 
@@ -116,3 +118,47 @@ class Indicator(ABC):
 def decimals(step: float) -> int:
     """Digits after the point that a step needs."""
     return max(0, math.ceil(-math.log10(step) - 1e-9))
+
+
+Style = Literal["millis", "plain", "label", "openscale"]
+SATURATED = {"overload": 8388607, "underload": -8388608}  # of a 24-bit converter
+COUNTS_PER_N = 800
+TEMPERATURE = 21.5
+
+
+class AsciiIndicator(Indicator):
+    """Parameters as ``Indicator``, and the style of its lines.
+
+    - millis: ``12345,0.512,N``
+    - plain: ``0.512 N``
+    - label: ``Reading: 0.512 N``
+    - openscale: ``12345,0.512,N,409,21.5,``
+    """
+
+    name = "ascii"
+    line = (115200, 8, "N")
+    unasked: ClassVar[bool] = True
+    banner: ClassVar[bytes] = b"\r\nSerial load cell, press x for menu\r\nReadings:\r\n"
+
+    def __init__(self, resolution: float = 0.1, unit: str = "N", style: Style = "millis") -> None:
+        super().__init__(resolution, unit)
+        self._style = style
+
+    def render(self, shown: IndicatorReading) -> bytes:
+        """See ``Indicator``; a saturated converter shows its end value."""
+        value, unit = self.displayed(shown)
+        if shown.status in SATURATED and self._style != "openscale":
+            value = str(SATURATED[shown.status])
+        if shown.status == "error":
+            value = "nan"
+        return (self._text(shown, value, unit) + "\r\n").encode()
+
+    def _text(self, shown: IndicatorReading, value: str, unit: str) -> str:
+        if self._style == "plain":
+            return f"{value} {unit}"
+        if self._style == "label":
+            return f"Reading: {value} {unit}"
+        if self._style == "millis":
+            return f"{shown.ms:.0f},{value},{unit}"
+        raw = SATURATED.get(shown.status, round(shown.force * COUNTS_PER_N))
+        return f"{shown.ms:.0f},{value},{unit},{raw},{TEMPERATURE},"

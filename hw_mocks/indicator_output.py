@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hw_mocks.faults import Fault, FaultPlan
-from hw_mocks.indicator import Indicator, Shown, Status
+from hw_mocks.indicator import Indicator, IndicatorReading, Status
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +76,7 @@ class IndicatorOutput:
         """Whether the port is out at ``t``."""
         return self._faults.lasting("unplug", self._sensing.elapsed(t)) is not None
 
-    def shown(self, t: float) -> Shown:
+    def shown(self, t: float) -> IndicatorReading:
         """The display at ``t``, with fresh noise."""
         e, s = self._sensing.elapsed(t), self._sensing
         force = s.force(t) + s.noise_N * float(self._rng.standard_normal())
@@ -86,7 +86,7 @@ class IndicatorOutput:
         elif force < -s.capacity_N:
             status = "underload"
         stable = self._faults.lasting("unstable", e) is None
-        return Shown(
+        return IndicatorReading(
             force, (t - self._boot) * 1e3, stable, status, self._faults.lasting("unit", e) is not None
         )
 

@@ -3,6 +3,15 @@
 A line ``speed V`` (1/s: over the free length of the specimen) is answered with ``ok``. The machine is soft:
 while the specimen is elastic, part of the way goes into the machine, beyond yield all goes into the specimen. So
 the strain rate is not the speed, and jumps at yield; to hold it takes a controller. It only pulls.
+
+What the testing machine does over time: hold, pull to yield, pull on, hold.
+
+Two constant strain rates, as ISO 6892-1 has them: a slow one through the elastic part, where
+most is to be measured, and a faster one beyond yield. Times are seconds since the test began.
+
+The metal of the virtual specimen: elastic, then plastic with Voce and linear hardening.
+
+Uniaxial and rate independent. Nothing here unloads: the programme only ever pulls.
 """
 
 from __future__ import annotations
@@ -13,6 +22,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -117,3 +127,143 @@ class Machine:
                 self.drive(speed)
                 return "ok"
         return "no: give speed V, 1/s"
+
+
+@dataclass(frozen=True, slots=True)
+class Programme:
+    """Strain over time, made of straight pieces.
+
+    Attributes
+    ----------
+    hold_s : float, s
+        At rest, for the reference burst.
+    ramp_s : float, s
+        Pulling.
+    end_s : float, s
+        At rest at the highest strain.
+    knee_strain, max_strain : float
+        Axial strain where the rate changes, and at the end of the ramp.
+    knee : float
+        Part of the ramp's time spent up to ``knee_strain``.
+    machine : Machine or None
+        Driven from outside; then it alone says the strain, and the times are those of the test.
+    """
+
+    hold_s: float = 2.0
+    ramp_s: float = 17.0
+    end_s: float = 1.0
+    knee_strain: float = 2e-3
+    max_strain: float = 8e-3
+    knee: float = 0.6
+    machine: Machine | None = None
+
+    @property
+    def duration_s(self) -> float:
+        """Length of the whole test, s."""
+        return self.hold_s + self.ramp_s + self.end_s
+
+    @property
+    def knee_s(self) -> float:
+        """Time since the start at which the rate changes, s."""
+        return self.hold_s + self.knee * self.ramp_s
+
+    def strain(self, t: ArrayLike) -> Array:
+        """Axial strain at ``t`` seconds since the start; 0 before."""
+        if self.machine is not None:
+            return self.machine.strain(t)
+        times = (self.hold_s, self.knee_s, self.hold_s + self.ramp_s)
+        return np.asarray(np.interp(np.asarray(t, float), times, (0.0, self.knee_strain, self.max_strain)))
+
+    def progress(self, t: ArrayLike) -> Array:
+        """Part of the ramp that is done, 0 to 1."""
+        return np.clip((np.asarray(t, float) - self.hold_s) / self.ramp_s, 0.0, 1.0)
+
+
+class TestClock:
+    """When the test began, on the clock of whoever drives it; shared by both devices.
+
+    A simulated camera claims the start, so that the hold is not spent while a view opens; without
+    one, the load cell begins the test.
+    """
+
+    __test__ = False  # for pytest: not a test case
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._start: float | None = None
+        self.claimed = False
+
+    @property
+    def start(self) -> float | None:
+        """Monotonic seconds, or None before the test began."""
+        return self._start
+
+    def begin(self, now: float) -> float:
+        """Begin at ``now`` unless the test has begun already; gives the start, s."""
+        with self._lock:
+            if self._start is None:
+                self._start = now
+            return self._start
+
+    def elapsed(self, now: float) -> float:
+        """Seconds since the start; 0 before it began."""
+        return 0.0 if self._start is None else now - self._start
+
+
+PLASTIC_NU = 0.5  # plastic flow keeps the volume
+NEWTON_STEPS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class FlowCurve:
+    """Flow stress ``yield_stress + voce (1 - exp(-voce_rate ep)) + hardening ep`` over plastic strain ep.
+
+    Attributes
+    ----------
+    E : float, Pa
+    nu : float
+        Elastic Poisson's ratio; that of the plastic part is 0.5.
+    yield_stress : float, Pa
+    voce : float, Pa
+        Rise of the flow stress at saturation; 0 leaves linear hardening alone.
+    voce_rate : float
+        How fast it saturates, per unit of plastic strain.
+    hardening : float, Pa
+        Linear hardening modulus.
+    """
+
+    E: float = 70e9
+    nu: float = 0.33
+    yield_stress: float = 140e6
+    voce: float = 60e6
+    voce_rate: float = 300.0
+    hardening: float = 1e9
+
+    @property
+    def yield_strain(self) -> float:
+        """Axial strain where plastic flow begins."""
+        return self.yield_stress / self.E
+
+    def plastic_strain(self, strain: ArrayLike) -> Array:
+        """Plastic part of an axial strain >= 0, by Newton's rule.
+
+        The balance of flow stress and E (strain - ep) is concave and rising in ep, so that Newton
+        from ep = 0 approaches from one side and cannot overshoot.
+        """
+        total = np.asarray(strain, float)
+        ep = np.zeros_like(total)
+        for _ in range(NEWTON_STEPS):
+            decay = np.exp(-self.voce_rate * ep)
+            flow = self.yield_stress + self.voce * (1 - decay) + self.hardening * ep
+            slope = self.voce * self.voce_rate * decay + self.hardening + self.E
+            ep = np.maximum(ep - (flow - self.E * (total - ep)) / slope, 0.0)
+        return ep
+
+    def stress(self, strain: ArrayLike) -> Array:
+        """Axial stress, Pa, at an axial strain >= 0."""
+        return np.asarray(self.E * (np.asarray(strain, float) - self.plastic_strain(strain)))
+
+    def transverse(self, strain: ArrayLike) -> Array:
+        """Transverse strain at an axial strain >= 0."""
+        plastic = self.plastic_strain(strain)
+        return np.asarray(-self.nu * (np.asarray(strain, float) - plastic) - PLASTIC_NU * plastic)

@@ -19,7 +19,7 @@ from acquire.addresses import Address, Options
 from acquire.camera import CameraBase
 from acquire.frame import CameraInfo, Frame, frozen
 from hw_mocks.deformation import Affine
-from hw_mocks.sensor import Exposer, Sensor
+from hw_mocks.scene import Exposer, Sensor
 from hw_mocks.speckle import Speckle
 
 STILL = 1.0

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from hw_mocks.indicator import Indicator, Shown
+from hw_mocks.indicator import Indicator, IndicatorReading
 
 READ, WRITE_ONE, WRITE_MANY = 3, 6, 16
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
@@ -115,11 +115,11 @@ class ModbusIndicator(Indicator):
         self._written: dict[int, int] = {}
         self._peak = 0.0
 
-    def render(self, shown: Shown) -> bytes:
+    def render(self, shown: IndicatorReading) -> bytes:
         """The answer to a query of the gross weight alone."""
         return self._read(self.registers.gross, 2, shown)
 
-    def receive(self, data: bytes, shown: Shown) -> bytes:
+    def receive(self, data: bytes, shown: IndicatorReading) -> bytes:
         """Take bytes in any pieces; whole requests with a good CRC are answered."""
         self._partial += data
         answers = []
@@ -136,7 +136,7 @@ class ModbusIndicator(Indicator):
                 answers.append(self._respond(request[1], request[2:-2], shown))
         return b"".join(answers)
 
-    def _respond(self, function: int, body: bytes, shown: Shown) -> bytes:
+    def _respond(self, function: int, body: bytes, shown: IndicatorReading) -> bytes:
         self._peak = max(self._peak, shown.force)
         register, number = struct.unpack(">HH", body[:4])
         if function == READ:
@@ -151,7 +151,7 @@ class ModbusIndicator(Indicator):
                 return self._exception(function, ILLEGAL_VALUE)
         return self._framed(bytes([function]) + body[:4])
 
-    def _write(self, register: int, word: int, shown: Shown) -> bool:
+    def _write(self, register: int, word: int, shown: IndicatorReading) -> bool:
         r = self.registers
         if register != r.command:
             self._written[register] = word
@@ -162,7 +162,7 @@ class ModbusIndicator(Indicator):
             self._peak = shown.force
         return word in (0, r.zero, r.tare, r.reset_peak)
 
-    def _read(self, register: int, number: int, shown: Shown) -> bytes:
+    def _read(self, register: int, number: int, shown: IndicatorReading) -> bytes:
         if not 1 <= number <= MOST_REGISTERS:
             return self._exception(READ, ILLEGAL_VALUE)
         if register + number > self.registers.size:
@@ -171,7 +171,7 @@ class ModbusIndicator(Indicator):
         body = b"".join(struct.pack(">H", words.get(register + i, 0)) for i in range(number))
         return self._framed(bytes([READ, len(body)]) + body)
 
-    def _contents(self, shown: Shown) -> dict[int, int]:
+    def _contents(self, shown: IndicatorReading) -> dict[int, int]:
         """All registers that are not zero."""
         r = self.registers
         words = {**self._written, r.status: self._status(shown)}
@@ -188,7 +188,7 @@ class ModbusIndicator(Indicator):
         high, low = struct.unpack(">HH", struct.pack(FORMS[self.registers.value_type], value))
         return high, low
 
-    def _status(self, shown: Shown) -> int:
+    def _status(self, shown: IndicatorReading) -> int:
         r = self.registers
         bits = r.always | (r.stable if shown.stable else r.unstable) | (r.tared if self.offset else 0)
         return bits | {"overload": r.overload, "underload": r.underload}.get(shown.status, 0)

@@ -24,10 +24,8 @@ from acquire.closing import Closing
 from acquire.errors import DeviceError
 from acquire.events import EventSink, device_event
 from acquire.frame import CameraInfo, CameraSetting, Clock, Frame, frozen
-from hw_mocks.faults import CAMERA_FAULTS, FaultPlan, parse_faults
-from hw_mocks.frame_plan import Planned, plan_frames
-from hw_mocks.scene import Scene
-from hw_mocks.sensor import BITS, Exposer, Sensor
+from hw_mocks.faults import CAMERA_FAULTS, FaultPlan, Planned, parse_faults, plan_frames
+from hw_mocks.scene import BITS, Exposer, Scene, Sensor
 from hw_mocks.specimen import VirtualSpecimen, take_specimen
 
 log = logging.getLogger(__name__)

@@ -13,8 +13,7 @@ import math
 from collections.abc import Callable
 from typing import ClassVar
 
-from hw_mocks.ascii_indicator import AsciiIndicator
-from hw_mocks.indicator import NEWTONS, Indicator, Shown, decimals
+from hw_mocks.indicator import NEWTONS, AsciiIndicator, Indicator, IndicatorReading, decimals
 from hw_mocks.modbus_indicator import ModbusIndicator
 
 CRLF = b"\r\n"
@@ -27,17 +26,17 @@ class MtSicsIndicator(Indicator):
     serial_number: ClassVar[bytes] = b"B021002593"
     banner: ClassVar[bytes] = b'I4 A "B021002593"\r\n'
 
-    def render(self, shown: Shown) -> bytes:
+    def render(self, shown: IndicatorReading) -> bytes:
         """See ``Indicator``."""
         return b"S " + self._status_and_value(shown) + CRLF
 
-    def _status_and_value(self, shown: Shown) -> bytes:
+    def _status_and_value(self, shown: IndicatorReading) -> bytes:
         if shown.status != "ok":
             return {"overload": b"+", "underload": b"-", "error": b"I"}[shown.status]
         value, unit = self.displayed(shown)
         return f"{'S' if shown.stable else 'D'} {value:>10} {unit}".encode()
 
-    def answer(self, command: bytes, shown: Shown) -> bytes:
+    def answer(self, command: bytes, shown: IndicatorReading) -> bytes:
         """S SI SIU SIR SIRU SR SNR T TI TAC Z ZI @ I4; anything else is a syntax error."""
         if command in (b"S", b"SI", b"SIU", b"@"):
             self.left = 0.0
@@ -50,7 +49,7 @@ class MtSicsIndicator(Indicator):
             return self.render(shown)
         return self._other(command, shown)
 
-    def _other(self, command: bytes, shown: Shown) -> bytes:
+    def _other(self, command: bytes, shown: IndicatorReading) -> bytes:
         if command in (b"T", b"TI", b"Z", b"ZI"):
             if command in (b"T", b"Z") and not shown.stable:
                 return command + b" I" + CRLF
@@ -96,7 +95,7 @@ class AedStandardIndicator(Indicator):
         super().__init__(resolution, unit)
         self._second, self._prefix, self._blank = second_header, prefix, blank_overload
 
-    def render(self, shown: Shown) -> bytes:
+    def render(self, shown: IndicatorReading) -> bytes:
         """See ``Indicator``."""
         value, unit = self.displayed(shown)
         head = "ST" if shown.stable else "US"
@@ -107,14 +106,14 @@ class AedStandardIndicator(Indicator):
         padded = f"{unit:>2}" if self._second else f"{unit:>3}"
         return f"{self._prefix}{head},{second}{data}{padded}".encode() + CRLF
 
-    def _beyond(self, shown: Shown) -> tuple[str, str]:
+    def _beyond(self, shown: IndicatorReading) -> tuple[str, str]:
         if self._blank:
             return "OL", " " * 6 + ". "
         if shown.status == "underload":
             return "UL", "-9999999.9"
         return "OL", "+9999999.9"
 
-    def answer(self, command: bytes, shown: Shown) -> bytes:
+    def answer(self, command: bytes, shown: IndicatorReading) -> bytes:
         """Q (and KERN's W) at once, S when stable, SIR continuous until C, Z, T."""
         if command in (b"Q", b"W") or (command == b"S" and shown.stable):
             return self.render(shown)
@@ -138,18 +137,18 @@ class Mark10Indicator(Indicator):
         super().restart()
         self._full, self._peaks = True, [0.0, 0.0]
 
-    def render(self, shown: Shown) -> bytes:
+    def render(self, shown: IndicatorReading) -> bytes:
         """See ``Indicator``."""
         self._peaks = [max(self._peaks[0], self.net(shown)), min(self._peaks[1], self.net(shown))]
         return self._line(self.net(shown), shown)
 
-    def _line(self, force: float, shown: Shown) -> bytes:
+    def _line(self, force: float, shown: IndicatorReading) -> bytes:
         unit = self.foreign if shown.foreign_unit else self.unit
         value = -force / NEWTONS[unit] + 0.0  # no minus before zero
         text = f"{value:.{decimals(self.resolution / NEWTONS[unit])}f}"
         return (f"{text} {unit}" if self._full else text).encode() + CRLF
 
-    def answer(self, command: bytes, shown: Shown) -> bytes:
+    def answer(self, command: bytes, shown: IndicatorReading) -> bytes:
         """? ?C ?PT ?PC Z N LB KG FULL NUM AOUTn FLTCn LIST; *10 for anything else."""
         if command in (b"?", b"?C"):
             return self.render(shown)
@@ -191,7 +190,7 @@ class SauterIndicator(Indicator):
     ends: ClassVar[bytes] = b""
     WIDTH: ClassVar[int] = 6
 
-    def render(self, shown: Shown) -> bytes:
+    def render(self, shown: IndicatorReading) -> bytes:
         """See ``Indicator``."""
         force = self.net(shown)
         digits = decimals(self.resolution)
@@ -199,7 +198,7 @@ class SauterIndicator(Indicator):
             digits -= 1
         return f"{'1' if force >= 0 else '0'}{abs(force):0{self.WIDTH}.{digits}f}".encode()
 
-    def receive(self, data: bytes, shown: Shown) -> bytes:
+    def receive(self, data: bytes, shown: IndicatorReading) -> bytes:
         """Each ``9`` asks once; other bytes are not understood."""
         return b"".join(self.render(shown) for byte in data if byte == ord("9"))
 
@@ -228,7 +227,7 @@ class HbmAedIndicator(Indicator):
         super().restart()
         self._format = 9
 
-    def render(self, shown: Shown) -> bytes:
+    def render(self, shown: IndicatorReading) -> bytes:
         """See ``Indicator``; status bits: 0 to 2 overflows, 3 standstill."""
         beyond = shown.status in ("overload", "underload")
         counts = round(self.net(shown) / self._nominal * 1_000_000)
@@ -239,7 +238,7 @@ class HbmAedIndicator(Indicator):
         more = {3: "", 9: f",31,{status:03d}", 11: f",{status:03d}"}
         return (text + more[self._format]).encode() + CRLF
 
-    def answer(self, command: bytes, shown: Shown) -> bytes:
+    def answer(self, command: bytes, shown: IndicatorReading) -> bytes:
         """MSV?n STP TAR ICRn COFn NOV? IDN? ESR?; ``0`` for a good setting, ``?`` for a bad one."""
         if command.startswith(b"MSV?"):
             return self._measure(command[4:], shown)
@@ -254,7 +253,7 @@ class HbmAedIndicator(Indicator):
         answers = {b"NOV?": b"0000000", b"IDN?": b"HBM,AD103C,0012345,P20", b"ESR?": b"000"}
         return answers.get(command, b"?") + CRLF
 
-    def _measure(self, text: bytes, shown: Shown) -> bytes:
+    def _measure(self, text: bytes, shown: IndicatorReading) -> bytes:
         if not text:
             return self.render(shown)
         if not text.isdigit():

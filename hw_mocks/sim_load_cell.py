@@ -22,9 +22,8 @@ from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_cell import LoadCell, open_load_cell
 from acquire.load_sample import LoadCellInfo, LoadSample
-from hw_mocks.ascii_indicator import AsciiIndicator, Style
 from hw_mocks.faults import SERIAL_FAULTS, FaultPlan, parse_faults
-from hw_mocks.indicator import Indicator
+from hw_mocks.indicator import AsciiIndicator, Indicator, Style
 from hw_mocks.indicator_output import Sensing
 from hw_mocks.indicator_server import IndicatorServer
 from hw_mocks.sim_indicators import INDICATORS, HbmAedIndicator

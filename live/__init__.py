@@ -1,3 +1,3 @@
-"""Everything joined: configuration, devices, the measuring pipeline, results and the view."""
+"""The program: configuration, devices, the measuring pipeline, results and displays."""
 
 VERSION = "0.1.0"

@@ -14,7 +14,7 @@ from acquire.errors import PhasedicError
 from acquire.printable import brief, printable
 from live.commands.arguments import Command, parse
 from live.commands.exit_codes import EXIT_INTERRUPTED
-from live.unhurried import unhurried_streams
+from live.commands.streams import unhurried_streams
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -3,14 +3,18 @@
 A camera is a context manager and an iterable of frames. V4L2 devices, OpenCV cameras,
 video and image files, recorded sessions and the simulator differ in nothing else;
 ``tests/contracts`` holds all of them to this text.
+
+What all our cameras share: entering, stopping and closing. No device is touched here.
 """
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
+from acquire.closing import Closing
 from acquire.frame import CameraInfo, Frame
 
 
@@ -45,3 +49,40 @@ class Camera(Protocol):
     def stop(self) -> None: ...
 
     def close(self) -> None: ...
+
+
+class CameraBase(Closing):
+    """Base of cameras; a subclass gives ``info``, ``__iter__`` and, where needed, ``_start`` and ``_release``.
+
+    Attributes
+    ----------
+    stopped : threading.Event
+        Set by ``stop()`` and ``close()``; the iteration looks at it before every frame.
+    """
+
+    info: CameraInfo
+
+    def __init__(self) -> None:
+        self.stopped = threading.Event()
+        self._closed = False
+
+    def __enter__(self) -> Self:
+        self._start()
+        return self
+
+    def stop(self) -> None:
+        """End the iteration; from any thread."""
+        self.stopped.set()
+
+    def close(self) -> None:
+        """Release the device; may be called again without effect."""
+        self.stopped.set()
+        if not self._closed:
+            self._closed = True
+            self._release()
+
+    def _start(self) -> None:
+        """Begin to stream."""
+
+    def _release(self) -> None:
+        """Give the device back."""

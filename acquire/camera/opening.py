@@ -1,14 +1,32 @@
-"""Opening the camera that an address names, and listing the cameras that are there."""
+"""Opening the camera that an address names, and listing the cameras that are there.
+
+Guards around drivers that hide their faults: repeated pictures, dead handles, lost frames.
+
+Pure: told of pictures and times, they answer; they touch no device and read no clock.
+
+A part of a camera's picture as a camera of its own: what is cut away is neither measured nor stored.
+
+All coordinates downstream (ROI, mask, results) count from the corner of that part.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import logging
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from acquire.addresses import Registry, parse_address
 from acquire.camera.contract import Camera
 from acquire.events import EventSink, ignore_event
+from acquire.frame import CameraInfo, Frame, frozen
+from acquire.record_mode import Crop, RecordMode
 
 log = logging.getLogger(__name__)
 
@@ -107,3 +125,109 @@ def open_camera(address: str, on_event: EventSink = ignore_event) -> Camera:
         The device or file cannot be used; says why and what to do.
     """
     return CAMERAS.open(with_scheme(address), on_event)
+
+
+class RepeatGuard:
+    """Finds a driver that hands out the same picture again and again.
+
+    A sensor has noise: three pictures that agree in every bit are one picture.
+
+    Parameters
+    ----------
+    limit : int
+        Equal pictures in a row from which on they count as repeated.
+    """
+
+    def __init__(self, limit: int = 3) -> None:
+        self._limit = limit
+        self._last: NDArray[Any] | None = None
+        self.run = 0
+
+    def repeated(self, image: NDArray[Any]) -> bool:
+        """Whether this picture is the last of ``limit`` or more equal ones."""
+        same = self._last is not None and np.array_equal(self._last, image)
+        self.run = self.run + 1 if same else 1
+        self._last = image
+        return self.run >= self._limit
+
+    @property
+    def just_found(self) -> bool:
+        """Whether the last picture was the first to count as repeated (for one message a run)."""
+        return self.run == self._limit
+
+
+class FailureGuard:
+    """Tells a read that failed at once (a dead handle) from one that waited in vain (a stall).
+
+    Parameters
+    ----------
+    instant_s : float, s
+        A failure faster than this waited for nothing.
+    """
+
+    def __init__(self, instant_s: float = 0.005) -> None:
+        self._instant_s = instant_s
+
+    def verdict(self, took_s: float) -> str:
+        """Words for a failed read that took so long."""
+        if took_s < self._instant_s:
+            return "the device is gone or dead (its reads fail at once)"
+        return f"no picture within {took_s:.1f} s"
+
+
+def missing_between(earlier_t: float, later_t: float, fps: float | None) -> int:
+    """How many frames a steady camera must have lost between two stamps, by their distance.
+
+    Parameters
+    ----------
+    earlier_t, later_t : float, s
+    fps : float or None, 1/s
+        None or 0: nobody knows, 0 is the answer.
+    """
+    if not fps:
+        return 0
+    return max(0, round((later_t - earlier_t) * fps) - 1)
+
+
+class CroppedCamera:
+    """See ``acquire.camera.Camera``.
+
+    Parameters
+    ----------
+    camera : Camera
+    crop : (x, y, width, height), px
+
+    Raises
+    ------
+    ConfigError
+        The part leaves the picture.
+    """
+
+    def __init__(self, camera: Camera, crop: Crop) -> None:
+        self._camera, self._cut = camera, RecordMode(crop=crop)
+        self._cut.check(camera.info.width, camera.info.height)
+        controls = {**camera.info.controls, "crop": list(crop)}
+        self.info: CameraInfo = dataclasses.replace(
+            camera.info, width=crop[2], height=crop[3], controls=controls
+        )
+
+    def __enter__(self) -> Self:
+        self._camera.__enter__()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._camera.__exit__(kind, error, trace)
+
+    def __iter__(self) -> Iterator[Frame]:
+        for frame in self._camera:
+            yield dataclasses.replace(frame, image=frozen(self._cut.cut(frame.image).copy()))
+
+    def stop(self) -> None:
+        """End the iteration; from any thread."""
+        self._camera.stop()
+
+    def close(self) -> None:
+        """Release the device."""
+        self._camera.close()

@@ -2,10 +2,13 @@
 
 A file of somebody else may hold anything. Nothing outside of it is ever opened: links must be hard, and
 values must stand in the file itself. Nothing is read before its size is known to be that of what is stored.
+
+JSON that stands in a file, read as what it must be.
 """
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter
 from collections.abc import Mapping
@@ -17,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
+from acquire.hdf5.tables import word
 
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
 _MOST_BYTES = 1 << 31  # of a chunk, and of a column in memory
@@ -216,3 +220,71 @@ def _wrong(group: h5py.Group | h5py.Dataset, name: str, what: str) -> DataError:
     place = name if name.startswith("/") else f"{str(group.name).rstrip('/')}/{name}"
     said = "".join(c if c.isprintable() else "?" for c in f"{place} {what}")
     return DataError(f"{group.file.filename}: {said}; this is not a file as phasedic writes it")
+
+
+@dataclass(frozen=True, slots=True)
+class JsonField:
+    """What a value must be.
+
+    Attributes
+    ----------
+    kind : type
+        str, bool, int, float (which whole numbers are too), dict or list.
+    low, high : float
+        Range of a number, ends included; not a number is outside.
+    missing : bool
+        Whether it may be left out or null.
+    words : tuple of str
+        The texts that are allowed; empty: any.
+    """
+
+    kind: type
+    low: float = -math.inf
+    high: float = math.inf
+    missing: bool = False
+    words: tuple[str, ...] = ()
+
+    def takes(self, value: Any) -> bool:
+        """Whether ``value`` is so."""
+        if value is None:
+            return self.missing
+        if self.kind in (int, float):
+            number = isinstance(value, int) if self.kind is int else isinstance(value, int | float)
+            return (
+                number and not isinstance(value, bool) and self.low <= value <= self.high and _finite(value)
+            )
+        return isinstance(value, self.kind) and (not self.words or value in self.words)
+
+
+def _finite(value: float) -> bool:
+    return isinstance(value, int) or math.isfinite(value)
+
+
+def read_object(text: Any, where: str) -> dict[str, Any]:
+    """The JSON object that stands in ``text``.
+
+    Raises
+    ------
+    DataError
+        It is none.
+    """
+    try:
+        value = json.loads(word(text))
+    except (ValueError, RecursionError) as error:
+        raise DataError(f"{where} is not JSON ({error}); the file is damaged, or not of phasedic") from error
+    if not isinstance(value, dict):
+        raise DataError(f"{where} is not a JSON object; this is not a file as phasedic writes it")
+    return value
+
+
+def check_object(value: Mapping[str, Any], form: Mapping[str, JsonField], where: str) -> None:
+    """Refuse an object whose values are not of ``form``; others than those are let be.
+
+    Raises
+    ------
+    DataError
+    """
+    for name, said in form.items():
+        if not said.takes(value.get(name)):
+            shown = repr(value.get(name))[:60]
+            raise DataError(f"{where}: {name!r} is {shown}; this is not a file as phasedic writes it")

@@ -2,6 +2,10 @@
 
 A load cell is a context manager and an iterable of load samples; ``tests/contracts``
 holds all of them to this text.
+
+Opening the load cell that an address names.
+
+``none:``, the load cell of a test without one.
 """
 
 from __future__ import annotations
@@ -10,6 +14,10 @@ from collections.abc import Iterator
 from types import TracebackType
 from typing import Protocol, Self, runtime_checkable
 
+from acquire.addresses import Address, Options, Registry
+from acquire.closing import Closing
+from acquire.errors import ConfigError
+from acquire.events import EventSink, ignore_event
 from acquire.load_sample import LoadCellInfo, LoadSample
 
 
@@ -49,3 +57,69 @@ class LoadCell(Protocol):
     def stop(self) -> None: ...
 
     def close(self) -> None: ...
+
+
+LOAD_CELLS: Registry[LoadCell] = Registry(
+    "load cell",
+    "phasedic.load_cells",
+    {
+        "": "acquire.serial_line.cell:open_serial",
+        "none": "acquire.load_cell.contract:open_none",
+        "session": "acquire.session.devices:open_session_load",
+    },
+    fallback="acquire.serial_line.cell:open_serial",
+)
+
+
+def open_load_cell(address: str, on_event: EventSink = ignore_event) -> LoadCell:
+    """Open the load cell at ``address``.
+
+    Parameters
+    ----------
+    address : str
+        ``/dev/ttyUSB0?protocol=ascii&baud=115200&unit=N&sign=-1``, any pyserial URL with the
+        same keys, ``session:run.h5``, ``none:``, or a scheme registered by others.
+    on_event : callable taking an Event
+        Told of every fault and recovery; may be called from any thread.
+
+    Raises
+    ------
+    ConfigError, DeviceError, DataError
+        As for ``acquire.camera.open_camera``.
+    """
+    return LOAD_CELLS.open(address, on_event)
+
+
+class NoLoadCell(Closing):
+    """Gives no samples and ends at once."""
+
+    info = LoadCellInfo(address="none:", name="no load cell", protocol="none", clock="nominal")
+
+    def __iter__(self) -> Iterator[LoadSample]:
+        return iter(())
+
+    def tare(self, *, force: bool = False) -> None:
+        """Nothing to tare."""
+
+    def undo_tare(self) -> None:
+        """Nothing to undo."""
+
+    def stop(self) -> None:
+        """Nothing to stop."""
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+def open_none(address: Address, on_event: EventSink) -> NoLoadCell:
+    """Open ``none:``.
+
+    Raises
+    ------
+    ConfigError
+        The address says more than ``none:``.
+    """
+    Options(address).done()
+    if address.target:
+        raise ConfigError(f"{address.text}: nothing may follow none:, since it opens no device")
+    return NoLoadCell()

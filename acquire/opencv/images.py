@@ -22,11 +22,10 @@ from acquire.addresses import Address, Options
 from acquire.camera import CameraBase
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import EventSink, device_event, ignore_event
-from acquire.files import LOSSY, Source, check_regular, picture_source, read_picture_page
+from acquire.files.picture import LOSSY, Source, check_regular, picture_source, read_picture_page
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.opencv.gray import GRAYS, to_gray
-from acquire.opencv.image_stamps import read_stamps
-from acquire.opencv.tiff_pages import count_pages
+from acquire.opencv.image_metadata import count_pages, read_stamps
 
 SUFFIXES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")
 MOST_TOLD = 20  # pictures that are left out, one by one

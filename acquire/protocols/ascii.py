@@ -23,8 +23,7 @@ from acquire.addresses import Options
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
-from acquire.protocols.line_buffer import Line
-from acquire.protocols.line_parser import LineParser, bad, number
+from acquire.protocols.buffers import Line, LineParser, bad, number
 from acquire.protocols.units import is_unit
 
 SATURATED = {8388607.0: LoadFlag.OVERLOAD, -8388608.0: LoadFlag.UNDERLOAD}  # of a 24-bit converter

@@ -1,7 +1,11 @@
-"""What a protocol is: a description, a parser, and the bytes of its commands."""
+"""What a protocol is: a description, a parser, and the bytes of its commands.
+
+Every protocol by its name; a module is imported when it is first used.
+"""
 
 from __future__ import annotations
 
+import importlib
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -9,6 +13,7 @@ from types import MappingProxyType
 from typing import Literal
 
 from acquire.addresses import Options
+from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
 
 Mode = Literal["listen", "stream", "poll"]
@@ -120,3 +125,30 @@ class Protocol:
     max_rate: float = 10.0
     rates: Mapping[float, bytes] = field(default_factory=dict)
     silence_s: float = 0.1
+
+
+# Imported when used; each module has a PROTOCOL.
+PROTOCOLS: Mapping[str, str] = {
+    "ascii": "acquire.protocols.ascii",
+    "mt-sics": "acquire.protocols.mt_sics",
+    "aed-standard": "acquire.protocols.aed_standard",
+    "mark10": "acquire.protocols.mark10",
+    "sauter": "acquire.protocols.sauter",
+    "hbm-aed": "acquire.protocols.hbm_aed",
+    "modbus": "acquire.protocols.modbus",
+    "lines": "acquire.protocols.lines",
+}
+
+
+def find_protocol(name: str) -> Protocol:
+    """The protocol called ``name``.
+
+    Raises
+    ------
+    ConfigError
+        Nobody knows it; lists those there are.
+    """
+    if name not in PROTOCOLS:
+        raise ConfigError(f"no protocol is called {name!r}; there are: {', '.join(PROTOCOLS)}")
+    protocol: Protocol = importlib.import_module(PROTOCOLS[name]).PROTOCOL
+    return protocol

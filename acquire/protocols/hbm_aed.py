@@ -16,8 +16,7 @@ from acquire.addresses import Options
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
-from acquire.protocols.line_buffer import Line
-from acquire.protocols.line_parser import LineParser, bad, number
+from acquire.protocols.buffers import Line, LineParser, bad, number
 
 NOMINAL_COUNTS = 1_000_000
 OVERFLOW, STANDSTILL = 0b0111, 0b1000

@@ -24,8 +24,7 @@ from acquire.addresses import Options
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
-from acquire.protocols.line_buffer import Line, LineBuffer
-from acquire.protocols.line_parser import LineParser, bad, number
+from acquire.protocols.buffers import Line, LineBuffer, LineParser, bad, number
 
 STATES = {"overload": LoadFlag.OVERLOAD, "underload": LoadFlag.UNDERLOAD, "error": LoadFlag.ERROR}
 ENDS = {"line": b"\r\n", "cr": b"\r", "lf": b"\n", "etx": b"\x03"}

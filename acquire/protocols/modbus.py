@@ -14,7 +14,7 @@ from acquire.addresses import Options
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
-from acquire.protocols.held_bytes import HeldBytes
+from acquire.protocols.buffers import HeldBytes
 from acquire.protocols.modbus_profile import TYPES, FlagBit, Profile, load_profile
 
 LIMIT = 256  # longest frame of Modbus RTU

@@ -14,8 +14,7 @@ import re
 from acquire.addresses import Options
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
-from acquire.protocols.line_buffer import Line
-from acquire.protocols.line_parser import LineParser, bad, number
+from acquire.protocols.buffers import Line, LineParser, bad, number
 from acquire.protocols.units import is_unit
 
 _VALUE = re.compile(rb"S ([SD]) +([-+]? *[0-9]+(?:\.[0-9]*)?) ([A-Za-z]{1,4}) *")

@@ -15,8 +15,7 @@ import re
 from acquire.addresses import Options
 from acquire.load_sample import LoadFlag
 from acquire.protocols.base import Parser, Protocol, Reading
-from acquire.protocols.held_bytes import HeldBytes
-from acquire.protocols.line_parser import number
+from acquire.protocols.buffers import HeldBytes, number
 
 LENGTH = 7
 LIMIT = 64  # bytes kept of a babble without silence

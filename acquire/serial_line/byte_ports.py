@@ -2,6 +2,11 @@
 
 A socket is read by our own few lines: pyserial's reports one byte at a time, and its opening lasts as
 long as the other side keeps sending.
+
+A serial port behind a terminal server, by Telnet with the COM port option (RFC 854, RFC 2217).
+
+Our own client: pyserial's takes no write time-out, puts each byte into a queue without bound, and
+does not survive a server that ends a negotiation it has not begun.
 """
 
 from __future__ import annotations
@@ -9,7 +14,11 @@ from __future__ import annotations
 import contextlib
 import select
 import socket
+import time
+from collections.abc import Callable
 from typing import Any, Protocol
+
+from acquire.errors import DeviceError
 
 CONNECT_S = 3.0
 WRITE_S = 0.5
@@ -117,3 +126,183 @@ class TcpPort:
             self._socket.shutdown(socket.SHUT_RDWR)
         for one in (self._socket, self._woken, self._waker):
             one.close()
+
+
+SE, SB, WILL, WONT, DO, DONT, IAC = 240, 250, 251, 252, 253, 254, 255
+BINARY, SGA, COM_PORT = 0, 3, 44
+BAUD, SIZE, PARITY, STOP, CONTROL = 1, 2, 3, 4, 5
+ANSWER = 100  # what the server adds to the number of a command
+PARITIES = {"N": 1, "O": 2, "E": 3}
+STOPS = {1.0: 1, 2.0: 2, 1.5: 3}
+NO_FLOW_CONTROL, DTR_ON, RTS_ON = 1, 8, 11
+LONGEST = 64  # bytes kept of a negotiation
+
+_OURS, _THEIRS = frozenset({BINARY, SGA, COM_PORT}), frozenset({BINARY, SGA, COM_PORT})
+
+
+class Telnet:
+    """Takes Telnet's own words out of what the server sends.
+
+    Attributes
+    ----------
+    replies : bytearray
+        What has to be sent back; the caller takes it out.
+    willing : bool
+        The server speaks RFC 2217.
+    answered : set of int
+        Settings that the server has answered.
+    """
+
+    def __init__(self) -> None:
+        self.replies = bytearray()
+        self.willing = False
+        self.answered: set[int] = set()
+        self._begun = bytearray()  # of a command that is not whole yet
+        self._asked: set[tuple[int, int]] = set()
+
+    def begin(self) -> bytes:
+        """What is offered and asked for at the start."""
+        for action, option in ((WILL, COM_PORT), (DO, COM_PORT), (WILL, BINARY), (DO, BINARY), (DO, SGA)):
+            self._say(action, option)
+        return self.take_replies()
+
+    def take_replies(self) -> bytes:
+        """What is to be sent now."""
+        replies = bytes(self.replies)
+        self.replies.clear()
+        return replies
+
+    def feed(self, data: bytes) -> bytes:
+        """The data of the line in what has come."""
+        data, out = bytes(self._begun) + data, bytearray()
+        self._begun.clear()
+        at = 0
+        while at < len(data):
+            mark = data.find(b"\xff", at)
+            if mark < 0:
+                out += data[at:]
+                break
+            out += data[at:mark]
+            size = self._command(data[mark : mark + LONGEST])
+            if size == 0:  # the rest of it is still to come
+                self._begun += data[mark:]
+                break
+            out += b"\xff" if data[mark : mark + 2] == b"\xff\xff" else b""
+            at = mark + size
+        return bytes(out)
+
+    def _command(self, data: bytes) -> int:
+        """Do what a command at the beginning of ``data`` says; its length, 0 when it is not whole."""
+        if len(data) < 2:
+            return 0
+        if data[1] in (WILL, WONT, DO, DONT):
+            if len(data) < 3:
+                return 0
+            self._negotiate(data[1], data[2])
+            return 3
+        return self._settings(data) if data[1] == SB else 2
+
+    def _settings(self, data: bytes) -> int:
+        end = data.find(bytes([IAC, SE]), 2)
+        if end < 0:
+            return LONGEST if len(data) >= LONGEST else 0
+        if data[2:3] == bytes([COM_PORT]) and end > 3:
+            self.answered.add(data[3] - ANSWER)
+        return end + 2
+
+    def _negotiate(self, action: int, option: int) -> None:
+        if option == COM_PORT and action in (WILL, DO):
+            self.willing = True
+        if action == WILL:
+            self._say(DO if option in _THEIRS else DONT, option)
+        elif action == DO:
+            self._say(WILL if option in _OURS else WONT, option)
+
+    def _say(self, action: int, option: int) -> None:
+        """Once, so that no two sides can answer each other for ever."""
+        if (action, option) not in self._asked:
+            self._asked.add((action, option))
+            self.replies += bytes([IAC, action, option])
+
+
+def escaped(data: bytes) -> bytes:
+    """Data of the line as Telnet sends it."""
+    return data.replace(b"\xff", b"\xff\xff")
+
+
+def setting(command: int, value: int, size: int = 1) -> bytes:
+    """A command of RFC 2217."""
+    body = escaped(value.to_bytes(size, "big"))
+    return bytes([IAC, SB, COM_PORT, command]) + body + bytes([IAC, SE])
+
+
+class Rfc2217Port(TcpPort):
+    """The port, with its line set.
+
+    Parameters
+    ----------
+    host, port : str, int
+    line : bytes
+        The commands that set it (``line_settings``).
+    read_timeout_s : float, s
+
+    Raises
+    ------
+    OSError
+        Nobody answers.
+    DeviceError
+        What answers does not speak RFC 2217.
+    """
+
+    def __init__(self, host: str, port: int, line: bytes, read_timeout_s: float) -> None:
+        super().__init__(host, port, read_timeout_s)
+        self._telnet = Telnet()
+        try:
+            super().write(self._telnet.begin())
+            self._until(
+                lambda: self._telnet.willing, "speaks no RFC 2217; use socket:// for a plain connection"
+            )
+            super().write(line)
+            wanted = {BAUD, SIZE, PARITY, STOP}
+            self._until(
+                lambda: wanted <= self._telnet.answered, "does not answer to the settings of the line"
+            )
+        except BaseException:
+            self.close()
+            raise
+
+    def _until(self, done: Callable[[], bool], words: str) -> None:
+        until = time.monotonic() + CONNECT_S
+        while not done():
+            if time.monotonic() > until:
+                raise DeviceError(f"the other side {words}")
+            self._take(4096, 0.05)
+
+    def _take(self, limit: int, seconds: float) -> bytes:
+        data = self._telnet.feed(self._receive(limit, seconds))
+        if self._telnet.replies:
+            super().write(self._telnet.take_replies())
+        return data
+
+    def receive(self, limit: int, /, *, wait: bool = True) -> bytes:
+        """See ``Port``."""
+        return self._take(limit, self._read_timeout_s if wait else 0.0)
+
+    def write(self, data: bytes, /) -> object:
+        """See ``Port``."""
+        return super().write(escaped(data))
+
+
+def line_settings(baud: int, bytesize: int, parity: str, stopbits: float) -> bytes:
+    """The commands that set a line, without flow control, with DTR and RTS on."""
+    return b"".join(
+        (
+            setting(BAUD, baud, 4),
+            setting(SIZE, bytesize),
+            setting(PARITY, PARITIES[parity]),
+            setting(STOP, STOPS[stopbits]),
+            setting(CONTROL, NO_FLOW_CONTROL),
+            setting(CONTROL, DTR_ON),
+            setting(CONTROL, RTS_ON),
+        )
+    )

@@ -18,13 +18,12 @@ from acquire.closing import Closing
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
-from acquire.protocols import Reading
-from acquire.serial_line.clock import ArrivalTimes, DeviceClock, Pace
-from acquire.serial_line.link import Link, Means, Opener
+from acquire.protocols.base import Reading
+from acquire.serial_line.clock import ArrivalRate, ArrivalTimes, DeviceClock
+from acquire.serial_line.link import Flood, Link, LoadWatch, Means, Opener
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
 from acquire.serial_line.settings import SerialSettings, describe, read_settings
-from acquire.serial_line.watch import Flood, LoadWatch
 
 log = logging.getLogger(__name__)
 
@@ -70,7 +69,11 @@ class SerialCell(Closing):
         self._busy = threading.Lock()
         self._parser = settings.parser
         self._scaling = Scaling(settings, self._tell)
-        self._times, self._device, self._pace = ArrivalTimes(settings.byte_time_s), DeviceClock(), Pace()
+        self._times, self._device, self._pace = (
+            ArrivalTimes(settings.byte_time_s),
+            DeviceClock(),
+            ArrivalRate(),
+        )
         self._last_t = -math.inf  # of the last sample
         self._last_read = math.nan
         self._watch, self._flood = (

@@ -161,7 +161,7 @@ class DeviceClock:
         return math.sqrt(self._square / self._count) if self._count else math.nan
 
 
-class Pace:
+class ArrivalRate:
     """Which messages come later than the device's own pace lets them.
 
     A device sends at a pace of its own; the least delayed messages tie that pace to the host's clock, as

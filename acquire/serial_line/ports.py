@@ -11,8 +11,7 @@ from typing import Any
 from urllib.parse import parse_qsl, urlsplit
 
 from acquire.errors import ConfigError, DeviceError
-from acquire.serial_line.byte_ports import WRITE_S, Port, TcpPort, TtyPort
-from acquire.serial_line.rfc2217 import Rfc2217Port, line_settings
+from acquire.serial_line.byte_ports import WRITE_S, Port, Rfc2217Port, TcpPort, TtyPort, line_settings
 
 
 def _terminal_errors() -> tuple[type[Exception], ...]:

@@ -10,7 +10,8 @@ from acquire.addresses import Address, Options
 from acquire.errors import ConfigError
 from acquire.load_cell import Calibration, load_calibration
 from acquire.load_sample import LoadCellInfo
-from acquire.protocols import PROTOCOLS, Mode, Parser, Protocol, find_protocol, newtons_per
+from acquire.protocols.base import PROTOCOLS, Mode, Parser, Protocol, find_protocol
+from acquire.protocols.units import newtons_per
 from acquire.serial_line.ports import LineSettings
 
 

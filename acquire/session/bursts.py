@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.frame import Burst, frozen
-from acquire.hdf5 import GrowingDataset, PictureStack, Table
+from acquire.hdf5 import GrowingDataset, PictureStack, RowTable
 from acquire.record_mode import RecordMode
 from acquire.session import layout
 
@@ -45,7 +45,7 @@ class BurstTable:
     """
 
     def __init__(self, group: h5py.Group, mode: RecordMode) -> None:
-        self._rows = Table(group, list(layout.BURST_COLUMNS))
+        self._rows = RowTable(group, list(layout.BURST_COLUMNS))
         self._sums, self._clipped = PictureStack(group["sum"]), GrowingDataset(group["clipped"])
         self._mode = mode
         self.row_bytes = self._sums.row_bytes + self._clipped.row_bytes

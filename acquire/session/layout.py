@@ -3,23 +3,77 @@
 The file is HDF5 in NeXus conventions (docs/session-format.md describes it for other programs).
 All groups, datasets and attributes exist before the first frame, since a file in SWMR mode
 can only grow.
+
+What a session says once, at its start: devices, time zero, configuration, and what is recorded.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Self
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.clock import ClockPair
 from acquire.events import Event
 from acquire.frame import CameraInfo, Clock
 from acquire.hdf5 import NO_UNIT, Declared, new_group, new_json, say, to_json
 from acquire.load_sample import LoadCellInfo, LoadFlag
-from acquire.session.info import MOST_BURST_FRAMES, SessionInfo
+from acquire.record_mode import RecordMode
+
+MOST_BURST_FRAMES = 65536
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SessionInfo:
+    """The description of a recording.
+
+    Attributes
+    ----------
+    camera : CameraInfo
+    load : LoadCellInfo or None
+    start : ClockPair
+        The start of the test; ``time_s`` counts from here.
+    config, metadata, versions : mapping of str to JSON value
+    mode : RecordMode
+        Part of the picture; whether frames or bursts are what the file is for.
+    burst_frames : int
+        Frames of the longest burst that will be written.
+    set_id, part : str, int
+        Of a rotated recording (``RotatingWriter``).
+    """
+
+    camera: CameraInfo
+    load: LoadCellInfo | None
+    start: ClockPair
+    config: Mapping[str, Any]
+    metadata: Mapping[str, Any]
+    versions: Mapping[str, Any]
+    mode: RecordMode = dataclasses.field(default_factory=RecordMode)
+    burst_frames: int = MOST_BURST_FRAMES
+    set_id: str = ""
+    part: int = 0
+
+    def cropped(self) -> Self:
+        """The same with the camera as it is recorded: the part ``mode.crop`` of its picture.
+
+        Raises
+        ------
+        ConfigError
+            That part leaves the picture.
+        """
+        if self.mode.crop is None:
+            return self
+        self.mode.check(self.camera.width, self.camera.height)
+        _, _, width, height = self.mode.crop
+        return dataclasses.replace(self, camera=dataclasses.replace(self.camera, width=width, height=height))
+
 
 FORMAT = "phasedic-session"
 FORMAT_VERSION = 1

@@ -13,7 +13,7 @@ from typing import TypeVar
 from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.events import Event, EventKind, Level
-from acquire.session.info import SessionInfo
+from acquire.session.layout import SessionInfo
 from acquire.session.part import SessionPart
 from acquire.session.writer import SessionWriter
 

@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 from acquire.errors import DataError
 from acquire.events import Event, EventKind, Level
 from acquire.frame import CameraInfo
-from acquire.hdf5 import Declared, Said, check_object, open_dataset, open_datasets, read_object, stored_rows
+from acquire.hdf5 import (
+    Declared,
+    JsonField,
+    check_object,
+    open_dataset,
+    open_datasets,
+    read_object,
+    stored_rows,
+)
 from acquire.load_sample import LoadCellInfo
 from acquire.session import layout
 
@@ -32,41 +40,41 @@ EVENTS = Declared(f"S{layout.EVENT_BYTES}", (None,))
 LEDGER = Declared(f"S{layout.LEDGER_BYTES}", (1,))
 LINES = Declared("u1", (None,))
 
-_CLOCK = Said(str, words=layout.CLOCKS)
+_CLOCK = JsonField(str, words=layout.CLOCKS)
 CAMERA_SAID = {
-    "address": Said(str),
-    "name": Said(str),
-    "width": Said(int, 1, 65_535),
-    "height": Said(int, 1, 65_535),
-    "bits": Said(int, 1, 16),
-    "live": Said(bool),
+    "address": JsonField(str),
+    "name": JsonField(str),
+    "width": JsonField(int, 1, 65_535),
+    "height": JsonField(int, 1, 65_535),
+    "bits": JsonField(int, 1, 16),
+    "live": JsonField(bool),
     "clock": _CLOCK,
-    "fps": Said(float, 0, 1e9, missing=True),
-    "exposure_s": Said(float, 0, 1e9, missing=True),
-    "pixel_format": Said(str),
-    "controls": Said(dict),
-    "warnings": Said(list),
+    "fps": JsonField(float, 0, 1e9, missing=True),
+    "exposure_s": JsonField(float, 0, 1e9, missing=True),
+    "pixel_format": JsonField(str),
+    "controls": JsonField(dict),
+    "warnings": JsonField(list),
 }
 LOAD_SAID = {
-    "address": Said(str),
-    "name": Said(str),
-    "protocol": Said(str),
+    "address": JsonField(str),
+    "name": JsonField(str),
+    "protocol": JsonField(str),
     "clock": _CLOCK,
-    "sign": Said(int, -1, 1),
-    "capacity_N": Said(float, 0, layout.MOST_FORCE_N, missing=True),
-    "settings": Said(dict),
-    "warnings": Said(list),
+    "sign": JsonField(int, -1, 1),
+    "capacity_N": JsonField(float, 0, layout.MOST_FORCE_N, missing=True),
+    "settings": JsonField(dict),
+    "warnings": JsonField(list),
 }
 EVENT_SAID = {
-    "monotonic_s": Said(float, -layout.FURTHEST_S, layout.FURTHEST_S),
-    "kind": Said(str),
-    "source": Said(str),
-    "text": Said(str),
-    "level": Said(str, words=get_args(Level)),
-    "data": Said(dict),
+    "monotonic_s": JsonField(float, -layout.FURTHEST_S, layout.FURTHEST_S),
+    "kind": JsonField(str),
+    "source": JsonField(str),
+    "text": JsonField(str),
+    "level": JsonField(str, words=get_args(Level)),
+    "data": JsonField(dict),
 }
-_FRAME = Said(int, 0, 2**63 - 1)
-BURST_SAID = {"first": _FRAME, "last": _FRAME, "n": Said(int, 1, 65_536)}
+_FRAME = JsonField(int, 0, 2**63 - 1)
+BURST_SAID = {"first": _FRAME, "last": _FRAME, "n": JsonField(int, 1, 65_536)}
 _TELLS_OF_A_BURST = {EventKind.REFERENCE, EventKind.MEASURED}
 
 
@@ -85,7 +93,7 @@ def load_from(text: Any, where: str) -> LoadCellInfo | None:
     return LoadCellInfo(**_described(text, LOAD_SAID, where))
 
 
-def _described(text: Any, form: Mapping[str, Said], where: str) -> dict[str, Any]:
+def _described(text: Any, form: Mapping[str, JsonField], where: str) -> dict[str, Any]:
     said = read_object(text, where)
     check_object(said, form, where)
     return {name: said[name] for name in form if name in said} | {
@@ -250,7 +258,7 @@ def _event_from(text: bytes, where: str) -> Event | None:
 def config_from(text: Any, where: str) -> dict[str, Any]:
     """The configuration: sections of keys."""
     config = read_object(text, where)
-    check_object(config, dict.fromkeys(config, Said(dict)), where)
+    check_object(config, dict.fromkeys(config, JsonField(dict)), where)
     return config
 
 

@@ -24,11 +24,20 @@ from acquire.closing import Closing
 from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Burst, Frame
-from acquire.hdf5 import GrowingDataset, Pace, PictureStack, Table, ToDisk, free_bytes, let_go, to_json
+from acquire.hdf5 import (
+    FlushTimer,
+    GrowingDataset,
+    PictureStack,
+    RowTable,
+    ToDisk,
+    free_bytes,
+    let_go,
+    to_json,
+)
 from acquire.load_sample import LoadSample
 from acquire.session import layout
 from acquire.session.bursts import BurstTable
-from acquire.session.info import SessionInfo
+from acquire.session.layout import SessionInfo
 
 log = logging.getLogger(__name__)
 
@@ -77,7 +86,7 @@ class SessionWriter(Closing):
         self.path = Path(path)
         self._camera, self._start = recorded.camera, info.start.monotonic
         self._mode = dataclasses.replace(info.mode, crop=None) if cut_already else info.mode
-        self._pace = Pace(FLUSH_S, now)
+        self._pace = FlushTimer(FLUSH_S, now)
         self._held_lines: list[bytes] = []
         self._held_events: list[np.ndarray[Any, Any]] = []
         self._line_end = 0
@@ -98,11 +107,11 @@ class SessionWriter(Closing):
 
     def _find_datasets(self, entry: h5py.Group) -> None:
         self._images = PictureStack(entry["frames/image"])
-        self._frames = Table(entry["frames"], list(layout.FRAME_COLUMNS))
-        self._load = Table(entry["load"], list(layout.LOAD_COLUMNS))
+        self._frames = RowTable(entry["frames"], list(layout.FRAME_COLUMNS))
+        self._load = RowTable(entry["load"], list(layout.LOAD_COLUMNS))
         self._lines = GrowingDataset(entry["load/lines"])
         self._events = GrowingDataset(entry["events"])
-        self._clock = Table(entry["clock"], list(layout.CLOCK_COLUMNS))
+        self._clock = RowTable(entry["clock"], list(layout.CLOCK_COLUMNS))
         self._ledger: h5py.Dataset = entry["ledger"]
         self._bursts = BurstTable(entry["bursts"], self._mode)
 

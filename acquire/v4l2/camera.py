@@ -22,13 +22,19 @@ from numpy.typing import NDArray
 from acquire.addresses import Address, Options
 from acquire.camera import CameraBase
 from acquire.errors import ConfigError, DataError, DeviceError, PhasedicError
-from acquire.events import EventSink, Level, Muffler, device_event
+from acquire.events import EventSink, Level, RateLimiter, device_event
 from acquire.frame import CameraInfo, Clock, Frame
 from acquire.v4l2.api import Kernel
 from acquire.v4l2.controls import ControlWishes
-from acquire.v4l2.counter import FrameCounter
 from acquire.v4l2.device import NotACamera, Stamp, V4L2Device
-from acquire.v4l2.faults import cameras_here, fault_in_words, find_again, identities, why_not_open
+from acquire.v4l2.faults import (
+    FrameCounter,
+    cameras_here,
+    fault_in_words,
+    find_again,
+    identities,
+    why_not_open,
+)
 from acquire.v4l2.formats import PLANES, decode, picture_size
 from acquire.v4l2.setup import Setup, V4L2Settings, set_up
 
@@ -87,7 +93,7 @@ class V4L2Camera(CameraBase):
         self._t = float("-inf")
         self._running = False
         self._guard = threading.RLock()  # whoever closes must not take the buffers from under a reader
-        self._short = Muffler()
+        self._short = RateLimiter()
         self._last_sign = self._last_picture = self._not_before = 0.0
         self._stalled = self._late = False
         self._stale = self._wakes = 0

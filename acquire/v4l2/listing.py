@@ -101,7 +101,7 @@ def _stable(node: str) -> str:
 
 
 def _opencv_cameras() -> list[CameraListing]:
-    from acquire.opencv import capture
+    from acquire.opencv.webcam import capture
 
     found = []
     for number in OPENCV_NUMBERS:

@@ -25,8 +25,7 @@ os.environ.setdefault("GOMP_SPINCOUNT", "5000")
 import numba
 from numba.np.ufunc import parallel as numba_threads
 
-from analysis.compiled.layer import threading_layer
-from analysis.compiled.start_lock import give_start_lock
+from analysis.compiled.layer import give_start_lock, threading_layer
 
 give_start_lock(numba_threads)
 log = logging.getLogger("analysis")

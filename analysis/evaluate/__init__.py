@@ -10,13 +10,12 @@ load comes beside the frames. ``floor`` has the still phase of a test and the no
 from analysis.evaluate.curve import Curve, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import LoadAxis, load_axis, principal_direction
-from analysis.evaluate.figure import CONFIDENCE, Figure
+from analysis.evaluate.figure import CONFIDENCE, STANDARDS, Band, Figure, Interval, Standard, free
 from analysis.evaluate.floor import FEWEST_STILL, NoiseFloor, evenly, noise_floor, still_phase
 from analysis.evaluate.gauge_kinds import GAUGE_KINDS, AreaGauge, LineGauge, TransverseGauge, ZoiGauge
 from analysis.evaluate.gauges import Gauge, GaugeValue, Parameter, inside_polygon
 from analysis.evaluate.lag import Track, find_lag
-from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
-from analysis.evaluate.tensile import Options, Span, TensileFigures, Zero, ZeroBy, evaluate_test
+from analysis.evaluate.tensile import Span, StrainZero, TensileFigures, TensileOptions, ZeroBy, evaluate_test
 
 __all__ = [
     "CONFIDENCE",
@@ -33,14 +32,14 @@ __all__ = [
     "LineGauge",
     "LoadAxis",
     "NoiseFloor",
-    "Options",
     "Parameter",
     "Span",
     "Standard",
+    "StrainZero",
     "TensileFigures",
+    "TensileOptions",
     "Track",
     "TransverseGauge",
-    "Zero",
     "ZeroBy",
     "ZoiGauge",
     "deconvolved",

@@ -14,9 +14,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate.curve import Loading
+from analysis.evaluate.curve import Loading, UncertainValue, first_crossing, noise, reading
 from analysis.evaluate.figure import Figure
-from analysis.evaluate.series import Reading, first_crossing, noise, reading
 
 Floats = NDArray[np.float64]
 
@@ -28,7 +27,7 @@ _END = 0.1  # of the points of the interval: read at each end of a chord
 
 
 @dataclass(frozen=True, slots=True)
-class Line:
+class FittedLine:
     """stress = slope (strain - strain0), from points of both noises.
 
     Attributes
@@ -74,7 +73,7 @@ class Line:
         return Figure.about(self.slope, self.sigma, self.n - 2)
 
 
-def line_through(loading: Loading, first: int, last: int) -> Line | None:
+def line_through(loading: Loading, first: int, last: int) -> FittedLine | None:
     """The line through the points ``first:last``; None where they are too few or do not rise."""
     x, y = loading.strain[first:last], loading.stress[first:last]
     n = len(x)
@@ -89,7 +88,7 @@ def line_through(loading: Loading, first: int, last: int) -> Line | None:
     scatter = math.sqrt(float(rest @ rest) / (n - 2))
     sigma = slope * slope * scatter / math.sqrt(slope * sxy)
     strain0 = float(x.mean() - y.mean() / slope)
-    return Line(slope, sigma, strain0, sxy**2 / sxx / syy, n, float(y.mean()), scatter, first, last)
+    return FittedLine(slope, sigma, strain0, sxy**2 / sxx / syy, n, float(y.mean()), scatter, first, last)
 
 
 def _slope(sxx: float, sxy: float, syy: float, noise_x: float, noise_y: float) -> float:
@@ -115,7 +114,7 @@ def between(course: Floats, low: float, high: float) -> tuple[int, int]:
     return (int(below[-1]) + 1 if len(below) else 0), stop
 
 
-def chord(loading: Loading, line: Line) -> Figure:
+def chord(loading: Loading, line: FittedLine) -> Figure:
     """The modulus by the two ends of the interval of ``line``, each read from a tenth of its points."""
     (e0, e1), (s0, s1) = (
         _ends(values, line, sigma)
@@ -131,7 +130,7 @@ def chord(loading: Loading, line: Line) -> Figure:
     return Figure.about(rise / run, rise / run * share)
 
 
-def poisson(loading: Loading, line: Line) -> Figure:
+def poisson(loading: Loading, line: FittedLine) -> Figure:
     """Poisson's ratio over the interval of ``line``.
 
     Both strains are fitted against the stress, whose noise is the least, and the slopes divided.
@@ -245,7 +244,7 @@ def _turned(angle: Figure, at: float) -> Figure:
     return off.minus(math.pi * round(off.value / math.pi)) if off.known else off
 
 
-def _ends(values: Floats, line: Line, least_sigma: float) -> tuple[Reading, Reading]:
+def _ends(values: Floats, line: FittedLine, least_sigma: float) -> tuple[UncertainValue, UncertainValue]:
     reach = max(3, round(_END * line.n))
     first, last = (
         reading(values, k, k - reach, k + reach + 1, least_sigma) for k in (line.first, line.last - 1)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate.series import noise
+from analysis.evaluate.curve import noise
 
 Floats = NDArray[np.float64]
 

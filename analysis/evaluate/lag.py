@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.evaluate.curve import noise
 from analysis.evaluate.figure import Figure, quantile
-from analysis.evaluate.series import noise
 
 Floats = NDArray[np.float64]
 

@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.evaluate.curve import Curve, Loading
-from analysis.evaluate.elastic import Line
+from analysis.evaluate.curve import Curve, Floats, Loading, first_crossing, noise, reading, smoothed
+from analysis.evaluate.elastic import FittedLine
 from analysis.evaluate.figure import Figure, quantile
-from analysis.evaluate.series import Floats, first_crossing, noise, reading, smoothed
 
 _DROP, _RANGE = (
     0.005,
@@ -37,7 +36,7 @@ class Yield:
     at: int = -1
 
 
-def proof_strength(loading: Loading, line: Line, offset: float) -> Figure:
+def proof_strength(loading: Loading, line: FittedLine, offset: float) -> Figure:
     """Rp: the stress at which ``offset`` plastic strain is reached, parallel to ``line`` (3.10.3), Pa."""
     plastic = loading.strain - line.strain_at(loading.stress)
     course = smoothed(plastic, loading.half)
@@ -55,7 +54,7 @@ def proof_strength(loading: Loading, line: Line, offset: float) -> Figure:
     return Figure.about(value, math.hypot(stress.sigma, hardening * doubt), max(last - first - 3, 4))
 
 
-def yield_point(loading: Loading, line: Line) -> Yield:
+def yield_point(loading: Loading, line: FittedLine) -> Yield:
     """ReH and ReL (3.10.2, annex A), or why the curve has none."""
     highest = np.maximum.accumulate(loading.stress)
     fallen = (loading.level < highest * (1 - _DROP)) & (
@@ -120,7 +119,7 @@ def _passed(loading: Loading, at: int) -> int:
     return at + 1 + int(again[0]) if len(again) else loading.n - 1
 
 
-def _begins_to_flow(loading: Loading, line: Line, at: int) -> bool:
+def _begins_to_flow(loading: Loading, line: FittedLine, at: int) -> bool:
     """Whether a peak that is never passed again is a yield point and not the beginning of a neck."""
     plastic = loading.course[at] - line.strain_at(loading.level[at])
     return bool(plastic < 4 * _RANGE and loading.course[-1] - loading.course[at] >= _PLATEAU)

@@ -12,11 +12,9 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.evaluate.curve import Curve, Loading
-from analysis.evaluate.elastic import FEWEST, Line, between, chord, line_through, poisson
-from analysis.evaluate.figure import Figure
-from analysis.evaluate.series import first_crossing, reading
-from analysis.evaluate.standards import STANDARDS, Band, Standard
+from analysis.evaluate.curve import Curve, Loading, first_crossing, reading
+from analysis.evaluate.elastic import FEWEST, FittedLine, between, chord, line_through, poisson
+from analysis.evaluate.figure import STANDARDS, Band, Figure, Standard
 from analysis.evaluate.strengths import (
     Yield,
     proof_strength,
@@ -32,7 +30,7 @@ _ROUNDS = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class TensileOptions:
     """How a test is evaluated.
 
     Attributes
@@ -56,7 +54,7 @@ class Options:
 
 
 @dataclass(frozen=True, slots=True)
-class Zero:
+class StrainZero:
     """The measured strain that counts as none, and how it was found, in words."""
 
     strain: float
@@ -95,7 +93,7 @@ class TensileFigures:
     seconds : Figure, s
         From the start of the loading to the break, or to the highest stress.
     span : Span or None
-    zero : Zero
+    zero : StrainZero
     standard : str
     """
 
@@ -117,24 +115,24 @@ class TensileFigures:
     rate_plastic: Figure
     seconds: Figure
     span: Span | None
-    zero: Zero
+    zero: StrainZero
     standard: str
 
 
-def evaluate_test(curve: Curve, options: Options | None = None) -> TensileFigures:
+def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> TensileFigures:
     """Evaluate a test.
 
     Parameters
     ----------
     curve : Curve
         As measured, from before the load to the end.
-    options : Options, optional
+    options : TensileOptions, optional
 
     Returns
     -------
     TensileFigures
     """
-    options = options or Options()
+    options = options or TensileOptions()
     loading, strength = Loading.of(curve), tensile_strength(curve)
     if loading.n < FEWEST or loading.stress[loading.top] <= 0:
         words = f"strain and a tensile stress are known together at {loading.n} points"
@@ -147,14 +145,14 @@ def evaluate_test(curve: Curve, options: Options | None = None) -> TensileFigure
 
 @dataclass(frozen=True, slots=True)
 class _Elastic:
-    line: Line
+    line: FittedLine
     flow: Yield
-    zero: Zero
+    zero: StrainZero
 
 
-def _elastic(loading: Loading, options: Options) -> _Elastic | str:
+def _elastic(loading: Loading, options: TensileOptions) -> _Elastic | str:
     """The elastic line and what its interval hangs on, found in turns until they agree; or why there is none."""
-    limit, zero = 0.5 * float(loading.stress[loading.top]), Zero(0.0, "as measured")
+    limit, zero = 0.5 * float(loading.stress[loading.top]), StrainZero(0.0, "as measured")
     found: _Elastic | None = None
     for _ in range(_ROUNDS):
         first, last, words = _interval(loading, options.standard, limit, zero.strain)
@@ -182,22 +180,24 @@ def _interval(loading: Loading, standard: Standard, limit: float, zero: float) -
     return *between(course, low, high), f"between the strains {100 * low:.3g} % and {100 * high:.3g} %"
 
 
-def _zero(loading: Loading, options: Options, line: Line) -> Zero:
+def _zero(loading: Loading, options: TensileOptions, line: FittedLine) -> StrainZero:
     if options.zero == "toe":
-        return Zero(line.strain0, "where the elastic line has no stress (toe compensation)")
+        return StrainZero(line.strain0, "where the elastic line has no stress (toe compensation)")
     if options.zero == "raw":
-        return Zero(0.0, "as measured")
+        return StrainZero(0.0, "as measured")
     at = first_crossing(loading.level, options.preload)
     if math.isnan(at):
-        return Zero(
+        return StrainZero(
             float(loading.strain[0]), "the first value; the preload was there from the beginning or never"
         )
     k = int(at)
     value = reading(loading.strain, at, k - FEWEST, k + FEWEST, loading.noise_strain).value
-    return Zero(value, "where the stress first reached the preload")
+    return StrainZero(value, "where the stress first reached the preload")
 
 
-def _with_line(loading: Loading, options: Options, elastic: _Elastic, strength: Figure) -> TensileFigures:
+def _with_line(
+    loading: Loading, options: TensileOptions, elastic: _Elastic, strength: Figure
+) -> TensileFigures:
     line, flow, zero = elastic.line, elastic.flow, elastic.zero.strain
     rp01, rp02, rp1 = (proof_strength(loading, line, offset) for offset in (0.001, 0.002, 0.01))
     agt, at = (_from_zero(f(loading), zero) for f in (strain_at_top, strain_at_break))
@@ -232,7 +232,7 @@ def _without_flow(figures: TensileFigures) -> TensileFigures:
     return replace(figures, Rp01=none, Rp02=none, Rp1=none, ReH=none, ReL=none, Ag=none, A=none)
 
 
-def _without_line(loading: Loading, options: Options, why: str) -> TensileFigures:
+def _without_line(loading: Loading, options: TensileOptions, why: str) -> TensileFigures:
     zero = 0.0 if options.zero != "preload" else float(loading.strain[0])
     how = "as measured" if options.zero != "preload" else "the first value"
     return replace(
@@ -240,14 +240,14 @@ def _without_line(loading: Loading, options: Options, why: str) -> TensileFigure
         Agt=_from_zero(strain_at_top(loading), zero),
         At=_from_zero(strain_at_break(loading), zero),
         seconds=_seconds(loading, options.standard),
-        zero=Zero(zero, how),
+        zero=StrainZero(zero, how),
     )
 
 
-def _nothing(why: str, options: Options) -> TensileFigures:
+def _nothing(why: str, options: TensileOptions) -> TensileFigures:
     texts = {
         "span": None,
-        "zero": Zero(0.0, "as measured"),
+        "zero": StrainZero(0.0, "as measured"),
         "standard": options.standard.name,
         "r2": math.nan,
     }
@@ -259,13 +259,13 @@ def _from_zero(strain: Figure, zero: float) -> Figure:
     return strain.minus(zero) if strain.known else strain
 
 
-def _plastic(total: Figure, stress: float, line: Line) -> Figure:
+def _plastic(total: Figure, stress: float, line: FittedLine) -> Figure:
     if not total.known:
         return total
     return total.minus(stress / line.slope, stress / line.slope * line.sigma / line.slope)
 
 
-def _span(loading: Loading, line: Line, zero: float) -> Span:
+def _span(loading: Loading, line: FittedLine, zero: float) -> Span:
     ends = [line.first, line.last - 1]
     strain, stress = loading.course[ends] - zero, loading.level[ends]
     return Span((float(strain[0]), float(strain[1])), (float(stress[0]), float(stress[1])), line.n)
@@ -284,7 +284,7 @@ def _rate(loading: Loading, first: int, last: int, bands: tuple[Band, ...]) -> F
     return replace(found, why=_against(slope, bands))
 
 
-def _midway(loading: Loading, line: Line) -> int:
+def _midway(loading: Loading, line: FittedLine) -> int:
     """Where half the strain between the elastic interval and the highest stress has gone."""
     first, last = line.last - 1, loading.top
     if last <= first:

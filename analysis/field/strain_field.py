@@ -3,24 +3,79 @@
 Strains, rotation and principal values are derived here from the displacement gradient
 (docs/method.md); nothing is smoothed. x points right and y down on the screen, so a positive
 ``omega`` is clockwise.
+
+The named values of a field as attributes: ``field.exx`` is ``field.value("exx")``, ``sigma_exx`` its sigma.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.field.attributes import Sigma, Value
-from analysis.field.grid import ZoiGrid
+from analysis.field.grid import Window, ZoiGrid
 from analysis.field.motion import Motion
 from analysis.field.status import Status
-from analysis.field.tensor import Floats, Measure, StrainTensor, elongations, half_logarithm
-from analysis.field.uncertainty import PAIR_INDEX, Sums, combination, fixed_sum, products, variance_of_sum
-from analysis.field.windows import Window
+from analysis.field.uncertainty import (
+    PAIR_INDEX,
+    Floats,
+    Measure,
+    StrainTensor,
+    Sums,
+    combination,
+    elongations,
+    fixed_sum,
+    half_logarithm,
+    products,
+    variance_of_sum,
+)
+
+
+class Named(Protocol):
+    """What knows values by their names."""
+
+    def value(self, name: str, /) -> Floats: ...
+
+    def sigma(self, name: str, /) -> Floats: ...
+
+
+class Value:
+    """An attribute that is the value of its own name, (R, C); ``text`` says which and in what unit."""
+
+    def __init__(self, text: str) -> None:
+        self.__doc__ = text
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        combination(name)  # a name that is not known is refused here
+        self.name = name
+
+    @overload
+    def __get__(self, field: None, owner: type) -> Self: ...
+
+    @overload
+    def __get__(self, field: Named, owner: type) -> Floats: ...
+
+    def __get__(self, field: Named | None, owner: type) -> Self | Floats:
+        return self if field is None else self.of(field)
+
+    def of(self, field: Named) -> Floats:
+        return field.value(self.name)
+
+
+class Sigma(Value):
+    """An attribute ``sigma_NAME`` that is the standard uncertainty of the value NAME, (R, C), in its unit."""
+
+    def __init__(self) -> None:
+        super().__init__("Standard uncertainty of the value of this name, (R, C), in its unit.")
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        super().__set_name__(owner, name.removeprefix("sigma_"))
+
+    def of(self, field: Named) -> Floats:
+        return field.sigma(self.name)
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

@@ -15,22 +15,32 @@ from typing import Any
 import numpy as np
 from numba import prange
 
-from analysis.compiled.cores import caller, keep_apart
 from analysis.compiled.loops import helper, inlined, parallel
-from analysis.compiled.shares import SHARES, next_piece
+from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.compiled.vectors import LANES, fetch_later, fetch_soon
-from analysis.fit.bundles import CONVERGED, DIVERGED, LEFT_IMAGE, RUNNING, Fit, Out, Picture, Stop
-from analysis.fit.moments import (
+from analysis.fit.kernel_args import (
+    CONVERGED,
+    DIVERGED,
+    LEFT_IMAGE,
+    RUNNING,
+    FitArgs,
+    OutArgs,
+    PictureArgs,
+    StopArgs,
+)
+from analysis.fit.shapes import (
     CHANNELS,
     DEGREES,
     DIFFERENCE_ROWS,
+    N_SHAPES,
     add_difference_columns,
+    bent,
     difference_moments,
+    shares,
     weighted_rows,
 )
-from analysis.fit.shapes import N_SHAPES, bent, shares
-from analysis.picture import PAD
 from analysis.picture.cutting import ROWS, displacement, inside, new_plan, plan_rows
+from analysis.picture.splines import PAD
 from analysis.picture.warp import warp_cut_rows, warp_rows
 
 f4 = np.float32
@@ -208,7 +218,7 @@ def _fetch_all(array: Any, z: int) -> None:
 
 
 @parallel
-def track(picture: Picture, table: Any, fit: Fit, stop: Stop, out: Out) -> None:
+def track(picture: PictureArgs, table: Any, fit: FitArgs, stop: StopArgs, out: OutArgs) -> None:
     """Measure all ZOIs from the start values in ``out.p`` and write what is found to ``out``.
 
     ``table`` (18,) has the weights of the taps (``splines.tap_table``). It is no part of the picture, since
@@ -305,7 +315,7 @@ def _settled(step: Any, half: int, lever: Any, length_left: Any, slope_left: Any
 
 
 @parallel
-def warp_zois(picture: Picture, table: Any, origins: Any, size: int, p: Any, out: Any) -> None:
+def warp_zois(picture: PictureArgs, table: Any, origins: Any, size: int, p: Any, out: Any) -> None:
     """The deformed image in every warped ZOI of order 1, (A, n, n) float32, written to ``out``."""
     line = (size + LANES - 1) // LANES * LANES
     for z in prange(len(origins)):
@@ -328,7 +338,7 @@ def compose_all(p: Any, steps: Any) -> None:
 
 
 @helper
-def within_image(picture: Picture, origins: Any, size: int, p: Any, out: Any) -> None:
+def within_image(picture: PictureArgs, origins: Any, size: int, p: Any, out: Any) -> None:
     """Whether each warped ZOI of order 1 lies in the image, written to ``out`` (A,) bool."""
     reach = (size - 1) / 2
     for z in range(len(p)):

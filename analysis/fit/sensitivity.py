@@ -16,12 +16,10 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from analysis.compiled.cores import caller, keep_apart
 from analysis.compiled.loops import helper, parallel
-from analysis.compiled.shares import SHARES, next_piece
-from analysis.fit.bundles import Images, Normal, WindowRows
-from analysis.fit.moments import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, product_moments
-from analysis.fit.shapes import cross_moments
+from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
+from analysis.fit.kernel_args import Images, Normal, WindowRows
+from analysis.fit.shapes import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, cross_moments, product_moments
 
 CHUNK = 32
 """ZOIs that a thread takes at a time."""

@@ -10,7 +10,7 @@ from typing import Any
 
 from analysis.compiled.loops import helper
 from analysis.field import Status
-from analysis.fit.bundles import CONVERGED, LEFT_IMAGE, Known, Out, Rule
+from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, ReferenceArgs, VerdictArgs
 from analysis.fit.validity import (
     BENDING_CHANCE,
     BENDING_SHARE,
@@ -33,17 +33,19 @@ NO_PATTERN = int(Status.NO_PATTERN)
 
 
 @helper
-def judge(found: Out, left: Any, expected: Any, known: Known, rule: Rule, out: Any) -> None:
+def judge(
+    found: OutArgs, left: Any, expected: Any, known: ReferenceArgs, rule: VerdictArgs, out: Any
+) -> None:
     """Write a status for each measured ZOI.
 
     Parameters
     ----------
-    found : Out
+    found : OutArgs
         Of the iteration.
     left, expected : (A,), GL^2
         Variance a pixel that the fit leaves, and expected from the noise of both images.
-    known : Known
-    rule : Rule
+    known : ReferenceArgs
+    rule : VerdictArgs
     out : (A,) uint8, written
     """
     for z in range(len(out)):

@@ -1,15 +1,249 @@
-"""Each ZOI found from nothing: blocks of the picture first, then its own whole pixel."""
+"""Each ZOI found from nothing: blocks of the picture first, then its own whole pixel.
+
+The whole-pixel start: where the pattern of each ZOI went, from nothing.
+
+Coarse to fine: one displacement for the whole region by zero-mean normalised correlation
+(errata of eq. 2-3 of the paper: FFT(g) conj(FFT(f))), then blocks at each level of an image
+pyramid, then each ZOI tries the displacements of the blocks around it and climbs to the best
+whole pixel. Blocks depend on the images and the region alone, never on which ZOIs are active.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Roi
-from analysis.follow.climb import climb
-from analysis.follow.start import find_blocks
+from analysis.follow.hill_climb import climb
+
+COARSEST = 48
+"""Halving stops before the shorter side of the region falls below this (px)."""
+BLOCK = 24
+BLOCK_STEP = 20
+PARTS = 3
+"""The coarsest level is looked for in this many parts a side."""
+PLANE_REACH = 2
+OUTLIER = 2.0
+"""Pixels from the plane of its neighbours from which on a block is left out."""
+STEEPEST = 0.15
+"""Displacement gradient that a search from nothing reckons with."""
+LEAST_OVERLAP = 0.2
+"""Share of the region that must still lie in the deformed image."""
+
+Image = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Blocks:
+    """Displacements of blocks of the reference, whole pixels of their level.
+
+    ``y`` (M,) and ``x`` (N,) are centres and ``shift`` (M, N, 2) the displacements (x, y) in px.
+    """
+
+    y: NDArray[np.float64]
+    x: NDArray[np.float64]
+    shift: NDArray[np.float64]
+
+    def planes(self) -> NDArray[np.float64]:
+        """A plane through each block's displacement and its neighbours', (M, N, 6), px.
+
+        u, du_dx, du_dy, v, dv_dx, dv_dy at the block's centre, least squares over 5 x 5 blocks; those
+        further than OUTLIER from the plane are left out the second time.
+        """
+        rows, columns = self.shift.shape[:2]
+        near = np.arange(-PLANE_REACH, PLANE_REACH + 1)
+        r = np.clip(np.arange(rows)[:, None] + near, 0, rows - 1)
+        c = np.clip(np.arange(columns)[:, None] + near, 0, columns - 1)
+        # Blocks beyond the border would be counted twice: weight zero.
+        weight = np.einsum("ai,bj->abij", *(np.diff(k, axis=1, prepend=-1) > 0 for k in (r, c))).astype(float)
+        dy = np.broadcast_to((self.y[r] - self.y[:, None])[:, None, :, None], weight.shape)
+        dx = np.broadcast_to((self.x[c] - self.x[:, None])[None, :, None, :], weight.shape)
+        basis = np.stack([np.ones_like(dx), dx, dy], axis=-1).reshape(rows, columns, -1, 3)
+        shift = self.shift[r[:, None, :, None], c[None, :, None, :]].reshape(rows, columns, -1, 2)
+        start = np.median(shift, axis=2, keepdims=True)
+        weight = weight.reshape(rows, columns, -1)
+        reach = 0.5 * np.hypot(np.ptp(self.x), np.ptp(self.y)) / max(rows, columns) * STEEPEST
+        keep = weight * (np.abs(shift - start).max(axis=-1) < np.maximum(OUTLIER, 4 * reach))
+        fit = _planes(basis, shift, keep)
+        error = np.abs(np.einsum("abkp,abpc->abkc", basis, fit) - shift).max(axis=-1)
+        fit = _planes(
+            basis, shift, weight * (error < np.maximum(OUTLIER, np.median(error, axis=2, keepdims=True)))
+        )
+        return np.concatenate([fit[..., 0], fit[..., 1]], axis=-1)
+
+    def around(self, y: NDArray[np.floating], x: NDArray[np.floating]) -> NDArray[np.float64]:
+        """Displacements of the four blocks around each point, (points, 4, 2)."""
+        rows, columns = _neighbours(self.y, y), _neighbours(self.x, x)
+        return np.concatenate([self.shift[r, c][:, None] for r in rows for c in columns], axis=1)
+
+    def plane_at(self, y: NDArray[np.floating], x: NDArray[np.floating]) -> NDArray[np.float64]:
+        """The plane of the nearest block, moved to each point, (points, 6)."""
+        r, c = (np.abs(np.subtract.outer(at, own)).argmin(axis=1) for at, own in ((y, self.y), (x, self.x)))
+        plane = self.planes()[r, c]
+        dy, dx = y - self.y[r], x - self.x[c]
+        for k in (0, 3):
+            plane[:, k] += plane[:, k + 1] * dx + plane[:, k + 2] * dy
+        return np.asarray(plane)
+
+
+def _planes(
+    basis: NDArray[np.float64], values: NDArray[np.float64], weight: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Weighted least squares of planes, (M, N, 3, 2); flat where too few blocks are left."""
+    normal = np.einsum("abkp,abk,abkq->abpq", basis, weight, basis)
+    right = np.einsum("abkp,abk,abkc->abpc", basis, weight, values)
+    ridge = np.zeros((3, 3))
+    ridge[1, 1] = ridge[2, 2] = BLOCK_STEP**2
+    ridge[0, 0] = 1e-9
+    return np.asarray(np.linalg.solve(normal + ridge, right))
+
+
+def _neighbours(centres: NDArray[np.floating], at: NDArray[np.floating]) -> tuple[NDArray[np.intp], ...]:
+    right = np.searchsorted(centres, at)
+    return np.clip(right - 1, 0, len(centres) - 1), np.clip(right, 0, len(centres) - 1)
+
+
+def find_blocks(reference: Image, deformed: Image, roi: Roi) -> Blocks:
+    """Displacements of blocks all over the region, right to about one pixel.
+
+    Parameters
+    ----------
+    reference, deformed : (H, W) float32
+    roi : Roi
+        The region of the reference that is looked for in the whole deformed image.
+    """
+    levels = list(_pyramid(reference, deformed, roi))
+    coarse = levels[-1]
+    whole = global_shift(*coarse)
+    blocks = _match_parts(*coarse)
+    reach = 6 if len(levels) > 1 else 4
+    # The finest level only costs time: each ZOI climbs to its own whole pixel anyway.
+    for ref, image, box in levels[: 0 if len(levels) > 1 else None : -1]:
+        blocks = _match_blocks(ref, image, box, blocks, reach, whole if ref is coarse[0] else None)
+        scale = 1.0 if ref is levels[0][0] else 2.0
+        blocks = Blocks((blocks.y + 0.5) * scale - 0.5, (blocks.x + 0.5) * scale - 0.5, blocks.shift * scale)
+        reach = 3
+    return blocks
+
+
+def _pyramid(reference: Image, deformed: Image, roi: Roi) -> Iterator[tuple[Image, Image, Roi]]:
+    import cv2
+
+    box = roi
+    while True:
+        yield reference, deformed, box
+        if min(box.width, box.height) < 2 * COARSEST:
+            return
+        size = (reference.shape[1] // 2, reference.shape[0] // 2)
+        reference, deformed = (
+            np.asarray(cv2.resize(im[: 2 * size[1], : 2 * size[0]], size, interpolation=cv2.INTER_AREA))
+            for im in (reference, deformed)
+        )
+        right, bottom = min((box.x + box.width) // 2, size[0]), min((box.y + box.height) // 2, size[1])
+        box = Roi((box.x + 1) // 2, (box.y + 1) // 2, right - (box.x + 1) // 2, bottom - (box.y + 1) // 2)
+
+
+def global_shift(reference: Image, deformed: Image, box: Roi) -> tuple[int, int]:
+    """One displacement (x, y) of a region, whole px, by normalised correlation over their overlap."""
+    from scipy import fft
+
+    part = reference[box.y : box.y + box.height, box.x : box.x + box.width].astype(np.float64)
+    image = deformed.astype(np.float64)
+    part, image = part - part.mean(), image - image.mean()
+    shape = tuple(
+        fft.next_fast_len(a + b - 1, real=True) for a, b in zip(part.shape, image.shape, strict=True)
+    )
+
+    def correlate(a: NDArray[Any], b: NDArray[Any]) -> NDArray[np.float64]:
+        return np.asarray(fft.irfft2(fft.rfft2(b, shape) * np.conj(fft.rfft2(a, shape)), shape))
+
+    here, there = np.ones_like(part), np.ones_like(image)
+    count = np.maximum(correlate(here, there), 1)
+    sum_f, sum_g = correlate(part, there), correlate(here, image)
+    product = correlate(part, image) - sum_f * sum_g / count
+    var_f = correlate(part**2, there) - sum_f**2 / count
+    var_g = correlate(here, image**2) - sum_g**2 / count
+    floor = 1e-6 * max(float(np.sum(part**2)), float(np.sum(image**2)), 1e-30)
+    score = product / np.sqrt(np.maximum(var_f, floor) * np.maximum(var_g, floor))
+    score[count < LEAST_OVERLAP * part.size] = -2
+    row, column = np.unravel_index(int(np.argmax(score)), score.shape)
+    dy = int(row) - (shape[0] if row >= image.shape[0] else 0) - box.y
+    dx = int(column) - (shape[1] if column >= image.shape[1] else 0) - box.x
+    return dx, dy
+
+
+def _match_parts(reference: Image, deformed: Image, box: Roi) -> Blocks:
+    """Displacements of 3 x 3 parts of the region, each looked for in the whole image.
+
+    A rotated region as a whole correlates with nothing; its parts still do.
+    """
+    import cv2
+
+    height, width = max(box.height // PARTS, 8), max(box.width // PARTS, 8)
+    first_y = np.linspace(box.y, box.y + max(box.height - height, 0), PARTS).astype(int)
+    first_x = np.linspace(box.x, box.x + max(box.width - width, 0), PARTS).astype(int)
+    shift = np.zeros((PARTS, PARTS, 2))
+    for r, top in enumerate(first_y):
+        for c, left in enumerate(first_x):
+            template = reference[top : top + height, left : left + width]
+            if template.std() > 0 and all(
+                a <= b for a, b in zip(template.shape, deformed.shape, strict=True)
+            ):
+                score = cv2.matchTemplate(deformed, template, cv2.TM_CCOEFF_NORMED)
+                _, _, _, place = cv2.minMaxLoc(np.nan_to_num(score, nan=-1.0, posinf=-1.0, neginf=-1.0))
+                shift[r, c] = place[0] - left, place[1] - top
+    return Blocks(first_y + (height - 1) / 2, first_x + (width - 1) / 2, shift)
+
+
+def _match_blocks(
+    reference: Image, deformed: Image, box: Roi, guess: Blocks, reach: int, extra: tuple[int, int] | None
+) -> Blocks:
+    """Displacement of each block: the best match within ``reach`` px of any guess."""
+    size = min(BLOCK, box.width, box.height)
+    first_y = _firsts(box.y, box.height, size)
+    first_x = _firsts(box.x, box.width, size)
+    y: NDArray[np.float64] = np.asarray(first_y + (size - 1) / 2, np.float64)
+    x: NDArray[np.float64] = np.asarray(first_x + (size - 1) / 2, np.float64)
+    grid_y, grid_x = (a.ravel() for a in np.meshgrid(y, x, indexing="ij"))
+    guesses = np.rint(guess.around(grid_y, grid_x)).astype(int)
+    if extra is not None:
+        guesses = np.concatenate([guesses, np.broadcast_to(np.array(extra), (len(guesses), 1, 2))], axis=1)
+    margin = size + 2 * reach
+    padded = np.pad(deformed, margin, mode="reflect" if min(deformed.shape) > margin else "edge")
+    shift = np.empty((len(grid_y), 2))
+    for k, (top, left) in enumerate((a, b) for a in first_y for b in first_x):
+        template = reference[top : top + size, left : left + size]
+        shift[k] = _match(template, padded, (top + margin, left + margin), guesses[k], reach)
+    return Blocks(y, x, shift.reshape(len(y), len(x), 2))
+
+
+def _firsts(first: int, length: int, size: int) -> NDArray[np.intp]:
+    count = max(1, (length - size) // BLOCK_STEP + 1)
+    return np.unique(np.linspace(first, first + length - size, count).astype(np.intp))
+
+
+def _match(
+    template: Image, padded: Image, at: tuple[int, int], guesses: NDArray[Any], reach: int
+) -> tuple[float, float]:
+    """The best of the neighbourhoods of several guesses, as a displacement (x, y)."""
+    import cv2
+
+    best, found = -2.0, (float(guesses[0][0]), float(guesses[0][1]))
+    for dx, dy in dict.fromkeys(map(tuple, guesses)):
+        top = int(np.clip(at[0] + dy - reach, 0, padded.shape[0] - template.shape[0] - 2 * reach))
+        left = int(np.clip(at[1] + dx - reach, 0, padded.shape[1] - template.shape[1] - 2 * reach))
+        window = padded[
+            top : top + template.shape[0] + 2 * reach, left : left + template.shape[1] + 2 * reach
+        ]
+        score = cv2.matchTemplate(window, template, cv2.TM_CCOEFF_NORMED)
+        _, value, _, place = cv2.minMaxLoc(score)
+        if np.isfinite(value) and value > best:
+            best, found = value, (float(left + place[0] - at[1]), float(top + place[1] - at[0]))
+    return found
 
 
 def search(

@@ -15,13 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.compiled.forked import THREADS
 from analysis.field import Motion, StrainField, ZoiGrid
 from analysis.follow.renewal import taken
-from analysis.kernel.attempt import Attempt
-from analysis.kernel.images import as_image, as_recorded, clipped_pixels
-from analysis.kernel.noise import Noise, as_model
-from analysis.kernel.reference import Reference
-from analysis.kernel.rescue import rescue
-from analysis.kernel.result import Expected, field_of
+from analysis.kernel.images import Noise, as_image, as_model, as_recorded, clipped_pixels
+from analysis.kernel.reference import ReferencePicture
+from analysis.kernel.result import PredictedMotion, field_of
 from analysis.kernel.settings import Estimator, KernelSettings
+from analysis.kernel.solve import Solution, rescue
 from analysis.self_test import Way, check
 
 Floats = NDArray[np.float64]
@@ -47,7 +45,7 @@ class PhaseKernel:
 
     Attributes
     ----------
-    reference : Reference
+    reference : ReferencePicture
         Everything that does not change from frame to frame.
 
     Raises
@@ -60,7 +58,7 @@ class PhaseKernel:
         This machine measures a known pattern wrong (``check_machine``, once a process and kind of ZOI).
     """
 
-    reference: Reference
+    reference: ReferencePicture
 
     def __init__(
         self,
@@ -72,7 +70,7 @@ class PhaseKernel:
     ) -> None:
         THREADS.use()
         image = as_image(reference, "the reference")
-        self.reference = Reference.first(image, grid, settings or KernelSettings(), noise, clipped)
+        self.reference = ReferencePicture.first(image, grid, settings or KernelSettings(), noise, clipped)
         check_machine(self.settings, grid.size)
 
     @property
@@ -167,14 +165,14 @@ class PhaseKernel:
         model = None if noise is None else as_model(noise)
         saturated = clipped_pixels(image, clipped, model)
         if start is None:
-            attempt = Attempt(reference, image, model, reference.searched(image))
+            attempt = Solution(reference, image, model, reference.searched(image))
             rescue(attempt, None, saturated)
             return field_of(attempt)
         before, carried = self._before(start), self._carried_motion(start)
         predicted = before + carried.ahead
-        attempt = Attempt(reference, image, model, reference.local(predicted))
+        attempt = Solution(reference, image, model, reference.local(predicted))
         rescue(attempt, reference.local(before), saturated)
-        return field_of(attempt, Expected(predicted, carried))
+        return field_of(attempt, PredictedMotion(predicted, carried))
 
     def _before(self, start: StrainField) -> Floats:
         """Parameters of the field before, (A, modes); NaN for a ZOI without."""
@@ -220,8 +218,8 @@ def _measure_known(
     """As a new kernel measures its first picture."""
     estimator: Estimator = "phase" if way.estimator == "phase" else "spectral"
     settings = KernelSettings(way.window, estimator, way.order, way.interpolant)
-    made = Reference.first(as_image(reference, "the pattern"), grid, settings, None, None)
+    made = ReferencePicture.first(as_image(reference, "the pattern"), grid, settings, None, None)
     moved = as_recorded(deformed, "the moved pattern")
-    attempt = Attempt(made, moved, None, made.searched(moved))
+    attempt = Solution(made, moved, None, made.searched(moved))
     rescue(attempt, None)
     return field_of(attempt)

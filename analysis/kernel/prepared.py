@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Status, profile
-from analysis.fit.bundles import Images, Normal, WindowRows
+from analysis.fit.kernel_args import Images, Normal, WindowRows
 from analysis.fit.validity import CLIPPED_SHARE, has_pattern
-from analysis.kernel.images import padded
-from analysis.kernel.noise import NoiseModel
+from analysis.kernel.images import NoiseModel, padded
 from analysis.kernel.settings import KernelSettings
-from analysis.picture import Pattern, filtered_pattern
+from analysis.picture.spectrum import Pattern, filtered_pattern
 
 if TYPE_CHECKING:
     from analysis.fit.shapes import Shapes
@@ -25,7 +24,7 @@ class PatternError(ValueError):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Prepared:
+class PreparedReference:
     """Everything of a reference that does not change from frame to frame; A active ZOIs.
 
     Attributes
@@ -80,7 +79,7 @@ def prepare_reference(
     settings: KernelSettings,
     noise: NoiseModel | None,
     clipped: NDArray[np.bool_] | None = None,
-) -> Prepared:
+) -> PreparedReference:
     """Filter the reference and compute the normal matrix of each ZOI.
 
     Parameters
@@ -103,10 +102,10 @@ def prepare_reference(
     energy = out.energy
     status = _measurable(pattern, out.covariance, energy)
     if clipped is not None and clipped.any():
-        from analysis.fit.clipping import clipped_share
+        from analysis.fit.assembly import clipped_share
 
         status[clipped_share(clipped, origins, line) > CLIPPED_SHARE] = Status.CLIPPED
-    return Prepared(
+    return PreparedReference(
         shape=(image.shape[0], image.shape[1]),
         pattern=pattern,
         images=images,

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import PAIR_INDEX
-from analysis.fit.bundles import Picture, Stop
-from analysis.kernel.prepared import Prepared
+from analysis.fit.kernel_args import PictureArgs, StopArgs
+from analysis.kernel.prepared import PreparedReference
 
 BAND = 0.30
 """Highest frequency used, cycles/px."""
@@ -71,12 +71,12 @@ class _Basis:
         return np.asarray(np.sum(waves.real * self.windows, axis=-3), np.float32)
 
 
-def make_sensors(ready: Prepared, line: NDArray[np.float64], size: int) -> Sensors:
+def make_sensors(ready: PreparedReference, line: NDArray[np.float64], size: int) -> Sensors:
     """Sensors of all ZOIs of a reference.
 
     Parameters
     ----------
-    ready : Prepared
+    ready : PreparedReference
     line : (n,)
         The least-squares weight along one axis.
     """
@@ -119,7 +119,7 @@ def _basis(line: NDArray[np.float64]) -> _Basis:
 
 
 def _zois(
-    ready: Prepared, origins: NDArray[np.int64], size: int
+    ready: PreparedReference, origins: NDArray[np.int64], size: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Filtered level (B, n, n) and its derivatives along the six modes (B, 6, n, n) of some ZOIs."""
     x = (np.arange(size) - (size - 1) / 2).astype(np.float32)
@@ -171,10 +171,10 @@ def iterate(
     sensors: NDArray[np.float32],
     recorded: NDArray[np.float32],
     origins: NDArray[np.int64],
-    picture: Picture,
+    picture: PictureArgs,
     table: NDArray[np.float32],
     guess: NDArray[np.float64],
-    stop: Stop,
+    stop: StopArgs,
 ) -> tuple[NDArray[np.float64], NDArray[np.uint8], NDArray[np.uint8]]:
     """Warp, take the phases, compose, until the steps are small.
 
@@ -183,18 +183,18 @@ def iterate(
     sensors : (A, 7, n, n), origins : (A, 2), guess : (A, 6)
     recorded : (>= H, >= W) float32, GL
         The reference less its mean.
-    picture : Picture
+    picture : PictureArgs
         The deformed image.
     table : (18,) float32
         See ``iteration.track``.
-    stop : Stop
+    stop : StopArgs
 
     Returns
     -------
     parameters (A, 6), state (A,) and iterations (A,), as ``iteration.track`` gives them.
     """
-    from analysis.fit.bundles import CONVERGED, LEFT_IMAGE, RUNNING
     from analysis.fit.iteration import compose_all, warp_zois, within_image
+    from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, RUNNING
 
     size = sensors.shape[-1]
     p = guess.copy()
@@ -224,7 +224,7 @@ def _shortened(step: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(step * np.minimum(1, LONGEST_STEP / np.maximum(length, 1e-9))[:, None])
 
 
-def _settled(step: NDArray[np.float64], stop: Stop) -> NDArray[np.bool_]:
+def _settled(step: NDArray[np.float64], stop: StopArgs) -> NDArray[np.bool_]:
     """Whether what a step (B, 6) has left is below the tolerances, (B,)."""
     left = ERROR_LEFT * np.abs(step)
     lengths = (left[:, [0, 3]] <= stop.length[:, None]).all(axis=1)

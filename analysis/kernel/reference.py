@@ -1,6 +1,6 @@
 """A reference, made once and never changed: what every picture is measured against.
 
-The first is made by ``Reference.first``, one that goes on from a later picture by ``renewed``.
+The first is made by ``ReferencePicture.first``, one that goes on from a later picture by ``renewed``.
 """
 
 from __future__ import annotations
@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Roi, Status, StrainField, ZoiGrid, profile
-from analysis.fit.bundles import Stop
+from analysis.fit.kernel_args import StopArgs
 from analysis.follow.renewal import Placement, place
-from analysis.kernel.images import check_fit, clipped_pixels
-from analysis.kernel.noise import Noise, NoiseModel, as_model
-from analysis.kernel.prepared import PatternError, Prepared, prepare_reference
+from analysis.kernel.images import Noise, NoiseModel, as_model, check_fit, clipped_pixels
+from analysis.kernel.prepared import PatternError, PreparedReference, prepare_reference
 from analysis.kernel.quadrature import Sensors, make_sensors
 from analysis.kernel.settings import KernelSettings
-from analysis.picture import Box
+from analysis.picture.splines import Box
 
 if TYPE_CHECKING:
     from analysis.fit.sums import MeanNoise
@@ -41,7 +40,7 @@ _AFFINE = ((0, 15), (6, 11, 18, 20))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Reference:
+class ReferencePicture:
     """One picture with everything that measuring against it needs; A active ZOIs.
 
     Attributes
@@ -55,7 +54,7 @@ class Reference:
         Where the ZOIs lie in the image, for the search.
     index : (A,)
         Flat places of the active ZOIs on the grid.
-    prepared : Prepared
+    prepared : PreparedReference
     sensors : Sensors or None
         For the estimator by phases.
     placement : Placement or None
@@ -80,7 +79,7 @@ class Reference:
     image: Image
     region: Roi
     index: NDArray[np.intp]
-    prepared: Prepared
+    prepared: PreparedReference
     sensors: Sensors | None
     placement: Placement | None
     spacing: int
@@ -98,7 +97,7 @@ class Reference:
         settings: KernelSettings,
         noise: Noise | None,
         clipped: NDArray[np.bool_] | None,
-    ) -> Reference:
+    ) -> ReferencePicture:
         """The reference of a test; parameters and what is raised as for ``PhaseKernel``."""
         check_fit(grid, image.shape)
         index = np.flatnonzero(grid.active)
@@ -116,7 +115,7 @@ class Reference:
         field: StrainField,
         noise: Noise | None,
         clipped: NDArray[np.bool_] | None,
-    ) -> Reference:
+    ) -> ReferencePicture:
         """The reference that goes on from a later picture; parameters as for ``PhaseKernel.renewed``."""
         settings, size = self.settings, self.grid.size
         model = None if noise is None else as_model(noise)
@@ -143,11 +142,11 @@ class Reference:
         """Standard deviation of the noise, GL, as given or as estimated."""
         return self.prepared.pattern.noise
 
-    def tolerance(self, current: float) -> Stop:
+    def tolerance(self, current: float) -> StopArgs:
         """When the iteration may stop, for a noise of ``current`` GL in the deformed image."""
         settings = self.settings
         share = settings.tolerance_sigma * np.hypot(current, self.noise)
-        return Stop(
+        return StopArgs(
             length=np.maximum(share * self.unit_sigma[0], settings.tolerance_px),
             slope=np.maximum(share * self.unit_sigma[1], settings.tolerance_strain),
             trust=current * self.unit_sigma[2],
@@ -204,9 +203,9 @@ def _laid_out(
     grid: ZoiGrid,
     settings: KernelSettings,
     model: NoiseModel | None,
-    prepared: Prepared,
+    prepared: PreparedReference,
     placement: Placement | None = None,
-) -> Reference:
+) -> ReferencePicture:
     """What every frame needs of a prepared picture, once."""
     line = profile(settings.window, grid.size)
     sensors = None
@@ -217,7 +216,7 @@ def _laid_out(
     index = np.flatnonzero(grid.active)
     lengths, slopes = (np.sqrt(np.maximum(prepared.covariance[:, k].astype(np.float64), 0)) for k in _AFFINE)
     unit_covariance = np.ascontiguousarray(_spread(prepared.covariance, index, grid.shape, 0))
-    return Reference(
+    return ReferencePicture(
         grid=grid,
         settings=settings,
         noise_model=model,
@@ -240,7 +239,7 @@ def _sums(
     grid: ZoiGrid,
     settings: KernelSettings,
     index: NDArray[np.intp],
-    prepared: Prepared,
+    prepared: PreparedReference,
     unit_covariance: NDArray[np.float32],
 ) -> MeanNoise:
     from analysis.fit.sums import MeanNoise

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from analysis.field import Motion, Status, StrainField
 from analysis.follow.renewal import UNSHARED, Placement
-from analysis.kernel.attempt import Attempt
+from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]
 Covariance = NDArray[np.float32]
 
 
-class Expected(NamedTuple):
+class PredictedMotion(NamedTuple):
     """What the field before said of this image: parameters (A, modes) and the motion they come from."""
 
     values: Floats
@@ -29,13 +29,13 @@ class _Noise(NamedTuple):
     current: Floats
 
 
-def field_of(attempt: Attempt, expected: Expected | None = None) -> StrainField:
+def field_of(attempt: Solution, expected: PredictedMotion | None = None) -> StrainField:
     """The field that an attempt has found.
 
     Parameters
     ----------
-    attempt : Attempt
-    expected : Expected, optional
+    attempt : Solution
+    expected : PredictedMotion, optional
         None: the field says nothing of the motion.
     """
     from analysis.fit.assembly import weigh
@@ -66,21 +66,21 @@ def field_of(attempt: Attempt, expected: Expected | None = None) -> StrainField:
     )
 
 
-def _motion(attempt: Attempt, values: Floats, expected: Expected) -> Motion:
+def _motion(attempt: Solution, values: Floats, expected: PredictedMotion) -> Motion:
     from analysis.follow.prediction import motion_after
 
     lever = attempt.reference.grid.size / 6
     return motion_after(expected.motion, values, expected.values, attempt.tolerance.trust, lever)
 
 
-def _noise_found(attempt: Attempt, ok: NDArray[np.bool_], current: Floats) -> float:
+def _noise_found(attempt: Solution, ok: NDArray[np.bool_], current: Floats) -> float:
     """Standard deviation of the deformed image, GL, as given or found; the median over the ZOIs."""
     if attempt.noise is not None and attempt.noise.slope == 0 and ok.any():
         return float(np.sqrt(attempt.noise.floor))
     return float(np.sqrt(np.median(current[ok]))) if ok.any() else float("nan")
 
 
-def _noise_parts(attempt: Attempt, ok: NDArray[np.bool_]) -> _Noise:
+def _noise_parts(attempt: Solution, ok: NDArray[np.bool_]) -> _Noise:
     """The noise of the two images; what is not given, from the residual."""
     reference, current = attempt.variances(np.s_[:], attempt.found.nuisance[:, 0])
     if attempt.noise is not None or not ok.any():
@@ -93,7 +93,7 @@ def _noise_parts(attempt: Attempt, ok: NDArray[np.bool_]) -> _Noise:
 
 
 def _covariances(
-    attempt: Attempt,
+    attempt: Solution,
     ok: NDArray[np.bool_],
     noise: _Noise,
     first: NDArray[np.float32],
@@ -120,7 +120,7 @@ def _covariances(
 
 
 def _scaled(
-    attempt: Attempt, first: NDArray[np.float32], whole: NDArray[np.float32]
+    attempt: Solution, first: NDArray[np.float32], whole: NDArray[np.float32]
 ) -> tuple[Covariance, Covariance]:
     """The unit covariances times two variances of each ZOI."""
     from analysis.fit.assembly import scale
@@ -144,7 +144,7 @@ def _composed(
     return placement.carried(local) + renewed, placement.spread(local, from_current)
 
 
-def _level_covariances(attempt: Attempt, noise: _Noise) -> tuple[Covariance, Covariance]:
+def _level_covariances(attempt: Solution, noise: _Noise) -> tuple[Covariance, Covariance]:
     """The two parts (A, 21) with noise that grows with the grey level inside each ZOI."""
     from analysis.fit.assembly import LEAST_GAIN
 

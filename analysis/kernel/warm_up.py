@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from analysis.compiled.forked import THREADS
 from analysis.field import Motion, Roi, ZoiGrid, profile
 from analysis.kernel.images import as_image
-from analysis.picture import Box
+from analysis.picture.splines import Box
 
 if TYPE_CHECKING:
-    from analysis.fit.bundles import Picture
+    from analysis.fit.kernel_args import PictureArgs
 
 log = logging.getLogger("analysis")
 
@@ -34,8 +34,10 @@ PICTURE_KINDS = ("uint8", "uint16", "float32")
 def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) -> bool:
     """Whether numba's cache lacks a loop that pictures of these kinds (and the estimator by phases) need."""
     from analysis.compiled.loops import is_cached
-    from analysis.fit import assembly, clipping, iteration, sensitivity, sums, verdict
-    from analysis.follow import alpha_beta, climb
+    from analysis.fit import assembly, iteration, sensitivity, sums, verdict
+    from analysis.fit import assembly as clipping
+    from analysis.follow import hill_climb as climb
+    from analysis.follow import prediction as alpha_beta
     from analysis.picture import prefilter
 
     loops = [
@@ -99,7 +101,7 @@ def warm_up(part: str = ALL, kinds: Sequence[str] = PICTURE_KINDS, *, phase: boo
 
 def _everything(kinds: Sequence[str], phase: bool) -> None:
     """Measure small pictures in every way that a test can."""
-    from analysis.kernel.noise import NoiseModel
+    from analysis.kernel.images import NoiseModel
     from analysis.kernel.phase_kernel import PhaseKernel
     from analysis.kernel.settings import KernelSettings
 
@@ -124,11 +126,11 @@ def _small() -> tuple[NDArray[np.float32], ZoiGrid]:
 
 def _iteration() -> None:
     """The iteration alone: called for no ZOI at all, it is compiled all the same."""
-    from analysis.fit.bundles import Fit, Out, Stop
     from analysis.fit.iteration import track
+    from analysis.fit.kernel_args import FitArgs, OutArgs, StopArgs
 
     none, no_images = np.empty(0), np.empty((0, 6, 6), np.float32)
-    fit = Fit(
+    fit = FitArgs(
         np.empty(0, np.float32), 0, 0, np.empty((0, 2), np.int64), 32, 16, 1,
         np.empty((4, 32), np.float32), np.empty((4, 4)), no_images, no_images, np.empty((0, 2)), np.empty(6),
     )  # fmt: skip
@@ -136,15 +138,15 @@ def _iteration() -> None:
         _no_picture(),
         np.empty(18, np.float32),
         fit,
-        Stop(none, none, none, 12),
-        Out.starting(np.empty((0, 6))),
+        StopArgs(none, none, none, 12),
+        OutArgs.starting(np.empty((0, 6))),
     )
 
 
-def _no_picture() -> Picture:
-    from analysis.fit.bundles import Picture
+def _no_picture() -> PictureArgs:
+    from analysis.fit.kernel_args import PictureArgs
 
-    return Picture.within(np.empty(0, np.float32), (0, 0), Box.of((0, 0), (0, 0), (0, 0)), 0.5)
+    return PictureArgs.within(np.empty(0, np.float32), (0, 0), Box.of((0, 0), (0, 0), (0, 0)), 0.5)
 
 
 def _phase() -> None:
@@ -159,8 +161,8 @@ def _phase() -> None:
 
 def _prefilter(kinds: Sequence[str]) -> None:
     """What every deformed image goes through first, for each kind of picture."""
-    from analysis.picture import prefilter_taps
     from analysis.picture.prefilter import coefficients
+    from analysis.picture.splines import prefilter_taps
 
     for kind in kinds:
         picture = _small()[0].astype(kind)
@@ -170,18 +172,17 @@ def _prefilter(kinds: Sequence[str]) -> None:
 
 def _rest() -> None:
     """All but the iteration, the prefilter and what only the estimator by phases needs."""
-    from analysis.fit.assembly import scale, weigh
-    from analysis.fit.bundles import Known, Out, Rule
-    from analysis.fit.clipping import clipped_share
+    from analysis.fit.assembly import clipped_share, scale, weigh
+    from analysis.fit.kernel_args import OutArgs, ReferenceArgs, VerdictArgs
     from analysis.fit.verdict import judge
     from analysis.follow.prediction import motion_after
-    from analysis.kernel.reference import Reference
+    from analysis.kernel.reference import ReferencePicture
     from analysis.kernel.settings import KernelSettings
 
     image, grid = _small()
     THREADS.use()
     # No PhaseKernel: its self-test would compile the iteration.
-    reference = Reference.first(as_image(image, "the pattern"), grid, KernelSettings(), None, None)
+    reference = ReferencePicture.first(as_image(image, "the pattern"), grid, KernelSettings(), None, None)
     reference.searched(image)
     if reference.sums is not None:
         reference.sums.factor("exx", grid.active)
@@ -189,8 +190,8 @@ def _rest() -> None:
     clipped_share(np.zeros((32, 32), np.bool_), np.zeros((1, 2), np.int64), line)
     none, pairs, single = np.empty(0), np.empty((0, 2)), np.empty(0, np.float32)
     judge(
-        Out.starting(np.empty((0, 6))), none, none, Known(none, none, pairs, none),
-        Rule(True, np.empty(2), 1.0, 0.05, 4.0), np.empty(0, np.uint8),
+        OutArgs.starting(np.empty((0, 6))), none, none, ReferenceArgs(none, none, pairs, none),
+        VerdictArgs(True, np.empty(2), 1.0, 0.05, 4.0), np.empty(0, np.uint8),
     )  # fmt: skip
     weigh(np.empty(0, np.bool_), none, none, np.empty((2, 2))[:, 0], none, none, single, single, single)
     unit = np.empty((21, 0), np.float32)

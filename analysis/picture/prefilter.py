@@ -9,9 +9,8 @@ from numba import prange
 from numpy.typing import NDArray
 
 from analysis.compiled.convolution import GROUP, REACH, ROWS, STRIP, filter_across, filter_along
-from analysis.compiled.cores import caller, keep_apart
 from analysis.compiled.loops import helper, parallel
-from analysis.compiled.shares import SHARES, next_piece
+from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.compiled.vectors import LANES
 from analysis.picture.splines import LINE, PAD, Box
 

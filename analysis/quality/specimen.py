@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.field import Roi
-from analysis.picture import noise_of_picture
+from analysis.picture.pattern import noise_of_picture
 
 Cells = NDArray[np.float32]
 Bools = NDArray[np.bool_]

@@ -1,6 +1,6 @@
 """``phasedic characterise``: how well this measures, on rendered truth or on one's own pattern.
 
-Each experiment is a function that returns an ``Outcome``; what was done is kept in the output
+Each experiment is a function that returns an ``ExperimentOutcome``; what was done is kept in the output
 folder, so that an interrupted run goes on where it was. ``--pattern`` does the same for a picture of
 the user (live.characterise.own_pattern).
 """
@@ -19,18 +19,24 @@ from types import MappingProxyType
 from typing import TextIO
 
 from acquire.errors import ConfigError, DataError
-from live.characterise.outcome import Bench, Outcome, figure, read_outcome, write_outcome
+from live.characterise.outcome import (
+    ExperimentContext,
+    ExperimentOutcome,
+    ProgressBar,
+    figure,
+    read_outcome,
+    write_outcome,
+)
 from live.characterise.page import write_page
-from live.characterise.progress import Progress
-from live.measure import on_fit_machine
+from live.pipeline.reference import on_fit_machine
 
-Experiment = Callable[[Bench], Outcome]
+Experiment = Callable[[ExperimentContext], ExperimentOutcome]
 EXPERIMENTS: Mapping[str, tuple[str, str]] = MappingProxyType({
-    "fig1": ("live.characterise.experiments.fig1", "fig1"),
+    "fig1": ("live.characterise.experiments.figures", "fig1"),
     "table1": ("live.characterise.experiments.table1", "table1"),
     "resolution": ("live.characterise.experiments.resolution", "resolution"),
     "table2": ("live.characterise.experiments.table2", "table2"),
-    "fig3": ("live.characterise.experiments.fig3", "fig3"),
+    "fig3": ("live.characterise.experiments.figures", "fig3"),
     "section41": ("live.characterise.experiments.section41", "section41"),
     "woven": ("live.characterise.experiments.woven", "woven"),
     "open-hole": ("live.characterise.experiments.woven", "open_hole"),
@@ -89,7 +95,7 @@ def _characterised(arguments: argparse.Namespace) -> int:
         return characterise_pattern(arguments, folder)
     names = chosen(arguments.only)
     data = _data(arguments.data)
-    outcomes = run(names, Bench(folder, arguments.quick, data), screen=sys.stderr)
+    outcomes = run(names, ExperimentContext(folder, arguments.quick, data), screen=sys.stderr)
     target = Path(arguments.page) if arguments.page else folder / PAGE
     write_page(outcomes, target, folder, _as_typed(arguments))
     print(f"page: {target}")
@@ -111,13 +117,15 @@ def chosen(only: Iterable[str] | None) -> list[str]:
     return [name for name in EXPERIMENTS if name in wanted]
 
 
-def run(names: Iterable[str], bench: Bench, screen: TextIO | None = None) -> list[Outcome]:
+def run(
+    names: Iterable[str], bench: ExperimentContext, screen: TextIO | None = None
+) -> list[ExperimentOutcome]:
     """Do the experiments, or take what an earlier run of the same kind has left."""
     key = run_key(bench)
     outcomes = []
     for name in names:
         outcome = read_outcome(name, bench.folder, key)
-        progress = Progress(name, screen)
+        progress = ProgressBar(name, screen)
         if outcome is None:
             outcome = _timed(name, replace(bench, tick=progress))
             write_outcome(outcome, bench.folder, key)
@@ -128,14 +136,14 @@ def run(names: Iterable[str], bench: Bench, screen: TextIO | None = None) -> lis
     return outcomes
 
 
-def _timed(name: str, bench: Bench) -> Outcome:
+def _timed(name: str, bench: ExperimentContext) -> ExperimentOutcome:
     module, function = EXPERIMENTS[name]
     experiment: Experiment = getattr(importlib.import_module(module), function)
     begin = time.monotonic()
     return replace(experiment(bench), name=name, seconds=time.monotonic() - begin)
 
 
-def run_key(bench: Bench) -> str:
+def run_key(bench: ExperimentContext) -> str:
     """What an earlier result must have been made with to serve: the code, the extent, the data."""
     digest = hashlib.sha256()
     root = Path(__file__).parents[2]

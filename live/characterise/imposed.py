@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from analysis import KernelSettings, PatternError, PhaseKernel
 from analysis.field import Roi, StrainField, ZoiGrid
-from analysis.picture import filtered_pattern, predicted_sigma, resolution_length
+from analysis.picture.pattern import predicted_sigma, resolution_length
+from analysis.picture.spectrum import filtered_pattern
 from live.characterise.truth import QUANTISATION
 
 Floats = NDArray[np.float64]
@@ -83,7 +84,7 @@ class Imposed:
 
 
 @dataclass(frozen=True, slots=True)
-class Expected:
+class ExpectedErrors:
     """What one size and order of ZOI gives on the picture, for bursts of n frames.
 
     Attributes
@@ -133,7 +134,7 @@ def grid_for(shape: tuple[int, int], size: int) -> ZoiGrid | None:
     return ZoiGrid.cover(Roi(EDGE, EDGE, room[1], room[0]), size, size)
 
 
-def expected(imposed: Imposed, gradient: float, size: int, order: int, n: int) -> Expected | None:
+def expected(imposed: Imposed, gradient: float, size: int, order: int, n: int) -> ExpectedErrors | None:
     """Measure imposed shifts and a strain; None where the picture is too small or shows no pattern."""
     grid = grid_for(imposed.light.shape, size)
     if grid is None:
@@ -149,7 +150,7 @@ def expected(imposed: Imposed, gradient: float, size: int, order: int, n: int) -
         return None
     bias_u, strain_error = systematic(imposed, grid, order)
     theory = resolution_length(size) if order == 1 else measured_length(imposed, size, order)
-    return Expected(
+    return ExpectedErrors(
         size, order, n, grid.n_active,
         bias_u,
         float(np.mean([robust_std(f.u) for f in fields])),

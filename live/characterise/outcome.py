@@ -1,7 +1,9 @@
 """What an experiment of ``phasedic characterise`` hands back, and how it is kept.
 
-An ``Outcome`` is text, tables and verdicts; it goes through JSON unchanged, so that a run that was
+An ``ExperimentOutcome`` is text, tables and verdicts; it goes through JSON unchanged, so that a run that was
 interrupted takes up what it has. Figures and CSV files lie beside it.
+
+How far an experiment has come, on one line of the terminal.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TextIO
 
 from acquire.errors import ConfigError, DataError
 
@@ -25,7 +27,7 @@ Word = Literal["better", "equal", "worse"]
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ResultTable:
     """Rows under headings that carry their units; ``name`` is that of its CSV file."""
 
     name: str
@@ -48,7 +50,7 @@ class Table:
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class Comparison:
     """Where ours stands in one respect.
 
     Attributes
@@ -66,7 +68,7 @@ class Verdict:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class ExperimentOutcome:
     """The result of one experiment.
 
     Attributes
@@ -74,10 +76,10 @@ class Outcome:
     name, title : str
     text : str
         Markdown under the title; may hold ``![...](figure.png)``.
-    tables : tuple of Table
+    tables : tuple of ResultTable
     figures : tuple of str
         File names beside the page.
-    verdicts : tuple of Verdict
+    verdicts : tuple of Comparison
     seconds : float, s
         Time it took.
     """
@@ -85,14 +87,14 @@ class Outcome:
     name: str
     title: str
     text: str
-    tables: tuple[Table, ...] = ()
+    tables: tuple[ResultTable, ...] = ()
     figures: tuple[str, ...] = ()
-    verdicts: tuple[Verdict, ...] = ()
+    verdicts: tuple[Comparison, ...] = ()
     seconds: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
-class Bench:
+class ExperimentContext:
     """What an experiment is given.
 
     Attributes
@@ -141,10 +143,10 @@ def compared(ours: float, theirs: float) -> Word:
     return "equal" if ours <= theirs * (1 + EQUAL_WITHIN) else "worse"
 
 
-def verdict(what: str, unit: str, ours: float, theirs: float, against: str) -> Verdict:
+def verdict(what: str, unit: str, ours: float, theirs: float, against: str) -> Comparison:
     """A verdict whose text carries both figures."""
     subject = f"{what}: {shown(float(ours))} against {shown(float(theirs))} {unit}".rstrip()
-    return Verdict(subject, against, compared(ours, theirs))
+    return Comparison(subject, against, compared(ours, theirs))
 
 
 def figure(width: float = 9.0, height: float = 3.6) -> Any:
@@ -164,7 +166,7 @@ def figure(width: float = 9.0, height: float = 3.6) -> Any:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def save_figure(bench: Bench, name: str, drawn: Any) -> str:
+def save_figure(bench: ExperimentContext, name: str, drawn: Any) -> str:
     """Write a figure beside the page; returns its file name."""
     drawn.savefig(bench.folder / name, dpi=DPI, metadata={"Software": None})
     return name
@@ -183,7 +185,7 @@ def colour_map(axes: Any, values: Any, title: str, unit: str, limits: Sequence[f
     return picture
 
 
-def write_outcome(outcome: Outcome, folder: Path, key: str) -> None:
+def write_outcome(outcome: ExperimentOutcome, folder: Path, key: str) -> None:
     """Keep an outcome: JSON for taking up again, CSV for others. The JSON appears whole or not at all."""
     for table in outcome.tables:
         (folder / f"{table.name}.csv").write_text(table.csv(), encoding="utf-8")
@@ -193,7 +195,7 @@ def write_outcome(outcome: Outcome, folder: Path, key: str) -> None:
     new.replace(folder / f"{outcome.name}.json")
 
 
-def read_outcome(name: str, folder: Path, key: str) -> Outcome | None:
+def read_outcome(name: str, folder: Path, key: str) -> ExperimentOutcome | None:
     """What an earlier run with the same key left; None where there is nothing that serves.
 
     Raises
@@ -214,13 +216,13 @@ def read_outcome(name: str, folder: Path, key: str) -> Outcome | None:
     return outcome if all((folder / each).exists() for each in outcome.figures) else None
 
 
-def _from_dict(values: dict[str, Any]) -> Outcome:
+def _from_dict(values: dict[str, Any]) -> ExperimentOutcome:
     tables = tuple(
-        Table(t["name"], tuple(t["columns"]), tuple(tuple(row) for row in t["rows"]))
+        ResultTable(t["name"], tuple(t["columns"]), tuple(tuple(row) for row in t["rows"]))
         for t in values["tables"]
     )
-    verdicts = tuple(Verdict(**v) for v in values["verdicts"])
-    return Outcome(
+    verdicts = tuple(Comparison(**v) for v in values["verdicts"])
+    return ExperimentOutcome(
         values["name"], values["title"], values["text"], tables,
         tuple(values["figures"]), verdicts, float(values["seconds"]),
     )  # fmt: skip
@@ -247,3 +249,32 @@ def save_new(drawn: Any, path: Path) -> None:
         raise DataError(
             f"{path}: cannot be written: {error.strerror}; look at the folder and the disk"
         ) from None
+
+
+BAR = 24
+
+
+class ProgressBar:
+    """A bar on a terminal, a line an experiment elsewhere; called with the share done."""
+
+    def __init__(self, name: str, screen: TextIO | None) -> None:
+        self._name, self._screen = name, screen
+        self._live = screen is not None and screen.isatty()
+        self(0.0)
+
+    def __call__(self, share: float) -> None:
+        if self._live:
+            filled = round(BAR * min(max(share, 0.0), 1.0))
+            self._write(f"\r{self._name:12} [{'#' * filled}{'.' * (BAR - filled)}] {100 * share:3.0f} %")
+
+    def done(self, words: str) -> None:
+        """The experiment is finished."""
+        if self._live:
+            self(1.0)
+            self._write(f"  {words}\n")
+        else:
+            self._write(f"{self._name:12} {words}\n")
+
+    def _write(self, text: str) -> None:
+        if self._screen is not None:
+            print(text, end="", file=self._screen, flush=True)

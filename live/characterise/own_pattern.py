@@ -14,9 +14,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
-from analysis.picture import PatternReport, describe_pattern
-from live.characterise.imposed import Expected, Imposed, expected
-from live.characterise.outcome import Bench, Outcome, Table, figure, save_figure, shown, write_outcome
+from analysis.picture.pattern import PatternReport, describe_pattern
+from live.characterise.imposed import ExpectedErrors, Imposed, expected
+from live.characterise.outcome import (
+    ExperimentContext,
+    ExperimentOutcome,
+    ResultTable,
+    figure,
+    save_figure,
+    shown,
+    write_outcome,
+)
 from live.characterise.truth import grey_picture
 
 SIZES = (16, 24, 32, 48, 64, 96, 128)
@@ -42,8 +50,8 @@ def characterise_pattern(arguments: argparse.Namespace, folder: Path) -> int:
     DataError
         A file that is not a picture, or one without a pattern.
     """
+    from live.characterise.outcome import ProgressBar
     from live.characterise.page import write_page
-    from live.characterise.progress import Progress
 
     picture, bits = _picture(Path(arguments.pattern), arguments.roi)
     if arguments.noise is not None and not arguments.noise >= 0:
@@ -52,8 +60,8 @@ def characterise_pattern(arguments: argparse.Namespace, folder: Path) -> int:
         raise ConfigError(f"--burst {arguments.burst}: give 1 or more frames")
     if not arguments.target > 0:
         raise ConfigError(f"--target {arguments.target}: give a strain noise in um/m above 0")
-    progress, begin = Progress("pattern", sys.stderr), time.monotonic()
-    bench = Bench(folder, arguments.quick, None, progress)
+    progress, begin = ProgressBar("pattern", sys.stderr), time.monotonic()
+    bench = ExperimentContext(folder, arguments.quick, None, progress)
     outcome = pattern(bench, picture, bits, arguments.noise, arguments.burst, arguments.target * 1e-6)
     outcome = replace(outcome, seconds=time.monotonic() - begin)
     progress.done(f"{outcome.seconds:.1f} s")
@@ -106,8 +114,13 @@ def _depth(picture: NDArray[Any]) -> int:
 
 
 def pattern(
-    bench: Bench, picture: NDArray[Any], bits: int, noise: float | None, burst: int | None, target: float
-) -> Outcome:
+    bench: ExperimentContext,
+    picture: NDArray[Any],
+    bits: int,
+    noise: float | None,
+    burst: int | None,
+    target: float,
+) -> ExperimentOutcome:
     """The whole study of one picture; ``target`` is a standard deviation of strain."""
     report = describe_pattern(picture, bits, noise)
     sigma = math.sqrt(max(report.noise**2, 1 / 12))
@@ -124,14 +137,14 @@ def pattern(
         raise DataError(
             "no ZOI could be measured on this picture; give a larger region (--roi) or a better pattern"
         )
-    spectrum = Table("pattern_spectrum", ("frequency cycles/px", "power GL^2"), _pairs(report))
-    table = Table(
-        "pattern", tuple(_column(f.name) for f in fields(Expected)), tuple(astuple(e) for e in found)
+    spectrum = ResultTable("pattern_spectrum", ("frequency cycles/px", "power GL^2"), _pairs(report))
+    table = ResultTable(
+        "pattern", tuple(_column(f.name) for f in fields(ExpectedErrors)), tuple(astuple(e) for e in found)
     )
     name = _draw(bench, report, found, target)
     text = "\n\n".join([_described(report, bits, noise), recommended(found, target, burst), _short(found).markdown(),
                         f"![Spectrum of the pattern, strain noise and bias against ZOI size]({name})"])  # fmt: skip
-    return Outcome("pattern", "Your pattern", text, (table, spectrum), (name,))
+    return ExperimentOutcome("pattern", "Your pattern", text, (table, spectrum), (name,))
 
 
 def _pairs(report: PatternReport) -> tuple[tuple[float, float], ...]:
@@ -174,7 +187,7 @@ def _described(report: PatternReport, bits: int, noise: float | None) -> str:
 g = {shown(report.gradient)} GL/px, pattern above the noise up to {band} cycles/px. Verdict: {said}."""
 
 
-def recommended(found: list[Expected], target: float, burst: int | None) -> str:
+def recommended(found: list[ExpectedErrors], target: float, burst: int | None) -> str:
     """The smallest ZOI, then the shortest burst, that reaches the target."""
     able = [e for e in found if e.order == 1 and e.refused < 0.05 and e.sigma_strain <= target]
     if not able:
@@ -197,7 +210,7 @@ def recommended(found: list[Expected], target: float, burst: int | None) -> str:
     )
 
 
-def _short(found: list[Expected]) -> Table:
+def _short(found: list[ExpectedErrors]) -> ResultTable:
     columns = (
         "ZOI px", "order", "frames", "bias of u px", "std of u px", "std of exx um/m", "predicted um/m",
         "limit um/m", "error of 1e-3 %", "l_10% px",
@@ -207,10 +220,10 @@ def _short(found: list[Expected]) -> Table:
          1e6 * e.limit_strain, 100 * e.strain_error, e.length)
         for e in found
     )  # fmt: skip
-    return Table("pattern_short", columns, rows)
+    return ResultTable("pattern_short", columns, rows)
 
 
-def _draw(bench: Bench, report: PatternReport, found: list[Expected], target: float) -> str:
+def _draw(bench: ExperimentContext, report: PatternReport, found: list[ExpectedErrors], target: float) -> str:
     drawn = figure(14, 4)
     axes = drawn.subplots(1, 3)
     axes[0].semilogy(report.spectrum_radius, report.spectrum_power, label="picture")

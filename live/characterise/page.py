@@ -10,7 +10,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from acquire.errors import DataError
-from live.characterise.outcome import Outcome, Table, Verdict, Word
+from live.characterise.outcome import Comparison, ExperimentOutcome, ResultTable, Word
 
 WORDS: tuple[Word, ...] = ("better", "equal", "worse")
 LIBRARIES = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless")
@@ -57,12 +57,12 @@ def _processor() -> str:
     )
 
 
-def page(outcomes: Sequence[Outcome], command: str, images: str, intro: str = INTRODUCTION) -> str:
+def page(outcomes: Sequence[ExperimentOutcome], command: str, images: str, intro: str = INTRODUCTION) -> str:
     """The whole page.
 
     Parameters
     ----------
-    outcomes : sequence of Outcome
+    outcomes : sequence of ExperimentOutcome
     command : str
         What made it, as typed.
     images : str
@@ -77,7 +77,7 @@ def page(outcomes: Sequence[Outcome], command: str, images: str, intro: str = IN
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def linked(outcome: Outcome, images: str) -> str:
+def linked(outcome: ExperimentOutcome, images: str) -> str:
     """The text of an outcome with its figures where they lie, and the names of its CSV files."""
     text = outcome.text.strip()
     prefix = f"{images}/" if images else ""
@@ -90,7 +90,7 @@ def linked(outcome: Outcome, images: str) -> str:
     return text
 
 
-def standing(outcomes: Sequence[Outcome]) -> str:
+def standing(outcomes: Sequence[ExperimentOutcome]) -> str:
     """Where ours is better, equal (within 10 %) or worse, from the figures of all sections."""
     verdicts = [verdict for outcome in outcomes for verdict in outcome.verdicts]
     if not verdicts:
@@ -104,17 +104,17 @@ def standing(outcomes: Sequence[Outcome]) -> str:
     return "\n".join(lines)
 
 
-def _line(verdict: Verdict) -> str:
+def _line(verdict: Comparison) -> str:
     return f"- {verdict.subject} ({verdict.against})"
 
 
-def _table(verdicts: Sequence[Verdict]) -> Table:
+def _table(verdicts: Sequence[Comparison]) -> ResultTable:
     rows = [(v.word, v.subject, v.against) for word in reversed(WORDS) for v in verdicts if v.word == word]
-    return Table("verdicts", ("verdict", "ours against the other", "the other"), tuple(rows))
+    return ResultTable("verdicts", ("verdict", "ours against the other", "the other"), tuple(rows))
 
 
 def write_page(
-    outcomes: list[Outcome], target: Path, folder: Path, typed: str, intro: str | None = None
+    outcomes: list[ExperimentOutcome], target: Path, folder: Path, typed: str, intro: str | None = None
 ) -> None:
     """Write the Markdown page, its figures linked from where it stands, and the verdicts as CSV beside them."""
     images = os.path.relpath(folder, target.parent)

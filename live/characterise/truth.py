@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from acquire.opencv import read_image
+from acquire.opencv.images import read_image
 from analysis import KernelSettings, PhaseKernel
 from analysis.field import Roi, StrainField, ZoiGrid
 from analysis.paper_estimator import PaperEstimator, PaperField, PaperSettings
@@ -83,7 +83,7 @@ class TiledStrain:
 
 
 @dataclass(frozen=True, slots=True)
-class Camera:
+class SensorModel:
     """Encoding and white noise.
 
     Attributes
@@ -114,7 +114,7 @@ class Camera:
         return np.clip(np.rint(levels), 0, self.top).astype(np.uint8 if self.bits <= 8 else np.uint16)
 
 
-class Scene:
+class TrueScene:
     """A speckle pattern, its pictures and its exact gradient.
 
     Parameters
@@ -137,7 +137,7 @@ class Scene:
         """The deformed pattern, (H, W), part of full scale."""
         return self.speckle.fast(deformation)
 
-    def pair(self, deformation: Deformation, camera: Camera) -> tuple[Image, Image]:
+    def pair(self, deformation: Deformation, camera: SensorModel) -> tuple[Image, Image]:
         """Reference and deformed picture with independent noise."""
         return camera.picture(self.reference, self.rng), camera.picture(self.light(deformation), self.rng)
 

@@ -1,1 +1,3 @@
-"""The commands, one file each; ``arguments`` lists them, ``options`` says the keys of the configuration."""
+"""The commands, one module each. ``arguments`` lists them, ``options`` has the options that set keys of the
+configuration.
+"""

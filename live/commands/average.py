@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from live.commands.options import add_options
-from live.tell import TerminalScreen
+from live.ui.terminal.screen import TerminalScreen
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -21,8 +21,8 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic average``: a dark frame (lens covered) or a flat frame (evenly lit)."""
     from acquire.burst import average_bursts, compile_loops, save_mean
     from acquire.errors import DataError
-    from live.measure import kinds_of
-    from live.setup import open_rig
+    from live.pipeline.warm_up import kinds_of
+    from live.setup.devices import open_rig
 
     screen = TerminalScreen()
     given = getattr(arguments, "camera.crop")

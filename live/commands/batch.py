@@ -12,7 +12,7 @@ from acquire.errors import ConfigError
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import MEASURE, add_options, add_verbose, overrides
 from live.commands.signals import signals
-from live.tell import TerminalScreen
+from live.ui.terminal.screen import TerminalScreen
 
 OUTPUT = ("axis", "standard", "zero", "lag")
 
@@ -49,11 +49,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic batch``; 5 where a test failed or has losses."""
-    from live.batch import Wanted, find_tests, run_campaign
+    from live.replay.batch.campaign import CampaignRequest, run_campaign
+    from live.replay.batch.test_list import find_tests
 
     if arguments.workers < 1:
         raise ConfigError(f"--workers {arguments.workers} is not possible; allowed: from 1")
-    wanted = Wanted(
+    wanted = CampaignRequest(
         tests=find_tests(arguments.tests),
         out=Path(arguments.folder),
         workers=arguments.workers,

@@ -9,17 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
-from acquire.files import write_picture
+from acquire.files.picture import write_picture
 from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
-from live.check import WITHOUT_TARGET, Figures, examine, judge, table_lines, take
+from live.commands.check_watch import watch
 from live.commands.exit_codes import NOT_READY
 from live.commands.options import PICTURES, add_measure, add_options, configured, to_be_new
 from live.commands.signals import interrupts
-from live.commands.watching import watch
-from live.setup import Config, open_load
-from live.specimen import Overlay, snapshot, troubles, with_auto_gauges
-from live.tell import TerminalScreen
+from live.config.loading import Config
+from live.setup.check.check_list import CheckFigures, examine, table_lines
+from live.setup.check.sample import take
+from live.setup.check.verdict import WITHOUT_TARGET, judge
+from live.setup.devices import open_load
+from live.setup.placement import with_auto_gauges
+from live.setup.region import troubles
+from live.setup.specimen_drawing import Overlay, snapshot
+from live.ui.terminal.screen import TerminalScreen
 
 LISTEN_S = 3.0
 
@@ -68,7 +73,7 @@ def command(arguments: argparse.Namespace) -> int:
     return 0 if ready else NOT_READY
 
 
-def _verdict(figures: Figures, ready: bool) -> str:
+def _verdict(figures: CheckFigures, ready: bool) -> str:
     if not ready:
         return "NO-GO: not ready, see what to look at above"
     if figures.shots.few:
@@ -77,7 +82,7 @@ def _verdict(figures: Figures, ready: bool) -> str:
     return "GO: ready"
 
 
-def _drawn(figures: Figures, config: Config, target: float | None) -> NDArray[np.uint8]:
+def _drawn(figures: CheckFigures, config: Config, target: float | None) -> NDArray[np.uint8]:
     """The picture with what was judged over it."""
     zois = figures.zois
     gauges = with_auto_gauges(config, zois.grid).gauges

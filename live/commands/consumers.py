@@ -1,17 +1,96 @@
-"""The standard consumers of a test: results, view and status card; alarms and strain output of a live run."""
+"""The standard consumers of a test: results, view and status card; alarms and strain output of a live run.
+
+The signals that a configuration asks for, as consumers of a live run.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 
+from acquire.addresses import Options, parse_address
 from acquire.events import EventKind, Level
-from live.measure import Screen
-from live.outputs import About, Compose, Consumer, write_results
-from live.setup import outlines
-from live.signals import signals_of
-from live.tell import Books, StatusCard
-from live.view import View, ViewSetup, spawn_viewer
-from live.view.consumers import CardWriter, FiguresWriter, Watching
+from acquire.serial_line.ports import LineSettings
+from live.config.channels import STANDARD
+from live.config.gauges import outlines
+from live.config.listen_address import ListenAddress, read_token
+from live.config.loading import Config
+from live.pipeline.channel_values import ChannelValues
+from live.pipeline.consumer import Compose, Consumer, RunInfo
+from live.pipeline.run_state import RunState
+from live.pipeline.screen import Screen
+from live.results.summary import StatusCard
+from live.results.writer import write_results
+from live.run.alarms import ActionMeans, Alarm, AlarmWatch, actions_of
+from live.run.strain_output import Lines, SerialOut, StrainOut, TcpOut, UdpOut
+from live.ui.rerun.consumer import CardWriter, FiguresWriter, RerunConsumer
+from live.ui.rerun.messages import ViewSetup
+from live.ui.rerun.view import View, spawn_viewer
+
+WHAT = "strain out"
+
+
+def signals_of(about: RunInfo, books: RunState, screen: Screen) -> list[Consumer]:
+    """Alarms and strain out of a live run; none of a replay.
+
+    Raises
+    ------
+    ConfigError, DeviceError
+        A port is taken, not there, or needs a token.
+    """
+    if about.end is None:
+        return []
+    outs: list[StrainOut] = []
+    with ExitStack() as opened:
+        for make in (_tcp, _udp, _serial):
+            out = make(about.config, _lines(about, books))
+            if out is not None:
+                opened.callback(out.end)
+                outs.append(out)
+                screen.say(out.name)
+        opened.pop_all()
+    means = ActionMeans(screen.bell, about.end, outs)
+    alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
+    return [*_watch(alarms, about, books), *outs]
+
+
+def _watch(alarms: Sequence[Alarm], about: RunInfo, books: RunState) -> list[Consumer]:
+    if not alarms:
+        return []
+    readings, vitals = ChannelValues(about.start.monotonic, books.snapshot), books.vitals
+    return [AlarmWatch(alarms, readings, vitals.channels, books.alarms, books.journal)]
+
+
+def _lines(about: RunInfo, books: RunState) -> Lines:
+    config = about.config
+    gauges = tuple(f"{prefix}gauge_{name}" for name in config.gauges for prefix in ("", "sigma_"))
+    channels = config.strain_out.channels or (*STANDARD, *gauges)
+    return Lines(ChannelValues(about.start.monotonic, books.snapshot), channels, config.strain_out.format)
+
+
+def _tcp(config: Config, lines: Lines) -> StrainOut | None:
+    if config.strain_out.tcp is None:
+        return None
+    place = ListenAddress.parse(config.strain_out.tcp)
+    return TcpOut(place.listen(WHAT), read_token(place, config.operate.token_file, WHAT), lines)
+
+
+def _udp(config: Config, lines: Lines) -> StrainOut | None:
+    if config.strain_out.udp is None:
+        return None
+    place = ListenAddress.parse(config.strain_out.udp)
+    return UdpOut(place.host, place.port, lines)
+
+
+def _serial(config: Config, lines: Lines) -> StrainOut | None:
+    if config.strain_out.serial is None:
+        return None
+    address = parse_address(config.strain_out.serial)
+    options = Options(address)
+    baud = options.integer("baud", 115200, minimum=50, maximum=12_000_000)
+    options.done()
+    url = f"{address.scheme}:{address.target}" if address.scheme else address.target
+    return SerialOut(LineSettings(url, baud), lines)
 
 
 def standard_consumers(screen: Screen, more: Sequence[Consumer] = ()) -> Compose:
@@ -21,23 +100,23 @@ def standard_consumers(screen: Screen, more: Sequence[Consumer] = ()) -> Compose
     DataError where a file of the results exists already, or cannot be made.
     """
 
-    def compose(about: About, books: Books) -> Sequence[Consumer]:
+    def compose(about: RunInfo, books: RunState) -> Sequence[Consumer]:
         signals = signals_of(about, books, screen)
         return [*write_results(about, books), *_shown(about, books, screen), *more, *signals]
 
     return compose
 
 
-def _shown(about: About, books: Books, screen: Screen) -> list[Consumer]:
+def _shown(about: RunInfo, books: RunState, screen: Screen) -> list[Consumer]:
     """The view, and what keeps its words and figures new."""
     view = _view(about, books, screen)
     if view is None:
         return []
     card = StatusCard(about.config.specimen, books.loads)
-    return [CardWriter(view, card, books), FiguresWriter(view, books), Watching(view, books)]
+    return [CardWriter(view, card, books), FiguresWriter(view, books), RerunConsumer(view, books)]
 
 
-def _view(about: About, books: Books, screen: Screen) -> View | None:
+def _view(about: RunInfo, books: RunState, screen: Screen) -> View | None:
     v = about.config.view
     if not (v.enabled or v.rrd):
         return None

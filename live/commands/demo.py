@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 
 from live.commands.options import add_measure, add_options, configured
 from live.commands.run import conclude, run_to_the_end
-from live.measure import Measurement
-from live.outputs import Consumer
-from live.run import Outcome
-from live.setup import Config
-from live.tell import TerminalScreen, evaluate, tensile_table
+from live.config.loading import Config
+from live.pipeline.consumer import Consumer
+from live.pipeline.measurement import Measurement
+from live.results.figures import evaluate, tensile_table
+from live.run.outcome import Outcome
+from live.ui.terminal.screen import TerminalScreen
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid

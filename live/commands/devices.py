@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from live.tell import say
+from live.ui.terminal.screen import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -15,7 +15,7 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic devices``."""
     from acquire.camera import list_cameras
     from acquire.printable import printable
-    from acquire.serial_line import list_serial_ports
+    from acquire.serial_line.ports import list_serial_ports
     from analysis import threads
 
     cameras, ports = list_cameras(), list_serial_ports()

@@ -7,9 +7,11 @@ from pathlib import Path
 
 from acquire.errors import ConfigError
 from live.commands.options import add_gauge_option
-from live.export import FORMATS, ExportRequest, Options, export
-from live.finished import Display, RunFolder, add_gauges, open_run
-from live.tell import TerminalScreen
+from live.results.export.formats import FORMATS, ExportRequest, export
+from live.results.export.job import ExportOptions
+from live.results.quantities import Display
+from live.results.run_folder import RunFolder, add_gauges, open_run
+from live.ui.terminal.screen import TerminalScreen
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -76,5 +78,5 @@ def _request(arguments: argparse.Namespace, run: RunFolder) -> ExportRequest:
         arguments.start_s,
         arguments.end_s,
         display_of(arguments, run.mm_per_px),
-        Options(arguments.layout, arguments.fps, arguments.limit, not arguments.no_picture),
+        ExportOptions(arguments.layout, arguments.fps, arguments.limit, not arguments.no_picture),
     )

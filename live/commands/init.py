@@ -10,13 +10,16 @@ from pathlib import Path
 
 from acquire.addresses import parse_address
 from acquire.errors import DeviceError
-from acquire.files import write_picture
+from acquire.files.picture import write_picture
 from acquire.printable import printable
 from live.commands.options import PICTURES, add_options, add_verbose, overrides, to_be_new
-from live.measure import Screen
-from live.setup import load_config, new_rig
-from live.specimen import Overlay, Proposal, look, mask_picture, propose, rig_text, snapshot
-from live.tell import TerminalScreen
+from live.config.loading import load_config
+from live.config.rig_file import new_rig
+from live.pipeline.screen import Screen
+from live.setup.gauge_proposal import Proposal, propose, rig_text
+from live.setup.region import look, mask_picture
+from live.setup.specimen_drawing import Overlay, snapshot
+from live.ui.terminal.screen import TerminalScreen
 
 RECORDED = ("files", "video", "session")
 MEASURE = (
@@ -80,7 +83,7 @@ def _kept(said: dict[str, object], fixed: bool) -> set[str]:
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FoundDevices:
     """Camera and load cell of the rig, and what else there is."""
 
     camera: str
@@ -90,7 +93,7 @@ class Found:
     others: tuple[str, ...] = ()
 
 
-def find_devices(said: dict[str, object], screen: Screen) -> Found:
+def find_devices(said: dict[str, object], screen: Screen) -> FoundDevices:
     """Camera and load cell as ``said``, else those that are there; raises DeviceError where there is no camera."""
     camera, words, others = str(said.get("camera.address") or ""), "", tuple[str, ...]()
     if not camera:
@@ -100,7 +103,7 @@ def find_devices(said: dict[str, object], screen: Screen) -> Found:
     if not load:
         load, load_words = _load(camera, screen)
         screen.say(f"load cell: {load}  {load_words}".rstrip())
-    return Found(camera, printable(words), load, printable(load_words), others)
+    return FoundDevices(camera, printable(words), load, printable(load_words), others)
 
 
 def _camera() -> tuple[str, str, tuple[str, ...]]:
@@ -136,7 +139,8 @@ def _load(camera: str, screen: Screen) -> tuple[str, str]:
 
 def _heard(screen: Screen) -> Iterator[tuple[str, str]]:
     """What talks on the serial ports; a device that must be asked is silent here."""
-    from acquire.serial_line import identify, list_serial_ports
+    from acquire.serial_line import identify
+    from acquire.serial_line.ports import list_serial_ports
 
     for port in list_serial_ports():
         if not port.accessible:

@@ -11,7 +11,7 @@ from acquire.errors import ConfigError, DataError
 from acquire.load_cell import calibration, check, stillness
 from acquire.load_sample import LoadFlag, LoadSample
 from live.commands.exit_codes import NOT_READY
-from live.setup import open_load
+from live.setup.devices import open_load
 
 Say = Callable[[str], None]
 Ask = Callable[[str], str]

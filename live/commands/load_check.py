@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from acquire.load_cell import check
 from live.commands.exit_codes import NOT_READY
-from live.setup import open_load
+from live.setup.devices import open_load
 
 Say = Callable[[str], None]
 

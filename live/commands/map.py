@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from acquire.opencv import read_image
-from live.maps import Picture, draw, save
+from acquire.opencv.images import read_image
 from live.results import Strain
-from live.tell import say
+from live.results.maps.map import MapRequest, draw, save
+from live.ui.terminal.screen import say
 
 _SEEN_PX = 2.0
 
@@ -37,7 +37,7 @@ def command(arguments: argparse.Namespace) -> int:
     background = None if arguments.over is None else read_image(Path(arguments.over), gray="luma")
     path = Path(arguments.png)
     with Strain.open(Path(arguments.results)) as strain:
-        picture = Picture(
+        picture = MapRequest(
             arguments.field,
             arguments.row,
             arguments.limit,

@@ -1,6 +1,6 @@
 """The options of the command line that stand for keys of the configuration, and what they set.
 
-An option is declared where its key is (``live.setup.sections``): name, type, default and help are
+An option is declared where its key is (``live.config.sections``): name, type, default and help are
 written once. Its value is stored under "section.key".
 """
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError
-from live.setup import Config, load_config, options
+from live.config.loading import Config, load_config, options
 
 MEASURE = (
     "roi", "mask", "zoi", "step", "gauges", "scale", "burst", "reference-burst", "window", "estimator", "strain",

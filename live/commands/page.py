@@ -14,10 +14,12 @@ from live.commands.options import add_measure, add_options, overrides
 from live.commands.report import write_report
 from live.commands.run import OTHER_PROGRAMS, RECORDING, invite, watched
 from live.commands.signals import signals
-from live.measure import Screen
-from live.serve import DEFAULT_PORT, Desk, Draft
-from live.setup import load_config
-from live.tell import TerminalScreen
+from live.config.loading import load_config
+from live.pipeline.screen import Screen
+from live.ui.terminal.screen import TerminalScreen
+from live.ui.web.config_draft import ConfigDraft
+from live.ui.web.page_controller import PageController
+from live.ui.web.server import DEFAULT_PORT
 
 RIG = "rig.toml"
 
@@ -35,12 +37,12 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic page``; 0 when it is ended from the page, 130 when it is interrupted."""
     screen = TerminalScreen()
     path, said = Path(arguments.config or RIG), overrides(arguments)
-    draft = Draft(load_config(path if path.exists() else None, said), path, said)
+    draft = ConfigDraft(load_config(path if path.exists() else None, said), path, said)
     if not draft.config.camera.address:
         found = find_devices(said, screen)
         draft.change_all({"camera.address": found.camera, "load.address": found.load})
     interrupted = threading.Event()
-    with Desk(draft, arguments.page_port) as desk:
+    with PageController(draft, arguments.page_port) as desk:
 
         def interrupt() -> None:
             interrupted.set()
@@ -52,7 +54,7 @@ def command(arguments: argparse.Namespace) -> int:
     return EXIT_INTERRUPTED if interrupted.is_set() else 0
 
 
-def serve(desk: Desk, screen: Screen, interrupted: threading.Event) -> None:
+def serve(desk: PageController, screen: Screen, interrupted: threading.Event) -> None:
     """Specimen after specimen."""
     words = ""
     while not interrupted.is_set() and (config := desk.set_up(words)) is not None:

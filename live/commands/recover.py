@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
-from live.tell import say as told
+from live.ui.terminal.screen import say as told
 
 Say = Callable[[str], None]
 

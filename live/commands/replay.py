@@ -10,7 +10,8 @@ from typing import Any
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, overrides
 from live.commands.signals import signals
-from live.tell import TerminalScreen, file_lines, summary_lines
+from live.results.summary import file_lines, summary_lines
+from live.ui.terminal.screen import TerminalScreen
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,7 +29,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic replay``."""
     from live.commands.consumers import standard_consumers
-    from live.replay import ReplayRequest, replay
+    from live.replay.replay import replay
+    from live.replay.source import ReplayRequest
 
     request = ReplayRequest(
         source=arguments.source,

@@ -8,23 +8,14 @@ from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
 from live.commands.options import add_gauge_option
-from live.export import check_free, new_file
-from live.finished import Display, RunFolder, add_gauges, open_run
-from live.measure import Screen
-from live.report import (
-    NO_BROWSER,
-    Report,
-    Wanted,
-    compare,
-    find_browser,
-    make_report,
-    save_figures,
-    save_page,
-    save_pdf,
-    tests_of,
-    write_table,
-)
-from live.tell import TerminalScreen
+from live.pipeline.screen import Screen
+from live.results.export.atomic_file import check_free, new_file
+from live.results.quantities import Display
+from live.results.report.comparison import compare, tests_of, write_table
+from live.results.report.report import Report, ReportRequest, make_report
+from live.results.report.saving import NO_BROWSER, find_browser, save_figures, save_page, save_pdf
+from live.results.run_folder import RunFolder, add_gauges, open_run
+from live.ui.terminal.screen import TerminalScreen
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -80,15 +71,17 @@ def write_report(folder: Path, screen: Screen) -> None:
     """``report.html`` in the folder of a run that has just ended; what goes wrong is told and harms nothing."""
     try:
         with open_run(folder) as run:
-            save_page(make_report(run, Wanted(mm_per_px=run.mm_per_px), screen), folder / "report.html")
+            save_page(
+                make_report(run, ReportRequest(mm_per_px=run.mm_per_px), screen), folder / "report.html"
+            )
         screen.say(f"  {folder / 'report.html'}")
     except PhasedicError as error:
         screen.say(f"warning: no report was made: {error}")
 
 
-def _wanted(arguments: argparse.Namespace, run: RunFolder) -> Wanted:
+def _wanted(arguments: argparse.Namespace, run: RunFolder) -> ReportRequest:
     scale = Display(arguments.scale).mm_per_px or run.mm_per_px
-    return Wanted(tuple(arguments.fields), tuple(arguments.times), scale)
+    return ReportRequest(tuple(arguments.fields), tuple(arguments.times), scale)
 
 
 def _targets(out: Path, arguments: argparse.Namespace) -> list[Path]:

@@ -14,17 +14,21 @@ from live.commands.consumers import standard_consumers
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, add_options, configured
 from live.commands.signals import signals
-from live.measure import Screen
-from live.operate import OrderPort, listen
-from live.outputs import Consumer
-from live.run import INTERRUPTED, LiveRun, Outcome, Stop, run_live
-from live.setup import Config
-from live.specimen import searched
-from live.tell import TerminalScreen, file_lines, sentence, summary_lines
-from live.view import has_display, rerun_command, spawn_viewer
+from live.config.loading import Config
+from live.pipeline.consumer import Consumer
+from live.pipeline.event_log import sentence
+from live.pipeline.screen import Screen
+from live.results.summary import file_lines, summary_lines
+from live.run.control import ControlPort
+from live.run.keyboard import listen
+from live.run.live_run import INTERRUPTED, LiveRun, run_live
+from live.run.outcome import Outcome, StopSignal
+from live.setup.region import searched
+from live.ui.rerun.view import has_display, rerun_command, spawn_viewer
+from live.ui.terminal.screen import TerminalScreen
 
 if TYPE_CHECKING:
-    from live.serve import Desk
+    from live.ui.web.page_controller import PageController
 
 RECORDING = ("camera", "load", "no-record", "record", "armed", "start-above", "dark", "flat", "crop")
 VIEWER_OPENS_S = 1.5  # where it cannot, it ends sooner than that
@@ -52,16 +56,16 @@ def command(arguments: argparse.Namespace) -> int:
 
 def run_beside_page(config: Config, screen: Screen) -> Outcome:
     """Run with the operator's page, which ends with the run."""
-    from live.serve import Desk
+    from live.ui.web.page_controller import PageController
 
-    with Desk(None) as desk:
+    with PageController(None) as desk:
         invite(desk, screen)
         return watched(desk, config, screen)
 
 
-def watched(desk: Desk, config: Config, screen: Screen) -> Outcome:
+def watched(desk: PageController, config: Config, screen: Screen) -> Outcome:
     """One test, with the page, told to its end."""
-    from live.serve import ended
+    from live.ui.web.page_controller import ended
 
     desk.viewer = _open_viewer
     outcome = run_to_the_end(config, screen, [desk.begin(config)], desk.attend)
@@ -71,7 +75,7 @@ def watched(desk: Desk, config: Config, screen: Screen) -> Outcome:
     return outcome
 
 
-def invite(desk: Desk, screen: Screen) -> None:
+def invite(desk: PageController, screen: Screen) -> None:
     """Open the page where there is a display; say how to open it."""
     if has_display() and webbrowser.open(desk.address):
         screen.say("the page opens in the browser")
@@ -95,9 +99,9 @@ def run_to_the_end(
     attend: Callable[[LiveRun], None] = lambda live: None,
 ) -> Outcome:
     """Run with signals, keyboard, port for orders and viewer attached; ``attend`` gives orders too."""
-    stop, operate = Stop(), config.operate
+    stop, operate = StopSignal(), config.operate
     with contextlib.ExitStack() as stack:
-        port = OrderPort(operate.orders, operate.token_file, screen) if operate.orders else None
+        port = ControlPort(operate.orders, operate.token_file, screen) if operate.orders else None
 
         def hands(live: LiveRun) -> None:
             keyboard = listen(live, sys.stdin, screen)

@@ -11,20 +11,13 @@ from typing import TypeVar
 
 from acquire.errors import ConfigError
 from live.commands.options import add_options, add_verbose, configured
-from live.measure import Screen
-from live.setup import AUTO, Config, write_rig
-from live.specimen import (
-    OUT_OF_PLANE_MM,
-    Board,
-    Scale,
-    false_strain,
-    from_board,
-    from_points,
-    from_width,
-    look,
-    region_of,
-)
-from live.tell import TerminalScreen
+from live.config.loading import Config
+from live.config.rig_file import write_rig
+from live.config.values import AUTO
+from live.pipeline.screen import Screen
+from live.setup.region import look, region_of
+from live.setup.scale import OUT_OF_PLANE_MM, Board, Scale, false_strain, from_board, from_points, from_width
+from live.ui.terminal.screen import TerminalScreen
 
 Number = TypeVar("Number", int, float)
 OF_THE_RIG = -1.0  # --width without a number

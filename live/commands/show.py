@@ -9,9 +9,9 @@ from pathlib import Path
 from acquire.errors import ConfigError
 from live.commands.options import add_gauge_option
 from live.commands.signals import signals
-from live.finished import add_gauges, open_run
-from live.show import Asked, show
-from live.tell import TerminalScreen
+from live.results.run_folder import add_gauges, open_run
+from live.ui.rerun.playback import ShowRequest, show
+from live.ui.terminal.screen import TerminalScreen
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -31,7 +31,7 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic show``."""
     _check(arguments)
     screen, enough = TerminalScreen(), threading.Event()
-    asked = Asked(arguments.start_s, arguments.end_s, arguments.every)
+    asked = ShowRequest(arguments.start_s, arguments.end_s, arguments.every)
     rrd = Path(arguments.rrd) if arguments.rrd else None
     with signals(enough.set, lambda text: None), open_run(arguments.run) as run:
         if arguments.more_gauges:

@@ -13,13 +13,15 @@ import numpy as np
 
 from acquire.errors import ConfigError
 from live.commands.options import add_options, add_verbose, overrides
-from live.export import check_free, new_folder
-from live.report import Figure, Line, save_figures
-from live.setup import AUTO, compile_ahead
-from live.tell import TerminalScreen
+from live.config.values import AUTO
+from live.results.export.atomic_file import check_free, new_folder
+from live.results.report.saving import save_figures
+from live.results.report.svg import Plot, PlotLine
+from live.setup.compiling import compile_ahead
+from live.ui.terminal.screen import TerminalScreen
 
 if TYPE_CHECKING:
-    from live.study import Advice, Found, Setting
+    from live.replay.study import Advice, StudyResult, StudySetting
 
 MEASURE = ("roi", "mask", "burst", "reference-burst", "estimator", "strain", "bending", "noise", "axis")
 WINDOWS = ("gaussian", "uniform", "tukey", "bi-triangular")
@@ -54,9 +56,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic study``."""
-    from live.measure import kinds_of
-    from live.replay import ReplayRequest, open_material
-    from live.study import recommended, study, take_windows
+    from live.pipeline.warm_up import kinds_of
+    from live.replay.opening import open_material
+    from live.replay.source import ReplayRequest
+    from live.replay.study import recommended, study, take_windows
 
     screen, out = TerminalScreen(), Path(arguments.folder)
     check_free(out)
@@ -88,11 +91,11 @@ def command(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _settings(arguments: argparse.Namespace) -> list[Setting]:
-    from live.study import Setting
+def _settings(arguments: argparse.Namespace) -> list[StudySetting]:
+    from live.replay.study import StudySetting
 
     found = [
-        Setting(zoi, step, order, window)
+        StudySetting(zoi, step, order, window)
         for zoi, order, window in itertools.product(arguments.zoi, arguments.order, arguments.window)
         for step in arguments.step or [max(1, zoi // 4)]
     ]
@@ -107,7 +110,7 @@ _HEAD = (
 )
 
 
-def _line(one: Found) -> str:
+def _line(one: StudyResult) -> str:
     s = one.setting
     mark = "" if one.is_told else "  noise"
     over = f"{one.noise / one.predicted:.2f}" if one.measured else "-"
@@ -118,14 +121,14 @@ def _line(one: Found) -> str:
     )
 
 
-def _csv(found: Sequence[Found]) -> str:
+def _csv(found: Sequence[StudyResult]) -> str:
     rows = [{**dataclasses.asdict(one.setting), **_values(one)} for one in found]
     lines = [",".join(rows[0]), *(",".join(f"{value:.8g}" if isinstance(value, float) else str(value)
              for value in row.values()) for row in rows)]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 
-def _values(one: Found) -> dict[str, Any]:
+def _values(one: StudyResult) -> dict[str, Any]:
     values = {name: getattr(one, name) for name in ("l10", "vsg", "noise", "predicted", "seen", "sigma")}
     return {**values, "gradient": one.gradient, "valid": one.valid}
 
@@ -135,7 +138,7 @@ def _section(advice: Advice) -> str:
     return f'[measure]\nzoi = {s.zoi}\nstep = {s.step}\norder = {s.order}\nwindow = "{s.window}"\n'
 
 
-def _figures(found: Sequence[Found]) -> list[Figure]:
+def _figures(found: Sequence[StudyResult]) -> list[Plot]:
     """Noise and strain over the size of the virtual gauge, a line for each order and weight."""
     kinds = list(dict.fromkeys((one.setting.order, one.setting.window) for one in found))
     parts = [[one for one in found if (one.setting.order, one.setting.window) == kind] for kind in kinds]
@@ -148,16 +151,16 @@ def _figures(found: Sequence[Found]) -> list[Figure]:
     )
     x = "size of the virtual gauge, px"
     return [
-        Figure("noise", "Noise of one ZOI", x, "noise, um/m", noise),
-        Figure("strain", "Largest strain, its noise taken off", x, "strain, um/m", seen),
+        Plot("noise", "Noise of one ZOI", x, "noise, um/m", noise),
+        Plot("strain", "Largest strain, its noise taken off", x, "strain, um/m", seen),
     ]
 
 
-def _curve(name: str, part: Sequence[Found], value: str, colour: int) -> Line:
+def _curve(name: str, part: Sequence[StudyResult], value: str, colour: int) -> PlotLine:
     part = sorted(part, key=lambda one: one.vsg)
     x, y = np.array([one.vsg for one in part]), np.array([getattr(one, value) * 1e6 for one in part])
     sigma = np.array([one.sigma * 1e6 for one in part]) if value == "seen" else None
-    return Line(name, x, y, sigma, colour)
+    return PlotLine(name, x, y, sigma, colour)
 
 
 # -- what is read -------------------------------------------------------------------------------
@@ -181,7 +184,7 @@ def _windows(word: str) -> list[str]:
 
 
 def _still(word: str) -> tuple[float, float]:
-    from live.study import NEVER
+    from live.replay.study import NEVER
 
     return NEVER if word == "none" else _seconds(word)
 

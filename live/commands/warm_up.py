@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 
 from analysis import PICTURE_KINDS, KernelSettings, check_machine
-from live.measure import on_fit_machine
-from live.setup import compile_ahead
-from live.tell import TerminalScreen
+from live.pipeline.reference import on_fit_machine
+from live.setup.compiling import compile_ahead
+from live.ui.terminal.screen import TerminalScreen
 
 TESTED_PX = 64
 """The ZOI of the self-test; those of a test are tested when it begins."""

@@ -1,13 +1,6 @@
-"""A recorded session, or any folder of pictures, through the same measuring path.
+"""A recording, or any folder of pictures, through the measuring path of a live run.
 
-``replay`` runs it (``opened`` before the first burst, ``parts`` of a long session); ``session`` and ``pictures``
-make the ``material`` (reference, bursts, loads), ``store`` finds the bursts of a session whatever it holds, and
-``places`` tells where they lie.
+``replay`` runs it. ``session`` and ``pictures`` make a ``source`` (reference, bursts, loads), ``burst_index``
+finds the bursts of a session, ``forces`` reads loads from CSV, ``parts`` cuts a long session. ``study``
+compares settings on one test.
 """
-
-from live.replay.material import Material, ReplayRequest
-from live.replay.opened import open_material
-from live.replay.parts import measure_part
-from live.replay.replay import Replayed, replay
-
-__all__ = ["Material", "ReplayRequest", "Replayed", "measure_part", "open_material", "replay"]

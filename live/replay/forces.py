@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from acquire.errors import ConfigError, DataError
-from acquire.files import read_bytes
+from acquire.files.picture import read_bytes
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
-from acquire.protocols import newtons_per
+from acquire.protocols.units import newtons_per
 
 _HEAD = re.compile(r"^\s*([A-Za-z]+)(?:[\s_]*[\[(]?\s*([A-Za-z]+)\s*[\])]?)?\s*$")
 _FORCE, _TIME = ("force", "load", "f"), ("time", "t", "seconds")

@@ -20,12 +20,13 @@ from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst, frozen
 from analysis import StrainField
-from live.measure import Measurement, Screen, unchanged
-from live.replay.ahead import ahead
-from live.replay.material import ReplayRequest, check_window
-from live.replay.opened import opened_session, prepared
+from live.pipeline.measurement import Measurement
+from live.pipeline.reference import unchanged
+from live.pipeline.screen import Screen
+from live.replay.opening import opened_session, prepared
 from live.replay.session import session_path
-from live.setup import PreparedKernel
+from live.replay.source import ReplayRequest, ahead, check_window
+from live.setup.prepared import PreparedKernel
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
@@ -92,7 +93,7 @@ class _Stored:
     field: StrainField
 
 
-class Recital:
+class StoredResults:
     """Stands where a kernel does, and says of each burst what was found of it."""
 
     def __init__(self, parts: Sequence[Path], ready: PreparedKernel) -> None:
@@ -107,7 +108,7 @@ class Recital:
         self.measurements = told.measurements
 
     @classmethod
-    def of(cls, parts: Sequence[Path], ready: PreparedKernel) -> Recital | None:
+    def of(cls, parts: Sequence[Path], ready: PreparedKernel) -> StoredResults | None:
         """Of ``parts``; None without any."""
         return cls(parts, ready) if parts else None
 

@@ -16,13 +16,13 @@ from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.load_cell import LoadLog
-from acquire.opencv import picture_names
-from live.replay.material import Material, ReplayRequest, Seen, Window
-from live.setup import Config
+from acquire.opencv.images import picture_names
+from live.config.loading import Config
+from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Window
 
 
-def picture_material(camera: Camera, request: ReplayRequest, config: Config) -> Material:
-    seen = Seen()
+def picture_material(camera: Camera, request: ReplayRequest, config: Config) -> ReplaySource:
+    seen = PictureCount()
     frames = seen.passing(camera)
     if request.reference is not None:
         reference = reference_from(request.reference, camera.info)
@@ -34,7 +34,7 @@ def picture_material(camera: Camera, request: ReplayRequest, config: Config) -> 
     bursts = Window.of(request, 0.0).part(average_bursts(frames, config.measure.burst or 1))
     start = ClockPair(0.0, datetime.datetime.now(datetime.UTC))
     expected = _expected(camera.info, 0 if request.reference is not None else reference.n, config)
-    return Material(camera.info, reference, bursts, loads, start, expected=expected, seen=seen)
+    return ReplaySource(camera.info, reference, bursts, loads, start, expected=expected, seen=seen)
 
 
 def _expected(camera: CameraInfo, taken: int, config: Config) -> int | None:
@@ -59,7 +59,7 @@ def reference_from(path: str, camera: CameraInfo) -> Burst:
     DataError
         Missing, not a picture, or not of the size and bits of the pictures.
     """
-    from acquire.opencv import read_image
+    from acquire.opencv.images import read_image
 
     image = read_image(path, camera.controls.get("gray"))
     if image.shape != (camera.height, camera.width):

@@ -18,26 +18,27 @@ from acquire.addresses import parse_address
 from acquire.camera import with_scheme
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind, EventSink
-from acquire.opencv import picture_times
-from live.measure import History, Screen
-from live.outputs import About, Compose, Outputs, write_results
-from live.replay.ahead import ahead
+from acquire.opencv.images import picture_times
+from live.config.loading import Config, load_config
+from live.config.values import AUTO
+from live.pipeline.consumer import Compose, RunInfo
+from live.pipeline.consumer_thread import Outputs
+from live.pipeline.event_log import EventLog
+from live.pipeline.frame_counts import FrameCounts
+from live.pipeline.history import History
+from live.pipeline.run_state import RunState
+from live.pipeline.screen import Screen
 from live.replay.forces import read_forces
-from live.replay.material import Material, ReplayRequest, Work, check_window
-from live.replay.opened import opened_session, prepared
-from live.replay.parts import Recital
+from live.replay.opening import opened_session, prepared
+from live.replay.parts import StoredResults
 from live.replay.pictures import picture_material, picture_of, write_names
 from live.replay.session import session_path
-from live.setup import (
-    AUTO,
-    Config,
-    load_config,
-    make_folder,
-    open_rig,
-    with_mask,
-)
-from live.specimen import is_sought
-from live.tell import Books, Journal, Ledger
+from live.replay.source import ReplayRequest, ReplaySource, Work, ahead, check_window
+from live.results.folder import make_folder
+from live.results.writer import write_results
+from live.setup.devices import open_rig
+from live.setup.pictures import with_mask
+from live.setup.region import is_sought
 
 _MOST_TOLD = 5  # pictures that were left out, in the summary
 
@@ -49,7 +50,7 @@ class Replayed:
     Attributes
     ----------
     folder : Path
-    books : Books
+    books : RunState
     config : Config
     exit_code : int
     lines : tuple of str
@@ -59,7 +60,7 @@ class Replayed:
     """
 
     folder: Path
-    books: Books
+    books: RunState
     config: Config
     exit_code: int
     lines: tuple[str, ...] = ()
@@ -82,7 +83,7 @@ def replay(
         return _replay_pictures(request, screen, stopping, consumers)
     with opened_session(path, request, screen) as (found, config):
         material = _with_forces(found, request, config)
-        return _run(material, config, request, screen, stopping, Journal(), consumers)
+        return _run(material, config, request, screen, stopping, EventLog(), consumers)
 
 
 # -- pictures -----------------------------------------------------------------------------------
@@ -100,7 +101,7 @@ def _replay_pictures(
         load=replace(config.load, address="none:"),
         measure=replace(config.measure, roi=region),
     )
-    journal = Journal()
+    journal = EventLog()
     rig = open_rig(config.camera.address, "none:", _in_test_time(journal), crop=config.camera.crop)
     try:
         with rig.camera as camera:
@@ -110,7 +111,7 @@ def _replay_pictures(
         rig.close()
 
 
-def _with_forces(material: Material, request: ReplayRequest, config: Config) -> Material:
+def _with_forces(material: ReplaySource, request: ReplayRequest, config: Config) -> ReplaySource:
     """The same with the forces of the CSV that was given."""
     if request.forces is None:
         return material
@@ -122,7 +123,7 @@ def _with_forces(material: Material, request: ReplayRequest, config: Config) -> 
     )
 
 
-def _in_test_time(journal: Journal) -> EventSink:
+def _in_test_time(journal: EventLog) -> EventSink:
     """Events of a picture have its time, which is data of theirs."""
 
     def record(event: Event) -> None:
@@ -135,24 +136,26 @@ def _in_test_time(journal: Journal) -> EventSink:
 
 
 def _run(
-    material: Material,
+    material: ReplaySource,
     config: Config,
     request: ReplayRequest,
     screen: Screen,
     stopping: threading.Event,
-    journal: Journal,
+    journal: EventLog,
     consumers: Compose,
 ) -> Replayed:
     ready = prepared(material, config, request.source, screen, stopping.is_set)
-    stored = Recital.of(request.parts, ready)
+    stored = StoredResults.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements
     bursts = _not_empty(stored.bursts() if stored else material.bursts, request.source)
     folder = make_folder(ready.plan.config.output.dir, datetime.datetime.now(datetime.UTC))
     config = _settled(with_mask(ready.plan.config, ready.plan.mask, folder), request.settled)
-    books = Books(journal, Ledger(), material.loads, History(config.specimen.axis), specimen=config.specimen)
+    books = RunState(
+        journal, FrameCounts(), material.loads, History(config.specimen.axis), specimen=config.specimen
+    )
     write_names(request.source, folder / "pictures.csv")
     screen.say(f"replaying {request.source} into {request.settled or folder}")
-    about = About(
+    about = RunInfo(
         config, folder, material.camera, ready.plan.grid, material.start, aside=request.settled is not None
     )
     outputs = Outputs(consumers(about, books), books.loads, journal, books.history)
@@ -191,7 +194,7 @@ def _settled(config: Config, folder: Path | None) -> Config:
     )
 
 
-def _account(material: Material, books: Books) -> list[str]:
+def _account(material: ReplaySource, books: RunState) -> list[str]:
     """The fate of every picture, and why some were left out."""
     seen = material.seen
     if seen is None or not seen.left_out:
@@ -235,7 +238,7 @@ def _after(first: list[Work], rest: Iterator[Work]) -> Iterator[Work]:
     yield from rest
 
 
-def _give_past(material: Material, outputs: Outputs) -> None:
+def _give_past(material: ReplaySource, outputs: Outputs) -> None:
     """What was recorded beside the pictures: events and loads."""
     for event in material.events:
         if event.kind is not EventKind.MEASURED:

@@ -17,11 +17,11 @@ from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventKind
 from acquire.load_cell import LoadLog
 from acquire.session import Session
-from live.measure import NewReference
-from live.replay.material import Material, ReplayRequest, Window, Work
+from live.config.loading import Config, from_dict, settings_in
+from live.pipeline.measure import NewReference
+from live.replay.burst_index import Store, open_store
 from live.replay.pictures import reference_from
-from live.replay.store import Store, open_store
-from live.setup import Config, from_dict, settings_in
+from live.replay.source import ReplayRequest, ReplaySource, Window, Work
 
 LIVE_ONLY = ("output", "record", "operate", "strain_out", "alarm")
 """Sections of the configuration that a replay leaves out."""
@@ -68,7 +68,7 @@ def _beside(section: Mapping[str, Any], keys: Iterable[str], path: Path) -> dict
     return {**section, **{key: str(path.with_name(Path(old).name)) for key, old in moved.items()}}
 
 
-def session_material(session: Session, request: ReplayRequest, config: Config, path: Path) -> Material:
+def session_material(session: Session, request: ReplayRequest, config: Config, path: Path) -> ReplaySource:
     if request.as_measured and session.mode.every > 1:
         raise ConfigError(
             f"{path} holds only one frame in {session.mode.every}, not the bursts that were measured; replay it"
@@ -102,7 +102,7 @@ def session_material(session: Session, request: ReplayRequest, config: Config, p
         found = _all_after(stored, after, n, window, request.numbers)
     start = ClockPair(session.start_monotonic, session.start_utc)
     bursts = window.part(found.bursts)
-    return Material(
+    return ReplaySource(
         session.camera, reference, bursts, loads, start, events, samples, found.expected, found.times
     )
 

@@ -1,17 +1,15 @@
-"""``strain.h5`` and ``strain.csv``: written row by row, read back by ``Strain``.
+"""The files of a run: ``strain.h5`` and ``strain.csv`` written row by row, and read back.
 
-``writer`` waits for the force of a ``row`` and hands it to ``strain_h5`` and ``strain_csv``; ``info`` is
-what stands beside the numbers, ``quantities`` says what every number means, ``reader`` opens the file,
-``dataset`` makes an xarray of it, ``noise_floor`` finds its still phase; ``python -m live.results``
-is a first reading in a child process.
+``writer`` writes a ``row`` to ``strain_h5`` and ``strain_csv`` in the ``layout``; ``quantities`` describes each
+number, ``reader`` opens the file (``Strain``), ``run_folder`` a whole run. ``figures`` is the table of tensile
+figures, ``summary`` the words at the end, ``noise_floor`` the still phase. Packages: ``maps``, ``report``,
+``export``. ``python -m live.results`` reads a file first in a child process.
 """
 
-from live.results.dataset import dataset, mean_name
-from live.results.info import ResultsInfo
 from live.results.noise_floor import StillPhase, still_phase_of
 from live.results.quantities import MEANS, UNITLESS, Quantity, quantity_of
-from live.results.reader import Strain
-from live.results.row import gauge_columns
+from live.results.reader import Strain, dataset, mean_name
+from live.results.row import ResultsInfo, gauge_columns
 from live.results.strain_h5 import FLUSH_S
 from live.results.writer import Results
 

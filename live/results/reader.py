@@ -3,6 +3,8 @@
 Maps are fetched from the file when asked for; per-row values are in memory. HDF5 may wait for ever
 on an unfinished file that was damaged too, so such a file is first read by a child process,
 ``python -m live.results FILE``. A file that does not hold what ``layout`` declares is refused.
+
+Results as an ``xarray.Dataset``, where xarray is installed (``phasedic[xarray]``).
 """
 
 from __future__ import annotations
@@ -10,16 +12,16 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from acquire.closing import Closing
-from acquire.errors import DataError
+from acquire.errors import ConfigError, DataError
 from acquire.hdf5 import (
     Declared,
-    Said,
+    JsonField,
     check_links,
     check_object,
     check_size,
@@ -36,11 +38,93 @@ from acquire.hdf5 import (
 )
 from analysis.field import ZoiGrid
 from live.results import layout
-from live.results.dataset import Stored, dataset
-from live.results.info import FORMAT, FORMAT_VERSION
+from live.results.quantities import MEANS, quantity_of
+from live.results.row import FORMAT, FORMAT_VERSION
+
+
+class ShownAs(Protocol):
+    """In which units and axes numbers come out."""
+
+    def shown(self, name: str, values: NDArray[Any]) -> NDArray[Any]: ...
+    def unit(self, name: str) -> str: ...
+    def x(self, grid: ZoiGrid) -> NDArray[np.float64]: ...
+    def y(self, grid: ZoiGrid) -> NDArray[np.float64]: ...
+    def axes(self) -> str: ...
+
+
+class Stored:
+    """As the file holds them: px, y down, strains dimensionless."""
+
+    def shown(self, name: str, values: NDArray[Any]) -> NDArray[Any]:
+        """The same."""
+        return values
+
+    def unit(self, name: str) -> str:
+        """As it is kept."""
+        return quantity_of(name).unit
+
+    def x(self, grid: ZoiGrid) -> NDArray[np.float64]:
+        """(C,), px."""
+        return grid.x
+
+    def y(self, grid: ZoiGrid) -> NDArray[np.float64]:
+        """(R,), px."""
+        return grid.y
+
+    def axes(self) -> str:
+        """In words."""
+        return (
+            "x right, y down, px, from the centre of the first pixel; all values lie on the reference picture"
+        )
+
+
+def dataset(strain: Strain, shown: ShownAs, fields: tuple[str, ...] | None = None) -> Any:
+    """Maps and means with coordinates ``time``, ``y``, ``x`` and units; ``fields`` are maps, all without.
+
+    Raises
+    ------
+    ConfigError
+        xarray is not installed.
+    DataError
+        There is no such map, or it cannot be read.
+    """
+    try:
+        import xarray
+    except ImportError:
+        raise ConfigError("this needs xarray: pip install 'phasedic[xarray]'") from None
+    maps = {
+        name: (("time", "y", "x"), shown.shown(name, strain.maps(name)), _attributes_dataset(shown, name))
+        for name in fields or strain.names
+    }
+    means = {
+        mean_name(name): ("time", shown.shown(name, values), _attributes_dataset(shown, name))
+        for name, values in strain.values.items()
+        if name != "time_s"
+    }
+    places = {
+        "time": ("time", strain.time_s, {"units": "s"}),
+        "y": ("y", shown.y(strain.grid), _attributes_dataset(shown, "y")),
+        "x": ("x", shown.x(strain.grid), _attributes_dataset(shown, "x")),
+    }
+    about = {"strain_measure": strain.strain_measure, "start_time": strain.start_utc, "axes": shown.axes()}
+    return xarray.Dataset({**maps, **means}, places, about)
+
+
+def mean_name(name: str) -> str:
+    """The name of a column where it stands beside maps, which may have the same."""
+    plain = MEANS.get(name, name)
+    if plain.removeprefix("sigma_").startswith("gauge_"):
+        return plain
+    averaged = quantity_of(plain.removeprefix("sigma_")).is_strain or plain in ("u", "v")
+    return f"mean_{plain}" if averaged else plain
+
+
+def _attributes_dataset(shown: ShownAs, name: str) -> dict[str, str]:
+    return {"units": shown.unit(name), "long_name": quantity_of(name).words}
+
 
 _log = logging.getLogger(__name__)
-_LENGTH, _PLACE = Said(int, 1, layout.MOST_PIXELS), Said(int, 0, layout.MOST_PIXELS)
+_LENGTH, _PLACE = JsonField(int, 1, layout.MOST_PIXELS), JsonField(int, 0, layout.MOST_PIXELS)
 
 
 class Strain(Closing):
@@ -209,7 +293,7 @@ def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
     """The grid, once its description and what stands in the file agree."""
     where = f"{path}: the grid"
     said = read_object(text, where)
-    check_object(said, {"roi": Said(dict), "size": _LENGTH, "step": _LENGTH}, where)
+    check_object(said, {"roi": JsonField(dict), "size": _LENGTH, "step": _LENGTH}, where)
     check_object(said["roi"], {"x": _PLACE, "y": _PLACE, "width": _LENGTH, "height": _LENGTH}, where)
     active = open_dataset(strain, "active", Declared("u1", (None, None), 0, 1))
     shape = tuple((said["roi"][name] - said["size"]) // said["step"] + 1 for name in ("height", "width"))

@@ -1,20 +1,24 @@
-"""One row of the results: the strain maps of one instant, their means, and what belongs to them."""
+"""One row of the results: the strain maps of one instant, their means, and what belongs to them.
+
+What stands beside the numbers of a test in its files.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from live.measure import AXIAL, ordered_mean, strains_along
+from live.pipeline.measurement import AXIAL, ordered_mean, strains_along
 
 if TYPE_CHECKING:
+    from acquire.frame import CameraInfo
     from analysis.field import StrainField
-    from live.measure import Measurement
+    from live.pipeline.measurement import Measurement
 
 StrainMeasure = Literal["small", "engineering", "green", "hencky"]
 STRAINS = ("exx", "eyy", "exy")
@@ -38,7 +42,7 @@ class RowInfo(Protocol):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Row:
+class StrainRow:
     """What is written of one measurement.
 
     Attributes
@@ -54,7 +58,7 @@ class Row:
     values: dict[str, float | int]
 
     @classmethod
-    def of(cls, measurement: Measurement, info: RowInfo, axis: str = "y") -> Row:
+    def of(cls, measurement: Measurement, info: RowInfo, axis: str = "y") -> StrainRow:
         """The row of ``measurement`` in the measure of strain of ``info``; ``axis`` is that of the load."""
         maps = maps_of(measurement.field, info.strain_measure)
         return cls(maps, _values(measurement, maps, info, axis))
@@ -129,3 +133,49 @@ def _stretched(strain: float, measure: StrainMeasure) -> float:
 
 def _mean(name: str, small: float, maps: dict[str, NDArray[Any]], measure: StrainMeasure) -> float:
     return small if measure == "small" else ordered_mean(maps[name][np.isfinite(maps[name])])
+
+
+FORMAT, FORMAT_VERSION = "phasedic-strain", 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ResultsInfo:
+    """What stands beside the numbers.
+
+    Attributes
+    ----------
+    start_monotonic : float, s
+        Zero of ``time_s``.
+    start_utc : str
+        The same instant, ISO 8601.
+    config, metadata, versions : mapping to JSON values
+        In force, free words of the user, and of the programs.
+    camera : CameraInfo or None
+    strain_measure : "small" | "engineering" | "green" | "hencky"
+    area_m2 : float or None, m^2
+        Cross-section of the specimen; with it the rows have a stress.
+    gauges : mapping of name to JSON values
+        The virtual gauges, each as it was described.
+    axis : "x", "y" or "auto"
+        Of the load; auto: as the means tell it, y until then.
+    lagged : bool
+        A lag of the load was taken off, so that rows have the force without it too.
+    """
+
+    start_monotonic: float
+    start_utc: str
+    config: Mapping[str, Any]
+    metadata: Mapping[str, Any]
+    versions: Mapping[str, Any]
+    camera: CameraInfo | None
+    strain_measure: StrainMeasure = "small"
+    area_m2: float | None = None
+    gauges: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    axis: str = "y"
+    lagged: bool = False
+
+    @property
+    def extras(self) -> tuple[str, ...]:
+        """The columns that not every test has, but for those of gauges."""
+        stress = ("stress_Pa", "true_strain", "true_stress_Pa") if self.area_m2 is not None else ()
+        return (*stress, *(("force_raw_N",) if self.lagged else ()))

@@ -7,7 +7,7 @@ from itertools import chain
 from pathlib import Path
 
 from acquire.errors import DataError
-from live.results.row import Row, gauge_columns
+from live.results.row import StrainRow, gauge_columns
 
 COLUMNS = (
     *("frame", "time_s", "force_N", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy"),
@@ -36,7 +36,7 @@ class CsvWriter:
             raise self._trouble(error) from error
         self._put(",".join(self._columns))
 
-    def write(self, row: Row) -> None:
+    def write(self, row: StrainRow) -> None:
         """One line; see the class for what is raised."""
         self._put(",".join(_text(row.values[column]) for column in self._columns))
 

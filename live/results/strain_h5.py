@@ -16,15 +16,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import DataError
-from acquire.hdf5 import Pace, PictureStack, Table, let_go
+from acquire.hdf5 import FlushTimer, PictureStack, RowTable, let_go
 from analysis.evaluate import load_axis
 from live.results import layout
-from live.results.info import FORMAT, FORMAT_VERSION
-from live.results.row import STRAINS, Row, gauge_columns
+from live.results.row import FORMAT, FORMAT_VERSION, STRAINS, StrainRow, gauge_columns
 
 if TYPE_CHECKING:
     from analysis.field import ZoiGrid
-    from live.results.info import ResultsInfo
+    from live.results.row import ResultsInfo
 
 FLUSH_S = 0.25  # a row of a live test waits for its flush no longer than this
 _UNITS = {"time_s": "s", "force_N": "N", "noise_GL": "GL", "duration_s": "s", "u_px": "px", "v_px": "px"}
@@ -82,13 +81,13 @@ class StrainWriter:
     ) -> None:
         self._path, self.failed, self._axis = path, False, info.axis
         self._flushed = 0  # rows
-        self._pace = Pace(flush_s, now)
+        self._pace = FlushTimer(flush_s, now)
         self._file = self._guard(lambda: _create(path, grid, info))
         entry = self._file["entry"]
         self._maps = {n: PictureStack(entry["strain"][n]) for n in layout.MAPS}
-        self._values = Table(entry["mean"], _value_names(info))
+        self._values = RowTable(entry["mean"], _value_names(info))
 
-    def write(self, row: Row) -> None:
+    def write(self, row: StrainRow) -> None:
         """Append one row."""
         self._guard(lambda: self._append(row))
         self._pace.wrote()
@@ -116,7 +115,7 @@ class StrainWriter:
             self._guard(self._tell_axis)
             self._guard(self._file.close)
 
-    def _append(self, row: Row) -> None:
+    def _append(self, row: StrainRow) -> None:
         values = self._values.row(row.values)
         for name, stack in self._maps.items():
             stack.append(row.maps[name])

@@ -1,26 +1,32 @@
 """What a test gives: one row a measurement in ``strain.h5`` and ``strain.csv``.
 
-The force of a measurement must be final when it comes here (``live.measure.Settling``). Recording,
+The force of a measurement must be final when it comes here (``live.pipeline.measurement.ForceMatching``). Recording,
 drawing and reporting are not done here; ``Strain`` (``reader``) reads the file back. The format is
 described in docs/strain-format.md.
+
+The results as a consumer: every measurement, in order, once its force is final.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, cast
 
 from acquire.closing import Closing
 from acquire.errors import DataError
-from live.measure import AxisFinder
-from live.results.info import ResultsInfo
-from live.results.row import Row
+from live.pipeline.consumer import Consumer, Policy, RunInfo
+from live.pipeline.history import AxisFinder
+from live.pipeline.measurement import Measurement
+from live.pipeline.run_state import RunState
+from live.results.folder import versions
+from live.results.row import ResultsInfo, StrainRow
 from live.results.strain_csv import CsvWriter
 from live.results.strain_h5 import FLUSH_S, StrainWriter
 
 if TYPE_CHECKING:
     from analysis.field import ZoiGrid
-    from live.measure import Measurement
+    from live.pipeline.measurement import Measurement
 
 
 class Results(Closing):
@@ -69,7 +75,7 @@ class Results(Closing):
             The file cannot be written (a full disk); what was written before stays readable.
             Stop adding then.
         """
-        row = Row.of(measurement, self._info, self._axis.add(measurement.instant))
+        row = StrainRow.of(measurement, self._info, self._axis.add(measurement.instant))
         self._h5.write(row)
         self._csv.write(row)
         self.written += 1
@@ -93,3 +99,59 @@ class Results(Closing):
             self._csv.close()
         finally:
             self._h5.close()
+
+
+SELDOM_S = 10.0  # a row may wait for its flush where nobody would have it from a broken run
+
+
+class Files(Consumer):
+    """Writes ``results``; a disk with bad moments holds the measurement up only when ``room`` of them wait.
+
+    Then nothing is lost: bursts are skipped, and counted, as with any slow measurement.
+    """
+
+    name = "results"
+    policy = Policy.WAIT
+    room = 64
+    vital = True
+
+    def __init__(self, results: Results) -> None:
+        self._results = results
+
+    def settled(self, measurement: Measurement) -> None:
+        """Write one row."""
+        self._results.add(measurement)
+
+    def idle(self) -> float:
+        """A row that is not flushed must not wait for one that does not come."""
+        return self._results.flush_when_due()
+
+    def end(self) -> str:
+        """Close the files."""
+        self._results.close()
+        return ""
+
+
+def write_results(about: RunInfo, books: RunState) -> Sequence[Consumer]:
+    """The results alone.
+
+    Raises
+    ------
+    DataError
+        A file of the results exists already, or cannot be made.
+    """
+    config = about.config
+    info = ResultsInfo(
+        about.start.monotonic,
+        about.start.utc.isoformat(),
+        config.as_dict(),
+        dict(config.metadata),
+        versions(),
+        about.camera,
+        strain_measure=cast(Any, config.measure.strain),
+        area_m2=config.specimen.area_m2,
+        gauges=dict(config.gauges),
+        axis=config.specimen.axis,
+        lagged=config.load.lag_s != 0,
+    )
+    return [Files(Results(about.folder, about.grid, info, SELDOM_S if about.aside else FLUSH_S))]

@@ -1,13 +1,6 @@
-"""The threads of a live test.
+"""The test: devices, threads and consumers joined.
 
-``run_live`` opens everything: ``setting``, ``recorder`` behind its ``gate``, and a ``live_run`` that
-joins the threads: ``grabber`` drains the camera, ``load_thread`` the load cell, ``measuring`` measures
-what comes through ``feed`` and ``channels`` once ``reference_step`` has a reference. ``stopping`` is the
-wish to end, ``outcome`` what is left behind.
+``live_run`` runs it: ``grabber``, ``burst_queue``, ``measuring``, ``load_thread``. ``recorder`` records, with
+``pre_trigger``. ``control`` carries out commands from ``keyboard`` and ``tcp_lines``. ``alarms`` and
+``strain_output`` are consumers.
 """
-
-from live.run.live_run import INTERRUPTED, LiveRun, run_live
-from live.run.outcome import Outcome
-from live.run.stopping import Stop
-
-__all__ = ["INTERRUPTED", "LiveRun", "Outcome", "Stop", "run_live"]

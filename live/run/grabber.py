@@ -16,12 +16,12 @@ from dataclasses import dataclass
 from acquire.burst import BurstAccumulator
 from acquire.camera import Camera
 from acquire.errors import PhasedicError
-from acquire.events import EventKind, Muffler
+from acquire.events import EventKind, RateLimiter
 from acquire.frame import Burst, CameraInfo, Frame
-from live.measure import Reference, ReferenceTaker
-from live.run.channels import Mailbox
-from live.setup import Config
-from live.tell import Books
+from live.config.loading import Config
+from live.pipeline.queues import LatestQueue
+from live.pipeline.reference import ReferenceBurst, ReferenceTaker
+from live.pipeline.run_state import RunState
 
 log = logging.getLogger(__name__)
 HELD_BYTES, HELD_S = 256_000_000, 1.0
@@ -67,14 +67,14 @@ class Grabber:
     camera : Camera
         Entered before ``start``.
     plan : GrabPlan
-    books : Books
+    books : RunState
     on_frame, on_burst : callable
         Told of every frame, and of every burst; they must not wait.
 
     Attributes
     ----------
-    references : queue of Reference
-    bursts : Mailbox of Burst
+    references : queue of ReferenceBurst
+    bursts : LatestQueue of Burst
         Newest wins; with a source that waits for its reader, nothing is skipped.
     error : Exception or None
         Why the camera ended, where it did not end well.
@@ -84,14 +84,14 @@ class Grabber:
         self,
         camera: Camera,
         plan: GrabPlan,
-        books: Books,
+        books: RunState,
         on_frame: Callable[[Frame], None] = lambda frame: None,
         on_burst: Callable[[Burst], None] = lambda burst: None,
     ) -> None:
         self._camera, self._journal, self._ledger = camera, books.journal, books.ledger
         self._plan, self._on_frame, self._on_burst = plan, on_frame, on_burst
-        self.references: queue.SimpleQueue[Reference] = queue.SimpleQueue()
-        self.bursts: Mailbox[Burst] = Mailbox(
+        self.references: queue.SimpleQueue[ReferenceBurst] = queue.SimpleQueue()
+        self.bursts: LatestQueue[Burst] = LatestQueue(
             waits=not camera.info.live, at_first=_held_at_first(camera.info)
         )
         self.error: Exception | None = None
@@ -99,7 +99,7 @@ class Grabber:
         self._taker: ReferenceTaker | None = ReferenceTaker(plan.reference_burst)
         self._accumulator = BurstAccumulator(plan.burst)
         self._fed = 0
-        self._muffler, self._unsaid = Muffler(), 0
+        self._muffler, self._unsaid = RateLimiter(), 0
         self._first_t: float | None = None
         self._last_t: float | None = None
         self._retake = threading.Event()

@@ -17,21 +17,23 @@ from pathlib import Path
 from acquire.errors import ConfigError, PhasedicError
 from acquire.events import EventKind
 from acquire.frame import Burst, Frame
-from live.measure import Screen
-from live.operate import OrderRefused
-from live.outputs import About, Compose, Outputs, write_results
-from live.pace import Pace
-from live.run.feed import TAKING, Feed
-from live.run.gate import Gate
+from live.config.loading import Config
+from live.pipeline.consumer import Compose, RunInfo
+from live.pipeline.consumer_thread import Outputs
+from live.pipeline.latency import LatencyMonitor
+from live.pipeline.run_state import RunState
+from live.pipeline.screen import Screen
+from live.results.writer import write_results
+from live.run.burst_queue import TAKING, BurstQueue
+from live.run.control import ControlRefused
 from live.run.grabber import Grabber, GrabPlan
 from live.run.load_thread import LoadThread, tare_orders
 from live.run.measuring import Measuring
-from live.run.outcome import Outcome
+from live.run.outcome import Outcome, StopSignal
+from live.run.pre_trigger import PreTriggerBuffer
+from live.run.prepared_run import PreparedRun, set_up
 from live.run.recorder import open_recording
-from live.run.setting import Setting, set_up
-from live.run.stopping import Stop
-from live.setup import Config, Rig, open_rig
-from live.tell import Books
+from live.setup.devices import Rig, open_rig
 
 _ARMED = "; nothing is recorded until start is ordered"
 _SILENT_S = 1.0
@@ -44,27 +46,27 @@ INTERRUPTED = "interrupted"
 class LiveRun:
     """A test that runs from the moment it is entered; leaving it closes everything.
 
-    It carries out orders (``live.operate.Orders``) from any thread.
+    It carries out orders (``live.run.control.Controls``) from any thread.
 
     Parameters
     ----------
-    setting : Setting
-    books : Books
+    setting : PreparedRun
+    books : RunState
     outputs : Outputs
-    recording : Gate or None
+    recording : PreTriggerBuffer or None
         None: nothing is recorded.
     screen : Screen
-    stop : Stop
+    stop : StopSignal
     """
 
     def __init__(
         self,
-        setting: Setting,
-        books: Books,
+        setting: PreparedRun,
+        books: RunState,
         outputs: Outputs,
-        recording: Gate | None,
+        recording: PreTriggerBuffer | None,
         screen: Screen,
-        stop: Stop,
+        stop: StopSignal,
     ) -> None:
         self._setting, self._books, self._outputs = setting, books, outputs
         self._recording, self._screen, self._stop = recording, screen, stop
@@ -75,10 +77,10 @@ class LiveRun:
         self.grabber = Grabber(self._rig.camera, plan, books, self._take, self._averaged)
         books.vitals.began_t, self._hinted = time.monotonic(), False
         self._has_recorded = self.recording
-        self._feed = Feed(self.grabber, books.ledger, self._idle)
+        self._feed = BurstQueue(self.grabber, books.ledger, self._idle)
         self._load = LoadThread(self._rig.load, books, outputs, recording)
         self._tares = tare_orders(self._rig.load, books)
-        pace = Pace(lambda: recording.backlog if recording else 0.0)
+        pace = LatencyMonitor(lambda: recording.backlog if recording else 0.0)
         self._measuring = Measuring(setting, books, outputs, self._feed, pace, self._show)
 
     # -- what may be called from other threads ------------------------------------------------
@@ -94,7 +96,7 @@ class LiveRun:
         return self._recording is not None and self._recording.on
 
     @property
-    def books(self) -> Books:
+    def books(self) -> RunState:
         """What is kept of the test so far."""
         return self._books
 
@@ -122,7 +124,7 @@ class LiveRun:
             self._silence()
         elif kind is EventKind.RECORD:
             if self._recording is None:
-                raise OrderRefused("this run records nothing, as it was asked (--no-record)")
+                raise ControlRefused("this run records nothing, as it was asked (--no-record)")
             said = self._recording.order(note)
             self._has_recorded = True
             return said
@@ -130,7 +132,7 @@ class LiveRun:
 
     def _pause(self, wanted: bool) -> None:
         if wanted is self._feed.paused:
-            raise OrderRefused("measuring is paused already" if wanted else "measuring is not paused")
+            raise ControlRefused("measuring is paused already" if wanted else "measuring is not paused")
         kind = EventKind.PAUSE if wanted else EventKind.RESUME
         self._told(kind, "measuring is paused" if wanted else "measuring goes on")
         self._feed.paused = wanted
@@ -138,7 +140,7 @@ class LiveRun:
     def _silence(self) -> None:
         names = self._books.alarms.silence()
         if not names:
-            raise OrderRefused("no alarm is on")
+            raise ControlRefused("no alarm is on")
         self._told(EventKind.ALARM, f"silenced: {', '.join(names)}")
 
     def _told(self, kind: EventKind, text: str) -> None:
@@ -253,7 +255,7 @@ def run_live(
     config: Config,
     screen: Screen,
     *,
-    stop: Stop | None = None,
+    stop: StopSignal | None = None,
     consumers: Compose = write_results,
     hands: Callable[[LiveRun], object] = lambda live: None,
 ) -> Outcome:
@@ -263,9 +265,9 @@ def run_live(
     ----------
     config : Config
     screen : Screen
-    stop : Stop, optional
+    stop : StopSignal, optional
         Ends the test from anywhere, also while the devices are being opened.
-    consumers : callable taking About and Books
+    consumers : callable taking RunInfo and RunState
         Makes the consumers of the test; ``live.commands.consumers`` has the standard ones.
     hands : callable taking the LiveRun
         Called once when the test has begun, for a keyboard and the like.
@@ -277,7 +279,10 @@ def run_live(
     """
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (phasedic devices lists what is there)")
-    stop, books = stop or Stop(), Books.new(config.load.max_gap_s, config.load.lag_s, config.specimen)
+    stop, books = (
+        stop or StopSignal(),
+        RunState.new(config.load.max_gap_s, config.load.lag_s, config.specimen),
+    )
     books.journal.names |= device_names(config)
     screen.say(f"opening {config.camera.address}")
     rig = open_rig(config.camera.address, config.load.address, books.journal, crop=config.camera.crop)
@@ -285,7 +290,7 @@ def run_live(
         setting = set_up(config, rig, books.journal, screen, stop)
         for line in announcement(rig, setting.folder):
             screen.say(line)
-        about = About(
+        about = RunInfo(
             setting.config, setting.folder, rig.camera.info, setting.plan.grid, setting.start, stop.ask
         )
         outputs = Outputs(consumers(about, books), books.loads, books.journal, books.history)
@@ -312,11 +317,11 @@ def device_names(config: Config) -> dict[str, str]:
 
 
 def _with_outputs(
-    setting: Setting,
-    books: Books,
+    setting: PreparedRun,
+    books: RunState,
     outputs: Outputs,
     screen: Screen,
-    stop: Stop,
+    stop: StopSignal,
     hands: Callable[[LiveRun], object],
 ) -> int:
     """The run proper; outputs and recording are closed whatever happens, the recording last."""
@@ -334,7 +339,7 @@ def _with_outputs(
     return live.exit_code
 
 
-def _close(recording: Gate | None, books: Books, outputs: Outputs, stop: Stop) -> None:
+def _close(recording: PreTriggerBuffer | None, books: RunState, outputs: Outputs, stop: StopSignal) -> None:
     outputs.end()
     reason = stop.reason or "camera ended"
     books.journal.tell(EventKind.STOP, "phasedic", f"the test ends: {reason}")

@@ -9,11 +9,11 @@ import time
 from acquire.errors import PhasedicError
 from acquire.events import EventKind
 from acquire.load_cell import LoadCell
-from live.operate import TareOrders
-from live.outputs import Outputs
-from live.pace import LOAD, yield_to_others
-from live.run.gate import Gate
-from live.tell import Books
+from live.pipeline.consumer_thread import Outputs
+from live.pipeline.latency import LOAD, yield_to_others
+from live.pipeline.run_state import RunState
+from live.run.control import TareControls
+from live.run.pre_trigger import PreTriggerBuffer
 
 log = logging.getLogger(__name__)
 
@@ -24,9 +24,9 @@ class LoadThread:
     Parameters
     ----------
     cell : LoadCell
-    books : Books
+    books : RunState
     outputs : Outputs
-    recording : Gate or None
+    recording : PreTriggerBuffer or None
 
     Attributes
     ----------
@@ -34,7 +34,9 @@ class LoadThread:
         The exit code of what ended the load; 0 where all was well.
     """
 
-    def __init__(self, cell: LoadCell, books: Books, outputs: Outputs, recording: Gate | None) -> None:
+    def __init__(
+        self, cell: LoadCell, books: RunState, outputs: Outputs, recording: PreTriggerBuffer | None
+    ) -> None:
         self._cell, self._books, self._outputs, self._recording = cell, books, outputs, recording
         self.failure = 0
         self._thread = threading.Thread(target=self._work, name="load", daemon=True)
@@ -69,10 +71,10 @@ class LoadThread:
             self._books.loads.close()
 
 
-def tare_orders(cell: LoadCell, books: Books) -> TareOrders:
+def tare_orders(cell: LoadCell, books: RunState) -> TareControls:
     """What carries out orders to tare ``cell`` in this test."""
 
     def measured() -> bool:
         return bool(books.history.instants)
 
-    return TareOrders(cell, measured, lambda: books.loads.latest, books.journal.tell, time.monotonic)
+    return TareControls(cell, measured, lambda: books.loads.latest, books.journal.tell, time.monotonic)

@@ -22,13 +22,15 @@ from acquire.hdf5 import forecast, network_share
 from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import RotatingWriter, SessionInfo, SessionWriter
-from live.measure import Screen
-from live.run.channels import ByteBuffer
-from live.run.gate import Gate, Keep
-from live.run.setting import Setting
-from live.run.stopping import Stop
-from live.setup import versions
-from live.tell import Books, Journal, Ledger, Vitals
+from live.pipeline.event_log import EventLog
+from live.pipeline.frame_counts import FrameCounts
+from live.pipeline.queues import BoundedQueue
+from live.pipeline.run_state import Health, RunState
+from live.pipeline.screen import Screen
+from live.results.folder import versions
+from live.run.outcome import StopSignal
+from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
+from live.run.prepared_run import PreparedRun
 
 log = logging.getLogger(__name__)
 _SMALL = 512  # bytes counted for a sample or an event
@@ -40,7 +42,9 @@ _DISK_WARN_S = 180.0
 Item = Frame | Burst | LoadSample | Event
 
 
-def open_recording(setting: Setting, books: Books, screen: Screen, stop: Stop) -> Gate | None:
+def open_recording(
+    setting: PreparedRun, books: RunState, screen: Screen, stop: StopSignal
+) -> PreTriggerBuffer | None:
     """The recording that the configuration asks for, in the folder of the run; None where it asks for none.
 
     Raises
@@ -64,15 +68,15 @@ def open_recording(setting: Setting, books: Books, screen: Screen, stop: Stop) -
         on_failure=lambda: stop.ask("recording failed") if record.when_full == "stop" else None,
         vitals=books.vitals,
     )
-    keep = Keep(
+    keep = PreTrigger(
         record.keep_s, int(record.buffer_MB * 5e5), record.start_above_N or math.inf, mode.kind == "bursts"
     )
-    gate = Gate(recorder, books.ledger, books.journal, keep, on=not record.armed)
+    gate = PreTriggerBuffer(recorder, books.ledger, books.journal, keep, on=not record.armed)
     books.journal.add_listener(gate.event)
     return gate
 
 
-def _open_writer(path: Path, setting: Setting, mode: RecordMode) -> SessionWriter | RotatingWriter:
+def _open_writer(path: Path, setting: PreparedRun, mode: RecordMode) -> SessionWriter | RotatingWriter:
     """A new session file, or a set of files that begins another one when it has grown."""
     config, rotate_MB = setting.config, setting.config.record.rotate_MB
     info = SessionInfo(
@@ -109,8 +113,8 @@ class Recorder:
         Used from the recorder's thread only, and closed by it.
     mode : RecordMode
         Which frames are written, or bursts in their place.
-    ledger : Ledger
-    journal : Journal
+    ledger : FrameCounts
+    journal : EventLog
         Told of gaps and of a disk that takes no more.
     limit : int, bytes
         What may wait for the disk.
@@ -118,7 +122,7 @@ class Recorder:
         Wait for room instead of leaving a gap (sources that wait for their reader).
     on_failure : callable
         Called once when nothing more can be written.
-    vitals : Vitals, optional
+    vitals : Health, optional
         Told how long the disk lasts.
     now : callable
         The clock, s.
@@ -127,22 +131,22 @@ class Recorder:
     def __init__(
         self,
         writer: SessionWriter | RotatingWriter,
-        ledger: Ledger,
-        journal: Journal,
+        ledger: FrameCounts,
+        journal: EventLog,
         limit: int,
         *,
         mode: RecordMode | None = None,
         waits: bool = False,
         on_failure: Callable[[], None] = lambda: None,
-        vitals: Vitals | None = None,
+        vitals: Health | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
         self._writer, self._ledger, self._journal = writer, ledger, journal
-        self._buffer: ByteBuffer[Item] = ByteBuffer(limit, waits=waits)
+        self._buffer: BoundedQueue[Item] = BoundedQueue(limit, waits=waits)
         self._limit, self._on_failure = limit, on_failure
         self._mode = mode or RecordMode()
         self._number = self._gap = 0
-        self._vitals, self._now = vitals or Vitals(), now
+        self._vitals, self._now = vitals or Health(), now
         self._began = now()
         self._next_clock = self._began + _CLOCK_EVERY_S
         self._next_disk = self._began + _DISK_EVERY_S

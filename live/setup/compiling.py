@@ -3,6 +3,8 @@
 ``python -m live.setup PART KINDS PHASE`` is one of the two processes. The process that compiles a loop
 may sum in another order than one that loads it, so a run or a replay does not measure with what it has compiled
 itself, unless numba's cache cannot be written.
+
+``python -m live.setup PART KINDS PHASE``: one of the processes of ``compiling``.
 """
 
 from __future__ import annotations
@@ -120,3 +122,7 @@ def main(part: str, kinds: str, phase: str) -> int:
     if phase == "phase":
         warm_up("phase")
     return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
-from live.measure import usable
-from live.setup.checks import AUTO
-from live.setup.config import Config
+from live.config.loading import Config
+from live.config.values import AUTO
+from live.pipeline.reference import usable
 
 if TYPE_CHECKING:
     from analysis import KernelSettings, ZoiGrid

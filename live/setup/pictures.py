@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from acquire.burst import FlatField, load_mean
 from acquire.errors import DataError
-from acquire.files import write_picture
+from acquire.files.picture import write_picture
 from acquire.frame import CameraInfo
-from live.measure import Correction, unchanged
-from live.setup.config import Config
+from live.config.loading import Config
+from live.pipeline.reference import Correction, unchanged
 
 
 def read_mask(path: str | None, width: int, height: int) -> NDArray[np.bool_] | None:
@@ -25,7 +25,7 @@ def read_mask(path: str | None, width: int, height: int) -> NDArray[np.bool_] | 
     DataError
         Missing, unreadable, or not the size of the pictures.
     """
-    from acquire.opencv import read_image
+    from acquire.opencv.images import read_image
 
     if path is None:
         return None

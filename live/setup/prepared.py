@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 from acquire.events import EventSink
 from acquire.frame import Burst, CameraInfo
 from acquire.load_cell import LoadLog
-from live.measure import Correction, Measurement, NewReference, kinds_of, measure, prepare
+from live.config.gauges import gauges_for
+from live.config.loading import Config
+from live.pipeline.measure import NewReference, measure
+from live.pipeline.measurement import Measurement
+from live.pipeline.reference import Correction, prepare
+from live.pipeline.warm_up import kinds_of
 from live.setup.compiling import compile_ahead
-from live.setup.config import Config
-from live.setup.gauges import gauges_for
 from live.setup.grid import grid_for, kernel_settings
 from live.setup.pictures import correction
 
@@ -69,7 +72,7 @@ class MeasurePlan:
         return compile_ahead(kinds_of(camera), phase=phase, say=say, stopped=stopped)
 
     def on(self, reference: Burst, what: str = "the reference") -> PreparedKernel:
-        """The kernel on ``reference``, which errors call ``what``; raises as ``live.measure.prepare``."""
+        """The kernel on ``reference``, which errors call ``what``; raises as ``live.pipeline.reference.prepare``."""
         stated = self.config.measure.noise_GL
         kernel, noise_GL = prepare(reference, self.grid, self.settings, stated, self.correct, what)
         return PreparedKernel(self, kernel, noise_GL)
@@ -96,7 +99,7 @@ class PreparedKernel:
     def measurements(
         self, bursts: Iterable[Burst | NewReference], loads: LoadLog, on_event: EventSink
     ) -> Iterator[Measurement]:
-        """One burst after the other (``live.measure.measure``)."""
+        """One burst after the other (``live.pipeline.measure.measure``)."""
         wanted = self.plan.config.measure
         return measure(
             bursts,

@@ -18,7 +18,7 @@ import numpy as np
 
 from analysis import KernelSettings, NoiseModel, PhaseKernel
 from analysis.evaluate.deconvolution import effect
-from analysis.field.windows import profile
+from analysis.field.grid import profile
 from tests.accuracy import gauges as virtual
 from tests.accuracy import means as dense
 from tests.accuracy import rejection

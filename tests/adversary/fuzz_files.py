@@ -24,11 +24,11 @@ from typing import Any
 from acquire.errors import DataError, PhasedicError
 from acquire.session import Session, recover
 from live.cli import main as phasedic
-from live.replay.material import ReplayRequest
 from live.replay.session import session_config, session_material
+from live.replay.source import ReplayRequest
 from live.results import Strain
 from tests.adversary.structure import change, make_fifo
-from tests.live.replay.test_recorded_before import RECORDED
+from tests.live.replay.test_replay import RECORDED
 
 LONGEST_S = 30.0  # of one case; what takes longer hangs
 Numbers = dict[str, Any]

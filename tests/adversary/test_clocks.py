@@ -22,11 +22,12 @@ from acquire.session import Session
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
+from live.config.loading import load_config
 from live.run import live_run as live_module
-from live.run import run_live
+from live.run.live_run import run_live
 from live.run.outcome import Outcome
-from live.setup import Rig, load_config
-from live.tell import TerminalScreen
+from live.setup.devices import Rig
+from live.ui.terminal.screen import TerminalScreen
 
 SHAPE = (64, 80)
 SMALL = {

@@ -19,8 +19,7 @@ from typing import Any
 import pytest
 
 from acquire.errors import ConfigError
-from live.setup import from_dict, load_config
-from live.setup.config import Config
+from live.config.loading import Config, from_dict, load_config
 
 SECONDS = 15.0
 VALUES = [

@@ -21,7 +21,7 @@ from live.results import Results, Strain
 from tests.acquire.session.fixtures import frame, sample, writer
 from tests.adversary.structure import make_fifo
 from tests.live.made_up import make_grid, make_measurement
-from tests.live.replay.test_recorded_before import RECORDED
+from tests.live.replay.test_replay import RECORDED
 from tests.live.results.test_writer_and_reader import INFO
 
 

@@ -13,11 +13,12 @@ import pytest
 from acquire.events import Event
 from acquire.load_cell import LoadCell, open_load_cell
 from acquire.load_sample import LoadFlag, LoadSample
-from acquire.protocols import find_protocol
+from acquire.protocols.base import find_protocol
 from acquire.protocols.modbus import crc16, frame
-from live.run import Outcome, run_live
-from live.setup import load_config
-from live.tell import TerminalScreen
+from live.config.loading import load_config
+from live.run.live_run import run_live
+from live.run.outcome import Outcome
+from live.ui.terminal.screen import TerminalScreen
 from tests.acquire.protocols.conversation import parser
 from tests.adversary.peers import PEERS, TALKS, Peer, SocketPeer, leave, stamped
 

@@ -15,8 +15,8 @@ import pytest
 
 from acquire.session import Session
 from live.cli import main
-from live.tell import TerminalScreen
-from live.unhurried import Unhurried
+from live.commands.streams import NonBlockingStream
+from live.ui.terminal.screen import TerminalScreen
 
 SIM = "sim:uniform?lockstep=yes&seconds=1&fps=15&width=160&height=128&bits=12"
 RUN = ["run", "--camera", SIM, "--zoi", "48", "--step", "24", "--burst", "3", "--reference-burst", "4"]
@@ -69,7 +69,7 @@ class Stuck(io.StringIO):
 
 def test_what_finds_no_room_is_counted() -> None:
     stream = Stuck()
-    patient = Unhurried(stream, room=3)
+    patient = NonBlockingStream(stream, room=3)
     for k in range(10):
         patient.write(f"{k}\n")
     assert not patient.drain(0.01)
@@ -88,7 +88,7 @@ def test_a_stream_that_fails_is_let_go() -> None:
         def write(self, text: str) -> int:
             raise OSError(5, "Input/output error")
 
-    gone = Unhurried(Gone())
+    gone = NonBlockingStream(Gone())
     gone.write("nobody reads this")
     assert gone.drain()
 

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from analysis.compiled.start_lock import give_start_lock
+from analysis.compiled.layer import give_start_lock
 
 # The default of Python 3.14, on any Python; the process is ended as the workers of a batch are.
 PROGRAM = """

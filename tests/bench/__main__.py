@@ -24,10 +24,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
-from analysis.kernel import warm_up
+from analysis.kernel.warm_up import warm_up
+from live.characterise.experiments.others import Points
 from tests.accuracy.truth import Speckle, affine, digitise
 from tests.bench import live, machine
-from tests.bench.peers import HOW_TO_ADD, Peer, Points, missing, peers
+from tests.bench.peers import HOW_TO_ADD, Peer, missing, peers
 
 DATA = Path(__file__).parents[2] / "docs" / "data"
 SHAPE = (1024, 1024)

@@ -21,14 +21,16 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from live.batch.standing import Standing
-from live.batch.work import Row, Task, failed
-from live.batch.workers import Cluster, Hands, Pool
 from live.cli import main as phasedic
-from live.tell import TerminalScreen
+from live.replay.batch.cluster import Cluster
+from live.replay.batch.row import BatchRow, failed
+from live.replay.batch.scheduler import BatchProgress
+from live.replay.batch.task import Task
+from live.replay.batch.worker_processes import Pool, WorkerProcesses
+from live.ui.terminal.screen import TerminalScreen
 from tests.bench import machine
 from tests.bench.soak import children, status
-from tests.live.batch.running import running
+from tests.live.replay.batch.running import running
 
 SESSIONS = 4
 CAMERA = "sim:hole?lockstep=yes&fps=20&width=1280&height=1024&bits=12"
@@ -96,7 +98,7 @@ def empty(folder: Path, count: int) -> list[dict[str, Any]]:
         task.folder.mkdir()
         row = failed(task.name, task.source, "", 0).values
         (task.folder / "batch.json").write_text(json.dumps({"key": task.key, "row": row}), encoding="utf-8")
-    with contextlib.closing(Hands(0)) as hands:
+    with contextlib.closing(WorkerProcesses(0)) as hands:
         found = [_emptied("pool", tasks, lambda told, done: Pool(tasks, 2, told, done, hands))]
     with running(folder) as cluster:
         screen = TerminalScreen(quiet=True)
@@ -107,10 +109,10 @@ def empty(folder: Path, count: int) -> list[dict[str, Any]]:
 
 def _emptied(name: str, tasks: list[Task], start: Callable[..., Pool | Cluster]) -> dict[str, Any]:
     done: list[str] = []
-    standing, first = Standing(len(tasks), time.monotonic), 0.0
+    standing, first = BatchProgress(len(tasks), time.monotonic), 0.0
     began = time.perf_counter()
 
-    def ended(task: Task, row: Row) -> tuple[Task, ...]:
+    def ended(task: Task, row: BatchRow) -> tuple[Task, ...]:
         nonlocal first
         first = first or time.perf_counter() - began
         done.append(task.name)

@@ -28,10 +28,11 @@ from acquire.load_cell import LoadCell
 from acquire.load_sample import LoadSample
 from acquire.session import SessionWriter
 from live.commands.consumers import standard_consumers
-from live.measure import Measurement
-from live.run import live_run, run_live
-from live.setup import load_config
-from live.tell import TerminalScreen
+from live.config.loading import load_config
+from live.pipeline.measurement import Measurement
+from live.run import live_run
+from live.run.live_run import run_live
+from live.ui.terminal.screen import TerminalScreen
 from tests.bench.live_case import PORT, Watch, attached
 from tests.bench.soak import children, status
 
@@ -67,7 +68,7 @@ class Disturbed(Watch):
 def view_process() -> int:
     """The one that draws."""
     for pid in children(os.getpid()):
-        if b"live.view.drawing" in Path(f"/proc/{pid}/cmdline").read_bytes():
+        if b"live.ui.rerun.drawing" in Path(f"/proc/{pid}/cmdline").read_bytes():
             return pid
     raise RuntimeError(f"no view among {[status(pid)[:1] for pid in children(os.getpid())]}")
 

@@ -24,12 +24,13 @@ from typing import Any
 import numpy as np
 
 from live.commands.consumers import standard_consumers
-from live.measure import Measurement
-from live.outputs import Consumer
-from live.run import Outcome, run_live
-from live.setup import load_config
-from live.tell import TerminalScreen
-from live.view.viewer import url, viewer_binary
+from live.config.loading import load_config
+from live.pipeline.consumer import Consumer
+from live.pipeline.measurement import Measurement
+from live.run.live_run import run_live
+from live.run.outcome import Outcome
+from live.ui.rerun.view import url, viewer_binary
+from live.ui.terminal.screen import TerminalScreen
 
 PORT = 19_876
 SETTLED_S = 2.0

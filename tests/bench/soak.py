@@ -20,9 +20,9 @@ from pathlib import Path
 import numpy as np
 
 from live.commands.consumers import standard_consumers
-from live.run import run_live
-from live.setup import load_config
-from live.tell import TerminalScreen
+from live.config.loading import load_config
+from live.run.live_run import run_live
+from live.ui.terminal.screen import TerminalScreen
 from tests.bench.live_case import Watch, skipped_share
 
 WARM_S = 300.0

@@ -26,10 +26,10 @@ from acquire.v4l2.camera import V4L2Camera
 from acquire.v4l2.setup import V4L2Settings
 from live.cli import main
 from live.commands.init import find_devices
-from live.serve.draft import with_setting
-from live.serve.judged import camera_values
-from live.setup import open_rig
-from live.tell import TerminalScreen
+from live.setup.devices import open_rig
+from live.ui.terminal.screen import TerminalScreen
+from live.ui.web.check_panel import camera_values
+from live.ui.web.config_draft import with_setting
 from tests.acquire.session import fixtures as session_fixtures
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeKernel
 from tests.contracts.entry_points import install_example

@@ -15,8 +15,7 @@ import pytest
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DataError, DeviceError, PhasedicError
 from acquire.events import Event, EventKind
-from acquire.load_cell.contract import LoadCell
-from acquire.load_cell.opening import open_load_cell
+from acquire.load_cell.contract import LoadCell, open_load_cell
 from hw_mocks.faults import FaultPlan
 from hw_mocks.indicator_output import Sensing
 from hw_mocks.indicator_server import IndicatorServer

@@ -5,8 +5,7 @@ from __future__ import annotations
 import pytest
 
 from acquire.errors import ConfigError
-from hw_mocks.faults import CAMERA_FAULTS, SERIAL_FAULTS, Fault, FaultPlan, parse_faults
-from hw_mocks.frame_plan import plan_frames
+from hw_mocks.faults import CAMERA_FAULTS, SERIAL_FAULTS, Fault, FaultPlan, parse_faults, plan_frames
 
 
 def test_lasting_faults_have_an_end() -> None:

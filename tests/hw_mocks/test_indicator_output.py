@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hw_mocks.ascii_indicator import AsciiIndicator
 from hw_mocks.faults import SERIAL_FAULTS, parse_faults
-from hw_mocks.indicator import Shown
+from hw_mocks.indicator import AsciiIndicator, IndicatorReading
 from hw_mocks.indicator_output import IndicatorOutput, Sensing
 
 RATE = 10.0
@@ -45,12 +44,14 @@ def test_one_line_a_sample() -> None:
     ],
 )
 def test_styles(style: str, line: bytes) -> None:
-    assert AsciiIndicator(style=style).render(Shown(-0.514, 1234.4)) == line
+    assert AsciiIndicator(style=style).render(IndicatorReading(-0.514, 1234.4)) == line
 
 
 def test_saturation_is_the_converters_end_value() -> None:
-    assert AsciiIndicator().render(Shown(1e9, 7, status="overload")) == b"7,8388607,N\r\n"
-    assert b",-8388608," in AsciiIndicator(style="openscale").render(Shown(-1e9, 7, status="underload"))
+    assert AsciiIndicator().render(IndicatorReading(1e9, 7, status="overload")) == b"7,8388607,N\r\n"
+    assert b",-8388608," in AsciiIndicator(style="openscale").render(
+        IndicatorReading(-1e9, 7, status="underload")
+    )
 
 
 def test_noise_is_as_stated() -> None:

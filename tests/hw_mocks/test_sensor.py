@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from hw_mocks.sensor import Exposer, Sensor, normal_quantiles
+from hw_mocks.scene import Exposer, Sensor, normal_quantiles
 
 SHAPE = (200, 250)
 

@@ -13,8 +13,7 @@ from acquire.camera.contract import Camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.events import Event, ignore_event
 from acquire.frame import Frame
-from hw_mocks.scene import Scene
-from hw_mocks.sensor import Sensor
+from hw_mocks.scene import Scene, Sensor
 from hw_mocks.sim_camera import Ring, SimCamera, SimCameraSettings, open_sim_camera
 from hw_mocks.specimen import specimen_from
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hw_mocks.indicator import Indicator, Shown, decimals
+from hw_mocks.indicator import Indicator, IndicatorReading, decimals
 from hw_mocks.modbus_indicator import DAT400, PT113, ModbusIndicator, RegisterMap, crc
 from hw_mocks.sim_indicators import (
     INDICATORS,
@@ -20,57 +20,67 @@ from hw_mocks.sim_indicators import (
     SauterIndicator,
 )
 
-AT_12 = Shown(12.34)
+AT_12 = IndicatorReading(12.34)
 G = 9.80665e-3
-LINES: dict[str, tuple[Indicator, Shown, bytes]] = {
-    "sics stable": (MtSicsIndicator(0.01 * G, "g"), Shown(100 * G), b"S S     100.00 g\r\n"),
+LINES: dict[str, tuple[Indicator, IndicatorReading, bytes]] = {
+    "sics stable": (MtSicsIndicator(0.01 * G, "g"), IndicatorReading(100 * G), b"S S     100.00 g\r\n"),
     "sics dynamic": (
         MtSicsIndicator(0.01 * G, "g"),
-        Shown(100.03 * G, stable=False),
+        IndicatorReading(100.03 * G, stable=False),
         b"S D     100.03 g\r\n",
     ),
-    "sics overload": (MtSicsIndicator(), Shown(0, status="overload"), b"S +\r\n"),
-    "sics underload": (MtSicsIndicator(), Shown(0, status="underload"), b"S -\r\n"),
-    "sics error": (MtSicsIndicator(), Shown(0, status="error"), b"S I\r\n"),
+    "sics overload": (MtSicsIndicator(), IndicatorReading(0, status="overload"), b"S +\r\n"),
+    "sics underload": (MtSicsIndicator(), IndicatorReading(0, status="underload"), b"S -\r\n"),
+    "sics error": (MtSicsIndicator(), IndicatorReading(0, status="error"), b"S I\r\n"),
     "aed one header": (
         AedStandardIndicator(0.01 * G, "g", second_header=False),
-        Shown(123.45 * G),
+        IndicatorReading(123.45 * G),
         b"ST,+00123.45  g\r\n",
     ),
-    "aed two headers": (AedStandardIndicator(G, "kg"), Shown(1.234 * 9.80665), b"ST,GS,+0001.234kg\r\n"),
-    "aed unstable": (AedStandardIndicator(), Shown(-18.3, stable=False), b"US,GS,-000018.3 N\r\n"),
+    "aed two headers": (
+        AedStandardIndicator(G, "kg"),
+        IndicatorReading(1.234 * 9.80665),
+        b"ST,GS,+0001.234kg\r\n",
+    ),
+    "aed unstable": (AedStandardIndicator(), IndicatorReading(-18.3, stable=False), b"US,GS,-000018.3 N\r\n"),
     "aed overload": (
         AedStandardIndicator(unit="g", second_header=False),
-        Shown(0, status="overload"),
+        IndicatorReading(0, status="overload"),
         b"OL,+9999999.9  g\r\n",
     ),
     "aed blank": (
         AedStandardIndicator(blank_overload=True),
-        Shown(0, status="overload"),
+        IndicatorReading(0, status="overload"),
         b"OL,GS,      .  N\r\n",
     ),
-    "aed prefix": (AedStandardIndicator(prefix="01"), Shown(5), b"01ST,GS,+000005.0 N\r\n"),
-    "mark10 tension is negative": (Mark10Indicator(0.001), Shown(-4.285), b"4.285 N\r\n"),
+    "aed prefix": (AedStandardIndicator(prefix="01"), IndicatorReading(5), b"01ST,GS,+000005.0 N\r\n"),
+    "mark10 tension is negative": (Mark10Indicator(0.001), IndicatorReading(-4.285), b"4.285 N\r\n"),
     "mark10 pounds": (
         Mark10Indicator(0.01 * 4.4482216153, "lbF"),
-        Shown(18.78 * 4.4482216153),
+        IndicatorReading(18.78 * 4.4482216153),
         b"-18.78 lbF\r\n",
     ),
-    "sauter tension": (SauterIndicator(0.01), Shown(21.15), b"1021.15"),
-    "sauter compression": (SauterIndicator(0.01), Shown(-11.70), b"0011.70"),
-    "sauter large": (SauterIndicator(0.01), Shown(7712.32), b"17712.3"),
-    "hbm": (HbmAedIndicator(nominal_N=10_000), Shown(1234.5), b" 0123450,31,008\r\n"),
-    "hbm negative": (HbmAedIndicator(nominal_N=10_000), Shown(-1234.5, stable=False), b"-0123450,31,000\r\n"),
-    "hbm overload": (HbmAedIndicator(), Shown(0, status="overload"), b" 1600000,31,011\r\n"),
+    "sauter tension": (SauterIndicator(0.01), IndicatorReading(21.15), b"1021.15"),
+    "sauter compression": (SauterIndicator(0.01), IndicatorReading(-11.70), b"0011.70"),
+    "sauter large": (SauterIndicator(0.01), IndicatorReading(7712.32), b"17712.3"),
+    "hbm": (HbmAedIndicator(nominal_N=10_000), IndicatorReading(1234.5), b" 0123450,31,008\r\n"),
+    "hbm negative": (
+        HbmAedIndicator(nominal_N=10_000),
+        IndicatorReading(-1234.5, stable=False),
+        b"-0123450,31,000\r\n",
+    ),
+    "hbm overload": (HbmAedIndicator(), IndicatorReading(0, status="overload"), b" 1600000,31,011\r\n"),
 }
 
 
 @pytest.mark.parametrize(("indicator", "shown", "line"), LINES.values(), ids=LINES.keys())
-def test_lines(indicator: Indicator, shown: Shown, line: bytes) -> None:
+def test_lines(indicator: Indicator, shown: IndicatorReading, line: bytes) -> None:
     assert indicator.render(shown) == line
 
 
-def talk(indicator: Indicator, conversation: list[tuple[bytes, bytes]], shown: Shown = AT_12) -> None:
+def talk(
+    indicator: Indicator, conversation: list[tuple[bytes, bytes]], shown: IndicatorReading = AT_12
+) -> None:
     for said, answered in conversation:
         assert indicator.receive(said, shown) == answered, said
 
@@ -90,7 +100,7 @@ def test_mt_sics_conversation() -> None:
             (b"Z\r\n", b"Z A\r\n"),
         ],
     )
-    talk(indicator, [(b"S\r\n", b"S I\r\n"), (b"T\r\n", b"T I\r\n")], Shown(1, stable=False))
+    talk(indicator, [(b"S\r\n", b"S I\r\n"), (b"T\r\n", b"T I\r\n")], IndicatorReading(1, stable=False))
     talk(indicator, [(b"SIR\r\n", b"")])
     assert indicator.left == math.inf
     talk(indicator, [(b"SI\r\n", b"S S        0.0 N\r\n")])
@@ -188,7 +198,7 @@ def test_crc_is_that_of_the_standard() -> None:
 
 def test_modbus_reads_the_laumas_registers() -> None:
     indicator = ModbusIndicator()
-    answer = indicator.receive(read(7, 2), Shown(-12.3))
+    answer = indicator.receive(read(7, 2), IndicatorReading(-12.3))
     assert answer == framed(b"\x01\x03\x04" + struct.pack(">i", -123))
     assert indicator.receive(read(7, 2, slave=2), AT_12) == b""
 
@@ -207,14 +217,14 @@ def test_modbus_types_and_word_order(registers: RegisterMap, words: bytes) -> No
 
 
 def test_modbus_status_by_map() -> None:
-    def status(registers: RegisterMap, shown: Shown) -> int:
+    def status(registers: RegisterMap, shown: IndicatorReading) -> int:
         answer = ModbusIndicator(registers=registers).receive(read(registers.status, 1), shown)
         return int.from_bytes(answer[3:5])
 
     assert status(DAT400, AT_12) == 0b10
-    assert status(DAT400, Shown(0, stable=False, status="overload")) == 0b100000
+    assert status(DAT400, IndicatorReading(0, stable=False, status="overload")) == 0b100000
     assert status(PT113, AT_12) == 0b010
-    assert status(PT113, Shown(0, stable=False)) == 0b110
+    assert status(PT113, IndicatorReading(0, stable=False)) == 0b110
 
 
 def test_modbus_tare_by_command_register() -> None:

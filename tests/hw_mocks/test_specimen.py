@@ -10,8 +10,7 @@ import pytest
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError
 from hw_mocks.deformation import Affine, Deformation, SpecimenDeformation, Wave
-from hw_mocks.material import Material
-from hw_mocks.programme import Programme, TestClock
+from hw_mocks.machine import FlowCurve, Programme, TestClock
 from hw_mocks.specimen import VirtualSpecimen, specimen_from
 
 DEFORMATIONS: dict[str, Deformation] = {
@@ -101,14 +100,14 @@ def test_woven_mean_over_a_cell_is_the_mean_strain() -> None:
 
 
 def test_material_is_elastic_up_to_yield() -> None:
-    material = Material()
+    material = FlowCurve()
     strain = np.linspace(0, material.yield_strain, 20)
     np.testing.assert_allclose(material.stress(strain), material.E * strain)
     np.testing.assert_allclose(material.transverse(strain), -material.nu * strain)
 
 
 def test_material_beyond_yield_is_on_its_flow_curve() -> None:
-    material = Material()
+    material = FlowCurve()
     strain = np.linspace(material.yield_strain, 0.1, 50)
     plastic = material.plastic_strain(strain)
     flow = (

@@ -16,9 +16,10 @@ from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import SessionInfo, SessionWriter
 from analysis.field.strain_field import StrainField
-from live.measure.measurement import Measurement
+from live.config.gauges import gauges_for
+from live.config.loading import from_dict
+from live.pipeline.measurement import Measurement
 from live.results import Results, ResultsInfo
-from live.setup import from_dict, gauges_for
 from tests.live.made_up import CAMERA, START, make_field, make_frame, make_grid, make_measurement
 
 E_PA, YIELD, HARDENING_PA, WIDTH_MM, THICKNESS_MM = 70e9, 0.003, 1e8, 10.0, 2.0

@@ -12,7 +12,7 @@ from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
 from analysis.field.grid import Roi, ZoiGrid
 from analysis.field.strain_field import StrainField
-from live.measure.measurement import Measurement
+from live.pipeline.measurement import Measurement
 
 START = 1000.0
 CAMERA = CameraInfo("sim:made-up", "made up", 128, 96, 12, live=False, clock="nominal", fps=10.0)

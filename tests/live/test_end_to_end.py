@@ -18,15 +18,15 @@ from acquire.frame import Frame
 from acquire.session.reader import Session
 from live.cli import main
 from live.commands.consumers import standard_consumers
-from live.measure.measurement import Measurement
-from live.operate import answer
-from live.outputs import Consumer
-from live.run import LiveRun, run_live
+from live.config.loading import load_config
+from live.pipeline.consumer import Consumer
+from live.pipeline.measurement import Measurement
 from live.run import live_run as live_module
+from live.run.control import answer
+from live.run.live_run import LiveRun, run_live
 from live.run.outcome import Outcome
-from live.setup.config import load_config
-from live.setup.rig import Rig
-from live.tell.screen import TerminalScreen
+from live.setup.devices import Rig
+from live.ui.terminal.screen import TerminalScreen
 
 SIM = "sim:woven?lockstep=yes&seconds=3&fps=15&width=224&height=192&bits=12"
 SMALL = {

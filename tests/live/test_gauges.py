@@ -14,10 +14,11 @@ import pytest
 from acquire.errors import ConfigError
 from analysis.evaluate import GaugeValue
 from live.cli import main
-from live.measure import History
+from live.config.gauges import gauges_for
+from live.config.loading import load_config
+from live.pipeline.history import History
 from live.run.outcome import Outcome
-from live.setup import gauges_for, load_config
-from live.tell.status_line import gauge_words
+from live.ui.terminal.status_line import gauge_words
 from tests.live.made_up import make_grid, make_measurement
 from tests.live.test_end_to_end import live_run
 

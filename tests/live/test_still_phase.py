@@ -8,15 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from live.batch.work import Task, perform
 from live.cli import main
-from live.finished import open_run
-from live.replay import ReplayRequest, open_material
-from live.report import Wanted, make_report
-from live.report.evaluation import Curve
+from live.replay.batch.task import Task, perform
+from live.replay.opening import open_material
+from live.replay.source import ReplayRequest
+from live.replay.study import still_window
 from live.results import still_phase_of
-from live.study.windows import still_window
-from live.tell import TerminalScreen, headline
+from live.results.figures import headline
+from live.results.report.evaluation import EvaluatedCurve
+from live.results.report.report import ReportRequest, make_report
+from live.results.run_folder import open_run
+from live.ui.terminal.screen import TerminalScreen
 from tests.live.made_run import make_run, noisy
 
 CAMERA = "sim:hole?lockstep=yes&seconds=6&fps=10&width=320&height=288&bits=12&hole=24&hold=2&end=1"
@@ -26,7 +28,7 @@ SETTINGS = {"measure.zoi": 32, "measure.step": 16, "measure.burst": 2, "measure.
 def reported(folder: Path) -> tuple[int, str]:
     """Still instants, and the noise of eyy in um/m, as the page has them."""
     with open_run(folder) as run:
-        html = make_report(run, Wanted(), TerminalScreen(quiet=True)).html
+        html = make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html
     instants = re.search(r"in the first (\d+) instants", html)
     eyy = re.search(r"<td>eyy</td><td[^>]*>([\d.]+)</td>", html)
     assert instants is not None and eyy is not None
@@ -43,7 +45,7 @@ def test_one_still_phase_and_one_table_in_report_batch_and_study(tmp_path: Path)
         low, high = (material.start.monotonic + limit for limit in still_window(material))
         studied = np.count_nonzero((material.times >= low) & (material.times <= high))
     with open_run(tmp_path / "again") as run:
-        found = headline(Curve.of(run).figures, stresses=False)
+        found = headline(EvaluatedCurve.of(run).figures, stresses=False)
     for figure in found:
         value = pytest.approx(figure.figure.value) if figure.figure.known else None
         assert row[figure.column] == value, figure.name

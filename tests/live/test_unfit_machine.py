@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 import pytest
 
-from analysis.kernel import attempt
-from analysis.picture import tap_table
-from analysis.self_test import machine
+from analysis import self_test as machine
+from analysis.kernel import solve as attempt
+from analysis.picture.splines import tap_table
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
-from live.batch.work import Task, perform
 from live.cli import main
+from live.replay.batch.task import Task, perform
 
 
 @pytest.fixture

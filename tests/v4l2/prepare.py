@@ -39,7 +39,7 @@ def compile_loops() -> None:
     from acquire.frame import Frame, frozen
     from acquire.hdf5 import compile_loops as compile_recording
     from analysis import KernelSettings, PhaseKernel, Roi, ZoiGrid
-    from analysis.kernel import warm_up
+    from analysis.kernel.warm_up import warm_up
 
     warm_up()
     compile_recording()

@@ -11,8 +11,16 @@ from numpy.typing import NDArray
 
 from analysis.field import Roi, ZoiGrid
 from hw_mocks.deformation import Affine
-from live.characterise.outcome import Bench, Outcome, Table, figure, save_figure, shown, verdict
-from live.characterise.truth import Camera, Scene, limit, ours
+from live.characterise.outcome import (
+    ExperimentContext,
+    ExperimentOutcome,
+    ResultTable,
+    figure,
+    save_figure,
+    shown,
+    verdict,
+)
+from live.characterise.truth import SensorModel, TrueScene, limit, ours
 
 Floats = NDArray[np.float64]
 SIZE, STEP, RADIUS = 32, 32, 2.0
@@ -30,18 +38,18 @@ class Study:
 
     def __init__(self, quick: bool) -> None:
         side = (256, 320) if quick else (384, 480)
-        self.scene = Scene(side, RADIUS, seed=55)
+        self.scene = TrueScene(side, RADIUS, seed=55)
         self.grid = ZoiGrid.cover(Roi(16, 16, side[1] - 32, side[0] - 32), SIZE, STEP)
         self.moved = self.scene.light(SHIFT)
         sigma = limit(self.scene.slopes, self.grid, SIZE / 6).sigma[1]
         self.unit = float(np.sqrt(np.mean(sigma**2)))
         self.fixed = np.random.default_rng(9).standard_normal(side).astype(np.float32)
 
-    def predicted(self, camera: Camera, n: int) -> float:
+    def predicted(self, camera: SensorModel, n: int) -> float:
         """Noise limit of exx for means of n frames, rounding averaged like noise."""
         return self.unit * camera.sigma / camera.top / math.sqrt(n)
 
-    def bursts(self, camera: Camera, fixed: float = 0.0) -> Iterator[tuple[int, Any, Any]]:
+    def bursts(self, camera: SensorModel, fixed: float = 0.0) -> Iterator[tuple[int, Any, Any]]:
         """(n, mean of the reference, mean of the current frames), growing frame by frame."""
         pattern = self.fixed * np.float32(fixed / camera.top)
         totals = [np.zeros(self.scene.reference.shape, np.uint32) for _ in range(2)]
@@ -58,13 +66,13 @@ class Study:
         return float(np.nanstd(field.exx, ddof=1)), float(np.nanmean(field.u)) - SHIFT.u
 
 
-def burst(bench: Bench) -> Outcome:
+def burst(bench: ExperimentContext) -> ExperimentOutcome:
     """N = 1 .. 64, 8 and 12 bit, 0.1 to 4 GL; then fixed pattern and motion at 12 bit."""
     study = Study(bench.quick)
     rows: list[tuple[Any, ...]] = []
     cases = [(bits, noise, 0.0) for bits in (8, 12) for noise in NOISES] + [(12, 4.0, FIXED_PATTERN)]
     for bits, noise, fixed in bench.steps(cases):
-        camera = Camera(bits, noise)
+        camera = SensorModel(bits, noise)
         for n, reference, current in study.bursts(camera, fixed):
             std, error = study.scatter(reference, current, camera.sigma / math.sqrt(n))
             rows.append((bits, noise, fixed, n, 1e6 * std, 1e6 * study.predicted(camera, n), error))
@@ -72,17 +80,19 @@ def burst(bench: Bench) -> Outcome:
         "bits", "camera noise GL", "fixed pattern GL", "frames N", "measured std of exx um/m",
         "predicted um/m", "mean error of u px",
     )  # fmt: skip
-    table = Table("burst", columns, tuple(rows))
+    table = ResultTable("burst", columns, tuple(rows))
     motion = _motion(study)
     name = _draw(bench, table, motion)
     best = _at(table, 12, 4.0, 0.0, 64)
     found = (verdict("std of exx, 12 bit, 4 GL, 64 frames", "um/m", best[4], best[5], "the noise limit"),)
-    return Outcome("burst", "Averaging frames", _text(table, motion, name), (table, motion), (name,), found)
+    return ExperimentOutcome(
+        "burst", "Averaging frames", _text(table, motion, name), (table, motion), (name,), found
+    )
 
 
-def _motion(study: Study) -> Table:
+def _motion(study: Study) -> ResultTable:
     """Steady motion during the current burst, 12 bit, 4 GL."""
-    camera, rows = Camera(12, 4.0), []
+    camera, rows = SensorModel(12, 4.0), []
     reference = _mean(study, camera, [study.scene.reference] * MOTION_FRAMES)
     for smear in MOTIONS:
         places = (np.arange(MOTION_FRAMES) - (MOTION_FRAMES - 1) / 2) * smear / MOTION_FRAMES
@@ -97,17 +107,17 @@ def _motion(study: Study) -> Table:
         "predicted at rest um/m",
         "mean error of u px",
     )
-    return Table("burst_motion", columns, tuple(rows))
+    return ResultTable("burst_motion", columns, tuple(rows))
 
 
-def _mean(study: Study, camera: Camera, lights: list[Any]) -> Any:
+def _mean(study: Study, camera: SensorModel, lights: list[Any]) -> Any:
     total = np.zeros(lights[0].shape, np.uint32)
     for light in lights:
         total += camera.picture(light, study.scene.rng)
     return (total / len(lights)).astype(np.float32)
 
 
-def _draw(bench: Bench, table: Table, motion: Table) -> str:
+def _draw(bench: ExperimentContext, table: ResultTable, motion: ResultTable) -> str:
     drawn = figure(14, 4)
     axes = drawn.subplots(1, 3)
     for place, bits in zip(axes, (8, 12), strict=False):
@@ -132,11 +142,11 @@ def _draw(bench: Bench, table: Table, motion: Table) -> str:
     return save_figure(bench, "burst.png", drawn)
 
 
-def _at(table: Table, bits: int, noise: float, fixed: float, n: int) -> tuple[Any, ...]:
+def _at(table: ResultTable, bits: int, noise: float, fixed: float, n: int) -> tuple[Any, ...]:
     return next(row for row in table.rows if row[:4] == (bits, noise, fixed, n))
 
 
-def _summary(table: Table) -> Table:
+def _summary(table: ResultTable) -> ResultTable:
     columns = (
         "bits",
         "camera noise GL",
@@ -150,10 +160,10 @@ def _summary(table: Table) -> Table:
         for noise in NOISES:
             one, many = (_at(table, bits, noise, 0.0, n) for n in (1, 64))
             rows.append((bits, noise, one[4], many[4], many[5], one[4] / many[4]))
-    return Table("burst_summary", columns, tuple(rows))
+    return ResultTable("burst_summary", columns, tuple(rows))
 
 
-def _text(table: Table, motion: Table, name: str) -> str:
+def _text(table: ResultTable, motion: ResultTable, name: str) -> str:
     fixed, plain = _at(table, 12, 4.0, FIXED_PATTERN, 64), _at(table, 12, 4.0, 0.0, 64)
     still, half, last = motion.rows[0], motion.rows[3], motion.rows[-1]
     return f"""The paper recommends averaging. Strain noise of a {SIZE} px ZOI for bursts of N frames, reference and

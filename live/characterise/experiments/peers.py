@@ -14,8 +14,16 @@ from analysis.field import Roi, ZoiGrid
 from hw_mocks.deformation import Affine
 from live.characterise.experiments.others import PROGRAMS, Program, installed
 from live.characterise.experiments.others import STEP as OTHERS_STEP
-from live.characterise.outcome import Bench, Outcome, Table, Verdict, figure, save_figure, verdict
-from live.characterise.truth import Camera, Scene, ours, papers
+from live.characterise.outcome import (
+    Comparison,
+    ExperimentContext,
+    ExperimentOutcome,
+    ResultTable,
+    figure,
+    save_figure,
+    verdict,
+)
+from live.characterise.truth import SensorModel, TrueScene, ours, papers
 
 log = logging.getLogger(__name__)
 
@@ -67,10 +75,10 @@ def plane_strain(u: Floats, step: int) -> Floats:
     return np.asarray(slope[half:-half:GAUGE, half:-half:GAUGE])
 
 
-def peers(bench: Bench) -> Outcome:
+def peers(bench: ExperimentContext) -> ExperimentOutcome:
     """Bias and noise of rigid shifts, and strain on a 65 px gauge, of all engines on the same 8-bit pairs."""
     shape = (320, 400) if bench.quick else (512, 640)
-    scene = Scene(shape, RADIUS, seed=77)
+    scene = TrueScene(shape, RADIUS, seed=77)
     grid = ZoiGrid.cover(Roi(16, 16, shape[1] - 32, shape[0] - 32), ZOI, 8)
     engines = _engines(grid)
     columns = (
@@ -92,15 +100,15 @@ def peers(bench: Bench) -> Outcome:
             continue
         curves[name] = curve
         rows.append(row)
-    table = Table("peers", columns, tuple(rows))
+    table = ResultTable("peers", columns, tuple(rows))
     name = _draw(bench, curves)
-    return Outcome(
+    return ExperimentOutcome(
         "peers", "Peers on the same pairs", _text(table, name, failed), (table,), (name,), _verdicts(table)
     )
 
 
 def _judged(
-    name: str, engine: Engine, scene: Scene, shape: tuple[int, int]
+    name: str, engine: Engine, scene: TrueScene, shape: tuple[int, int]
 ) -> tuple[list[float], tuple[Any, ...]]:
     """Bias at each shift, px, and the row of the table."""
     shifts = [_shift_error(scene, engine, float(s), 0.0) for s in SHIFTS]
@@ -154,28 +162,28 @@ def _program(program: Program) -> Engine:
     return measure
 
 
-def _shift_error(scene: Scene, engine: Any, shift: float, noise: float) -> tuple[float, float]:
-    camera = Camera(8, noise)
+def _shift_error(scene: TrueScene, engine: Any, shift: float, noise: float) -> tuple[float, float]:
+    camera = SensorModel(8, noise)
     u, _ = engine(*scene.pair(Affine(shift), camera), camera.sigma)
     return float(np.nanmean(u)) - shift, float(np.nanstd(u))
 
 
-def _strain_error(scene: Scene, engine: Any, shape: tuple[int, int]) -> Floats:
-    camera = Camera(8)
+def _strain_error(scene: TrueScene, engine: Any, shape: tuple[int, int]) -> Floats:
+    camera = SensorModel(8)
     deformation = Affine(du_dx=STRAIN, x0=shape[1] / 2, y0=shape[0] / 2)
     _, exx = engine(*scene.pair(deformation, camera), camera.sigma)
     return np.asarray(exx[np.isfinite(exx)] - STRAIN)
 
 
-def _illumination_error(scene: Scene, engine: Any) -> float:
-    camera = Camera(8)
+def _illumination_error(scene: TrueScene, engine: Any) -> float:
+    camera = SensorModel(8)
     reference, deformed = scene.pair(Affine(0.25), camera)
     darker = np.clip(np.rint(deformed * 0.8 - 10), 0, 255).astype(np.uint8)
     u, _ = engine(reference, darker, camera.sigma)
     return float(np.sqrt(np.nanmean((u - 0.25) ** 2)))
 
 
-def _draw(bench: Bench, curves: dict[str, list[float]]) -> str:
+def _draw(bench: ExperimentContext, curves: dict[str, list[float]]) -> str:
     drawn = figure(9, 4)
     axes = drawn.subplots()
     for name, values in curves.items():
@@ -186,7 +194,7 @@ def _draw(bench: Bench, curves: dict[str, list[float]]) -> str:
     return save_figure(bench, "peers.png", drawn)
 
 
-def _verdicts(table: Table) -> tuple[Verdict, ...]:
+def _verdicts(table: ResultTable) -> tuple[Comparison, ...]:
     mine, *others = table.rows
     found = []
     for other in others:
@@ -196,7 +204,7 @@ def _verdicts(table: Table) -> tuple[Verdict, ...]:
     return tuple(found)
 
 
-def _text(table: Table, name: str, failed: list[str]) -> str:
+def _text(table: ResultTable, name: str, failed: list[str]) -> str:
     return f"""The same 8-bit pairs for all: shifts from -0.5 to 0.5 px without noise, 1 % noise (2.55 GL) at 0.25 px, a
 strain of {STRAIN:g}, and a change of light (gain 0.8, offset -10 GL) at 0.25 px. Ours is a {ZOI} px Gaussian ZOI, with
 about the l_10% of the others' 33 px subset (130 px). Strain: ours is that of a {STRAIN_ZOI} px ZOI itself, the others'

@@ -12,10 +12,18 @@ from numpy.typing import NDArray
 
 from analysis import Estimator, KernelSettings
 from analysis.field import Roi, ZoiGrid
-from analysis.picture import resolution_length
+from analysis.picture.pattern import resolution_length
 from hw_mocks.deformation import Affine, Wave
-from live.characterise.outcome import Bench, Outcome, Table, Verdict, figure, save_figure, verdict
-from live.characterise.truth import LENGTH_OF_C, Camera, Scene, grey_picture, ours, papers
+from live.characterise.outcome import (
+    Comparison,
+    ExperimentContext,
+    ExperimentOutcome,
+    ResultTable,
+    figure,
+    save_figure,
+    verdict,
+)
+from live.characterise.truth import LENGTH_OF_C, SensorModel, TrueScene, grey_picture, ours, papers
 
 Floats = NDArray[np.float64]
 RADIUS = 2.0
@@ -63,7 +71,7 @@ def measured(estimator: str, pair: tuple[Any, Any], grid: ZoiGrid, noise: float 
 def error_maps(who: Iterable[str], size: int, count: int, step: int, seed: int) -> dict[str, Any]:
     """Two pictures of one pattern with independent noise, measured against each other."""
     side = (count - 1) * step + size
-    scene, camera = Scene((side + 16, side + 16), RADIUS, seed), Camera(12, 31.0)
+    scene, camera = TrueScene((side + 16, side + 16), RADIUS, seed), SensorModel(12, 31.0)
     pair = scene.pair(Affine(), camera)
     grid = ZoiGrid.cover(Roi(8, 8, side, side), size, step)
     return {estimator: measured(estimator, pair, grid, camera.sigma) for estimator in who}
@@ -72,7 +80,7 @@ def error_maps(who: Iterable[str], size: int, count: int, step: int, seed: int) 
 def attenuation(estimator: str, size: int, period: float, seed: int) -> tuple[float, float]:
     """Share of a sine's amplitude that u and exx keep."""
     width = int(period * max(3, round(512 / period)))
-    scene, camera = Scene((256, width + 2 * size), RADIUS, seed), Camera(16)
+    scene, camera = TrueScene((256, width + 2 * size), RADIUS, seed), SensorModel(16)
     pair = scene.pair(Wave(AMPLITUDE, period), camera)
     grid = ZoiGrid.cover(Roi(size // 2, 16, width + size, 224), size, 8 if estimator == "ours" else 12)
     field = measured(estimator, pair, grid, camera.sigma)
@@ -124,7 +132,7 @@ def _star_fit(period: Floats, kept: Floats) -> float:
     return c2
 
 
-def resolution(bench: Bench) -> Outcome:
+def resolution(bench: ExperimentContext) -> ExperimentOutcome:
     """Sections 2.3 and 3.2: 9 px by autocorrelation, and what that is in the terms of the DIC Challenge."""
     counts = {32: 34, 64: 24} if bench.quick else {32: 64, 64: 44}
     periods = PERIODS[::2] if bench.quick else PERIODS
@@ -156,15 +164,17 @@ def resolution(bench: Bench) -> Outcome:
         "l_10% of a sine px", "l_10% of theory px", "l_10% on the Star px", "equivalent square VSG px",
         "share kept of the longest waves",
     )  # fmt: skip
-    table = Table("resolution", columns, tuple(rows))
-    kept_table = Table("attenuation", ("quantity", "estimator", "period px", "share kept"), tuple(kept_rows))
+    table = ResultTable("resolution", columns, tuple(rows))
+    kept_table = ResultTable(
+        "attenuation", ("quantity", "estimator", "period px", "share kept"), tuple(kept_rows)
+    )
     name = _draw(bench, lines, kept_rows)
     text = _text(table, name)
     found = tuple(_verdicts(rows))
-    return Outcome("resolution", "Spatial resolution", text, (table, kept_table), (name,), found)
+    return ExperimentOutcome("resolution", "Spatial resolution", text, (table, kept_table), (name,), found)
 
 
-def _verdicts(rows: list[tuple[Any, ...]]) -> Iterator[Verdict]:
+def _verdicts(rows: list[tuple[Any, ...]]) -> Iterator[Comparison]:
     half = len(rows) // 2
     for paper, mine in (rows[:2], rows[half : half + 2]):
         yield verdict(
@@ -174,7 +184,7 @@ def _verdicts(rows: list[tuple[Any, ...]]) -> Iterator[Verdict]:
 
 
 def _row(
-    bench: Bench, label: str, estimator: str, size: int, half: float, fit: tuple[float, float]
+    bench: ExperimentContext, label: str, estimator: str, size: int, half: float, fit: tuple[float, float]
 ) -> tuple[Any, ...]:
     theory = resolution_length(size) if estimator == "ours" else float("nan")
     gauge = VSG_OF_SIGMA * size / 6 if estimator == "ours" else float("nan")
@@ -184,7 +194,7 @@ def _row(
     return label, WHO[estimator], half, 2 * half, PAPER_WIDTH, fit[0], theory, star, gauge, fit[1]
 
 
-def _draw(bench: Bench, lines: dict[tuple[str, str], Floats], kept: list[tuple[Any, ...]]) -> str:
+def _draw(bench: ExperimentContext, lines: dict[tuple[str, str], Floats], kept: list[tuple[Any, ...]]) -> str:
     drawn = figure(12, 3.8)
     left, right = drawn.subplots(1, 2)
     for (label, estimator), line in lines.items():
@@ -209,7 +219,7 @@ def _draw(bench: Bench, lines: dict[tuple[str, str], Floats], kept: list[tuple[A
     return save_figure(bench, "resolution.png", drawn)
 
 
-def _text(table: Table, name: str) -> str:
+def _text(table: ResultTable, name: str) -> str:
     return f"""The paper adds two independent noises to one picture, measures one against the other and takes the
 width of the autocorrelation of the error map: 9 px. That width says over which distance errors repeat. It
 does not say how fine a strain field is still seen: a sine of displacement loses 10 % of its amplitude at l_10%,

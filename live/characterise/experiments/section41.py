@@ -12,8 +12,17 @@ from numpy.typing import NDArray
 from analysis.field import Roi, ZoiGrid
 from analysis.paper_estimator import PaperSettings
 from hw_mocks.deformation import Wave
-from live.characterise.outcome import Bench, Outcome, Table, Verdict, colour_map, figure, save_figure, verdict
-from live.characterise.truth import Camera, Limit, Scene, limit, ours, papers
+from live.characterise.outcome import (
+    Comparison,
+    ExperimentContext,
+    ExperimentOutcome,
+    ResultTable,
+    colour_map,
+    figure,
+    save_figure,
+    verdict,
+)
+from live.characterise.truth import Limit, SensorModel, TrueScene, limit, ours, papers
 
 Floats = NDArray[np.float64]
 AMPLITUDE, PERIOD, BITS, RADIUS = 0.02, 128.0, 8, 2.0
@@ -58,7 +67,7 @@ class Field:
     def __init__(self, quick: bool) -> None:
         self.step = 8
         self.shape = (160, 320) if quick else (320, 512)
-        self.scene = Scene(self.shape, RADIUS, seed=21)
+        self.scene = TrueScene(self.shape, RADIUS, seed=21)
         self.wave = Wave(AMPLITUDE, PERIOD)
         centres = self.grid(LARGE).x
         rows = len(self.grid(LARGE).y)
@@ -84,9 +93,9 @@ class Field:
         return float(np.sqrt(np.nanmean(self.inner(values - truth) ** 2)))
 
 
-def measured(field: Field, noise: float, bench: Bench, done: float) -> dict[str, Maps]:
+def measured(field: Field, noise: float, bench: ExperimentContext, done: float) -> dict[str, Maps]:
     """The paper's estimator, ours at the paper's sizes, and ours at its spatial resolution."""
-    camera = Camera(BITS, noise)
+    camera = SensorModel(BITS, noise)
     pair = field.scene.pair(field.wave, camera)
     small, large, same = (field.grid(size) for size in (SMALL, LARGE, SAME_LENGTH))
     paper_u, paper_direct = papers(pair, small).u, papers(pair, large).exx
@@ -109,7 +118,7 @@ def measured(field: Field, noise: float, bench: Bench, done: float) -> dict[str,
 
 def bounds(field: Field, limits: dict[int, Limit], noise: float) -> dict[str, float]:
     """Predicted rms: noise of both pictures (rounding included) and window attenuation, in squares."""
-    camera, found = Camera(BITS, noise), {}
+    camera, found = SensorModel(BITS, noise), {}
     for name, size, index, truth in (
         ("u", SMALL, 0, field.u), ("ours", LARGE, 1, field.exx), ("same", SAME_LENGTH, 1, field.exx),
     ):  # fmt: skip
@@ -121,12 +130,12 @@ def bounds(field: Field, limits: dict[int, Limit], noise: float) -> dict[str, fl
     return found
 
 
-def section41(bench: Bench) -> Outcome:
+def section41(bench: ExperimentContext) -> ExperimentOutcome:
     """0.02 sin(2 pi x/128) px, 8 bit, without noise and with 1 %."""
     field = Field(bench.quick)
     limits = {size: field.limit(size) for size in (SMALL, LARGE, SAME_LENGTH)}
     rows: list[tuple[Any, ...]] = []
-    verdicts: list[Verdict] = []
+    verdicts: list[Comparison] = []
     kept: dict[str, Maps] = {}
     for number, (label, noise) in enumerate(NOISES.items()):
         maps = measured(field, noise, bench, 0.5 * number)
@@ -140,12 +149,14 @@ def section41(bench: Bench) -> Outcome:
         "noise", "quantity", "the paper", "its estimator", "ours, ZOI 32 / 64", "predicted limit", "ours / limit",
         f"ours, ZOI {SAME_LENGTH}, the paper's l_10%", "its limit",
     )  # fmt: skip
-    table = Table("section41", columns, tuple(rows))
+    table = ResultTable("section41", columns, tuple(rows))
     name = _draw(bench, field, kept)
     whole = papers(
-        field.scene.pair(field.wave, Camera(BITS)), field.grid(LARGE), PaperSettings(overlay="whole-pixel")
+        field.scene.pair(field.wave, SensorModel(BITS)),
+        field.grid(LARGE),
+        PaperSettings(overlay="whole-pixel"),
     )
-    return Outcome(
+    return ExperimentOutcome(
         "section41",
         "Section 4.1, Figs. 4 and 5: the sine field",
         _text(table, name, field.rms(whole.exx, field.exx)),
@@ -171,7 +182,7 @@ def _rows(field: Field, label: str, maps: dict[str, Maps], bound: dict[str, floa
     ]  # fmt: skip
 
 
-def _verdicts(rows: list[tuple[Any, ...]]) -> list[Verdict]:
+def _verdicts(rows: list[tuple[Any, ...]]) -> list[Comparison]:
     u, direct, classical = rows
     return [
         verdict("rms of u, sine field", "px", u[4], u[2], "the paper"),
@@ -182,7 +193,7 @@ def _verdicts(rows: list[tuple[Any, ...]]) -> list[Verdict]:
     ]  # fmt: skip
 
 
-def _draw(bench: Bench, field: Field, maps: dict[str, Maps]) -> str:
+def _draw(bench: ExperimentContext, field: Field, maps: dict[str, Maps]) -> str:
     drawn = figure(14, 5.2)
     axes = drawn.subplots(2, 4)
     span, strain = (-0.03, 0.03), (-1500.0, 1500.0)
@@ -214,7 +225,7 @@ def _draw_row(axes: Any, field: Field, maps: dict[str, Maps]) -> None:
     axes.legend(fontsize=7)
 
 
-def _text(table: Table, name: str, whole: float) -> str:
+def _text(table: ResultTable, name: str, whole: float) -> str:
     u, direct, classical = table.rows[:3]
     noisy = table.rows[4:6]
     return f"""u = {AMPLITUDE} sin(2 pi x/{PERIOD:g}) px, 8 bit, speckle radius {RADIUS:g} px, ZOI 32 for the

@@ -11,8 +11,15 @@ from numpy.typing import NDArray
 
 from analysis import KernelSettings
 from hw_mocks.deformation import Affine
-from live.characterise.outcome import Bench, Outcome, Table, figure, save_figure, verdict
-from live.characterise.truth import Camera, Scene, Tiles, limit, ours, papers
+from live.characterise.outcome import (
+    ExperimentContext,
+    ExperimentOutcome,
+    ResultTable,
+    figure,
+    save_figure,
+    verdict,
+)
+from live.characterise.truth import SensorModel, Tiles, TrueScene, limit, ours, papers
 
 Floats = NDArray[np.float64]
 BITS, SIZE, RADIUS = 12, 32, 2.0
@@ -50,10 +57,10 @@ class Shifts:
 
 
 def measured(
-    scenes: list[Scene], tiles: Tiles, noise: float, draws: int, tick: Callable[[], None]
+    scenes: list[TrueScene], tiles: Tiles, noise: float, draws: int, tick: Callable[[], None]
 ) -> dict[str, Shifts]:
     """The estimators on the same pairs; ours on each with ``draws`` independent noises."""
-    camera = Camera(BITS, noise)
+    camera = SensorModel(BITS, noise)
     found: dict[str, list[list[Floats]]] = {
         name: [[] for _ in SHIFTS] for name in ("paper", "ours", "phase", "ours wide")
     }
@@ -75,16 +82,16 @@ def measured(
     return {name: Shifts(np.array([np.concatenate(row) for row in rows])) for name, rows in found.items()}
 
 
-def limits(scenes: list[Scene], tiles: Tiles, size: int) -> float:
+def limits(scenes: list[TrueScene], tiles: Tiles, size: int) -> float:
     """rms noise limit of u for a noise of 1 of full scale, px."""
     values = [limit(scene.slopes, tiles.grid(size), size / 6).sigma[0] for scene in scenes]
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def table1(bench: Bench) -> Outcome:
+def table1(bench: ExperimentContext) -> ExperimentOutcome:
     """10 shifts, 60 pairs (whole: 360, ours with noise 3600), 12 bit, 0 and 31 GL."""
     tiles = Tiles(SAME_LENGTH + 20)
-    scenes = [Scene(tiles.shape, RADIUS, seed) for seed in range(1 if bench.quick else 6)]
+    scenes = [TrueScene(tiles.shape, RADIUS, seed) for seed in range(1 if bench.quick else 6)]
     noises = dict(list(NOISES.items())[:2]) if bench.quick else NOISES
     total, done = len(scenes) * len(SHIFTS) * len(noises), [0]
 
@@ -106,24 +113,24 @@ def table1(bench: Bench) -> Outcome:
         )
         largest = float(np.abs(mine.bias).max())
         verdicts.append(verdict(f"largest bias of u, {noise}", "px", largest, paper[1], "the paper"))
-        bound = unit[SIZE] * Camera(BITS, NOISES[noise]).sigma / Camera(BITS).top
+        bound = unit[SIZE] * SensorModel(BITS, NOISES[noise]).sigma / SensorModel(BITS).top
         verdicts.append(
             verdict(f"resolution of u, 32x32, {noise}", "px", mine.resolution, bound, "the noise limit")
         )
     text = _text(results, unit, summary, name, len(scenes) * 60, draws["31 GL (std)"])
-    return Outcome(
+    return ExperimentOutcome(
         "table1", "Table 1 and Fig. 2: rigid shifts", text, (summary, curves), (name,), tuple(verdicts)
     )
 
 
-def _summary(results: dict[str, dict[str, Shifts]], unit: dict[int, float]) -> Table:
+def _summary(results: dict[str, dict[str, Shifts]], unit: dict[int, float]) -> ResultTable:
     columns = (
         "noise", "figure", "the paper px", "its estimator px", "ours px", "ours, phase alone px",
         f"ours, {SAME_LENGTH} px ZOI, same l_10% px", "noise limit 32 px", f"noise limit {SAME_LENGTH} px",
     )  # fmt: skip
     rows: list[tuple[Any, ...]] = []
     for noise, found in results.items():
-        sigma = Camera(BITS, NOISES[noise]).sigma / Camera(BITS).top
+        sigma = SensorModel(BITS, NOISES[noise]).sigma / SensorModel(BITS).top
         each_of = [found[each] for each in ("paper", "ours", "phase", "ours wide")]
         resolution, bias = PAPER[noise]
         bounds = tuple(value * sigma for value in unit.values())
@@ -136,20 +143,22 @@ def _summary(results: dict[str, dict[str, Shifts]], unit: dict[int, float]) -> T
         rows.append(
             (noise, "largest abs bias", bias, *(float(np.abs(s.bias).max()) for s in each_of), *absent)
         )
-    return Table("table1", columns, tuple(rows))
+    return ResultTable("table1", columns, tuple(rows))
 
 
-def _curves(results: dict[str, dict[str, Shifts]]) -> Table:
+def _curves(results: dict[str, dict[str, Shifts]]) -> ResultTable:
     columns = ["shift px"]
     values: list[Floats] = [SHIFTS]
     for noise, found in results.items():
         for name, shifts in found.items():
             columns += [f"bias px, {name}, {noise}", f"std px, {name}, {noise}"]
             values += [shifts.bias, shifts.scatter]
-    return Table("fig2", tuple(columns), tuple(tuple(float(v) for v in row) for row in np.transpose(values)))
+    return ResultTable(
+        "fig2", tuple(columns), tuple(tuple(float(v) for v in row) for row in np.transpose(values))
+    )
 
 
-def _draw(bench: Bench, results: dict[str, dict[str, Shifts]]) -> str:
+def _draw(bench: ExperimentContext, results: dict[str, dict[str, Shifts]]) -> str:
     drawn = figure(12, 6.4)
     axes = drawn.subplots(2, 2, sharex=True)
     for column, noise in enumerate(("0 GL", "31 GL (std)")):
@@ -176,7 +185,7 @@ def _draw(bench: Bench, results: dict[str, dict[str, Shifts]]) -> str:
 def _text(
     results: dict[str, dict[str, Shifts]],
     unit: dict[int, float],
-    summary: Table,
+    summary: ResultTable,
     name: str,
     pairs: int,
     draws: int,
@@ -188,8 +197,8 @@ def _text(
     )
     noisy = results["31 GL (std)"]["ours"].resolution
     chance, chance_of_60 = noisy / (pairs * draws) ** 0.5, noisy / 60**0.5
-    bound = unit[SIZE] * Camera(BITS, 31.0).sigma / Camera(BITS).top
-    rounding = unit[SIZE] * Camera(BITS).sigma / Camera(BITS).top
+    bound = unit[SIZE] * SensorModel(BITS, 31.0).sigma / SensorModel(BITS).top
+    rounding = unit[SIZE] * SensorModel(BITS).sigma / SensorModel(BITS).top
     return f"""ZOI 32x32, 12 bit, speckle radius {RADIUS:g} px, shifts of u from -0.5 to 0.5 px in 10 equal steps,
 {pairs} pairs a shift; the spectral kernel sees each of them with {draws} noises. The paper samples a pattern
 drawn 10 times oversampled; here it is rendered analytically at the shifted place. It says neither whether 31 GL is a

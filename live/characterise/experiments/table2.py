@@ -20,19 +20,27 @@ from live.characterise.experiments.table2_design import (
     SIZES,
     TERMS,
     Corner,
-    Fit,
+    DesignFit,
     corner_values,
     fitted,
     measured,
     model_matrix,
 )
-from live.characterise.outcome import Bench, Outcome, Table, Verdict, figure, save_figure, verdict
+from live.characterise.outcome import (
+    Comparison,
+    ExperimentContext,
+    ExperimentOutcome,
+    ResultTable,
+    figure,
+    save_figure,
+    verdict,
+)
 
 Floats = NDArray[np.float64]
 NAMES = ("paper", "ours", "paper, range", "ours, range")
 
 
-def table2(bench: Bench) -> Outcome:
+def table2(bench: ExperimentContext) -> ExperimentOutcome:
     """The design at the paper's corners, its models in % strain and on log10."""
     corners = measured(bench)
     by = {name: [c for c in corners if c.estimator == name] for name in NAMES}
@@ -46,7 +54,7 @@ def table2(bench: Bench) -> Outcome:
     effects, cells = _effects(linear, logs), _cells(corners)
     name = _draw(bench, logs, corners)
     text = _text(linear, logs, effects, cells, corners, name)
-    return Outcome(
+    return ExperimentOutcome(
         "table2",
         "Table 2: what the uncertainty of strain depends on",
         text,
@@ -56,7 +64,7 @@ def table2(bench: Bench) -> Outcome:
     )
 
 
-def _effects(linear: dict[str, Fit], logs: dict[str, Fit]) -> Table:
+def _effects(linear: dict[str, DesignFit], logs: dict[str, DesignFit]) -> ResultTable:
     columns = (
         "effect", "the paper % strain", "its confidence %", "its estimator % strain", "confidence %",
         "ours % strain", "confidence %", "ours on log10", "+-", "confidence %", "factor from low to high",
@@ -70,10 +78,10 @@ def _effects(linear: dict[str, Fit], logs: dict[str, Fit]) -> Table:
             float(mine.beta[k]), float(mine.confidence[k]),
             float(log.beta[k]), float(log.sigma[k]), float(log.confidence[k]), factor,
         ))  # fmt: skip
-    return Table("table2", columns, tuple(rows))
+    return ResultTable("table2", columns, tuple(rows))
 
 
-def _cells(corners: list[Corner]) -> Table:
+def _cells(corners: list[Corner]) -> ResultTable:
     columns = (
         "ROI px", "speckle radius px", "bits", "noise GL",
         "the paper's model %", "its estimator rms %", "ours rms %", "ours measured of 60",
@@ -89,10 +97,10 @@ def _cells(corners: list[Corner]) -> Table:
             pair[(code + 1) // 2] for pair, code in zip((SIZES, RADII, BITS, NOISES), coded, strict=True)
         ]
         rows.append((*values, model, *means, int(np.mean([c.measured for c in picked[1]]))))
-    return Table("table2_corners", columns, tuple(rows))
+    return ResultTable("table2_corners", columns, tuple(rows))
 
 
-def _verdicts(corners: list[Corner]) -> list[Verdict]:
+def _verdicts(corners: list[Corner]) -> list[Comparison]:
     found = []
     for noise in (-1, 1):
         rms = {}
@@ -111,7 +119,7 @@ def _verdicts(corners: list[Corner]) -> list[Verdict]:
     return found
 
 
-def _draw(bench: Bench, logs: dict[str, Fit], corners: list[Corner]) -> str:
+def _draw(bench: ExperimentContext, logs: dict[str, DesignFit], corners: list[Corner]) -> str:
     drawn = figure(12, 4.2)
     left, right = drawn.subplots(1, 2, width_ratios=[1.2, 1])
     order = np.argsort(np.abs(logs["ours"].beta[1:]))
@@ -157,10 +165,10 @@ def _draw_corners(axes: Any, corners: list[Corner]) -> None:
 
 
 def _text(
-    linear: dict[str, Fit],
-    logs: dict[str, Fit],
-    effects: Table,
-    cells: Table,
+    linear: dict[str, DesignFit],
+    logs: dict[str, DesignFit],
+    effects: ResultTable,
+    cells: ResultTable,
     corners: list[Corner],
     name: str,
 ) -> str:
@@ -186,7 +194,7 @@ there the models stand on the other corners alone.
 ![Effects on log10, and the error at each corner]({name})"""
 
 
-def _agreement(linear: dict[str, Fit]) -> str:
+def _agreement(linear: dict[str, DesignFit]) -> str:
     """Signs and ranking against the paper's significant effects, in words."""
     significant = [k for k in range(1, 11) if PAPER_CONFIDENCE[k] >= SIGNIFICANT]
     lines = []
@@ -209,7 +217,7 @@ def _agreement(linear: dict[str, Fit]) -> str:
     return "\n".join([heading, "", *lines, "", _why(linear["paper"])])
 
 
-def _why(fit: Fit) -> str:
+def _why(fit: DesignFit) -> str:
     """What the sizes of the effects say, and why their ranking need not agree."""
     alone, with_noise = (1, 2, 3), (7, 9, 10)
     pairs = [

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from analysis import PatternError
 from analysis.field import ZoiGrid
-from live.characterise.outcome import Bench
-from live.characterise.truth import Camera, Scene, TiledStrain, Tiles, ours, papers
+from live.characterise.outcome import ExperimentContext
+from live.characterise.truth import SensorModel, TiledStrain, Tiles, TrueScene, ours, papers
 
 Floats = NDArray[np.float64]
 SIZES, RADII, BITS, NOISES = (32, 64), (2.0, 16.0), (8, 16), (0.0, 31.0)
@@ -33,7 +33,7 @@ SIGNIFICANT = 95.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fit:
+class DesignFit:
     """A linear model on the coded factors, -1 and 1.
 
     Attributes
@@ -56,7 +56,7 @@ def model_matrix(corners: NDArray[Any]) -> Floats:
     return np.column_stack([np.ones(len(coded)), coded, *products])
 
 
-def fitted(corners: NDArray[Any], response: Floats) -> Fit:
+def fitted(corners: NDArray[Any], response: Floats) -> DesignFit:
     """Least squares with Student's confidence.
 
     Parameters
@@ -74,7 +74,7 @@ def fitted(corners: NDArray[Any], response: Floats) -> Fit:
     sigma = np.sqrt(variance * np.diag(np.linalg.pinv(matrix.T @ matrix)))
     t = np.abs(beta) / np.maximum(sigma, 1e-300)
     confidence = 100 * (2 * stdtr(freedom, t) - 1)
-    return Fit(np.asarray(beta, float), np.asarray(sigma, float), np.asarray(confidence, float))
+    return DesignFit(np.asarray(beta, float), np.asarray(sigma, float), np.asarray(confidence, float))
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,14 +89,14 @@ class Corner:
     measured: int
 
 
-def measured(bench: Bench) -> list[Corner]:
+def measured(bench: ExperimentContext) -> list[Corner]:
     """All corners, levels and estimators; the pictures of a speckle size are rendered once."""
     levels = (2e-4,) if bench.quick else tuple(np.geomspace(2e-5, 2e-3, 5))
     readings = {"": READINGS[""]} if bench.quick else READINGS
     found: list[Corner] = []
     for radius_code, radius in zip((-1, 1), RADII, strict=True):
         tiles = Tiles(64 + GUARD[radius])
-        scene = Scene(tiles.shape, radius, 90 + radius_code)
+        scene = TrueScene(tiles.shape, radius, 90 + radius_code)
         lights = [scene.light(TiledStrain(tiles.pitch, du_dx=float(level))) for level in levels]
         corners = [c for c in CORNERS if c[1] == radius_code]
         for number, coded in enumerate(corners):
@@ -106,7 +106,7 @@ def measured(bench: Bench) -> list[Corner]:
 
 
 def _corner(
-    scene: Scene,
+    scene: TrueScene,
     tiles: Tiles,
     coded: tuple[int, ...],
     lights: list[tuple[float, Any]],
@@ -116,7 +116,7 @@ def _corner(
     size, _, bits, noise = corner_values(coded)
     grid, found = tiles.grid(size), []
     for reading, spread in readings.items():
-        camera = Camera(bits, noise * spread)
+        camera = SensorModel(bits, noise * spread)
         for level, light in lights if noise or not reading else ():
             pair = camera.picture(scene.reference, scene.rng), camera.picture(light, scene.rng)
             found.append(_figures(coded, level, "paper" + reading, papers(pair, grid).exx))
@@ -128,7 +128,7 @@ def _corner(
     return found
 
 
-def _ours_or_refused(pair: tuple[Any, Any], grid: ZoiGrid, camera: Camera) -> Floats:
+def _ours_or_refused(pair: tuple[Any, Any], grid: ZoiGrid, camera: SensorModel) -> Floats:
     try:
         return ours(pair, grid, camera.sigma).exx
     except PatternError:

@@ -17,18 +17,18 @@ from analysis.paper_estimator import PaperSettings
 from hw_mocks.deformation import SpecimenDeformation
 from hw_mocks.strain_modes import StrainModes
 from live.characterise.outcome import (
-    Bench,
-    Outcome,
-    Table,
-    Verdict,
+    Comparison,
+    ExperimentContext,
+    ExperimentOutcome,
+    ResultTable,
     colour_map,
     figure,
     save_figure,
     shown,
     verdict,
 )
-from live.characterise.truth import Camera, Scene, grey_picture, ours, papers
-from live.maps import PAPER_LOW_PASS, for_display
+from live.characterise.truth import SensorModel, TrueScene, grey_picture, ours, papers
+from live.results.maps.colours import PAPER_LOW_PASS, for_display
 
 Floats = NDArray[np.float64]
 CELL, OVER, MEAN_STRAIN, NU = 160.0, 0.6, 1e-3, 0.3
@@ -41,13 +41,13 @@ HOLE_ROI = Roi(20, 30, 360, 980)
 BACKGROUND = 30  # grey levels, smoothed: below is hole or background
 
 
-def woven(bench: Bench) -> Outcome:
+def woven(bench: ExperimentContext) -> ExperimentOutcome:
     """A plain weave in tension along x with over-strain where the yarns cross; truth known."""
     step = 16 if bench.quick else 8
     shape = (256, 384) if bench.quick else (384, 544)
     modes = StrainModes("woven", "x", (shape[1] - 1) / 2, (shape[0] - 1) / 2, cell=CELL, overstrain=OVER)
     motion = SpecimenDeformation(modes, MEAN_STRAIN, -NU * MEAN_STRAIN)
-    scene, camera = Scene(shape, 2.0, seed=31), Camera(BITS, NOISE)
+    scene, camera = TrueScene(shape, 2.0, seed=31), SensorModel(BITS, NOISE)
     pair = scene.pair(motion, camera)
     edge = SIZE // 2
     roi = Roi(edge, edge, shape[1] - SIZE, shape[0] - SIZE)
@@ -68,7 +68,7 @@ def woven(bench: Bench) -> Outcome:
     truth["exx"], truth["exy"] = truth["du_dx"], 0.5 * (truth["du_dy"] + truth["dv_dx"])
     table = _errors(fields, truth, step)
     name = _draw_woven(bench, fields, truth, step)
-    return Outcome(
+    return ExperimentOutcome(
         "woven",
         "Section 4.2: a simulated woven composite",
         _woven_text(table, name),
@@ -78,7 +78,7 @@ def woven(bench: Bench) -> Outcome:
     )
 
 
-def _errors(fields: dict[str, Any], truth: dict[str, Floats], step: int) -> Table:
+def _errors(fields: dict[str, Any], truth: dict[str, Floats], step: int) -> ResultTable:
     columns = (
         "quantity", "its estimator", "its estimator, overlaid by whole pixels", "the latter, filtered as in the paper",
         f"ours, {SIZE} px", f"ours, {SMALLER} px",
@@ -96,14 +96,14 @@ def _errors(fields: dict[str, Any], truth: dict[str, Floats], step: int) -> Tabl
         ]
         peaks = [float(np.nanmax(v)) for v in (truth[name], values["ours"], values["fine"])]
         rows.append((f"rms error of {name}, {unit}", *(scale * v for v in each), *(scale * v for v in peaks)))
-    return Table("woven", columns, tuple(rows))
+    return ResultTable("woven", columns, tuple(rows))
 
 
 def _rms(values: Floats, truth: Floats) -> float:
     return float(np.sqrt(np.nanmean((values - truth) ** 2)))
 
 
-def _verdicts(table: Table) -> tuple[Verdict, ...]:
+def _verdicts(table: ResultTable) -> tuple[Comparison, ...]:
     return tuple(
         verdict(f"{row[0]}, woven".replace(", um/m", "").replace(", px", ""), row[0].split()[-1], row[4], row[3],
                 "the paper's estimator with its filters")
@@ -111,7 +111,7 @@ def _verdicts(table: Table) -> tuple[Verdict, ...]:
     )  # fmt: skip
 
 
-def _draw_woven(bench: Bench, fields: dict[str, Any], truth: dict[str, Floats], step: int) -> str:
+def _draw_woven(bench: ExperimentContext, fields: dict[str, Any], truth: dict[str, Floats], step: int) -> str:
     drawn = figure(14, 6.2)
     axes = drawn.subplots(2, 4)
     for row, name in enumerate(("exx", "exy")):
@@ -127,7 +127,7 @@ def _draw_woven(bench: Bench, fields: dict[str, Any], truth: dict[str, Floats], 
     return save_figure(bench, "fig7_woven.png", drawn)
 
 
-def _woven_text(table: Table, name: str) -> str:
+def _woven_text(table: ResultTable, name: str) -> str:
     return f"""A plain weave with a cell of {CELL:g} px, {1e6 * MEAN_STRAIN:g} um/m in the mean along x and
 {100 * OVER:g} % more where the yarns cross; 12 bit, {NOISE:g} GL of noise (16 frames of 20 GL averaged). The paper's
 maps are filtered (3x3 median, then Gaussian with sigma = {PAPER_LOW_PASS:g} px); ours are drawn as measured. Here
@@ -140,11 +140,11 @@ paper's strain; overlaid by whole pixels, as its section 2.2 may be read, it sho
 ![Strain maps of the simulated weave]({name})"""
 
 
-def open_hole(bench: Bench) -> Outcome:
+def open_hole(bench: ExperimentContext) -> ExperimentOutcome:
     """The open-hole composite of the DIC Challenge 1.0 (sample 12), a real test."""
     if bench.data is None or not (bench.data / HOLE).is_dir():
         text = "Left out: give the folder of the DIC Challenge image sets with `--data DIR`."
-        return Outcome("open-hole", "Section 4.2: a real composite with a hole", text)
+        return ExperimentOutcome("open-hole", "Section 4.2: a real composite with a hole", text)
     pictures = [grey_picture(bench.data / HOLE / name) for name in HOLE_FRAMES]
     step = 16 if bench.quick else 8
     mask = _specimen(pictures[0])
@@ -165,8 +165,8 @@ def open_hole(bench: Bench) -> Outcome:
         "predicted sigma of eyy um/m",
     )  # fmt: skip
     rows = tuple(_hole_row(frame, field) for frame, field in zip(HOLE_FRAMES[1:], fields, strict=True))
-    table = Table("open_hole", columns, rows)
-    return Outcome(
+    table = ResultTable("open_hole", columns, rows)
+    return ExperimentOutcome(
         "open-hole",
         "Section 4.2: a real composite with a hole",
         _hole_text(table, name, gold),
@@ -209,7 +209,9 @@ def _against_gold(path: Path, field: StrainField) -> str:
     return f"median |du| {shown(du)} px, |dv| {shown(dv)} px over {np.count_nonzero(common)} common points"
 
 
-def _draw_hole(bench: Bench, picture: NDArray[Any], field: StrainField, paper: Any, whole: Any) -> str:
+def _draw_hole(
+    bench: ExperimentContext, picture: NDArray[Any], field: StrainField, paper: Any, whole: Any
+) -> str:
     drawn = figure(13, 6.4)
     axes = drawn.subplots(1, 4)
     step, size = field.grid.step, field.grid.size
@@ -235,7 +237,7 @@ def _draw_hole(bench: Bench, picture: NDArray[Any], field: StrainField, paper: A
     return save_figure(bench, "fig6_7_open_hole.png", drawn)
 
 
-def _hole_text(table: Table, name: str, gold: str) -> str:
+def _hole_text(table: ResultTable, name: str, gold: str) -> str:
     return f"""Open-hole tension of a carbon-fibre composite (DIC Challenge 1.0, sample 12; SEM/iDICs, images
 from the DICe regression tests), 8 bit, one picture a step, ZOI 48, noise estimated from the
 residual. No truth is known; DICe's own displacements at frame 04 against ours with 32 px: {gold}.

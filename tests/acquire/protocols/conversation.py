@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from acquire.addresses import Options, parse_address
-from acquire.protocols import PROTOCOLS, Parser, Reading, find_protocol
+from acquire.protocols.base import PROTOCOLS, Parser, Reading, find_protocol
 
 SETTINGS = {"modbus": "profile=pt113", "lines": "preset=ohaus", "hbm-aed": "nominal=500"}
 

@@ -1,4 +1,11 @@
-"""What holds for every parser, whatever the bytes and however they are cut."""
+"""What holds for every parser, whatever the bytes and however they are cut.
+
+Lines out of bytes.
+
+The same number in all notations of the world: read rightly or not at all.
+
+Units to newtons.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +13,18 @@ import itertools
 import math
 import random
 from collections.abc import Callable
+from decimal import Decimal
+from typing import NamedTuple
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
-from acquire.protocols import Reading
+from acquire.protocols.base import Reading
+from acquire.protocols.buffers import LineBuffer
+from acquire.protocols.units import is_mass, is_unit, newtons_per
 from tests.acquire.protocols.conversation import ALL, any_parser, parser, read_line
 
 SEEDS = [
@@ -140,3 +152,127 @@ def test_what_sauter_answers_is_read(value: float) -> None:
     made = parser("sauter")
     made.feed(f"{0 if value < 0 else 1}{abs(value):06.2f}".encode())
     assert made.silence()[0].value == pytest.approx(float(value))
+
+
+def test_lines_with_their_positions() -> None:
+    buffer = LineBuffer(drop_first=False)
+    assert [(line.data, line.start) for line in buffer.feed(b"ab\r\n\ncd\ref")] == [(b"ab", 0), (b"cd", 5)]
+    assert [(line.data, line.start) for line in buffer.feed(b"g\n")] == [(b"efg", 8)]
+
+
+def test_an_endless_line_comes_out_once_and_cut() -> None:
+    buffer = LineBuffer(limit=8, drop_first=False)
+    lines = [line for _ in range(100) for line in buffer.feed(b"123456789")]
+    assert [(line.data, line.whole) for line in lines] == [(b"12345678", False)]
+    assert [(line.data, line.start) for line in buffer.feed(b"\nab\n")] == [(b"ab", 901)]
+
+
+def test_a_line_of_just_the_limit_is_whole() -> None:
+    buffer = LineBuffer(limit=8, drop_first=False)
+    assert [line.whole for line in buffer.feed(b"12345678\n")] == [True]
+
+
+@given(st.binary(max_size=300), st.booleans())
+def test_every_line_stands_where_it_says(data: bytes, drop: bool) -> None:
+    buffer = LineBuffer(limit=32, drop_first=drop)
+    lines = [line for i in range(0, len(data), 7) for line in buffer.feed(data[i : i + 7])]
+    for line in lines:
+        assert data[line.start : line.start + len(line.data)] == line.data
+        assert not {10, 13} & set(line.data)
+
+
+class Notation(NamedTuple):
+    """How a number is written: the decimal mark, and what stands between thousands."""
+
+    point: str
+    thousands: str
+
+
+MARKS = (".,", ". ", ".'", ",.", ", ", ".", ",")
+NOTATIONS = [Notation(marks[0], marks[1:]) for marks in MARKS]
+LINES = ("{}", "{} N", "{}N", "Reading: {} N", "F={}", "{} N,8388,21.5,", "{};")
+SETTINGS = ("", "column=1", "decimal=comma", "decimal=comma&column=1")
+numbers = st.decimals(min_value=-(10**8), max_value=10**8, allow_nan=False, allow_infinity=False)
+
+
+def written(value: Decimal, notation: Notation) -> str:
+    """``value`` with its decimals, grouped."""
+    text = f"{value:,}"
+    marks = {",": notation.thousands, ".": notation.point}
+    return "".join(marks.get(letter, letter) for letter in text)
+
+
+def may_mislead(text: str, notation: Notation, settings: str) -> bool:
+    """One lone mark with three digits behind it says both 1.234 and 1234: nobody can tell."""
+    read_as = "," if "decimal=comma" in settings else "."
+    return notation.thousands == read_as and text.count(read_as) == 1 and notation.point not in text
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+@given(
+    value=numbers,
+    places=st.integers(0, 5),
+    notation=st.sampled_from(NOTATIONS),
+    line=st.sampled_from(LINES),
+)
+def test_no_notation_is_read_as_another_number(
+    settings: str, value: Decimal, places: int, notation: Notation, line: str
+) -> None:
+    rounded = round(value, places) if places else Decimal(round(value))
+    text = written(rounded, notation)
+    reading = read_line("ascii", line.format(text).encode(), settings)
+    assert reading is not None
+    ours = notation.point == ("," if "decimal=comma" in settings else ".")
+    if not math.isnan(reading.value) and not may_mislead(text, notation, settings):
+        assert reading.value == pytest.approx(float(rounded), abs=1e-9)
+    if ours and notation.thousands == "" and "column" not in settings and "8388," not in line:
+        assert not math.isnan(reading.value)
+
+
+@given(value=numbers, places=st.integers(0, 5), notation=st.sampled_from(NOTATIONS), ms=st.integers(0, 10**7))
+def test_nor_beside_milliseconds(value: Decimal, places: int, notation: Notation, ms: int) -> None:
+    rounded = round(value, places) if places else Decimal(round(value))
+    text = written(rounded, notation)
+    for settings in ("millis=1", "millis=1&column=2"):
+        reading = read_line("ascii", f"{ms},{text},N".encode(), settings)
+        assert reading is not None
+        if not math.isnan(reading.value) and not may_mislead(text, notation, settings):
+            assert reading.value == pytest.approx(float(rounded), abs=1e-9)
+
+
+FORCES = {
+    "N": 1.0,
+    "kN": 1e3,
+    "mN": 1e-3,
+    "kgf": 9.80665,
+    "lbf": 4.4482216153,
+    "lbF": 4.4482216153,
+    "gf": 9.80665e-3,
+}
+MASSES = {"kg": 9.80665, "g": 9.80665e-3, "t": 9806.65, "lb": 4.4482216153}
+
+
+@pytest.mark.parametrize(("unit", "newtons"), FORCES.items())
+def test_forces(unit: str, newtons: float) -> None:
+    assert newtons_per(unit) == pytest.approx(newtons, rel=1e-9)
+    assert is_unit(unit) and not is_mass(unit)
+
+
+@pytest.mark.parametrize(("unit", "newtons"), MASSES.items())
+def test_masses_need_leave(unit: str, newtons: float) -> None:
+    assert newtons_per(unit, mass_reads_force=True) == pytest.approx(newtons, rel=1e-9)
+    with pytest.raises(ConfigError, match="mass_reads_force=yes"):
+        newtons_per(unit)
+
+
+@pytest.mark.parametrize("unit", ["", "stone", "Pa", "N m"])
+def test_other_units_are_refused(unit: str) -> None:
+    assert not is_unit(unit)
+    with pytest.raises(ConfigError, match="not known"):
+        newtons_per(unit)
+
+
+@pytest.mark.parametrize("unit", ["MN", "Mn", "MG", "Mg"])
+def test_mega_is_never_taken_for_milli(unit: str) -> None:
+    with pytest.raises(ConfigError, match="milli or mega"):
+        newtons_per(unit, mass_reads_force=True)

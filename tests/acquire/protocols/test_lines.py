@@ -1,15 +1,23 @@
-"""The configurable line parser: rules of one's own, and what is wrong with them."""
+"""The configurable line parser: rules of one's own, and what is wrong with them.
+
+Modbus RTU: frames, damage, register maps.
+"""
 
 from __future__ import annotations
 
 import math
+import struct
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from acquire.errors import ConfigError
 from acquire.load_sample import LoadFlag
 from acquire.protocols.lines import PRESETS, load_preset, parser_from
+from acquire.protocols.modbus import ModbusParser, crc16, frame
+from acquire.protocols.modbus_profile import load_profile, profile_from
 from tests.acquire.protocols.conversation import parser
 
 OWN = r"""
@@ -97,3 +105,104 @@ def test_the_example_reads_the_lines_that_it_shows() -> None:
     assert [reading.unit for reading in readings] == ["kN", "kN", None]
     assert [reading.flags for reading in readings] == [LoadFlag.NONE, LoadFlag.UNSTABLE, LoadFlag.OVERLOAD]
     assert made.commands["tare"] == b"T\r\n"
+
+
+def answer(*words: int, slave: int = 1, function: int = 3) -> bytes:
+    return frame(slave, function, 2 * len(words), words=words)
+
+
+def test_check_sum_of_the_specification() -> None:
+    assert crc16(bytes([0x01, 0x03, 0x00, 0x00, 0x00, 0x0A])) == bytes([0xC5, 0xCD])
+
+
+def test_query_of_pt113() -> None:
+    assert parser("modbus", "profile=pt113").commands["poll"][:-2] == bytes([1, 3, 0, 0, 0, 3])
+
+
+@pytest.mark.parametrize(
+    ("status", "value", "stable", "flags"),
+    [
+        (0b010, -2.0, True, LoadFlag.NONE),
+        (0b110, -2.0, False, LoadFlag.UNSTABLE),
+        (0b000, math.nan, True, LoadFlag.ERROR),
+    ],
+)
+def test_flags_and_their_polarity(status: int, value: float, stable: bool, flags: LoadFlag) -> None:
+    made = parser("modbus", "profile=pt113&scale=0.01")
+    (reading,) = made.feed(answer(0xFFFF, 0xFF38, status))
+    assert reading.value == pytest.approx(value, nan_ok=True)
+    assert (reading.stable, reading.flags) == (stable, flags)
+
+
+KINDS = {"i16": ">h", "u16": ">H", "i32": ">i", "u32": ">I", "f32": ">f"}
+
+
+@pytest.mark.parametrize("order", ["big", "little"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_type_and_word_order(kind: str, order: str) -> None:
+    value = 1234.5 if kind == "f32" else -1234 if kind.startswith("i") else 1234
+    packed = struct.pack(KINDS[kind], value)
+    words = struct.unpack(f">{len(packed) // 2}H", packed)
+    profile = profile_from({"value": {"register": 4, "type": kind, "order": order}}, "test")
+    (reading,) = ModbusParser(profile).feed(answer(*(words[::-1] if order == "little" else words)))
+    assert reading.value == value
+
+
+def test_sign_apart_from_magnitude() -> None:
+    said = {"value": {"register": 7, "type": "u32"}, "sign": {"register": 6, "mask": 128}}
+    made = ModbusParser(profile_from(said, "test"))
+    assert made.feed(answer(128, 0, 55))[0].value == -55
+    assert made.feed(answer(0, 0, 55))[0].value == 55
+
+
+def test_commands_of_a_profile() -> None:
+    said = {"value": {"register": 0}, "commands": {"tare": {"register": 5, "value": 7}}}
+    made = ModbusParser(profile_from(said, "test"))
+    assert made.commands["tare"][:-2] == bytes([1, 6, 0, 5, 0, 7])
+    assert made.feed(made.commands["tare"] + answer(0, 9))[0].value == 9  # the echo is no reading
+
+
+def test_exception_is_an_error_not_a_value() -> None:
+    (reading,) = parser("modbus", "profile=pt113").feed(frame(1, 0x83, 2))
+    assert math.isnan(reading.value) and reading.flags is LoadFlag.ERROR
+
+
+def test_an_echoing_adapter() -> None:
+    made = parser("modbus", "profile=pt113")
+    assert [r.value for r in made.feed(made.commands["poll"] + answer(0, 5, 2))] == [5.0]
+
+
+@given(st.integers(0, 10), st.integers(1, 255))
+def test_every_damaged_byte_is_noticed(at: int, change: int) -> None:
+    whole = bytearray(answer(0, 12345, 2))
+    whole[at] ^= change
+    made = parser("modbus", "profile=pt113")
+    readings = made.feed(bytes(whole)) + made.silence()
+    assert all(math.isnan(reading.value) for reading in readings) and readings
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("value = { register = 1, kind = 'i32' }", "unknown key value.kind"),
+        ("slave = 0\nvalue = { register = 1 }", "slave = 0"),
+        ("slave = 1", "'value' is missing"),
+        ("value = { register = 1, type = 'i64' }", "value.type"),
+        ("value = 3", "a table is expected"),
+        ("value = { register = 1 }\nflags.error = { register = 99, mask = 1 }", "at most 32"),
+        ("value = { register = ", "Invalid"),
+    ],
+)
+def test_a_wrong_profile_names_its_key(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "my.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=words):
+        load_profile(str(path))
+
+
+def test_profiles_of_ours_are_sound() -> None:
+    assert load_profile("laumas-tlb").count == 2
+    with pytest.raises(ConfigError, match="laumas-tlb, pt113"):
+        load_profile("nobody")
+    with pytest.raises(ConfigError, match="my-own"):
+        load_profile("my-own.toml")

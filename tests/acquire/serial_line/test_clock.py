@@ -7,7 +7,7 @@ import random
 
 import pytest
 
-from acquire.serial_line.clock import ArrivalTimes, DeviceClock, Pace
+from acquire.serial_line.clock import ArrivalRate, ArrivalTimes, DeviceClock
 
 
 def test_a_byte_began_as_many_byte_times_ago_as_came_after_it() -> None:
@@ -96,13 +96,13 @@ def test_a_device_that_lost_time_is_tied_anew_in_the_end() -> None:
 PERIOD = 0.0125
 
 
-def paced(pace: Pace, count: int, start: float = 0.0) -> list[bool]:
+def paced(pace: ArrivalRate, count: int, start: float = 0.0) -> list[bool]:
     """Single messages at their pace."""
     return [late for k in range(count) for late in pace.late([start + PERIOD * (k + 1)])]
 
 
 def test_pace() -> None:
-    pace = Pace()
+    pace = ArrivalRate()
     assert not any(paced(pace, 200))
     assert pace.period == pytest.approx(PERIOD)
     assert pace.late([2.5 + 0.2] * 2) == [True, True]  # two after a pause of sixteen
@@ -110,7 +110,7 @@ def test_pace() -> None:
 
 @pytest.mark.parametrize("known_for", [0, 1, 10, 20, 200])
 def test_a_backlog_is_late_however_early_it_comes(known_for: int) -> None:
-    pace = Pace()
+    pace = ArrivalRate()
     assert not any(paced(pace, known_for))
     late = pace.late([PERIOD * known_for] * 160)
     assert late.count(True) >= 159
@@ -119,7 +119,7 @@ def test_a_backlog_is_late_however_early_it_comes(known_for: int) -> None:
 
 
 def test_a_fast_stream_in_large_reads_is_not_late() -> None:
-    pace = Pace()
+    pace = ArrivalRate()
     late = [any(pace.late([0.016 * k] * 16)) for k in range(300)]
     assert all(late[:5]) and not any(late[40:])  # at first the pace is not known
     assert pace.late([0.016 * 300] * 400).count(True) == 400
@@ -127,7 +127,7 @@ def test_a_fast_stream_in_large_reads_is_not_late() -> None:
 
 @pytest.mark.parametrize("rate", [500, 3000, 20_000])
 def test_a_stall_is_late_until_it_is_caught_up_with_however_it_is_read(rate: int) -> None:
-    pace = Pace()
+    pace = ArrivalRate()
     paced(pace, 400)
     now, due, wrong = 9.0, 5.0 + PERIOD, 0
     while now - due > PERIOD:
@@ -141,7 +141,7 @@ def test_a_stall_is_late_until_it_is_caught_up_with_however_it_is_read(rate: int
 
 @pytest.mark.parametrize("speed", [0.5, 2.0, 10.0])
 def test_another_pace_is_learned_in_seconds(speed: float) -> None:
-    pace = Pace()
+    pace = ArrivalRate()
     paced(pace, 800)
     step, t = PERIOD / speed, 10.0
     late = [pace.late([t + step * k])[0] for k in range(round(10 / step))]
@@ -151,13 +151,13 @@ def test_another_pace_is_learned_in_seconds(speed: float) -> None:
 
 @pytest.mark.parametrize("chunk_s", [0.016, 0.04])
 def test_an_adapter_that_collects_bytes_makes_nothing_late(chunk_s: float) -> None:
-    pace = Pace()
+    pace = ArrivalRate()
     late = [pace.late([math.ceil(PERIOD * k / chunk_s) * chunk_s])[0] for k in range(2000)]
     assert not any(late[100:])
 
 
 def test_irregular_messages_are_not_all_late() -> None:
-    rng, pace, t, late = random.Random(5), Pace(), 0.0, []
+    rng, pace, t, late = random.Random(5), ArrivalRate(), 0.0, []
     for _ in range(3000):
         t += rng.expovariate(10.0)
         late += pace.late([t])

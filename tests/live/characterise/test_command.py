@@ -16,11 +16,10 @@ from acquire.frame import frozen
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.characterise.command import EXPERIMENTS, add_arguments, chosen, command, run
-from live.characterise.outcome import Bench, Outcome, Verdict
+from live.characterise.inspect import add_arguments as add_inspect
+from live.characterise.inspect import command as inspect
+from live.characterise.outcome import Comparison, ExperimentContext, ExperimentOutcome, ProgressBar
 from live.characterise.page import page, standing, write_page
-from live.characterise.progress import Progress
-from live.commands.inspect import add_arguments as add_inspect
-from live.commands.inspect import command as inspect
 from tests.acquire.session.fixtures import CAMERA, frame, writer
 
 
@@ -49,13 +48,13 @@ def test_names_are_checked_and_ordered() -> None:
 def test_a_run_takes_up_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
 
-    def experiment(name: str, bench: Bench) -> Outcome:
+    def experiment(name: str, bench: ExperimentContext) -> ExperimentOutcome:
         calls.append(name)
         bench.tick(0.5)
-        return Outcome(name, name, "words")
+        return ExperimentOutcome(name, name, "words")
 
     monkeypatch.setattr(characterise, "_timed", experiment)
-    bench = Bench(tmp_path, quick=True)
+    bench = ExperimentContext(tmp_path, quick=True)
     screen = io.StringIO()
     run(["fig1"], bench, screen)
     again = run(["fig1", "fig3"], bench, screen)
@@ -73,13 +72,13 @@ def test_progress_is_a_bar_on_a_terminal_only() -> None:
 
     terminal, log = Terminal(), io.StringIO()
     for screen in (terminal, log):
-        progress = Progress("fig1", screen)
+        progress = ProgressBar("fig1", screen)
         progress(0.5)
         progress.done("1.0 s")
     assert "50 %" in terminal.getvalue()
     assert terminal.getvalue().endswith("1.0 s\n")
     assert log.getvalue() == "fig1         1.0 s\n"
-    Progress("fig1", None).done("nowhere")
+    ProgressBar("fig1", None).done("nowhere")
 
 
 def test_fig1_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -95,7 +94,9 @@ def test_fig1_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
 
 
 def test_the_page_says_where_we_are_worse_first() -> None:
-    outcome = Outcome("a", "A", "t", verdicts=(Verdict("x", "p", "better"), Verdict("y", "q", "worse")))
+    outcome = ExperimentOutcome(
+        "a", "A", "t", verdicts=(Comparison("x", "p", "better"), Comparison("y", "q", "worse"))
+    )
     said = standing([outcome])
     assert said.index("**Worse**") < said.index("**Better**")
     assert "better in 1, equal in 0, worse in 1" in said
@@ -200,7 +201,9 @@ def test_inspect_refuses(session: Path, tmp_path: Path, words: list[str], said: 
 
 
 def test_the_verdicts_lie_beside_the_figures(tmp_path: Path) -> None:
-    outcome = Outcome("a", "A", "t", verdicts=(Verdict("x, y", "p", "better"), Verdict("z", "q", "worse")))
+    outcome = ExperimentOutcome(
+        "a", "A", "t", verdicts=(Comparison("x, y", "p", "better"), Comparison("z", "q", "worse"))
+    )
     write_page([outcome], tmp_path / "page.md", tmp_path, "phasedic characterise --out a")
     lines = (tmp_path / "verdicts.csv").read_text(encoding="utf-8").splitlines()
     assert lines == ["verdict,ours against the other,the other", "worse,z,q", 'better,"x, y",p']

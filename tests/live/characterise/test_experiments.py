@@ -12,9 +12,9 @@ from live.characterise.experiments.peers import GAUGE, dense_flow, plane_strain,
 from live.characterise.experiments.resolution import autocorrelation, fitted_length, half_width
 from live.characterise.experiments.section41 import derived, low_pass_for
 from live.characterise.experiments.table2_design import CORNERS, PAPER, corner_values, fitted, model_matrix
-from live.characterise.imposed import Expected, Imposed, robust_std
+from live.characterise.imposed import ExpectedErrors, Imposed, robust_std
 from live.characterise.own_pattern import recommended
-from live.maps.display_filter import for_display
+from live.results.maps.colours import for_display
 
 
 def test_the_papers_model_at_its_optimum_and_its_negative_corners() -> None:
@@ -96,9 +96,9 @@ def test_plane_of_a_gauge() -> None:
 @pytest.mark.parametrize("flow", [pyramid_flow, dense_flow])
 def test_peers_see_the_same_displacement(flow: object) -> None:
     from hw_mocks.deformation import Affine
-    from live.characterise.truth import Camera, Scene
+    from live.characterise.truth import SensorModel, TrueScene
 
-    pair = Scene((160, 160), 2.5, seed=3).pair(Affine(0.3, -0.2), Camera(8))
+    pair = TrueScene((160, 160), 2.5, seed=3).pair(Affine(0.3, -0.2), SensorModel(8))
     points = np.array([[60.0, 60.0], [80, 90], [100, 70]])
     found = flow(*pair, points)  # type: ignore[operator]
     assert found == pytest.approx(np.tile([0.3, -0.2], (3, 1)), abs=0.06)
@@ -126,8 +126,8 @@ def test_a_few_odd_zois_do_not_count() -> None:
     assert math.isnan(robust_std(np.full(3, np.nan)))
 
 
-def expectation(size: int, n: int, sigma: float) -> Expected:
-    return Expected(size, 1, n, 100, 0, 0, sigma, 0, sigma, sigma, 0, 2.28 * size, 0)
+def expectation(size: int, n: int, sigma: float) -> ExpectedErrors:
+    return ExpectedErrors(size, 1, n, 100, 0, 0, sigma, 0, sigma, sigma, 0, 2.28 * size, 0)
 
 
 def test_the_smallest_zoi_that_reaches_the_target_is_recommended() -> None:
@@ -146,9 +146,9 @@ def test_the_smallest_zoi_that_reaches_the_target_is_recommended() -> None:
 @pytest.mark.slow
 def test_the_simulated_weave_is_measured_better_than_by_the_paper(tmp_path: Path) -> None:
     from live.characterise.experiments.woven import woven
-    from live.characterise.outcome import Bench
+    from live.characterise.outcome import ExperimentContext
 
-    outcome = woven(Bench(tmp_path, quick=True))
+    outcome = woven(ExperimentContext(tmp_path, quick=True))
     (table,) = outcome.tables
     figures = {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
     strain = figures["rms error of exx, um/m"]
@@ -162,13 +162,13 @@ def test_the_simulated_weave_is_measured_better_than_by_the_paper(tmp_path: Path
 @pytest.mark.slow
 def test_averaging_falls_as_predicted_until_rounding_stops_it(monkeypatch: pytest.MonkeyPatch) -> None:
     import live.characterise.experiments.burst as burst
-    from live.characterise.truth import Camera
+    from live.characterise.truth import SensorModel
 
     monkeypatch.setattr(burst, "LENGTHS", (1, 16))
     study = burst.Study(quick=True)
     ratios = {}
     for noise in (0.1, 4.0):
-        camera = Camera(12, noise)
+        camera = SensorModel(12, noise)
         for n, reference, current in study.bursts(camera):
             std, _ = study.scatter(reference, current, camera.sigma / math.sqrt(n))
             ratios[noise, n] = std / study.predicted(camera, n)

@@ -12,7 +12,7 @@ import pytest
 import live.characterise.experiments.others as others
 import live.characterise.experiments.peers as peers
 from live.characterise.experiments.peers import present
-from live.characterise.outcome import Bench
+from live.characterise.outcome import ExperimentContext
 
 
 def test_what_is_not_installed_is_left_out_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -50,9 +50,9 @@ def test_a_known_shift(module: str, program: others.Program) -> None:
     if find_spec(module) is None:  # not imported here: pyvale opens a log file wherever that is done
         pytest.skip(f"{module} is not installed")
     from hw_mocks.deformation import Affine
-    from live.characterise.truth import Camera, Scene
+    from live.characterise.truth import SensorModel, TrueScene
 
-    pair = Scene((160, 200), 2.25, 3).pair(Affine(0.25), Camera(8))
+    pair = TrueScene((160, 200), 2.25, 3).pair(Affine(0.25), SensorModel(8))
     assert np.nanmean(program(*pair)) == pytest.approx(0.25, abs=5e-3)
 
 
@@ -64,7 +64,7 @@ def test_a_program_that_fails_is_named_and_the_page_goes_on(
 
     monkeypatch.setattr(peers, "installed", lambda: {"pyvale, 33 px": broken})
     monkeypatch.setattr(peers, "SHIFTS", np.array([0.25]))
-    outcome = peers.peers(Bench(tmp_path, quick=True))
+    outcome = peers.peers(ExperimentContext(tmp_path, quick=True))
     assert "pyvale is installed but failed (AttributeError: no such module)" in outcome.text.replace(
         "\n", " "
     )

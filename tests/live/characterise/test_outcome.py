@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 from acquire.errors import ConfigError, DataError
 from live.characterise.outcome import (
-    Bench,
-    Outcome,
-    Table,
-    Verdict,
+    Comparison,
+    ExperimentContext,
+    ExperimentOutcome,
+    ResultTable,
     compared,
     figure,
     read_outcome,
@@ -27,14 +27,14 @@ from live.characterise.outcome import (
     write_outcome,
 )
 
-TABLE = Table("numbers", ("name", "length px"), (("a", 1.5), ("b, c", float("nan")), ("d", 3)))
-OUTCOME = Outcome(
-    "name", "Title", "text ![x](p.png)", (TABLE,), (), (Verdict("s", "the paper", "better"),), 2.5
+TABLE = ResultTable("numbers", ("name", "length px"), (("a", 1.5), ("b, c", float("nan")), ("d", 3)))
+OUTCOME = ExperimentOutcome(
+    "name", "Title", "text ![x](p.png)", (TABLE,), (), (Comparison("s", "the paper", "better"),), 2.5
 )
 
 
 def test_csv_keeps_every_digit() -> None:
-    table = Table("t", ("x px",), ((0.1 + 0.2,), (1e-17,)))
+    table = ResultTable("t", ("x px",), ((0.1 + 0.2,), (1e-17,)))
     rows = list(csv.reader(io.StringIO(table.csv())))
     assert rows[0] == ["x px"]
     assert [float(row[0]) for row in rows[1:]] == [0.1 + 0.2, 1e-17]
@@ -81,7 +81,7 @@ def test_what_does_not_serve_is_not_taken(tmp_path: Path) -> None:
     assert read_outcome("name", tmp_path, "key") is None
     write_outcome(OUTCOME, tmp_path, "key")
     assert read_outcome("name", tmp_path, "another key") is None
-    with_figure = Outcome("name", "t", "", figures=("gone.png",))
+    with_figure = ExperimentOutcome("name", "t", "", figures=("gone.png",))
     write_outcome(with_figure, tmp_path, "key")
     assert read_outcome("name", tmp_path, "key") is None
 
@@ -102,11 +102,11 @@ def test_without_matplotlib_it_says_what_to_install(monkeypatch: pytest.MonkeyPa
 def test_a_figure_is_written(tmp_path: Path) -> None:
     drawn = figure(2, 1)
     drawn.subplots().plot([0, 1], [1, 0])
-    assert save_figure(Bench(tmp_path), "a.png", drawn) == "a.png"
+    assert save_figure(ExperimentContext(tmp_path), "a.png", drawn) == "a.png"
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
 
 
 def test_steps_tick(tmp_path: Path) -> None:
     shares: list[float] = []
-    assert list(Bench(tmp_path, tick=shares.append).steps("abcd")) == list("abcd")
+    assert list(ExperimentContext(tmp_path, tick=shares.append).steps("abcd")) == list("abcd")
     assert shares == [0.25, 0.5, 0.75, 1.0]

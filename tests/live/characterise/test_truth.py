@@ -11,12 +11,21 @@ from acquire.errors import DataError
 from analysis.field.grid import Roi, ZoiGrid
 from analysis.picture.pattern import predicted_sigma
 from hw_mocks.deformation import Affine, Wave
-from live.characterise.truth import Camera, Scene, TiledStrain, Tiles, grey_picture, limit, ours, papers
+from live.characterise.truth import (
+    SensorModel,
+    TiledStrain,
+    Tiles,
+    TrueScene,
+    grey_picture,
+    limit,
+    ours,
+    papers,
+)
 
 
 @pytest.fixture(scope="module")
-def scene() -> Scene:
-    return Scene((200, 260), 2.0, seed=4)
+def scene() -> TrueScene:
+    return TrueScene((200, 260), 2.0, seed=4)
 
 
 def test_every_zoi_sits_in_the_middle_of_its_tile() -> None:
@@ -40,28 +49,28 @@ def test_tiled_strain_leaves_every_centre_where_it_is() -> None:
     assert np.allclose(strain.gradient(grid.x, grid.y[0])[2], 2e-2)
 
 
-def test_a_strained_tile_is_measured(scene: Scene) -> None:
+def test_a_strained_tile_is_measured(scene: TrueScene) -> None:
     tiles = Tiles(84, 2, 2)
-    own = Scene(tiles.shape, 2.0, seed=5)
-    pair = own.pair(TiledStrain(84, du_dx=1e-3), Camera(16))
+    own = TrueScene(tiles.shape, 2.0, seed=5)
+    pair = own.pair(TiledStrain(84, du_dx=1e-3), SensorModel(16))
     field = ours(pair, tiles.grid(64), 0.3)
     assert np.allclose(field.exx, 1e-3, atol=2e-6)
     assert np.allclose(field.u, 0, atol=1e-4)
     assert np.allclose(papers(pair, tiles.grid(64)).exx, 1e-3, rtol=0.2)
 
 
-def test_camera_rounds_and_adds_noise(scene: Scene) -> None:
+def test_camera_rounds_and_adds_noise(scene: TrueScene) -> None:
     rng = np.random.default_rng(0)
-    clean = Camera(12).picture(scene.reference, rng)
+    clean = SensorModel(12).picture(scene.reference, rng)
     assert clean.dtype == np.uint16
     assert np.array_equal(clean, np.rint(scene.reference * np.float32(4095)))
-    noisy = Camera(8, 2.0).picture(scene.reference, rng)
+    noisy = SensorModel(8, 2.0).picture(scene.reference, rng)
     assert noisy.dtype == np.uint8
     difference = noisy - scene.reference * np.float32(255)
-    assert np.std(difference) == pytest.approx(Camera(8, 2.0).sigma, rel=0.02)
+    assert np.std(difference) == pytest.approx(SensorModel(8, 2.0).sigma, rel=0.02)
 
 
-def test_limit_agrees_with_the_closed_form(scene: Scene) -> None:
+def test_limit_agrees_with_the_closed_form(scene: TrueScene) -> None:
     grid = ZoiGrid.cover(Roi(10, 10, 240, 180), 48, 32)
     found = limit(scene.slopes, grid, 8.0).sigma
     u, strain = predicted_sigma(48, 1.0, float(np.sqrt(np.mean(np.square(scene.slopes)))))
@@ -69,7 +78,7 @@ def test_limit_agrees_with_the_closed_form(scene: Scene) -> None:
     assert np.mean(found[[1, 2, 4, 5]]) == pytest.approx(strain, rel=0.08)
 
 
-def test_response_of_the_window(scene: Scene) -> None:
+def test_response_of_the_window(scene: TrueScene) -> None:
     grid = ZoiGrid.cover(Roi(10, 10, 240, 180), 48, 16)
     y, x = np.mgrid[:200, :260]
     affine = limit(scene.slopes, grid, 8.0, Affine(0.3, -0.2, 1e-3).displacement(x, y)).response

@@ -13,7 +13,7 @@ import pytest
 
 from acquire.camera import CameraListing
 from live.cli import main
-from live.setup import load_config
+from live.config.loading import load_config
 
 SIM = "sim:hole?seconds=3&fps=20&width=320&height=320&hole=30&lockstep=yes"
 
@@ -130,7 +130,7 @@ def test_devices_are_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     finding = SimpleNamespace(address="/dev/ttyUSB0?protocol=ascii", remark="say the unit", protocol="ascii")
     port = SimpleNamespace(device="/dev/ttyUSB0", accessible=True)
     monkeypatch.setattr("acquire.v4l2.listing.list_cameras", lambda: cameras)
-    monkeypatch.setattr("acquire.serial_line.list_serial_ports", lambda: [port])
+    monkeypatch.setattr("acquire.serial_line.ports.list_serial_ports", lambda: [port])
     monkeypatch.setattr("acquire.serial_line.identify.listen", lambda device: [(9600, b"1 N", finding)])
     look = init.look
     opened = []

@@ -15,9 +15,9 @@ import pytest
 
 from acquire.errors import Interrupted
 from live import cli
-from live.setup import compile_ahead
+from live.setup.compiling import compile_ahead
 from tests.bench.soak import children
-from tests.live.batch.running import until
+from tests.live.replay.batch.running import until
 
 ROOT = Path(__file__).parents[3]
 CAMERA = "sim:uniform?seconds=60&fps=20&width=160&height=128"
@@ -77,7 +77,7 @@ def test_while_workers_load(tmp_path: Path) -> None:
     (tmp_path / "run" / "session.h5").write_bytes(b"nothing of a session")
 
     def loading(process: subprocess.Popen[str]) -> bool:
-        return any("live.batch.workers" in command_of(pid) for pid in children(process.pid))
+        return any("live.replay.batch.worker" in command_of(pid) for pid in children(process.pid))
 
     code, said, seconds = interrupted(tmp_path, "batch run/session.h5 --out out --workers 2", loading)
     assert code == 130, said

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from acquire.errors import PhasedicError
 from live.cli import main
-from live.finished import open_run
 from live.replay.forces import read_forces
-from tests.live.replay.test_asked import SMALL, shots
+from live.results.run_folder import open_run
+from tests.live.replay.test_requests import SMALL, shots
 
 __all__ = ["shots"]
 

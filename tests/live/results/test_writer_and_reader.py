@@ -19,9 +19,9 @@ import numpy as np
 import pytest
 
 from acquire.errors import DataError
-from acquire.hdf5 import child
+from acquire.hdf5 import damage as child
 from live.results import Results, ResultsInfo, Strain
-from live.results.row import Row
+from live.results.row import StrainRow
 from live.results.strain_csv import COLUMNS
 from live.results.strain_h5 import FLUSH_S, StrainWriter
 from tests.clock import Clock
@@ -223,7 +223,7 @@ def test_time_of_the_kernel_and_latency_are_columns(tmp_path: Path) -> None:
 def test_rows_are_flushed_together_and_on_time(tmp_path: Path, flush_s: float) -> None:
     clock = Clock()
     writer = StrainWriter(tmp_path / "strain.h5", make_grid(), INFO, flush_s, now=clock)
-    rows = [Row.of(make_measurement(k, 1e-3 * k), INFO) for k in range(3)]
+    rows = [StrainRow.of(make_measurement(k, 1e-3 * k), INFO) for k in range(3)]
     clock.now_s = 1.0
     writer.write(rows[0])
     clock.now_s += flush_s / 2

@@ -1,1 +1,1 @@
-"""Tests of live.specimen."""
+"""Tests of live.setup."""

@@ -16,7 +16,7 @@ from acquire.camera.opening import open_camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.v4l2.listing import list_cameras
 from live.cli import main
-from live.setup import load_config
+from live.config.loading import load_config
 from tests.v4l2.inside import running, vivid
 
 SMALL = "/dev/video0?format=GREY&width=640&height=360"

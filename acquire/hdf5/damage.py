@@ -1,0 +1,128 @@
+"""A first reading of a file in a child process.
+
+HDF5 waits and waits on a truncated file in SWMR mode, and may crash on damaged bytes; a child
+process with a time limit takes that in our place.
+
+Letting go of an HDF5 file whose disk takes no more.
+
+HDF5 tries to write once more while closing; when that fails too it crashes the process, at once or
+at its end. So the file is first swapped for one that takes everything: what stands on the disk
+stays as the last complete flush left it.
+
+Looking at an HDF5 file before the library does: its superblock.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import h5py
+
+from acquire.errors import DataError
+
+PROBE_S = 30.0  # HDF5 retries a bad checksum of an unfinished file for ever
+
+
+def probe(path: Path, package: str, timeout_s: float | None = None) -> None:
+    """Read ``path`` by ``python -m package path`` first.
+
+    Parameters
+    ----------
+    package : str
+        Its ``__main__`` reads the file and prints what is wrong with it, exit code 4.
+
+    Raises
+    ------
+    DataError
+        The child crashed, did not end in time, or refused the file itself.
+    """
+    command = [sys.executable, "-m", package, str(path)]
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=timeout_s or PROBE_S, check=False
+        )
+    except subprocess.TimeoutExpired as error:
+        raise DataError(f"{path} is damaged: reading it does not come to an end") from error
+    if done.returncode != 0:
+        said = done.stdout.strip() if done.returncode == DataError.exit_code else ""
+        raise DataError(said or f"{path} is damaged: the HDF5 library fails on it ({done.returncode})")
+
+
+log = logging.getLogger(__name__)
+
+
+def let_go(file: h5py.File) -> None:
+    """Close a file that cannot be written any more, without touching it and without an error."""
+    try:
+        nowhere = os.open(os.devnull, os.O_RDWR)
+        try:
+            os.dup2(nowhere, file.id.get_vfd_handle())
+        finally:
+            os.close(nowhere)
+        file.close()
+    except (OSError, RuntimeError) as error:
+        log.debug("letting go of a file: %s", error)
+
+
+SIGNATURE = b"\x89HDF\r\n\x1a\n"
+
+
+@dataclass(frozen=True, slots=True)
+class Superblock:
+    """The first bytes of an HDF5 file, as far as they tell its state.
+
+    Attributes
+    ----------
+    unfinished : bool
+        Not closed by its writer.
+    size : int, bytes
+        Size that the file must have, where it was closed.
+    """
+
+    unfinished: bool
+    size: int
+
+
+def read_superblock(path: Path) -> Superblock:
+    """The superblock of ``path`` (HDF5 file format specification, version 2 and 3).
+
+    Raises
+    ------
+    DataError
+        No such file, unreadable, or not HDF5 of this kind.
+    """
+    if path.exists() and not path.is_file():
+        raise DataError(f"{path} is no regular file; give a file that a run has written")
+    if not path.is_file():
+        raise DataError(f"{path}: no such file; give a session.h5 that a run has recorded")
+    try:
+        with path.open("rb") as file:
+            begin = file.read(48)
+    except OSError as error:
+        raise DataError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
+    if not begin.startswith(SIGNATURE):
+        raise DataError(f"{path} is not an HDF5 file, so not a session; give a session.h5")
+    if len(begin) < 48:
+        raise DataError(f"{path} is truncated to {len(begin)} bytes; nothing in it can be read")
+    if begin[8] not in (2, 3) or begin[9] != 8:
+        return Superblock(False, 0)
+    return Superblock(begin[11] != 0, int.from_bytes(begin[28:36], "little"))
+
+
+def check_size(path: Path, block: Superblock) -> None:
+    """Refuse a file that was closed and has lost its end since.
+
+    Raises
+    ------
+    DataError
+    """
+    there = path.stat().st_size
+    if not block.unfinished and there < block.size:
+        raise DataError(
+            f"{path} is truncated: {there} of {block.size} bytes are there; copy it again from where it came"
+        )

@@ -1,0 +1,302 @@
+"""The measuring of one image against a reference: iterate from a guess and judge.
+
+``rescue`` tries again what was lost, ``result`` puts everything on the grid.
+
+Lost ZOIs tried again: without extrapolation, from their neighbours, by a search.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.field import Status, profile
+from analysis.fit.kernel_args import LEFT_IMAGE, FitArgs, OutArgs, PictureArgs, ReferenceArgs, VerdictArgs
+from analysis.fit.validity import CENTRE_VARIANCE, CLIPPED_SHARE
+from analysis.kernel.images import NoiseModel
+from analysis.kernel.quadrature import Sensors
+from analysis.kernel.reference import SPILL_PX, Places, ReferencePicture
+from analysis.picture.splines import Box, prefilter_taps, tap_table
+
+Floats = NDArray[np.float64]
+
+
+class Solution:
+    """Parameters and verdict of every active ZOI of one image, as they come.
+
+    Parameters
+    ----------
+    reference : ReferencePicture
+    image : (H, W) uint8, uint16 or float32, GL
+    noise : NoiseModel or None
+        Of the image; None: not known.
+    guess : (A, modes)
+        Every ZOI that has a pattern and a guess is measured; one without a guess is LOST.
+
+    Attributes
+    ----------
+    found : OutArgs
+        What the iteration says of all A ZOIs; NaN where there was none.
+    status : (A,) uint8
+    tolerance : Stop
+        Where the iteration may stop.
+    """
+
+    def __init__(
+        self, reference: ReferencePicture, image: NDArray[Any], noise: NoiseModel | None, guess: Floats
+    ) -> None:
+        prepared = reference.prepared
+        self.reference = reference
+        self.image = image
+        self.noise = noise
+        self.guess = guess
+        self.picture = self._picture(reference.reached(guess))
+        self.table = tap_table(reference.settings.interpolant)
+        self.tolerance = reference.tolerance(self._current_std())
+        able = prepared.status == Status.OK
+        known = np.isfinite(guess.sum()) or np.isfinite(guess @ np.ones(guess.shape[1]))  # as a rule all
+        which = np.flatnonzero(able & known)
+        if len(which) == len(guess):  # as a rule: no copies
+            self.found, self.status = self.tried(which, guess)
+            return
+        self.found = OutArgs.nothing(*guess.shape)
+        self.status = np.where(able & ~known, np.uint8(Status.LOST), prepared.status)
+        if len(which):
+            self.keep(which, *self.tried(which, guess[which]))
+
+    def _picture(self, box: Box) -> PictureArgs:
+        from analysis.picture.prefilter import coefficients
+
+        self._box, prepared = box, self.reference.prepared
+        taps = prefilter_taps(self.reference.settings.interpolant)
+        flat = coefficients(self.image, np.float32(prepared.pattern.mean), taps, box)
+        return PictureArgs.within(flat, prepared.shape, box, SPILL_PX)
+
+    def _current_std(self) -> float:
+        if self.noise is None:
+            return self.reference.noise
+        return float(np.sqrt(self.noise.variance(self.reference.prepared.pattern.mean)))
+
+    def tried(self, which: NDArray[np.intp], guess: Floats) -> tuple[OutArgs, NDArray[np.uint8]]:
+        """What comes of the B ZOIs ``which`` from their guesses (B, modes), and their status; kept by ``keep``."""
+        reference = self.reference
+        places: Places = which if len(which) < len(reference.index) else np.s_[:]
+        found = self._found(places, guess)
+        if (
+            self._box != reference.whole and (found.state == LEFT_IMAGE).any()
+        ):  # it may have left the box alone
+            self.picture = self._picture(reference.whole)
+            found = self._found(places, guess)
+        return found, self._judged(places, found)
+
+    def _found(self, places: Places, guess: Floats) -> OutArgs:
+        if self.reference.sensors is None:
+            return self._iterated(places, guess)
+        return self._by_phases(self.reference.sensors, places, guess)
+
+    def keep(self, which: NDArray[np.intp], found: OutArgs, status: NDArray[np.uint8]) -> None:
+        """Take over what was found of the ZOIs ``which``."""
+        self.status[which] = status
+        self.found.put(which, found)
+
+    def refuse_clipped(self, clipped: NDArray[np.bool_], among: NDArray[np.bool_] | None = None) -> None:
+        """The status CLIPPED where too much of a ZOI lies on saturated pixels (H, W), found or as guessed.
+
+        ``among`` (A,) are those to be looked at; None: all.
+        """
+        from analysis.fit.assembly import clipped_share
+
+        reference, grid = self.reference, self.reference.grid
+        ok = self.status == Status.OK
+        at = np.where(ok[:, None], self.found.p, self.guess)[:, [reference.modes // 2, 0]]
+        seen = (reference.prepared.status == Status.OK) & np.isfinite(at).all(axis=1)
+        which = np.flatnonzero(seen if among is None else seen & among)
+        first = reference.prepared.origins[which] + np.rint(np.clip(at[which], -1e6, 1e6)).astype(np.int64)
+        share = clipped_share(clipped, first, profile(reference.settings.window, grid.size))
+        self.status[which[share > CLIPPED_SHARE]] = Status.CLIPPED
+
+    def _iterated(self, which: Places, guess: Floats, max_iterations: int | None = None) -> OutArgs:
+        from analysis.fit.iteration import track
+
+        out, stop = OutArgs.starting(guess), self.tolerance.at(which)
+        if max_iterations is not None:
+            stop = stop.after(max_iterations)
+        track(self.picture, self.table, self._fit(which), stop, out)
+        return out
+
+    def _fit(self, which: Places) -> FitArgs:
+        from analysis.fit.sensitivity import parameter_scale
+
+        ready, grid, order = self.reference.prepared, self.reference.grid, self.reference.settings.order
+        padded = which if isinstance(which, slice) else np.append(which, -1)
+        return FitArgs(
+            ready.images.ravel(), ready.images[0].size, ready.images.shape[2],
+            ready.origins[which], grid.size, self.reference.spacing, order, ready.shapes.rows, ready.shapes.mix,
+            ready.inverse[padded], ready.cross[padded],
+            ready.weight * ready.energy[which], parameter_scale(order, grid.size),
+        )  # fmt: skip
+
+    def _by_phases(self, sensors: Sensors, which: Places, guess: Floats) -> OutArgs:
+        """The same by phases alone; one step of the spectral fit tells gain and residual."""
+        from analysis.kernel.quadrature import iterate
+
+        ready = self.reference.prepared
+        values, state, iterations = iterate(
+            sensors.weights[which], ready.images[3], ready.origins[which], self.picture, self.table,
+            guess, self.tolerance.at(which),
+        )  # fmt: skip
+        seen = self._iterated(which, values, max_iterations=1)
+        return OutArgs(values, seen.left, seen.bending, seen.nuisance, state, iterations)
+
+    def _judged(self, which: Places, found: OutArgs) -> NDArray[np.uint8]:
+        from analysis.fit.verdict import judge
+
+        reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
+        freedom = ready.freedom[which]
+        known = ReferenceArgs(
+            ready.signal[which], freedom * reference.sharpness, reference.share_variance[which],
+            reference.unit_sigma[2, which],
+        )  # fmt: skip
+        noise_known = self.noise is not None and reference.noise_model is not None
+        far = CENTRE_VARIANCE[settings.order - 1]
+        rule = VerdictArgs(noise_known, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far)
+        status = np.empty(len(freedom), np.uint8)
+        judge(found, found.left / freedom, self._expected(which, found.nuisance[:, 0]), known, rule, status)
+        return status
+
+    def _expected(self, which: Places, gain: Floats) -> Floats:
+        """Variance a pixel that noise alone leaves in the difference of the images, GL^2."""
+        reference, current = self.variances(which, gain)
+        return np.asarray(np.minimum(gain**2, 25.0) * reference + current)
+
+    def variances(self, which: Places, gain: Floats) -> tuple[Floats, Floats]:
+        """Variance a pixel of the reference and of the image at some ZOIs, GL^2; the reference's where not known."""
+        level = self.reference.prepared.level[which]
+        model, own = self.reference.noise_model, self.noise
+        if model is None:
+            reference = np.full(len(gain), self.reference.noise**2)
+        else:
+            reference = model.variance(level)
+        if own is None:
+            return reference, reference
+        return reference, own.variance(level if own.slope == 0 else level * np.maximum(gain, 0))
+
+
+RESCUE_ROUNDS = 40
+SEARCH_SHARE = 0.3
+"""Share of lost ZOIs from which on the whole picture is searched again."""
+_WORTH_RETRYING = np.isin(
+    list(Status), (Status.LOST, Status.NOT_CONVERGED, Status.POOR_MATCH, Status.OUTSIDE)
+)
+"""By status."""
+_DOWN, _RIGHT = (offset.ravel() - 1 for offset in np.indices((3, 3)))
+"""Rows and columns to a ZOI's neighbours, itself among them."""
+
+
+def rescue(attempt: Solution, before: Floats | None, clipped: NDArray[np.bool_] | None = None) -> None:
+    """Try lost ZOIs again from other guesses; a worse outcome does not replace a better one.
+
+    Parameters
+    ----------
+    attempt : Solution
+    before : (A, modes), or None
+        Parameters of the frame before; None: the guess of the attempt was searched for.
+    clipped : (H, W) bool, or None
+        Saturated pixels: a ZOI on them is refused, before it is tried again and after.
+    """
+    if clipped is not None:
+        attempt.refuse_clipped(clipped)
+    lost = _lost(attempt)
+    if not lost.any():
+        return
+    _rescue(attempt, before)
+    if clipped is not None:
+        attempt.refuse_clipped(clipped, lost)
+
+
+def _rescue(attempt: Solution, before: Floats | None) -> None:
+    reference = attempt.reference
+    # Without its gradients a guess is right for ZOIs beside a discontinuity.
+    displacements = np.arange(reference.modes) % (reference.modes // 2) == 0
+    _retry(attempt, attempt.guess * displacements if before is None else before)
+    _retry_from_neighbours(attempt)
+    able = np.count_nonzero(reference.prepared.status == Status.OK)
+    if before is not None and np.count_nonzero(_lost(attempt)) > SEARCH_SHARE * able:
+        _retry(attempt, reference.searched(attempt.image))
+        _retry_from_neighbours(attempt)
+
+
+def _lost(attempt: Solution) -> NDArray[np.bool_]:
+    return np.asarray(_WORTH_RETRYING[attempt.status] & (attempt.reference.prepared.status == Status.OK))
+
+
+def _retry(attempt: Solution, guess: Floats) -> None:
+    which = np.flatnonzero(_lost(attempt) & np.isfinite(guess).all(axis=1))
+    if len(which):
+        _retry_some(attempt, which, guess[which])
+
+
+def _retry_some(attempt: Solution, which: NDArray[np.intp], guess: Floats) -> None:
+    found, status = attempt.tried(which, guess)
+    good = np.flatnonzero(status == Status.OK)
+    attempt.keep(which[good], found.at(good), status[good])
+
+
+def _retry_from_neighbours(attempt: Solution) -> None:
+    """Let good ZOIs lend their shape to lost neighbours, round by round."""
+    tried = np.zeros(len(attempt.status), np.uint8)
+    places = _Places.of(attempt.reference)
+    for _ in range(RESCUE_ROUNDS):
+        lost = np.flatnonzero(_lost(attempt))
+        guess, lenders = _lent(attempt, places, lost)
+        fresh = np.isfinite(guess[:, 0]) & (lenders > tried[lost])
+        if not fresh.any():
+            return
+        tried[lost] = lenders
+        _retry_some(attempt, lost[fresh], guess[fresh])
+
+
+class _Places(NamedTuple):
+    """Where the ZOIs lie on the grid.
+
+    Attributes
+    ----------
+    zoi : (R + 2, C + 2)
+        Which of the active ZOIs, -1 for none; the grid begins at (1, 1).
+    row, column : (A,)
+        Of each active ZOI in ``zoi``.
+    """
+
+    zoi: NDArray[np.intp]
+    row: NDArray[np.intp]
+    column: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, reference: ReferencePicture) -> _Places:
+        rows, columns = reference.grid.shape
+        row, column = np.unravel_index(reference.index, (rows, columns))
+        zoi = np.full((rows + 2, columns + 2), -1, np.intp)
+        zoi[row + 1, column + 1] = np.arange(len(reference.index))
+        return cls(zoi, row + 1, column + 1)
+
+
+def _lent(attempt: Solution, places: _Places, lost: NDArray[np.intp]) -> tuple[Floats, NDArray[np.uint8]]:
+    """For each of the lost ZOIs (L,) the mean of what its good neighbours predict there, (L, modes), and their number.
+
+    Of a ZOI's shape u, du_dx, du_dy, v, dv_dx, dv_dy count, moved by the step to the neighbour.
+    """
+    reference, step = attempt.reference, attempt.reference.grid.step
+    good = np.append(attempt.status == Status.OK, False)  # the last for "none"
+    zoi = places.zoi[places.row[lost, None] + _DOWN, places.column[lost, None] + _RIGHT]
+    to, which = np.nonzero(good[zoi])
+    lender = zoi[to, which]
+    part = reference.total(attempt.found.p[lender], lender)[:, reference.affine]
+    for r in (0, 3):
+        part[:, r] -= step * (_RIGHT[which] * part[:, r + 1] + _DOWN[which] * part[:, r + 2])
+    number = np.bincount(to, minlength=len(lost))
+    total = np.stack([np.bincount(to, values, len(lost)) for values in part.T], axis=1)
+    with np.errstate(invalid="ignore"):
+        mean = np.where(number[:, None] > 0, total / np.maximum(number, 1)[:, None], np.nan)
+    return reference.local(reference.all_modes(mean), lost), number.astype(np.uint8)

@@ -1,0 +1,88 @@
+"""Virtual gauges of the configuration: a table ``[gauges.NAME]`` each, made into gauges on a grid.
+
+The keys of a table are the parameters of its kind of gauge (``analysis.evaluate.GAUGE_KINDS``). The gauges called
+``axial`` and ``transverse`` make the stress-strain curve.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from acquire.errors import ConfigError
+from analysis.evaluate import GAUGE_KINDS, Gauge, Parameter
+from live.config.values import CORNERS, POINT, RECTANGLE, Check, choice, length, number
+
+if TYPE_CHECKING:
+    from analysis import ZoiGrid
+
+Point = tuple[float, float]
+GaugeTable = Mapping[str, Any]
+"""``kind`` and the parameters given of one gauge, fit for JSON."""
+
+NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
+"""A gauge's name stands in the columns of files."""
+USUAL = "line"
+"""The kind of a gauge that names none."""
+_PLACES = {"point": POINT, "box": RECTANGLE, "corners": CORNERS}
+
+
+def gauge_checks(kind: object) -> dict[str, Check]:
+    """What the keys of a gauge may be; those of other kinds are checked too, and do nothing."""
+    own = [one for name, one in GAUGE_KINDS.items() if name == kind]
+    checks = {"kind": choice(*GAUGE_KINDS)}
+    for one in (*GAUGE_KINDS.values(), *own):
+        checks |= {key: _check(found) for key, found in one.parameters().items()}
+    return checks
+
+
+def _check(one: Parameter) -> Check:
+    if one.kind == "choice":
+        return choice(*one.choices)
+    return length(number(one.low, one.high)) if one.kind == "length" else _PLACES[one.kind]
+
+
+def make_gauge(name: str, table: GaugeTable, axis: str) -> Gauge:
+    """The gauge of a table with what follows from the ``axis`` of the load; raises ConfigError."""
+    try:
+        return GAUGE_KINDS[table.get("kind", USUAL)].of(name, table, axis)
+    except ValueError as error:
+        raise ConfigError(f"gauges.{name}: {error}") from None
+
+
+def gauges_for(tables: Mapping[str, GaugeTable], axis: str, grid: ZoiGrid) -> tuple[Gauge, ...]:
+    """The gauges of a configuration on a grid, in its order; ``axis`` ("x" or "y") is that of the load.
+
+    Raises
+    ------
+    ConfigError
+        A key is missing or impossible, or no ZOI lies where a gauge is.
+    """
+    gauges = tuple(make_gauge(name, table, axis) for name, table in tables.items())
+    for gauge in gauges:
+        _check_place(gauge, grid)
+    return gauges
+
+
+def _check_place(gauge: Gauge, grid: ZoiGrid) -> None:
+    if all(mask.any() for mask in gauge.zois(grid)):
+        return
+    raise ConfigError(
+        f"gauges.{gauge.name}: no ZOI is there; the centres of ZOIs reach from {grid.x[0]:g}, {grid.y[0]:g} to"
+        f" {grid.x[-1]:g}, {grid.y[-1]:g} px, and a mask may leave some out"
+    )
+
+
+def complete_gauges(gauges: Mapping[str, GaugeTable], axis: str = "y") -> Iterator[Gauge]:
+    """Those of which nothing is missing, to be drawn."""
+    for name, table in gauges.items():
+        try:
+            yield make_gauge(name, table, axis)
+        except ConfigError:
+            continue
+
+
+def outlines(gauges: Mapping[str, GaugeTable], zoi: float) -> dict[str, tuple[tuple[Point, ...], ...]]:
+    """The lines to be drawn for each gauge, px, with ZOIs of a side of ``zoi`` px."""
+    return {gauge.name: gauge.outline(zoi) for gauge in complete_gauges(gauges)}

@@ -1,0 +1,110 @@
+"""Where a server listens: a port of this machine alone, or of an address of it, and then only with a token."""
+
+from __future__ import annotations
+
+import ipaddress
+import socket
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+from acquire.errors import ConfigError
+
+HERE = "127.0.0.1"
+SHORTEST = 16  # letters of a token
+ALLOWED = "PORT, or HOST:PORT with the address of this machine, PORT from 1024 to 65535 (0: any free one)"
+
+
+@dataclass(frozen=True, slots=True)
+class ListenAddress:
+    """An address of this machine and a port."""
+
+    host: str
+    port: int
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """From ``PORT`` or ``HOST:PORT``; raises ValueError that says what is allowed."""
+        host, _, port = text.rpartition(":")
+        if not port.isascii() or not port.isdigit() or len(port) > 5 or not _may_be(int(port)):
+            raise ValueError(ALLOWED)
+        host = host or HERE
+        if host != "localhost":
+            try:
+                ipaddress.IPv4Address(host)
+            except ValueError:
+                raise ValueError(ALLOWED) from None
+        return cls(HERE if host == "localhost" else host, int(port))
+
+    @property
+    def is_here(self) -> bool:
+        """Whether only programs of this machine can reach it."""
+        return ipaddress.IPv4Address(self.host).is_loopback
+
+    def listen(self, what: str) -> socket.socket:
+        """A listening socket; ``what`` names it in messages.
+
+        Raises
+        ------
+        ConfigError
+            The port is taken, or the address is not one of this machine.
+        """
+        try:
+            found = listening(self.host, self.port)
+        except OSError as error:
+            raise ConfigError(
+                f"{what}: {self.host}:{self.port} cannot be listened to ({error.strerror}); choose another port"
+            ) from None
+        found.setblocking(False)
+        return found
+
+
+def listening(host: str, port: int, tries: int = 1) -> socket.socket:
+    """A socket that listens at ``port``, or the next free one of as many as ``tries``.
+
+    Raises
+    ------
+    OSError
+        None is free; the error of the last.
+    """
+    failed = OSError(f"there is no port {port}")
+    for candidate in range(port, min(port + tries, 65536)):
+        found = socket.socket()
+        try:
+            # A port in TIME_WAIT is free.
+            found.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            found.bind((host, candidate))
+            found.listen()
+            return found
+        except OSError as error:
+            found.close()
+            failed = error
+    raise failed
+
+
+def _may_be(port: int) -> bool:
+    return port == 0 or 1024 <= port <= 65535
+
+
+def read_token(place: ListenAddress, path: str | None, what: str) -> str:
+    """The token that a client must give first; empty where none is needed.
+
+    Raises
+    ------
+    ConfigError
+        There must be one and it is not there or too short.
+    """
+    if path is None:
+        if place.is_here:
+            return ""
+        raise ConfigError(
+            f"{what}: {place.host} can be reached from other machines; give token_file, a file with a word of"
+            f" {SHORTEST} letters or more, or listen at {HERE}"
+        )
+    try:
+        token = Path(path).read_text(encoding="utf-8").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{what}: {path}: no token can be read ({error})") from None
+    if len(token) < SHORTEST or len(token.split()) != 1:
+        raise ConfigError(f"{what}: {path}: a token is one word of {SHORTEST} letters or more")
+    return token

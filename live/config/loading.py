@@ -1,0 +1,280 @@
+"""The configuration of a run: sections of a TOML file, overridden by the command line.
+
+Every key has a type, bounds and a default. An unknown key, a wrong type or an impossible value is a
+``ConfigError`` that names the key and says what is allowed. The configuration in force is stored in
+every file as JSON (``as_dict``) and read back with ``from_dict``.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import math
+import reprlib
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from acquire.bounds import NotAllowed
+from acquire.errors import ConfigError, DataError
+from acquire.files.picture import read_bytes
+from live.config.channels import channel_names
+from live.config.gauges import NAME, USUAL, GaugeTable, gauge_checks
+from live.config.sections import (
+    AlarmConfig,
+    CameraConfig,
+    LoadConfig,
+    MeasureConfig,
+    OperateConfig,
+    OutputConfig,
+    RecordConfig,
+    ScaleConfig,
+    SpecimenConfig,
+    StrainOutConfig,
+    ViewConfig,
+)
+from live.config.values import AUTO, Check, Option, in_px
+
+Section = TypeVar("Section")
+MOST_BYTES = 10**6  # of a configuration file
+_WITHDRAWN = {
+    ("measure", "shorten_bursts"): "a burst keeps its length; leave it out, and take a smaller measure.burst"
+    " where the picture moves",
+}
+"""Keys of earlier versions, with what to do: left out of a stored configuration, refused in a new one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """All sections, virtual gauges by name, and free metadata (specimen, operator, material, note ...)."""
+
+    camera: CameraConfig = field(default_factory=CameraConfig)
+    load: LoadConfig = field(default_factory=LoadConfig)
+    measure: MeasureConfig = field(default_factory=MeasureConfig)
+    scale: ScaleConfig = field(default_factory=ScaleConfig)
+    record: RecordConfig = field(default_factory=RecordConfig)
+    operate: OperateConfig = field(default_factory=OperateConfig)
+    strain_out: StrainOutConfig = field(default_factory=StrainOutConfig)
+    view: ViewConfig = field(default_factory=ViewConfig)
+    specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
+    output: OutputConfig = field(default_factory=OutputConfig)
+    alarm: tuple[AlarmConfig, ...] = ()
+    gauges: Mapping[str, GaugeTable] = field(default_factory=dict)
+    metadata: Mapping[str, Any] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Nested plain values, fit for JSON; sections of keys, alarms by their number."""
+        plain = dataclasses.asdict(self)
+        return plain | {"alarm": {str(n): alarm for n, alarm in enumerate(plain["alarm"], 1)}}
+
+
+AUTO_GAUGES = ("axial", "transverse", "area")
+"""Those that are placed on the specimen once it is found (``live.setup.placement``)."""
+
+_SECTIONS: dict[str, type] = {
+    f.name: f.default_factory  # type: ignore[misc]
+    for f in dataclasses.fields(Config)
+    if f.name not in ("metadata", "gauges", "alarm")
+}
+
+
+def options() -> dict[str, tuple[str, dataclasses.Field[Any]]]:
+    """What can be said on the command line: option name to ("section.key", field of the section)."""
+    found = {}
+    for name, kind in _SECTIONS.items():
+        for field_ in dataclasses.fields(kind):
+            option: Option | None = field_.metadata["option"]
+            if option is not None:
+                found[option.name] = (f"{name}.{field_.name}", field_)
+    return found
+
+
+def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
+    """Read ``path`` and lay ``overrides`` ("measure.zoi" -> 32) over it.
+
+    Raises
+    ------
+    ConfigError
+        Missing or malformed file, unknown key, wrong type, impossible value.
+    """
+    return _overlaid({} if path is None else _read_toml(path), overrides, str(path or "command line"))
+
+
+def from_dict(stored: Mapping[str, Any], overrides: Mapping[str, Any], where: str) -> Config:
+    """The configuration stored in a file, with ``overrides`` laid over it; raises ConfigError.
+
+    Keys of earlier versions that are withdrawn are left out.
+    """
+    tree = _without_none(stored)
+    for section, key in _WITHDRAWN:
+        if isinstance(tree.get(section), dict):
+            tree[section].pop(key, None)
+    return _overlaid(tree, overrides, where)
+
+
+def settings_in(path: Path) -> dict[str, Any]:
+    """What ``path`` sets, as "section.key" -> value, once it has been checked; raises ConfigError."""
+    load_config(path, {})
+    tree = _read_toml(path)
+    return {
+        f"{name}.{key}": value
+        for name, section in tree.items()
+        if isinstance(section, Mapping)
+        for key, value in section.items()
+    }
+
+
+def _without_none(stored: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: _without_none_in(section) for name, section in stored.items() if section is not None}
+
+
+def _without_none_in(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return _without_none(value)
+    return [_without_none_in(one) for one in value] if isinstance(value, list | tuple) else value
+
+
+def _overlaid(tree: Mapping[str, Any], overrides: Mapping[str, Any], where: str) -> Config:
+    merged: dict[str, Any] = {k: dict(v) if isinstance(v, Mapping) else v for k, v in tree.items()}
+    for dotted, value in overrides.items():
+        name, _, key = dotted.partition(".")
+        if not key:
+            merged[name] = value
+            continue
+        section = merged.setdefault(name, {})
+        if isinstance(section, dict):
+            section[key] = value
+    return _build(merged, where)
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    if not path.exists():
+        raise ConfigError(f"{path}: there is no such configuration file")
+    try:
+        return tomllib.loads(read_bytes(path, MOST_BYTES).decode("utf-8-sig"))
+    except (DataError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read ({error}); give a text file in TOML") from None
+    except RecursionError:
+        raise ConfigError(f"{path}: not valid TOML: too many brackets within brackets") from None
+    except ValueError as error:  # of TOML, and a number with thousands of digits
+        raise ConfigError(f"{path}: not valid TOML: {error}") from None
+
+
+def _build(tree: Mapping[str, Any], where: str) -> Config:
+    known = [*_SECTIONS, "alarm", "gauges", "metadata"]
+    parts: dict[str, Any] = {}
+    px_per_mm = _px_per_mm(tree, where)
+    for name, content in tree.items():
+        if name not in known:
+            raise ConfigError(f"{where}: unknown section [{name}]{_meant(name, known)}")
+        if name == "alarm":
+            parts[name] = _alarms(content, where)
+        elif not isinstance(content, Mapping):
+            raise ConfigError(f"{where}: {name} must be a section, [{name}] with keys below it")
+        elif name == "metadata":
+            parts[name] = dict(content)
+        elif name == "gauges":
+            parts[name] = {gauge: _gauge(gauge, table, where, px_per_mm) for gauge, table in content.items()}
+        else:
+            parts[name] = _section(_SECTIONS[name], name, content, where, px_per_mm)
+    _check_metadata(parts.get("metadata", {}), where)
+    config = Config(**parts)
+    _check_channels(config, where)
+    return config
+
+
+def _px_per_mm(tree: Mapping[str, Any], where: str) -> float | None:
+    content = tree.get("scale")
+    if not isinstance(content, Mapping):
+        return None
+    return _section(ScaleConfig, "scale", content, where).px_per_mm
+
+
+def _section(
+    kind: type[Section],
+    name: str,
+    content: Mapping[str, Any],
+    where: str,
+    px_per_mm: float | None = None,
+) -> Section:
+    checks = {f.name: f.metadata["check"] for f in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    return kind(**_accepted(checks, name, content, where, px_per_mm))
+
+
+def _accepted(
+    checks: Mapping[str, Check], name: str, content: Mapping[str, Any], where: str, px_per_mm: float | None
+) -> dict[str, Any]:
+    values = {}
+    for key, value in content.items():
+        if (name, key) in _WITHDRAWN:
+            raise ConfigError(f"{where}: {name}.{key} is withdrawn: {_WITHDRAWN[name, key]}")
+        if key not in checks:
+            raise ConfigError(f"{where}: unknown key {name}.{key}{_meant(key, list(checks))}")
+        try:
+            values[key] = checks[key].accept(in_px(value, checks[key], px_per_mm))
+        except NotAllowed as allowed:
+            raise ConfigError(
+                f"{where}: {name}.{key} = {_shown(value)} is not possible; allowed: {allowed}"
+            ) from None
+    return values
+
+
+def _gauge(name: str, table: Any, where: str, px_per_mm: float | None) -> GaugeTable:
+    if not NAME.fullmatch(name):
+        raise ConfigError(
+            f"{where}: gauges.{name}: a name has up to 32 letters, digits and _, a letter first"
+        )
+    if not isinstance(table, Mapping):
+        raise ConfigError(f"{where}: gauges.{name} must be a table, [gauges.{name}] with keys below it")
+    values = _accepted(gauge_checks(table.get("kind")), f"gauges.{name}", table, where, px_per_mm)
+    return {"kind": USUAL, **values}
+
+
+def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
+    if isinstance(content, Mapping):  # by their number, as files have them
+        content = list(content.values())
+    if not isinstance(content, list | tuple) or not all(isinstance(table, Mapping) for table in content):
+        raise ConfigError(f"{where}: alarm must be tables, [[alarm]] with keys below it")
+    alarms = tuple(
+        _section(AlarmConfig, f"alarm {number}", table, where) for number, table in enumerate(content, 1)
+    )
+    for number, alarm in enumerate(alarms, 1):
+        if (alarm.above is None) is (alarm.below is None):
+            raise ConfigError(f"{where}: alarm {number}: give one of above and below")
+    return alarms
+
+
+def _check_channels(config: Config, where: str) -> None:
+    placed = AUTO_GAUGES if config.measure.gauges == AUTO else ()
+    gauges = dict.fromkeys((*config.gauges, *placed))
+    measured, known = channel_names(gauges), channel_names(gauges, machine=True)
+    asked = [("strain_out", channel, measured) for channel in config.strain_out.channels or ()]
+    asked += [(f"alarm {number}", alarm.channel, known) for number, alarm in enumerate(config.alarm, 1)]
+    for whose, channel, names in asked:
+        if channel not in names:
+            raise ConfigError(f"{where}: {whose}: unknown channel {channel!r}{_meant(channel, list(names))}")
+
+
+def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:
+    for key, value in metadata.items():
+        if (
+            not isinstance(value, str | int | float | bool)
+            or value in (math.inf, -math.inf)
+            or value != value
+        ):
+            raise ConfigError(f"{where}: metadata.{key} must be a text or a number, in one line")
+
+
+def _shown(value: Any) -> str:
+    try:
+        return reprlib.repr(value)
+    except ValueError:  # thousands of digits
+        return "this number"
+
+
+def _meant(word: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(word, known, 1)
+    meant = f" (did you mean {near[0]}?)" if near else ""
+    return f"{meant}; known: {', '.join(known)}"

@@ -1,0 +1,246 @@
+"""What a value of the configuration may be: checked as it comes from a file, and read from a word.
+
+A check that refuses says what is allowed; whoever asks adds the key and the value.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+from acquire.bounds import NotAllowed, as_integer, as_number
+from acquire.errors import ConfigError
+from acquire.record_mode import RECORD_MODES, RecordMode
+from live.config.listen_address import ListenAddress
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """A kind of value.
+
+    Attributes
+    ----------
+    accept : callable
+        The value as it is used; raises ``NotAllowed``.
+    read : callable
+        From a word of the command line to what ``accept`` takes; raises ValueError.
+    length : "", "px" or "whole px"
+        Whether it is a length in the picture, which may be said in mm; whole ones are rounded.
+    words : tuple of str
+        All that is accepted, where that is a few words.
+    """
+
+    accept: Callable[[Any], Any]
+    read: Callable[[str], Any] = str
+    length: str = ""
+    words: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """How a key is said on the command line.
+
+    Attributes
+    ----------
+    name : str
+        Without its dashes.
+    metavar : str
+        "": the words of the check.
+    off, on : bool
+        A switch that turns the key off, or on.
+    """
+
+    name: str
+    metavar: str = ""
+    off: bool = False
+    on: bool = False
+
+
+def key(
+    check: Check, default: Any, help_text: str, option: Option | None = None, *, optional: bool = False
+) -> Any:
+    """A field of a section: its check, its default, its meaning; ``optional`` is for the reader alone."""
+    return field(default=default, metadata={"check": check, "help": help_text, "option": option})
+
+
+def number(low: float = -math.inf, high: float = math.inf) -> Check:
+    """A number within bounds."""
+    return Check(lambda value: as_number(value, low, high), float)
+
+
+def integer(low: int, high: int) -> Check:
+    """A whole number within bounds."""
+    return Check(lambda value: as_integer(value, low, high), int)
+
+
+_NUMBER = r"[-+]?(?:[0-9]+[.]?[0-9]*|[.][0-9]+)"
+_IN_MM = re.compile(rf"\s*({_NUMBER}(?:\s*,\s*{_NUMBER})*)\s*mm\s*")
+
+
+def length(check: Check, *, whole: bool = False) -> Check:
+    """The same for a length in the picture: px, or mm as "6 mm" and "10, 20 mm" where the scale is known."""
+
+    def read(word: str) -> Any:
+        if _IN_MM.fullmatch(word):
+            return word
+        try:
+            return check.read(word)
+        except ValueError as error:
+            kind = {int: "a whole number of px", float: "a number of px"}.get(check.read)  # type: ignore[call-overload]
+            raise ValueError(f"give {kind}, or mm as 6mm" if kind else str(error)) from None
+
+    return Check(check.accept, read, "whole px" if whole else "px")
+
+
+def in_px(value: Any, check: Check, px_per_mm: float | None) -> Any:
+    """What was said in mm in px, all else as it is; raises ``NotAllowed`` where the scale is not known."""
+    if isinstance(value, list | tuple):
+        return [in_px(v, check, px_per_mm) for v in value]
+    found = _IN_MM.fullmatch(value) if check.length and isinstance(value, str) else None
+    if found is None:
+        return value
+    if px_per_mm is None:
+        raise NotAllowed("px; for mm the scale must be known: phasedic scale, or mm_per_px in [scale]")
+    lengths = [float(number) * px_per_mm for number in found[1].split(",")]
+    if not all(abs(px) < 1e9 for px in lengths):
+        raise NotAllowed("a length within the picture")
+    said = [round(px) if check.length == "whole px" else px for px in lengths]
+    return said if len(said) > 1 else said[0]
+
+
+def choice(*allowed: str) -> Check:
+    """One of a few words."""
+
+    def accept(value: Any) -> str:
+        if value not in allowed:
+            raise NotAllowed("one of " + ", ".join(repr(word) for word in allowed))
+        return str(value)
+
+    return Check(accept, words=allowed)
+
+
+def _text(value: Any) -> str:
+    if not isinstance(value, str) or "\0" in value:
+        raise NotAllowed("a text in quotes, without a zero byte")
+    return value
+
+
+def _place(value: Any) -> str:
+    try:
+        ListenAddress.parse(_text(value))
+    except ValueError as allowed:
+        raise NotAllowed(str(allowed)) from None
+    return str(value)
+
+
+def _flag(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise NotAllowed("true or false")
+    return value
+
+
+def _box(value: Any) -> tuple[int, int, int, int]:
+    if not isinstance(value, list | tuple) or len(value) != 4 or not all(type(v) is int for v in value):
+        raise NotAllowed("four whole numbers: x, y, width, height in px")
+    x, y, width, height = value
+    if x < 0 or y < 0 or width < 1 or height < 1:
+        raise NotAllowed("x and y from 0, width and height from 1 (px)")
+    return x, y, width, height
+
+
+def _read_box(word: str) -> list[int]:
+    values = [int(part) for part in word.split(",")]
+    if len(values) != 4:
+        raise ValueError("give four whole numbers x,y,width,height")
+    return values
+
+
+def _rectangle(value: Any) -> tuple[float, float, float, float]:
+    if not isinstance(value, list | tuple) or len(value) != 4 or not all(_finite(v) for v in value):
+        raise NotAllowed("four numbers: x, y, width, height in px")
+    x, y, width, height = (float(v) for v in value)
+    if x < 0 or y < 0 or width <= 0 or height <= 0:
+        raise NotAllowed("x and y from 0, width and height above 0 (px)")
+    return x, y, width, height
+
+
+def _region(value: Any) -> tuple[int, int, int, int] | str:
+    if value in REGIONS:
+        return str(value)
+    try:
+        return _box(value)
+    except NotAllowed as allowed:
+        raise NotAllowed(f"{allowed}; or {' or '.join(map(repr, REGIONS))}") from None
+
+
+def _read_region(word: str) -> list[int] | str:
+    return word if word in REGIONS else _read_box(word)
+
+
+def _record_mode(value: Any) -> str:
+    try:
+        return RecordMode.parse(_text(value)).text()
+    except ConfigError:
+        raise NotAllowed(RECORD_MODES) from None
+
+
+def _point(value: Any) -> tuple[float, float]:
+    if not isinstance(value, list | tuple) or len(value) != 2 or not all(_finite(v) for v in value):
+        raise NotAllowed("two numbers: x, y in px")
+    return float(value[0]), float(value[1])
+
+
+def _finite(value: Any) -> bool:
+    return type(value) in (int, float) and abs(value) < 1e6
+
+
+def _corners(value: Any) -> tuple[tuple[float, float], ...]:
+    if not isinstance(value, list | tuple) or not 3 <= len(value) <= 100:
+        raise NotAllowed("3 to 100 corners [x, y], px")
+    return tuple(_point(corner) for corner in value)
+
+
+def _strains(value: Any) -> tuple[float, float]:
+    if (
+        not isinstance(value, list | tuple)
+        or len(value) != 2
+        or any(type(v) not in (int, float) for v in value)
+    ):
+        raise NotAllowed("two strains, from and to, as [0.0005, 0.0025]")
+    low, high = float(value[0]), float(value[1])
+    if not 0 <= low < high <= 1:
+        raise NotAllowed("two strains with 0 <= from < to <= 1")
+    return low, high
+
+
+def _names(value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list | tuple) or not 1 <= len(value) <= 64:
+        raise NotAllowed("1 to 64 names in brackets")
+    return tuple(_text(name) for name in value)
+
+
+TEXT = Check(_text)
+NAMES = Check(_names, lambda word: word.split(","))
+"""Names, on the command line with commas between."""
+PLACE = Check(_place)
+"""Where something listens: PORT or HOST:PORT."""
+FLAG = Check(_flag)
+BOX = length(Check(_box, _read_box), whole=True)
+"""x, y, width, height in whole px."""
+RECTANGLE = length(Check(_rectangle))
+"""The same in any px."""
+STRAINS = Check(_strains)
+"""An interval of strains."""
+POINT = length(Check(_point))
+CORNERS = length(Check(_corners))
+"""x, y in px; of the corners of a polygon."""
+AUTO, ALL = REGIONS = ("auto", "all")
+"""Regions in words: the specimen that is found, or the picture but for a rim."""
+GIVEN = "given"
+"""Gauges that are not placed by themselves (``AUTO``)."""
+REGION = length(Check(_region, _read_region), whole=True)
+"""A box, or one of the words."""
+RECORD_MODE = Check(_record_mode)

@@ -1,0 +1,87 @@
+"""The journal: every event goes to the log, the screen, the session and the view, once.
+
+Listeners that come later (the session is opened after the devices) are told what they missed, but
+for the one event a burst, which would fill the memory in a long test.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+import threading
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from acquire.events import Event, EventKind, EventSink, Level
+from acquire.printable import brief
+
+log = logging.getLogger(__name__)
+_LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
+_QUIET = {EventKind.MEASURED}  # one a burst: for the session, not for a person
+
+
+def sentence(event: Event, names: Mapping[str, str] | None = None) -> str:
+    """Who says what: a device by its name of ``names``, else by its address without settings, and only once."""
+    source, text = brief(event.source), brief(event.text)
+    text = text.removeprefix(f"{source}: ")
+    return f"{(names or {}).get(event.source, source)}: {text}"
+
+
+class EventLog:
+    """Collects events from any thread and passes them to its listeners.
+
+    Attributes
+    ----------
+    origin : float, s
+        Taken off the stamps of devices and of ``tell``; not 0 where the pictures come with nominal
+        times from 0, so that events and pictures share one time.
+    names : dict of str to str
+        What devices are called on the screen, by their addresses.
+    """
+
+    def __init__(self) -> None:
+        self.origin = 0.0
+        self.names: dict[str, str] = {}
+        self._events: list[Event] = []
+        self._listeners: list[EventSink] = []
+        self._lock = threading.RLock()
+
+    def __call__(self, event: Event) -> None:
+        """Take an event stamped by this machine's clock; itself an ``EventSink``."""
+        self.record(dataclasses.replace(event, t=event.t - self.origin) if self.origin else event)
+
+    def record(self, event: Event) -> None:
+        """Take an event stamped with the time of a frame."""
+        with self._lock:
+            if event.kind not in _QUIET:
+                self._events.append(event)
+            listeners = list(self._listeners)
+        if event.kind not in _QUIET:
+            log.log(_LEVELS[event.level], "%s", sentence(event, self.names))
+        for listener in listeners:
+            listener(event)
+
+    def tell(
+        self,
+        kind: EventKind,
+        source: str,
+        text: str,
+        level: Level = "info",
+        data: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Make an event, stamped now, and take it."""
+        self(Event(time.monotonic(), kind, source, text, level, data or {}))
+
+    def add_listener(self, listener: EventSink) -> None:
+        """Pass all past and coming events to ``listener``."""
+        with self._lock:
+            self._listeners.append(listener)
+            past = list(self._events)
+        for event in past:
+            listener(event)
+
+    def events(self, *levels: Level) -> list[Event]:
+        """The events so far, of the given levels (of all where none is given)."""
+        with self._lock:
+            return [e for e in self._events if not levels or e.level in levels]

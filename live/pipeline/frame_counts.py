@@ -1,0 +1,75 @@
+"""The ledger of a run: every frame grabbed is accounted for, and the sums are checked."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field, fields
+
+
+@dataclass(slots=True)
+class FrameCounts:
+    """Counts of frames; ``add`` may be called from any thread.
+
+    Attributes
+    ----------
+    grabbed : int
+        Frames the camera handed out.
+    recorded, unrecorded, thinned : int
+        Written to the session; not written although they should have been (a counted gap); left
+        out as the recording mode says (only bursts, every K-th).
+    reference, measured, skipped, left_out : int
+        Part of the reference burst; of a measured burst; of a burst that was replaced by a newer
+        one or came while measuring was paused; of no complete burst, or damaged.
+    lost : int
+        Frames the camera, or the way to it, lost before they were handed out.
+    load_samples : int
+    """
+
+    grabbed: int = 0
+    recorded: int = 0
+    unrecorded: int = 0
+    thinned: int = 0
+    reference: int = 0
+    measured: int = 0
+    skipped: int = 0
+    left_out: int = 0
+    lost: int = 0
+    load_samples: int = 0
+    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False, compare=False)
+
+    def add(self, **counts: int) -> None:
+        """Add to the named counts."""
+        with self._lock:
+            for name, count in counts.items():
+                setattr(self, name, getattr(self, name) + count)
+
+    def as_dict(self) -> dict[str, int]:
+        """The counts by name."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if not f.name.startswith("_")}
+
+    @property
+    def adds_up(self) -> bool:
+        """Whether every grabbed frame has one fate, and one place on disk where recording was on."""
+        fates = self.reference + self.measured + self.skipped + self.left_out
+        stored = self.recorded + self.unrecorded + self.thinned
+        return fates == self.grabbed and stored in (0, self.grabbed)
+
+    @property
+    def loss(self) -> bool:
+        """Whether anything is missing that cannot be had again."""
+        return self.lost > 0 or self.unrecorded > 0
+
+    @property
+    def skipped_share(self) -> float:
+        """Share of the frames behind the reference that were not measured because measuring was late or paused."""
+        return self.skipped / max(self.measured + self.skipped, 1)
+
+    def line(self) -> str:
+        """One line for a person."""
+        share = f" ({self.skipped_share:.1%})" * (self.skipped > 0)
+        return (
+            f"grabbed {self.grabbed} / recorded {self.recorded} / measured {self.measured}"
+            f" / skipped {self.skipped}{share} / lost {self.lost}"
+            f"  (reference {self.reference}, left over {self.left_out}, not recorded {self.unrecorded};"
+            f" {'adds up' if self.adds_up else 'DOES NOT ADD UP'})"
+        )

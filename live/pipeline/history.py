@@ -1,0 +1,274 @@
+"""The means of all measured instants, kept in memory for the summary and the status line; the axis they tell.
+
+Instants in little memory: a test of a day has millions of them.
+
+A history that never grows beyond its bound: when full, every second item goes.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Iterator, Sequence
+from dataclasses import fields
+from typing import Any, Generic, Literal, TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.load_cell import LoadLog
+from analysis.evaluate import GaugeValue, LoadAxis, load_axis
+from live.pipeline.measurement import AXIAL, TRANSVERSE, TimeStep, strains_along
+
+_NUMBERS = tuple(one.name for one in fields(TimeStep) if one.name not in ("refused", "gauges"))
+_COUNTS = ("n_valid", "n_zoi")
+
+
+class TimeSeries(Sequence[TimeStep]):
+    """A list to which one thread appends and that any may read: numbers as columns, each word once.
+
+    About 200 bytes an instant and 24 more for each gauge.
+    """
+
+    def __init__(self) -> None:
+        self._numbers = {name: array("d") for name in _NUMBERS}
+        self._refused = _Words()
+        self._gauges: dict[str, _GaugeColumn] = {}
+        self._count = 0
+
+    def append(self, instant: TimeStep) -> None:
+        """Add the newest."""
+        for name, kept in self._numbers.items():
+            kept.append(getattr(instant, name))
+        self._refused.append(instant.refused)
+        for name in instant.gauges:
+            if name not in self._gauges:
+                self._gauges[name] = _GaugeColumn(self._count)
+        for name, column in self._gauges.items():
+            column.append(instant.gauges.get(name))
+        # Counted last: whoever reads meanwhile sees whole instants only.
+        self._count += 1
+
+    def column(self, name: str) -> Array:
+        """One number over time, (N,) float64."""
+        return _copied(self._numbers[name], self._count)
+
+    @property
+    def gauges(self) -> tuple[str, ...]:
+        """Names of the gauges that the first instant has."""
+        return tuple(name for name, column in list(self._gauges.items()) if not column.since)
+
+    def gauge(self, name: str) -> Array | None:
+        """Values of a gauge, (N,) float64; None where the first instant has none of that name."""
+        column = self._gauges.get(name)
+        return None if column is None or column.since else _copied(column.values, self._count)
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, at: int) -> TimeStep: ...
+
+    @overload
+    def __getitem__(self, at: slice) -> list[TimeStep]: ...
+
+    def __getitem__(self, at: int | slice) -> TimeStep | list[TimeStep]:
+        if isinstance(at, slice):
+            return [self._made(i) for i in range(*at.indices(self._count))]
+        if not -self._count <= at < self._count:
+            raise IndexError(f"instant {at} of {self._count}")
+        return self._made(at % self._count)
+
+    def __iter__(self) -> Iterator[TimeStep]:
+        return (self._made(i) for i in range(self._count))
+
+    def _made(self, i: int) -> TimeStep:
+        numbers: dict[str, Any] = {name: kept[i] for name, kept in self._numbers.items()}
+        numbers |= {name: int(numbers[name]) for name in _COUNTS}
+        asked = {name: column.at(i) for name, column in self._gauges.items()}
+        gauges = {name: value for name, value in asked.items() if value is not None}
+        return TimeStep(**numbers, refused=self._refused[i], gauges=gauges)
+
+
+class _Words:
+    """Texts of which few differ."""
+
+    def __init__(self) -> None:
+        self._known: dict[str, int] = {}
+        self._texts: list[str] = []
+        self._which = array("l")
+
+    def append(self, text: str) -> None:
+        if text not in self._known:
+            self._texts.append(text)
+            self._known[text] = len(self._known)
+        self._which.append(self._known[text])
+
+    def __getitem__(self, i: int) -> str:
+        return self._texts[self._which[i]]
+
+
+class _GaugeColumn:
+    """Of one gauge, which the first ``since`` instants do not have."""
+
+    def __init__(self, since: int) -> None:
+        nothing = [math.nan] * since
+        self.since = since
+        self.values, self._sigmas = array("d", nothing), array("d", nothing)
+        self._reasons, self._missing = _Words(), array("b", [1] * since)
+        for _ in range(since):
+            self._reasons.append("")
+
+    def append(self, value: GaugeValue | None) -> None:
+        told = value or GaugeValue(math.nan, math.nan)
+        self.values.append(told.value)
+        self._sigmas.append(told.sigma)
+        self._reasons.append(told.reason)
+        self._missing.append(value is None)
+
+    def at(self, i: int) -> GaugeValue | None:
+        return None if self._missing[i] else GaugeValue(self.values[i], self._sigmas[i], self._reasons[i])
+
+
+def _copied(kept: array[float], count: int) -> Array:
+    # Of a slice: an array that lends its memory to numpy cannot grow meanwhile.
+    return np.frombuffer(kept[:count], np.float64).copy()
+
+
+Item = TypeVar("Item")
+
+
+class Thinned(Generic[Item]):
+    """Evenly thinned past, and always the newest item.
+
+    Parameters
+    ----------
+    most : int
+        Items kept, at most (and one more, the newest).
+
+    Attributes
+    ----------
+    kept : list
+        Every ``2**halvings``-th item from the first on, oldest first.
+    halvings : int
+        How often every second item went.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most, self._count = most, 0
+        self.kept, self.halvings = list[Item](), 0
+        self._newest: list[Item] = []
+
+    def append(self, item: Item) -> None:
+        """Add the newest."""
+        self._newest = [item]
+        if self._count % (1 << self.halvings) == 0:
+            self.kept.append(item)
+            if len(self.kept) > self._most:
+                self.kept, self.halvings = self.kept[::2], self.halvings + 1
+        self._count += 1
+
+    def items(self) -> list[Item]:
+        """Oldest first, the newest always among them."""
+        is_kept = (self._count - 1) % (1 << self.halvings) == 0
+        return self.kept + self._newest * (not is_kept)
+
+
+Array = NDArray[np.float64]
+MOST_INSTANTS = 2000
+"""That are kept, evenly thinned."""
+_FIRST, _GROWTH = 8, 1.1  # looked at first, and again whenever there are so many times more
+
+
+class History:
+    """All instants so far: added by one thread, read by any.
+
+    Parameters
+    ----------
+    axis : "x", "y" or "auto"
+        Of the load, as given.
+    """
+
+    def __init__(self, axis: str = "y") -> None:
+        self.instants, self._finder = TimeSeries(), AxisFinder(axis)
+
+    def add(self, instant: TimeStep) -> None:
+        """Keep ``instant``."""
+        self.instants.append(instant)
+        self._finder.add(instant)
+
+    @property
+    def axis_by_now(self) -> Literal["x", "y"]:
+        """Of the load: as given, or as the strains so far show it; y until they do."""
+        return self._finder.axis
+
+    @property
+    def told_something(self) -> bool:
+        """Whether any ZOI had a value at any instant."""
+        return bool(self.column("n_valid").any())
+
+    def column(self, name: str) -> Array:
+        """One quantity over time, (N,) float64."""
+        return self.instants.column(name)
+
+    def forces(self, loads: LoadLog) -> Array:
+        """The force at each instant with all samples that have come by now, (N,) float64, N.
+
+        As if the zero of the first instant had held to the end: a tare in mid-test is no unloading.
+        """
+        return loads.forces_one_zero(self.column("t").tolist())
+
+    def tared_in_mid_test(self, loads: LoadLog) -> float:
+        """What tares after the first instant have taken off the force by the last one, N."""
+        t = self.column("t")
+        return loads.zero_at(t[-1]) - loads.zero_at(t[0]) if t.size else 0.0
+
+    def axis(self, given: str) -> LoadAxis:
+        """Of the load: "x" or "y" as ``given``, or what all instants tell where that is "auto"."""
+        return load_axis(self.column("exx"), self.column("eyy"), self.column("exy"), given)
+
+    def along(self, axis: str) -> tuple[Array, Array]:
+        """Strain along and across the load: the gauges ``axial`` and ``transverse``, or else the means."""
+        chosen = axis if axis in ("x", "y") else self.axis(axis).axis
+        axial, transverse = strains_along(self.instants.gauges, chosen)
+        return self._strain(axial), self._strain(transverse)
+
+    def _strain(self, name: str) -> Array:
+        gauge = self.gauge(name) if name in (AXIAL, TRANSVERSE) else None
+        return self.column(name) if gauge is None else gauge
+
+    def gauge(self, name: str) -> Array | None:
+        """A gauge over time, (N,) float64; None where there is none of that name."""
+        return self.instants.gauge(name)
+
+
+class AxisFinder:
+    """Given the same instants it tells the same, in a test and in its replay.
+
+    Parameters
+    ----------
+    given : "x", "y" or "auto"
+
+    Attributes
+    ----------
+    axis : "x" or "y"
+        As given, or as the strains tell it; y until they do.
+    """
+
+    def __init__(self, given: str) -> None:
+        self.axis: Literal["x", "y"] = "x" if given == "x" else "y"
+        self._seeks = given not in ("x", "y")
+        self._strains: Thinned[tuple[float, float, float]] = Thinned(MOST_INSTANTS)
+        self._count, self._next = 0, _FIRST
+        self._t = -math.inf
+
+    def add(self, instant: TimeStep) -> Literal["x", "y"]:
+        """The axis with one instant more; one that is told again counts once."""
+        if self._seeks and instant.t > self._t:
+            self._t, self._count = instant.t, self._count + 1
+            self._strains.append((instant.exx, instant.eyy, instant.exy))
+            if self._count >= self._next:
+                self._next = math.ceil(self._count * _GROWTH)
+                exx, eyy, exy = np.array(self._strains.kept, np.float64).T
+                self.axis = load_axis(exx, eyy, exy).axis
+        return self.axis

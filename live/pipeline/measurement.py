@@ -1,0 +1,243 @@
+"""The means of one measured field over its valid ZOIs, computed once for all who want them.
+
+One measured instant: what the pipeline hands to the results, the view and the screen.
+
+Waiting for the force: a measurement is settled once its force can no longer change.
+
+The force at a time is final when the load log reaches past it. Until then a measurement waits, at
+most ``HOLD_S`` of measured time, so that files and curves say what a replay will say.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from acquire.frame import Burst
+from analysis.evaluate import Gauge
+from analysis.field import StrainField
+
+if TYPE_CHECKING:
+    from acquire.frame import Burst
+    from analysis.evaluate import GaugeValue
+    from analysis.field import StrainField
+
+AXIAL, TRANSVERSE = "axial", "transverse"
+"""Gauges of these names are the strain along and across the load."""
+
+
+@dataclass(frozen=True, slots=True)
+class TimeStep:
+    """Means over the valid ZOIs at one time; strains are small strains, force in N, u and v in px.
+
+    Attributes
+    ----------
+    t : float, s
+        Monotonic.
+    force : float, N
+        At ``t``; NaN where no load is known (yet).
+    exx, eyy, exy, sigma_exx, sigma_eyy, sigma_exy : float
+        Means and the standard uncertainties of the means.
+    u, v : float, px
+    largest : float
+        The strain of largest magnitude of any valid ZOI.
+    zoi_sigma : float
+        Median standard uncertainty of one ZOI's eyy.
+    n_valid, n_zoi : int
+    refused : str
+        Why ZOIs have no value ("3 UNEVEN, 1 LOST"), empty where all have one.
+    noise_GL : float
+        Of one frame, from the burst; NaN where it tells nothing.
+    measure_s : float, s
+        Time the kernel took; 0.0 where nobody measured it.
+    latency_s : float, s
+        From the stamp of the burst's last frame to this result; NaN in a replay.
+    gauges : mapping of name to GaugeValue
+        In the order of the configuration.
+    force_raw : float, N
+        As stamped, where a lag of the load was taken off ``force``; else NaN.
+    zero : float, N
+        What tares have taken off ``force`` by then.
+    """
+
+    t: float
+    force: float
+    exx: float
+    eyy: float
+    exy: float
+    sigma_exx: float
+    sigma_eyy: float
+    sigma_exy: float
+    u: float
+    v: float
+    largest: float
+    zoi_sigma: float
+    n_valid: int
+    n_zoi: int
+    refused: str
+    noise_GL: float
+    measure_s: float
+    latency_s: float = math.nan
+    gauges: Mapping[str, GaugeValue] = field(default_factory=dict)
+    force_raw: float = math.nan
+    zero: float = 0.0
+
+    def axial(self, axis: str) -> tuple[float, float]:
+        """Strain along the load, which runs along ``axis`` ("x" or "y"), and its standard uncertainty."""
+        name, _ = strains_along(self.gauges, axis)
+        if name == AXIAL:
+            return self.gauges[name].value, self.gauges[name].sigma
+        return getattr(self, name), getattr(self, f"sigma_{name}")
+
+
+def strains_along(gauges: Container[str], axis: str) -> tuple[str, str]:
+    """What is read as strain along and across the load, which runs along ``axis`` ("x" or "y").
+
+    The gauges ``AXIAL`` and ``TRANSVERSE`` where they are among ``gauges``, else the mean strains.
+    """
+    along, across = ("exx", "eyy") if axis == "x" else ("eyy", "exx")
+    return AXIAL if AXIAL in gauges else along, TRANSVERSE if TRANSVERSE in gauges else across
+
+
+def instant_of(burst: Burst, field: StrainField, force: float, measure_s: float = 0.0) -> TimeStep:
+    """The means of ``field``, measured from ``burst``."""
+    (exx, s_xx), (eyy, s_yy), (exy, s_xy) = (field.mean(name) for name in ("exx", "eyy", "exy"))
+    valid = field.ok
+    values = np.concatenate([field.exx[valid], field.eyy[valid]])
+    return TimeStep(
+        t=burst.t,
+        force=force,
+        exx=exx,
+        eyy=eyy,
+        exy=exy,
+        sigma_exx=s_xx,
+        sigma_eyy=s_yy,
+        sigma_exy=s_xy,
+        u=ordered_mean(field.u[valid]),
+        v=ordered_mean(field.v[valid]),
+        largest=float(values[np.argmax(np.abs(values))]) if values.size else math.nan,
+        zoi_sigma=float(np.median(field.sigma_eyy[valid])) if values.size else math.nan,
+        n_valid=int(valid.sum()),
+        n_zoi=int(field.grid.active.sum()),
+        refused=", ".join(f"{n} {status.name}" for status, n in field.refused.items()),
+        noise_GL=burst.noise,
+        measure_s=measure_s,
+    )
+
+
+def ordered_mean(values: np.ndarray) -> float:
+    """The mean of finite values, NaN of none: the same bits wherever they lie in memory.
+
+    numpy's own sum takes them in an order that depends on their alignment.
+    """
+    return float(np.cumsum(values, dtype=np.float64)[-1]) / values.size if values.size else math.nan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measurement:
+    """A burst, its strain field, and the means of that with the force at its time.
+
+    Attributes
+    ----------
+    number : int
+        0, 1, 2 ... of the measured bursts.
+    burst : Burst
+    field : StrainField
+    instant : TimeStep
+    """
+
+    number: int
+    burst: Burst
+    field: StrainField
+    instant: TimeStep
+
+    @classmethod
+    def of(
+        cls, number: int, burst: Burst, field: StrainField, force: float, measure_s: float = 0.0,
+        gauges: Sequence[Gauge] = (),
+    ) -> Measurement:  # fmt: skip
+        """The same with its means and ``gauges``.
+
+        ``force`` (N) is NaN where it is not known, ``measure_s`` (s) the kernel's time.
+        """
+        read = {gauge.name: gauge.measure(field) for gauge in gauges}
+        return cls(number, burst, field, replace(instant_of(burst, field, force, measure_s), gauges=read))
+
+    @property
+    def t(self) -> float:
+        """Time of the burst in monotonic seconds."""
+        return self.burst.t
+
+    @property
+    def force(self) -> float:
+        """Force at that time, N; NaN where no load is known (yet)."""
+        return self.instant.force
+
+    def with_latency(self, latency_s: float) -> Measurement:
+        """The same once it is known how long it took, from the stamp of the last frame."""
+        return replace(self, instant=replace(self.instant, latency_s=latency_s))
+
+    def with_force(self, force: float, raw: float = math.nan, zero: float = 0.0) -> Measurement:
+        """The same once the force is known; ``raw`` as stamped, where a lag was taken off; ``zero`` by tares."""
+        return replace(self, instant=replace(self.instant, force=force, force_raw=raw, zero=zero))
+
+
+HOLD_S = 2.0
+"""Measurements wait for their force at most this long, in measured time."""
+
+
+class Loads(Protocol):
+    """What is asked of a load log (``acquire.load_cell.LoadLog``)."""
+
+    def force_at(self, t: float) -> float: ...
+
+    def raw_force_at(self, t: float) -> float: ...
+
+    def zero_at(self, t: float) -> float: ...
+
+    def covers(self, t: float) -> bool: ...
+
+
+class ForceMatching:
+    """Holds measurements until their force is final.
+
+    Parameters
+    ----------
+    loads : LoadLog
+    hold_s : float, s
+    """
+
+    def __init__(self, loads: Loads, hold_s: float = HOLD_S) -> None:
+        self._loads, self._hold_s = loads, hold_s
+        self._held: deque[Measurement] = deque()
+
+    def __len__(self) -> int:
+        """Measurements that still wait."""
+        return len(self._held)
+
+    def add(self, measurement: Measurement) -> list[Measurement]:
+        """Take one measurement; those that are settled by now, in order, with their force."""
+        self._held.append(measurement)
+        settled = []
+        while self._held and self._is_final(self._held[0], measurement.t):
+            settled.append(self._with_force(self._held.popleft()))
+        return settled
+
+    def rest(self) -> list[Measurement]:
+        """All that still wait, with the force as far as it is known."""
+        held, self._held = self._held, deque()
+        return [self._with_force(measurement) for measurement in held]
+
+    def _is_final(self, measurement: Measurement, newest_t: float) -> bool:
+        return self._loads.covers(measurement.t) or newest_t - measurement.t > self._hold_s
+
+    def _with_force(self, measurement: Measurement) -> Measurement:
+        t = measurement.t
+        return measurement.with_force(
+            self._loads.force_at(t), self._loads.raw_force_at(t), self._loads.zero_at(t)
+        )

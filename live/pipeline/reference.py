@@ -1,0 +1,148 @@
+"""Before the first burst: noise of a frame, correction, and the kernel on the reference.
+
+A reference burst, whole and as two halves.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from acquire.burst import BurstAccumulator
+from acquire.errors import ConfigError, DataError, MachineUnfit, PhasedicError
+from acquire.frame import Burst, Frame
+from analysis.field import Status, StrainField
+
+if TYPE_CHECKING:
+    from analysis import KernelSettings, PhaseKernel, ZoiGrid
+
+log = logging.getLogger(__name__)
+LEAST_FOUND = 0.2  # a background of noise may be the larger part of the picture
+
+
+def usable(error: ValueError, what: str) -> PhasedicError:
+    """An error of the numerics as one with an exit code: no pattern is the data's, the rest is usage."""
+    from analysis import PatternError
+
+    kind = DataError if isinstance(error, PatternError) else ConfigError
+    return kind(f"{what}: {error}")
+
+
+@contextlib.contextmanager
+def on_fit_machine() -> Iterator[None]:
+    """Where kernels are made: a machine that measures a known pattern wrong raises MachineUnfit."""
+    from analysis import MachineError
+
+    try:
+        yield
+    except MachineError as error:
+        raise MachineUnfit(str(error)) from error
+
+
+Correction = Callable[[Burst], Burst]
+
+
+def unchanged(burst: Burst) -> Burst:
+    """The correction of those who have none."""
+    return burst
+
+
+def frame_noise(burst: Burst, stated_GL: float | None) -> float | None:
+    """The noise of one frame, GL: as stated, else as measured within the burst, else None.
+
+    A burst without any scatter (noise-free pictures) tells nothing.
+    """
+    if stated_GL is not None:
+        return stated_GL
+    return burst.noise if math.isfinite(burst.noise) and burst.noise > 0 else None
+
+
+def averaged(noise_GL: float | None, n: int) -> float | None:
+    """The noise of the mean of n frames; quantisation, 1/12 GL^2, is the least there is of one frame."""
+    return None if noise_GL is None else max(noise_GL, 12**-0.5) / math.sqrt(n)
+
+
+def prepare(
+    reference: Burst,
+    grid: ZoiGrid,
+    settings: KernelSettings,
+    stated_noise_GL: float | None,
+    correct: Correction = unchanged,
+    what: str = "the reference",
+) -> tuple[PhaseKernel, float | None]:
+    """The kernel on ``reference``, and the noise of one frame that goes with it.
+
+    Raises
+    ------
+    ConfigError
+        The grid leaves the picture.
+    DataError
+        The reference, called ``what`` for a person, has no pattern.
+    MachineUnfit
+        The machine measures a known pattern wrong.
+    """
+    from analysis import PhaseKernel
+
+    noise_GL = frame_noise(reference, stated_noise_GL)
+    noise = averaged(noise_GL, reference.n)
+    try:
+        with on_fit_machine():
+            return PhaseKernel(correct(reference).mean, grid, settings, noise=noise), noise_GL
+    except ValueError as error:
+        raise usable(error, what) from error
+
+
+def motion_between(
+    kernel: PhaseKernel, first: Burst, second: Burst, correct: Correction = unchanged
+) -> float:
+    """How far the picture moved from one half of the reference burst to the other, px.
+
+    The median over the ZOIs of the displacement between the two; NaN where it cannot be told, since
+    no more than ``LEAST_FOUND`` of the ZOIs with a pattern are found in both.
+    """
+    first, second = correct(first), correct(second)
+    # A still picture is where it was: nothing is searched, and the test can begin that much sooner.
+    still = StrainField.from_values(kernel.grid, {})
+    a = kernel.measure(first.mean, start=still, clipped=first.clipped)
+    b = kernel.measure(second.mean, start=a, clipped=second.clipped)
+    moved = np.hypot(b.u - a.u, b.v - a.v)
+    found, wanted = np.isfinite(moved), ~np.isin(a.status, (Status.NOT_MEASURED, Status.NO_PATTERN))
+    return float(np.median(moved[found])) if found.sum() > LEAST_FOUND * wanted.sum() else math.nan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReferenceBurst:
+    """A reference burst, and its two halves for the check that nothing moved (none for n < 4)."""
+
+    burst: Burst
+    halves: tuple[Burst, Burst] | None
+
+
+class ReferenceTaker:
+    """Accumulates n frames as a whole and as two halves."""
+
+    def __init__(self, n: int) -> None:
+        self._n = n
+        self._whole = BurstAccumulator(n)
+        self._half: BurstAccumulator | None = None
+        self._halves: list[Burst] = []
+        self._begin_half()
+
+    def _begin_half(self) -> None:
+        self._half = BurstAccumulator(self._n // 2) if self._n >= 4 else None
+
+    def add(self, frame: Frame) -> ReferenceBurst | None:
+        """Take a frame; the reference when it is complete."""
+        if self._half is not None and (half := self._half.add(frame)) is not None:
+            self._halves = [*self._halves[-1:], half]
+        whole = self._whole.add(frame)
+        if whole is None:
+            return None
+        pair = (self._halves[0], self._halves[1]) if len(self._halves) == 2 else None
+        return ReferenceBurst(whole, pair)

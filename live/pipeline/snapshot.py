@@ -1,0 +1,76 @@
+"""Where a test stands at one time: what status line, status card, view and page show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from live.pipeline.measurement import TimeStep
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """Where a test stands at one time; NaN where a number is not known.
+
+    Attributes
+    ----------
+    t : float, s
+        Monotonic.
+    state : str
+        What is done with the frames: "REC", "ARMED" ...
+    elapsed_s : float, s
+        Since the test began.
+    fps : float, 1/s
+        As frames come.
+    force_N, stress_Pa : float
+        The newest force, and that over the section.
+    peak_N : float, N
+        The force of largest magnitude so far, with its sign.
+    axial_name : str
+        What ``axial`` is: a gauge, "exx" or "eyy".
+    axial, sigma_axial : float
+        Strain along the load and its standard uncertainty.
+    valid, zois : int
+        ZOIs with a value, and all.
+    latency_p95_s : float, s
+        Of the last seconds.
+    disk_s : float, s
+        Until the disk is full; infinite where nothing is written.
+    alarms : tuple of str
+        Words of the alarms that are on.
+    frames : mapping of str to int
+        The counts of frames by name.
+    instant : TimeStep or None
+        The last that was measured.
+    """
+
+    t: float
+    state: str = ""
+    elapsed_s: float = math.nan
+    fps: float = math.nan
+    force_N: float = math.nan
+    stress_Pa: float = math.nan
+    peak_N: float = math.nan
+    axial_name: str = ""
+    axial: float = math.nan
+    sigma_axial: float = math.nan
+    valid: int = 0
+    zois: int = 0
+    latency_p95_s: float = math.nan
+    disk_s: float = math.inf
+    alarms: tuple[str, ...] = ()
+    frames: Mapping[str, int] = field(default_factory=dict)
+    instant: TimeStep | None = None
+
+    @property
+    def lost(self) -> int:
+        """Frames that were lost before they were handed out, or could not be recorded."""
+        return self.frames.get("lost", 0) + self.frames.get("unrecorded", 0)
+
+
+def peak_force(peak_N: float, force_N: float) -> float:
+    """The force of larger magnitude, with its sign, N; ``peak_N`` is NaN before the first force."""
+    if not math.isfinite(force_N) or abs(force_N) <= abs(peak_N):
+        return peak_N
+    return force_N

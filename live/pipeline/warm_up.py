@@ -1,0 +1,75 @@
+"""A rehearsal before a test: everything that will run is run once, on made-up frames of the right kind.
+
+What compiles or is imported on first use does so here and not while a specimen is being pulled.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.frame import Burst, CameraInfo, Frame, frozen
+from acquire.load_cell import LoadLog
+from live.pipeline.history import History
+from live.pipeline.measure import measure
+from live.pipeline.reference import ReferenceBurst, ReferenceTaker, motion_between, on_fit_machine, prepare
+
+if TYPE_CHECKING:
+    from analysis import KernelSettings, ZoiGrid
+
+
+def kinds_of(camera: CameraInfo) -> tuple[str, ...]:
+    """The kinds of pictures that a camera's frames and bursts are (of ``analysis.PICTURE_KINDS``)."""
+    return ("uint8" if camera.bits <= 8 else "uint16", "float32")
+
+
+def rehearse(camera: CameraInfo, grid: ZoiGrid, settings: KernelSettings, bursts: tuple[int, int]) -> None:
+    """Average, prepare, measure and evaluate made-up frames as the test will.
+
+    Parameters
+    ----------
+    camera : CameraInfo
+    grid : ZoiGrid
+    settings : KernelSettings
+    bursts : (reference, measured)
+        Frames in each.
+
+    Raises
+    ------
+    MachineUnfit
+        The machine measures a known pattern wrong.
+    """
+    from analysis import warm_up
+
+    with on_fit_machine():
+        warm_up(kinds=kinds_of(camera), phase=settings.estimator == "phase")
+    images = [_image(camera, seed) for seed in (1, 2)]
+    reference, *_ = [_averaged(camera, images, n) for n in bursts]
+    kernel, noise_GL = prepare(reference.burst, grid, settings, None, what="measure")
+    if reference.halves is not None:
+        motion_between(kernel, *reference.halves)
+    again: list[Burst] = [reference.burst, reference.burst]
+    history = History()
+    for measurement in measure(again, kernel, LoadLog(), noise_GL=noise_GL):
+        history.add(measurement.instant)
+
+
+def _averaged(camera: CameraInfo, images: list[NDArray[Any]], n: int) -> ReferenceBurst:
+    """A reference of n frames, the images in turn."""
+    taker = ReferenceTaker(n)
+    for i in range(n):
+        taken = taker.add(Frame(images[i % 2], i, float(i), camera.clock, 0, camera.bits, float(i)))
+    assert taken is not None
+    return taken
+
+
+def _image(camera: CameraInfo, seed: int) -> NDArray[Any]:
+    """A pattern of random blocks with a little noise: enough to be measured."""
+    shape = (camera.height, camera.width)
+    blocks = np.random.default_rng(0).integers(0, 2, (shape[0] // 4 + 1, shape[1] // 4 + 1))
+    pattern = np.kron(blocks, np.ones((4, 4), int))[: shape[0], : shape[1]]
+    noise = np.random.default_rng(seed).integers(-2, 3, shape)
+    image = (0.3 + 0.4 * pattern) * (2**camera.bits - 1) + noise
+    return frozen(image.astype(np.uint8 if camera.bits <= 8 else np.uint16))

@@ -1,0 +1,292 @@
+"""A campaign: what is missing is done by workers, and all of it stands in one table.
+
+The table of a campaign: ``summary.csv`` and ``summary.parquet``, each whole or not there.
+"""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import io
+import os
+import threading
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from acquire.errors import ConfigError, DataError, PhasedicError
+from live.config.loading import load_config
+from live.pipeline.screen import Screen
+from live.replay.batch.cluster import Cluster
+from live.replay.batch.keys import key_of, longest_first
+from live.replay.batch.row import COLUMNS, BatchRow, Value, failed
+from live.replay.batch.scheduler import BatchProgress, ChunkPlan, Scheduler, cut, sweep_chunks
+from live.replay.batch.task import Task, row_done
+from live.replay.batch.test_list import BatchJob
+from live.replay.batch.workdir import sweep, sweep_whole
+from live.replay.batch.worker_processes import Pool, WorkerProcesses
+from live.setup.compiling import compile_ahead
+
+
+def write_summary(rows: Sequence[BatchRow], out: Path) -> list[Path]:
+    """Write both, in place of those of an earlier call; Parquet where pyarrow is installed.
+
+    Raises
+    ------
+    DataError
+        They cannot be written; the earlier ones stay.
+    """
+    made = {"summary.csv": as_csv(rows)}
+    if (table := as_parquet(rows)) is not None:
+        made["summary.parquet"] = table
+    for name, content in made.items():
+        _put(out / name, content)
+    return [out / name for name in made]
+
+
+def as_csv(rows: Sequence[BatchRow]) -> bytes:
+    """A line a test, with a heading; what is not known is empty."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    writer.writerows([_cell(row.values[name]) for name in COLUMNS] for row in rows)
+    return text.getvalue().encode()
+
+
+def as_parquet(rows: Sequence[BatchRow]) -> bytes | None:
+    """The same with types; None without pyarrow."""
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        return None
+    kinds = {str: pyarrow.string(), int: pyarrow.int64(), float: pyarrow.float64()}
+    schema = pyarrow.schema([(name, kinds[kind]) for name, kind in COLUMNS.items()])
+    sink = io.BytesIO()
+    parquet.write_table(pyarrow.Table.from_pylist([dict(row.values) for row in rows], schema), sink)
+    return sink.getvalue()
+
+
+def _cell(value: Value) -> Any:
+    """No program takes a word for a formula."""
+    return value.lstrip("=+-@\t ") if isinstance(value, str) else "" if value is None else value
+
+
+def _put(path: Path, content: bytes) -> None:
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        part.write_bytes(content)
+        part.replace(path)
+    except OSError as error:
+        part.unlink(missing_ok=True)
+        raise DataError(f"{path}: cannot be written ({error.strerror}); make room and call again") from error
+
+
+_LOOK_S = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignRequest:
+    """What is asked of a campaign.
+
+    Attributes
+    ----------
+    tests : sequence of BatchJob
+    out : Path
+        The folder of a test is made in it.
+    workers : int
+    config : str or None
+        A configuration for all; that of a test goes before it.
+    overrides : mapping of "section.key" to value
+        For all; those of a test go before them.
+    start_s, end_s : float or None, s
+    as_measured : bool
+    chunk_s : float or None, s
+        Cut longer sessions into chunks of about this length.
+    scheduler : str or None
+        Of a Dask cluster that does the work in the place of ``workers`` processes of this machine.
+    """
+
+    tests: Sequence[BatchJob]
+    out: Path
+    workers: int
+    config: str | None = None
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+    start_s: float | None = None
+    end_s: float | None = None
+    as_measured: bool = False
+    chunk_s: float | None = None
+    scheduler: str | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Campaign:
+    """What came out.
+
+    Attributes
+    ----------
+    rows : tuple of BatchRow
+        In the order of the tests.
+    new : int
+        Tests that were replayed now.
+    files : tuple of Path
+        The tables.
+    exit_code : int
+    """
+
+    rows: tuple[BatchRow, ...]
+    new: int
+    files: tuple[Path, ...]
+    exit_code: int
+
+
+def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Event) -> Campaign:
+    """Replay what is missing; setting ``stopping`` ends it early, without a table.
+
+    Raises
+    ------
+    ConfigError
+        The settings cannot be, or a folder holds results of other settings.
+    DataError
+        The table cannot be written.
+    """
+    load_config(Path(wanted.config) if wanted.config else None, wanted.overrides)
+    _make(wanted.out)
+    with closing(_hands(wanted)) as hands:
+        rows, tasks = _planned(wanted)
+        _sweep(wanted.out, rows, tasks)
+        ready = len(wanted.tests) - len(tasks)
+        screen.say(
+            f"{len(wanted.tests)} tests: {ready} as they are, {len(tasks)} to replay into {wanted.out}"
+        )
+        if tasks:
+            _work(wanted, longest_first(tasks), rows, screen, stopping, hands)
+    _sweep(wanted.out, rows, tasks)
+    if stopping.is_set():
+        return Campaign(tuple(rows.values()), len(tasks), (), 130)
+    found = tuple(rows[test.name] for test in wanted.tests)
+    files = write_summary(found, wanted.out)
+    code = 0 if all(row.is_well for row in found) else 5
+    return Campaign(found, len(tasks), tuple(files), code)
+
+
+def _hands(wanted: CampaignRequest) -> WorkerProcesses:
+    """Processes for what is missing at first sight: they load while this one plans."""
+    missing = sum(not (wanted.out / test.name).exists() for test in wanted.tests)
+    try:
+        return WorkerProcesses(0 if wanted.scheduler else min(wanted.workers, missing))
+    except OSError as error:
+        raise _no_process(error) from error
+
+
+def _no_process(error: OSError) -> DataError:
+    return DataError(f"no process can be started on this machine ({error.strerror}); end other programs")
+
+
+def _sweep(out: Path, rows: Mapping[str, BatchRow], tasks: Sequence[Task]) -> None:
+    """Remove what nobody works on and nobody needs."""
+    done = {name for name, row in rows.items() if row.is_done}
+    sweep(out)
+    sweep_whole(out, done)
+    sweep_chunks(out, done, {task.name: task for task in tasks})
+
+
+def _make(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ConfigError(f"{out}: cannot be made ({error.strerror}); choose another --out") from None
+
+
+def _planned(wanted: CampaignRequest) -> tuple[dict[str, BatchRow], list[Task]]:
+    """The rows there are, and the tasks that are missing."""
+    rows: dict[str, BatchRow] = {}
+    tasks: list[Task] = []
+    for test in wanted.tests:
+        task = _task(wanted, test)
+        try:
+            task = dataclasses.replace(task, key=key_of(task))
+        except PhasedicError as error:
+            rows[task.name] = failed(task.name, task.source, str(error), error.exit_code)
+            continue
+        if (row := row_done(task)) is not None:
+            rows[task.name] = row
+        else:
+            tasks.append(task)
+    taken = [str(task.folder) for task in tasks if task.folder.exists()]
+    if taken:
+        more = f" and {len(taken) - 1} more" if len(taken) > 1 else ""
+        raise ConfigError(
+            f"{taken[0]}{more}: holds results of other settings, another recording or another version; nothing is"
+            " overwritten, choose another --out"
+        )
+    return rows, tasks
+
+
+def _task(wanted: CampaignRequest, test: BatchJob) -> Task:
+    return Task(
+        name=test.name,
+        out=str(wanted.out.absolute()),
+        source=test.source,
+        config=_absolute(test.config or wanted.config),
+        reference=_absolute(test.reference),
+        forces=_absolute(test.forces),
+        start_s=wanted.start_s,
+        end_s=wanted.end_s,
+        as_measured=wanted.as_measured,
+        chunk_s=wanted.chunk_s,
+        overrides={**wanted.overrides, **test.overrides},
+    )
+
+
+def _absolute(path: str | None) -> str | None:
+    return None if path is None else str(Path(path).absolute())
+
+
+def _work(
+    wanted: CampaignRequest,
+    tasks: Sequence[Task],
+    rows: dict[str, BatchRow],
+    screen: Screen,
+    stopping: threading.Event,
+    hands: WorkerProcesses,
+) -> None:
+    standing = BatchProgress(len(tasks), time.monotonic)
+    course = Scheduler(tasks, _cuts(tasks, screen), rows, standing, screen)
+    first = course.first()
+    workers: Pool | Cluster
+    if wanted.scheduler is None:
+        _compile(hands, screen, stopping)
+        workers = Pool(first, wanted.workers, course.told, course.done, hands)
+    else:
+        workers = Cluster(first, wanted.scheduler, course.told, course.done, screen)
+    try:
+        while not workers.wait(_LOOK_S) and not stopping.is_set():
+            screen.status(standing.words())
+    finally:
+        workers.close()
+    screen.say(standing.words())
+
+
+def _compile(hands: WorkerProcesses, screen: Screen, stopping: threading.Event) -> None:
+    """Have compiled what is missing, before workers need it."""
+    try:
+        ready = hands.are_ready()
+    except OSError as error:
+        raise _no_process(error) from error
+    if not ready:
+        from analysis import PICTURE_KINDS
+
+        compile_ahead(PICTURE_KINDS, phase=True, say=screen.status, stopped=stopping.is_set)
+
+
+def _cuts(tasks: Sequence[Task], screen: Screen) -> dict[str, ChunkPlan]:
+    """The chunks of those that are to be cut; said where one cannot be."""
+    found = {task.name: cut(task) for task in tasks if task.chunk_s is not None}
+    for name, one in found.items():
+        if one.why:
+            screen.say(f"{name}: done whole: {one.why}")
+    return found

@@ -1,0 +1,153 @@
+"""A test in one line of the table: settings, figures with their intervals, noise, losses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from acquire.printable import printable
+from analysis.evaluate import TensileFigures
+from live.config.loading import Config
+from live.pipeline.history import History
+from live.replay.replay import Replayed
+from live.results import Strain, still_phase_of
+from live.results.figures import evaluate, headline
+
+Value = str | int | float | None
+COLUMNS: dict[str, type] = {
+    "test": str, "source": str, "outcome": str, "exit_code": int, "error": str,
+    "zoi_px": int, "step_px": int, "burst": int, "order": int, "window": str, "estimator": str, "strain": str,
+    "instants": int, "zois": int, "valid_last": int,
+    **{f"{name}{end}": float for name in ("E_GPa", "nu", "Rp0.2_MPa", "Rm_MPa", "EA_kN", "Fp0.2_kN", "Fm_kN")
+       for end in ("", "_low", "_high")},
+    "noise_GL": float, "strain_noise": float, "mean_strain_noise": float,
+    "still_instants": int, "strain_noise_measured": float,
+    "frames_lost": int, "pictures_left_out": int, "seconds": float,
+}  # fmt: skip
+"""Name of each column, with its kind; a number that is not known is empty."""
+RENEWED = "renewed"  # outcome of a chunk that cannot stand in the place of its part of the whole
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BatchRow:
+    """One test; ``values`` has all of ``COLUMNS``."""
+
+    values: Mapping[str, Value]
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> BatchRow:
+        """With the columns there are, in their order; what is of another kind is left empty."""
+        return cls({name: _fitting(values.get(name), kind) for name, kind in COLUMNS.items()})
+
+    @property
+    def is_well(self) -> bool:
+        """Whether nothing is missing."""
+        return self.values["exit_code"] == 0
+
+    @property
+    def is_done(self) -> bool:
+        """Whether there are results."""
+        return self.values["outcome"] != "failed"
+
+    @property
+    def words(self) -> str:
+        """Name and what went wrong, in a line."""
+        return f"{self.values['test']}: {self.values['outcome']}: {self.values['error']}"
+
+
+def failed(name: str, source: str, error: str, exit_code: int) -> BatchRow:
+    """The row of a test without results."""
+    found = {"test": name, "source": source, "outcome": "failed", "exit_code": exit_code, "error": error}
+    return BatchRow.of(found)
+
+
+def row_of_chunk(name: str, source: str, as_the_whole: bool, seconds: float) -> BatchRow:
+    """The row of a chunk, which comes into no table."""
+    outcome = "done" if as_the_whole else RENEWED
+    found = {"test": name, "source": source, "outcome": outcome, "exit_code": 0}
+    return BatchRow.of({**found, "seconds": round(seconds, 3)})
+
+
+def row_of(name: str, source: str, done: Replayed, seconds: float) -> BatchRow:
+    """The row of a test that was replayed."""
+    history, code = done.books.history, done.exit_code
+    said = (
+        "" if code == 0 else "; ".join(done.lines[:1]) if history.told_something else "nothing was measured"
+    )
+    return BatchRow.of(
+        {
+            "test": name,
+            "source": source,
+            "outcome": "done" if code == 0 else "with loss",
+            "exit_code": code,
+            "error": said,
+            **_settings(done.config),
+            "burst": done.config.measure.burst or _burst(done),
+            **_counts(history),
+            **_figures(evaluate(history, done.books.loads, done.config.specimen), done.config),
+            **_noise(history),
+            **_noise_floor(done.folder / "strain.h5"),
+            "frames_lost": done.books.ledger.lost,
+            "pictures_left_out": done.left_out,
+            "seconds": round(seconds, 3),
+        }
+    )
+
+
+def _settings(config: Config) -> dict[str, Any]:
+    measure = config.measure
+    names = ("order", "window", "estimator", "strain")
+    found = {name: getattr(measure, name) for name in names}
+    return {"zoi_px": measure.zoi, "step_px": measure.step, **found}
+
+
+def _burst(done: Replayed) -> int | None:
+    """Frames in a burst where nobody said how many."""
+    instants = len(done.books.history.instants)
+    return round(done.books.ledger.measured / instants) if instants else None
+
+
+def _counts(history: History) -> dict[str, Any]:
+    last = history.instants[-1] if history.instants else None
+    found: dict[str, Any] = {"instants": len(history.instants)}
+    return found if last is None else {**found, "zois": last.n_zoi, "valid_last": last.n_valid}
+
+
+def _figures(figures: TensileFigures, config: Config) -> dict[str, float]:
+    """Stresses where the section is known, else forces."""
+    rows = headline(figures, stresses=config.specimen.area_m2 is not None)
+    parts = {"": "value", "_low": "low", "_high": "high"}
+    return {row.column + end: getattr(row.figure, part) for row in rows for end, part in parts.items()}
+
+
+def _noise(history: History) -> dict[str, float]:
+    """Typical of the test: of one frame, of one ZOI's strain and of the mean strain, as predicted."""
+    columns = {"noise_GL": "noise_GL", "strain_noise": "zoi_sigma", "mean_strain_noise": "sigma_eyy"}
+    return {name: _median(history, column) for name, column in columns.items()}
+
+
+def _noise_floor(results: Path) -> dict[str, Any]:
+    """The still phase, and the scatter of one ZOI's eyy in it."""
+    with Strain.open(results) as strain:
+        still = still_phase_of(strain, ("eyy",))
+    floor = still.floors.get("eyy")
+    return {"still_instants": still.instants, "strain_noise_measured": floor and floor.measured}
+
+
+def _median(history: History, column: str) -> float:
+    values = history.column(column)
+    values = values[np.isfinite(values)]
+    return float(np.median(values)) if values.size else math.nan
+
+
+def _fitting(value: Any, kind: type) -> Value:
+    if kind is str:
+        return "" if value is None else printable(value)
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        return None
+    return int(value) if kind is int else float(value)

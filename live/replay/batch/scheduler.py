@@ -1,0 +1,238 @@
+"""What follows what in a campaign: chunks, then what joins them; a test whole where its chunks cannot stand for it.
+
+A long session as chunks for several workers: where it is cut, and where what they give waits for the others.
+
+The kernel of a chunk has not seen what came before it; the difference dies away within some instants, which are
+measured before the chunk and thrown away. What waits lies in ``.NAME.KEY.chunks`` and goes once the test is whole.
+
+How far a campaign is, in one line.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import PhasedicError
+from acquire.printable import duration
+from live.pipeline.screen import Screen
+from live.replay.batch.keys import is_session, key_of_chunk
+from live.replay.batch.row import RENEWED, BatchRow, failed
+from live.replay.batch.task import Task, TaskProgress
+from live.replay.batch.workdir import parts, remove
+from live.replay.opening import open_material
+
+RUN_IN = 20  # instants; after them 0.0004 sigma is left of a first difference of 0.011
+LEAST = 100  # instants of a chunk, so that the run-in costs a fifth at most
+_SUFFIX = ".chunks"
+
+
+@dataclass(frozen=True, slots=True)
+class ChunkPlan:
+    """The chunks of a test; without any it is done whole, ``why`` where that is not for its shortness."""
+
+    chunks: tuple[Task, ...] = ()
+    why: str = ""
+
+
+def cut(task: Task) -> ChunkPlan:
+    """Chunks of about ``task.chunk_s`` of at least ``LEAST`` instants, each with its run-in."""
+    assert task.chunk_s is not None
+    if not is_session(task.source):
+        return ChunkPlan(why="pictures are not cut")
+    try:
+        with open_material(task.request(task.folder)) as (material, _):
+            times = material.times
+    except PhasedicError:
+        return ChunkPlan()  # the replay will tell
+    if times is None:  # --as-measured, which the command refuses beside --chunk
+        return ChunkPlan()
+    edges = [0, *_edges(times, task.chunk_s), len(times)]
+    pairs = list(itertools.pairwise(edges))
+    return ChunkPlan(tuple(_chunk(task, k, a, b) for k, (a, b) in enumerate(pairs)) if len(pairs) > 1 else ())
+
+
+def _edges(times: NDArray[np.float64], seconds: float) -> Iterator[int]:
+    """Numbers of the bursts that chunks begin with, but for the first."""
+    begun = 0
+    for number in (np.flatnonzero(np.diff((times - times[:1]) // seconds)) + 1).tolist():
+        if number - begun >= LEAST and len(times) - number >= LEAST:
+            begun = number
+            yield number
+
+
+def _chunk(task: Task, number: int, first: int, stop: int) -> Task:
+    begin = max(0, first - RUN_IN)
+    chunk = dataclasses.replace(
+        task,
+        name=f"{number:04d}",
+        of=task.name,
+        out=str(_place(task)),
+        numbers=(begin, stop),
+        run_in=first - begin,
+    )
+    return dataclasses.replace(chunk, key=key_of_chunk(chunk))
+
+
+def joined(task: Task, found: ChunkPlan) -> Task:
+    """The task that makes one result of all chunks."""
+    return dataclasses.replace(task, chunks=[str(chunk.folder) for chunk in found.chunks])
+
+
+def _place(task: Task) -> Path:
+    return Path(task.out) / f".{task.name}.{task.key[:12]}{_SUFFIX}"
+
+
+def sweep_chunks(out: Path, done: set[str], missing: Mapping[str, Task]) -> None:
+    """Remove the chunks of tests that are ``done``, and those of other settings of the ``missing``; none at work."""
+    for path in sorted(out.glob(f".*{_SUFFIX}")):
+        name = path.name[1:].removesuffix(_SUFFIX).rpartition(".")[0]
+        outdated = name in done or (name in missing and path != _place(missing[name]))
+        if outdated and all(part.is_stale for part in parts(path)):
+            remove(path)
+
+
+class BatchProgress:
+    """Counts what workers tell, from any thread.
+
+    Parameters
+    ----------
+    tests : int
+        To be replayed.
+    now : callable giving s
+    """
+
+    def __init__(self, tests: int, now: Callable[[], float]) -> None:
+        self._tests, self._now, self._began = tests, now, now()
+        self._ended = 0
+        self._shares: dict[str, float] = {}
+        self._last: dict[str, TaskProgress] = {}
+        self._done: set[str] = set()
+        self._lock = threading.Lock()
+
+    def expect(self, title: str, share: float = 1.0) -> None:
+        """The task ``title`` is that share of a test."""
+        with self._lock:
+            self._shares[title] = share
+
+    def told(self, title: str, progress: TaskProgress) -> None:
+        """How far that task is."""
+        with self._lock:
+            self._last[title] = progress
+
+    def done(self, title: str) -> None:
+        """It has come to its end."""
+        with self._lock:
+            self._done.add(title)
+
+    def ended(self) -> None:
+        """A test has."""
+        with self._lock:
+            self._ended += 1
+
+    def words(self) -> str:
+        """Sessions, instants, ZOIs a second and the time that is left."""
+        with self._lock:
+            took = self._now() - self._began
+            instants = sum(progress.done for progress in self._last.values())
+            zois = sum(progress.zois for progress in self._last.values())
+            share = sum(share * self._part(title) for title, share in self._shares.items()) / self._tests
+        left = f"  {duration(took * (1 - share) / share)} left" if 0 < share < 1 else ""
+        rate = f"  {zois / took:,.0f} ZOI/s" if took > 0 else ""
+        return f"{self._ended} of {self._tests} tests  {instants} instants{rate}{left}"
+
+    def _part(self, title: str) -> float:
+        """How much of a task is done."""
+        last = self._last.get(title)
+        if title in self._done or last is None or not last.expected:
+            return float(title in self._done)
+        return min(1.0, last.done / last.expected)
+
+
+class Scheduler:
+    """Told of every task that is done, from any thread.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+        One a test.
+    cuts : mapping of name to ChunkPlan
+        The tests that are cut.
+    rows : dict of name to BatchRow
+        Filled as tests come to their end.
+    standing : BatchProgress
+    screen : Screen
+    """
+
+    def __init__(
+        self,
+        tasks: Sequence[Task],
+        cuts: Mapping[str, ChunkPlan],
+        rows: dict[str, BatchRow],
+        standing: BatchProgress,
+        screen: Screen,
+    ) -> None:
+        self._tests = {task.name: task for task in tasks}
+        self._cuts = {name: found for name, found in cuts.items() if found.chunks}
+        self._left = {name: {chunk.name for chunk in found.chunks} for name, found in self._cuts.items()}
+        self._rows, self._standing, self._screen = rows, standing, screen
+        self._lock = threading.Lock()
+
+    def first(self) -> list[Task]:
+        """What can be done at once."""
+        found: list[Task] = []
+        for name, task in self._tests.items():
+            pieces = self._cuts[name].chunks if name in self._cuts else (task,)
+            for piece in pieces:
+                self._standing.expect(piece.title, 1 / len(pieces))
+            found += pieces
+        return found
+
+    def told(self, task: Task, progress: TaskProgress) -> None:
+        """How far a task is."""
+        if not task.chunks:  # its chunks have told all that
+            self._standing.told(task.title, progress)
+
+    def done(self, task: Task, row: BatchRow) -> Sequence[Task]:
+        """It has come to its end; what can be done now."""
+        self._standing.done(task.title)
+        if task.of:
+            with self._lock:
+                return self._chunk_done(task, row)
+        self._end(task.name, row)
+        return ()
+
+    def _end(self, name: str, row: BatchRow) -> None:
+        self._rows[name] = row
+        self._standing.ended()
+        if not row.is_well:
+            self._screen.say(row.words)
+
+    def _chunk_done(self, task: Task, row: BatchRow) -> Sequence[Task]:
+        name = task.of
+        if name not in self._left:
+            return ()  # it has failed, or is done whole
+        if row.values["outcome"] == RENEWED:
+            return self._whole(name)
+        if not row.is_done:
+            del self._left[name]
+            code = int(row.values["exit_code"] or 1)
+            self._end(name, failed(name, task.source, str(row.values["error"]), code))
+            return ()
+        self._left[name].discard(task.name)
+        return () if self._left[name] else [joined(self._tests[name], self._cuts[name])]
+
+    def _whole(self, name: str) -> Sequence[Task]:
+        del self._left[name]
+        self._screen.say(f"{name}: a reference was renewed in it; it is not cut, but done whole")
+        for chunk in self._cuts[name].chunks:
+            self._standing.expect(chunk.title, 0)
+        self._standing.expect(name)
+        return [self._tests[name]]

@@ -1,0 +1,215 @@
+"""Which tests there are: sessions, folders of pictures, or a list of what belongs together.
+
+A list in CSV has a heading, a list in TOML a table ``[[test]]`` for each: ``source``, and where they differ from
+test to test ``name``, ``config``, ``reference``, ``load`` (all but the name relative to the list), and keys of the
+configuration such as ``specimen.width_mm``.
+"""
+
+from __future__ import annotations
+
+import csv
+import tomllib
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from acquire.addresses import parse_address
+from acquire.errors import ConfigError, DataError
+from acquire.files.picture import read_bytes
+from acquire.printable import printable
+
+LISTS = (".toml", ".csv")
+_PICTURES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")
+_OWN = ("source", "name", "config", "reference", "load")
+_SESSION = "session.h5"
+
+
+@dataclass(frozen=True, slots=True)
+class BatchJob:
+    """One test.
+
+    Attributes
+    ----------
+    name : str
+        Of the folder of its results; no two are the same.
+    source : str
+        A session, or an address of pictures.
+    config, reference, forces : str or None
+        Files of its own.
+    overrides : mapping of "section.key" to value
+    """
+
+    name: str
+    source: str
+    config: str | None = None
+    reference: str | None = None
+    forces: str | None = None
+    overrides: Mapping[str, Any] = field(default_factory=dict)
+
+
+def find_tests(words: Sequence[str]) -> list[BatchJob]:
+    """The tests that ``words`` name: paths, globs, addresses, or lists.
+
+    Raises
+    ------
+    ConfigError
+        There is none, one is no test, or two have one name in a list.
+    DataError
+        A list cannot be read.
+    """
+    found: list[dict[str, Any]] = []
+    for word in words:
+        path = Path(word)
+        if path.suffix.lower() in LISTS:
+            found += [_from_list(path, number, row) for number, row in enumerate(_rows(path), 1)]
+        else:
+            found += [{"source": source} for source in _sources(word)]
+    given = {row["source"]: row for row in reversed(found)}  # the same twice is one
+    rows = [row for row in found if given[row["source"]] is row or "name" in row]
+    return _named(rows)
+
+
+# -- paths --------------------------------------------------------------------------------------
+
+
+def _sources(word: str) -> Iterator[str]:
+    scheme = parse_address(word).scheme
+    if scheme and scheme != "session" and not Path(word).exists():
+        yield word
+        return
+    path = Path(word.removeprefix("session:")).expanduser()
+    pattern = str(path.relative_to(path.anchor))
+    paths = [path] if path.exists() else sorted(Path(path.anchor).glob(pattern))
+    if not paths:
+        raise ConfigError(f"{word}: no session and no folder of pictures is there; check the path")
+    for path in paths:
+        yield str(_source(path).absolute())
+
+
+def _source(path: Path) -> Path:
+    if path.is_dir():
+        return path / _SESSION if (path / _SESSION).exists() else path
+    if path.suffix.lower() in _PICTURES:
+        raise ConfigError(f"{path}: is one picture; give the folder it lies in, or 'files:{path.parent}/*'")
+    return path
+
+
+# -- names --------------------------------------------------------------------------------------
+
+
+def _named(rows: Sequence[Mapping[str, Any]]) -> list[BatchJob]:
+    names = [str(row.get("name") or _short(row["source"], 1)) for row in rows]
+    twice = {name for name, n in Counter(names).items() if n > 1}
+    names = [
+        _short(row["source"], 2) if name in twice and "name" not in row else name
+        for row, name in zip(rows, names, strict=True)
+    ]
+    for name, n in Counter(names).items():
+        if n > 1:
+            raise ConfigError(f"{n} tests are called {name}; give them names in a list (--help)")
+        if printable(name) != name or "/" in name or name.startswith(".") or name in ("summary.csv",):
+            raise ConfigError(f"{name!r}: a test cannot be called that; give it another name in a list")
+    return [BatchJob(name, **_without_name(row)) for row, name in zip(rows, names, strict=True)]
+
+
+def _without_name(row: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in row.items() if key != "name"}
+
+
+def _short(source: str, n: int) -> str:
+    """The last ``n`` folders of a path, or the name of the file."""
+    path = Path(parse_address(source).target)
+    parts = path.parts[:-1] if path.name == _SESSION or "*" in path.name else (*path.parts[:-1], path.stem)
+    return "-".join(part for part in parts[-n:] if part not in ("/", "..", "."))
+
+
+# -- lists --------------------------------------------------------------------------------------
+
+
+def _rows(path: Path) -> list[dict[str, Any]]:
+    try:
+        text = read_bytes(path).decode("utf-8-sig")
+        rows = _toml(text) if path.suffix.lower() == ".toml" else _csv(text)
+    except (UnicodeDecodeError, csv.Error, ValueError, RecursionError) as error:
+        raise DataError(f"{path}: the list cannot be read: {error}") from None
+    if not rows:
+        raise DataError(f"{path}: lists no test; wanted: [[test]] tables, or a CSV with a column source")
+    return rows
+
+
+def _toml(text: str) -> list[dict[str, Any]]:
+    tables = tomllib.loads(text).get("test")
+    if not isinstance(tables, list):
+        return []
+    return [_flat(table) for table in tables if isinstance(table, Mapping)]
+
+
+def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
+    """``specimen.width_mm = 20`` and a table in it are the same."""
+    found: dict[str, Any] = {}
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            found |= {f"{key}.{inner}": one for inner, one in value.items()}
+        else:
+            found[key] = value
+    return found
+
+
+def _csv(text: str) -> list[dict[str, Any]]:
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    parting = ";" if lines and ";" in lines[0] else ","
+    rows = csv.DictReader(lines, delimiter=parting, strict=True)
+    return [
+        {
+            key.strip(): _value(key, cell.strip())
+            for key, cell in row.items()
+            if isinstance(cell, str) and cell
+        }
+        for row in rows
+        if None not in row or _refuse(row)
+    ]
+
+
+def _refuse(row: Mapping[Any, Any]) -> bool:
+    raise ValueError(f"a line has more cells than the heading: {', '.join(map(str, row.values()))[:60]}")
+
+
+def _value(key: str, cell: str) -> Any:
+    """A setting is a number or a list where it reads like one in TOML, else text."""
+    if "." not in key:
+        return cell
+    try:
+        return tomllib.loads(f"value = {cell}")["value"]
+    except tomllib.TOMLDecodeError:
+        return cell
+
+
+def _from_list(path: Path, number: int, row: Mapping[str, Any]) -> dict[str, Any]:
+    unknown = [key for key in row if key not in _OWN and "." not in key]
+    if unknown or not isinstance(row.get("source"), str):
+        what = f"unknown: {', '.join(unknown)}" if unknown else "no source"
+        raise ConfigError(
+            f"{path}: test {number}: {what}; there are {', '.join(_OWN)} and keys such as specimen.width_mm"
+        )
+    beside = {key: _beside(path, str(row[key])) for key in _OWN if key in row and key != "name"}
+    beside["source"] = (
+        str(_source(Path(beside["source"]))) if _is_path(beside["source"]) else beside["source"]
+    )
+    if "load" in beside:
+        beside["forces"] = beside.pop("load")
+    found: dict[str, Any] = {**beside, "overrides": {key: row[key] for key in row if "." in key}}
+    return found | ({"name": str(row["name"])} if "name" in row else {})
+
+
+def _is_path(source: str) -> bool:
+    return not parse_address(source).scheme
+
+
+def _beside(path: Path, word: str) -> str:
+    """Relative to the list; addresses of pictures too."""
+    address = parse_address(word)
+    scheme = f"{address.scheme}:" if address.scheme else ""
+    rest = word.removeprefix(scheme)
+    return f"{scheme}{(path.absolute().parent / Path(rest).expanduser())}"

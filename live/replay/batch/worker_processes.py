@@ -1,0 +1,228 @@
+"""Worker processes, as their caller sees them: given a task at a time, killed, ended.
+
+Each is a Python of its own with one thread for the numerics (the libraries read that before they are imported). To fork
+them off from one that has loaded everything was tried: as many as there are cores load it in the same time.
+
+Worker processes of this machine, one task at a time each; one that dies is replaced and its task done again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+
+from acquire.held_back import held_back
+from live.replay.batch.row import BatchRow, failed
+from live.replay.batch.task import Task, TaskProgress
+from live.replay.batch.worker import ONE_THREAD
+
+# Of glibc: what one task leaves free goes back to the system before the next one.
+_LEAN = {
+    "MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "6000000", "MALLOC_TRIM_THRESHOLD_": "20000000",
+}  # fmt: skip
+_LAST_S = 5.0
+
+Told = Callable[[Task, TaskProgress], object]
+
+
+class WorkerProcesses:
+    """``count`` processes that load their libraries while it is found out what there is to do."""
+
+    def __init__(self, count: int) -> None:
+        self._idle = deque(WorkerProcess() for _ in range(count))
+
+    def are_ready(self) -> bool:
+        """Whether all loops are compiled on this machine; waits until a worker has looked.
+
+        Raises
+        ------
+        OSError
+            No process can be started.
+        """
+        if not self._idle:
+            self._idle.append(WorkerProcess())
+        return self._idle[0].is_ready()
+
+    def take(self) -> WorkerProcess:
+        """One of them, or a new one where none is left.
+
+        Raises
+        ------
+        OSError
+            No process can be started.
+        """
+        try:
+            return self._idle.popleft()
+        except IndexError:
+            return WorkerProcess()
+
+    def close(self) -> None:
+        """Let go of those that nobody took."""
+        while self._idle:
+            worker = self._idle.popleft()
+            worker.kill()
+            worker.end()
+
+
+class WorkerProcess:
+    """One process; raises OSError where it cannot be started."""
+
+    def __init__(self) -> None:
+        with held_back(signal.SIGINT):
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "live.replay.batch.worker"],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                env=_LEAN | os.environ | dict.fromkeys(ONE_THREAD, "1"),
+                text=True,
+                encoding="utf-8",
+            )
+        self.pid = self._process.pid
+
+    def is_ready(self) -> bool:
+        """Its first word, whether it finds all loops compiled; False where it died before."""
+        assert self._process.stdout is not None
+        try:
+            return bool(json.loads(self._process.stdout.readline()).get("compiled"))
+        except (OSError, ValueError):
+            return False
+
+    def perform(self, task: Task, told: Told) -> BatchRow | None:
+        """The row of ``task``; None where the process died over it."""
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        try:
+            self._process.stdin.write(task.to_json() + "\n")
+            self._process.stdin.flush()
+            for line in self._process.stdout:
+                message = json.loads(line)
+                if "row" in message:
+                    return BatchRow.of(message["row"])
+                if "progress" in message:
+                    told(task, TaskProgress(**message["progress"]))
+        except (OSError, ValueError):  # half a line is the last word of a process that was killed
+            pass
+        return None
+
+    def kill(self) -> None:
+        """At once."""
+        self._process.kill()
+
+    def end(self) -> None:
+        """Let it go; it ends where nothing comes any more."""
+        for stream in (self._process.stdin, self._process.stdout):
+            if stream is not None:
+                with contextlib.suppress(OSError):
+                    stream.close()
+        try:
+            self._process.wait(_LAST_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+
+log = logging.getLogger(__name__)
+MOST_DEATHS = 3
+
+Done = Callable[[Task, BatchRow], Sequence[Task]]
+"""Of a task that is done; gives those that can be done now."""
+
+
+class Pool:
+    """``workers`` processes at work on ``tasks``; ``told`` and ``done`` are called from threads.
+
+    A task whose worker died three times is a failed row; those of other workers go on untouched. The
+    processes come from ``hands``; whoever made that closes it.
+    """
+
+    def __init__(
+        self, tasks: Sequence[Task], workers: int, told: Told, done: Done, hands: WorkerProcesses
+    ) -> None:
+        self._hands = hands
+        self._waiting, self._deaths = deque(tasks), dict.fromkeys((task.title for task in tasks), 0)
+        self._told, self._done = told, done
+        self._stopped = threading.Event()
+        self._workers: set[WorkerProcess] = set()
+        self._lock = threading.Lock()
+        n = min(workers, len(tasks))
+        self._threads = [threading.Thread(target=self._serve, name="worker", daemon=True) for _ in range(n)]
+        for thread in self._threads:
+            thread.start()
+
+    def wait(self, seconds: float) -> bool:
+        """Whether all is done within ``seconds``."""
+        for thread in self._threads:
+            thread.join(seconds / len(self._threads))
+        return not any(thread.is_alive() for thread in self._threads)
+
+    def close(self) -> None:
+        """End all workers, in the middle of a task too."""
+        self._stopped.set()
+        with self._lock:
+            for worker in self._workers:
+                worker.kill()
+        for thread in self._threads:
+            thread.join()
+
+    def _serve(self) -> None:
+        worker: WorkerProcess | None = None
+        try:
+            while (task := self._next()) is not None:
+                worker = worker or self._new()
+                row = worker.perform(task, self._told) if worker is not None else None
+                if row is None:
+                    self._end(worker)
+                    worker, row = None, self._after_death(task)
+                if row is not None:
+                    self._add(self._done(task, row))
+        finally:
+            self._end(worker)
+
+    def _next(self) -> Task | None:
+        with self._lock:
+            return self._waiting.popleft() if self._waiting and not self._stopped.is_set() else None
+
+    def _add(self, tasks: Sequence[Task]) -> None:
+        with self._lock:
+            self._deaths |= dict.fromkeys((task.title for task in tasks), 0)
+            self._waiting.extendleft(tasks)
+
+    def _new(self) -> WorkerProcess | None:
+        """None where no process can be started."""
+        try:
+            worker = self._hands.take()
+        except OSError as error:
+            log.error("no worker could be started: %s", error)
+            return None
+        with self._lock:
+            self._workers.add(worker)
+        if self._stopped.is_set():
+            worker.kill()
+        return worker
+
+    def _end(self, worker: WorkerProcess | None) -> None:
+        if worker is None:
+            return
+        worker.end()
+        with self._lock:
+            self._workers.discard(worker)
+
+    def _after_death(self, task: Task) -> BatchRow | None:
+        """Once more, as the last of all; None then."""
+        if self._stopped.is_set():
+            return None
+        self._deaths[task.title] += 1
+        if self._deaths[task.title] < MOST_DEATHS:
+            with self._lock:
+                self._waiting.append(task)
+            return None
+        words = f"its worker died {MOST_DEATHS} times; is there memory enough for --workers?"
+        return failed(task.title, task.source, words, 1)

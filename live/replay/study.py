@@ -1,0 +1,303 @@
+"""A study of settings: what each shows of the strain, and with how much noise (the VSG study of the iDICs guide).
+
+Only the bursts of a still and of a loaded window are measured. A largest value is one of noise too where noise
+is large; so the ZOI is looked for in one half of the bursts and read in the other, less its value when still,
+which takes the noise of the reference off.
+
+Bursts of a still and of a loaded window, kept to be measured with many settings.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import ConfigError, DataError
+from acquire.frame import Burst
+from analysis.evaluate import FEWEST_STILL, evenly, noise_floor, still_phase
+from analysis.quality.exposure import gauge_length, l10_strain
+from live.config.loading import Config
+from live.pipeline.reference import averaged
+from live.replay.source import ReplaySource
+from live.setup.pictures import read_mask
+from live.setup.prepared import MeasurePlan
+
+if TYPE_CHECKING:
+    from analysis.field import StrainField
+
+_LOADED_FORCE = 0.98  # of the highest
+MOST_STILL, MOST_LOADED = 8, 6
+LEAST_STILL, LEAST_LOADED = FEWEST_STILL, 2
+
+Seconds = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Windows:
+    """Averaged bursts.
+
+    Attributes
+    ----------
+    still, loaded : tuple of Burst
+        At least two each; no still ones where there were none.
+    """
+
+    still: tuple[Burst, ...]
+    loaded: tuple[Burst, ...]
+
+
+NEVER: Seconds = (math.inf, -math.inf)
+"""The still window of a test in which nothing was still."""
+
+
+def take_windows(material: ReplaySource, still: Seconds | None, loaded: Seconds | None) -> Windows:
+    """Read the bursts of both windows, s since the start; without one, as the force tells it; ``NEVER`` for none.
+
+    Raises
+    ------
+    DataError
+        There are not enough bursts in one, or no force tells it.
+    """
+    told = (still or still_window(material), loaded or _loaded(material))
+    found: tuple[list[Burst], list[Burst]] = ([], [])
+    for item in material.bursts:
+        if not isinstance(item, Burst):
+            raise DataError("the reference was renewed in this session; a study needs one without")
+        t = item.t - material.start.monotonic
+        for (low, high), bursts in zip(told, found, strict=True):
+            if low <= t <= high:
+                bursts.append(item)
+        if t > max(high for _, high in told):
+            break
+    for name, bursts, least, (low, high) in zip(
+        ("static", "loaded"), found, (LEAST_STILL, LEAST_LOADED), told, strict=True
+    ):
+        if len(bursts) < least and (low, high) != NEVER:
+            raise DataError(
+                f"{len(bursts)} bursts from {low:.3g} to {high:.3g} s, {least} are needed; give --{name} A,B"
+            )
+    return Windows(_spread(found[0], MOST_STILL), _spread(found[1], MOST_LOADED))
+
+
+def _untold(option: str) -> DataError:
+    return DataError(f"no force tells when it was still and when loaded; give --{option} A,B in seconds")
+
+
+def _forces(material: ReplaySource, option: str) -> tuple[np.ndarray, np.ndarray]:
+    t, force = material.loads.arrays()
+    if not len(t) or not np.isfinite(force).any():
+        raise _untold(option)
+    return t - material.start.monotonic, force
+
+
+def still_window(material: ReplaySource) -> Seconds:
+    """The still phase by the force at the bursts, as report and batch find it once they are measured.
+
+    Raises
+    ------
+    DataError
+        No force tells it.
+    """
+    times = np.zeros(0) if material.times is None else material.times
+    count = still_phase(material.loads.forces_one_zero(times.tolist()))
+    if not count:
+        raise _untold("static")
+    return -math.inf, float(times[count - 1]) - material.start.monotonic
+
+
+def _loaded(material: ReplaySource) -> Seconds:
+    """About the highest force, for as long as it stays near it."""
+    t, force = _forces(material, "loaded")
+    high = np.abs(force) >= _LOADED_FORCE * np.nanmax(np.abs(force))
+    top = low = int(np.nanargmax(np.abs(force)))
+    while low > 0 and high[low - 1]:
+        low -= 1
+    while top + 1 < len(t) and high[top + 1]:
+        top += 1
+    return float(t[low]), float(t[top])
+
+
+def _spread(bursts: Sequence[Burst], most: int) -> tuple[Burst, ...]:
+    """At most ``most`` of them, evenly."""
+    return tuple(bursts[row] for row in evenly(len(bursts), most))
+
+
+Array = NDArray[np.float64]
+KEEPS = 0.95  # of the largest strain
+TOLD = 3.0  # sigmas above which a strain is told from noise
+
+
+@dataclass(frozen=True, slots=True)
+class StudySetting:
+    """One of the settings tried."""
+
+    zoi: int
+    step: int
+    order: int
+    window: str
+
+    @property
+    def words(self) -> str:
+        """In a line."""
+        return f"{self.zoi} px ZOIs, step {self.step}, order {self.order}, {self.window}"
+
+
+@dataclass(frozen=True, slots=True)
+class StudyResult:
+    """What one setting gave; strains dimensionless.
+
+    Attributes
+    ----------
+    setting : StudySetting
+    noise, predicted : float
+        Standard deviation of the strain along the load of one ZOI, over the ZOIs of still instants; the same as
+        predicted where nothing was still.
+    measured : bool
+        Whether something was.
+    l10, vsg : float, px
+        Period of a strain that has lost 10 %; side of the square with the same noise.
+    seen, sigma : float
+        Largest strain along the load under load, its noise taken off, and its standard uncertainty.
+    gradient : float, 1/px
+        Largest difference of neighbours over their distance, in the same way.
+    valid : float
+        Share of the ZOIs that have a value under load.
+    """
+
+    setting: StudySetting
+    noise: float
+    predicted: float
+    l10: float
+    vsg: float
+    seen: float
+    sigma: float
+    gradient: float
+    valid: float
+    measured: bool = True
+
+    @property
+    def is_told(self) -> bool:
+        """Whether the strain stands out of its noise."""
+        return self.seen >= TOLD * self.sigma
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """The setting to take, and why."""
+
+    found: StudyResult
+    why: str
+
+
+def study(
+    material: ReplaySource, windows: Windows, config: Config, settings: Sequence[StudySetting]
+) -> Iterator[StudyResult]:
+    """Measure both windows with one setting after the other.
+
+    Raises
+    ------
+    ConfigError, DataError
+        As for a replay with such a setting; also where no ZOI has a value in both windows.
+    """
+    for setting in settings:
+        measure = dataclasses.replace(config.measure, **dataclasses.asdict(setting))
+        one = dataclasses.replace(config, measure=measure, gauges={})  # none is read
+        yield _found(setting, one.specimen.axis, *_fields(material, windows, one))
+
+
+def _fields(
+    material: ReplaySource, windows: Windows, config: Config
+) -> tuple[list[StrainField], list[StrainField]]:
+    camera = material.camera
+    mask = read_mask(config.measure.mask, camera.width, camera.height)
+    ready = MeasurePlan.of(config, camera, mask).on(material.reference)
+
+    def measured(bursts: Sequence[Burst]) -> list[StrainField]:
+        start, found = None, []
+        for burst in map(ready.plan.correct, bursts):
+            noise = averaged(ready.noise_GL, burst.n)
+            start = ready.kernel.measure(burst.mean, start=start, noise=noise, clipped=burst.clipped)
+            found.append(dataclasses.replace(start, measure=cast(Any, config.measure.strain)))
+        return found
+
+    return measured(windows.still), measured(windows.loaded)
+
+
+def _found(
+    setting: StudySetting, axis: str, still: list[StrainField], loaded: list[StrainField]
+) -> StudyResult:
+    name = "exx" if axis == "x" else "eyy"
+    pulled = _stacked(loaded, name)
+    at_rest = _stacked(still, name) if still else np.zeros((2, *pulled.shape[1:]))
+    known = np.isfinite(at_rest).all(0) & np.isfinite(pulled).all(0)
+    if known.sum() < 2:
+        raise ConfigError(f"{setting.words}: fewer than two ZOIs have a value in both windows; leave it out")
+    sigmas = _stacked(still or loaded, f"sigma_{name}")
+    predicted = math.sqrt(float(np.mean(sigmas[:, known] ** 2)))
+    floor = noise_floor(zip(np.where(known, at_rest, np.nan), sigmas, strict=True)) if still else None
+    noise = predicted if floor is None else floor.measured
+    first, second = (np.where(known, pulled[k::2].mean(0) - at_rest[k::2].mean(0), np.nan) for k in (0, 1))
+    grid = loaded[0].grid
+    share = 1 / len(pulled[1::2]) + (1 / len(still[1::2]) if still else 0)
+    return StudyResult(
+        setting=setting,
+        noise=noise,
+        predicted=predicted,
+        l10=l10_strain(setting.zoi, cast(Any, setting.window)),
+        vsg=gauge_length(setting.zoi, cast(Any, setting.window)),
+        seen=_largest(first, second),
+        sigma=noise * math.sqrt(share),
+        gradient=max(_largest(np.diff(first, axis=k), np.diff(second, axis=k)) for k in (0, 1)) / grid.step,
+        valid=float(np.isfinite(pulled).all(0).sum() / max(1, grid.n_active)),
+        measured=bool(still),
+    )
+
+
+def _stacked(fields: Sequence[StrainField], name: str) -> Array:
+    return np.stack([np.asarray(getattr(field, name), np.float64) for field in fields])
+
+
+def _largest(first: Array, second: Array) -> float:
+    """The place is that of the largest magnitude of ``first``, the value that of ``second``; 0 without one."""
+    if not np.isfinite(first).any():
+        return 0.0
+    place = np.unravel_index(int(np.nanargmax(np.abs(first))), first.shape)
+    return float(max(0.0, np.sign(first[place]) * second[place]))
+
+
+def recommended(found: Sequence[StudyResult]) -> Advice:
+    """The knee: least noise among those that still show the largest strain.
+
+    Raises
+    ------
+    ConfigError
+        No setting shows a strain that stands out of its noise.
+    """
+    told = [one for one in found if one.is_told]
+    if not told:
+        raise ConfigError(
+            "no setting shows a strain above its noise: take larger ZOIs (--zoi), or another --loaded window"
+        )
+    top = max(told, key=lambda one: one.seen - one.sigma)
+    keep = [one for one in told if one.seen >= KEEPS * (top.seen - top.sigma)]
+    best = min(keep, key=lambda one: one.noise)
+    why = (
+        f"of the {len(keep)} settings that show at least {KEEPS:.0%} of the largest strain"
+        f" ({top.seen * 1e6:.0f} um/m, with {top.setting.words}) it has the least noise"
+    )
+    larger = [one for one in told if one.noise < best.noise]
+    if larger:
+        nearest = max(larger, key=lambda one: one.seen)
+        why += f"; {nearest.setting.words} has less, but shows {nearest.seen / top.seen:.0%}"
+    sizes = [one.setting.zoi for one in found]
+    if best.setting.zoi == max(sizes):
+        why += "; it is the largest tried, larger ones may do as well"
+    elif best.setting.zoi == min(sizes):
+        why += "; it is the smallest tried, smaller ones may show more"
+    return Advice(best, why)

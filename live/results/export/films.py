@@ -1,0 +1,140 @@
+"""Pictures and films of a map over the pictures: ``png``, ``mp4`` (``.webm`` by the name of --out), ``gif``."""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Iterator
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.cv2_loader import load_cv2
+from acquire.errors import ConfigError, DataError
+from live.results.export.atomic_file import new_file, new_folder
+from live.results.export.job import Job
+from live.results.maps.painting import Levels, Painter, caption
+from live.results.maps.scale import ColourScale
+from live.results.pictures import Pictures
+
+# What the encoders in OpenCV's wheel make, and who does not play it.
+_CODECS = {
+    ".mp4": (
+        "mp4v",
+        "MPEG-4 part 2: web browsers do not play it; --to gif or --out NAME.webm is for them",
+    ),
+    ".webm": (
+        "VP90",
+        "VP9: old versions of QuickTime and PowerPoint do not play it; --out NAME.mp4 is for them",
+    ),
+}
+
+
+def write_png(job: Job, path: Path) -> None:
+    """A folder with one picture an instant."""
+    cv2 = load_cv2()
+    with new_folder(path) as folder:
+        for k, image in _frames(job):
+            _, data = cv2.imencode(".png", image)
+            (folder / f"{job.fields[0]}_{k:05d}.png").write_bytes(bytes(data))
+
+
+def write_mp4(job: Job, path: Path) -> None:
+    """A film, ``fps`` instants a second.
+
+    Raises
+    ------
+    ConfigError
+        Another suffix than .mp4 and .webm.
+    DataError
+        No such encoder in this OpenCV.
+    """
+    if path.suffix not in _CODECS:
+        raise ConfigError(f"{path}: a film is .mp4 or .webm; choose another --out")
+    code, remark = _CODECS[path.suffix]
+    cv2 = load_cv2()
+    with new_file(path) as part:
+        writer = None
+        try:
+            for _, image in _frames(job):
+                if writer is None:
+                    size = (image.shape[1], image.shape[0])
+                    four = cv2.VideoWriter_fourcc(*code)
+                    writer = cv2.VideoWriter(str(part), cv2.CAP_FFMPEG, four, job.options.fps, size)
+                    if not writer.isOpened():
+                        raise DataError(
+                            f"{path}: this OpenCV has no encoder for {code}; give --to gif or --to png"
+                        )
+                writer.write(image)
+        finally:
+            if writer is not None:
+                writer.release()
+        if not part.exists():
+            raise DataError(f"{path}: the encoder wrote nothing; is there room on the disk?")
+    job.screen.say(remark)
+
+
+def write_gif(job: Job, path: Path) -> None:
+    """A film that any program shows; 256 colours, so large ones are reduced to 640 px.
+
+    Raises
+    ------
+    ConfigError
+        Pillow is not installed.
+    """
+    try:
+        from PIL import Image as Pillow
+    except ImportError:
+        raise ConfigError(
+            "--to gif needs Pillow: pip install 'phasedic[export]'; --to mp4 does without"
+        ) from None
+    with new_file(path) as part:
+        pages = [Pillow.fromarray(image[..., ::-1].copy()).quantize() for _, image in _frames(job, 640)]
+        pages[0].save(
+            part,
+            "GIF",
+            save_all=True,
+            append_images=pages[1:],
+            duration=round(1000 / job.options.fps),
+            loop=0,
+        )
+
+
+def _frames(job: Job, longest: int = 1280) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+    """(k, BGR image) of each instant."""
+    (name,) = job.fields
+    pictures = job.run.pictures if job.options.picture else None
+    if pictures is None and job.options.picture:
+        job.screen.say("the pictures are not here any more; maps are painted on plain grey")
+    scale = None
+    if name != "status":
+        display = job.display
+        scale = ColourScale.of_run(
+            job.strain, name, job.rows, job.options.limit, display.unit(name), display.factor(name)
+        )
+    painter = Painter(job.strain, name, scale, _size(job, pictures), longest)
+    levels: Levels | None = None
+    with closing(_images(job, pictures)) as images:
+        for k, row in job.steps():
+            picture = next(images)
+            if picture is not None and levels is None:
+                levels = Levels.of(picture)
+            image = painter.over(painter.picture(picture, levels), row)
+            yield k, painter.framed(image, [caption(job.strain, row)], row)
+
+
+def _images(job: Job, pictures: Pictures | None) -> Generator[Any]:
+    if pictures is not None:
+        yield from pictures.each(job.rows)
+    while True:
+        yield None
+
+
+def _size(job: Job, pictures: Pictures | None) -> tuple[int, int]:
+    """Of the pictures; without, as far as the ZOIs reach and as much again beside them as on the left."""
+    if pictures is not None:
+        return pictures.info.width, pictures.info.height
+    grid = job.strain.grid
+    roi = grid.roi
+    return 2 * roi.x + roi.width, 2 * roi.y + roi.height

@@ -1,0 +1,158 @@
+"""What is exported: which run, which maps at which instants, in which units."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import ConfigError
+from analysis.field import Status
+from live.pipeline.screen import Screen
+from live.results.quantities import Display
+from live.results.reader import Strain
+from live.results.run_folder import RunFolder
+
+USUAL = ("u", "v", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy", "status")
+_SAME_S = 1e-6  # times that were typed are rounded
+QUIET_S = 2.0  # what takes no longer shows no progress
+
+_MEASURES = {
+    "engineering": "engineering strain: elongation over length of lines along x and y; exy half the shear angle",
+    "small": "small strain: exx = du/dx, eyy = dv/dy, exy = (du/dy + dv/dx)/2",
+    "green": "Green-Lagrange strain: E = (F'F - 1)/2",
+    "hencky": "Hencky (logarithmic) strain: ln(F'F)/2",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ExportOptions:
+    """What only some formats ask for.
+
+    Attributes
+    ----------
+    layout : "long" | "wide" | "means"
+        Of tables.
+    fps : float, 1/s
+        Of films.
+    limit : float or None
+        The colour range is -limit to limit, in the unit of the map as it is stored; automatic without.
+    picture : bool
+        Maps are painted over the pictures.
+    """
+
+    layout: str = "long"
+    fps: float = 10.0
+    limit: float | None = None
+    picture: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Job:
+    """An export.
+
+    Attributes
+    ----------
+    run : RunFolder
+    fields : tuple of str
+        Maps of ``strain.h5``.
+    rows : tuple of int
+        Instants, ascending.
+    display : Display
+    screen : Screen
+        Told how far it is.
+    options : ExportOptions
+    """
+
+    run: RunFolder
+    fields: tuple[str, ...]
+    rows: tuple[int, ...]
+    display: Display
+    screen: Screen
+    options: ExportOptions = field(default_factory=ExportOptions)
+
+    @property
+    def strain(self) -> Strain:
+        """The results."""
+        return self.run.strain
+
+    def map(self, name: str, row: int) -> NDArray[Any]:
+        """One map as it is exported, (R, C)."""
+        return self.display.shown(name, self.strain.maps(name, row))
+
+    def column(self, name: str) -> NDArray[Any]:
+        """One number an instant as it is exported, (number of rows,); a column of ``Strain.values``."""
+        values = self.display.shown(name, self.strain.values[name][list(self.rows)])
+        return -values if self.display.y_up and self._is_shear(name) else values
+
+    def _is_shear(self, name: str) -> bool:
+        """Whether a column is of a gauge that reads a shear, which changes its sign with the y axis."""
+        gauge = self.run.gauges.get(name.removeprefix("gauge_"))
+        return gauge is not None and gauge.described.get("value") in ("exy", "gamma_xy")
+
+    def steps(self, now: Callable[[], float] = time.monotonic) -> Iterator[tuple[int, int]]:
+        """(k, row) for each instant; tells how far it is once that has taken two seconds."""
+        began = now()
+        for k, row in enumerate(self.rows):
+            spent = now() - began
+            if spent > QUIET_S and k:
+                left = spent / k * (len(self.rows) - k)
+                self.screen.status(f"instant {k} of {len(self.rows)}, about {left:.0f} s left")
+            yield k, row
+
+    def notes(self) -> list[str]:
+        """What a reader of the file must know: origin, conventions, statuses."""
+        strain = self.strain
+        version = strain.versions.get("phasedic", "")
+        lines = [
+            f"{self.run.title}: exported by phasedic from {strain.path.name}, measured by phasedic {version}",
+            f"test started {strain.start_utc}; ZOIs of {strain.grid.size} px, {strain.grid.step} px apart",
+            _MEASURES.get(strain.strain_measure, strain.strain_measure),
+            self.display.axes(),
+        ]
+        if "status" in self.fields and self.options.layout != "means":
+            lines.append("status: " + ", ".join(f"{int(s)} {s.name}" for s in Status))
+        return lines
+
+
+def chosen_fields(strain: Strain, asked: str | None, usual: Sequence[str] = USUAL) -> tuple[str, ...]:
+    """Names of maps: ``usual`` where nothing is asked for, all for "all", else those between commas.
+
+    Raises
+    ------
+    ConfigError
+        One that is not there.
+    """
+    if asked is None:
+        return tuple(name for name in usual if name in strain.names)
+    if asked == "all":
+        return strain.names
+    names = tuple(dict.fromkeys(word.strip() for word in asked.split(",")))
+    for name in names:
+        if name not in strain.names:
+            raise ConfigError(f"--fields {name}: there is no such map; there are {', '.join(strain.names)}")
+    return names
+
+
+def chosen_rows(strain: Strain, start_s: float | None, end_s: float | None) -> tuple[int, ...]:
+    """The instants between two times, seconds since the start of the test, both included.
+
+    Raises
+    ------
+    ConfigError
+        There is none.
+    """
+    t = strain.time_s
+    low, high = -np.inf if start_s is None else start_s, np.inf if end_s is None else end_s
+    rows = tuple(int(row) for row in np.flatnonzero((t >= low - _SAME_S) & (t <= high + _SAME_S)))
+    if rows:
+        return rows
+    if not len(t):
+        raise ConfigError(f"{strain.path}: holds no measurement, there is nothing to export")
+    raise ConfigError(
+        f"--from, --until: no measurement between {low:g} and {high:g} s; they reach from {t[0]:.6g} to {t[-1]:.6g} s"
+    )

@@ -1,0 +1,224 @@
+"""Tables as text: ``csv`` with one line a ZOI and instant, one line an instant, or the means.
+
+The first lines begin with ``#`` and say what stands in the columns (``pandas.read_csv(..., comment="#")``,
+``numpy.genfromtxt`` and MATLAB's ``readtable(..., CommentStyle="#")`` pass over them); then come the
+names, with their units, and the numbers.
+
+Arrays for other programs: ``npz`` (numpy), ``mat`` (MATLAB, Octave), and xarray in memory.
+"""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import DataError
+from acquire.load_sample import LoadSample
+from live.results.export.atomic_file import new_file, new_folder
+from live.results.export.job import Job
+from live.results.quantities import Display, quantity_of
+from live.results.reader import Strain, dataset, mean_name
+from live.results.run_folder import RunFolder
+
+FIRST = ("time_s", "force_N", "stress_Pa", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy")
+_OF_AN_INSTANT = ("time_s", "force_N")
+_PLACE = ("row", "column", "x", "y")
+_AVERAGED = ("u_px", "v_px", "exx", "eyy", "exy")
+
+
+def write_csv(job: Job, path: Path) -> None:
+    """A table in the layout of ``job.options``; the wide one is a folder with a file a map."""
+    if job.options.layout == "wide":
+        with new_folder(path) as folder:
+            _wide(job, folder)
+        return
+    with new_file(path) as part, part.open("x", encoding="utf-8", newline="\n") as file:
+        if job.options.layout == "means":
+            means(job, file)
+        else:
+            _long(job, file)
+
+
+def means(job: Job, file: TextIO, notes: bool = True) -> None:
+    """One line an instant: the means over the valid ZOIs, and what else is known of it."""
+    values = job.strain.values
+    names = [name for name in FIRST if name in values]
+    names += [name for name in values if name not in names]
+    if notes:
+        _comment(file, [*job.notes(), *(_mean_words(job, name) for name in names)])
+    _line(file, [job.display.column(name) for name in names])
+    _rows(file, [job.column(name) for name in names])
+
+
+def _mean_words(job: Job, name: str) -> str:
+    if name in _AVERAGED:
+        return job.display.definition(name) + ", mean over the valid ZOIs"
+    if "gauge_" in name:
+        return job.display.definition(name) + _gauge_words(job, name)
+    if name.startswith("sigma_"):
+        return f"{job.display.definition(name)}, of that mean; the overlap of ZOIs is taken into account"
+    return job.display.definition(name)
+
+
+def _gauge_words(job: Job, name: str) -> str:
+    gauge = job.run.gauges.get(name.removeprefix("gauge_"))
+    said = gauge.described if gauge is not None else {}
+    known = (f"{key} {value}" for key, value in said.items())
+    return f" ({', '.join(known)}; places in px, y down)" if said else ""
+
+
+def field_table(job: Job, number: int, file: TextIO) -> None:
+    """One instant, a line a ZOI, no notes."""
+    _line(file, [job.display.column(name) for name in (*_PLACE, *job.fields)])
+    _rows(file, [*_places(job), *_values(job, number)])
+
+
+def load_table(run: RunFolder, samples: Sequence[LoadSample], file: TextIO) -> None:
+    """All readings of the load cell, seconds since the start of the test."""
+    _line(file, ["time_s", "force_N"])
+    _rows(file, [[s.t - run.start_monotonic for s in samples], [s.force for s in samples]])
+
+
+def _long(job: Job, file: TextIO) -> None:
+    heads = ["instant", *_OF_AN_INSTANT, *_PLACE, *job.fields]
+    _comment(file, [*job.notes(), *(job.display.definition(name) for name in heads)])
+    _line(file, [job.display.column(name) for name in heads])
+    places = _places(job)
+    for _, number in job.steps():
+        same = [np.full(len(places[0]), value) for value in (number, *_instant(job, number))]
+        _rows(file, [*same, *places, *_values(job, number)])
+
+
+def _places(job: Job) -> list[NDArray[Any]]:
+    """Row, column, x and y of each ZOI that was asked for, (N,) each."""
+    grid = job.strain.grid
+    rows, columns = np.nonzero(grid.active)
+    return [rows, columns, job.display.x(grid)[columns], job.display.y(grid)[rows]]
+
+
+def _values(job: Job, number: int) -> list[NDArray[Any]]:
+    return [job.map(name, number)[job.strain.grid.active] for name in job.fields]
+
+
+def _wide(job: Job, folder: Path) -> None:
+    grid, display = job.strain.grid, job.display
+    _, _, x, y = _places(job)
+    unit = display.unit("x")
+    heads = [*_OF_AN_INSTANT, *(f"x{a:.6g}_y{b:.6g}" for a, b in zip(x, y, strict=True))]
+    for name in job.fields:
+        with (folder / f"{display.column(name)}.csv").open("x", encoding="utf-8", newline="\n") as file:
+            _comment(
+                file,
+                [*job.notes(), display.definition(name), f"one column a ZOI, named by its centre in {unit}"],
+            )
+            _line(file, heads)
+            for _, number in job.steps():
+                _rows(
+                    file, [[value] for value in (*_instant(job, number), *job.map(name, number)[grid.active])]
+                )
+
+
+def _instant(job: Job, number: int) -> list[float]:
+    return [float(job.strain.values[name][number]) for name in _OF_AN_INSTANT]
+
+
+def _comment(file: TextIO, lines: Iterable[str]) -> None:
+    file.writelines(f"# {' '.join(line.split())}\n" for line in lines)
+
+
+def _line(file: TextIO, words: Sequence[str]) -> None:
+    file.write(",".join(words) + "\n")
+
+
+def _rows(file: TextIO, columns: Sequence[NDArray[Any] | Sequence[Any]]) -> None:
+    """Columns of equal length as lines; enough digits to give single precision back."""
+    arrays = [np.asarray(column) for column in columns]
+    form = ",".join(_form(array) for array in arrays) + "\n"
+    file.writelines(form % values for values in zip(*(array.tolist() for array in arrays), strict=True))
+
+
+def _form(array: NDArray[Any]) -> str:
+    if array.dtype.kind in "iub":
+        return "%d"
+    return "%.9g" if array.dtype == np.float32 else "%.10g"
+
+
+def write_npz(job: Job, path: Path) -> None:
+    """Maps (T, R, C) and the numbers of each instant (T,), ``x`` (C,), ``y`` (R,); ``about`` is JSON text."""
+    with new_file(path) as part, zipfile.ZipFile(part, "x", zipfile.ZIP_DEFLATED) as archive:
+        for name, values in _small(job).items():
+            _put(archive, name, values)
+        _put(archive, "about", np.array(json.dumps(_about(job), ensure_ascii=False)))
+        for name in job.fields:
+            _put(archive, name, _stack(job, name))
+
+
+def write_mat(job: Job, path: Path) -> None:
+    """MATLAB 5: maps are (R, C, T), ``mean`` holds the numbers of each instant (T, 1), ``about`` the words."""
+    from scipy.io import savemat
+    from scipy.io.matlab import MatWriteError
+
+    small, about = _small(job), _about(job)
+    about["notes"] = np.array(about["notes"], object)  # a cell array
+    places = {name: small.pop(name) for name in ("x", "y", "active")}
+    with new_file(path) as part, part.open("xb") as file:
+        try:
+            savemat(file, {**places, "mean": {k: v[:, None] for k, v in small.items()}, "about": about})  # type: ignore[arg-type]
+            for name in job.fields:
+                stack = {name: np.moveaxis(_stack(job, name), 0, -1)}
+                savemat(file, stack, do_compression=True)  # type: ignore[arg-type]
+        except MatWriteError as error:
+            raise DataError(
+                f"{path}: too large for this format ({error}); give --from and --until, or --to npz"
+            ) from error
+
+
+def to_xarray(strain: Strain, display: Display | None = None, fields: tuple[str, ...] | None = None) -> Any:
+    """The maps and means as an ``xarray.Dataset`` with coordinates ``time``, ``y``, ``x`` and units.
+
+    Parameters
+    ----------
+    strain : Strain
+    display : Display, optional
+        Units and axes; without, as they are stored (px, y down).
+    fields : tuple of str, optional
+        Maps; all without.
+
+    Raises
+    ------
+    ConfigError
+        xarray is not installed.
+    """
+    return dataset(strain, display or Display(), fields)
+
+
+def _small(job: Job) -> dict[str, NDArray[Any]]:
+    """Everything but the maps."""
+    grid = job.strain.grid
+    places = {"x": job.display.x(grid), "y": job.display.y(grid), "active": grid.active}
+    return {**places, **{mean_name(name): job.column(name) for name in job.strain.values}}
+
+
+def _about(job: Job) -> dict[str, Any]:
+    names = {mean_name(name): name for name in job.strain.values}
+    units = {name: job.display.unit(name) or "1" for name in ("x", "y", *job.fields)}
+    units |= {shown: job.display.unit(name) or "1" for shown, name in names.items()}
+    words = {name: quantity_of(name).words for name in ("x", "y", *job.fields)}
+    words |= {shown: quantity_of(name).words for shown, name in names.items()}
+    return {"notes": job.notes(), "units": units, "definitions": words}
+
+
+def _stack(job: Job, name: str) -> NDArray[Any]:
+    """(T, R, C) of the chosen instants."""
+    return np.stack([job.map(name, row) for _, row in job.steps()])
+
+
+def _put(archive: zipfile.ZipFile, name: str, values: NDArray[Any]) -> None:
+    with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+        np.lib.format.write_array(member, np.asanyarray(values), allow_pickle=False)

@@ -1,0 +1,106 @@
+"""``vtk``: a ``.vti`` an instant and a ``.pvd`` with their times, for ParaView and whatever reads VTK.
+
+XML image data with appended raw data (VTK File Formats, https://docs.vtk.org/en/latest/vtk_file_formats/):
+the points are the centres of the ZOIs. Values are arrays of the points; ``displacement`` is the vector to warp
+by; time and force stand in the field data. VTK's y axis points up: without ``--y-up`` a map stands on its head.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import escape, quoteattr
+
+import numpy as np
+from numpy.typing import NDArray
+
+from live.results.export.atomic_file import new_folder
+from live.results.export.job import Job
+
+_TYPES = {"f4": "Float32", "f8": "Float64", "u1": "UInt8", "i8": "Int64"}
+_ORDER = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
+_HEAD = (
+    '<?xml version="1.0"?>\n<VTKFile type="{}" version="1.0" byte_order="'
+    + _ORDER
+    + '" header_type="UInt64">\n'
+)
+
+
+def write_vtk(job: Job, path: Path) -> None:
+    """A folder with ``strain.pvd`` and ``strain_00000.vti`` and so on."""
+    with new_folder(path) as folder:
+        lines = []
+        for k, row in job.steps():
+            name = f"strain_{k:05d}.vti"
+            (folder / name).write_bytes(image(job, row))
+            time = float(job.strain.time_s[row])
+            lines.append(f'<DataSet timestep="{time:.10g}" part="0" file={quoteattr(name)}/>\n')
+        head = _HEAD.format("Collection") + _comment(job)
+        (folder / "strain.pvd").write_text(
+            f"{head}<Collection>\n{''.join(lines)}</Collection>\n</VTKFile>\n", encoding="utf-8"
+        )
+
+
+def image(job: Job, row: int) -> bytes:
+    """The file of one instant."""
+    grid, display = job.strain.grid, job.display
+    # VTK counts rows upwards: with y up, the last row of ZOIs comes first.
+    y = np.sort(display.y(grid))
+    appended = _Appended()
+    extent = f"0 {grid.shape[1] - 1} 0 {grid.shape[0] - 1} 0 0"
+    step = f"{display.step(grid):.10g}"
+    origin = f"{display.x(grid)[0]:.10g} {y[0]:.10g} 0"
+    values = job.strain.values
+    known = {"TimeValue": values["time_s"][row], display.column("force_N"): values["force_N"][row]}
+    facts = "".join(appended.add(name, np.array([value]), facts=True) for name, value in known.items())
+    points = "".join(appended.add(name, data) for name, data in _points(job, row).items())
+    text = (
+        f"{_HEAD.format('ImageData')}{_comment(job)}"
+        f'<ImageData WholeExtent="{extent}" Origin="{origin}" Spacing="{step} {step} 1">\n'
+        f"<FieldData>\n{facts}</FieldData>\n"
+        f'<Piece Extent="{extent}">\n<PointData>\n{points}</PointData>\n<CellData/>\n</Piece>\n</ImageData>\n'
+        '<AppendedData encoding="raw">\n_'
+    )
+    return text.encode() + appended.data() + b"\n</AppendedData>\n</VTKFile>\n"
+
+
+def _points(job: Job, row: int) -> Mapping[str, NDArray[Any]]:
+    flip = slice(None, None, -1 if job.display.y_up else 1)
+    found = {job.display.column(name): job.map(name, row)[flip].ravel() for name in job.fields}
+    u, v = (job.map(name, row)[flip].ravel() for name in ("u", "v"))
+    found[f"displacement_{job.display.unit('u')}"] = np.stack([u, v, np.zeros_like(u)], axis=1)
+    return found
+
+
+class _Appended:
+    """The raw block at the end of a file, and the offsets into it."""
+
+    def __init__(self) -> None:
+        self._parts: list[bytes] = []
+        self._length = 0
+
+    def add(self, name: str, values: NDArray[Any], *, facts: bool = False) -> str:
+        """Append an array, (N,) or (N, components); returns the element that names it."""
+        data = np.ascontiguousarray(values)
+        kind = _TYPES[data.dtype.str[1:]]
+        size = f' NumberOfTuples="{len(data)}"' if facts else ""
+        parts = f' NumberOfComponents="{data.shape[1]}"' if data.ndim == 2 else ""
+        element = (
+            f'<DataArray type="{kind}" Name={quoteattr(name)}{parts}{size} format="appended"'
+            f' offset="{self._length}"/>\n'
+        )
+        for part in (np.uint64(data.nbytes).tobytes(), data.tobytes()):
+            self._parts.append(part)
+            self._length += len(part)
+        return element
+
+    def data(self) -> bytes:
+        """All of it."""
+        return b"".join(self._parts)
+
+
+def _comment(job: Job) -> str:
+    lines = [*job.notes(), *(job.display.definition(name) for name in job.fields)]
+    return "<!--\n" + escape("\n".join(lines)).replace("--", "- -") + "\n-->\n"

@@ -1,0 +1,225 @@
+"""The figures of a tensile test in words: modulus, strengths, extensions, each with its interval.
+
+The table of tensile figures: summary, page, report, comparison and batch take name, unit and interval from it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from acquire.load_cell import LoadLog
+from analysis.evaluate import (
+    CONFIDENCE,
+    STANDARDS,
+    Curve,
+    Figure,
+    Interval,
+    LoadAxis,
+    TensileFigures,
+    TensileOptions,
+    Track,
+    evaluate_test,
+    find_lag,
+    free,
+)
+from live.config.sections import SpecimenConfig
+from live.pipeline.history import History
+
+HEADLINE = ("E", "nu", "Rp02", "Rm")
+"""The figures that are shown first, and compared between tests."""
+
+_PLAIN, _PERCENT, _MPA, _GPA, _KN = ("", 1.0), ("%", 0.01), ("MPa", 1e6), ("GPa", 1e9), ("kN", 1e3)
+_STRENGTHS_TENSILE_TABLE = {"Rp01": "p0.1", "Rp02": "p0.2", "Rp1": "p1", "ReH": "eH", "ReL": "eL", "Rm": "m"}
+_SMALL_KN = 2.0  # below it forces are shown in N
+
+
+def quantity(value: float, sigma: float, unit: str) -> str:
+    """``value +- sigma unit`` with as many digits as the uncertainty deserves."""
+    if not math.isfinite(value):
+        return "not known"
+    if not math.isfinite(sigma) or sigma <= 0:
+        return f"{value:.4g} {unit}".rstrip()
+    digits = max(0, min(6, 1 - math.floor(math.log10(sigma))))
+    return f"{value:.{digits}f} +- {sigma:.{digits}f} {unit}".rstrip()
+
+
+def interval(figure: Figure, unit_is: float = 1.0, unit: str = "") -> str:
+    """A figure with the larger half of its interval, in a unit that is ``unit_is`` of ours."""
+    half = max(figure.high - figure.value, figure.value - figure.low)
+    return quantity(figure.value / unit_is, half / unit_is, unit)
+
+
+@dataclass(frozen=True, slots=True)
+class TensileRow:
+    """One line of the table.
+
+    Attributes
+    ----------
+    name : str
+        As the standards have it: Rp0.2, or Fp0.2 of a force.
+    unit : str
+    figure : Figure
+        In that unit, or why it is not known.
+    """
+
+    name: str
+    unit: str
+    figure: Figure
+
+    @property
+    def column(self) -> str:
+        """The head of a column: name and unit."""
+        return f"{self.name}_{self.unit}" if self.unit else self.name
+
+    @property
+    def half(self) -> float:
+        """The larger half of the interval; NaN where the figure is not known."""
+        return max(self.figure.high - self.figure.value, self.figure.value - self.figure.low)
+
+    @property
+    def text(self) -> str:
+        """Value, interval and unit for a person; forces below 2 kN in N."""
+        if self.unit == "kN" and abs(self.figure.value) < _SMALL_KN:
+            return interval(self.figure, 1e-3, "N")
+        return interval(self.figure, 1.0, self.unit)
+
+
+def tensile_table(figures: TensileFigures, *, stresses: bool) -> dict[str, TensileRow]:
+    """The rows by the attribute of ``figures`` that they show, in the order of a report.
+
+    Parameters
+    ----------
+    figures : TensileFigures
+    stresses : bool
+        The section is known; else the figures are of forces, N: EA, Fp0.2, Fm.
+    """
+    modulus, letter = ("E", "R") if stresses else ("EA", "F")
+    stiffness, strength = (_GPA, _MPA) if stresses else (_KN, _KN)
+    names = {"E": (modulus, stiffness), "E_chord": (f"{modulus} by chord", stiffness), "nu": ("nu", _PLAIN)}
+    names |= {key: (letter + end, strength) for key, end in _STRENGTHS_TENSILE_TABLE.items()}
+    names |= {key: (key, _PERCENT) for key in ("Ag", "Agt", "A", "At")}
+    return {
+        key: TensileRow(name, unit, getattr(figures, key).over(one))
+        for key, (name, (unit, one)) in names.items()
+    }
+
+
+def headline(figures: TensileFigures, *, stresses: bool) -> list[TensileRow]:
+    """The rows that are shown first: modulus, Poisson's ratio, proof strength and strength."""
+    rows = tensile_table(figures, stresses=stresses)
+    return [rows[key] for key in HEADLINE]
+
+
+_STRENGTHS = ("Rp01", "Rp02", "Rp1", "ReH", "ReL", "Rm")
+_EXTENSIONS = ("Ag", "Agt", "A", "At")
+
+
+def evaluate(history: History, loads: LoadLog, specimen: SpecimenConfig) -> TensileFigures:
+    """The tensile figures of the run; stresses are forces (N) where the section is not known."""
+    axial, transverse = history.along(specimen.axis)
+    stress = history.forces(loads) / (specimen.area_m2 or 1.0)
+    return evaluate_test(Curve(history.column("t"), axial, stress, transverse), options_of(specimen))
+
+
+def options_of(specimen: SpecimenConfig) -> TensileOptions:
+    """How the configuration asks for the evaluation; a preload (MPa) needs a section, and is let go without."""
+    standard = STANDARDS.get(specimen.standard) or free(Interval("strain", *specimen.modulus_between))
+    if specimen.zero == "preload" and specimen.area_m2 is not None:
+        return TensileOptions(standard, "preload", specimen.preload_MPa * 1e6)
+    return TensileOptions(standard, "toe" if specimen.zero == "toe" else "raw")
+
+
+def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
+    """How late the load comes, as the test itself tells it; nothing without a load."""
+    t, force = loads.arrays()
+    if not len(t):
+        return []
+    lag = find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
+    if not lag.known:
+        return [f"lag of the load beside the frames: not known ({lag.why})"]
+    how = f"{loads.lag_s * 1e3:g} ms taken off" if loads.lag_s else f"not applied; --lag {lag.value:.3f} does"
+    return [f"lag of the load beside the frames: {interval(lag, 1e-3, 'ms')} ({CONFIDENCE:.0%}; {how})"]
+
+
+def tare_line(history: History, loads: LoadLog) -> list[str]:
+    """That the zero was moved in mid-test; nothing where it was not."""
+    tared = history.tared_in_mid_test(loads)
+    if not tared:
+        return []
+    return [
+        f"tared in mid-test by {tared:+.4g} N: these figures go by the zero before; strain.csv has it as zero_N"
+    ]
+
+
+def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
+    """How far the largest strain lies off the axis of the load; nothing where the strains do not tell."""
+    load = history.axis(specimen.axis)
+    words = axis_words(load)
+    stays = load.found and load.axis != specimen.first_axis and history.gauge("axial") is not None
+    return [words + ("; the gauge axial stays where it was placed" if stays else "")] if words else []
+
+
+def axis_words(load: LoadAxis) -> str:
+    """The axis of the load with the angle to it; empty where the strains do not tell."""
+    if not load.off.known:
+        return ""
+    words = f"largest strain {interval(load.off, math.pi / 180, 'degrees')} off {load.axis} (clockwise)"
+    if load.found:
+        return f"{words}; {load.axis} was found to be the axis of the load"
+    wrong = abs(load.off.value) > math.pi / 4
+    return words + (f"; is specimen.axis = {load.axis!r} right?" if wrong else "")
+
+
+def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]:
+    """E, nu and the strengths in words; nothing where the curve told nothing."""
+    if not figures.E.known or figures.span is None:
+        return []
+    rows = _rows(figures, specimen)
+    hint = "" if specimen.area_m2 else " (give [specimen] width_mm and thickness_mm for E)"
+    words = f"  {_said(rows, 'nu')}  ({figures.span.n} points, +-: {CONFIDENCE:.0%} interval)"
+    return [_said(rows, "E") + hint + words, _known(rows, _STRENGTHS)]
+
+
+def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> dict[str, TensileRow]:
+    return tensile_table(figures, stresses=specimen.area_m2 is not None)
+
+
+def _said(rows: Mapping[str, TensileRow], key: str) -> str:
+    return f"{rows[key].name} = {rows[key].text}"
+
+
+def _known(rows: Mapping[str, TensileRow], keys: Sequence[str]) -> str:
+    return "  ".join(_said(rows, key) for key in keys if rows[key].figure.known)
+
+
+def figure_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]:
+    """All of a test: what ``elastic_lines`` says, how it was had, extensions, rates, and what cannot be had."""
+    rows, span = _rows(figures, specimen), figures.span
+    lines = elastic_lines(figures, specimen) or [line for line in [_known(rows, _STRENGTHS)] if line]
+    if not lines:
+        return []
+    if span is not None:
+        low, high = span.strain
+        lines.append(
+            f"  {figures.standard}: strains {100 * low:.3f} to {100 * high:.3f} %, R2 = {figures.r2:.5f}, by chord"
+            f" {rows['E_chord'].text}; strain counts {figures.zero.how}"
+        )
+    if extensions := _known(rows, _EXTENSIONS):
+        length = f"  (gauge length {specimen.gauge_length_mm:g} mm)" if specimen.gauge_length_mm else ""
+        lines.append(extensions + length)
+    if figures.rate_elastic.known:
+        words = f" ({figures.rate_elastic.why})" if figures.rate_elastic.why else ""
+        lines.append(f"strain rate {figures.rate_elastic.value:.3g} 1/s in the elastic part{words}")
+    return lines + _unknown(rows)
+
+
+def _unknown(rows: Mapping[str, TensileRow]) -> list[str]:
+    """Which figures of the standard are not known, and why, a line for each reason."""
+    reasons: dict[str, list[str]] = {}
+    for key in ("E", *_STRENGTHS, *_EXTENSIONS, "nu"):
+        figure = rows[key].figure
+        if not figure.known and not figure.why.startswith("not a figure of"):
+            reasons.setdefault(figure.why, []).append(rows[key].name)
+    return [f"not known: {', '.join(words)} ({why})" for why, words in reasons.items()]

@@ -1,0 +1,99 @@
+"""A field as maps in colours while it is measured: strains, principal strains, displacements, sigma, status."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.field import StrainField
+from live.results.maps.scale import (
+    OPACITY,
+    AutoRange,
+    ColourScale,
+    Kind,
+    StatusCount,
+    kind_of,
+    status_colours,
+    status_legend,
+)
+
+_PRINCIPAL = ("e1", "e2")
+FIELD_MAPS = ("exx", "eyy", "exy", *_PRINCIPAL, "u", "v", "sigma", "residual", "status")
+"""e1 and e2 are the principal strains, sigma is that of the strain along the load, residual is chi squared."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Painted:
+    """One map.
+
+    Attributes
+    ----------
+    rgba : (R, C, 4) uint8
+    scale : ColourScale or None
+        Of the colours; None where they have no order (status).
+    legend : tuple of StatusCount
+        What the colours mean where they have no order.
+    """
+
+    rgba: NDArray[np.uint8]
+    scale: ColourScale | None
+    legend: tuple[StatusCount, ...] = ()
+
+
+class FieldMaps:
+    """Paints the maps of one field after the other; ranges follow the data and do not flicker.
+
+    Parameters
+    ----------
+    axis : "x" or "y"
+        Of the load.
+    fixed : float or None
+        Range of the strains, -fixed to fixed.
+    about_zero : bool
+        Colours of strains lie about zero; else over the values there are.
+    alpha : int
+        Opacity, 0..255.
+    """
+
+    def __init__(
+        self,
+        axis: Literal["x", "y"],
+        fixed: float | None = None,
+        *,
+        about_zero: bool = True,
+        alpha: int = OPACITY,
+    ) -> None:
+        self._along, self._alpha = f"e{axis * 2}", alpha
+        self._ranges: dict[str, AutoRange] = {}
+        for name in FIELD_MAPS:
+            kind: Kind = kind_of(name)
+            strain = kind == "about zero"
+            if strain and not about_zero and fixed is None:
+                kind = "free"
+            self._ranges[name] = AutoRange(kind, fixed if strain else None)
+
+    def paint(self, field: StrainField, names: Iterable[str]) -> dict[str, Painted]:
+        """The named maps, of ``FIELD_MAPS``."""
+        wanted = tuple(names)
+        principal = field.strain(field.measure).principal[:2] if set(wanted) & {*_PRINCIPAL} else ()
+        known = dict(zip(_PRINCIPAL, principal, strict=False))
+        return {name: self._painted(field, name, known.get(name)) for name in wanted}
+
+    def _painted(self, field: StrainField, name: str, values: NDArray[np.floating] | None) -> Painted:
+        if name == "status":
+            return Painted(status_colours(field.status, self._alpha), None, status_legend(field.status))
+        sigmas: NDArray[np.floating] | None = None
+        if name == "residual":
+            values = np.where(field.ok, field.residual, np.nan)
+        elif name == "sigma":
+            values = field.sigma(self._along)
+        elif values is None:
+            values, sigmas = field.value(name), field.sigma(name)
+        else:
+            sigmas = field.sigma(self._along)
+        scale = ColourScale.of(name, self._ranges[name].update(values, sigmas))
+        return Painted(scale.colours(values, self._alpha), scale)

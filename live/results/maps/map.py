@@ -1,0 +1,164 @@
+"""A map of the results over the reference picture, to put into a report.
+
+Values are drawn as they were measured, one square a ZOI; filters and deconvolution are options, and
+the title names them. A ZOI that was rejected stays transparent, and the field "status" shows why.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.cv2_loader import load_cv2
+from acquire.errors import ConfigError, DataError
+from analysis.evaluate import deconvolved, effect
+from analysis.field import ZoiGrid
+from live.results.maps.colours import for_display
+from live.results.maps.painting import Image, Painter
+from live.results.maps.scale import AutoRange, ColourScale, kind_of
+from live.results.reader import Strain
+
+DISPLACEMENTS = ("u", "v")
+MOST_MEDIAN, MOST_STEPS = 51, 100
+FORMATS = (".png", ".jpg")
+
+
+@dataclass(frozen=True, slots=True)
+class MapRequest:
+    """What to draw.
+
+    Attributes
+    ----------
+    field : str
+        A map of ``strain.h5``: u, v, exx, eyy, exy, a gradient, a sigma, residual or status.
+    row : int
+        Which instant; -1 is the last.
+    limit : float or None
+        The colour range is -limit to limit (px for displacements, else dimensionless); automatic without.
+    title : str
+    median : int
+        Side of a median filter, ZOIs; 1 for none.
+    low_pass_px : float, px
+        Sigma of a Gaussian filter; 0 for none.
+    deconvolution : int
+        Steps that take off the window's blur (``analysis.evaluate.deconvolution``); 0 for none.
+    """
+
+    field: str
+    row: int = -1
+    limit: float | None = None
+    title: str = ""
+    median: int = 1
+    low_pass_px: float = 0.0
+    deconvolution: int = 0
+
+    def check(self, grid: ZoiGrid) -> None:
+        """Raises ConfigError where a number is impossible, or beyond what makes sense on ``grid``."""
+        extent = max(grid.shape) * grid.step
+        limit, low_pass, odd = self.limit, self.low_pass_px, self.median in range(1, MOST_MEDIAN + 1, 2)
+        for what, value, well, allowed in (
+            ("limit", limit, limit is None or 0 < limit < math.inf, "a number above 0"),
+            ("median", self.median, odd, f"an odd number from 1 to {MOST_MEDIAN}"),
+            ("low-pass", low_pass, 0 <= low_pass <= extent, f"0 to {extent} px, the extent of the grid"),
+            ("deconvolution", self.deconvolution, 0 <= self.deconvolution <= MOST_STEPS, f"0 to {MOST_STEPS} steps"),
+        ):  # fmt: skip
+            if not well:
+                raise ConfigError(f"a {what} of {value} is not possible; allowed: {allowed}")
+
+    def treatment(self, grid: ZoiGrid) -> str:
+        """What was done to the map before it was drawn, in words; "" for nothing."""
+        words = []
+        if self.deconvolution:
+            done = effect(grid, self.deconvolution)
+            noise = done.noise if self.field in DISPLACEMENTS else done.noise_gradient
+            words = [f"deconvolved, {self.deconvolution} steps: l_10% {done.l10:.0f} px, noise x {noise:.2f}"]
+        words += [f"median {self.median} x {self.median}"] * (self.median > 1)
+        words += [f"low-pass {self.low_pass_px:g} px"] * (self.low_pass_px > 0)
+        return ", ".join(words)
+
+
+def draw(strain: Strain, picture: MapRequest, background: NDArray[Any] | None) -> Image:
+    """The map over ``background`` (H, W) with title, axes and colour bar, (h, w, 3) uint8: blue, green, red.
+
+    Raises
+    ------
+    DataError
+        There is no such map or row.
+    ConfigError
+        ``picture`` asks for what is impossible.
+    """
+    picture.check(strain.grid)
+    name, row, grid = picture.field, picture.row, strain.grid
+    values = _treated(strain, picture)
+    scale = None
+    if name != "status":
+        span = AutoRange(kind_of(name), picture.limit).update(values, _sigma(strain, name, row))
+        scale = ColourScale.of(name, span)
+    size = (2 * grid.roi.x + grid.roi.width, 2 * grid.roi.y + grid.roi.height)
+    if background is not None:
+        size = background.shape[1], background.shape[0]
+    painter = Painter(strain, name, scale, size)
+    painted = painter.over(painter.picture(background), row, values, moved=False)
+    treatment = picture.treatment(grid)
+    title = picture.title or f"{name}, {strain.time_s[row]:.2f} s, ZOI {grid.size} px"
+    return painter.framed(painted, [title, treatment] if treatment else [title], row, axes=True)
+
+
+def save(image: Image, path: Path) -> None:
+    """Write the picture to a new file, in the format that its name ends in.
+
+    Raises
+    ------
+    ConfigError
+        The file exists, or has another ending than ``FORMATS``.
+    DataError
+        It cannot be written.
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise ConfigError(f"{path}: choose a name that ends in {', '.join(FORMATS)}")
+    _, data = load_cv2().imencode(path.suffix.lower(), image)
+    try:
+        with path.open("xb") as file:
+            file.write(bytes(data))
+    except FileExistsError:
+        raise ConfigError(f"{path} exists and is not overwritten; choose another name") from None
+    except OSError as error:
+        raise DataError(
+            f"{path}: cannot be written: {error.strerror}; look at the folder and the disk"
+        ) from None
+
+
+def _sigma(strain: Strain, name: str, row: int) -> NDArray[Any] | None:
+    return strain.maps(f"sigma_{name}", row) if f"sigma_{name}" in strain.names else None
+
+
+def _treated(strain: Strain, picture: MapRequest) -> NDArray[np.float64]:
+    """The map as it is to be drawn; stored values stay as they are."""
+    values = np.array(strain.maps(picture.field, picture.row), np.float64)
+    treated = picture.deconvolution or picture.median > 1 or picture.low_pass_px > 0
+    if picture.field == "status" and treated:
+        raise ConfigError("a map of statuses is neither filtered nor deconvolved")
+    if picture.deconvolution:
+        _check_blur(strain.config.get("measure", {}), picture.field)
+        try:
+            values = deconvolved(values, strain.grid, picture.deconvolution)
+        except ValueError as error:
+            raise ConfigError(str(error)) from None
+    return for_display(values, strain.grid.step, picture.low_pass_px, picture.median)
+
+
+def _check_blur(measure: Mapping[str, Any], field: str) -> None:
+    """Raises ConfigError unless the map is one whose blur is known."""
+    if field.startswith(("sigma", "residual")):
+        raise ConfigError(f"{field} has no blur to take off; deconvolve a displacement or a strain")
+    for key, value in (("order", 1), ("window", "gaussian"), ("estimator", "spectral")):
+        if measure.get(key, value) != value:
+            raise ConfigError(
+                f"only maps measured with {key} = {value} can be deconvolved, not with {measure[key]}"
+            )

@@ -1,0 +1,144 @@
+"""Several tests in one report: their curves, and mean and scatter of what they tell."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TextIO
+
+import numpy as np
+
+from acquire.errors import ConfigError, DataError
+from analysis.evaluate import CONFIDENCE
+from live.results.figures import TensileRow, headline, quantity
+from live.results.report.curves import load_unit, strain_unit
+from live.results.report.evaluation import EvaluatedCurve
+from live.results.report.page import Html, element, joined, page, paragraph, safe, section, table
+from live.results.report.report import Report, plots
+from live.results.report.svg import Plot
+from live.results.report.svg import PlotLine as Line
+from live.results.run_folder import RunFolder
+
+_FEWEST = 2
+_ROOM = 50  # letters above the curves; numbers stand for longer names
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ComparedTest:
+    """One of the tests compared."""
+
+    title: str
+    path: str
+    curve: EvaluatedCurve
+
+
+def tests_of(runs: Sequence[RunFolder]) -> list[ComparedTest]:
+    """The curves of ``runs``.
+
+    Raises
+    ------
+    ConfigError
+        Fewer than two, or some with stresses and some with forces alone.
+    DataError
+        One holds no measurement.
+    """
+    if len(runs) < _FEWEST:
+        raise ConfigError("--compare needs at least two runs")
+    for run in runs:
+        if not run.strain.n:
+            raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to compare")
+    found = [ComparedTest(run.title, str(run.path), EvaluatedCurve.of(run)) for run in runs]
+    if len({test.curve.is_stress for test in found}) > 1:
+        without = ", ".join(test.path for test in found if not test.curve.is_stress)
+        raise ConfigError(
+            f"{without}: no section is known, the other runs have stresses; replay it with --section W,T to compare"
+        )
+    return found
+
+
+def _rows(tests: Sequence[ComparedTest]) -> list[tuple[TensileRow, ...]]:
+    """Of each figure the rows of all tests."""
+    found = (headline(test.curve.figures, stresses=test.curve.is_stress) for test in tests)
+    return list(zip(*found, strict=True))
+
+
+def summary(values: Sequence[float]) -> tuple[float, float, int]:
+    """Mean, standard deviation (n - 1) and number of those that are known."""
+    known = [value for value in values if math.isfinite(value)]
+    mean = float(np.mean(known)) if known else math.nan
+    return mean, float(np.std(known, ddof=1)) if len(known) > 1 else math.nan, len(known)
+
+
+def compare(tests: Sequence[ComparedTest]) -> Report:
+    """The page; the curves over one pair of axes, and the table."""
+    figures = (_together(tests),)
+    words = (
+        "E, nu and the strengths of each test as its own report has them, with half of the interval"
+        f" ({CONFIDENCE:.0%}); mean and scatter are those between tests."
+    )
+    parts = [
+        element("h1", f"Comparison of {len(tests)} tests"),
+        section("Curves", plots(figures)),
+        section("Figures", paragraph(words, "dim"), _table(tests)),
+    ]
+    return Report(page("Comparison of tests", parts), figures)
+
+
+def write_table(tests: Sequence[ComparedTest], file: TextIO) -> None:
+    """The figures as CSV, each beside half of its interval: a line a test, then mean, standard deviation and n."""
+    figures = _rows(tests)
+    heads = [f"{end}{row.column}" for row, *_ in figures for end in ("", "half_")]
+    file.write(f"test,path,{','.join(heads)}\n")
+    for k, test in enumerate(tests):
+        values = ",".join(f"{rows[k].figure.value:.8g},{rows[k].half:.8g}" for rows in figures)
+        file.write(f"{_quoted(test.title)},{_quoted(test.path)},{values}\n")
+    found = [summary([row.figure.value for row in rows]) for rows in figures]
+    for name, part in (("mean", 0), ("standard deviation", 1), ("n", 2)):
+        file.write(f"{name},,{','.join(f'{one[part]:.8g},' for one in found)}\n")
+
+
+def _quoted(words: str) -> str:
+    """A field of a CSV; no program takes it for a formula."""
+    plain = words.lstrip("=+-@\t ") or "-"
+    return '"' + plain.replace('"', '""') + '"'
+
+
+def _together(tests: Sequence[ComparedTest]) -> Plot:
+    e = strain_unit(*(test.curve.axial for test in tests))
+    load = load_unit(max((test.curve for test in tests), key=lambda c: np.nanmax(c.load, initial=0.0)))
+    names = [test.title for test in tests]
+    if sum(len(name) for name in names) > _ROOM:
+        names = [str(k + 1) for k in range(len(tests))]
+    lines = tuple(
+        Line(names[k], test.curve.axial * e.factor, test.curve.load * load.factor, colour=k)
+        for k, test in enumerate(tests)
+    )
+    what = "stress" if tests[0].curve.is_stress else "force"
+    return Plot("comparison", f"{what.capitalize()} against strain", f"axial strain, {e.name}",
+                  f"{what}, {load.name}", lines)  # fmt: skip
+
+
+def _table(tests: Sequence[ComparedTest]) -> Html:
+    figures = _rows(tests)
+    heads = ["", *(row.column.replace("_", ", ") for row, *_ in figures)]
+    rows: list[list[object]] = [
+        [f"{k + 1} {test.title}", *(_cell(of_tests[k]) for of_tests in figures)]
+        for k, test in enumerate(tests)
+    ]
+    found = [summary([row.figure.value for row in of_tests]) for of_tests in figures]
+    rows.append(["mean", *(_number(mean) for mean, _, _ in found)])
+    rows.append(["standard deviation", *(_number(deviation) for _, deviation, _ in found)])
+    rows.append(["n", *(str(n) for _, _, n in found)])
+    return joined([table(heads, rows, tuple(range(1, len(heads))))])
+
+
+def _cell(row: TensileRow) -> Html:
+    """Value and half of the interval in the unit of the column; where it is not known, the reason when pointed at."""
+    if not row.figure.known:
+        return element("span", "not known", title=row.figure.why)
+    return safe(quantity(row.figure.value, row.half, "").replace("+-", "±"))
+
+
+def _number(value: float) -> str:
+    return f"{value:.4g}" if math.isfinite(value) else "not known"

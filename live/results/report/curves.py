@@ -1,0 +1,122 @@
+"""The curves of a report as figures."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from live.results.maps.colours import Unit, unit_for
+from live.results.report.evaluation import EvaluatedCurve as TestCurve
+from live.results.report.svg import COLOURS, Array, Mark, Plot, PlotLine
+from live.results.run_folder import RunFolder
+
+_NAMES = ("exx", "eyy", "exy")
+
+
+def load_unit(curve: TestCurve) -> Unit:
+    """In which stresses (MPa) or forces (N or kN) are shown."""
+    if curve.is_stress:
+        return Unit("MPa", 1e-6)
+    return force_unit(curve.load)
+
+
+def force_unit(force: Array) -> Unit:
+    """N, or kN from 2 kN on."""
+    largest = float(np.nanmax(np.abs(force))) if np.isfinite(force).any() else 0.0
+    return Unit("kN", 1e-3) if largest >= 2000 else Unit("N", 1.0)
+
+
+def strain_unit(*strains: Array) -> Unit:
+    """% or µm/m."""
+    values = [np.abs(e[np.isfinite(e)]) for e in strains]
+    return unit_for(max((float(v.max()) for v in values if v.size), default=0.0))
+
+
+def stress_strain(curve: TestCurve) -> Plot:
+    """Stress (or force) over axial strain with the line of E and the construction of Rp0.2."""
+    e, load, figures = strain_unit(curve.axial), load_unit(curve), curve.figures
+    curves = [PlotLine("measured", curve.axial * e.factor, curve.load * load.factor)]
+    marks = []
+    if figures.E.known and math.isfinite(curve.intercept):
+        label = "E" if curve.is_stress else "EA"
+        curves.append(_straight(curve, label, 0.0, e, load))
+    if figures.Rp02.known:
+        curves.append(_straight(curve, "0.2 % offset", 0.002, e, load))
+        strain = 0.002 + (figures.Rp02.value - curve.intercept) / figures.E.value
+        name = "Rp0.2" if curve.is_stress else "Fp0.2"
+        words = f"{name} = {figures.Rp02.value * load.factor:.4g} {load.name}"
+        marks.append(Mark(strain * e.factor, figures.Rp02.value * load.factor, words))
+    what = "stress" if curve.is_stress else "force"
+    title = f"{what.capitalize()} against strain"
+    return Plot(
+        "stress-strain", title, f"axial strain, {e.name}", f"{what}, {load.name}", tuple(curves), tuple(marks)
+    )
+
+
+def _straight(curve: TestCurve, label: str, offset: float, e: Unit, load: Unit) -> PlotLine:
+    top = 1.05 * curve.figures.Rm.value
+    y = np.array([0.0, top])
+    x = offset + (y - curve.intercept) / curve.figures.E.value
+    return PlotLine(label, x * e.factor, y * load.factor, colour=1 if not offset else 3, dashed=True)
+
+
+def means(run: RunFolder) -> Plot:
+    """Mean strains against time, each in a band of one standard uncertainty."""
+    values, t = run.strain.values, run.strain.time_s
+    found = [np.asarray(values[name], np.float64) for name in _NAMES]
+    e = strain_unit(*found)
+    curves = tuple(
+        PlotLine(name, t, mean * e.factor, np.asarray(values[f"sigma_{name}"], np.float64) * e.factor, colour)
+        for colour, (name, mean) in enumerate(zip(_NAMES, found, strict=True))
+    )
+    return Plot(
+        "strain-time", "Mean strains", "time, s", f"strain, {e.name}", curves, x_range=time_range(run)
+    )
+
+
+def gauges(run: RunFolder) -> Plot | None:
+    """Virtual gauges against time, each in a band of one standard uncertainty; None without any."""
+    found = run.gauges
+    if not found:
+        return None
+    e = strain_unit(*(gauge.value for gauge in found.values()))
+    curves = tuple(
+        PlotLine(name, run.strain.time_s, gauge.value * e.factor, gauge.sigma * e.factor, k % COLOURS)
+        for k, (name, gauge) in enumerate(found.items())
+    )
+    return Plot(
+        "gauges-time", "Virtual gauges", "time, s", f"strain, {e.name}", curves, x_range=time_range(run)
+    )
+
+
+def force(run: RunFolder) -> Plot | None:
+    """Force against time, with every reading of the load cell where a session has them; None without force."""
+    samples = run.session.load_samples() if run.session is not None else []
+    if samples:
+        t = np.array([s.t - run.start_monotonic for s in samples])
+        f = np.array([s.force for s in samples])
+    else:
+        t, f = run.strain.time_s, run.force
+    if not np.isfinite(f).any():
+        return None
+    unit = force_unit(f)
+    curve = PlotLine("", t, f * unit.factor, colour=4)
+    return Plot("force-time", "Force", "time, s", f"force, {unit.name}", (curve,), x_range=time_range(run))
+
+
+def valid(run: RunFolder) -> Plot:
+    """Share of ZOIs with a value against time."""
+    values = run.strain.values
+    share = 100.0 * np.asarray(values["n_valid"], np.float64) / np.maximum(values["n_zoi"], 1)
+    curve = PlotLine("", run.strain.time_s, share, colour=2)
+    return Plot(
+        "valid-time", "ZOIs with a value", "time, s", "share, %", (curve,), (), time_range(run), (0.0, 105.0)
+    )
+
+
+def time_range(run: RunFolder) -> tuple[float, float]:
+    """The same for all figures against time."""
+    t = run.strain.time_s
+    first, last = float(min(0.0, t[0])), float(t[-1])
+    return (first, last) if last > first else (first, first + 1.0)

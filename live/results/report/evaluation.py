@@ -1,0 +1,116 @@
+"""What a finished run tells: tensile figures with their line, and the instants worth showing."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.evaluate import Figure, TensileFigures, Track, evaluate_test, find_lag
+from live.results.figures import options_of
+from live.results.run_folder import RunFolder
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EvaluatedCurve:
+    """The curve of a test and its figures.
+
+    Attributes
+    ----------
+    axial, transverse : (T,) float64
+        Strains of the gauges of these names, else mean strains.
+    load : (T,) float64
+        Stress, Pa, or force, N, where the section is not known; NaN where no force is known.
+    is_stress : bool
+    figures : TensileFigures
+        In the unit of ``load``.
+    intercept : float
+        Of the elastic line, in the unit of ``load``; NaN where there is none.
+    """
+
+    axial: Array
+    transverse: Array
+    load: Array
+    is_stress: bool
+    figures: TensileFigures
+    intercept: float
+
+    @classmethod
+    def of(cls, run: RunFolder) -> EvaluatedCurve:
+        """The curve of ``run``."""
+        measured, is_stress = run.curve, run.specimen.area_m2 is not None
+        figures = evaluate_test(measured, options_of(run.specimen))
+        axial, load = measured.strain, measured.stress
+        return cls(axial, run.transverse_strain, load, is_stress, figures, _intercept(axial, load, figures))
+
+    @property
+    def has_load(self) -> bool:
+        """Whether any force is known."""
+        return bool(np.isfinite(self.load).any())
+
+    @property
+    def elastic(self) -> NDArray[np.bool_]:
+        """Instants of the elastic part, (T,)."""
+        return _elastic(self.axial, self.load, self.figures)
+
+
+def _elastic(axial: Array, load: Array, figures: TensileFigures) -> NDArray[np.bool_]:
+    span = figures.span
+    if span is None or not np.isfinite(load).any():
+        return np.zeros(len(load), np.bool_)
+    before = np.arange(len(load)) <= int(np.nanargmax(load))
+    strain = axial - figures.zero.strain
+    return np.asarray(before & (strain >= span.strain[0]) & (strain <= span.strain[1]), np.bool_)
+
+
+def _intercept(axial: Array, load: Array, figures: TensileFigures) -> float:
+    part = _elastic(axial, load, figures) & np.isfinite(load)
+    return float(np.mean(load[part]) - figures.E.value * np.mean(axial[part])) if part.any() else math.nan
+
+
+def lag_of(run: RunFolder) -> Figure:
+    """How late the recorded load comes beside the frames, s, as the test itself tells it."""
+    samples = run.session.load_samples() if run.session is not None else []
+    if not samples:
+        return Figure.none("no readings of a load cell were recorded")
+    t = np.array([sample.t - run.start_monotonic for sample in samples])
+    force = np.array([sample.force for sample in samples])
+    strain = Track(np.asarray(run.strain.time_s, np.float64), run.axial_strain)
+    return find_lag(strain, Track(t, force))
+
+
+def instants(run: RunFolder, curve: EvaluatedCurve) -> dict[int, str]:
+    """Row -> what it is: first, elastic, yield, maximum, last; each row once, in order of time."""
+    found = {0: ["first"]}
+
+    def add(row: int, words: str) -> None:
+        found.setdefault(row, []).append(words)
+
+    elastic = np.flatnonzero(curve.elastic)
+    if len(elastic):
+        add(int(elastic[len(elastic) // 2]), "elastic")
+    if curve.figures.Rp02.known:
+        add(_yield_row(curve), "yield (0.2 %)")
+    if curve.has_load:
+        add(int(np.nanargmax(curve.load)), "highest force")
+    elif np.isfinite(curve.axial).any():
+        add(int(np.nanargmax(np.abs(curve.axial))), "largest strain")
+    add(run.strain.n - 1, "last")
+    return {row: ", ".join(words) for row, words in sorted(found.items())}
+
+
+def _yield_row(curve: EvaluatedCurve) -> int:
+    plastic = curve.axial - (curve.load - curve.intercept) / curve.figures.E.value
+    beyond = np.flatnonzero((plastic >= 0.002) & (curve.load >= 0.98 * curve.figures.Rp02.value))
+    return int(beyond[0]) if len(beyond) else int(np.nanargmax(curve.load))
+
+
+def nearest_rows(run: RunFolder, times: Sequence[float]) -> dict[int, str]:
+    """Row -> "chosen" of the instants nearest to ``times``, s."""
+    t = run.strain.time_s
+    return {int(np.argmin(np.abs(t - time))): "chosen" for time in sorted(times)}

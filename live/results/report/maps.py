@@ -1,0 +1,126 @@
+"""Maps of a report: beside the picture of their instant, all of a name with one colour bar."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.cv2_loader import load_cv2
+from acquire.frame import CameraInfo
+from live.results.maps.colours import number, ramp, ticks
+from live.results.maps.painting import Levels, Painter, caption
+from live.results.maps.scale import ColourScale, status_legend
+from live.results.quantities import quantity_of
+from live.results.report.page import Html, captioned, element, joined, safe
+from live.results.run_folder import RunFolder
+
+_QUALITY = 80
+_STEPS = 16  # colours of the bar
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MapPictures:
+    """Pictures of the instants that are shown.
+
+    Attributes
+    ----------
+    images : mapping of row to (H, W) array, or None where there is no picture
+    levels : Levels or None
+        The same for all.
+    size : (width, height), px
+    camera : CameraInfo or None
+        What took them.
+    """
+
+    images: Mapping[int, NDArray[Any] | None]
+    levels: Levels | None
+    size: tuple[int, int]
+    camera: CameraInfo | None = None
+
+
+def shots(run: RunFolder, rows: list[int]) -> MapPictures:
+    """Read the pictures; without them, plain grey as large as the ZOIs reach.
+
+    Raises
+    ------
+    DataError
+        The recording is there and cannot be read.
+    """
+    pictures = run.pictures
+    if pictures is None:
+        roi = run.strain.grid.roi
+        return MapPictures(dict.fromkeys(rows), None, (2 * roi.x + roi.width, 2 * roi.y + roi.height))
+    images: dict[int, NDArray[Any] | None] = dict.fromkeys(rows)
+    images.update(zip(rows, pictures.each(rows), strict=False))
+    first = images[rows[0]]
+    levels = Levels.of(first) if first is not None else None
+    return MapPictures(images, levels, (pictures.info.width, pictures.info.height), pictures.info)
+
+
+def maps(run: RunFolder, name: str, instants: Mapping[int, str], taken: MapPictures, longest: int) -> Html:
+    """One map at all instants beside its picture."""
+    scale = ColourScale.of_run(run.strain, name, list(instants))
+    painter = Painter(run.strain, name, scale, taken.size, longest)
+    pairs = []
+    for row, words in instants.items():
+        base = painter.picture(taken.images[row], taken.levels)
+        beside = [_picture(painter.over(base, row), f"{name}, {words}")]
+        if taken.images[row] is not None:
+            beside.insert(0, _picture(base, f"picture, {words}"))
+        pairs.append(
+            captioned(element("div", joined(beside, "")), f"{words}: {caption(run.strain, row)}", "pair")
+        )
+    words = quantity_of(name).words
+    bar = captioned(
+        _bar(name, scale),
+        f"{words}; beyond the ends the colours stay; without colour there is no value",
+        "bar",
+    )
+    return joined(
+        [element("h3", f"{name}, {scale.unit}"), bar, element("div", joined(pairs), class_="pairs")]
+    )
+
+
+def statuses(run: RunFolder, row: int, taken: MapPictures, longest: int) -> Html:
+    """Why ZOIs have no value at an instant: the map and the counts."""
+    painter = Painter(run.strain, "status", None, taken.size, longest)
+    base = painter.picture(taken.images.get(row), taken.levels)
+    picture = _picture(painter.over(base, row), "status of each ZOI")
+    lines = []
+    for one in status_legend(run.strain.maps("status", row)[run.strain.grid.active]):
+        key = Html(f'<span class="key" style="background:rgb{one.rgb}"></span>')
+        lines.append(Html(f"<p>{key}{one.count} {safe(f'{one.name}: {one.text}')}</p>"))
+    return joined([captioned(element("div", picture), caption(run.strain, row), "pair"), *lines])
+
+
+def _picture(image: NDArray[np.uint8], words: str) -> Html:
+    cv2 = load_cv2()
+    _, data = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
+    text = base64.b64encode(bytes(data)).decode("ascii")
+    height, width = image.shape[:2]
+    source = f"data:image/jpeg;base64,{text}"
+    return Html(f'<img src="{source}" width="{width}" height="{height}" alt="{safe(words)}">')
+
+
+def _bar(name: str, scale: ColourScale) -> Html:
+    """The colours from low to high with their numbers, as SVG."""
+    colours = ramp(_STEPS, 1)[::-1, 0]
+    boxes = "".join(
+        f'<rect x="{10 + k * 480 / _STEPS:.1f}" y="4" width="{480 / _STEPS + 0.5:.1f}" height="14"'
+        f' fill="rgb({r},{g},{b})"/>'
+        for k, (r, g, b) in enumerate(colours.tolist())
+    )
+    words = "".join(
+        f'<text class="word" text-anchor="middle" x="{10 + 480 * (v - scale.low) / (scale.high - scale.low):.1f}"'
+        f' y="34">{safe(number(v))}</text>'
+        for v in ticks(scale.low, scale.high, about=7)
+    )
+    label = safe(f"colours of {name} from {scale.low:g} to {scale.high:g} {scale.unit}")
+    return Html(
+        f'<svg class="plot" viewBox="0 0 500 40" role="img" aria-label="{label}">{boxes}{words}</svg>'
+    )

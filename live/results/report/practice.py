@@ -1,0 +1,154 @@
+"""The reporting table of the Good Practices Guide for DIC, filled in from what was recorded.
+
+International Digital Image Correlation Society, A Good Practices Guide for Digital Image Correlation (2018),
+section on reporting requirements, doi:10.32720/idics/gpg.ed1. What nobody recorded is left open and marked;
+``--meta KEY=TEXT`` at the run fills it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.events import EventKind
+from acquire.frame import CameraInfo
+from analysis.evaluate import NoiseFloor
+from analysis.picture.pattern import describe_pattern
+from live.results.report.page import Html, element, table
+from live.results.run_folder import RunFolder
+
+_MICRO = 1e6
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PracticeValues:
+    """What the table is filled in from.
+
+    Attributes
+    ----------
+    run : RunFolder
+    camera : CameraInfo or None
+    reference : (H, W) array or None
+        A picture of the pattern.
+    noise : mapping of str to NoiseFloor
+        Of the still phase by map; empty where there is none.
+    mm_per_px : float or None
+    """
+
+    run: RunFolder
+    camera: CameraInfo | None
+    reference: NDArray[np.generic] | None
+    noise: Mapping[str, NoiseFloor]
+    mm_per_px: float | None
+
+
+def reporting_table(known: PracticeValues) -> Html:
+    """Both halves of the table: hardware and analysis."""
+    rows = [*_hardware(known), *_analysis(known)]
+    shown = [(item, value if value else _open(item, key)) for item, key, value in rows]
+    return table(("", "this test"), shown)
+
+
+def _open(item: str, key: str) -> Html:
+    hint = f" (phasedic run --meta {key}=...)" if key else ""
+    return element("span", f"not recorded{hint}", class_="open")
+
+
+def _hardware(known: PracticeValues) -> list[tuple[str, str, str]]:
+    said, camera, scale = _said(known.run), known.camera, known.mm_per_px
+    size = f"{camera.width} x {camera.height} px, {camera.bits} bits" if camera else ""
+    view = f"{camera.width * scale:.4g} x {camera.height * scale:.4g} mm" if camera and scale else ""
+    return [
+        ("Camera", "camera", camera.name if camera else said("camera")),
+        ("Image resolution", "", size),
+        ("Lens", "lens", said("lens")),
+        ("Aperture", "aperture", said("aperture")),
+        ("Field of view", "field_of_view", view or said("field_of_view")),
+        ("Image scale", "scale", f"{scale:g} mm/px" if scale else said("scale")),
+        ("Stand-off distance", "standoff", said("standoff")),
+        ("Stereo angle", "", "one camera, in-plane measurement"),
+        ("Image acquisition rate", "", f"{camera.fps:g} frames/s" if camera and camera.fps else ""),
+        ("Exposure time", "exposure", _exposure(camera) or said("exposure")),
+        ("Lighting", "lighting", said("lighting")),
+        ("Patterning technique", "pattern", said("pattern")),
+        ("Pattern feature size", "", _feature(known)),
+    ]
+
+
+def _said(run: RunFolder) -> Callable[[str], str]:
+    """What the operator gave as metadata, "" where nothing."""
+    lower = {str(k).lower().replace("-", "_"): str(v) for k, v in run.strain.metadata.items()}
+    return lambda key: lower.get(key, "")
+
+
+def _exposure(camera: CameraInfo | None) -> str:
+    return f"{camera.exposure_s * 1e3:.4g} ms" if camera and camera.exposure_s else ""
+
+
+def _feature(known: PracticeValues) -> str:
+    if known.reference is None:
+        return ""
+    grid = known.run.strain.grid
+    roi = grid.roi
+    part = np.asarray(known.reference)[roi.y : roi.y + roi.height, roi.x : roi.x + roi.width]
+    try:
+        width = describe_pattern(part).autocorrelation_fwhm
+    except ValueError:
+        return ""
+    scale = f" ({width * known.mm_per_px:.3g} mm)" if known.mm_per_px else ""
+    return (
+        f"{width:.1f} px{scale}, full width at half height of the autocorrelation"
+        if math.isfinite(width)
+        else ""
+    )
+
+
+def _analysis(known: PracticeValues) -> list[tuple[str, str, str]]:
+    run, measure = known.run, known.run.section("measure")
+    grid, camera = run.strain.grid, run.section("camera")
+    order = "quadratic (12 parameters)" if measure.get("order") == 2 else "affine (6 parameters)"
+    fields = [name for name in ("dark", "flat") if camera.get(name)]
+    filtering = "Wiener filter of the reference by its own spectrum" + (
+        f"; {' and '.join(fields)} frame" if fields else ""
+    )
+    window = str(measure.get("window", "gaussian"))
+    return [
+        ("DIC software", "", f"phasedic {run.strain.versions.get('phasedic', '')}, phase-DIC"),
+        ("Image filtering", "", filtering),
+        ("Frames averaged", "", _bursts(run)),
+        ("Subset size (ZOI)", "", f"{grid.size} px, {window} weight" + _gaussian(window, grid.size)),
+        ("Step size", "", f"{grid.step} px"),
+        ("Subset shape function", "", order),
+        ("Matching criterion", "", "weighted least squares, gain and offset of the light free"),
+        ("Interpolant", "", "B-spline of degree 5"),
+        ("Strain window", "", "none: gradients are parameters of each ZOI"),
+        ("Virtual strain gauge size", "", f"{grid.size} px, one ZOI"),
+        ("Strain formulation", "", run.strain.strain_measure),
+        ("Post-filtering of strains", "", "none"),
+        ("Displacement noise floor", "", _floor(known.noise, ("u", "v"), 1.0, "px")),
+        ("Strain noise floor", "", _floor(known.noise, ("exx", "eyy", "exy"), _MICRO, "µm/m")),
+    ]
+
+
+def _gaussian(window: str, size: int) -> str:
+    return f" of standard deviation {size / 6:.1f} px" if window == "gaussian" else ""
+
+
+def _bursts(run: RunFolder) -> str:
+    frames = np.asarray(run.strain.values["n_frames"])
+    told = [e for e in _events(run) if e.get("n")]
+    reference = f"; reference {told[0]['n']}" if told else ""
+    return f"{int(np.median(frames))}{reference}" if len(frames) else ""
+
+
+def _events(run: RunFolder) -> list[dict[str, object]]:
+    return [dict(event.data) for event in run.events if event.kind is EventKind.REFERENCE]
+
+
+def _floor(noise: Mapping[str, NoiseFloor], names: tuple[str, ...], factor: float, unit: str) -> str:
+    found = [f"{name} {noise[name].measured * factor:.3g}" for name in names if name in noise]
+    return f"{', '.join(found)} {unit} (1 standard deviation of one ZOI, still phase)" if found else ""

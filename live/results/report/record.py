@@ -1,0 +1,146 @@
+"""What was kept of a run: gauges, times, ledger, events, definitions, versions, hashes."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.evaluate import CONFIDENCE
+from live.pipeline.screen import Screen
+from live.results.figures import interval, quantity
+from live.results.folder import versions
+from live.results.maps.colours import unit_for
+from live.results.quantities import MEANS, quantity_of
+from live.results.report.evaluation import lag_of
+from live.results.report.page import Html, element, facts, joined, paragraph, table
+from live.results.run_folder import RunFolder
+
+_MOST_EVENTS = 3000
+_KINDS = (".h5", ".csv", ".json", ".png", ".tif")
+_FIGURES = (
+    (
+        "E",
+        "Pa",
+        "slope of stress over axial strain by least squares, over the strains named under Figures of the test",
+    ),
+    ("EA", "N", "the same of force where the section is not known"),
+    ("nu", "1", "minus the slope of transverse over axial strain in the same part"),
+    ("Rp0.1, Rp0.2, Rp1", "Pa", "stress where the curve crosses the elastic line moved by so much strain"),
+    ("ReH, ReL", "Pa", "upper and lower yield strength, where there is a yield point"),
+    ("Rm", "Pa", "highest stress: force over the undeformed section"),
+    ("Agt, Ag", "1", "extension at Rm, total and plastic"),
+    ("At, A", "1", "extension at the break, total and plastic"),
+)
+
+
+def gauges(run: RunFolder) -> Html:
+    """The virtual gauges: what each is, how far it went, where it ended, and how often it was lost."""
+    rows = []
+    for name, gauge in run.gauges.items():
+        e = unit_for(_largest(gauge.value))
+        known = np.isfinite(gauge.value)
+        last = quantity(gauge.value[-1] * e.factor, gauge.sigma[-1] * e.factor, e.name).replace("+-", "±")
+        words = "; ".join(f"{key} {_plain(value)}" for key, value in gauge.described.items())
+        largest = f"{_largest(gauge.value) * e.factor:.4g} {e.name}" if known.any() else "not known"
+        rows.append((name, words or "not recorded", largest, last, int(np.count_nonzero(~known))))
+    heads = ("gauge", "what it is, px", "largest", "last ± sigma", "instants lost")
+    return table(heads, rows, (2, 3, 4)) if rows else Html("")
+
+
+def _largest(values: NDArray[np.float64]) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.abs(known).max()) if known.size else 0.0
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, list | tuple):
+        return ", ".join(map(_plain, value))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def times(run: RunFolder) -> Html:
+    """How late the load came beside the frames, and the results after them."""
+    lag = lag_of(run)
+    words = interval(lag, 1e-3, "ms").replace("+-", "±") if lag.known else f"not known: {lag.why}"
+    sign = f" ({CONFIDENCE:.0%} interval; positive: the load comes late)" if lag.known else ""
+    late = np.asarray(run.strain.values.get("latency_s", ()), np.float64) * 1e3
+    late = late[np.isfinite(late)]
+    taken = run.section("load").get("lag_s")
+    found = {
+        "lag of the load beside the frames": words + sign,
+        "lag taken off the force": f"{taken:g} s" if isinstance(taken, int | float) and taken else "none",
+    }
+    if late.size:
+        p50, p95 = np.percentile(late, (50, 95))
+        found["from the last frame of a burst to its result"] = f"p50 {p50:.0f} ms, p95 {p95:.0f} ms"
+    return facts(found)
+
+
+def ledger(run: RunFolder) -> Html:
+    """The counts of frames."""
+    found = run.session.ledger if run.session is not None else None
+    return facts(found) if found else paragraph("No ledger was recorded.", "dim")
+
+
+def events(run: RunFolder) -> Html:
+    """All events; of more than 3000 the first."""
+    found = run.events
+    rows = [
+        (
+            f"{event.t - run.start_monotonic:.3f}",
+            element("span", event.level, class_=event.level),
+            event.kind.value,
+            event.source,
+            event.text,
+        )
+        for event in found[:_MOST_EVENTS]
+    ]
+    if not rows:
+        return paragraph("No events were recorded.", "dim")
+    left = len(found) - len(rows)
+    more = paragraph(f"{left} more events are in session.h5.", "warning") if left else Html("")
+    return joined([table(("time, s", "level", "kind", "who", "what"), rows, (0,)), more])
+
+
+def definitions(run: RunFolder) -> Html:
+    """What every number is."""
+    names = ["x", "y", *run.strain.names, *(MEANS.get(name, name) for name in run.strain.values)]
+    known = {q.name: q for q in map(quantity_of, names)}
+    rows = [(q.name, q.unit or "1", q.words) for q in known.values()]
+    words = (
+        "x right, y down, from the centre of the first pixel; all maps lie on the reference picture. Strain"
+        f" measure: {run.strain.strain_measure}. Strains are dimensionless in the files."
+    )
+    return joined([paragraph(words), table(("", "unit", "what it is"), [*rows, *_FIGURES])])
+
+
+def version_table(run: RunFolder) -> Html:
+    """Of the programs that measured, and of those that made the report."""
+    then = {str(key): str(value) for key, value in run.strain.versions.items()}
+    now = versions()
+    rows = [(name, then.get(name, ""), now.get(name, "")) for name in {**then, **now}]
+    return table(("", "measured with", "report made with"), rows)
+
+
+def hashes(run: RunFolder, screen: Screen) -> Html:
+    """The files of the run as they are on the disk, and the recording that was replayed."""
+    files = {path for path in run.path.iterdir() if path.suffix in _KINDS}
+    session = run.session_path
+    beside = [session] if session is not None and session.parent.resolve() != run.path.resolve() else []
+    rows = []
+    for path in [*sorted(files), *beside]:
+        screen.status(f"reading {path.name} for its hash")
+        size = f"{path.stat().st_size:,}".replace(",", "\u202f")
+        rows.append((path.name, size, element("span", _sha256(path), class_="code")))
+    return table(("file", "bytes", "SHA-256"), rows, (1,))
+
+
+def _sha256(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        return f"cannot be read: {error.strerror}"

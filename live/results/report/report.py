@@ -1,0 +1,239 @@
+"""The report of one run: what was tested, how, what came out, how well, and from which files."""
+
+from __future__ import annotations
+
+import datetime
+from dataclasses import dataclass
+
+import numpy as np
+
+from acquire.errors import DataError
+from analysis.evaluate import CONFIDENCE
+from live.pipeline.screen import Screen
+from live.results.figures import axis_words, figure_lines, headline
+from live.results.noise_floor import StillPhase, still_phase_of
+from live.results.report import curves
+from live.results.report.evaluation import EvaluatedCurve, instants, nearest_rows
+from live.results.report.maps import MapPictures, maps, shots, statuses
+from live.results.report.page import (
+    Html,
+    captioned,
+    element,
+    facts,
+    joined,
+    page,
+    paragraph,
+    section,
+    table,
+    tiles,
+)
+from live.results.report.practice import PracticeValues, reporting_table
+from live.results.report.record import definitions, events, gauges, hashes, ledger, times, version_table
+from live.results.report.svg import Plot, draw
+from live.results.run_folder import RunFolder
+
+MOST_BYTES = 5_000_000
+_SIDES = (720, 480, 320, 200)  # px, of the pictures: smaller ones where the page would be too large
+
+
+@dataclass(frozen=True, slots=True)
+class ReportRequest:
+    """What a report shows.
+
+    Attributes
+    ----------
+    fields : tuple of str
+        Maps; the strain along the load where empty.
+    times : tuple of float, s
+        Instants of the maps; automatic where empty.
+    mm_per_px : float or None
+    """
+
+    fields: tuple[str, ...] = ()
+    times: tuple[float, ...] = ()
+    mm_per_px: float | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Report:
+    """A page and the figures on it."""
+
+    html: str
+    figures: tuple[Plot, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Content:
+    """What is worked out once, whatever the size of the pictures."""
+
+    run: RunFolder
+    curve: EvaluatedCurve
+    figures: tuple[Plot, ...]
+    instants: dict[int, str]
+    shots: MapPictures
+    still: StillPhase
+    files: Html
+
+
+def make_report(run: RunFolder, wanted: ReportRequest, screen: Screen) -> Report:
+    """The report of ``run``, below 5 MB.
+
+    Raises
+    ------
+    DataError
+        Its files cannot be read, or hold no measurement, or not this map.
+    """
+    if not run.strain.n:
+        raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to report")
+    content = _content(run, wanted, screen)
+    for side in _SIDES:
+        text = page(f"{run.title}: phasedic report", _parts(content, wanted, side))
+        if len(text.encode()) < MOST_BYTES:
+            break
+    return Report(text, content.figures)
+
+
+def _content(run: RunFolder, wanted: ReportRequest, screen: Screen) -> _Content:
+    curve = EvaluatedCurve.of(run)
+    chosen = nearest_rows(run, wanted.times) if wanted.times else instants(run, curve)
+    still = still_phase_of(run.strain)
+    return _Content(
+        run, curve, _figures(run, curve), chosen, shots(run, list(chosen)), still, hashes(run, screen)
+    )
+
+
+def _figures(run: RunFolder, curve: EvaluatedCurve) -> tuple[Plot, ...]:
+    first = [curves.stress_strain(curve)] if curve.has_load else []
+    found = [*first, curves.force(run), curves.gauges(run), curves.means(run), curves.valid(run)]
+    return tuple(figure for figure in found if figure is not None)
+
+
+def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
+    run, taken, chosen = content.run, content.shots, content.instants
+    fields = wanted.fields or (run.axial,)
+    reference = next((image for image in taken.images.values() if image is not None), None)
+    known = PracticeValues(run, taken.camera, reference, content.still.floors, wanted.mm_per_px)
+    return [
+        _head(run, content.curve),
+        section("Specimen and rig", facts(_rig(run, taken))),
+        section("Curves", plots(content.figures), _about_curves(content.curve)),
+        section("Figures of the test", *figure_table(run, content.curve)),
+        section("Virtual gauges", gauges(run)),
+        section("Lag and latency", times(run)),
+        section("Maps", *(maps(run, name, chosen, taken, side) for name in fields)),
+        section("Noise floor", *_noise_section(content)),
+        section("Status of the ZOIs", statuses(run, max(chosen), taken, min(side, 480))),
+        section("Ledger and events", ledger(run), events(run)),
+        section("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
+        section("Definitions", definitions(run)),
+        section("Versions and files", version_table(run), content.files),
+    ]
+
+
+def _head(run: RunFolder, curve: EvaluatedCurve) -> Html:
+    now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
+    words = f"Test of {run.strain.start_utc}: {run.strain.n} measurements in {run.strain.time_s[-1]:.4g} s."
+    unfinished = "The results were not closed by their writer; all complete rows are here."
+    return joined(
+        [
+            element("h1", run.title),
+            paragraph(f"{words} Report made by phasedic on {now}.", "dim"),
+            paragraph(unfinished, "warning") if run.strain.unfinished else Html(""),
+            tiles({**tensile(curve), **_extent(run, curve)}),
+        ]
+    )
+
+
+def tensile(curve: EvaluatedCurve) -> dict[str, str]:
+    """E, nu and the strengths by name, each with its uncertainty; what the curve does not tell is left out."""
+    rows = headline(curve.figures, stresses=curve.is_stress)
+    return {row.name: row.text.replace("+-", "±") for row in rows if row.figure.known}
+
+
+def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
+    values, e = run.strain.values, curves.strain_unit(curve.axial)
+    found = {"ZOIs with a value, last": f"{int(values['n_valid'][-1])} of {int(values['n_zoi'][-1])}"}
+    if np.isfinite(curve.axial).any():
+        largest = curve.axial[np.nanargmax(np.abs(curve.axial))] * e.factor
+        name = "gauge axial" if "axial" in run.gauges else f"mean {run.axial}"
+        found[f"largest {name}"] = f"{largest:.4g} {e.name}"
+    return found
+
+
+def _rig(run: RunFolder, taken: MapPictures) -> dict[str, object]:
+    s, camera, grid = run.specimen, taken.camera, run.strain.grid
+    found: dict[str, object] = {str(key): value for key, value in run.strain.metadata.items()}
+    known = s.width_mm is not None and s.thickness_mm is not None
+    found["section"] = (
+        f"{s.width_mm:g} mm x {s.thickness_mm:g} mm" if known else "not known: forces, no stresses"
+    )
+    found["load along"] = f"{run.load_axis.axis} of the picture"
+    if known_angle := axis_words(run.load_axis):
+        found["direction of the load"] = known_angle
+    if camera is not None:
+        fps = f", {camera.fps:g} frames/s" if camera.fps else ""
+        size = f"{camera.width} x {camera.height} px, {camera.bits} bits{fps}, clock: {camera.clock}"
+        found["camera"] = f"{camera.name}: {size}"
+    found["camera address"] = run.camera_address or "not recorded"
+    cell = run.session.load_cell if run.session is not None else None
+    if cell is not None:
+        found["load cell"] = cell.name + (f", capacity {cell.capacity_N:g} N" if cell.capacity_N else "")
+    warnings = [*(camera.warnings if camera else ()), *(cell.warnings if cell else ())]
+    if warnings:
+        found["warnings of the devices"] = "; ".join(warnings)
+    found["ZOIs"] = (
+        f"{grid.n_active} of {grid.size} px, {grid.step} px apart, region x,y,w,h = {grid.roi.text} px"
+    )
+    return found
+
+
+def plots(figures: tuple[Plot, ...]) -> Html:
+    """Figures side by side as there is room."""
+    found = [
+        captioned(Html(draw(figure).replace("<svg ", '<svg class="plot" ', 1)), figure.title)
+        for figure in figures
+    ]
+    return element("div", joined(found), class_="plots")
+
+
+def _about_curves(curve: EvaluatedCurve) -> Html:
+    if not curve.has_load:
+        return paragraph("No force is known at any instant, so there is no stress-strain curve.", "dim")
+    words = "Bands are one standard uncertainty of the mean on either side."
+    figures = curve.figures
+    if not figures.E.known:
+        words += f" E is not known: {figures.E.why}."
+    if figures.span is not None:
+        low, high = (100 * strain for strain in figures.span.strain)
+        words += (
+            f" The elastic line has {figures.span.n} instants between the strains {low:.3g} and {high:.3g} %"
+            f" ({figures.standard}, R^2 {figures.r2:.5f}); intervals of E, nu and Rp0.2 are of {CONFIDENCE:.0%}."
+        )
+    return paragraph(words, "dim")
+
+
+def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
+    """All figures in words, how they were had, and which are not known and why."""
+    lines = figure_lines(curve.figures, run.specimen) if curve.has_load else []
+    return [paragraph(line.strip().replace("+-", "±").replace("  ", ", ")) for line in lines]
+
+
+def _noise_section(content: _Content) -> list[Html]:
+    n = content.still.instants
+    if not content.still.floors:
+        words = (
+            "No still phase was found: fewer than two instants before anything moves. With the specimen at rest"
+            " for a few seconds at the start of a test the noise floor is measured there."
+        )
+        return [paragraph(words, "open")]
+    rows = []
+    for name, noise in content.still.floors.items():
+        factor, unit = (1.0, "px") if name in ("u", "v") else (1e6, "µm/m")
+        ratio = f"{noise.measured / noise.predicted:.2f}" if noise.predicted else "not known"
+        rows.append((name, f"{noise.measured * factor:.3g}", f"{noise.predicted * factor:.3g}", unit, ratio))
+    words = (
+        f"Standard deviation of single ZOIs in the first {n} instants (to {content.run.strain.time_s[n - 1]:.4g} s),"
+        " in which nothing moves yet: displacements about a plane, strains about their mean. Predicted: from the"
+        " noise of the pictures, as every value's sigma."
+    )
+    return [paragraph(words), table(("", "measured", "predicted", "", "ratio"), rows, (1, 2, 4))]

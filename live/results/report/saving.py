@@ -1,0 +1,124 @@
+"""The files of a report: the page, its PDF, and each figure as SVG, PNG and the CSV behind it.
+
+A browser without a window, where there is one: pages to PDF, figures to PNG.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from acquire.errors import ConfigError, DataError
+from live.pipeline.screen import Screen
+from live.results.export.atomic_file import new_file, new_folder
+from live.results.report.report import Report
+from live.results.report.svg import HEIGHT, WIDTH, Plot, draw
+
+_NAMES = (
+    *("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "msedge"),
+    "/Applications/Google Chrome.app/Contents/MacOS/Google Chrome",
+)
+_INSTALL = "`apt install chromium` on Debian"
+NO_BROWSER = (
+    f"no browser was found (chromium, Chrome or Edge); print the page from yours, or install one: {_INSTALL}"
+)
+NO_PNG = f"no browser was found to make PNG of the figures; SVG and CSV are there ({_INSTALL} brings one)"
+_TIME_S = 120
+
+
+def find_browser() -> str | None:
+    """Its program, or None."""
+    return next((path for path in map(shutil.which, _NAMES) if path), None)
+
+
+def to_pdf(page: Path, pdf: Path) -> None:
+    """Print a page; raises as ``_run``."""
+    _run(page, pdf, ["--no-pdf-header-footer", f"--print-to-pdf={pdf.resolve()}"])
+
+
+def to_png(picture: Path, png: Path, width: int, height: int) -> None:
+    """A page or SVG as it looks in a window of this size, px; raises as ``_run``."""
+    _run(
+        picture,
+        png,
+        ["--hide-scrollbars", f"--screenshot={png.resolve()}", f"--window-size={width},{height}"],
+    )
+
+
+def _run(page: Path, wanted: Path, arguments: list[str]) -> None:
+    """Let the browser make ``wanted`` of ``page``.
+
+    Raises
+    ------
+    ConfigError
+        There is no browser.
+    DataError
+        It made nothing.
+    """
+    browser = find_browser()
+    if browser is None:
+        raise ConfigError(NO_BROWSER)
+    with tempfile.TemporaryDirectory() as profile:
+        # Its sandbox does not start for root; the page is ours and its policy forbids scripts.
+        root = ["--no-sandbox"] if hasattr(os, "geteuid") and os.geteuid() == 0 else []
+        plain = [browser, "--headless=new", "--disable-gpu", f"--user-data-dir={profile}", *root]
+        try:
+            done = subprocess.run(
+                [*plain, *arguments, page.resolve().as_uri()],
+                capture_output=True,
+                timeout=_TIME_S,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise DataError(
+                f"{wanted}: {browser} did not finish within {_TIME_S} s; print the page from it"
+            ) from None
+    if not wanted.exists():
+        words = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
+        raise DataError(
+            f"{wanted}: {browser} made nothing of {page} ({' '.join(words)}); print the page from it"
+        )
+
+
+def save_page(report: Report, path: Path) -> None:
+    """The HTML file; raises as ``new_file``."""
+    with new_file(path) as part:
+        part.write_text(report.html, encoding="utf-8")
+
+
+def save_pdf(page: Path, path: Path) -> None:
+    """The page printed by a browser without a window; raises ConfigError where there is none."""
+    with new_file(path) as part:
+        to_pdf(page, part)
+
+
+def save_figures(figures: Sequence[Plot], folder: Path, screen: Screen) -> None:
+    """Each as SVG and CSV, and as PNG where there is a browser to make it; raises as ``new_folder``."""
+    browser = find_browser()
+    with new_folder(folder) as part:
+        for figure in figures:
+            svg = part / f"{figure.name}.svg"
+            svg.write_text(draw(figure, alone=True), encoding="utf-8")
+            (part / f"{figure.name}.csv").write_text(as_csv(figure), encoding="utf-8")
+            if browser is not None:
+                to_png(svg, svg.with_suffix(".png"), WIDTH, HEIGHT)
+    if browser is None:
+        screen.say(NO_PNG)
+
+
+def as_csv(figure: Plot) -> str:
+    """The points of all curves, a line each: curve, x, y, and half the width of the band."""
+    lines = [f"# {figure.title}; x: {figure.x_label}; y: {figure.y_label}", "curve,x,y,sigma"]
+    for curve in figure.curves:
+        sigma = curve.sigma if curve.sigma is not None else np.full(len(curve.x), np.nan)
+        name = curve.label.replace('"', "'")
+        lines += [
+            f'"{name}",{x:.9g},{y:.9g},{s:.4g}' for x, y, s in zip(curve.x, curve.y, sigma, strict=True)
+        ]
+    return "\n".join(lines) + "\n"

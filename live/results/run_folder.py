@@ -1,0 +1,349 @@
+"""The folder of a finished run: results, recording and settings, tied together.
+
+with open_run("runs/20261122T081747Z") as run:
+    run.strain.values["eyy"], run.stress, run.events
+
+Virtual gauges laid over a finished run: read from its maps as they would have been read in the test.
+
+The strain field of a measured instant, made of the maps that the file holds.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.camera import with_scheme
+from acquire.closing import Closing
+from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.events import Event, EventKind
+from acquire.record_mode import Crop
+from acquire.session import Session
+from analysis.evaluate import Curve, Gauge, LoadAxis, load_axis
+from analysis.field import PAIR_INDEX, WINDOWS, Measure, StrainField, Window
+from live.config.gauges import gauges_for
+from live.config.loading import from_dict, load_config
+from live.config.sections import SpecimenConfig
+from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
+from live.results.pictures import Pictures, of_images, of_session
+from live.results.reader import Strain
+from live.results.row import gauge_columns
+
+_GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
+_DU_DY, _DV_DX = 2, 4  # of u, du_dx, du_dy, v, dv_dx, dv_dy
+
+
+def read_field(strain: Strain, row: int) -> StrainField:
+    """The field of ``row``; of the covariances those that the stored sigmas tell, the others 0.
+
+    Raises
+    ------
+    DataError
+        There is no such row, or it cannot be read.
+    """
+    maps = {name: np.asarray(strain.maps(name, row), np.float64) for name in ("u", "v", *_GRADIENTS)}
+    sigmas = {name: np.asarray(strain.maps(f"sigma_{name}", row), np.float64) for name in maps}
+    status, residual = strain.maps("status", row), strain.maps("residual", row)
+    field = StrainField.from_values(strain.grid, maps, sigmas, status=status, residual=residual)
+    covariance = np.array(field.covariance)
+    shear = np.asarray(strain.maps("sigma_exy", row), np.float64)
+    both = sigmas["du_dy"] ** 2 + sigmas["dv_dx"] ** 2
+    covariance[PAIR_INDEX[_DU_DY, _DV_DX]] = (4 * shear**2 - both) / 2
+    measure = cast(Measure, strain.strain_measure)
+    return replace(field, covariance=covariance, measure=measure, window=_window(strain))
+
+
+def _window(strain: Strain) -> Window:
+    """The weight of the ZOIs, which says how far neighbours are correlated; gaussian where it is not recorded."""
+    said = strain.config.get("measure")
+    name = said.get("window") if isinstance(said, dict) else None
+    return cast(Window, name) if name in WINDOWS else "gaussian"
+
+
+SESSION, STRAIN = "session.h5", "strain.h5"
+_AS_FILES = ("files:", "video:")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GaugeTrack:
+    """A virtual gauge over a test.
+
+    Attributes
+    ----------
+    value, sigma : (T,) float64
+        Strain and its standard uncertainty; NaN where it was lost.
+    described : mapping of str to JSON value
+        Kind and place as they were configured; empty where the file does not say.
+    """
+
+    value: NDArray[np.float64]
+    sigma: NDArray[np.float64]
+    described: dict[str, Any]
+
+
+class RunFolder(Closing):
+    """A finished run, open for reading; a context manager. ``open_run`` makes one.
+
+    Attributes
+    ----------
+    path : Path
+        The folder.
+    strain : Strain
+        Its results: maps and means.
+    """
+
+    def __init__(self, path: Path, strain: Strain) -> None:
+        self.path, self.strain = path, strain
+        self._sessions: list[Session] = []
+
+    @cached_property
+    def session(self) -> Session | None:
+        """The recording, in this folder or the one that was replayed; None where there is none.
+
+        Raises
+        ------
+        DataError
+            It is there and cannot be read.
+        """
+        path = self.session_path
+        if path is None:
+            return None
+        self._sessions.append(Session.open(path))
+        return self._sessions[-1]
+
+    @property
+    def session_path(self) -> Path | None:
+        """Where the recording lies; None where there is none."""
+        address = self.camera_address
+        replayed = address.removeprefix("session:") if address.startswith("session:") else ""
+        tried = [self.path / SESSION, *([Path(replayed), self.path / replayed] if replayed else [])]
+        return next((path for path in tried if path.is_file()), None)
+
+    @property
+    def camera_address(self) -> str:
+        """What was measured, as it was given."""
+        return str(self.section("camera").get("address") or "")
+
+    def section(self, name: str) -> dict[str, Any]:
+        """A section of the configuration that was in force, as it is stored."""
+        found = self.strain.config.get(name)
+        return found if isinstance(found, dict) else {}
+
+    @cached_property
+    def pictures(self) -> Pictures | None:
+        """Pictures of the measured instants; None where they are not here any more.
+
+        Raises
+        ------
+        DataError
+            The recording is there and cannot be read.
+        """
+        if self.session is not None:
+            return of_session(self.session, self.strain)
+        try:
+            address = with_scheme(self.camera_address) if self.camera_address else ""
+            return of_images(address, self.strain, self._crop) if address.startswith(_AS_FILES) else None
+        except PhasedicError:
+            return None
+
+    @property
+    def _crop(self) -> Crop | None:
+        """The part of the pictures that was measured; None for all of it, or where the file says what cannot be."""
+        crop = self.section("camera").get("crop")
+        if not isinstance(crop, list) or [type(value) for value in crop] != [int] * 4:
+            return None
+        x, y, width, height = crop
+        return x, y, width, height
+
+    @property
+    def specimen(self) -> SpecimenConfig:
+        """Section and axis of the load, as stored; what is not stored is not known.
+
+        Raises
+        ------
+        DataError
+            The file says what cannot be.
+        """
+        known = {field.name for field in fields(SpecimenConfig)}
+        stored = {key: value for key, value in self.section("specimen").items() if key in known}
+        try:
+            return from_dict({"specimen": stored}, {}, str(self.strain.path)).specimen
+        except ConfigError as error:
+            raise DataError(f"{error}; make the results again with phasedic replay") from None
+
+    @property
+    def mm_per_px(self) -> float | None:
+        """The scale that was configured; None where there is none."""
+        scale = self.section("scale").get("mm_per_px")
+        if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0 < scale < math.inf:
+            return None
+        return float(scale)
+
+    @property
+    def title(self) -> str:
+        """Name of the specimen, else of the folder."""
+        return str(self.strain.metadata.get("specimen") or self.path.resolve().name)
+
+    @cached_property
+    def load_axis(self) -> LoadAxis:
+        """The axis of the load, as it was given or as the means tell it."""
+        exx, eyy, exy = (np.asarray(self.strain.values[name], np.float64) for name in ("exx", "eyy", "exy"))
+        return load_axis(exx, eyy, exy, self.specimen.axis)
+
+    @property
+    def axial(self) -> str:
+        """The strain along the load: "exx" or "eyy"."""
+        return f"e{self.load_axis.axis * 2}"
+
+    @property
+    def transverse(self) -> str:
+        """The strain across the load."""
+        return "eyy" if self.load_axis.axis == "x" else "exx"
+
+    @cached_property
+    def gauges(self) -> dict[str, GaugeTrack]:
+        """The virtual gauges by name, in the order of the configuration."""
+        values, described = self.strain.values, self.section("gauges")
+        names = [name.removeprefix("gauge_") for name in values if f"sigma_{name}" in values]
+        names = [name for name in names if gauge_columns(name)[0] in values]
+        tracks = {}
+        for name in names:
+            value, sigma = (np.asarray(values[column], np.float64) for column in gauge_columns(name))
+            said = described.get(name)
+            known = (
+                {key: item for key, item in said.items() if item is not None}
+                if isinstance(said, dict)
+                else {}
+            )
+            tracks[name] = GaugeTrack(value, sigma, known)
+        return tracks
+
+    @property
+    def axial_strain(self) -> NDArray[np.float64]:
+        """Strain along the load, (T,): of the gauge ``axial`` where there is one, else the mean."""
+        return self._strain(strains_along(self.gauges, self.load_axis.axis)[0])
+
+    @property
+    def transverse_strain(self) -> NDArray[np.float64]:
+        """Strain across the load, (T,): of the gauge ``transverse`` where there is one, else the mean."""
+        return self._strain(strains_along(self.gauges, self.load_axis.axis)[1])
+
+    def _strain(self, name: str) -> NDArray[np.float64]:
+        if name in (AXIAL, TRANSVERSE):
+            return self.gauges[name].value
+        return np.asarray(self.strain.values[name], np.float64)
+
+    def field(self, row: int) -> StrainField:
+        """The strain field of one instant, as ``strain.h5`` holds it.
+
+        Raises
+        ------
+        DataError
+            There is no such instant, or it cannot be read.
+        """
+        return read_field(self.strain, row)
+
+    @property
+    def force(self) -> NDArray[np.float64]:
+        """Force at each instant, (T,) N; NaN where it is not known."""
+        return np.asarray(self.strain.values["force_N"], np.float64)
+
+    @property
+    def force_one_zero(self) -> NDArray[np.float64]:
+        """The force as if the zero of the first instant had held to the end, (T,) N: no tare in mid-test."""
+        return self.strain.force_one_zero
+
+    @property
+    def stress(self) -> NDArray[np.float64] | None:
+        """Force over the section, (T,) Pa; None where the section is not known."""
+        area = self.specimen.area_m2
+        return None if area is None else self.force_one_zero / area
+
+    @property
+    def curve(self) -> Curve:
+        """Stress over axial strain, to be evaluated; force (N) where the section is not known."""
+        load = self.force_one_zero if self.stress is None else self.stress
+        times = np.asarray(self.strain.time_s, np.float64)
+        return Curve(times, self.axial_strain, load, self.transverse_strain)
+
+    @cached_property
+    def events(self) -> list[Event]:
+        """What was recorded of events, without the one a burst; empty without a recording."""
+        if self.session is None:
+            return []
+        return [event for event in self.session.events() if event.kind is not EventKind.MEASURED]
+
+    @property
+    def start_monotonic(self) -> float:
+        """Time zero of the results on the clock of the recording's events, s."""
+        return 0.0 if self.session is None else self.session.start_monotonic
+
+    def __repr__(self) -> str:
+        return f"<RunFolder {self.path}: {self.strain.n} instants>"
+
+    def close(self) -> None:
+        """Close the files; again without effect."""
+        self.strain.close()
+        for session in self._sessions:
+            session.close()
+
+
+def open_run(path: str | os.PathLike[str]) -> RunFolder:
+    """Open the folder of a run, or a ``strain.h5`` in it.
+
+    Raises
+    ------
+    DataError
+        There is no ``strain.h5``, or it cannot be read.
+    """
+    place = Path(path)
+    file = place / STRAIN if place.is_dir() else place
+    if not file.exists():
+        raise DataError(f"{place}: no {STRAIN} there; give the folder that phasedic run or replay wrote")
+    return RunFolder(file.parent, Strain.open(file))
+
+
+def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
+    """Add the ``[gauges.NAME]`` of a TOML file to ``run``, as long as it is open; its files stay as they are.
+
+    Values are those that a replay with this file would give, and so are the uncertainties of extensometers and single
+    ZOIs. That of a mean over an area is of the overlap of the windows alone, which is low on dense grids (by 6 % at a
+    step of a quarter of a ZOI, by a third at most). One of a name that is there already takes its place.
+
+    Raises
+    ------
+    ConfigError
+        The file cannot be read, says nothing of gauges, or no ZOI lies where one is.
+    DataError
+        The maps cannot be read.
+    """
+    config = load_config(path, {"specimen.axis": run.specimen.axis})
+    if not config.gauges:
+        raise ConfigError(f"{path}: holds no gauge; give a table [gauges.NAME] each")
+    gauges, strain = gauges_for(config.gauges, config.specimen.first_axis, run.strain.grid), run.strain
+    values, sigmas = _read(run, gauges)
+    stored = run.section("gauges")
+    strain.config["gauges"] = {**stored, **config.gauges}
+    for k, gauge in enumerate(gauges):
+        strain.values |= dict(zip(gauge_columns(gauge.name), (values[:, k], sigmas[:, k]), strict=True))
+    run.__dict__.pop("gauges", None)  # worked out anew when it is asked for
+    return tuple(gauge.name for gauge in gauges)
+
+
+def _read(run: RunFolder, gauges: tuple[Gauge, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Values and sigmas, (T, number of gauges) each."""
+    shape = (run.strain.n, len(gauges))
+    values, sigmas = np.full(shape, np.nan), np.full(shape, np.nan)
+    for row in range(run.strain.n):
+        field = run.field(row)
+        for k, gauge in enumerate(gauges):
+            read = gauge.measure(field)
+            values[row, k], sigmas[row, k] = read.value, read.sigma
+    return values, sigmas

@@ -1,0 +1,121 @@
+"""The short summary at the end of a run: what was measured, how well, and where it lies.
+
+The status card of the view: where the test stands, in a few lines of Markdown.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from acquire.load_cell import LoadLog
+from acquire.printable import brief
+from live.config.sections import SpecimenConfig
+from live.pipeline.history import History
+from live.pipeline.run_state import RunState
+from live.pipeline.snapshot import Snapshot
+from live.results.figures import alignment_line, elastic_lines, evaluate, figure_lines, lag_line, tare_line
+
+
+def noise_line(history: History) -> str:
+    """The noise of the picture and of the strain, typical of the run."""
+    noise = history.column("noise_GL")
+    noise = noise[np.isfinite(noise)]
+    picture = f"one frame {np.median(noise):.3g} GL, " if noise.size else ""
+    one = np.nanmedian(history.column("zoi_sigma")) * 1e6
+    mean = np.nanmedian(history.column("sigma_eyy")) * 1e6
+    return (
+        f"noise: {picture}strain of one ZOI {one:.3g} um/m, of the mean {mean:.2g} um/m (predicted, 1 sigma)"
+    )
+
+
+def latency_lines(history: History) -> list[str]:
+    """How late the results were; nothing in a replay."""
+    late = history.column("latency_s") * 1e3
+    if not np.isfinite(late).any():
+        return []
+    p50, p95 = np.nanpercentile(late, (50, 95))
+    kernel = np.median(history.column("measure_s")) * 1e3
+    words = f"latency from the last frame of a burst: p50 {p50:.0f} ms, p95 {p95:.0f} ms"
+    return [f"{words}, largest {np.nanmax(late):.0f} ms; the kernel took {kernel:.1f} ms"]
+
+
+def why_nothing(books: RunState) -> str:
+    """Why no ZOI has a value, in a sentence."""
+    instants, troubles = books.history.instants, books.journal.events("warning", "error")
+    if instants:
+        return f"nothing was measured: no ZOI has a value ({instants[-1].refused or 'none was asked for'})"
+    if troubles:
+        return f"nothing was measured: {brief(troubles[-1].text)}"
+    return f"nothing was measured: {books.ledger.grabbed} frames gave no burst after the reference; take shorter ones"
+
+
+def summary_lines(books: RunState, specimen: SpecimenConfig) -> list[str]:
+    """The summary, a line each."""
+    history = books.history
+    valid = np.flatnonzero(history.column("n_valid"))
+    if not valid.size:
+        return [why_nothing(books)]
+    last, strains = history.instants[int(valid[-1])], history.column("largest")[valid]
+    largest = strains[np.argmax(np.abs(strains))]
+    refused = f" ({last.refused})" if last.refused else ""
+    lines = [
+        f"measured {len(history.instants)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
+        f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} um/m;"
+        f" largest of any ZOI {largest * 1e6:+.0f} um/m",
+        noise_line(history),
+    ]
+    lines += latency_lines(history)
+    figures = figure_lines(evaluate(history, books.loads, specimen), specimen)
+    if figures:
+        figures += tare_line(history, books.loads) + lag_line(history, books.loads, specimen)
+    return lines + figures + alignment_line(history, specimen)
+
+
+def file_lines(folder: Path) -> list[str]:
+    """The files in ``folder``, with sizes."""
+    return [
+        f"  {path}  ({path.stat().st_size / 1e6:.1f} MB)"
+        for path in sorted(folder.iterdir())
+        if path.is_file() and path.stat().st_size
+    ]
+
+
+EVERY_S = 1.0  # of the test
+
+
+class StatusCard:
+    """Writes the card anew once a second of the test."""
+
+    def __init__(self, specimen: SpecimenConfig, loads: LoadLog) -> None:
+        self._specimen, self._loads = specimen, loads
+        self._last = -math.inf
+
+    def is_due(self, now: float) -> bool:
+        """Whether the last card is old at ``now`` (s, monotonic); then the next is not, for a while."""
+        if now - self._last < EVERY_S:
+            return False
+        self._last = now
+        return True
+
+    def written(self, snapshot: Snapshot, history: History) -> str:
+        """The card, from the last instant and the figures of all of ``history``."""
+        return "\n\n".join(self._lines(snapshot, history))
+
+    def _lines(self, snapshot: Snapshot, history: History) -> list[str]:
+        i, frames, lost = history.instants[-1], snapshot.frames, snapshot.lost
+        lines = [
+            f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
+            f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, mean **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
+        ]
+        figures = evaluate(history, self._loads, self._specimen)
+        lines += [
+            line.replace("  ", ", ").replace("+-", "±") for line in elastic_lines(figures, self._specimen)
+        ]
+        lines.append(
+            f"recorded {frames['recorded']}, measured {frames['measured']}, skipped {frames['skipped']},"
+            f" lost {f'**{lost}**' if lost else 0}"
+        )
+        return lines

@@ -1,0 +1,118 @@
+"""From the grab thread to the measuring path: references and bursts in order, skips counted."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from acquire.frame import Burst
+from live.pipeline.frame_counts import FrameCounts
+from live.pipeline.measure import NewReference
+from live.pipeline.reference import ReferenceBurst
+from live.run.grabber import Grabber
+
+POLL_S = 0.2
+TAKING = "taking the reference"
+
+
+class BurstQueue:
+    """What the measuring thread takes from the grabber.
+
+    Parameters
+    ----------
+    grabber : Grabber
+    ledger : FrameCounts
+        Told of every burst that is not measured.
+    idle : callable
+        Called with a few words whenever nothing has come for a while, and after each burst with "".
+    """
+
+    def __init__(self, grabber: Grabber, ledger: FrameCounts, idle: Callable[[str], None]) -> None:
+        self._grabber, self._ledger, self._idle = grabber, ledger, idle
+        self._held: Burst | None = None
+        self._reference_end = self._lost = 0
+        self.paused = False
+
+    @property
+    def fps(self) -> float:
+        """Frames a second, as they come."""
+        return self._grabber.fps
+
+    def next_reference(self) -> ReferenceBurst | None:
+        """Wait for a reference burst; None where the run ended before it was complete.
+
+        A burst that came after it is held for the measurement, those before it are skipped.
+        """
+        while True:
+            ended = not self._grabber.running
+            burst = self._grabber.bursts.get(POLL_S)
+            reference = None if self._grabber.references.empty() else self._grabber.references.get()
+            if reference is not None:
+                self._reference_end, self._lost = reference.burst.last_index, 0
+            self.count_skipped()
+            if burst is not None and reference and burst.first_index > reference.burst.last_index:
+                self._held = burst
+            elif burst is not None:
+                self._skip(burst)
+            if reference is not None or ended:
+                return reference
+            self._idle(TAKING)
+
+    def another_reference(self) -> ReferenceBurst | None:
+        """Have a reference taken from the next frames, and wait for it."""
+        if self._held is not None:
+            self._skip(self._held)
+            self._held = None
+        self._grabber.take_reference()
+        return self.next_reference()
+
+    def bursts(self) -> Iterator[Burst | NewReference]:
+        """The newest burst each time, and a new reference before the bursts that come after it.
+
+        Those that came while the first reference was prepared come too, until it has caught up.
+        """
+        self._grabber.bursts.begin()
+        while self._held is not None or not self._grabber.bursts.finished:
+            burst, self._held = self._held or self._grabber.bursts.get(POLL_S), None
+            self.count_skipped()
+            if burst is None:
+                self._idle("waiting for frames")
+            elif self.paused or burst.first_index <= self._reference_end:
+                self._skip(burst)
+            elif self._grabber.references.empty():
+                yield self._with_all_lost(burst)
+            else:
+                yield NewReference(self._reference_before(burst))
+            self._idle("")
+        self.count_skipped()
+
+    def _reference_before(self, burst: Burst) -> Burst:
+        """The new reference; ``burst`` is held where it came after it."""
+        reference = self._grabber.references.get().burst
+        if burst.first_index > reference.last_index:
+            self._held = burst
+        else:
+            self._skip(burst)
+        self._lost += reference.lost
+        return reference
+
+    def let_pass(self) -> None:
+        """Measure nothing any more; all that comes is counted as skipped."""
+        self.paused = True
+        for _ in self.bursts():
+            pass
+
+    def count_skipped(self) -> None:
+        """Account for bursts that newer ones replaced."""
+        for burst in self._grabber.bursts.take_skipped():
+            self._skip(burst)
+
+    def _skip(self, burst: Burst) -> None:
+        self._ledger.add(skipped=burst.n)
+        if burst.first_index > self._reference_end:
+            self._lost += burst.lost
+
+    def _with_all_lost(self, burst: Burst) -> Burst:
+        """What was lost since the burst that was measured before, whatever was skipped in between."""
+        lost, self._lost = burst.lost + self._lost, 0
+        return replace(burst, lost=lost)

@@ -1,0 +1,102 @@
+"""Everything that stands ready before the first frame of a test: devices, grid, settings, folder."""
+
+from __future__ import annotations
+
+import datetime
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.clock import ClockPair
+from acquire.hdf5 import compile_loops
+from acquire.record_mode import RecordMode
+from live.config.loading import Config
+from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
+from live.pipeline.event_log import EventLog
+from live.pipeline.screen import Screen
+from live.pipeline.warm_up import rehearse
+from live.results.folder import make_folder
+from live.run.outcome import StopSignal
+from live.setup.devices import Rig
+from live.setup.pictures import read_mask, with_flat_field, with_mask
+from live.setup.prepared import MeasurePlan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PreparedRun:
+    """What a test is set up with.
+
+    Attributes
+    ----------
+    rig : Rig
+        Open, not yet entered.
+    plan : MeasurePlan
+        Its configuration is in force; mask, dark and flat frame lie in ``folder``.
+    bursts : (reference, measured)
+        Frames in each.
+    folder : Path
+        Of the files.
+    start : ClockPair
+        Time zero of all files.
+    """
+
+    rig: Rig
+    plan: MeasurePlan
+    bursts: tuple[int, int]
+    folder: Path
+    start: ClockPair
+
+    @property
+    def config(self) -> Config:
+        """In force."""
+        return self.plan.config
+
+
+def set_up(config: Config, rig: Rig, journal: EventLog, screen: Screen, stop: StopSignal) -> PreparedRun:
+    """Lay the grid, run everything once, and make the folder.
+
+    Raises
+    ------
+    ConfigError, DataError
+        Something does not fit, or cannot be read or made.
+    Interrupted
+        ``stop`` was asked while loops were compiled.
+    """
+    camera = rig.camera.info
+    plan = MeasurePlan.of(config, camera, _mask(config, rig))
+    bursts = _burst_lengths(config, camera.live)
+    took = plan.compile(camera, screen.status, lambda: stop.asked)
+    if took > 0:
+        screen.say(f"everything is compiled ({took:.0f} s)")
+    compile_loops()
+    rehearse(camera, plan.grid, plan.settings, bursts)
+    folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
+    in_force = with_flat_field(with_mask(config, plan.mask, folder), folder)
+    return PreparedRun(rig, replace(plan, config=in_force), bursts, folder, _time_zero(rig, journal))
+
+
+def _mask(config: Config, rig: Rig) -> NDArray[np.bool_] | None:
+    """The mask that was given; a simulated specimen knows its own."""
+    path = config.measure.mask
+    if path is None and rig.specimen is not None:
+        mask = RecordMode(crop=config.camera.crop).cut(rig.specimen.mask())
+        return None if mask.all() else mask
+    return read_mask(path, rig.camera.info.width, rig.camera.info.height)
+
+
+def _burst_lengths(config: Config, live: bool) -> tuple[int, int]:
+    """Frames in the reference and in a measured burst."""
+    m = config.measure
+    reference = m.reference_burst or (DEFAULT_REFERENCE_BURST if live else 1)
+    return reference, m.burst or (DEFAULT_BURST if live else 1)
+
+
+def _time_zero(rig: Rig, journal: EventLog) -> ClockPair:
+    """Now; pictures with nominal times begin at 0 whatever the clock says."""
+    now = ClockPair.now()
+    if rig.camera.info.clock != "nominal":
+        return now
+    journal.origin = now.monotonic
+    return ClockPair(0.0, now.utc)

@@ -1,0 +1,204 @@
+"""Strain out: every measurement as a line to TCP clients, by UDP, or to a serial port.
+
+Each way has a thread of its own and takes the newest measurement: one that stalls skips and counts, and
+neither the measurement nor another way feels it.
+
+A measurement as a line: JSON, or CSV under a line of names.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import socket
+import time
+from abc import ABC, abstractmethod
+from collections import deque
+from collections.abc import Sequence
+from typing import Any
+
+from acquire.errors import DeviceError, PhasedicError
+from acquire.events import Event
+from acquire.serial_line.ports import LineSettings, open_port
+from live.pipeline.channel_values import ChannelValues
+from live.pipeline.consumer import Consumer, Policy
+from live.pipeline.measurement import Measurement
+from live.run.tcp_lines import LineServer
+
+
+class Lines:
+    """Writes the chosen channels of measurements.
+
+    Parameters
+    ----------
+    readings : ChannelValues
+    channels : sequence of str
+    form : "json" or "csv"
+
+    Attributes
+    ----------
+    heading : str
+        The first line a client is told; empty where there is none.
+    """
+
+    def __init__(self, readings: ChannelValues, channels: Sequence[str], form: str) -> None:
+        self._readings, self._channels, self._json = readings, tuple(channels), form == "json"
+        self.heading = "" if self._json else ",".join(channels)
+
+    def of(self, measurement: Measurement) -> str:
+        """The line, without its end; what is not known is null in JSON and nan in CSV."""
+        values = self._readings.read(measurement)
+        if not self._json:
+            return ",".join(_number(values.get(channel, math.nan)) for channel in self._channels)
+        told = {channel: _rounded(values.get(channel, math.nan)) for channel in self._channels}
+        return json.dumps(told, separators=(",", ":"))
+
+
+def _number(value: float) -> str:
+    return str(value) if isinstance(value, int) else f"{value:.8g}"
+
+
+def _rounded(value: float) -> float | None:
+    if isinstance(value, int):
+        return value
+    return float(f"{value:.8g}") if math.isfinite(value) else None
+
+
+AGAIN_S = 1.0
+"""A serial port that was lost is opened again so often."""
+
+
+class StrainOut(Consumer, ABC):
+    """One way out; ``send`` takes a line without its end."""
+
+    policy = Policy.NEWEST
+    room = 2
+    patience_s = 2.0
+
+    def __init__(self, name: str, lines: Lines) -> None:
+        self.name, self._lines = name, lines
+        self._posted: deque[str] = deque()
+
+    def measurement(self, measurement: Measurement) -> None:
+        """Send its line."""
+        self.send(self._lines.of(measurement))
+
+    def post(self, line: str) -> None:
+        """Leave a line, from any thread; it goes out with the next event."""
+        self._posted.append(line)
+
+    def event(self, event: Event) -> None:
+        """Send the lines that were left."""
+        while self._posted:
+            self.send(self._posted.popleft())
+
+    @abstractmethod
+    def send(self, line: str) -> None:
+        """Send a line."""
+
+
+class TcpOut(StrainOut):
+    """To any number of TCP clients."""
+
+    def __init__(self, listening: socket.socket, token: str, lines: Lines) -> None:
+        self._server = LineServer(listening, token, greeting=lines.heading)
+        super().__init__(f"strain out (port {self._server.port})", lines)
+        self.port = self._server.port
+
+    def begin(self) -> None:
+        """Listen."""
+        self._server.start()
+
+    def send(self, line: str) -> None:
+        """To all clients; those that do not read are passed over."""
+        self._server.tell(line)
+
+    def end(self) -> str:
+        """Let the clients go."""
+        self._server.close()
+        skipped = f", {self._server.skipped} skipped by clients that did not read" * (
+            self._server.skipped > 0
+        )
+        return f"{self._server.served} clients, {self._server.taken} lines{skipped}"
+
+
+class UdpOut(StrainOut):
+    """To one address by UDP, which nobody confirms."""
+
+    def __init__(self, host: str, port: int, lines: Lines) -> None:
+        super().__init__(f"strain out (udp {host}:{port})", lines)
+        self._to = (host, port)
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._sent = self._skipped = 0
+
+    def send(self, line: str) -> None:
+        """Send a datagram; where nobody listens, or there is no room, it is counted."""
+        try:
+            self._socket.sendto(line.encode() + b"\n", self._to)
+            self._sent += 1
+        except OSError:
+            self._skipped += 1
+
+    def end(self) -> str:
+        """Close the socket."""
+        self._socket.close()
+        return f"{self._sent} lines" + f", {self._skipped} refused" * (self._skipped > 0)
+
+
+class SerialOut(StrainOut):
+    """To a serial port, opened again where it is lost.
+
+    Raises
+    ------
+    ConfigError, DeviceError
+        The port cannot be opened at the start.
+    """
+
+    def __init__(self, line: LineSettings, lines: Lines) -> None:
+        super().__init__(f"strain out ({line.url})", lines)
+        self._settings = line
+        self._port: Any = open_port(line)
+        self._lost = -float("inf")
+        self._sent = self._skipped = 0
+        self._told_heading = False
+
+    def send(self, line: str) -> None:
+        """Write; a port that takes nothing for half a second is lost, and tried again a second later."""
+        if not self._told_heading and self._lines.heading:
+            line = f"{self._lines.heading}\n{line}"
+        if self._port is None and time.monotonic() - self._lost > AGAIN_S:
+            self._open_again()
+        if self._port is not None and self._written(line.encode() + b"\n"):
+            self._told_heading = True
+            self._sent += 1
+        else:
+            self._skipped += 1
+
+    def _written(self, data: bytes) -> bool:
+        try:
+            self._port.write(data)
+        except Exception:  # pyserial's time-out, an unplugged port: termios.error is no OSError
+            self._close()
+            self._lost = time.monotonic()
+            return False
+        return True
+
+    def _open_again(self) -> None:
+        self._lost = time.monotonic()
+        with contextlib.suppress(PhasedicError, DeviceError):
+            self._port = open_port(self._settings)
+
+    def _close(self) -> None:
+        if self._port is not None:
+            with contextlib.suppress(Exception):
+                self._port.close()
+            self._port = None
+
+    def end(self) -> str:
+        """Close the port."""
+        self._close()
+        return f"{self._sent} lines" + f", {self._skipped} skipped, the port took nothing" * (
+            self._skipped > 0
+        )

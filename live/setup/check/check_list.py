@@ -1,0 +1,282 @@
+"""All figures of a check, judged inside the region alone: what surrounds the specimen decides nothing.
+
+The table of the strain noise, in words: ZOIs and orders down, bursts across.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.load_cell.check import LoadReport
+from analysis.quality.exposure import Depth, Exposure, depth, exposure
+from analysis.quality.pattern import speckle_radius, zoi_pattern
+from live.config.loading import Config
+from live.setup.check.noise_floor import (
+    BURSTS,
+    ORDERS,
+    SIZES,
+    GaugeNoise,
+    Predicted,
+    StrainNoise,
+    ZoiFloor,
+    noise_floors,
+    predicted,
+)
+from live.setup.check.sample import CheckRegion, CheckSample, FrameStack
+from live.setup.check.stillness import PictureStillness, light, stillness
+from live.setup.pictures import correction
+from live.setup.region import Region, region_of
+
+if TYPE_CHECKING:
+    from analysis import ZoiGrid
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Zois:
+    """The ZOIs of the test.
+
+    Attributes
+    ----------
+    grid : ZoiGrid
+        On the whole picture.
+    sigma : (R, C) float64
+        Predicted strain noise of each for one burst of the test; NaN without pattern.
+    contrast : (R, C) float64, GL
+        Standard deviation of the pattern within each, its noise taken out.
+    sssig : (R, C) float64, GL^2/px^2
+        Sum of squares of the gradient in each, of x or y the smaller.
+    sharpness : (R, C) float64, 1/px
+        rms gradient over contrast: 0.7 over the radius for blobs, more for sharp edges, less out of focus.
+    """
+
+    grid: ZoiGrid
+    sigma: Floats
+    contrast: Floats
+    sssig: Floats
+    sharpness: Floats
+
+    @property
+    def without_pattern(self) -> float:
+        """Share of the ZOIs that cannot be measured."""
+        active = self.grid.active
+        return 1 - float(np.isfinite(self.sigma[active]).mean()) if active.any() else 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CheckFigures:
+    """What a check has found.
+
+    Attributes
+    ----------
+    region : Region
+    shots : FrameStack
+    noise : float, GL
+        Of one frame, at the ZOIs.
+    exposure : Exposure
+    depth : Depth
+    radius : float, px
+        Of the speckle.
+    zois : Zois
+    still : PictureStillness
+    floors : tuple of ZoiFloor
+    zoi, order, burst : int
+        Of the test.
+    noise_stated : bool
+        Whether it was given; from too few frames it comes from the spectrum of the picture otherwise.
+    removed : float or None, GL
+        Standard deviation of what dark and flat frame took out; None without them.
+    gauges : tuple of GaugeNoise
+        Those of the test, and the mean of all ZOIs along the load.
+    load : LoadReport or None
+    px_per_mm : float or None
+    """
+
+    region: Region
+    shots: FrameStack
+    noise: float
+    exposure: Exposure
+    depth: Depth
+    radius: float
+    zois: Zois
+    still: PictureStillness
+    floors: tuple[ZoiFloor, ...]
+    zoi: int
+    order: int
+    burst: int
+    noise_stated: bool = False
+    removed: float | None = None
+    gauges: tuple[GaugeNoise, ...] = ()
+    load: LoadReport | None = None
+    px_per_mm: float | None = None
+
+    @property
+    def automatic(self) -> tuple[str, ...]:
+        """Controls that the camera changes by itself."""
+        return automatic_controls(self.shots.camera.controls)
+
+    @property
+    def floor(self) -> ZoiFloor | None:
+        """The floor of the settings of the test; None where it could not be had."""
+        same = [f for f in self.floors if (f.zoi, f.order) == (self.zoi, self.order) and f.noises]
+        return same[0] if same else None
+
+    @property
+    def sharpness(self) -> float:
+        """Median over the ZOIs, 1/px."""
+        return median(self.zois.sharpness)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """What the kernel has to be asked for: the slower part of the figures."""
+
+    predicted: Predicted
+    still: PictureStillness
+
+    @classmethod
+    def of(cls, bench: CheckSample) -> Measured:
+        """Ask it for everything."""
+        noise = predicted(bench)
+        return cls(noise, stillness(bench, noise.able))
+
+
+def examine(
+    shots: FrameStack,
+    config: Config,
+    load: LoadReport | None = None,
+    table: bool = True,
+) -> CheckFigures:
+    """Judge frames of a still specimen.
+
+    Parameters
+    ----------
+    shots : FrameStack
+    config : Config
+    load : LoadReport, optional
+    table : bool
+        Whether all ZOIs, orders and bursts of the table are tried, or those of the test alone.
+
+    Raises
+    ------
+    ConfigError, DataError
+        Region, mask, dark or flat do not fit.
+    """
+    bench = CheckSample.of(shots, CheckRegion.of(sought(shots, config), config, shots.camera))
+    m = config.measure
+    sizes, orders, bursts = (SIZES, ORDERS, BURSTS) if table else ((), (), ())
+    wanted = (*sizes, m.zoi), (*orders, m.order), (*bursts, bench.burst)
+    return figures_of(bench, Measured.of(bench), noise_floors(bench, *wanted), load)
+
+
+def sought(shots: FrameStack, config: Config) -> Region:
+    """The region of a test, looked for in the mean of the frames, or in the first of too few."""
+    picture = correction(config, shots.camera)(shots.mean(0, 1 if shots.few else None))
+    return region_of(config, picture.mean, shots.noise())
+
+
+def figures_of(
+    bench: CheckSample, measured: Measured, floors: tuple[ZoiFloor, ...] = (), load: LoadReport | None = None
+) -> CheckFigures:
+    """All figures: those that are read off the frames, beside what was measured with the kernel."""
+    ground, m, bits = bench.ground, bench.ground.config.measure, bench.shots.camera.bits
+    same = bench.picture.mean is bench.raw
+    return CheckFigures(
+        region=ground.region,
+        shots=bench.shots,
+        noise=bench.noise,
+        exposure=exposure(bench.pixels, bits),
+        depth=depth(bench.pixels, bits),
+        radius=_radius(bench),
+        zois=_zois(bench, measured.predicted.sigma),
+        still=replace(measured.still, light=light(bench)),
+        floors=floors,
+        zoi=m.zoi,
+        order=m.order,
+        burst=bench.burst,
+        noise_stated=m.noise_GL is not None,
+        removed=None if same else float((bench.picture.mean - bench.raw)[ground.inside].std()),
+        gauges=measured.predicted.gauges,
+        load=load,
+        px_per_mm=ground.config.scale.px_per_mm,
+    )
+
+
+def automatic_controls(controls: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the controls that are automatic by their name and value."""
+    return tuple(name for name, value in controls.items() if _is_automatic(name.lower(), value))
+
+
+def _is_automatic(name: str, value: object) -> bool:
+    if isinstance(value, str):
+        words = value.lower()
+        return "auto" in name and "manual" not in words and "shutter" not in words and words != "disabled"
+    named = "auto" in name or "continuous" in name or "dynamic_framerate" in name
+    # 1 is "manual" for the exposure of V4L2, whose menu comes as words; here a number is a switch.
+    return named and isinstance(value, int | float) and bool(value)
+
+
+def median(values: Floats) -> float:
+    """Of the finite ones; NaN where there is none."""
+    known = values[np.isfinite(values)]
+    return float(np.median(known)) if known.size else math.nan
+
+
+def _radius(bench: CheckSample) -> float:
+    at_zois = bench.ground.at_zois[bench.ground.cut]
+    rows, columns = np.flatnonzero(at_zois.any(axis=1)), np.flatnonzero(at_zois.any(axis=0))
+    if not rows.size:
+        return math.nan
+    cut = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
+    noise = bench.noise / math.sqrt(bench.picture.n)
+    return speckle_radius(bench.picture.mean[cut], noise, at_zois[cut])
+
+
+def _zois(bench: CheckSample, sigma: Floats) -> Zois:
+    """Pattern of each ZOI, and what the kernel makes of it."""
+    grid = bench.ground.zois
+    found = zoi_pattern(bench.picture.mean, grid, bench.noise / math.sqrt(bench.picture.n))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        sharpness = np.sqrt((found.along_x + found.along_y) / (2 * grid.size**2) / found.variance)
+    contrast, weaker = np.sqrt(found.variance), np.minimum(found.along_x, found.along_y)
+    for values in (contrast, weaker, sharpness):
+        values[~grid.active] = np.nan
+    return Zois(bench.ground.grid, sigma, contrast, weaker, sharpness)
+
+
+def table_lines(figures: CheckFigures) -> list[str]:
+    """Measured and (predicted) strain noise of one ZOI, um/m; * are the settings of the test."""
+    bursts = sorted({noise.burst for floor in figures.floors for noise in floor.noises})
+    scale = figures.px_per_mm
+    unit = "px" if scale is None else "mm"
+    head = f"  ZOI order {f'l_10% {unit}':>9} {f'VSG {unit}':>7}  " + "".join(f"{n:>15}" for n in bursts)
+    reference = figures.floors[0].reference if figures.floors else 0
+    return [
+        f"strain noise of one ZOI, um/m: measured (predicted) for bursts of so many frames, reference of {reference}",
+        head,
+        *(_row(floor, bursts, figures) for floor in figures.floors),
+    ]
+
+
+def _row(floor: ZoiFloor, bursts: list[int], figures: CheckFigures) -> str:
+    factor, digits = (1.0, 0) if figures.px_per_mm is None else (1 / figures.px_per_mm, 2)
+    ours = (floor.zoi, floor.order) == (figures.zoi, figures.order)
+    lengths = f"{floor.l10 * factor:>9.{digits}f} {floor.vsg * factor:>7.{digits}f}"
+    front = f"{'*' if ours else ' '} {floor.zoi:>3} {floor.order:>5} {lengths}  "
+    if not floor.noises:
+        return front + "   does not fit, or has no pattern"
+    return front + "".join(f"{_cell(floor.of(n)):>15}" for n in bursts)
+
+
+def _cell(noise: StrainNoise | None) -> str:
+    if noise is None:
+        return "-"
+    measured = f"{noise.measured * 1e6:.0f}" if math.isfinite(noise.measured) else "-"
+    return f"{measured} ({noise.predicted * 1e6:.0f})"

@@ -1,0 +1,286 @@
+"""Where a check looks: the region with its ZOIs, laid once for many glances, and frames on it.
+
+A few frames of the still specimen, held for the check, and the region they are judged in.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import DataError
+from acquire.events import EventSink, ignore_event
+from acquire.frame import Burst, CameraInfo, Frame, frozen
+from acquire.printable import printable
+from analysis.picture.pattern import noise_of_picture
+from live.config.loading import Config
+from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
+from live.pipeline.reference import Correction, averaged
+from live.setup.devices import open_rig
+from live.setup.grid import kernel_settings
+from live.setup.pictures import correction
+from live.setup.region import Region
+
+if TYPE_CHECKING:
+    from analysis import KernelSettings, ZoiGrid
+
+FEWEST = 8  # frames
+MOST_BYTES = 1_500_000_000
+PIXELS_LOOKED_AT = 200_000  # of each frame, for light, bits and noise
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameStack:
+    """Frames in the order they came.
+
+    Attributes
+    ----------
+    frames : (N, H, W) uint8 or uint16, GL
+    times : (N,) float64, s
+    lost : int
+        Frames that the camera gave between the first and the last and that did not come whole.
+    camera : CameraInfo
+    """
+
+    frames: NDArray[Any]
+    times: NDArray[np.float64]
+    lost: int
+    camera: CameraInfo
+
+    def __len__(self) -> int:
+        return len(self.frames)
+
+    @property
+    def few(self) -> bool:
+        """Whether there are too few of them to tell what changes in time."""
+        return len(self) < FEWEST
+
+    @property
+    def said(self) -> str:
+        """How many, in words."""
+        return f"{len(self)} picture{'s' if len(self) > 1 else ''}"
+
+    def cut(self, rows: slice, columns: slice) -> FrameStack:
+        """A part of each."""
+        return replace(self, frames=self.frames[:, rows, columns])
+
+    def mean(self, first: int = 0, count: int | None = None) -> Burst:
+        """The frames from ``first`` as one burst; its noise and motion are not looked at here."""
+        part = self.frames[first:] if count is None else self.frames[first : first + count]
+        times = self.times[first : first + len(part)]
+        mean = part.sum(axis=0, dtype=np.uint32) / len(part) if len(part) > 1 else part[0]
+        return Burst(
+            mean=frozen(mean.astype(np.float32)),
+            n=len(part),
+            noise=math.nan,
+            clipped=frozen(part.max(axis=0) >= 2**self.camera.bits - 1),
+            bits=self.camera.bits,
+            t=float(times.mean()),
+            duration=float(times[-1] - times[0]),
+            first_index=first,
+            last_index=first + len(part) - 1,
+            lost=0,
+            clock=self.camera.clock,
+        )
+
+    def pixels(self, inside: NDArray[np.bool_] | None = None) -> NDArray[Any]:
+        """Some of the pixels ``inside`` (H, W) in every frame, (N, P): enough for light, bits and noise."""
+        where = np.ones(self.frames.shape[1:], bool) if inside is None else inside
+        index = np.flatnonzero(where)
+        index = index[:: max(1, len(index) // PIXELS_LOOKED_AT)]
+        return np.asarray(self.frames.reshape(len(self), -1)[:, index])
+
+    def noise(self) -> float | None:
+        """Temporal standard deviation of their mean, GL; None where they tell nothing."""
+        return averaged(None if self.few else temporal_noise(self.pixels()) or None, len(self))
+
+
+def temporal_noise(pixels: NDArray[Any]) -> float:
+    """Standard deviation of one frame, GL, from pixels in all frames, (N, P).
+
+    From successive differences, so that a slow drift of the light does not count; 0 where every
+    frame is the same.
+    """
+    steps = [b.astype(np.float32) - a for a, b in itertools.pairwise(pixels)]
+    return math.sqrt(float(np.mean([np.mean((step - step.mean()) ** 2) for step in steps])) / 2)
+
+
+def take(config: Config, on_event: EventSink = ignore_event) -> FrameStack:
+    """Twice as many frames as the reference has, so that one half can be measured against the other.
+
+    A folder that has fewer is judged by what it has. Frames that are lost in between are counted.
+
+    Raises
+    ------
+    DataError
+        The camera gave too few frames.
+    """
+    reference = config.measure.reference_burst or DEFAULT_REFERENCE_BURST
+    rig = open_rig(config.camera.address, "none:", on_event, crop=config.camera.crop)
+    frames: list[Frame] = []
+    lost = 0
+    try:
+        camera = rig.camera.info
+        n = max(min(2 * reference, MOST_BYTES // (camera.width * camera.height * 2)), FEWEST)
+        with rig.camera:
+            for frame in rig.camera:
+                lost += (frame.lost_before if frames else 0) + frame.damaged
+                frames += [] if frame.damaged else [frame]
+                if len(frames) == n:
+                    break
+    finally:
+        rig.close()
+    return taken(frames, camera, lost, config.camera.address)
+
+
+def taken(frames: Sequence[Frame], camera: CameraInfo, lost: int, address: str) -> FrameStack:
+    """Whole frames as what is judged: of a camera ``FEWEST`` at least, of pictures one; else DataError."""
+    least = FEWEST if camera.live else 1
+    if len(frames) < least:
+        raise DataError(
+            f"{printable(address)}: gave {len(frames)} whole frames, a check needs {least};"
+            " look at the camera, or give more pictures"
+        )
+    return FrameStack(np.stack([f.image for f in frames]), np.array([f.t for f in frames]), lost, camera)
+
+
+Bools = NDArray[np.bool_]
+Cut = tuple[slice, slice]
+
+MARGIN = 24  # px around what is measured: a spline reaches so far
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CheckRegion:
+    """A region with its ZOIs.
+
+    Attributes
+    ----------
+    config : Config
+    camera : CameraInfo
+    region : Region
+    grid : ZoiGrid
+        On the whole picture.
+    cut : (slice, slice)
+        Rows and columns of the region with a margin; all below is cut to it.
+    zois : ZoiGrid
+        The same ZOIs.
+    inside : (h, w) bool
+        The region.
+    at_zois : (H, W) bool
+        The inner halves of its ZOIs, on the whole picture: where light and noise are judged.
+    correct : callable
+    """
+
+    config: Config
+    camera: CameraInfo
+    region: Region
+    grid: ZoiGrid
+    cut: Cut
+    zois: ZoiGrid
+    inside: Bools
+    at_zois: Bools
+    correct: Correction
+
+    @classmethod
+    def of(cls, region: Region, config: Config, camera: CameraInfo) -> CheckRegion:
+        """Lay it; raises ConfigError or DataError where region, mask, dark or flat do not fit."""
+        inside = region.inside(camera.width, camera.height, config.measure.zoi)
+        grid, cut = region.grid(config, camera.width, camera.height), around(inside)
+        correct = correction(config, camera, cut)
+        at_zois = _inner_halves(grid, inside)
+        return cls(config, camera, region, grid, cut, moved(grid, cut), inside[cut], at_zois, correct)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CheckSample:
+    """Frames on a ground, and how they are measured.
+
+    Attributes
+    ----------
+    shots : FrameStack
+    ground : CheckRegion
+    settings : KernelSettings
+    picture : Burst
+        What the pattern is judged by, cut and corrected: all frames, or the first of too few.
+    raw : (h, w) float32, GL
+        The same as it came.
+    pixels : (N, P), GL
+        Some at the ZOIs in every frame.
+    noise : float, GL
+        Of one frame: as stated, as it changes in time, or of too few frames from the spectrum of the picture.
+    reference, burst : int
+        Frames in each of the test; one where nothing is given and the pictures are few.
+    """
+
+    shots: FrameStack
+    ground: CheckRegion
+    settings: KernelSettings
+    picture: Burst
+    raw: NDArray[np.float32]
+    pixels: NDArray[Any]
+    noise: float
+    reference: int
+    burst: int
+
+    @classmethod
+    def of(cls, shots: FrameStack, ground: CheckRegion) -> CheckSample:
+        """Look at the frames once."""
+        m = ground.config.measure
+        raw = shots.cut(*ground.cut).mean(0, 1 if shots.few else None)
+        picture, pixels = ground.correct(raw), shots.pixels(ground.at_zois)
+        if m.noise_GL is not None:
+            noise = m.noise_GL
+        else:
+            noise = noise_of_picture(picture.mean) if shots.few else temporal_noise(pixels)
+        reference = m.reference_burst or (1 if shots.few else DEFAULT_REFERENCE_BURST)
+        burst, settings = m.burst or (1 if shots.few else DEFAULT_BURST), kernel_settings(ground.config)
+        return cls(shots, ground, settings, picture, raw.mean, pixels, noise, reference, burst)
+
+    @property
+    def half(self) -> int:
+        """Frames of the reference here."""
+        return 1 if self.shots.few else len(self.shots) // 2
+
+    def mean(self, first: int, count: int) -> Burst:
+        """A corrected burst, cut to the region."""
+        return self.ground.correct(self.shots.cut(*self.ground.cut).mean(first, count))
+
+    def halves(self) -> tuple[Burst, Burst]:
+        """The reference here and what is measured against it; of too few frames the first and itself."""
+        first = self.mean(0, self.half)
+        return first, first if self.shots.few else self.mean(self.half, self.half)
+
+
+def around(inside: Bools) -> Cut:
+    """Rows and columns of what is True in (H, W), with a margin; all where nothing is."""
+    if not inside.any():
+        return slice(0, inside.shape[0]), slice(0, inside.shape[1])
+    spans = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
+    rows, columns = (slice(max(int(s[0]) - MARGIN, 0), int(s[-1]) + 1 + MARGIN) for s in spans)
+    return rows, columns
+
+
+def moved(grid: ZoiGrid, cut: Cut) -> ZoiGrid:
+    """The same ZOIs on a picture that is cut."""
+    from analysis import Roi, ZoiGrid
+
+    roi, (rows, columns) = grid.roi, cut
+    place = Roi(roi.x - columns.start, roi.y - rows.start, roi.width, roi.height)
+    return ZoiGrid(place, grid.size, grid.step, grid.active)
+
+
+def _inner_halves(grid: ZoiGrid, inside: Bools) -> Bools:
+    """(H, W) bool: the middle of each active ZOI, half as wide; the region where there is none."""
+    found = np.zeros(inside.shape, bool)
+    half, quarter = grid.size // 2, grid.size // 4
+    for row, column in np.argwhere(grid.active):
+        top, left = grid.first_y[row] + quarter, grid.first_x[column] + quarter
+        found[top : top + half, left : left + half] = True
+    return found if found.any() else inside

@@ -1,0 +1,245 @@
+"""Where is measured: as given, else on the specimen that is found in a picture, else all but a rim.
+
+``searched`` puts what was found into the configuration, as a box and a mask, so that all that comes after
+(the run, its folder, a replay) has it as if a person had drawn it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.cv2_loader import load_cv2
+from acquire.errors import ConfigError, DataError
+from acquire.events import Event, EventSink
+from acquire.files.picture import write_picture
+from acquire.frame import CameraInfo
+from live.config.loading import Config
+from live.config.values import ALL, AUTO
+from live.setup.devices import open_rig
+from live.setup.grid import grid_for, whole_picture
+from live.setup.pictures import read_mask
+from live.setup.placement import with_auto_gauges
+
+if TYPE_CHECKING:
+    from analysis import ZoiGrid
+
+Box = tuple[int, int, int, int]
+Bools = NDArray[np.bool_]
+
+LOOK_FRAMES = 4
+"""Taken of a live camera to find the specimen; of pictures, one."""
+ALL_SHARE = 0.98  # of the picture: the specimen fills it, but for holes that a ZOI would feel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Region:
+    """Where is measured.
+
+    Attributes
+    ----------
+    box : (x, y, width, height) or None, px
+        None: all but a rim.
+    mask : (H, W) bool or None
+    words : str
+        Where it comes from, for a person.
+    found : bool
+        Whether it is a specimen that was looked for and found.
+    """
+
+    box: Box | None
+    mask: Bools | None
+    words: str
+    found: bool = False
+
+    def config(self, config: Config) -> Config:
+        """The configuration with this box (the mask is a file and comes apart)."""
+        return replace(config, measure=replace(config.measure, roi=self.box or ALL))
+
+    def grid(self, config: Config, width: int, height: int) -> ZoiGrid:
+        """The ZOIs of the test in it; raises ConfigError where none fits."""
+        return grid_for(self.config(config), width, height, self.mask)
+
+    def inside(self, width: int, height: int, zoi: int) -> Bools:
+        """(H, W) bool: the pixels that are measured."""
+        x, y, w, h = self.box or whole_picture(width, height, zoi)
+        inside = np.zeros((height, width), bool)
+        inside[y : y + h, x : x + w] = True
+        return inside if self.mask is None else inside & self.mask
+
+
+def is_sought(config: Config) -> bool:
+    """Whether the specimen is to be found: nothing is given, or that it shall be."""
+    return config.measure.mask is None and config.measure.roi in (None, AUTO)
+
+
+def region_of(config: Config, picture: NDArray[Any], noise: float | None = None) -> Region:
+    """The region on ``picture`` (H, W), GL; ``noise`` is its standard deviation.
+
+    Raises
+    ------
+    DataError
+        The mask cannot be read, or is not the size of the picture.
+    """
+    height, width = picture.shape
+    box = config.measure.roi if isinstance(config.measure.roi, tuple) else None
+    if not is_sought(config):
+        mask = read_mask(config.measure.mask, width, height)
+        words = "as given" if box is not None or mask is not None else "all but a rim, as given"
+        return Region(box, mask, words)
+    return _found(config, picture, noise)
+
+
+def _found(config: Config, picture: NDArray[Any], noise: float | None) -> Region:
+    from analysis.quality.specimen import find_specimen
+
+    height, width = picture.shape
+    none = Region(None, None, "no specimen was found that stands out: all but a rim")
+    specimen = find_specimen(picture, noise) if min(picture.shape) >= config.measure.zoi else None
+    if specimen is None:
+        return none
+    if specimen.share > ALL_SHARE and _deepest_gap(specimen.mask) < config.measure.zoi / 4:
+        return Region(None, None, "the specimen fills the picture: all but a rim", found=True)
+    box = _within(specimen.box.x, specimen.box.y, specimen.box.width, specimen.box.height, config, picture)
+    share = f"{specimen.share:.0%} of the picture"
+    words = f"the specimen was found: {share}, within x,y,width,height = {','.join(map(str, box))}"
+    region = Region(box, specimen.mask, words, found=True)
+    try:
+        zois = region.grid(config, width, height).n_active
+    except ConfigError:
+        zois = 0
+    if zois == 0:
+        zoi = config.measure.zoi
+        return replace(none, words=f"the pattern that was found takes no ZOI of {zoi} px: all but a rim")
+    return region
+
+
+def _deepest_gap(mask: Bools) -> float:
+    """How far inside what is left out one can be, px: the radius of a hole."""
+    gaps = np.where(mask, np.uint8(0), np.uint8(1))
+    return float(load_cv2().distanceTransform(gaps, load_cv2().DIST_L2, 5).max()) if gaps.any() else 0.0
+
+
+def _within(x: int, y: int, w: int, h: int, config: Config, picture: NDArray[Any]) -> Box:
+    """The box without the rim of the picture that is left out everywhere."""
+    height, width = picture.shape
+    x0, y0, w0, h0 = whole_picture(width, height, config.measure.zoi)
+    left, top = max(x, x0), max(y, y0)
+    return left, top, max(min(x + w, x0 + w0) - left, 1), max(min(y + h, y0 + h0) - top, 1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FirstLook:
+    """A first look at what the camera sees.
+
+    Attributes
+    ----------
+    picture : (H, W) float32 or as it came, GL
+        Mean of the frames.
+    noise : float or None, GL
+        Of that mean; None where one frame tells nothing.
+    camera : CameraInfo
+    """
+
+    picture: NDArray[Any]
+    noise: float | None
+    camera: CameraInfo
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, px."""
+        height, width = self.picture.shape
+        return width, height
+
+
+def look(config: Config, say: Callable[[str], None]) -> FirstLook:
+    """Open the camera, take a few frames, and close it again; raises as ``open_rig``.
+
+    What goes wrong meanwhile is said: a camera that gives nothing is waited for.
+
+    Raises
+    ------
+    DataError
+        The camera gave nothing.
+    """
+    rig = open_rig(config.camera.address, "none:", troubles(say), crop=config.camera.crop)
+    n = LOOK_FRAMES if rig.camera.info.live else 1
+    images: list[NDArray[Any]] = []
+    try:
+        with rig.camera:
+            for frame in rig.camera:
+                images += [] if frame.damaged else [frame.image]
+                if len(images) == n:
+                    break
+    finally:
+        rig.close()
+    if not images:
+        raise DataError(f"{config.camera.address}: gave no whole frame; look at the camera")
+    return FirstLook(*_mean_and_noise(images), rig.camera.info)
+
+
+def troubles(say: Callable[[str], None]) -> EventSink:
+    """Warnings and errors of a device, said."""
+
+    def tell(event: Event) -> None:
+        if event.level != "info":
+            say(event.text)
+
+    return tell
+
+
+def _mean_and_noise(images: list[NDArray[Any]]) -> tuple[NDArray[Any], float | None]:
+    if len(images) == 1:
+        return images[0], None
+    stack = np.stack(images).astype(np.float32)
+    noise = float(np.diff(stack, axis=0).std()) / 2**0.5
+    return stack.mean(axis=0), noise / len(images) ** 0.5 if noise > 0 else None
+
+
+@contextmanager
+def searched(config: Config, say: Callable[[str], None]) -> Iterator[Config]:
+    """The configuration of a test, with the specimen found where nothing is given, and gauges placed where asked.
+
+    The mask lies in a folder that is gone afterwards: a run has its own copy by then.
+    """
+    if not config.camera.address or not (is_sought(config) or config.measure.gauges == AUTO):
+        yield config
+        return
+    sought = is_sought(config)
+    config, mask = placed_on(config, look(config, say), say)
+    with TemporaryDirectory(prefix="phasedic-") as folder:
+        yield with_mask_at(config, mask if sought else None, Path(folder) / "mask.png")
+
+
+def placed_on(config: Config, seen: FirstLook, say: Callable[[str], None]) -> tuple[Config, Bools | None]:
+    """The configuration with region and gauges in px, as far as they are sought, and the mask (H, W).
+
+    Raises
+    ------
+    ConfigError, DataError
+        As ``region_of``; no ZOI fits, or too few for gauges.
+    """
+    region = region_of(config, seen.picture, seen.noise)
+    if is_sought(config):
+        say(f"{region.words} (--roi all or --roi X,Y,W,H say otherwise)")
+    return with_auto_gauges(region.config(config), region.grid(config, *seen.size)), region.mask
+
+
+def with_mask_at(config: Config, mask: Bools | None, path: Path) -> Config:
+    """The configuration with a mask, which is written to ``path``; as it is without one."""
+    if mask is None:
+        return config
+    write_picture(path, mask_picture(mask))
+    return replace(config, measure=replace(config.measure, mask=str(path)))
+
+
+def mask_picture(mask: Bools) -> NDArray[np.uint8]:
+    """A mask (H, W) as the picture that is read again: black where nothing is measured."""
+    return np.where(mask, np.uint8(255), np.uint8(0))

@@ -1,0 +1,345 @@
+"""The scale of the picture, mm per px, with its uncertainty: from two points, or from the specimen's width.
+
+``board`` has it from a checkerboard.
+
+The scale from a checkerboard or ChArUco board held where the specimen will be; its tilt told.
+
+The corners are found by OpenCV. A plane seen by a camera without distortion is a homography; its derivative
+in the middle of the board is the scale there, its unevenness the tilt (R. Hartley, A. Zisserman, Multiple
+View Geometry, 2nd ed., sections 2.3 and 8.1).
+"""
+
+from __future__ import annotations
+
+import datetime
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.cv2_loader import load_cv2
+from acquire.errors import ConfigError, DataError
+from live.setup.region import Region
+
+Bools = NDArray[np.bool_]
+
+POINT_PX = 1.0
+"""Standard uncertainty of a place that a person has picked, each way."""
+EDGE_PX = 1.0  # of an edge of the specimen that its pattern shows, systematic
+MASK_PX = 6.0  # of an edge of the mask, where the pattern does not show it
+ROWS, FEWEST_ROWS = 48, 12  # px along the load over which an edge is found
+REACH = 24  # px to both sides of the mask's edge
+OUT_OF_PLANE_MM = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """A scale that was taken.
+
+    Attributes
+    ----------
+    mm_per_px, sigma : float
+        With its standard uncertainty.
+    method : str
+        How, in words.
+    remarks : tuple of str
+        What a person should know or mend, as a tilt.
+    """
+
+    mm_per_px: float
+    sigma: float
+    method: str
+    remarks: tuple[str, ...] = ()
+
+    @property
+    def relative(self) -> float:
+        """Its uncertainty as a part of it."""
+        return self.sigma / self.mm_per_px
+
+    def changes(self, stand_off_mm: float | None = None) -> dict[str, Any]:
+        """What it sets in a rig file (``live.config.rig_file.write_rig``)."""
+        changes: dict[str, Any] = {
+            "scale.mm_per_px": float(f"{self.mm_per_px:.7g}"),
+            "scale.sigma_mm_per_px": float(f"{self.sigma:.2g}"),
+            "scale.date": f"{datetime.datetime.now(datetime.UTC):%Y-%m-%d %H:%M} UTC",
+            "scale.method": self.method,
+        }
+        return changes if stand_off_mm is None else {**changes, "scale.stand_off_mm": stand_off_mm}
+
+
+def from_points(points: tuple[float, float, float, float], length_mm: float, sigma_mm: float = 0.0) -> Scale:
+    """Two points x1, y1, x2, y2 (px) that are ``length_mm`` apart; raises ConfigError where they are one."""
+    x1, y1, x2, y2 = points
+    px = math.hypot(x2 - x1, y2 - y1)
+    if not (px > 1 and length_mm > 0 and math.isfinite(px) and math.isfinite(length_mm)):
+        raise ConfigError("the scale needs two points more than 1 px apart and a length above 0 mm")
+    relative = math.hypot(math.sqrt(2) * POINT_PX / px, sigma_mm / length_mm)
+    scale = length_mm / px
+    return Scale(scale, scale * relative, f"two points {px:.1f} px apart, {length_mm:g} mm")
+
+
+def from_width(
+    picture: NDArray[Any], region: Region, axis: str, width_mm: float, sigma_mm: float = 0.0
+) -> Scale:
+    """The specimen found in ``picture`` (H, W) is ``width_mm`` wide across the load.
+
+    Raises
+    ------
+    DataError
+        Its edges are not seen.
+    """
+    px, sigma_px = specimen_width(picture, region, axis)
+    scale = width_mm / px
+    relative = math.hypot(sigma_px / px, sigma_mm / width_mm)
+    remarks = (
+        ("the edges are known to some px only: two points or a board are better",) if relative > 0.01 else ()
+    )
+    return Scale(scale, scale * relative, f"width of the specimen, {px:.1f} px are {width_mm:g} mm", remarks)
+
+
+def false_strain(stand_off_mm: float, out_of_plane_mm: float = OUT_OF_PLANE_MM) -> float:
+    """Strain that a motion toward the camera feigns: the image grows as the distance falls."""
+    return out_of_plane_mm / stand_off_mm
+
+
+# -- the width of the specimen ------------------------------------------------------------------
+
+
+def specimen_width(picture: NDArray[Any], region: Region, axis: str) -> tuple[float, float]:
+    """Width across the load in the middle half of the specimen, px, with its standard uncertainty.
+
+    An edge is where the scatter of the grey levels along the load falls to the middle between pattern and
+    background. Where the background scatters as much, it is the edge of the mask.
+    """
+    mask = region.mask
+    if mask is None or not region.found:
+        raise DataError("the edges of the specimen are not seen; give two points, or a larger field of view")
+    if axis == "x":
+        picture, mask = picture.T, mask.T
+    grey = np.asarray(picture, np.float32)
+    bands = list(_bands(mask))
+    found = [_band_width(grey[rows], mask[rows]) for rows in bands]
+    widths = [width for width in found if width is not None]
+    if len(widths) >= max(2, len(bands) // 2):
+        scatter = 1.25 * float(np.std(widths)) / math.sqrt(len(widths))
+        return float(np.median(widths)), math.hypot(scatter, math.sqrt(2) * EDGE_PX)
+    sides = [_sides(mask[rows]) for rows in bands]
+    known = [right - left for left, right in filter(None, sides)]
+    if not known:
+        raise DataError(
+            "the edges of the specimen leave the picture; give two points, or a larger field of view"
+        )
+    return float(np.median(known)), math.sqrt(2) * MASK_PX
+
+
+def _bands(mask: Bools) -> Iterator[slice]:
+    rows = np.flatnonzero(mask.any(axis=1))
+    quarter = len(rows) // 4
+    first, last = int(rows[quarter]), int(rows[len(rows) - 1 - quarter])
+    size = min(ROWS, max(FEWEST_ROWS, last + 1 - first))
+    yield from (slice(top, top + size) for top in range(first, max(last + 2 - size, first + 1), size))
+
+
+def _sides(mask: Bools) -> tuple[float, float] | None:
+    """Left and right edge of the mask over some rows; None where it reaches the picture's."""
+    inside = np.flatnonzero(mask.mean(axis=0) > 0.5)
+    if not inside.size or inside[0] == 0 or inside[-1] == mask.shape[1] - 1:
+        return None
+    return float(inside[0]), float(inside[-1] + 1)
+
+
+def _band_width(grey: NDArray[np.float32], mask: Bools) -> float | None:
+    sides = _sides(mask)
+    if sides is None:
+        return None
+    left, right = (round(side) for side in sides)
+    scatter = grey.std(axis=0)
+    inner = float(np.median(scatter[left + REACH : right - REACH])) if right - left > 3 * REACH else math.nan
+    edges = [_edge(scatter[::-1], len(scatter) - left, inner), _edge(scatter, right, inner)]
+    if None in edges:
+        return None
+    return float(edges[1] + edges[0] - len(scatter))  # type: ignore[operator]
+
+
+def _edge(scatter: NDArray[np.float32], at: int, inner: float) -> float | None:
+    """Where the scatter falls for good, coming from the left; px from the left edge of the picture."""
+    near = scatter[max(at - REACH, 0) : at + REACH]
+    outer = float(np.median(near[-REACH // 2 :])) if len(near) > 1.5 * REACH else math.nan
+    if not outer < inner / 2:
+        return None
+    middle = (inner + outer) / 2
+    above = np.flatnonzero(near > middle)
+    if not above.size or above[-1] + 1 >= len(near):
+        return None
+    last = int(above[-1])
+    part = (near[last] - middle) / (near[last] - near[last + 1])
+    return max(at - REACH, 0) + last + 0.5 + float(part)
+
+
+Floats = NDArray[np.float64]
+
+MOST_UNEVEN = 0.005
+"""Change of the scale over the board, or between its directions, above which the tilt is warned of."""
+FEWEST_CORNERS = 6
+MOST_SQUARES = 60
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """A board.
+
+    Attributes
+    ----------
+    columns, rows : int
+        Of a checkerboard: inner corners; of a ChArUco board: squares.
+    square_mm : float
+    marker_mm : float
+        Of a ChArUco board; 0 for a checkerboard.
+    dictionary : str
+        Of its markers, as OpenCV names it: ``4X4_50``.
+    """
+
+    columns: int
+    rows: int
+    square_mm: float
+    marker_mm: float = 0.0
+    dictionary: str = "4X4_50"
+
+    def __post_init__(self) -> None:
+        if not (3 <= self.columns <= MOST_SQUARES and 3 <= self.rows <= MOST_SQUARES and self.square_mm > 0):
+            raise ConfigError(f"a board has 3 to {MOST_SQUARES} columns and rows, and squares above 0 mm")
+        if not 0 <= self.marker_mm < self.square_mm:
+            raise ConfigError("the markers of a ChArUco board are smaller than its squares")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Corners:
+    """Corners that were found: ``mm`` (N, 2) on the board and ``px`` (N, 2) in the picture."""
+
+    mm: Floats
+    px: Floats
+
+
+def find_corners(picture: NDArray[Any], board: Board) -> Corners:
+    """The corners of the board in a picture (H, W).
+
+    Raises
+    ------
+    DataError
+        There are too few.
+    ConfigError
+        OpenCV has no such dictionary.
+    """
+    low, high = np.percentile(picture, (0.5, 99.5))
+    grey = np.clip((picture - low) * (255 / max(float(high - low), 1e-6)), 0, 255).astype(np.uint8)
+    found = _charuco(grey, board) if board.marker_mm else _checkerboard(grey, board)
+    if found is None or len(found.px) < FEWEST_CORNERS:
+        kind = "ChArUco board" if board.marker_mm else "checkerboard"
+        count = "squares" if board.marker_mm else "inner corners"
+        raise DataError(
+            f"no {kind} of {board.columns} x {board.rows} {count} is seen; hold all of it in the picture, in focus"
+            " and evenly lit, and count again"
+        )
+    return found
+
+
+def _checkerboard(grey: NDArray[np.uint8], board: Board) -> Corners | None:
+    cv2 = load_cv2()
+    size = board.columns, board.rows
+    well, corners = cv2.findChessboardCornersSB(
+        grey, size, flags=cv2.CALIB_CB_ACCURACY | cv2.CALIB_CB_NORMALIZE_IMAGE
+    )
+    if not well:
+        return None
+    row, column = np.mgrid[: board.rows, : board.columns]
+    mm = np.stack([column.ravel(), row.ravel()], axis=1) * board.square_mm
+    return Corners(mm, np.asarray(corners, np.float64).reshape(-1, 2))
+
+
+def _charuco(grey: NDArray[np.uint8], board: Board) -> Corners | None:
+    cv2 = load_cv2()
+    name = f"DICT_{board.dictionary.upper()}"
+    if not (name.replace("_", "").isalnum() and hasattr(cv2.aruco, name)):
+        raise ConfigError(
+            f"no dictionary of markers {board.dictionary!r}; give one as 4X4_50, 5X5_100, APRILTAG_36H11"
+        )
+    dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+    if len(dictionary.bytesList) < board.columns * board.rows // 2:
+        raise ConfigError(f"the dictionary {board.dictionary} has too few markers for this board")
+    made = cv2.aruco.CharucoBoard((board.columns, board.rows), board.square_mm, board.marker_mm, dictionary)
+    corners, ids, _, _ = cv2.aruco.CharucoDetector(made).detectBoard(grey)
+    if ids is None:
+        return None
+    mm = np.asarray(made.getChessboardCorners(), np.float64)[ids.ravel(), :2]
+    return Corners(mm, np.asarray(corners, np.float64).reshape(-1, 2))
+
+
+def from_board(
+    picture: NDArray[Any], board: Board, sigma_mm: float = 0.0, stand_off_mm: float | None = None
+) -> Scale:
+    """The scale in the middle of a board in a picture (H, W).
+
+    Parameters
+    ----------
+    picture : (H, W), GL
+    board : Board
+    sigma_mm : float
+        Standard uncertainty of the length of the whole board.
+    stand_off_mm : float, optional
+        Distance to the camera; the tilt is told in degrees with it.
+
+    Raises
+    ------
+    DataError, ConfigError
+        As ``find_corners``.
+    """
+    corners = find_corners(picture, board)
+    h = _homography(corners)
+    middle = corners.mm.mean(axis=0)
+    larger, smaller = np.linalg.svd(_derivative(h, middle), compute_uv=False)
+    gradient = -h[2, :2] / (h[2, :2] @ middle + h[2, 2])  # of ln(px per mm), per mm
+    extent = float(np.ptp(corners.mm, axis=0).max())
+    spread = math.sqrt(float(((corners.mm - middle) ** 2).sum(axis=1).mean()))
+    rest = math.sqrt(float(((_mapped(h, corners.mm) - corners.px) ** 2).mean()))
+    # Foreshortened one way: half of the difference is not known to belong to the scale.
+    uneven = 1 - smaller / larger
+    fit = rest / (larger * spread * math.sqrt(len(corners.mm)))
+    relative = math.sqrt(fit**2 + (sigma_mm / extent) ** 2 + uneven**2 / 12)
+    kind = "ChArUco board" if board.marker_mm else "checkerboard"
+    scale = float(math.sqrt(1 / (larger * smaller)))
+    method = f"{kind} of {len(corners.mm)} corners, {rest:.2f} px rms"
+    change = float(np.hypot(*gradient)) * extent
+    return Scale(scale, scale * relative, method, tuple(_tilt(change, float(uneven), extent, stand_off_mm)))
+
+
+def _tilt(change: float, uneven: float, extent: float, stand_off_mm: float | None) -> Iterator[str]:
+    if max(change, uneven) <= MOST_UNEVEN:
+        return
+    degrees = math.degrees(math.acos(min(1 - uneven, 1.0)))
+    if stand_off_mm is not None:
+        degrees = math.degrees(math.asin(min(change / extent * stand_off_mm, 1.0)))
+    yield (
+        f"the board is tilted, about {degrees:.0f} degrees: the scale changes by {change:.1%} over it and by"
+        f" {uneven:.1%} between its directions; set the camera square to the specimen"
+    )
+
+
+def _homography(corners: Corners) -> Floats:
+    h, _ = load_cv2().findHomography(corners.mm, corners.px, 0)
+    if h is None:
+        raise DataError("the corners found make no plane; hold the board still and in focus")
+    return np.asarray(h, np.float64)
+
+
+def _mapped(h: Floats, mm: Floats) -> Floats:
+    seen = np.column_stack([mm, np.ones(len(mm))]) @ h.T
+    return np.asarray(seen[:, :2] / seen[:, 2:])
+
+
+def _derivative(h: Floats, at: Floats) -> Floats:
+    """px per mm there, (2, 2)."""
+    seen = h @ np.array([*at, 1.0])
+    return np.asarray((h[:2, :2] - np.outer(seen[:2] / seen[2], h[2, :2])) / seen[2])

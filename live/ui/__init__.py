@@ -1,0 +1,1 @@
+"""What a person sees: ``terminal``, ``rerun`` (maps and curves) and ``web`` (the operator's page)."""

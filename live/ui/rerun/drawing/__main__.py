@@ -1,0 +1,17 @@
+"""The process: Ctrl-C and a closed terminal are not meant for it."""
+
+from __future__ import annotations
+
+import signal
+import sys
+
+from acquire.held_back import let_through
+
+if __name__ == "__main__":
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
+    let_through(signal.SIGINT, signal.SIGHUP)  # held back by live.ui.rerun.supervisor
+
+    from live.ui.rerun.drawing.process import main
+
+    sys.exit(main())

@@ -1,0 +1,188 @@
+"""How the viewer opens: which view shows what, and where it stands (rerun blueprint)."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from live.ui.rerun.drawing.board import HEIGHT, WIDTH
+from live.ui.rerun.messages import MAPS, ViewSetup
+
+BAR_GAP, BAR_WIDTH, BAR_LABEL, BAR_ROOM = 0.03, 0.035, 0.16, 0.275
+"""Colour bar, right of the picture: its left edge, width, middle and right end of its labels.
+
+In ``bar_unit``s, like all that goes with the size of letters.
+"""
+
+BAR_TOP, BAR_HEIGHT = 0.12, 0.84
+"""Its top edge (the unit stands above) and height, in heights of the picture."""
+
+LETTER = 0.028
+"""About half the height of a line of words, in ``bar_unit``s."""
+
+CURVE_WIDTH = 1.6
+"""Width of the curve's rectangle; its height is 1."""
+
+_TITLES = {"e1": "e1 (largest)", "e2": "e2 (smallest)"}
+
+_WIDE = 2.2
+"""Pictures wider than that many heights stand one above the other."""
+
+ROWS = [2.4, 5.6, 3.8]
+"""Shares of the height: the large figures, the pictures, plots and words."""
+
+BACKGROUND = (18, 20, 24)
+
+VALUES = "/specimen/values"
+"""Where every ZOI tells its values when it is pointed at or clicked."""
+
+
+def gauge_path(name: str) -> str:
+    """Where the strain of a gauge is drawn over time."""
+    return f"gauges/{name}"
+
+
+def bar_unit(setup: ViewSetup) -> float:
+    """A length that has about the same size on the screen for all shapes of picture, px."""
+    return math.sqrt(setup.width * setup.height)
+
+
+def blueprint(setup: ViewSetup) -> Any:
+    """The layout for a test: the pictures on the left, curves, status and events on the right."""
+    import rerun.blueprint as rrb
+
+    return rrb.Blueprint(
+        rrb.Vertical(
+            *([] if setup.finished else [_board()]), _middle(setup), _below(setup), row_shares=_rows(setup)
+        ),
+        rrb.TimePanel(
+            state="collapsed",
+            timeline="time",
+            play_state="paused" if setup.finished else "following",
+        ),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="expanded" if setup.finished else "collapsed"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def _rows(setup: ViewSetup) -> list[float]:
+    return ROWS[1:] if setup.finished else ROWS
+
+
+def _board() -> Any:
+    """The large figures."""
+    import rerun.blueprint as rrb
+
+    bounds = rrb.VisualBounds2D(x_range=[0, WIDTH], y_range=[0, HEIGHT])
+    return rrb.Spatial2DView(
+        origin="/figures", name="Now", visual_bounds=bounds, background=[*BACKGROUND, 255]
+    )
+
+
+def _middle(setup: ViewSetup) -> Any:
+    """Picture, maps as tabs (the strain along the load in front), and the curve where there is a load."""
+    import rerun.blueprint as rrb
+
+    axial = "eyy" if setup.axis == "y" else "exx"
+    maps = rrb.Tabs(*(_map(setup, name) for name in MAPS), active_tab=MAPS.index(axial))
+    curve = [_curve(setup)] if setup.with_load else []
+    if setup.width > _WIDE * setup.height:
+        return rrb.Horizontal(
+            rrb.Vertical(_camera(setup), maps), *curve, column_shares=[5, 3][: 1 + len(curve)]
+        )
+    return rrb.Horizontal(_camera(setup), maps, *curve)
+
+
+def _below(setup: ViewSetup) -> Any:
+    import rerun.blueprint as rrb
+
+    plots = [_strains(setup), *([_load()] if setup.with_load else [])]
+    status = rrb.TextDocumentView(origin="/status", name="Status")
+    shares = [4, 3, 3, 4] if setup.with_load else [6, 3, 4]
+    return rrb.Horizontal(*plots, status, _events(), column_shares=shares)
+
+
+def _camera(setup: ViewSetup) -> Any:
+    return _picture_view(
+        setup, "Camera", ["/camera/**", "/zoi/**", "/specimen/zoi/**", "/specimen/gauges/**"]
+    )
+
+
+def _map(setup: ViewSetup, name: str) -> Any:
+    return _picture_view(
+        setup,
+        _TITLES.get(name, name),
+        [
+            *("/camera/picture", f"/specimen/map/{name}", "/specimen/gauges/**", f"/bar/{name}/**"),
+            *[VALUES] * setup.finished,
+        ],
+    )
+
+
+def _picture_view(setup: ViewSetup, name: str, contents: list[str]) -> Any:
+    import rerun.blueprint as rrb
+
+    w, h = setup.width, setup.height
+    margin, unit = 0.02 * max(w, h), bar_unit(setup)
+    if name == "Camera":
+        # Room for a line of words above.
+        x_range, y_range = [-margin, w + margin], [-0.1 * unit, h + margin]
+    else:
+        x_range, y_range = [-margin, w + BAR_ROOM * unit], [-margin, h + margin]
+    bounds = rrb.VisualBounds2D(x_range=x_range, y_range=y_range)
+    return rrb.Spatial2DView(
+        origin="/", contents=contents, name=name, visual_bounds=bounds, background=[*BACKGROUND, 255]
+    )
+
+
+def _strain() -> Any:
+    return _plot("/strain", "Mean strain ± sigma, µm/m", legend=True)
+
+
+def _strains(setup: ViewSetup) -> Any:
+    """The mean strain, behind that of the gauges where there are any."""
+    import rerun.blueprint as rrb
+
+    if not setup.gauges:
+        return _strain()
+    gauges = _plot("/gauges", "Gauges ± sigma, µm/m", legend=True)
+    return rrb.Tabs(gauges, _strain(), active_tab=0)
+
+
+def _load() -> Any:
+    return _plot("/load", "Load, N", legend=False)
+
+
+def _plot(origin: str, name: str, *, legend: bool) -> Any:
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    # Without this only the last half minute of a running test is shown.
+    whole = rr.TimeRange(rr.TimeRangeBoundary.infinite(), rr.TimeRangeBoundary.infinite())
+    return rrb.TimeSeriesView(
+        origin=origin,
+        name=name,
+        axis_x=rrb.TimeAxis(view_range=whole),
+        plot_legend=rrb.PlotLegend("LeftTop", visible=legend),
+    )
+
+
+def _events() -> Any:
+    import rerun.blueprint as rrb
+
+    # Rerun's own column of times is too narrow to be read; the text begins with the time instead.
+    hidden = rrb.encodings.TimelineColumn("time", visible=False)
+    columns = rrb.TextLogColumns(timeline_columns=[hidden], text_log_columns=["LogLevel", "Body"])
+    return rrb.TextLogView(origin="/events", name="Events", columns=columns)
+
+
+def _curve(setup: ViewSetup) -> Any:
+    import rerun.blueprint as rrb
+
+    what = "Stress" if setup.area_m2 else "Load"
+    bounds = rrb.VisualBounds2D(x_range=[-0.3, CURVE_WIDTH + 0.17], y_range=[-0.25, 1.3])
+    return rrb.Spatial2DView(
+        origin="/curve", name=f"{what} – strain", visual_bounds=bounds, background=[*BACKGROUND, 255]
+    )

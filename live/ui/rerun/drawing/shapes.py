@@ -1,0 +1,165 @@
+"""Where things lie on the picture: sample ZOIs, arrows, dots with values, and the mean motion of the specimen.
+
+Places are those of rerun, whose pixel (0, 0) covers 0..1: ours (its centre is 0) plus 0.5.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.field import Status
+from live.results.maps.colours import MICROSTRAIN
+from live.ui.rerun.messages import STRAINS
+
+if TYPE_CHECKING:
+    from analysis.field import StrainField, ZoiGrid
+
+Points = NDArray[np.float64]
+_DOT = (255, 255, 255, 70)
+_HEAD = 0.3, 0.15  # of an arrow: length and half the width
+_MOST_BOXES, _MOST_ARROWS, _MOST_POINTS = 16, 240, 2000
+
+
+def centres(grid: ZoiGrid) -> Points:
+    """(R, C, 2) centres of all ZOIs, px of the viewer."""
+    x, y = np.meshgrid(np.asarray(grid.x, np.float64), np.asarray(grid.y, np.float64))
+    places: Points = np.stack([x, y], axis=-1) + 0.5
+    return places
+
+
+def every(grid: ZoiGrid, most: int, apart_px: float = 0.0) -> tuple[slice, slice]:
+    """Rows and columns of an evenly thinned grid of at most about ``most`` ZOIs, centred."""
+    rows, columns = grid.active.shape
+    step = max(math.ceil(math.sqrt(rows * columns / most)), math.ceil(apart_px / grid.step), 1)
+    return _centred(rows, step), _centred(columns, step)
+
+
+def _centred(count: int, step: int) -> slice:
+    return slice((count - 1) % step // 2, None, step)
+
+
+def sample_boxes(grid: ZoiGrid) -> Points:
+    """(N, 2) centres of a few active ZOIs that do not overlap, spread over the grid."""
+    pick = every(grid, _MOST_BOXES, 1.5 * grid.size)
+    return np.asarray(centres(grid)[pick][grid.active[pick]])
+
+
+def region_edges(grid: ZoiGrid) -> NDArray[np.float64]:
+    """(N, 2, 2) straight pieces, from and to, of the edge of all that the active ZOIs cover, px."""
+    unit = math.gcd(grid.size, grid.step)
+    side, step = grid.size // unit, grid.step // unit
+    rows, columns = grid.shape
+    cover = np.zeros(((rows - 1) * step + side + 2, (columns - 1) * step + side + 2), np.int8)
+    for row, column in np.argwhere(grid.active):
+        top, left = row * step + 1, column * step + 1
+        cover[top : top + side, left : left + side] = 1
+    flat = _runs(np.diff(cover, axis=0) != 0)
+    upright = _runs(np.diff(cover, axis=1).T != 0)[:, :, ::-1]
+    # One cell of rim lies around what is covered.
+    return unit * (np.concatenate([flat, upright]) - 1.0) + [grid.roi.x, grid.roi.y]
+
+
+def _runs(edges: NDArray[np.bool_]) -> NDArray[np.float64]:
+    """(N, 2, 2) from and to, (along, across) cells, of what is True without a gap in each row."""
+    turns = np.diff(np.pad(edges, ((0, 0), (1, 1))).astype(np.int8))
+    ends = [np.argwhere(turns == turn)[:, ::-1] + [0, 1] for turn in (1, -1)]
+    return np.stack(ends, axis=1).astype(np.float64)
+
+
+def thinned(grid: ZoiGrid, wanted: NDArray[np.bool_]) -> Points:
+    """(N, 2) centres of the wanted ZOIs; every second, third ... where there are very many."""
+    found = centres(grid)[wanted]
+    return np.asarray(found[:: max(1, math.ceil(len(found) / _MOST_POINTS))])
+
+
+def mean_motion(field: StrainField) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The affine motion common to all valid ZOIs, as matrix (3, 3) and shift (3,) px.
+
+    The maps lie on the reference picture; with it they follow the specimen on the present one.
+    """
+    valid = np.isfinite(field.u)
+    if not valid.any():
+        return np.eye(3), np.zeros(3)
+    matrix = np.eye(3)
+    parts = (field.du_dx, field.du_dy, field.dv_dx, field.dv_dy)
+    matrix[:2, :2] += np.array([float(p[valid].mean(dtype=np.float64)) for p in parts]).reshape(2, 2)
+    middle = centres(field.grid)[valid].mean(axis=0)
+    moved = np.array([field.u[valid].mean(dtype=np.float64), field.v[valid].mean(dtype=np.float64)])
+    shift = np.zeros(3)
+    shift[:2] = middle + moved - matrix[:2, :2] @ middle
+    return matrix, shift
+
+
+class ArrowScale:
+    """Displacement arrows, magnified by a round factor that changes seldom."""
+
+    def __init__(self) -> None:
+        self._factor = 0.0
+
+    def arrows(self, field: StrainField) -> tuple[Points, Points, float]:
+        """(N, 2) origins, (N, 2) vectors as drawn (px), and the factor of magnification."""
+        pick = every(field.grid, _MOST_ARROWS)
+        shown = np.stack([field.u[pick], field.v[pick]], axis=-1).astype(np.float64)
+        valid = np.isfinite(shown).all(axis=-1)
+        origins, vectors = centres(field.grid)[pick][valid], shown[valid]
+        room = field.grid.step * (pick[0].step or 1)
+        self._follow(vectors, 1.6 * room)
+        return origins, vectors * self._factor, self._factor
+
+    def _follow(self, vectors: Points, room: float) -> None:
+        longest = float(np.percentile(np.hypot(*vectors.T), 95)) if len(vectors) else 0.0
+        fits = room / max(longest, 1e-3)
+        if not fits / 5 < self._factor <= fits:
+            self._factor = _round_below(min(fits, 1000.0))
+
+
+def with_heads(origins: Points, vectors: Points) -> NDArray[np.float32]:
+    """(N, 5, 2): each arrow as one line, with a head that rerun's own would be too small to show."""
+    tips, across = origins + vectors, vectors[:, ::-1] * [-1, 1]
+    barbs = [tips - _HEAD[0] * vectors + side * _HEAD[1] * across for side in (1, -1)]
+    return np.stack([origins, tips, barbs[0], tips, barbs[1]], axis=1).astype(np.float32)
+
+
+def _round_below(value: float) -> float:
+    decade = 10.0 ** math.floor(math.log10(value))
+    return max(step for step in (1.0, 2.0, 5.0) if step * decade <= value * (1 + 1e-9)) * decade
+
+
+def value_dots(field: StrainField) -> tuple[Any, Any]:
+    """A dot a ZOI with a label in words (shown where it is pointed at), and its numbers as components."""
+    import rerun as rr
+
+    wanted = np.asarray(field.grid.active, bool)
+    numbers = {"u_px": field.u, "v_px": field.v}
+    for name in STRAINS:
+        numbers[f"{name}_um_m"] = getattr(field, name) * MICROSTRAIN.factor
+        numbers[f"sigma_{name}_um_m"] = getattr(field, f"sigma_{name}") * MICROSTRAIN.factor
+    found = {name: np.asarray(values[wanted], np.float64) for name, values in numbers.items()}
+    places, rows, columns = centres(field.grid)[wanted], *np.nonzero(wanted)
+    words = [
+        _words(row, column, status, {name: values[k] for name, values in found.items()})
+        for k, (row, column, status) in enumerate(
+            zip(rows.tolist(), columns.tolist(), field.status[wanted].tolist(), strict=True)
+        )
+    ]
+    dots = rr.Points2D(
+        places,
+        radii=rr.Radius.ui_points(1.2),
+        colors=_DOT,
+        labels=words,
+        show_labels=False,
+        draw_order=15,
+    )
+    return dots, rr.AnyValues(row=rows, column=columns, status=field.status[wanted], **found)
+
+
+def _words(row: int, column: int, status: int, of: dict[str, float]) -> str:
+    head = f"ZOI {row}, {column}"
+    if status != Status.OK:
+        return f"{head}: {Status(status).name}"
+    strains = "\n".join(f"{n} {of[f'{n}_um_m']:+.1f} ± {of[f'sigma_{n}_um_m']:.1f} µm/m" for n in STRAINS)
+    return f"{head}\nu {of['u_px']:+.4f}  v {of['v_px']:+.4f} px\n{strains}"

@@ -1,0 +1,199 @@
+"""Where is drawn to: a server that viewers look at, and a file; each a rerun stream with rates of its own."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from live.ui.rerun.drawing.layout import blueprint
+from live.ui.rerun.drawing.proxy import ViewerProxy, hidden, wait_for
+from live.ui.rerun.messages import ViewSetup, Where
+
+APPLICATION = "phasedic"
+SERVER_MIB = 64
+"""What a viewer that comes late can still be shown; beyond, the oldest pictures and maps go."""
+
+FINISHED_MIB = 768
+"""Of a finished test everything is to be kept: whoever tells it chooses no more than that."""
+
+RRD_LIMIT_BYTES = 1e9
+_FLUSH_S = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """How much goes to one place, per second of the test; and how much in all.
+
+    Attributes
+    ----------
+    picture_hz, map_hz, row_hz : float, 1/s
+        Pictures, maps; and how often what came of means and loads (all of it) is drawn, a parcel each time.
+    gather_s : float, s
+        What is drawn of one thing in so long goes out together; rerun's memory grows with each parcel
+        (of a file: for good).
+    parcel_bytes : int
+        What is drawn of one thing goes out when it comes to this much; large parcels leave holes in the memory,
+        which grew by as much as was written.
+    limit_bytes : float
+        When the pictures and maps drawn come to this much they stop; the curves go on.
+    repeat_bytes : float
+        Each time that much was drawn, the curves are sent again from their beginning: a server
+        forgets the oldest, and a viewer that comes later is to see the whole test.
+    """
+
+    picture_hz: float
+    map_hz: float
+    row_hz: float = 10.0
+    gather_s: float = 0.1
+    parcel_bytes: int = 2**20
+    limit_bytes: float = math.inf
+    repeat_bytes: float = math.inf
+
+
+ALL = Rates(math.inf, math.inf)
+"""Whatever comes."""
+
+
+class RerunSink:
+    """One stream, and how much it was given so far.
+
+    Parameters
+    ----------
+    stream : rerun.RecordingStream
+    rates : Rates
+    drawn : callable
+        Told how many bytes of pictures and maps were drawn so far.
+
+    Attributes
+    ----------
+    drawn_bytes : int
+        Of pictures and maps.
+    """
+
+    def __init__(self, stream: Any, rates: Rates, drawn: Callable[[int], None] = lambda count: None) -> None:
+        self.stream, self._rates, self._drawn = stream, rates, drawn
+        self._hz = {
+            "picture": rates.picture_hz,
+            "map": rates.map_hz,
+            "more": rates.map_hz / 4,
+            "figures": min(4.0, 5 * rates.row_hz),
+            "rows": rates.row_hz,
+        }
+        self._last_t = dict.fromkeys(self._hz, -math.inf)
+        self._rows: dict[str, list[Sequence[float]]] = {}
+        self.drawn_bytes = self._repeated_at = 0
+
+    def count(self, data: bytes) -> None:
+        """A picture or map of so many bytes was drawn."""
+        self.drawn_bytes += len(data)
+        self._drawn(self.drawn_bytes)
+
+    def takes(self, what: str, t: float) -> bool:
+        """Whether a "picture", "map", "more" (maps), "figures" or "rows" at ``t`` (s) is due.
+
+        Then the next is not, for a while.
+        """
+        full = self.drawn_bytes >= self._rates.limit_bytes and what not in ("rows", "figures")
+        if full or t - self._last_t[what] < 0.999 / self._hz[what]:
+            return False
+        self._last_t[what] = t
+        return True
+
+    def forgets(self) -> bool:
+        """Whether so much was drawn since the last time that the curves are to be sent again."""
+        if self.drawn_bytes - self._repeated_at < self._rates.repeat_bytes:
+            return False
+        self._repeated_at = self.drawn_bytes
+        return True
+
+    def add_row(self, path: str, row: Sequence[float]) -> None:
+        """Keep (time, value ...) until rows are due."""
+        self._rows.setdefault(path, []).append(row)
+
+    def send_rows(self, columns: Callable[[str, Any], Any]) -> None:
+        """Draw all rows kept; ``columns`` makes rerun's columns of a path and (values, N)."""
+        kept, self._rows = self._rows, {}
+        for path, rows in kept.items():
+            self.send(path, rows, columns)
+
+    def send(self, path: str, rows: Sequence[Sequence[float]], columns: Callable[[str, Any], Any]) -> None:
+        """Draw rows."""
+        import rerun as rr
+
+        if rows:
+            times, *values = np.array(rows, np.float64).T
+            self.stream.send_columns(path, [rr.TimeColumn("time", duration=times)], columns(path, values))
+
+    def close(self) -> None:
+        """Let all reach its place, and close that."""
+        self.stream.flush(timeout_sec=_FLUSH_S)
+        self.stream.disconnect()
+
+
+def serve(setup: ViewSetup, where: Where, tell: Callable[[str], None]) -> tuple[RerunSink, int]:
+    """A server, and the port where viewers connect.
+
+    Raises
+    ------
+    OSError
+        No port is free.
+    """
+    import rerun as rr
+
+    wanted = where.port or 0
+    door = ViewerProxy(wanted, tell)
+    if wanted and door.port != wanted:
+        tell(f"port {wanted} is taken; the view is on {door.port}")
+    host, port = hidden()
+    memory = FINISHED_MIB if setup.finished else SERVER_MIB
+    live = Rates(setup.picture_hz, 1.0 if setup.light else 10.0, repeat_bytes=SERVER_MIB * 2**20 / 4)
+    rates = ALL if setup.finished else live
+    sink = rr.GrpcServerSink(host, port, server_memory_limit=f"{memory}MiB")
+    place = _place(sink, setup, where.recording, rates, door.drawn)
+    wait_for(host, port)
+    door.open(host, port)
+    return place, door.port
+
+
+def write(setup: ViewSetup, where: Where) -> RerunSink:
+    """A file.
+
+    Raises
+    ------
+    OSError
+        It is there already, or cannot be made.
+    """
+    import rerun as rr
+
+    path = Path(where.rrd or "")
+    with path.open("xb"):  # rerun overwrites
+        pass
+    rates = (
+        ALL
+        if setup.finished
+        else Rates(1.0, 2.0, 0.2, gather_s=5.0, parcel_bytes=2**16, limit_bytes=RRD_LIMIT_BYTES)
+    )
+    # Two streams of one name in a process would be one stream.
+    return _place(rr.FileSink(str(path)), setup, f"{where.recording}-file", rates)
+
+
+def _place(
+    sink: Any,
+    setup: ViewSetup,
+    recording: str,
+    rates: Rates,
+    drawn: Callable[[int], None] = lambda count: None,
+) -> RerunSink:
+    import rerun as rr
+
+    parcels = rr.ChunkBatcherConfig(flush_tick=rates.gather_s, flush_num_bytes=rates.parcel_bytes)
+    stream = rr.RecordingStream(APPLICATION, recording_id=recording, batcher_config=parcels)
+    stream.set_sinks(sink)
+    stream.send_recording_name(setup.title)
+    stream.send_blueprint(blueprint(setup))
+    return RerunSink(stream, rates, drawn)

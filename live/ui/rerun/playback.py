@@ -1,0 +1,279 @@
+"""The view of a finished run: opened, told everything, and kept until a person has seen enough.
+
+What the view is told of a finished run: setup, curves, events, then picture and maps instant by instant.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import zip_longest
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.events import Level
+from acquire.frame import Frame, frozen
+from analysis.evaluate import evaluate_test
+from live.config.gauges import outlines
+from live.config.loading import from_dict
+from live.pipeline.screen import Screen
+from live.results.figures import figure_lines, options_of
+from live.results.run_folder import RunFolder
+from live.ui.rerun.messages import (
+    STRAINS,
+    ViewSetup,
+    events_message,
+    field_message,
+    picture_message,
+    rows_message,
+)
+from live.ui.rerun.view import View, spawn_viewer
+from live.ui.rerun.wire import Kind, Message
+
+MOST_BYTES = 500e6
+"""Of pictures and maps, as they are drawn: the viewer keeps them all in memory."""
+
+_BYTES_PX, _BYTES_ZOI = 0.35, 250.0  # of a JPEG of speckle; of three maps and the values of a ZOI
+_LONGEST_PX = 1280  # larger pictures are drawn reduced
+
+
+@dataclass(frozen=True, slots=True)
+class ShowRequest:
+    """Which part of the run.
+
+    Attributes
+    ----------
+    start_s, end_s : float or None, s
+        Since the start of the test.
+    every : int or None
+        One instant in so many; None: as many as the viewer can keep.
+    """
+
+    start_s: float | None = None
+    end_s: float | None = None
+    every: int | None = None
+
+
+def chosen(run: RunFolder, asked: ShowRequest) -> tuple[int, ...]:
+    """Rows of the instants that are shown, the last of them always.
+
+    Raises
+    ------
+    ConfigError
+        None is left.
+    DataError
+        The run holds none.
+    """
+    t = run.strain.time_s
+    if not len(t):
+        raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to show")
+    low = -math.inf if asked.start_s is None else asked.start_s
+    high = math.inf if asked.end_s is None else asked.end_s
+    rows = np.flatnonzero((t >= low) & (t <= high))
+    if not len(rows):
+        raise ConfigError(
+            f"--from, --to: no measurement between {low:g} and {high:g} s; they reach from {t[0]:.6g} to {t[-1]:.6g} s"
+        )
+    every = asked.every or math.ceil(len(rows) * _bytes_each(run) / MOST_BYTES)
+    return tuple(int(row) for row in rows[::-1][::every][::-1])
+
+
+def _bytes_each(run: RunFolder) -> float:
+    width, height = size_of(run)
+    reduced = max(1, math.ceil(max(width, height) / _LONGEST_PX))
+    return _BYTES_PX * width * height / reduced**2 + _BYTES_ZOI * run.strain.grid.n_active
+
+
+def size_of(run: RunFolder) -> tuple[int, int]:
+    """Width and height of the pictures, px; without any, as far as the ZOIs reach."""
+    if run.pictures is not None:
+        return run.pictures.info.width, run.pictures.info.height
+    roi = run.strain.grid.roi
+    return 2 * roi.x + roi.width, 2 * roi.y + roi.height
+
+
+def setup_of(run: RunFolder) -> ViewSetup:
+    """What is shown, and how."""
+    width, height = size_of(run)
+    return ViewSetup(
+        title=run.title,
+        width=width,
+        height=height,
+        bits=run.pictures.info.bits if run.pictures is not None else 8,
+        grid=run.strain.grid,
+        start_monotonic=0.0,
+        area_m2=run.specimen.area_m2,
+        axis=run.load_axis.axis,
+        finished=True,
+        with_load=bool(np.isfinite(run.force).any()),
+        outlines=_outlines(run),
+        gauges=tuple(run.gauges),
+    )
+
+
+def _outlines(run: RunFolder) -> dict[str, tuple[tuple[tuple[float, float], ...], ...]]:
+    """Where the gauges lie; of one whose place the file does not tell, nothing."""
+    described = {name: gauge.described for name, gauge in run.gauges.items()}
+    try:
+        gauges = from_dict({"gauges": described}, {}, str(run.path)).gauges
+        return outlines(gauges, run.strain.grid.size)
+    except ConfigError:
+        return {}
+
+
+def story(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Message]:
+    """Everything, times in seconds since the start of the test.
+
+    Raises
+    ------
+    DataError
+        A file cannot be read.
+    """
+    yield Message(Kind.STATUS, {"markdown": _status(run)})
+    yield from _curves(run)
+    yield from _events(run)
+    pictures = iter(()) if run.pictures is None else run.pictures.each(rows)
+    since = 0
+    for row, image in zip_longest(rows, pictures):
+        t = float(run.strain.time_s[row])
+        if image is not None and run.pictures is not None:
+            yield picture_message(_frame(image, t, run.pictures.info.bits))
+        yield rows_message(Kind.POINTS, _points(run, since, row + 1))
+        since = row + 1
+        yield field_message(t, run.field(row))
+
+
+def _frame(image: NDArray[Any], t: float, bits: int) -> Frame:
+    kind = np.uint8 if bits <= 8 else np.uint16
+    whole = image if image.dtype == kind else np.rint(image).astype(kind)
+    return Frame(frozen(whole), 0, t, "nominal", 0, bits, t)
+
+
+def _curves(run: RunFolder) -> Iterator[Message]:
+    values, t = run.strain.values, np.asarray(run.strain.time_s, np.float64)
+    columns = [values[column] for name in STRAINS for column in (name, f"sigma_{name}")]
+    yield rows_message(Kind.MEANS, zip(t, *columns, strict=True))
+    for name, gauge in run.gauges.items():
+        yield rows_message(Kind.GAUGE, zip(t, gauge.value, gauge.sigma, strict=True), name)
+    loads = [(t[row], run.force[row]) for row in range(run.strain.n)]
+    if run.session is not None and (samples := run.session.load_samples()):
+        loads = [(sample.t - run.start_monotonic, sample.force) for sample in samples]
+    yield rows_message(Kind.LOADS, (row for row in loads if math.isfinite(row[1])))
+
+
+def _points(run: RunFolder, start: int, stop: int) -> list[tuple[float, float]]:
+    """Strain and N of some instants, for the curve that grows with the slider."""
+    found = zip(run.axial_strain[start:stop].tolist(), run.force[start:stop].tolist(), strict=True)
+    return list(found)
+
+
+def _events(run: RunFolder) -> Iterator[Message]:
+    yield events_message([replace(event, t=event.t - run.start_monotonic) for event in run.events])
+
+
+def _status(run: RunFolder) -> str:
+    """The figures of the test and the gauges at its end, as Markdown."""
+    lines = figure_lines(evaluate_test(run.curve, options_of(run.specimen)), run.specimen)
+    lines += [
+        f"gauge **{name}** {gauge.value[-1] * 1e6:+.0f} ± {gauge.sigma[-1] * 1e6:.0f} µm/m at the end"
+        for name, gauge in run.gauges.items()
+    ]
+    values = run.strain.values
+    head = f"**{run.title}**, {run.strain.n} instants, {values['n_valid'][-1]} of {values['n_zoi'][-1]} ZOIs at the end"
+    return "\n\n".join([head, *(line.strip().replace("+-", "±") for line in lines)])
+
+
+_LOOK_S, _CLOSE_S = 0.1, 600.0
+
+
+def show(
+    run: RunFolder,
+    asked: ShowRequest,
+    screen: Screen,
+    enough: threading.Event,
+    *,
+    port: int,
+    rrd: Path | None = None,
+) -> None:
+    """Show ``run`` until ``enough`` is set; with ``rrd`` into that file alone, until all is written.
+
+    Raises
+    ------
+    ConfigError, DataError
+        Nothing can be shown, a file cannot be read, or the view's process fails.
+    """
+    rows = chosen(run, asked)
+    _tell_of_choice(len(rows), run, screen)
+    told = _Told(run, rows, screen)
+    view = View(
+        setup_of(run),
+        port=None if rrd else port,
+        rrd=rrd,
+        tell=lambda text, level: None if enough.is_set() else _say(screen, text, level),
+        serving=lambda view: _announce(view, screen),
+        story=told.messages,
+    )
+    try:
+        while not view.failed and not told.trouble and not (told.all if rrd else enough).wait(_LOOK_S):
+            if enough.is_set():
+                break
+    finally:
+        view.close(_CLOSE_S if rrd and not enough.is_set() else 0.0)
+    if told.trouble or view.failed:
+        raise DataError(told.trouble or view.failed)
+
+
+class _Told:
+    """The story as it is taken, from the beginning each time a process is started.
+
+    Attributes
+    ----------
+    all : Event
+        Once everything was taken.
+    trouble : str
+        Why the story ended early.
+    """
+
+    def __init__(self, run: RunFolder, rows: tuple[int, ...], screen: Screen) -> None:
+        self._run, self._rows, self._screen = run, rows, screen
+        self.all, self.trouble = threading.Event(), ""
+
+    def messages(self) -> Iterator[Message]:
+        try:
+            done = 0
+            for message in story(self._run, self._rows):
+                yield message
+                done += message.kind is Kind.FIELD
+                self._screen.status(f"instant {done} of {len(self._rows)}")
+        except PhasedicError as error:
+            self.trouble = str(error)
+        self.all.set()
+
+
+def _tell_of_choice(shown: int, run: RunFolder, screen: Screen) -> None:
+    if shown < run.strain.n:
+        screen.say(f"{shown} of {run.strain.n} instants are shown; --from, --to and --every choose others")
+    if run.pictures is None:
+        screen.say("note: the pictures that were measured are not here any more; maps alone")
+
+
+def _say(screen: Screen, text: str, level: Level) -> None:
+    screen.say(text if level == "info" else f"{level}: {text}")
+
+
+def _announce(view: View, screen: Screen) -> None:
+    """Open the viewer where there is a display; else say how to look."""
+    if view.port is None:
+        return
+    if spawn_viewer(view.port, screen.say) is not None:
+        screen.say("the viewer opens in a window of its own; Ctrl-C here ends it")
+        return
+    screen.say("no viewer is opened here (no display); this shows it, Ctrl-C ends it:")
+    for line in view.address.splitlines():
+        screen.say(f"  {line}")

@@ -1,0 +1,1 @@
+"""Messages and the status line on a terminal."""

@@ -1,0 +1,79 @@
+"""The status line of a live run: what matters most, as much of it as the terminal is wide."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from acquire.printable import duration
+
+if TYPE_CHECKING:
+    from live.pipeline.measurement import TimeStep
+    from live.pipeline.snapshot import Snapshot
+
+GAP = "  "
+MOST_GAUGES = 4
+Part = tuple[int, str]
+"""How soon it has to go where the line is too long (the highest first), and its words."""
+
+
+def status_line(s: Snapshot, width: int, words: str = "") -> str:
+    """The line, at most ``width`` letters; ``words`` say what is waited for."""
+    return fitted([*_test(s), (3, words), *_strain(s.instant), *_machine(s)], width)
+
+
+def fitted(parts: Sequence[Part], width: int) -> str:
+    """The parts in their order, without as many as do not fit; the last one left is cut."""
+    left = [part for part in parts if part[1]]
+    while len(left) > 1 and len(GAP.join(text for _, text in left)) > width:
+        left.remove(max(left, key=lambda part: part[0]))
+    return GAP.join(text for _, text in left)[: max(width, 0)]
+
+
+def _test(s: Snapshot) -> list[Part]:
+    alarm = " ".join(f"ALARM {text}" for text in s.alarms)
+    stress = "" if math.isnan(s.stress_Pa) else f"{s.stress_Pa * 1e-6:.1f} MPa"
+    peak = "" if math.isnan(s.peak_N) else f"peak {force(s.peak_N)}"
+    load = [(0, force(s.force_N)), (4, stress), (12, peak)]
+    return [(1, alarm), (2, s.state), (7, duration(s.elapsed_s)), *load]
+
+
+def _strain(i: TimeStep | None) -> list[Part]:
+    if i is None:
+        return []
+    parts = [(5 if number == 0 else 10, text) for number, text in enumerate(gauge_words(i))]
+    parts[-1] = parts[-1][0], f"{parts[-1][1]} um/m"
+    return [*parts, (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
+
+
+def _machine(s: Snapshot) -> list[Part]:
+    frames = s.frames
+    late = "" if math.isnan(s.latency_p95_s) else f"p95 {s.latency_p95_s * 1e3:.0f} ms"
+    measured = f"measured {frames['measured']}" if s.instant is not None else f"{frames['grabbed']} frames"
+    return [
+        (9, f"{s.fps:.0f} fps"),
+        (12, measured),
+        (11, f"skipped {frames['skipped']}"),
+        (6, f"LOST {s.lost}") if s.lost else (13, "lost 0"),
+        (12, late),
+        (14, "" if math.isinf(s.disk_s) else f"disk {s.disk_s / 60:.0f} min"),
+    ]
+
+
+def force(value: float) -> str:
+    """A force in words; nothing where it is not known."""
+    return "" if math.isnan(value) else f"{value:.1f} N"
+
+
+def gauge_words(i: TimeStep) -> list[str]:
+    """The virtual gauges with their sigmas in um/m, or the means where there are none."""
+    if not i.gauges:
+        return [
+            f"{name} {getattr(i, name) * 1e6:+.0f} +- {getattr(i, f'sigma_{name}') * 1e6:.0f}"
+            for name in ("eyy", "exx", "exy")
+        ]
+    return [
+        f"{name} lost" if gauge.reason else f"{name} {gauge.value * 1e6:+.0f} +- {gauge.sigma * 1e6:.0f}"
+        for name, gauge in list(i.gauges.items())[:MOST_GAUGES]
+    ]

@@ -1,0 +1,102 @@
+"""What is told to all open pages: of each kind the newest, so that a page that does not read holds up nobody."""
+
+from __future__ import annotations
+
+import json
+import math
+import threading
+from typing import Any
+
+MOST_STREAMS = 8
+"""Pages that are told at one time."""
+
+
+def plain(value: Any) -> Any:
+    """Fit for JSON: what is not finite becomes None."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    return value.item() if hasattr(value, "item") else value
+
+
+def encoded(value: Any) -> bytes:
+    """JSON in one line."""
+    return json.dumps(plain(value), allow_nan=False, separators=(",", ":")).encode()
+
+
+class Subscriber:
+    """What waits for one page: one message of each kind."""
+
+    def __init__(self) -> None:
+        self._waiting: dict[str, bytes] = {}
+        self._changed = threading.Condition()
+        self._closed = False
+
+    def put(self, kind: str, message: bytes) -> None:
+        """Replace what waits of this kind; never waits for the page."""
+        with self._changed:
+            self._waiting[kind] = message
+            self._changed.notify()
+
+    def close(self) -> None:
+        """Nothing comes any more; what waits can still be taken."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify()
+
+    def take(self, timeout_s: float) -> dict[str, bytes] | None:
+        """All that waits, empty after ``timeout_s``; None once it is closed and empty."""
+        with self._changed:
+            if not self._waiting and not self._closed:
+                self._changed.wait(timeout_s)
+            taken, self._waiting = self._waiting, {}
+            return None if self._closed and not taken else taken
+
+
+class Broadcaster:
+    """Passes messages on to all streams; a stream that is opened begins with the newest of each kind."""
+
+    def __init__(self) -> None:
+        self._streams: set[Subscriber] = set()
+        self._newest: dict[str, bytes] = {}
+        self._lock = threading.Lock()
+        self._closed = False
+
+    @property
+    def watched(self) -> int:
+        """Pages that are open."""
+        return len(self._streams)
+
+    def tell(self, kind: str, value: Any) -> None:
+        """Tell every page."""
+        message = encoded(value)
+        with self._lock:
+            self._newest[kind] = message
+            for stream in self._streams:
+                stream.put(kind, message)
+
+    def open(self) -> Subscriber | None:
+        """A new stream; None where ``MOST_STREAMS`` are open, or all is over."""
+        with self._lock:
+            if self._closed or len(self._streams) >= MOST_STREAMS:
+                return None
+            stream = Subscriber()
+            for kind, message in self._newest.items():
+                stream.put(kind, message)
+            self._streams.add(stream)
+            return stream
+
+    def leave(self, stream: Subscriber) -> None:
+        """The page has gone."""
+        with self._lock:
+            self._streams.discard(stream)
+
+    def close(self) -> None:
+        """End all streams."""
+        with self._lock:
+            self._closed = True
+            for stream in self._streams:
+                stream.close()

@@ -1,0 +1,135 @@
+"""The rig as it is being set up: what was given, and what has been changed on the page and not saved yet."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.addresses import parse_address
+from acquire.errors import ConfigError, DataError
+from acquire.files.picture import write_picture
+from live.config.loading import Config, from_dict, load_config, settings_in
+from live.config.rig_file import write_rig
+
+CHANGEABLE = frozenset(
+    {
+        "camera.address", "load.address", "measure.zoi", "measure.step", "measure.burst", "measure.roi",
+        "measure.mask", "measure.gauges",
+        "specimen.width_mm", "specimen.thickness_mm", "specimen.diameter_mm", "specimen.area_mm2",
+        "specimen.gauge_length_mm", "specimen.axis", "specimen.standard", "metadata.specimen", "metadata.operator",
+        "metadata.material", "scale.mm_per_px", "scale.sigma_mm_per_px", "scale.date", "scale.method",
+    }
+)  # fmt: skip
+"""Keys that a page may change, beside gauges."""
+
+OF_TODAY = ("output.", "view.")
+
+
+class ConfigDraft:
+    """A configuration with its changes.
+
+    Parameters
+    ----------
+    given : Config
+        As the file and the command line have it.
+    path : Path
+        Of the rig file; need not be there yet.
+    said : mapping of "section.key" to value
+        What the command line says: saved with the rest, but for what is of this time alone (``OF_TODAY``).
+
+    Attributes
+    ----------
+    changes : dict of "section.key" to value
+        Not saved yet; None takes a key out.
+    """
+
+    def __init__(self, given: Config, path: Path, said: Mapping[str, Any]) -> None:
+        self.path = path
+        self._of_today = {key: value for key, value in said.items() if key.startswith(OF_TODAY)}
+        in_file = settings_in(path) if path.exists() else {}
+        lasting = {key: value for key, value in said.items() if key not in self._of_today}
+        self.changes: dict[str, Any] = {key: v for key, v in lasting.items() if in_file.get(key) != v}
+        self._config = given
+
+    @property
+    def config(self) -> Config:
+        """With all changes."""
+        return self._config
+
+    def change_all(self, changes: Mapping[str, Any]) -> None:
+        """Change keys, all or none; raises ConfigError where a value is impossible, and nothing is changed then."""
+        tree: dict[str, Any] = json.loads(json.dumps(self._config.as_dict()))
+        for dotted, value in changes.items():
+            section, _, key = dotted.partition(".")
+            if section != "gauges" and dotted not in CHANGEABLE:
+                raise ConfigError(f"{dotted} is not changed here; change it in {self.path}")
+            if value is None:
+                tree[section].pop(key, None)
+            else:
+                tree[section][key] = value
+        self._config = from_dict(tree, {}, "the page")
+        self.changes |= changes
+
+    def save(self, mask: NDArray[np.bool_] | None) -> None:
+        """Write the changes into the rig file, the old one kept beside it; ``mask`` as a picture beside it.
+
+        Raises
+        ------
+        ConfigError
+            It cannot be written; then nothing is changed.
+        """
+        if mask is not None:
+            self.change_all({"measure.mask": str(self._mask_beside(mask))})
+        write_rig(self.path, self.changes)
+        self._config = load_config(self.path, self._of_today)
+        self.changes = {}
+
+    def _mask_beside(self, mask: NDArray[np.bool_]) -> Path:
+        """A new file each time: a rig file kept as .bak still means its own."""
+        stem = self.path.resolve().with_suffix("")
+        tries = (stem.with_name(f"{stem.name}-mask-{n}.png") for n in range(1, 10_000))
+        path = next(one for one in tries if not one.exists())
+        try:
+            write_picture(path, mask.astype(np.uint8) * 255)
+        except DataError as error:
+            raise ConfigError(str(error)) from None
+        return path
+
+
+def with_setting(address: str, key: str, value: float) -> str:
+    """The address with one of its settings changed."""
+    known = dict(parse_address(address).settings) | {key: f"{value:g}"}
+    body = address.partition("?")[0] if parse_address(address).settings else address
+    return f"{body}?{'&'.join(f'{k}={quote(v, safe=_SAFE)}' for k, v in known.items())}"
+
+
+_SAFE = "/:,@+-_.*~"
+
+
+def still(address: str) -> str:
+    """The address of a rig that is looked at and not pulled: a simulated one would begin by itself."""
+    if parse_address(address).scheme != "sim":
+        return address
+    for key, value in (("max_strain", 0.0), ("seconds", 3600.0), ("hold", 1.0), ("end", 1.0)):
+        address = with_setting(address, key, value)
+    return address
+
+
+NUMBERED = re.compile(r"^(.*?)-?(\d{1,6})$")
+
+
+def counted_up(name: str) -> str:
+    """The name of the next specimen: bar-7 after bar-6."""
+    found = NUMBERED.match(name)
+    if found is None:
+        return f"{name}-2"
+    stem, number = found[1], found[2]
+    dash = "-" if name[len(stem) :].startswith("-") else ""
+    return f"{stem}{dash}{int(number) + 1:0{len(number)}d}"

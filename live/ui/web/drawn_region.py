@@ -1,0 +1,158 @@
+"""The region as it is drawn: strokes of the mouse, in px of the picture, made into a mask.
+
+The centre of the pixel in column i and row j is at (i, j). A pixel belongs to a shape where its centre does.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import ConfigError
+from analysis.evaluate import inside_polygon
+
+TOOLS = ("rectangle", "polygon", "brush", "eraser")
+MOST_POINTS = 5000
+_KEPT = 12  # masks that can be gone back to
+
+Bools = NDArray[np.bool_]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stroke:
+    """One movement of a tool.
+
+    Attributes
+    ----------
+    tool : str
+        One of ``TOOLS``.
+    points : (N, 2) float64, px
+        x, y: two opposite corners, the corners of a polygon, or the way of a brush.
+    radius : float, px
+        Of a brush or eraser.
+    add : bool
+        Whether a rectangle or polygon adds to what is there; else the region is that shape alone.
+    """
+
+    tool: str
+    points: Floats
+    radius: float
+    add: bool
+
+    @classmethod
+    def read(cls, said: Mapping[str, Any]) -> Stroke:
+        """From what a page has sent; raises ConfigError where it is no stroke."""
+        tool, points, radius = said.get("tool"), said.get("points"), said.get("radius", 8)
+        fewest = {"rectangle": 2, "polygon": 3}.get(str(tool), 1)
+        if tool not in TOOLS:
+            raise ConfigError(f"no such tool; there are {', '.join(TOOLS)}")
+        if not isinstance(points, list) or not fewest <= len(points) <= MOST_POINTS:
+            raise ConfigError(f"a {tool} has {fewest} to {MOST_POINTS} points")
+        if not all(isinstance(p, list) and len(p) == 2 and all(map(_is_place, p)) for p in points):
+            raise ConfigError("a point is two numbers, x and y in px")
+        if not _is_place(radius) or not 0.5 <= radius <= 1000:
+            raise ConfigError("a brush has a radius from 0.5 to 1000 px")
+        return cls(str(tool), np.array(points, np.float64), float(radius), said.get("add") is True)
+
+    def drawn_on(self, mask: Bools) -> Bools:
+        """The mask after this stroke."""
+        shape = self._shape(mask.shape)
+        if self.tool == "eraser":
+            return mask & ~shape
+        return mask | shape if self.add or self.tool == "brush" else shape
+
+    def _shape(self, shape: tuple[int, ...]) -> Bools:
+        margin = self.radius if self.tool in ("brush", "eraser") else 0.0
+        low, high = self.points.min(axis=0) - margin, self.points.max(axis=0) + margin
+        rows, columns = (
+            slice(max(math.ceil(low[k]), 0), max(min(math.floor(high[k]), shape[axis] - 1) + 1, 0))
+            for k, axis in ((1, 0), (0, 1))
+        )
+        y, x = np.mgrid[rows, columns].astype(np.float64)
+        found = np.zeros(shape, bool)
+        if self.tool == "rectangle":
+            found[rows, columns] = True
+        elif self.tool == "polygon":
+            found[rows, columns] = inside_polygon(x, y, self.points)
+        else:
+            found[rows, columns] = near_way(x, y, self.points, self.radius)
+        return found
+
+
+def _is_place(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6
+
+
+def near_way(x: Floats, y: Floats, way: Floats, radius: float) -> Bools:
+    """Whether the points lie within ``radius`` of the line through the points of ``way``."""
+    near = np.hypot(x - way[0, 0], y - way[0, 1]) <= radius
+    for (x0, y0), (x1, y1) in itertools.pairwise(way):
+        length = (x1 - x0) ** 2 + (y1 - y0) ** 2
+        along = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / length if length else np.zeros(x.shape)
+        along = np.clip(along, 0.0, 1.0)
+        near |= np.hypot(x - x0 - along * (x1 - x0), y - y0 - along * (y1 - y0)) <= radius
+    return np.asarray(near)
+
+
+class DrawnRegion:
+    """A region that is drawn on, stroke by stroke; the last ones can be undone.
+
+    Parameters
+    ----------
+    mask : (H, W) bool
+        To begin with.
+    words : str
+        Where that comes from.
+    """
+
+    def __init__(self, mask: Bools, words: str) -> None:
+        self._masks: list[tuple[Bools, str]] = [(mask, words)]
+
+    @property
+    def mask(self) -> Bools:
+        """(H, W) bool: what is measured."""
+        return self._masks[-1][0]
+
+    @property
+    def words(self) -> str:
+        """Where it comes from, for a person."""
+        return self._masks[-1][1]
+
+    @property
+    def box(self) -> tuple[int, int, int, int] | None:
+        """x, y, width, height of what is drawn, px; None where nothing is."""
+        rows, columns = np.flatnonzero(self.mask.any(axis=1)), np.flatnonzero(self.mask.any(axis=0))
+        if not rows.size:
+            return None
+        x, y = int(columns[0]), int(rows[0])
+        return x, y, int(columns[-1]) - x + 1, int(rows[-1]) - y + 1
+
+    @property
+    def is_box(self) -> bool:
+        """Whether it is all of its box."""
+        box = self.box
+        return box is not None and int(self.mask.sum()) == box[2] * box[3]
+
+    def draw(self, said: Sequence[Mapping[str, Any]]) -> None:
+        """Draw strokes; raises ConfigError, and nothing is drawn, where one of them is none."""
+        mask = self.mask
+        for stroke in [Stroke.read(one) for one in said]:
+            mask = stroke.drawn_on(mask)
+        self.take(mask, "as drawn")
+
+    def take(self, mask: Bools, words: str) -> None:
+        """Another mask, of the same size."""
+        kept = self._masks[-_KEPT:]
+        self._masks = [*kept, (mask, words)]
+
+    def undo(self) -> None:
+        """Take the last change back."""
+        if len(self._masks) > 1:
+            self._masks.pop()

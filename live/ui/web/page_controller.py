@@ -1,0 +1,299 @@
+"""The operator's desk: set up, run, after, and again; what each stage shows, and which orders it takes.
+
+An order is the same line from the page as from the keyboard (``live.run``). Before and after a test there
+are ``start``, ``next`` and ``quit``.
+
+What the page shows of a test that has ended.
+"""
+
+from __future__ import annotations
+
+import queue
+import re
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Protocol
+
+import numpy as np
+
+from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.printable import brief, printable
+from analysis.evaluate import GAUGE_KINDS, TensileFigures
+from live.config.loading import Config
+from live.config.sections import SpecimenConfig
+from live.pipeline.event_log import sentence
+from live.pipeline.run_state import RunState
+from live.results.figures import TensileRow, evaluate, headline
+from live.results.maps.field_maps import FIELD_MAPS
+from live.results.summary import summary_lines
+from live.run.control import Controls, answer
+from live.ui.web.authorization import HttpError
+from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.config_draft import ConfigDraft, counted_up
+from live.ui.web.draft_changes import CHANGES
+from live.ui.web.drawn_region import DrawnRegion
+from live.ui.web.page_consumer import PageConsumer, Running
+from live.ui.web.painting import RAMP, as_png
+from live.ui.web.server import ALONE, DEFAULT_PORT, PageServer, Response, jpeg, of_json
+from live.ui.web.setup_session import SetupSession
+
+SET_UP, RUN, AFTER = "setup", "run", "after"
+START, NEXT, QUIT = "start", "next", "quit"
+FIRST = "specimen-1"
+GOODBYE_S = 0.5
+
+
+class ControlledRun(Controls, Running, Protocol):
+    """A run that takes orders."""
+
+
+class PageController:
+    """The page and its server, until it is left.
+
+    Parameters
+    ----------
+    draft : ConfigDraft or None
+        None: there is nothing to set up, a run is watched.
+    port : int
+
+    Attributes
+    ----------
+    stage : str
+    bench : SetupSession or None
+        While it is set up.
+    server : PageServer
+    viewer : callable
+        Opens a viewer of the view at a port; its answer.
+    """
+
+    def __init__(self, draft: ConfigDraft | None, port: int = DEFAULT_PORT) -> None:
+        self.draft = draft
+        self.stage = RUN if draft is None else SET_UP
+        self.bench: SetupSession | None = None
+        self._drawn: DrawnRegion | None = None
+        self._hub = Broadcaster()
+        self._watching: PageConsumer | None = None
+        self._live: ControlledRun | None = None
+        self._report: Path | None = None
+        self._after: dict[str, Any] = {}
+        self._wishes: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._folder = TemporaryDirectory(prefix="phasedic-")
+        self._said = ""
+        self.viewer: Callable[[int], str] = lambda port: "no: there is no viewer here"
+        gets = {
+            "/points": self._points,
+            "/picture": self._picture,
+            "/mask": self._mask,
+            "/report": self._show_report,
+        }
+        posts = {"/order": self._order, "/setup": self._change, "/map": self._map, "/viewer": self._viewer}
+        self.server = PageServer(self._hub, gets, posts, port)
+        self._tell_stage()
+
+    def __enter__(self) -> PageController:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._hub.tell("gone", True)  # of its own kind: a page must still hear of the stage before
+        threading.Event().wait(GOODBYE_S)
+        self.server.close()
+        self._folder.cleanup()
+
+    @property
+    def address(self) -> str:
+        """What a person opens in a browser."""
+        return self.server.address
+
+    def quit(self) -> None:
+        """Leave the set-up, or what comes after a test."""
+        self._wishes.put(QUIT)
+
+    # -- the stages ---------------------------------------------------------------------------
+
+    def set_up(self, words: str = "") -> Config | None:
+        """Let the rig be set up until a test is started; its configuration, or None to quit.
+
+        Parameters
+        ----------
+        words : str
+            Said to the operator, such as why the last test did not begin.
+        """
+        assert self.draft is not None
+        if not self.draft.config.metadata.get("specimen"):
+            self.draft.change_all({"metadata.specimen": self._unused(FIRST)})
+        with SetupSession(self.draft, self._hub, self._drawn) as bench:
+            self.bench = bench
+            self._enter(SET_UP, words)
+            started = self._wishes.get() == START
+        self.bench, self._drawn = None, bench.drawn
+        return self._to_run(bench) if started else None
+
+    def _to_run(self, bench: SetupSession) -> Config:
+        config = bench.config(Path(self._folder.name))
+        wanted = self._folder_of(str(config.metadata["specimen"]))
+        tries = (wanted.with_name(f"{wanted.name}_{n}") for n in range(2, 10_000))
+        folder = next(one for one in tries if not one.exists()) if wanted.exists() else wanted
+        return replace(config, output=replace(config.output, dir=str(folder)))
+
+    def _folder_of(self, name: str) -> Path:
+        """Of the files of a specimen of that name."""
+        assert self.draft is not None
+        plain = re.sub(r"[^\w.-]+", "_", name).strip("._-")[:80]
+        return Path(self.draft.config.output.dir or "runs") / (plain or FIRST)
+
+    def _unused(self, name: str) -> str:
+        """The first name from here on whose folder is not there."""
+        while self._folder_of(name).exists():
+            name = counted_up(name)
+        return name
+
+    def begin(self, config: Config) -> PageConsumer:
+        """A run begins; what is to watch it."""
+        self._watching, self._live = PageConsumer(self._hub, config), None
+        self._enter(RUN, "")
+        return self._watching
+
+    def attend(self, live: ControlledRun) -> None:
+        """The run takes orders from now on."""
+        self._live = live
+        if self._watching is not None:
+            self._watching.attend(live)
+
+    def end(self, told: Mapping[str, Any]) -> None:
+        """The run has ended."""
+        self._live, self._report = None, None
+        name = None
+        if self.draft is not None:
+            name = self._unused(counted_up(str(self.draft.config.metadata.get("specimen", FIRST))))
+        self._after = {**told, "report": False, "next": name}
+        self._hub.tell("after", self._after)
+        self._enter(AFTER, "")
+
+    def reported(self, report: Path | None) -> None:
+        """The report of the last run is there, or could not be made."""
+        self._report = report
+        self._after |= {"report": report is not None}
+        self._hub.tell("after", self._after)
+
+    def after(self) -> bool:
+        """Wait for the operator; whether a next specimen is to be set up."""
+        assert self.draft is not None
+        if self._wishes.get() != NEXT:
+            return False
+        self.draft.change_all({"metadata.specimen": self._after["next"]})
+        return True
+
+    def _enter(self, stage: str, words: str) -> None:
+        self.stage, self._said = stage, printable(words)
+        self._wishes = queue.SimpleQueue()
+        self._tell_stage()
+
+    def _tell_stage(self) -> None:
+        said = {"stage": self.stage, "words": self._said, "alone": self.draft is None}
+        kinds = [
+            {"kind": name, "label": one.label, "hint": one.hint, "gesture": one.gesture}
+            for name, one in GAUGE_KINDS.items()
+        ]
+        self._hub.tell("stage", said | {"components": FIELD_MAPS, "ramp": RAMP, "kinds": kinds})
+
+    # -- what a page asks ---------------------------------------------------------------------
+
+    def _points(self, query: Mapping[str, str]) -> Response:
+        if self._watching is None:
+            raise HttpError(404, "nothing has been measured")
+        edition, count = (query.get(key, "") for key in ("edition", "count"))
+        if not all(word.isascii() and word.isdigit() and len(word) < 10 for word in (edition, count)):
+            raise HttpError(400, "edition and count are whole numbers")
+        return of_json(self._watching.curve.since(int(edition), int(count)))
+
+    def _picture(self, query: Mapping[str, str]) -> Response:
+        bench, watching = self.bench, self._watching
+        content = bench.picture if bench is not None else b"" if watching is None else watching.picture
+        return jpeg(content) if content else Response(as_png(np.zeros((1, 1), np.uint8)), "image/png")
+
+    def _mask(self, query: Mapping[str, str]) -> Response:
+        if self.bench is None:
+            raise HttpError(404, "nothing is set up")
+        return Response(self.bench.mask_picture(), "image/png")
+
+    def _show_report(self, query: Mapping[str, str]) -> Response:
+        if self._report is None:
+            raise HttpError(404, "there is no report yet")
+        return Response(self._report.read_bytes(), "text/html; charset=utf-8", ALONE)
+
+    def _map(self, said: Mapping[str, Any]) -> dict[str, str]:
+        refusal = (
+            "nothing is measured" if self._watching is None else self._watching.choose(str(said.get("of")))
+        )
+        return {"answer": f"no: {refusal}" if refusal else "ok"}
+
+    def _viewer(self, said: Mapping[str, Any]) -> dict[str, str]:
+        """Open it at the port that the view has told: another than was wanted where that was taken."""
+        port = None if self._live is None else self._live.books.vitals.view_port
+        if port is None:
+            return {"answer": "no: the view is switched off, or not there yet; after a test see its view.rrd"}
+        return {"answer": self.viewer(port)}
+
+    def _order(self, said: Mapping[str, Any]) -> dict[str, str]:
+        """One line, one answer."""
+        line = said.get("line")
+        return {"answer": self._answered(line) if isinstance(line, str) else "no: an order is a line"}
+
+    def _answered(self, line: str) -> str:
+        live, word = self._live, line.strip()
+        if live is not None:
+            return answer(line, live)
+        if self.stage == RUN or (self.stage == SET_UP and self.bench is None):
+            return "no: the test is being opened"
+        allowed = (START, QUIT) if self.stage == SET_UP else (NEXT, QUIT)
+        if word not in allowed or self.draft is None:
+            return f"no: now there are {', '.join(allowed)}"
+        try:
+            if word == START and self.bench is not None:
+                self.bench.ready(Path(self._folder.name))
+        except PhasedicError as error:
+            return f"no: {printable(brief(error))}"
+        self._wishes.put(word)
+        return "ok"
+
+    def _change(self, said: Mapping[str, Any]) -> dict[str, str]:
+        """A change of the rig."""
+        bench = self.bench
+        if bench is None:
+            return {"answer": "no: nothing is set up now"}
+        change = CHANGES.get(str(said.get("do")))
+        if change is None:
+            return {"answer": f"no: there are {', '.join(CHANGES)}"}
+        try:
+            change(bench, said)
+        except (ConfigError, DataError) as error:
+            return {"answer": f"no: {printable(brief(error))}"}
+        bench.refresh()
+        return {"answer": "ok"}
+
+
+def ended(books: RunState, specimen: SpecimenConfig, folder: Path, words: str) -> dict[str, Any]:
+    """Figures, summary, ledger and losses; ``words`` say how the run ended, empty where it ended well."""
+    figures = evaluate(books.history, books.loads, specimen) if books.history.instants else None
+    troubles = books.journal.events("warning", "error")
+    return {
+        "folder": str(folder),
+        "words": words,
+        "figures": [] if figures is None else _figures(figures, specimen),
+        "lines": [line.strip() for line in summary_lines(books, specimen)],
+        "ledger": books.ledger.line(),
+        "troubles": [sentence(event, books.journal.names) for event in troubles[-5:]],
+    }
+
+
+def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str, Any]]:
+    return [_figure(row) for row in headline(figures, stresses=specimen.area_m2 is not None)]
+
+
+def _figure(row: TensileRow) -> dict[str, Any]:
+    if not row.figure.known:
+        return {"name": row.name, "text": None, "why": row.figure.why}
+    return {"name": row.name, "text": row.text.replace("+-", "±"), "why": ""}

@@ -1,0 +1,124 @@
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from acquire.errors import DataError
+from acquire.files.picture import check_regular, decode, read_bytes, read_picture, write_picture
+from acquire.printable import printable
+
+
+def smooth(dtype: type = np.uint8) -> np.ndarray:
+    noise = np.random.default_rng(0).normal(size=(480, 640)).astype(np.float32)
+    blurred = cv2.GaussianBlur(noise, (0, 0), 2)
+    return cv2.normalize(blurred, None, 0, 255, cv2.NORM_MINMAX).astype(dtype)
+
+
+@pytest.fixture(params=["pipe", "folder", "device", "socket"])
+def odd(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Path]:
+    path = tmp_path / "a.png"
+    if request.param == "pipe":
+        os.mkfifo(path)
+    elif request.param == "folder":
+        path.mkdir()
+    elif request.param == "device":
+        path.symlink_to("/dev/zero")
+    else:
+        import socket
+
+        with socket.socket(socket.AF_UNIX) as end:
+            end.bind(str(path))
+            yield path
+        return
+    yield path
+
+
+def test_what_is_no_regular_file_is_refused_unopened(odd: Path) -> None:
+    for read in (check_regular, read_bytes, read_picture):
+        with pytest.raises(DataError, match=r"a\.png: cannot be read: it is a"):
+            read(odd)
+
+
+def test_a_name_that_is_not_utf8(tmp_path: Path) -> None:
+    path = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xfe.png"))
+    write_picture(path, smooth())
+    assert np.array_equal(read_picture(path), smooth())
+    assert printable(path).endswith("/\\xff\\xfe.png")
+    with pytest.raises(DataError, match="cannot be written: File exists"):
+        write_picture(path, smooth())
+
+
+@pytest.mark.parametrize(
+    "compression", [5, 8, 32773, 32946], ids=["lzw", "deflate", "packbits", "old deflate"]
+)
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_a_zeroed_part_of_a_tiff_is_told(tmp_path: Path, compression: int, dtype: type) -> None:
+    content = bytearray(
+        cv2.imencode(".tif", smooth(dtype), [cv2.IMWRITE_TIFF_COMPRESSION, compression])[1].tobytes()
+    )
+    end = len(content) - 600  # the directory stands at the end
+    content[end // 2 : end] = bytes(end - end // 2)
+    path = tmp_path / "a.tif"
+    path.write_bytes(content)
+    with pytest.raises(DataError, match=r"a\.tif: (a damaged image|not an image)"):
+        read_picture(path)
+
+
+def test_a_jpeg_damaged_in_its_middle_is_told(tmp_path: Path) -> None:
+    content = bytearray(cv2.imencode(".jpg", smooth())[1].tobytes())
+    content[5000:9000] = bytes(4000)
+    path = tmp_path / "a.jpg"
+    path.write_bytes(content)
+    with pytest.raises(DataError, match=r"a damaged image \(Corrupt JPEG data"):
+        read_picture(path)
+
+
+def test_what_others_say_meanwhile_is_passed_on(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = cv2.imencode(".png", smooth())[1].tobytes()
+    inner = cv2.imdecode
+
+    def talkative(*arguments: object) -> object:
+        os.write(2, b"a word of another thread\n")
+        return inner(*arguments)
+
+    monkeypatch.setattr(cv2, "imdecode", talkative)
+    decoded = decode(content)
+    assert decoded.picture is not None
+    assert decoded.damage == ""
+    assert capfd.readouterr().err == "a word of another thread\n"
+
+
+def test_decoding_without_a_standard_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "__stderr__", None)
+    assert decode(cv2.imencode(".png", smooth())[1].tobytes()).damage == ""
+
+
+def test_a_limit_of_size(tmp_path: Path) -> None:
+    path = tmp_path / "a.toml"
+    path.write_bytes(bytes(100))
+    assert read_bytes(path, 100) == bytes(100)
+    with pytest.raises(DataError, match="more than"):
+        read_bytes(path, 99)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("plain, µm/m ± 1\n\tnext", "plain, µm/m ± 1\n\tnext"),
+        ("\x1b]0;title\x07\x1b[2J", "\\x1b]0;title\\x07\\x1b[2J"),
+        ("a\rb\x9bc\x7f\x00", "a\\x0db\\x9bc\\x7f\\x00"),
+        ("right\u202eleft\u2028end", "right\\u202eleft\\u2028end"),
+        ("file\udcff", "file\\xff"),
+    ],
+)
+def test_words_of_others_are_harmless(text: str, shown: str) -> None:
+    assert printable(text) == shown
+    printable(text).encode()

@@ -1,0 +1,247 @@
+"""Room on a disk, how long it lasts, and whether it is a disk at all.
+
+Pictures handed to HDF5 as finished chunks: the same bytes that the library would have written.
+
+What is written is brought to its disk once a second; a disk that fails is told.
+"""
+
+from __future__ import annotations
+
+import errno
+import math
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from acquire.errors import DataError
+from acquire.hdf5 import PictureReader, PictureStack, ToDisk, compile_loops
+from acquire.hdf5 import disk as pace_module
+from acquire.hdf5.disk import forecast, free_bytes, network_share
+from tests.acquire.session.fixtures import frame, writer
+
+
+def test_free_bytes_of_what_does_not_exist_yet(tmp_path: Path) -> None:
+    assert free_bytes(tmp_path / "a" / "b" / "session.h5") > 0
+
+
+def test_forecast(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("acquire.hdf5.disk.free_bytes", lambda path: 70_200_000_000)
+    assert forecast(tmp_path, 30 * 1.3e6) == pytest.approx(1800)
+    assert forecast(tmp_path, 0.0) == math.inf
+
+
+MOUNTS = """\
+/dev/sda1 / ext4 rw 0 0
+server:/lab /mnt/lab nfs4 rw 0 0
+//nas/data /mnt/my\\040share cifs rw 0 0
+/dev/sdb1 /mnt/lab/local xfs rw 0 0
+"""
+
+
+@pytest.mark.parametrize(
+    ("path", "kind"),
+    [
+        ("/home/me/runs", None),
+        ("/mnt/lab", "nfs4"),
+        ("/mnt/lab/runs/session.h5", "nfs4"),
+        ("/mnt/laboratory/runs", None),
+        ("/mnt/my share/x", "cifs"),
+        ("/mnt/lab/local/x", None),
+    ],
+)
+def test_network_shares_are_known(tmp_path: Path, path: str, kind: str | None) -> None:
+    mounts = tmp_path / "mounts"
+    mounts.write_text(MOUNTS)
+    assert network_share(path, mounts) == kind
+
+
+def test_where_nobody_tells_the_mounts_nothing_is_known(tmp_path: Path) -> None:
+    assert network_share(tmp_path, tmp_path / "nothing") is None
+
+
+SIZES = [(1, 1), (3, 5), (12, 16), (37, 101), (360, 512), (363, 1025)]
+
+
+def new_stack(file: h5py.File, name: str, shape: tuple[int, ...], dtype: Any, **more: Any) -> h5py.Dataset:
+    more = {"chunks": (1, *shape), "fletcher32": True} | more
+    return file.create_dataset(name, (0, *shape), dtype, maxshape=(None, *shape), **more)
+
+
+def pictures(shape: tuple[int, ...], dtype: Any) -> list[NDArray[Any]]:
+    top = np.iinfo(dtype).max
+    noise = np.random.default_rng(1).integers(0, top, shape, dtype, endpoint=True)
+    one = np.zeros(shape, dtype)
+    one.flat[-1] = 1
+    return [noise, np.zeros(shape, dtype), np.full(shape, top, dtype), one]
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.uint32])
+@pytest.mark.parametrize("shape", SIZES, ids=str)
+def test_the_bytes_are_those_of_hdf5(tmp_path: Path, shape: tuple[int, ...], dtype: Any) -> None:
+    with h5py.File(tmp_path / "both.h5", "w") as file:
+        ours, theirs = new_stack(file, "ours", shape, dtype), new_stack(file, "theirs", shape, dtype)
+        stack = PictureStack(ours)
+        for k, picture in enumerate(pictures(shape, dtype)):
+            stack.append(picture)
+            theirs.resize(k + 1, axis=0)
+            theirs[k] = picture
+    with h5py.File(tmp_path / "both.h5") as file:
+        for k, picture in enumerate(pictures(shape, dtype)):
+            at = (k, *(0 for _ in shape))
+            chunks = [file[name].id.read_direct_chunk(at) for name in ("ours", "theirs")]
+            assert chunks[0] == chunks[1]
+            assert len(chunks[0][1]) == picture.nbytes + 4
+            np.testing.assert_array_equal(file["ours"][k], picture)
+
+
+def test_a_flipped_bit_is_seen_by_hdf5(tmp_path: Path) -> None:
+    path = tmp_path / "one.h5"
+    with h5py.File(path, "w") as file:
+        dataset = new_stack(file, "image", (12, 16), np.uint8)
+        PictureStack(dataset).append(pictures((12, 16), np.uint8)[0])
+        place = dataset.id.get_chunk_info(0).byte_offset
+    content = bytearray(path.read_bytes())
+    content[place + 7] ^= 1
+    path.write_bytes(content)
+    with h5py.File(path) as file:
+        for picture in (file["image"], PictureReader(file["image"])):
+            with pytest.raises(OSError, match="filter returned failure"):
+                picture[0]
+
+
+def test_without_a_checksum_the_chunk_is_the_picture(tmp_path: Path) -> None:
+    picture = pictures((12, 16), np.uint16)[0]
+    with h5py.File(tmp_path / "plain.h5", "w") as file:
+        dataset = new_stack(file, "image", (12, 16), np.uint16, fletcher32=False)
+        PictureStack(dataset).append(picture)
+        assert dataset.id.read_direct_chunk((0, 0, 0))[1] == picture.tobytes()
+
+
+@pytest.mark.parametrize(
+    "more", [{"chunks": (2, 12, 16)}, {"compression": "gzip"}, {"shuffle": True}], ids=str
+)
+def test_chunks_of_another_kind_are_refused(tmp_path: Path, more: dict[str, Any]) -> None:
+    with h5py.File(tmp_path / "odd.h5", "w") as file, pytest.raises(ValueError, match="not just one picture"):
+        PictureStack(new_stack(file, "image", (12, 16), np.uint8, **more))
+
+
+class _Library:
+    """A dataset that counts what is read through the library's filter."""
+
+    def __init__(self, dataset: h5py.Dataset) -> None:
+        self._dataset, self.reads = dataset, 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._dataset, name)
+
+    def __getitem__(self, number: int) -> Any:
+        self.reads += 1
+        return self._dataset[number]
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.uint32])
+@pytest.mark.parametrize("shape", SIZES, ids=str)
+def test_what_is_read_is_what_was_written(tmp_path: Path, shape: tuple[int, ...], dtype: Any) -> None:
+    compile_loops()
+    with h5py.File(tmp_path / "theirs.h5", "w") as file:
+        dataset = new_stack(file, "image", shape, dtype)
+        dataset.resize(4, axis=0)
+        dataset[:] = pictures(shape, dtype)
+    with h5py.File(tmp_path / "theirs.h5") as file:
+        reader = PictureReader(library := _Library(file["image"]))
+        for k, picture in enumerate(pictures(shape, dtype)):
+            np.testing.assert_array_equal(reader[k], picture, strict=True)
+        assert library.reads == 0, "the library's filter was waited for"
+
+
+def test_what_is_not_as_we_write_it_is_read_by_the_library(tmp_path: Path) -> None:
+    picture = pictures((12, 16), np.uint16)[0]
+    with h5py.File(tmp_path / "others.h5", "w") as file:
+        for name, more in (("plain", {"fletcher32": False}), ("small", {"compression": "gzip"})):
+            dataset = new_stack(file, name, (12, 16), np.uint16, **more)
+            dataset.resize(1, axis=0)
+            dataset[0] = picture
+        two = new_stack(file, "two", (12, 16), np.uint16, chunks=(2, 12, 16))
+        two.resize(1, axis=0)
+        two[0] = picture
+        unfiltered = new_stack(file, "unfiltered", (12, 16), np.uint16)
+        unfiltered.resize(2, axis=0)
+        unfiltered.id.write_direct_chunk((0, 0, 0), picture.tobytes(), filter_mask=1)
+    with h5py.File(tmp_path / "others.h5") as file:
+        for name in ("plain", "small", "two", "unfiltered"):
+            np.testing.assert_array_equal(PictureReader(file[name])[0], picture, strict=True)
+        assert not PictureReader(file["unfiltered"])[1].any(), "what was never written is the fill value"
+        with pytest.raises(IndexError):
+            PictureReader(file["unfiltered"])[2]
+
+
+def until(holds: Callable[[], bool]) -> None:
+    end = time.monotonic() + 20
+    while not holds():
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def test_it_is_brought_again_and_again_and_at_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, brought, plain = tmp_path / "a", list[int](), os.fdatasync
+
+    def bring(file: int) -> None:
+        brought.append(os.fstat(file).st_size)
+        plain(file)
+
+    monkeypatch.setattr(os, "fdatasync", bring)
+    path.write_bytes(b"1")
+    to_disk = ToDisk(path, every_s=0.02)
+    until(lambda: len(brought) > 2)
+    path.write_bytes(b"1234")
+    to_disk.close()
+    assert brought[0] == 1 and brought[-1] == 4
+    count = len(brought)
+    to_disk.close()
+    assert len(brought) == count and to_disk.failure is None
+
+
+def test_the_memory_of_what_was_brought_is_let_go_but_for_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, given = tmp_path / "a", list[tuple[int, int]]()
+    path.write_bytes(bytes(3_000_000))
+    monkeypatch.setattr(pace_module, "KEPT_BYTES", 1_000_000)
+    monkeypatch.setattr(os, "posix_fadvise", lambda file, start, size, advice: given.append((start, size)))
+    ToDisk(path).close()
+    assert given == [(0, 2_000_000)]
+
+
+@pytest.mark.parametrize(("code", "fails"), [(errno.EIO, True), (errno.ENOSPC, True), (errno.EINVAL, False)])
+def test_a_disk_that_fails_ends_the_recording_and_one_that_cannot_is_let_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, fails: bool
+) -> None:
+    def refuse(file: int) -> None:
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(ToDisk.__init__, "__defaults__", (0.01,))
+    session = writer(tmp_path / "session.h5")
+    monkeypatch.setattr(os, "fdatasync", refuse)
+
+    def failed() -> bool:
+        session.write_frame(frame(0))
+        time.sleep(0.06)
+        return False
+
+    if fails:
+        with pytest.raises(DataError, match=r"session\.h5: "):
+            until(failed)
+    else:
+        for number in range(5):
+            session.write_frame(frame(number))
+            time.sleep(0.06)
+        session.close()

@@ -1,0 +1,265 @@
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from acquire.camera.opening import open_camera
+from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.events import Event
+from acquire.opencv import images
+from acquire.opencv.image_metadata import count_pages
+from acquire.opencv.images import MOST_TOLD, natural_key, read_image
+
+
+def picture(value: int = 0, shape: tuple[int, ...] = (12, 16), dtype: type = np.uint8) -> NDArray[Any]:
+    return (np.arange(np.prod(shape)).reshape(shape) + value).astype(dtype)
+
+
+def write(path: Path, image: NDArray[Any]) -> Path:
+    assert cv2.imwrite(str(path), image)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("suffix", "dtype"),
+    [("tif", np.uint8), ("tif", np.uint16), ("png", np.uint8), ("png", np.uint16), ("bmp", np.uint8)],
+)
+def test_pictures_come_as_they_were_written(tmp_path: Path, suffix: str, dtype: type) -> None:
+    images = [picture(k, dtype=dtype) for k in range(3)]
+    for k, image in enumerate(images):
+        write(tmp_path / f"shot_{k}.{suffix}", image)
+    with open_camera(f"files:{tmp_path}/*.{suffix}?fps=5") as camera:
+        frames = list(camera)
+    assert [frame.index for frame in frames] == [0, 1, 2]
+    assert [frame.t for frame in frames] == [0.0, 0.2, 0.4]
+    assert all(frame.clock == "nominal" and not frame.image.flags.writeable for frame in frames)
+    for frame, image in zip(frames, images, strict=True):
+        assert frame.image.dtype == dtype
+        assert np.array_equal(frame.image, image)
+    assert (camera.info.width, camera.info.height, camera.info.live) == (16, 12, False)
+
+
+def test_natural_order_and_a_folder_without_its_other_files(tmp_path: Path) -> None:
+    for k in (10, 9, 1, 2):
+        write(tmp_path / f"s{k}.png", np.full((4, 4), k, np.uint8))
+    (tmp_path / "notes.txt").write_text("not an image")
+    with open_camera(f"files:{tmp_path}") as camera:
+        assert [int(frame.image[0, 0]) for frame in camera] == [1, 2, 9, 10]
+
+
+@given(st.lists(st.text(alphabet="ab019_.", max_size=8), max_size=6))
+def test_natural_order_takes_any_names(names: list[str]) -> None:
+    ordered = sorted((Path(name) for name in names), key=natural_key)
+    assert sorted(map(str, ordered)) == sorted(str(Path(name)) for name in names)
+
+
+def test_a_name_with_brackets_is_not_taken_for_a_glob(tmp_path: Path) -> None:
+    write(tmp_path / "shot[1].png", picture())
+    with open_camera(f"files:{tmp_path}/shot[1].png") as camera:
+        assert len(list(camera)) == 1
+
+
+def test_every_page_of_a_multi_page_tiff(tmp_path: Path) -> None:
+    pages = [picture(k, dtype=np.uint16) for k in (5, 300, 3900)]
+    path = tmp_path / "stack.tif"
+    assert cv2.imwritemulti(str(path), pages)
+    assert count_pages(path) == 3
+    with open_camera(f"files:{path}?bits=12") as camera:
+        frames = list(camera)
+    assert [np.array_equal(f.image, p) for f, p in zip(frames, pages, strict=True)] == [True] * 3
+    assert camera.info.bits == 12
+
+
+def test_equal_channels_are_grey(tmp_path: Path) -> None:
+    image = picture()
+    write(tmp_path / "a.png", np.dstack([image] * 3))
+    assert np.array_equal(read_image(tmp_path / "a.png"), image)
+
+
+def test_colour_has_to_be_chosen(tmp_path: Path) -> None:
+    blue, green, red = picture(1), picture(50), picture(30)
+    path = write(tmp_path / "a.png", np.dstack([blue, green, red]))
+    with pytest.raises(ConfigError, match="gray=luma"):
+        open_camera(f"files:{path}")
+    assert np.array_equal(read_image(path, "r"), red)
+    assert np.array_equal(read_image(path, "b"), blue)
+    luma = 0.299 * red + 0.587 * green + 0.114 * blue
+    assert np.abs(read_image(path, "luma") - luma).max() <= 0.51
+    with pytest.raises(ConfigError, match="luma, r, g, b"):
+        open_camera(f"files:{path}?gray=alpha")
+
+
+def test_a_picture_that_is_broken_or_of_another_size_is_damaged_and_told(tmp_path: Path) -> None:
+    for k in range(4):
+        write(tmp_path / f"a{k}.png", picture())
+    write(tmp_path / "a1.png", picture(shape=(12, 20)))
+    (tmp_path / "a2.png").write_text("this is no image")
+    told: list[Event] = []
+    with open_camera(f"files:{tmp_path}/*.png?fps=2", told.append) as camera:
+        frames = list(camera)
+    assert [frame.damaged for frame in frames] == [False, True, True, False]
+    assert [(frame.index, frame.image.shape) for frame in frames] == [(k, (12, 16)) for k in range(4)]
+    assert not frames[1].image.any()
+    assert "a1.png is 20x12 uint8, but" in told[0].text
+    assert "a2.png: not an image" in told[1].text
+    assert all(event.text.endswith("this picture is left out") for event in told)
+    assert [event.data for event in told] == [{"t": 0.5, "file": "a1.png"}, {"t": 1.0, "file": "a2.png"}]
+
+
+def test_a_folder_of_rubbish_is_not_told_picture_by_picture(tmp_path: Path) -> None:
+    write(tmp_path / "a.png", picture())
+    for k in range(50):
+        (tmp_path / f"b{k}.png").write_text("no image")
+    told: list[Event] = []
+    with open_camera(f"files:{tmp_path}/*.png", told.append) as camera:
+        assert sum(frame.damaged for frame in camera) == 50
+    assert len(told) == MOST_TOLD + 1
+    assert told[-1].text == "50 pictures were left out in all"
+
+
+def test_a_page_that_is_broken_leaves_the_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert cv2.imwritemulti(str(tmp_path / "stack.tif"), [picture() for _ in range(3)])
+    read, sources = images.read_picture_page, []
+
+    def broken(path: Path, source: Any, page: int) -> Any:
+        sources.append(id(source))
+        if page == 1:
+            raise DataError("page 1 is broken")
+        return read(path, source, page)
+
+    with open_camera(f"files:{tmp_path}/stack.tif") as camera:
+        monkeypatch.setattr(images, "read_picture_page", broken)
+        assert [frame.damaged for frame in camera] == [False, True, False]
+    assert len(set(sources)) == 1, "the file is read once"
+
+
+def test_nothing_there(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match="no image there"):
+        open_camera(f"files:{tmp_path}/*.tif")
+
+
+@pytest.mark.parametrize("suffix", ["tif", "png", "bmp", "jpg"])
+def test_a_truncated_file_is_named(tmp_path: Path, suffix: str) -> None:
+    path = write(tmp_path / f"a.{suffix}", picture(shape=(60, 80)))
+    path.write_bytes(path.read_bytes()[:-400])
+    with pytest.raises(DataError, match=f"a.{suffix}: .*cut off"):
+        open_camera(f"files:{path}")
+
+
+def test_a_foreign_file_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "a.tif"
+    path.write_text("this is no image")
+    with pytest.raises(DataError, match=r"a\.tif: not an image"):
+        open_camera(f"files:{path}")
+
+
+def test_floating_point_pictures_are_refused(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.tif", np.ones((4, 4), np.float32))
+    with pytest.raises(DataError, match="float32"):
+        open_camera(f"files:{path}")
+
+
+def test_bits_are_checked_and_guessed_aloud(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.png", np.array([[0, 1023], [5, 6]], np.uint16))
+    camera = open_camera(f"files:{path}")
+    assert camera.info.bits == 16
+    assert "bits=10" in camera.info.warnings[0]
+    assert open_camera(f"files:{path}?bits=10").info.warnings == ()
+    with pytest.raises(DataError, match="1023 does not fit into bits=9"):
+        open_camera(f"files:{path}?bits=9")
+    with pytest.raises(ConfigError, match="bits"):
+        open_camera(f"files:{path}?bits=17")
+
+
+def test_jpeg_is_warned_about(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.jpg", picture(shape=(40, 40)))
+    assert "lossy" in open_camera(f"files:{path}").info.warnings[0]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "0.5\n1.5\n1.75\n",
+        "time_s\n0.5\n1.5\n1.75\n",
+        "# log\nfile,time_s\nb.png,1.5\na.png,0.5\nc.png,1.75\n",
+    ],
+)
+def test_times_from_a_csv(tmp_path: Path, text: str) -> None:
+    for name in "abc":
+        write(tmp_path / f"{name}.png", picture())
+    (tmp_path / "times.csv").write_text(text)
+    with open_camera(f"files:{tmp_path}/*.png?stamps={tmp_path}/times.csv") as camera:
+        assert [frame.t for frame in camera] == [0.5, 1.5, 1.75]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1\n2\n", "2 times for 3"),
+        ("1\n2\n1\n", "backwards"),
+        ("a.png,1\nb.png,2\n", "no time for c.png"),
+        ("1\nx\n2\n", "row 2"),
+        ("1\nnan\n2\n", "row 2"),
+        ("", "0 times"),
+    ],
+)
+def test_times_that_do_not_fit(tmp_path: Path, text: str, message: str) -> None:
+    for name in "abc":
+        write(tmp_path / f"{name}.png", picture())
+    (tmp_path / "times.csv").write_text(text)
+    with pytest.raises(DataError, match=message):
+        open_camera(f"files:{tmp_path}/*.png?stamps={tmp_path}/times.csv")
+
+
+def test_stop_ends_the_iteration(tmp_path: Path) -> None:
+    for k in range(5):
+        write(tmp_path / f"{k}.png", picture())
+    with open_camera(f"files:{tmp_path}") as camera:
+        seen = 0
+        for _ in camera:
+            seen += 1
+            camera.stop()
+    assert seen == 1
+    camera.close()
+
+
+def test_unknown_settings_list_the_known_ones(tmp_path: Path) -> None:
+    write(tmp_path / "a.png", picture())
+    with pytest.raises(ConfigError, match="known: gray, fps, bits, stamps"):
+        open_camera(f"files:{tmp_path}?rate=5")
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    st.sampled_from(["tif", "png", "bmp"]),
+    st.lists(st.tuples(st.integers(0, 10**6), st.integers(0, 255)), max_size=6),
+    st.floats(0, 1),
+)
+def test_damaged_files_give_an_error_or_a_picture(
+    tmp_path: Path, suffix: str, flips: list[tuple[int, int]], kept: float
+) -> None:
+    path = write(tmp_path / f"a.{suffix}", picture(shape=(24, 31)))
+    content = bytearray(path.read_bytes())
+    for where, value in flips:
+        content[where % len(content)] = value
+    path.write_bytes(content[: int(len(content) * kept)])
+    try:
+        with open_camera(f"files:{path}?gray=luma") as camera:
+            assert all(frame.image.ndim == 2 for frame in camera)
+    except PhasedicError as error:
+        assert "a." in str(error)
+
+
+def test_real_photographs_are_read_as_grey(data_dir: Path) -> None:
+    folder = data_dir / "dic_challenge_1_sample12_ohtcfrp"
+    with open_camera(f"files:{folder}/*.tiff") as camera:
+        frames = list(camera)
+    assert len(frames) == 6
+    assert {frame.image.shape for frame in frames} == {(1040, 400)}

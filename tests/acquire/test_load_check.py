@@ -1,0 +1,260 @@
+"""The ten-second check of a load cell: what it sees, and what it warns of.
+
+Calibrating with known loads: the line, its residual, its file, and its use in an address.
+
+Noise apart from movement: what is still and what is not.
+"""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from acquire.addresses import parse_address
+from acquire.errors import ConfigError, DataError
+from acquire.load_cell import stillness
+from acquire.load_cell.calibration import Point, fit, load, point, save
+from acquire.load_cell.check import ListenResult, LoadReport, listen, report_lines
+from acquire.load_cell.check import report as report_heard
+from acquire.load_cell.contract import NoLoadCell
+from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
+from acquire.serial_line.settings import read_settings
+from tests.acquire.serial_line.fake_port import Bench
+
+INFO = LoadCellInfo("/dev/ttyUSB0", "a cell", "ascii", capacity_N=500.0)
+
+
+def report(samples: list[LoadSample], info: LoadCellInfo = INFO, seconds: float = 0.0) -> LoadReport:
+    """Of samples from 0 s on, listened to until the last of them or for so many seconds."""
+    last = samples[-1].t if samples else 1.0
+    return report_heard(ListenResult(tuple(samples), 0.0, max(seconds, last)), info)
+
+
+def steady(count: int = 100, rate: float = 50.0) -> list[LoadSample]:
+    """A healthy cell: steps of 0.1 N to and fro."""
+    return [LoadSample(k / rate, 100.0 + 0.1 * (k % 3), raw=b"%d" % (k % 3)) for k in range(count)]
+
+
+def test_a_healthy_cell() -> None:
+    found = report(steady(), INFO)
+    assert found.ready
+    assert found.rate == pytest.approx(50.0)
+    assert (found.samples, found.good, found.unique) == (100, 100, 3)
+    assert found.step_N == pytest.approx(0.1)
+    assert found.of_capacity == pytest.approx(100.2 / 500)
+    assert found.mean_N == pytest.approx(100.1, abs=0.01)
+    assert set(found.lines) == {b"0", b"1", b"2"}
+    assert any("50 1/s" in line for line in report_lines(found))
+
+
+def test_a_drift_is_no_noise() -> None:
+    samples = [LoadSample(k / 50, 1.0 * k) for k in range(100)]
+    assert report(samples, INFO).noise_N == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_triangle_of_load_is_neither_noise_nor_ready() -> None:
+    rng = random.Random(1)
+    samples = [LoadSample(k / 50, 548.0 - 2.192 * abs(k - 250) + rng.gauss(0, 1.0)) for k in range(500)]
+    found = report(samples)
+    assert found.noise_N == pytest.approx(1.0, rel=0.2)
+    assert not found.ready and any("ran between" in remark for remark in found.remarks)
+
+
+def test_noise_is_no_movement() -> None:
+    rng = random.Random(2)
+    assert report([LoadSample(k / 50, 100.0 + rng.gauss(0, 1.0)) for k in range(500)]).ready
+
+
+def test_silence_at_the_end_is_seen() -> None:
+    found = report(steady(15), seconds=10.0)
+    assert found.silent_s == pytest.approx(10 - 14 / 50)
+    assert not found.ready and "silence for the last 9.72 s" in found.remarks[0]
+
+
+def test_lines_are_told_in_their_order() -> None:
+    samples = [LoadSample(k / 50, k, raw=b"%d" % k) for k in range(100)]
+    assert report(samples).lines == (b"95", b"96", b"97", b"98", b"99")
+
+
+def test_a_recording_has_its_own_time() -> None:
+    with FinishedCell(steady(100)) as cell:
+        heard = listen(cell, 5.0)
+    assert (heard.began, heard.ended) == (0.0, 99 / 50)
+
+
+class FinishedCell(NoLoadCell):
+    """Gives the samples of a list."""
+
+    def __init__(self, samples: list[LoadSample]) -> None:
+        self._samples = samples
+
+    def __iter__(self) -> Iterator[LoadSample]:
+        return iter(self._samples)
+
+
+def changed(samples: list[LoadSample], at: int, sample: LoadSample) -> list[LoadSample]:
+    return [*samples[:at], sample, *samples[at + 1 :]]
+
+
+NAN = math.nan
+TROUBLES = {
+    "nothing came": [],
+    "no value": [LoadSample(k / 10, NAN, flags=LoadFlag.ERROR, raw=b"hello") for k in range(30)],
+    "gave no value": changed(steady(), 50, LoadSample(1.0, NAN, flags=LoadFlag.ERROR)),
+    "overload or saturated": changed(steady(), 50, LoadSample(1.0, NAN, flags=LoadFlag.OVERLOAD)),
+    "samples a second": steady(20, rate=2.0),
+    "silence for the last": [*steady(50), LoadSample(5.0, NAN, flags=LoadFlag.ERROR)],
+    "ran between": [LoadSample(k / 50, 1.0 * k) for k in range(100)],
+    "a gap of": steady(50) + [LoadSample(s.t + 3.0, s.force) for s in steady(50)],
+    "every value is the same": [LoadSample(k / 50, 7.0) for k in range(100)],
+}
+
+
+@pytest.mark.parametrize("words", TROUBLES)
+def test_each_trouble_is_named(words: str) -> None:
+    found = report(TROUBLES[words], INFO)
+    assert not found.ready
+    assert any(words in remark for remark in found.remarks)
+    assert any(words in line for line in report_lines(found))
+
+
+def test_flags_are_counted() -> None:
+    found = report(changed(steady(), 5, LoadSample(0.1, 100.0, flags=LoadFlag.UNSTABLE | LoadFlag.NET)), INFO)
+    assert found.flags == (("net", 1), ("unstable", 1))
+
+
+NOW = datetime(2026, 5, 9, 12, tzinfo=UTC)
+POINTS = [Point(0.0, 100.0, 1.0, 100), Point(50.0, 1100.0, 1.0, 100), Point(0.0, 104.0, 1.0, 100)]
+
+
+def test_the_line_and_its_residual() -> None:
+    found = fit(POINTS, NOW)
+    assert found.gain == pytest.approx(50 / 998)
+    assert found.zero == pytest.approx(102.0)
+    assert found.residual_N == pytest.approx(2 * 50 / 998)
+
+
+def test_values_without_a_number_do_not_count() -> None:
+    assert point(5.0, [1.0, math.nan, 3.0]) == Point(5.0, 2.0, 1.0, 2)
+    with pytest.raises(DataError, match="no reading"):
+        point(5.0, [math.nan])
+
+
+@pytest.mark.parametrize(
+    ("points", "words"),
+    [
+        (POINTS[:1], "two different loads"),
+        ([POINTS[0], POINTS[2]], "two different loads"),
+        ([Point(0, 100, 1, 10), Point(50, 100.1, 1, 10)], "do not change"),
+    ],
+)
+def test_what_is_no_calibration(points: list[Point], words: str) -> None:
+    with pytest.raises(DataError, match=words):
+        fit(points)
+
+
+def test_the_file_comes_back_and_is_never_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "cal.toml"
+    found = fit(POINTS, NOW)
+    save(found, path, r'/dev/ttyUSB0?protocol="odd"\n')
+    assert load(str(path)) == found
+    assert "2026-05-09T12:00:00+00:00" in path.read_text()
+    with pytest.raises(DataError, match="not overwritten"):
+        save(found, path, "")
+
+
+def test_an_address_uses_it(tmp_path: Path) -> None:
+    path = tmp_path / "cal.toml"
+    save(fit(POINTS, NOW), path, "")
+    bench = Bench([b"x\r\n", b"1100\r\n"], address=f"/dev/fake?calibration={path}")
+    assert [s.force for s in bench.run()] == pytest.approx([50.0, 50.0][:1], abs=0.11)
+    stored = bench.cell.info.settings["calibration"]
+    assert stored["date"].startswith("2026-05-09") and len(stored["points"]) == 3
+
+
+def test_a_calibration_carries_the_sign(tmp_path: Path) -> None:
+    path = tmp_path / "cal.toml"
+    save(fit([Point(0, 0.0, 0, 1), Point(10, -20.0, 0, 1)], NOW), path, "")
+    bench = Bench([b"x\r\n", b"-20 N\r\n"], address=f"/dev/fake?protocol=mark10&calibration={path}")
+    assert [s.force for s in bench.run()] == pytest.approx([10.0])
+    with pytest.raises(ConfigError, match="leave out sign"):
+        read_settings(parse_address(f"/dev/fake?sign=-1&calibration={path}"))
+
+
+@pytest.mark.parametrize(
+    "text", ["", "gain = 1", "gain = 0.0\nzero=0\nresidual_N=0\ndate='x'\npoints=[]", "[[["]
+)
+def test_another_file_is_refused(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "cal.toml"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=r"cal.toml"):
+        load(str(path))
+
+
+def test_a_missing_file_is_refused() -> None:
+    with pytest.raises(ConfigError, match="No such file"):
+        load("nowhere.toml")
+
+
+N = 40
+T = np.arange(N) / 80
+NOISE = np.random.default_rng(1).standard_normal(N)
+
+STILL = {
+    "constant": np.full(N, 7.0),
+    "noise": 100 + NOISE,
+    "noise on a display": np.round(100 + NOISE, 1),
+    "a last digit that flickers": 100 + 0.1 * (np.arange(N) % 7 == 0),
+    "a small offset of a large load": 1e6 + NOISE,
+}
+MOVING = {
+    "a ramp": 20.0 * T,
+    "a ramp in noise": 200.0 * T + NOISE,
+    "a step": np.where(T < 0.2, 0.0, 50.0) + NOISE,
+    "a step at the end": np.where(np.arange(N) < N - 1, 0.0, 50.0) + NOISE,
+    "a slow swing": 30 * np.sin(12 * T) + NOISE,
+    "a fall of a sawtooth": (500 * T + 300) % 400 + 0.3 * NOISE,
+}
+
+
+@pytest.mark.parametrize("name", STILL)
+def test_still(name: str) -> None:
+    assert stillness(T, STILL[name]).still
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_moving(name: str) -> None:
+    assert not stillness(T, MOVING[name]).still
+
+
+def test_noise_is_measured_beside_a_ramp() -> None:
+    t = np.arange(2000) / 80
+    found = stillness(t, 30 * t + np.random.default_rng(2).standard_normal(2000))
+    assert found.noise_N == pytest.approx(1.0, rel=0.1)
+    assert found.moved_N == pytest.approx(30 * t[-1], rel=0.01)
+
+
+@pytest.mark.parametrize("values", [np.zeros(0), np.zeros(1), np.zeros(2)])
+def test_too_few_say_nothing(values: NDArray[np.float64]) -> None:
+    found = stillness(np.arange(len(values)), values)
+    assert not found.still and math.isnan(found.noise_N)
+
+
+def test_a_known_digit_may_change_once() -> None:
+    once = np.where(T < 0.3, 10.0, 10.1)
+    assert not stillness(T, once).still
+    assert stillness(T, once, step_N=0.1).still
+
+
+def test_noise_alone_is_seldom_taken_for_movement() -> None:
+    rng = np.random.default_rng(3)
+    for n, most in ((5, 100), (12, 40), (40, 10)):
+        t = np.arange(n) / 80
+        assert sum(not stillness(t, rng.standard_normal(n)).still for _ in range(1000)) < most

@@ -1,0 +1,282 @@
+"""The threads of a loop are not on the core of the one that called it.
+
+Compiled code is kept, found again by the next process, and thrown away when anything in it changes.
+
+Pieces of work that threads come for: each is done once, whoever does it.
+
+Explicit vectors in compiled loops, and the moments that are made with them, against numpy.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+import pytest
+
+import analysis
+from analysis.compiled import threads as cores
+from analysis.compiled.layer import threading_layer
+from analysis.compiled.loops import helper, stamp
+from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
+from analysis.compiled.vectors import LANES, load, spread, store, total, whole
+from analysis.field.grid import profile
+from analysis.fit.sensitivity import square_rows
+from analysis.fit.shapes import (
+    CHANNELS,
+    DEGREES,
+    DIFFERENCE_ROWS,
+    PRODUCT,
+    PRODUCT_ROWS,
+    SQUARE_ROWS,
+    add_difference_columns,
+    difference_moments,
+    product_moments,
+    shapes_of,
+)
+
+PARTS = 64
+
+
+@numba.njit(parallel=True)
+def where(threads: Any, found: Any) -> Any:
+    """Thread and core of each part of a loop, and of its caller."""
+    calling = caller()
+    for part in numba.prange(PARTS):
+        keep_apart(calling)
+        threads[part], found[part] = cores._thread(), cores._core()
+    return calling
+
+
+@pytest.fixture(autouse=True)
+def _caller_works() -> None:
+    if threading_layer() == "workqueue":
+        pytest.skip("the caller of a loop only waits here (test_layer.py)")
+
+
+def _run() -> tuple[Any, np.ndarray, np.ndarray]:
+    threads, found = np.zeros(PARTS, np.int64), np.zeros(PARTS, np.int64)
+    return where(threads, found), threads, found
+
+
+@pytest.mark.skipif(not cores.LINUX, reason="threads are told apart on Linux only")
+def test_the_threads_of_a_loop_leave_the_core_of_its_caller() -> None:
+    allowed = os.sched_getaffinity(0)
+    for _ in range(20):
+        (thread, mask, taken), threads, found = _run()
+        (core,) = np.flatnonzero(taken)
+        assert core in allowed
+        assert taken[core] == thread
+        assert {n for n in range(1024) if int(mask[n // 64]) >> n % 64 & 1} == allowed
+        others = threads != thread
+        if len(allowed) > 1:
+            assert (found[others] != core).all()
+            assert others.any() or numba.get_num_threads() == 1
+        time.sleep(0.005)  # long enough for threads to fall asleep
+    assert os.sched_getaffinity(0) == allowed, "the caller may go where it could"
+
+
+@pytest.mark.skipif(not cores.LINUX, reason="threads are told apart on Linux only")
+def test_on_one_core_they_stay() -> None:
+    allowed = os.sched_getaffinity(0)
+    try:
+        os.sched_setaffinity(0, {min(allowed)})
+        (_, _, taken), _, found = _run()
+        assert np.flatnonzero(taken).tolist() == [min(allowed)]
+        assert set(found) <= allowed
+    finally:
+        os.sched_setaffinity(0, allowed)
+
+
+PACKAGE = Path(analysis.__file__).parent
+
+
+COMPILING = ("analysis.compiled.loops", "analysis.compiled.vectors")
+
+
+def imports_numba(module: Path) -> bool:
+    """Whether a module imports numba, or what compiles with it, when it is imported itself."""
+    nodes = ast.parse(module.read_text(encoding="utf-8")).body
+    names = [n.module or "" for n in nodes if isinstance(n, ast.ImportFrom)]
+    names += [alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names]
+    return any(name.split(".")[0] == "numba" or name.startswith(COMPILING) for name in names)
+
+
+COMPILED = sorted(m.relative_to(PACKAGE).as_posix() for m in PACKAGE.rglob("*.py") if imports_numba(m))
+# Their constants are part of the compiled code.
+CONSTANTS = ["fit/validity.py", "fit/bundles.py", "picture/splines.py"]
+
+
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    ignore = shutil.ignore_patterns("__pycache__")
+    return Path(shutil.copytree(PACKAGE, tmp_path_factory.mktemp("stamp") / "analysis", ignore=ignore))
+
+
+def test_modules_with_compiled_code_were_found() -> None:
+    assert {"compiled/loops.py", "compiled/vectors.py", "picture/warp.py", "follow/climb.py"} <= set(COMPILED)
+
+
+@pytest.mark.parametrize("module", [*COMPILED, *CONSTANTS])
+def test_a_change_of_any_module_with_compiled_code_changes_the_stamp(copied: Path, module: str) -> None:
+    before = stamp(copied)
+    assert stamp(copied) == before
+    path = copied / module
+    os.utime(path, (path.stat().st_atime, path.stat().st_mtime + 1))
+    moved = stamp(copied)
+    assert moved != before
+    path.write_bytes(path.read_bytes() + b"\n")
+    os.utime(path, (0, {name: at for name, at, _ in moved}[module]))
+    assert stamp(copied) != moved
+
+
+def test_what_is_not_compiled_is_not_stamped(copied: Path) -> None:
+    assert not [name for name, _, _ in stamp(copied) if name.startswith(("field/", "kernel/", "evaluate/"))]
+
+
+def test_a_second_process_compiles_nothing() -> None:
+    code = (
+        "import numpy as np\n"
+        "from analysis import PhaseKernel, Roi, ZoiGrid\n"
+        "from analysis.fit import iteration, sensitivity, verdict\n"
+        "image = np.random.default_rng(0).normal(100, 20, (96, 96)).astype(np.float32)\n"
+        "kernel = PhaseKernel(image, ZoiGrid.cover(Roi(8, 8, 80, 80), 32, 16), noise=1.0)\n"
+        "kernel.measure(image, start=kernel.measure(image))\n"
+        "for loop in (iteration.track.dispatcher, sensitivity.prepare.dispatcher, verdict.judge):\n"
+        "    assert len(loop.signatures) == 1, loop\n"
+        "    print(sum(loop.stats.cache_hits.values()), sum(loop.stats.cache_misses.values()))\n"
+    )
+    for _ in range(2):
+        done = subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, cwd=PACKAGE.parent, check=False
+        )
+        assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["1", "0"] * 3
+
+
+@numba.njit(parallel=True)
+def done_by(times: Any, counters: Any, pieces: int) -> None:
+    """How often each piece was done."""
+    for share in numba.prange(SHARES):
+        piece = next_piece(counters, share, pieces)
+        while piece >= 0:
+            times[piece] += 1
+            piece = next_piece(counters, share, pieces)
+
+
+@pytest.mark.parametrize("pieces", [0, 1, 3, 1000, 100_001])
+def test_each_piece_is_done_once(pieces: int) -> None:
+    times, counters = np.zeros(pieces, np.int64), np.zeros(SHARES, np.int64)
+    done_by(times, counters, pieces)
+    assert (times == 1).all()
+    assert counters.sum() >= pieces
+
+
+@pytest.mark.parametrize("share", [0, 5, SHARES - 1])
+def test_a_thread_begins_with_its_own_and_goes_on_with_what_others_left(share: int) -> None:
+    counters, pieces = np.zeros(SHARES, np.int64), 10 * SHARES + 3
+    other = next_piece(counters, (share + 1) % SHARES, pieces)
+    done = [next_piece(counters, share, pieces) for _ in range(pieces)]
+    own = range(pieces * share // SHARES, pieces * (share + 1) // SHARES)
+    assert done[: len(own)] == list(own)
+    assert sorted(done) == [-1, *sorted(set(range(pieces)) - {other})]
+
+
+RNG = np.random.default_rng(7)
+HEIGHT, PITCH = 90, 112
+
+
+@helper
+def every_operation(a: np.ndarray, at: np.uintp, factor: np.float32, out: np.ndarray) -> float:
+    v = load(a, at)
+    w = spread(factor)
+    s = v * w - w
+    s += v + w
+    store(out, np.uintp(1), s)
+    return total(s)
+
+
+@helper
+def of_the_difference(images, samples, at, pitch, g, line, size, rows, columns, out):
+    for first in range(0, size, 16):
+        count = min(16, size - first)
+        add_difference_columns(
+            images, samples, at + np.uintp(first) * pitch, pitch, g[first * line :], np.uintp(line), first,
+            count, rows, columns,
+        )  # fmt: skip
+    return difference_moments(columns, rows, line, out)
+
+
+def test_a_vector_does_what_is_said() -> None:
+    a, out = RNG.normal(size=LANES + 5).astype(np.float32), np.zeros(LANES + 3, np.float32)
+    found = every_operation(a, 3, np.float32(1.5), out)
+    expected = a[3 : 3 + LANES] * 1.5 - 1.5 + a[3 : 3 + LANES] + 1.5
+    assert out[1:-2] == pytest.approx(expected, rel=1e-6)
+    assert (out[0], *out[-2:]) == (0, 0, 0)
+    assert found == pytest.approx(expected.sum(), rel=1e-5)
+
+
+def test_a_two_dimensional_array_is_flat_memory() -> None:
+    a, out = RNG.normal(size=(3, LANES)).astype(np.float32), np.zeros(LANES + 3, np.float32)
+    every_operation(a, LANES, np.float32(0), out)
+    assert np.array_equal(out[1 : 1 + LANES], a[1])
+
+
+@pytest.mark.parametrize(("size", "rounded"), [(LANES, LANES), (LANES + 1, 2 * LANES), (1, LANES)])
+def test_whole_vectors(size: int, rounded: int) -> None:
+    assert whole(size) == rounded
+
+
+@pytest.mark.parametrize("size", [9, 32, 57])
+def test_moments_of_the_difference(size: int) -> None:
+    images = RNG.normal(size=(CHANNELS, HEIGHT, PITCH)).astype(np.float32)
+    top, left, line = 5, 7, whole(size)
+    g = np.full((size, line), 1e3, np.float32)  # what lies beyond the ZOI must not count
+    g[:, :size] = RNG.normal(size=(size, size))
+    shapes = shapes_of(profile("gaussian", size), line)
+    out, columns = np.zeros((CHANNELS, DEGREES, DEGREES)), np.zeros((DIFFERENCE_ROWS, line), np.float32)
+    energy = of_the_difference(
+        images.ravel(), HEIGHT * PITCH, top * PITCH + left, PITCH, g.ravel(), line, size, shapes.rows, columns, out
+    )  # fmt: skip
+    fx, fy, f, raw = images[:, top : top + size, left : left + size].astype(float)
+    d, rows = g[:, :size] - raw, shapes.rows[:, :size].astype(float)
+    assert energy == pytest.approx(rows[0] @ d**2 @ rows[0], rel=1e-5)
+    for channel, (image, degrees) in enumerate(((fx, 4), (fy, 4), (f, 2), (1.0, 2))):
+        expected = rows @ (d * image) @ rows.T
+        for j in range(degrees):
+            for i in range(degrees - j):
+                assert out[channel, j, i] == pytest.approx(expected[j, i], abs=1e-4 * size)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_moments_of_products(order: int) -> None:
+    size = 25
+    images = RNG.normal(size=(3, HEIGHT, PITCH)).astype(np.float32)
+    top, left, line = 11, 3, whole(size)
+    window = profile("gaussian", size)
+    powers, squares = shapes_of(window, line).powers, square_rows(window, line)
+    of_w, of_q = np.zeros((10, PRODUCT_ROWS, PRODUCT_ROWS)), np.zeros((10, PRODUCT_ROWS, PRODUCT_ROWS))
+    one = np.ones(line, np.float32)
+    columns = np.zeros((PRODUCT_ROWS + SQUARE_ROWS, line), np.float32)
+    product_moments(
+        images.ravel(), images.ravel(), one, 0, 0, one, HEIGHT * PITCH, top * PITCH + left, PITCH, size,
+        powers, squares, order, columns, of_w, of_q,
+    )  # fmt: skip
+    parts = [*images[:, top : top + size, left : left + size].astype(float), np.ones((size, size))]
+    w, q = powers[:, :size].astype(float), squares[:, :size].astype(float)
+    for a in range(4):
+        for b in range(a, 4):
+            product = parts[a] * parts[b]
+            for found, rows, most in ((of_w, w, 3 + order), (of_q, q, 2 * order)):
+                expected = rows @ product @ rows.T
+                for y in range(most + 1):
+                    for x in range(most + 1 - y):
+                        assert found[PRODUCT[a, b], y, x] == pytest.approx(expected[y, x], abs=1e-3)

@@ -1,0 +1,312 @@
+"""Residual and covariances against the same sums in plain numpy.
+
+The share of a ZOI on saturated pixels is that of plain arithmetic.
+
+Shapes that a ZOI cannot follow: their polynomials, and what of them is found in made-up pictures.
+
+The noise of means over ZOIs: what is said of it against how they scatter.
+
+Who is rejected: the pictures of tests/accuracy at one noise and size, and the rule itself.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis import KernelSettings, PhaseKernel, Roi, Status, ZoiGrid
+from analysis.field import profile
+from analysis.field.grid import WINDOWS, Window
+from analysis.fit.assembly import RUN, clipped_share, scale, weigh
+from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, RUNNING, OutArgs, ReferenceArgs, VerdictArgs
+from analysis.fit.shapes import shapes_of
+from analysis.fit.validity import has_pattern
+from analysis.fit.verdict import judge, stretch_of
+from analysis.kernel.images import as_model
+from analysis.kernel.reference import ReferencePicture
+from analysis.kernel.solve import Solution
+from tests.accuracy import rejection
+from tests.accuracy.truth import Speckle, affine, digitise, pixels
+
+
+def test_a_zoi_is_weighed_by_the_noise_of_both_images() -> None:
+    measured = np.array([True, False, True])
+    left, freedom, gain = np.array([8.0, 1.0, 3.0]), np.array([2.0, 1.0, 4.0]), np.array([0.5, 1.0, 0.01])
+    reference, current = np.array([4.0, 1.0, 2.0]), np.array([3.0, 1.0, 1.0])
+    residual, first, whole = np.empty((3, 3), np.float32)
+    weigh(measured, left, freedom, gain, reference, current, residual, first, whole)
+    assert np.allclose(residual, [4 / (1 + 3), 0.5, 0.75 / (2e-4 + 1)])
+    assert np.array_equal(first, [4, np.nan, 2], equal_nan=True)
+    # In grey levels of the reference, by a gain of 0.1 at least.
+    assert np.allclose(whole, [4 + 3 / 0.25, np.nan, 2 + 1 / 0.01], equal_nan=True)
+
+
+def test_unit_covariances_are_scaled_whatever_their_number() -> None:
+    rng = np.random.default_rng(0)
+    for count in (1, RUN, RUN + 5):
+        unit = rng.normal(size=(21, count)).astype(np.float32)
+        first, whole = rng.random((2, count)).astype(np.float32)
+        whole[0] = np.nan
+        out = np.empty((2, 21, count), np.float32)
+        scale(unit, first, whole, out[0], out[1])
+        assert np.array_equal(out[0], unit * first)
+        assert np.array_equal(out[1], unit * whole, equal_nan=True)
+
+
+def test_it_is_the_weight_of_the_marked_pixels() -> None:
+    rng = np.random.default_rng(0)
+    clipped = rng.random((60, 80)) < 0.1
+    line = profile("gaussian", 32)
+    first = np.array([[0, 0], [28, 48], [7, 13], [-5, 70], [40, -3]], np.int64)
+    inside = np.clip(first, 0, [60 - 32, 80 - 32])
+    weight = np.outer(line, line) / line.sum() ** 2
+    expected = [float((weight * clipped[y : y + 32, x : x + 32]).sum()) for y, x in inside]
+    np.testing.assert_allclose(clipped_share(clipped, first, line), expected, rtol=1e-5)
+
+
+def test_nothing_marked_is_nothing() -> None:
+    share = clipped_share(np.zeros((40, 40), bool), np.zeros((3, 2), np.int64), profile("uniform", 16))
+    assert (share == 0).all()
+
+
+SHAPE = (256, 256)
+GRID = ZoiGrid.cover(Roi(48, 48, 160, 160), 32, 16)
+
+
+@pytest.mark.parametrize("window", WINDOWS)
+@pytest.mark.parametrize("size", [17, 32, 57, 64])
+def test_the_polynomials_are_orthonormal_under_the_window(window: Window, size: int) -> None:
+    line = profile(window, size)
+    shapes = shapes_of(line, size + 8)
+    xi = shapes.powers[1, :size] / line
+    along = np.stack([np.polynomial.polynomial.polyval(xi, c) for c in shapes.mix])
+    assert (along * line) @ along.T / line.sum() == pytest.approx(np.eye(4), abs=1e-5)
+    assert shapes.rows[:, :size] == pytest.approx(along * line, abs=1e-5)
+    assert not shapes.rows[:, size:].any() and not shapes.powers[:, size:].any()
+
+
+def bending(
+    u: np.ndarray, noise: float = 0.0, order: int = 1, gain: float = 1.0
+) -> tuple[np.ndarray, Solution]:
+    """What the fit leaves, px^2, where the displacement is u(x, y)."""
+    x, y = pixels(SHAPE)
+    rng = np.random.default_rng(4)
+    pattern = Speckle(2.0, 6)
+    reference = digitise(pattern.at(x, y), 12, noise, rng)
+    deformed = digitise(gain * pattern.at(x - u, y), 12, noise, rng)
+    model = as_model(float(np.hypot(noise * 4095, 0.3)))
+    ready = ReferencePicture.first(
+        reference.astype(np.float32), GRID, KernelSettings(order=order), model, None
+    )
+    image = deformed.astype(np.float32)
+    attempt = Solution(ready, image, model, ready.searched(image))
+    return attempt.found.bending, attempt
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("gain", [1.0, 0.7])
+def test_an_affine_motion_leaves_nothing(order: int, gain: float) -> None:
+    x, y = pixels(SHAPE)
+    found, _ = bending(0.3 + 0.004 * x - 0.003 * y, order=order, gain=gain)
+    assert np.sqrt(found.max()) < 0.003
+
+
+def test_a_parabola_is_found_with_the_error_that_it_makes() -> None:
+    x, y = pixels(SHAPE)
+    found, _ = bending(0.0015 * (x**2 + y**2) / 2)
+    # u at the centre is wrong by half the curvatures times the second moment of the window.
+    line, at = profile("gaussian", 32), np.arange(32) - 15.5
+    assert np.sqrt(np.median(found)) == pytest.approx(0.0015 * (line @ at**2) / line.sum(), rel=0.15)
+
+
+def test_noise_alone_leaves_what_is_expected_of_it() -> None:
+    x, _ = pixels(SHAPE)
+    found, attempt = bending(0.2 + 0 * x, noise=0.02)
+    reference = attempt.reference
+    unit = reference.share_variance * 2 * ((0.02 * 4095) ** 2 + 0.1)
+    expected = unit.sum(axis=1) * reference.prepared.shapes.noise[0]
+    assert np.mean(found / expected) == pytest.approx(1.0, abs=0.3)
+
+
+@pytest.mark.parametrize("angle", [0, 30, 45, 90])
+def test_a_jump_through_a_zoi_is_said_to_be_one(angle: float) -> None:
+    x, y = pixels(SHAPE)
+    along = np.cos(np.deg2rad(angle)) * x + np.sin(np.deg2rad(angle)) * y
+    pattern, rng, noise = Speckle(2.0, 6), np.random.default_rng(4), 0.02
+    reference = digitise(pattern.at(x, y), 12, noise, rng)
+    deformed = digitise(pattern.at(x - np.where(along > 0, 0.6, -0.6), y), 12, noise, rng)
+    field = PhaseKernel(reference, GRID, noise=noise * 4095).measure(deformed, noise=noise * 4095)
+    gx, gy = np.meshgrid(GRID.x - 127.5, GRID.y - 127.5)
+    distance = np.abs(np.cos(np.deg2rad(angle)) * gx + np.sin(np.deg2rad(angle)) * gy)
+    assert np.mean(field.status[distance < 5] != Status.OK) > 0.95
+    assert (field.status == Status.UNEVEN).any()
+    assert np.mean(field.ok[distance > 20]) > 0.99
+
+
+NOISE_GL = 2.5
+PAIRS = 240
+NAMES = ("exx", "eyy", "exy", "u")
+
+
+def scatter_over_said(
+    size: int, step: int, count: int, order: int, noise: float | None, where: np.ndarray | None = None
+) -> dict[str, float]:
+    """Root mean square of means of a still picture over their own uncertainty, new noise in both pictures."""
+    side = size + step * (count - 1) + 16
+    pattern = Speckle(2.0, 5, span=side + 60).at(*affine((side, side)))
+    clean = 128 + 40 * (pattern - pattern.mean()) / pattern.std()
+    grid = ZoiGrid.cover(Roi(8, 8, side - 16, side - 16), size, step)
+    rng = np.random.default_rng(size + step)
+    ratios: dict[str, list[float]] = {name: [] for name in NAMES}
+    for _ in range(PAIRS // 8):
+        first = (clean + rng.normal(0, NOISE_GL, clean.shape)).astype(np.float32)
+        kernel = PhaseKernel(first, grid, KernelSettings(order=order), noise=noise)
+        start = kernel.measure(first, noise=noise)
+        for _ in range(8):
+            second = (clean + rng.normal(0, NOISE_GL, clean.shape)).astype(np.float32)
+            field = kernel.measure(second, start=start, noise=noise)
+            for name in NAMES:
+                value, sigma = field.mean(name, where)
+                ratios[name].append(value / sigma)
+    return {name: float(np.sqrt(np.mean(np.square(found)))) for name, found in ratios.items()}
+
+
+@pytest.mark.parametrize(
+    ("size", "step", "count", "order", "noise"),
+    [
+        (32, 4, 17, 1, NOISE_GL), (32, 8, 13, 1, NOISE_GL), (32, 8, 13, 1, None), (32, 16, 7, 1, NOISE_GL),
+        (48, 12, 9, 2, NOISE_GL),
+    ],
+)  # fmt: skip
+def test_means_scatter_as_said(size: int, step: int, count: int, order: int, noise: float | None) -> None:
+    """Eight pictures share a reference, so a ratio is known to about 8 %; by overlap alone it would be 1.3 to 1.5."""
+    found = scatter_over_said(size, step, count, order, noise)
+    assert all(0.8 < ratio < 1.22 for ratio in found.values()), found
+    assert 0.87 < np.mean([found[name] for name in ("exx", "eyy", "exy")]) < 1.13, found
+
+
+def test_a_gauge_of_any_shape() -> None:
+    where = np.add.outer(np.abs(np.arange(13) - 6), np.abs(np.arange(13) - 6)) <= 5
+    found = scatter_over_said(32, 8, 13, 1, NOISE_GL, where)
+    assert 0.87 < np.mean([found[name] for name in ("exx", "eyy", "exy")]) < 1.13, found
+
+
+def test_dense_grids_are_not_more_certain_than_they_are() -> None:
+    """The same region with more ZOIs in it tells hardly more of its mean."""
+    image = np.asarray(128 + 12 * Speckle(2.0, 5, span=300).at(*affine((160, 160))), np.float32)
+    sigmas = []
+    for step in (4, 8):
+        kernel = PhaseKernel(image, ZoiGrid.cover(Roi(8, 8, 128, 128), 32, step), noise=1.0)
+        sigmas.append(kernel.measure(image, noise=1.0).mean("eyy")[1])
+    assert sigmas[0] > 0.9 * sigmas[1], sigmas
+
+
+def test_what_was_asked_once_is_remembered_within_bounds() -> None:
+    image = np.asarray(128 + 12 * Speckle(2.0, 5, span=300).at(*affine((160, 160))), np.float32)
+    grid = ZoiGrid.cover(Roi(8, 8, 128, 128), 32, 16)
+    sums = PhaseKernel(image, grid, noise=1.0).reference.sums
+    assert sums is not None
+    rng = np.random.default_rng(0)
+    masks = [rng.random(grid.shape) < 0.5 for _ in range(100)]
+    once = [sums.factor("exx", mask) for mask in masks]
+    assert once == [sums.factor("exx", mask) for mask in masks]
+    assert len(sums._known) <= 64
+    single = np.zeros(grid.shape, bool)
+    single[2, 2] = True
+    assert sums.factor("exx", single) == 1.0
+
+
+def test_the_estimator_by_phases_has_the_overlap_alone() -> None:
+    image = np.asarray(128 + 12 * Speckle(2.0, 5, span=300).at(*affine((160, 160))), np.float32)
+    grid = ZoiGrid.cover(Roi(8, 8, 128, 128), 32, 32)
+    kernel = PhaseKernel(image, grid, KernelSettings(estimator="phase"), noise=1.0)
+    assert kernel.reference.sums is None
+    assert kernel.measure(image, noise=1.0).mean("exx")[1] > 0
+
+
+def verdict(
+    left=1.0, expected=1.0, signal=900.0, gain=1.0, state=CONVERGED, known=True, bending=0.0, unit=1e-4, values=None,
+    limit=0.05, beyond=1.0,
+) -> int:  # fmt: skip
+    one, out = np.ones(1), np.zeros(1, np.uint8)
+    found = OutArgs.starting(np.zeros((1, 6)) if values is None else values)
+    found.state[0], found.bending[0], found.nuisance[0, 0] = state, bending, gain
+    zoi, rule = (
+        ReferenceArgs(one * signal, one * 350, np.full((1, 2), unit), one * np.sqrt(unit * beyond)),
+        VerdictArgs(known, np.array([1.5, 0.5]), 5.0, limit, 4.0),
+    )
+    judge(found, one * left, one * expected, zoi, rule, out)
+    return int(out[0])
+
+
+def test_verdicts() -> None:
+    assert verdict() == Status.OK
+    assert verdict(left=8.0) == Status.POOR_MATCH
+    assert verdict(left=4.5, known=False) == Status.OK
+    assert verdict(gain=0.05) == Status.POOR_MATCH
+    assert verdict(state=RUNNING) == Status.NOT_CONVERGED
+    assert verdict(left=800.0) == Status.LOST
+    assert verdict(left=800.0, state=LEFT_IMAGE) == Status.OUTSIDE
+    assert verdict(left=np.nan) != Status.OK
+
+
+@pytest.mark.parametrize(
+    ("bending", "unit", "uneven"),
+    [
+        (0.002, 1e-4, False),
+        (0.02, 1e-4, True),
+        (0.048**2, 1e-8, False),
+        (0.052**2, 1e-8, True),
+        (np.nan, 1e-4, True),
+    ],
+)
+def test_bending_beyond_its_noise_and_the_limit(bending: float, unit: float, uneven: bool) -> None:
+    assert (verdict(bending=bending, unit=unit) == Status.UNEVEN) == uneven
+    assert verdict(bending=bending, unit=unit, state=RUNNING) == Status.NOT_CONVERGED
+    if np.isfinite(bending):
+        strained = np.array([[0.0, 0.3, 0.0, 0.0, 0.0, 0.0]])
+        assert verdict(bending=bending, unit=unit, values=strained) == Status.OK
+        assert verdict(bending=bending, unit=unit, limit=np.inf) == Status.OK
+
+
+def test_a_little_in_both_residual_and_bending_is_too_much() -> None:
+    half_left, more_left, half_bent, more_bent = 2.0, 2.6, 0.0015, 0.0018
+    assert verdict(left=half_left) == verdict(bending=more_bent, unit=1e-8) == Status.OK
+    assert verdict(left=half_left, bending=0.001, unit=1e-8) == Status.OK
+    assert verdict(left=half_left, bending=more_bent, unit=1e-8) == Status.UNEVEN
+    assert verdict(left=more_left, bending=half_bent, unit=1e-8) == Status.POOR_MATCH
+    assert verdict(left=half_left, bending=more_bent, unit=1e-8, limit=np.inf) == Status.OK
+    assert verdict(left=4.5, bending=more_bent, unit=1e-8, known=False) == Status.OK
+    assert verdict(left=6.5, bending=more_bent, unit=1e-8, known=False) != Status.OK
+
+
+def test_a_centre_beyond_the_pattern_is_told_by_its_uncertainty() -> None:
+    doubtful = {"left": 1.0, "bending": 0.0015, "unit": 1e-8}
+    assert verdict(**doubtful, beyond=3.9) == Status.OK
+    assert verdict(**doubtful, beyond=8.0) == Status.UNEVEN
+    assert verdict(beyond=8.0) == Status.OK
+
+
+def test_the_stretch_of_a_strain_is_free_of_rotation() -> None:
+    c, s, stretched = np.cos(0.5), np.sin(0.5), 1.1
+    turned = np.array([[3.0, stretched * c - 1, -s, -2.0, stretched * s, c - 1]])
+    assert stretch_of(turned, 0, 5.0) == pytest.approx(5.0 * (stretched**2 - 1) / 2)
+
+
+def test_a_zoi_of_noise_has_no_pattern() -> None:
+    energy, variance = np.array([[100.0, 100.0], [0.3, 0.3], [100.0, 0.3]]), np.full((3, 2), 1e-4)
+    assert has_pattern(energy, variance, 1.0, 0.2).tolist() == [True, False, False]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [c for c in rejection.CASES if c != "hole"])
+def test_wrong_zois_are_flagged_and_good_ones_kept(case: str) -> None:
+    found = rejection.count(case, radius=2.0, size=32, noise=0.01, step=16)
+    assert found.accepted <= 0.03 * (found.accepted + found.flagged)
+    assert found.good_rejected <= 0.01 * found.good
+
+
+def test_a_glare_that_shifts_the_pattern_a_little_is_seen() -> None:
+    found = rejection.count("glare", radius=3.0, size=64, noise=0.01)  # 19 by either limit alone
+    assert found.accepted <= 6
+    assert found.good_rejected == 0

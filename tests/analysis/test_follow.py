@@ -1,0 +1,214 @@
+"""The start of each ZOI in the next frame: averages noise away, follows what moves, survives a lost ZOI.
+
+A renewed reference: results stay those of the original grid, uncertainty included.
+
+The search of whole pixels, ZOI by ZOI.
+
+Large motion from nothing, and through a sequence.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis import PhaseKernel, Roi, Status, ZoiGrid
+from analysis.field.motion import Motion
+from analysis.follow.prediction import AGE_MOVED, OLDEST, motion_after
+from analysis.follow.search import find_blocks, global_shift, search
+from tests.analysis.speckle import SHAPE, picture
+
+SIGMA, LEVER, A = 0.01, 5.0, 4000
+UNIT = np.array([1, 1 / LEVER, 1 / LEVER] * 2) * SIGMA
+
+
+def follow(truth: np.ndarray, rng: np.random.Generator) -> tuple[np.ndarray, Motion]:
+    """Rms of what was not predicted, in standard deviations, frame by frame; truth (frames, modes)."""
+    motion = Motion.none(np.arange(A), 6)
+    values = truth[0] + UNIT * rng.standard_normal((A, 6))
+    missed = []
+    for now in truth[1:]:
+        guess = values + motion.ahead
+        values = now + UNIT * rng.standard_normal((A, 6))
+        missed.append(float(np.sqrt(np.mean(((values - guess) / UNIT) ** 2))))
+        motion = motion_after(motion, values, guess, np.full(A, SIGMA), LEVER)
+    return np.array(missed), motion
+
+
+def test_a_steady_motion_is_predicted_better_than_from_the_last_frame() -> None:
+    frames = np.arange(40)[:, None]
+    velocity = np.array([0.2, 1e-4, 0, -0.1, 0, 2e-4])
+    missed, motion = follow(frames * velocity, np.random.default_rng(1))
+    # An alpha-beta filter of 0.4 and 0.1: sqrt(1.45); the difference of two frames alone: sqrt(6).
+    assert missed[-1] == pytest.approx(np.sqrt(1.45), rel=0.03)
+    assert np.all(np.diff(missed[1:6]) < 0)
+    assert motion.change.mean(axis=0) == pytest.approx(velocity, abs=1e-4)
+    assert np.median(motion.age) == OLDEST
+
+
+def test_after_a_jolt_it_starts_from_what_was_measured() -> None:
+    truth = np.zeros((30, 6))
+    truth[20:, 0] = 1.0
+    missed, motion = follow(truth, np.random.default_rng(2))
+    assert missed[19] > 30
+    assert missed[20] < 20  # a part of the jolt is taken for motion
+    assert missed[-1] < 2
+    assert motion.age.max() < OLDEST
+
+
+def test_a_lost_zoi_is_forgotten_and_begins_anew() -> None:
+    motion = Motion(np.arange(2), np.ones((2, 6)), np.ones((2, 6)), np.full(2, 9, np.uint8))
+    values = np.ones((2, 6))
+    values[0, 4] = np.nan
+    after = motion_after(motion, values, np.ones((2, 6)), np.full(2, SIGMA), LEVER)
+    assert after.age.tolist() == [1, 10]
+    assert not after.change[0].any() and not after.ahead[0].any()
+    assert np.array_equal(after.change[1], np.ones(6))
+
+
+def test_news_beyond_noise_reset_the_age() -> None:
+    motion = Motion(np.arange(1), np.zeros((1, 6)), np.zeros((1, 6)), np.full(1, 9, np.uint8))
+    values = np.zeros((1, 6))
+    values[0, 5] = 10 * SIGMA / LEVER
+    after = motion_after(motion, values, np.zeros((1, 6)), np.full(1, SIGMA), LEVER)
+    assert after.age[0] == AGE_MOVED
+    assert after.ahead[0, 5] == after.change[0, 5] == pytest.approx(0.4 * values[0, 5])
+
+
+def test_it_is_of_the_same_zois_or_of_none() -> None:
+    motion = Motion.none(np.array([0, 2, 3]), 6)
+    assert motion.fits(np.array([0, 2, 3]), 6)
+    assert not motion.fits(np.array([0, 1, 3]), 6)
+    assert not motion.fits(np.array([0, 2]), 6)
+    assert not motion.fits(np.array([0, 2, 3]), 12)
+
+
+GRID = ZoiGrid.cover(Roi(36, 36, 168, 128), size=32, step=24)
+NOISE = 0.01
+SIGMA_RENEWAL = NOISE * 4095
+HALF = {"u": 2.3, "v": -1.2, "du_dx": 0.03, "dv_dy": -0.01, "du_dy": -0.02, "dv_dx": 0.02}
+WHOLE = {"u": 4.1, "v": -2.2, "du_dx": 0.06, "dv_dy": -0.02, "du_dy": -0.04, "dv_dx": 0.04}
+
+
+def true_u(grid: ZoiGrid, m: dict) -> np.ndarray:
+    x, y = np.meshgrid(grid.x - (SHAPE[1] - 1) / 2, grid.y - (SHAPE[0] - 1) / 2)
+    return m["u"] + m["du_dx"] * x + m["du_dy"] * y
+
+
+def test_results_are_composed_on_the_original_grid() -> None:
+    kernel = PhaseKernel(picture(), GRID)
+    first = kernel.measure(picture(**HALF))
+    renewed = kernel.renewed(picture(**HALF), first)
+    for start in (None, first):
+        field = renewed.measure(picture(**WHOLE), start=start)
+        assert field.ok.all()
+        assert np.max(np.abs(field.u - true_u(GRID, WHOLE))) < 2e-3
+        for name in ("du_dx", "du_dy", "dv_dx", "dv_dy"):
+            assert np.mean(getattr(field, name)) == pytest.approx(WHOLE[name], abs=2e-5)
+    same = renewed.measure(picture(**HALF))
+    assert np.max(np.abs(same.u - first.u)) < 1e-3
+
+
+def test_uncertainty_accumulates_as_the_scatter_does() -> None:
+    errors, sigmas = [], []
+    for seed in range(12):
+        kernel = PhaseKernel(picture(NOISE, 3 * seed), GRID, noise=SIGMA_RENEWAL)
+        middle = picture(NOISE, 3 * seed + 1, **HALF)
+        first = kernel.measure(middle, noise=SIGMA_RENEWAL)
+        field = kernel.renewed(middle, first).measure(
+            picture(NOISE, 3 * seed + 2, **WHOLE), noise=SIGMA_RENEWAL
+        )
+        errors.append(field.u - true_u(GRID, WHOLE))
+        sigmas.append(field.sigma_u)
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.sqrt(np.mean(np.square(sigmas))), rel=0.1)
+
+
+def test_a_zoi_that_was_lost_stays_lost() -> None:
+    kernel = PhaseKernel(picture(), GRID)
+    covered = picture(**HALF).copy()
+    covered[:90, :90] = 2000
+    first = kernel.measure(covered)
+    assert first.status[0, 0] != Status.OK and first.n_valid > 0
+    field = kernel.renewed(picture(**HALF), first).measure(picture(**WHOLE))
+    assert np.array_equal(field.ok, first.ok)
+    assert np.isnan(field.u[0, 0])
+
+
+def test_impossible_renewals_are_refused() -> None:
+    kernel = PhaseKernel(picture(), GRID)
+    field = kernel.measure(picture())
+    with pytest.raises(ValueError, match="shape"):
+        kernel.renewed(picture()[:100], field)
+    blank = kernel.measure(np.full(SHAPE, 7, np.uint8))
+    with pytest.raises(ValueError, match="valid ZOI"):
+        kernel.renewed(picture(), blank)
+
+
+def test_every_zoi_is_found_on_its_nearest_pixel() -> None:
+    reference, deformed = picture().astype(np.float32), picture(u=-11.7, v=6.2).astype(np.float32)
+    origins = np.array([[60, 60], [100, 90], [30, 150]], np.int64)
+    found = search(reference, deformed, np.float32(reference.mean()), Roi(24, 24, 190, 150), origins, 32)
+    assert found.shape == (3, 6)
+    assert np.array_equal(found[:, [0, 3]], np.broadcast_to([-12, 6], (3, 2)))
+    assert np.abs(found[:, [1, 2, 4, 5]]).max() < 0.02
+
+
+GRID_START = ZoiGrid.cover(Roi(4, 4, 232, 192), size=32, step=20)
+
+
+def truth(m: dict) -> tuple[np.ndarray, np.ndarray]:
+    x, y = np.meshgrid(GRID_START.x - (SHAPE[1] - 1) / 2, GRID_START.y - (SHAPE[0] - 1) / 2)
+    u = m.get("u", 0) + m.get("du_dx", 0) * x + m.get("du_dy", 0) * y
+    v = m.get("v", 0) + m.get("dv_dx", 0) * x + m.get("dv_dy", 0) * y
+    return u, v
+
+
+def turned(degrees: float) -> dict:
+    a = np.deg2rad(degrees)
+    return {"du_dx": np.cos(a) - 1, "dv_dy": np.cos(a) - 1, "du_dy": -np.sin(a), "dv_dx": np.sin(a)}
+
+
+@pytest.mark.parametrize("shift", [(110, 0), (-70, 60), (3, -95)])
+def test_half_the_image_is_found(shift: tuple) -> None:
+    motion = {"u": float(shift[0]), "v": float(shift[1])}
+    reference, deformed = (picture(**m).astype(np.float32) for m in ({}, motion))
+    assert global_shift(reference, deformed, GRID_START.roi) == shift
+    field = PhaseKernel(picture(), GRID_START).measure(picture(**motion))
+    assert field.n_valid > 10
+    assert np.nanmax(np.hypot(field.u - shift[0], field.v - shift[1])) < 0.01
+
+
+@pytest.mark.parametrize("motion", [turned(5), turned(10), {"du_dx": 0.1, "dv_dy": -0.03}])
+def test_rotation_and_strain_from_nothing(motion: dict) -> None:
+    field = PhaseKernel(picture(), GRID_START).measure(picture(**motion))
+    u, v = truth(motion)
+    inside = (np.abs(GRID_START.x + u - 119.5) < 98) & (np.abs(GRID_START.y[:, None] + v - 99.5) < 78)
+    assert field.ok[inside].mean() > 0.99
+    assert np.nanmax(np.hypot(field.u - u, field.v - v)) < 0.01
+
+
+@pytest.mark.parametrize("end", [turned(30), {"du_dx": 0.3, "dv_dy": -0.09}])
+def test_large_deformation_through_a_sequence(end: dict) -> None:
+    kernel, field = PhaseKernel(picture(), GRID_START), None
+    steps = 10
+    for i in range(1, steps + 1):
+        motion = turned(3 * i) if "du_dy" in end else {k: v * i / steps for k, v in end.items()}
+        field = kernel.measure(picture(**motion), start=field)
+    u, v = truth(end)
+    inside = (np.abs(GRID_START.x + u - 119.5) < 92) & (np.abs(GRID_START.y[:, None] + v - 99.5) < 72)
+    assert field is not None and field.ok[inside].mean() > 0.99
+    assert np.nanmax(np.hypot(field.u - u, field.v - v)) < 0.02
+
+
+def test_a_jump_within_a_sequence_is_caught() -> None:
+    kernel = PhaseKernel(picture(), GRID_START)
+    field = kernel.measure(picture(u=40.0, v=25.0), start=kernel.measure(picture(u=0.2)))
+    assert field.n_valid > 20
+    assert np.nanmax(np.abs(field.u - 40)) < 0.01
+
+
+def test_blocks_know_nothing_of_zois() -> None:
+    reference, deformed = picture().astype(np.float32), picture(u=7.0).astype(np.float32)
+    blocks = find_blocks(reference, deformed, GRID_START.roi)
+    assert np.all(np.abs(blocks.shift[..., 0] - 7) <= 1.5)
+    assert np.median(np.abs(blocks.planes()[..., 1:3])) < 0.01

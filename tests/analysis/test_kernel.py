@@ -1,0 +1,244 @@
+"""The kernel as its users see it: truth, uncertainty, independence of ZOIs, refusals.
+
+Of a deformed image no more is made ready than the ZOIs can reach; no value depends on it.
+
+The estimator by phases alone: the same answers, blind to brightness, with its own uncertainty.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numba
+import numpy as np
+import pytest
+
+from analysis import KernelSettings, NoiseModel, PatternError, PhaseKernel, Roi, Status, StrainField, ZoiGrid
+from analysis.kernel.reference import ReferencePicture
+from tests.analysis.speckle import SHAPE, picture
+
+GRID = ZoiGrid.cover(Roi(8, 8, 224, 184), size=32, step=16)
+FIELDS = ("u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy", "sigma_u", "sigma_exx", "residual")
+
+
+def true_displacement(grid: ZoiGrid, u=0.0, v=0.0, du_dx=0.0, du_dy=0.0, dv_dx=0.0, dv_dy=0.0):
+    x, y = np.meshgrid(grid.x - (SHAPE[1] - 1) / 2, grid.y - (SHAPE[0] - 1) / 2)
+    return u + du_dx * x + du_dy * y, v + dv_dx * x + dv_dy * y
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float32, np.float64])
+def test_any_kind_of_grey_image(dtype: type) -> None:
+    bits = 8 if dtype is np.uint8 else 12
+    kernel = PhaseKernel(picture(bits=bits).astype(dtype), GRID)
+    field = kernel.measure(picture(bits=bits, u=0.3, v=-0.2).astype(dtype))
+    assert field.ok.all()
+    assert abs(np.mean(field.u) - 0.3) < 1e-3 and abs(np.mean(field.v) + 0.2) < 1e-3
+
+
+def test_whole_grey_levels_are_the_same_in_any_type() -> None:
+    picture_of = {kind: picture(bits=8, u=0.3).astype(kind) for kind in (np.uint8, np.uint16, np.float32)}
+    kernel = PhaseKernel(picture(bits=8), GRID)
+    expected = kernel.measure(picture_of[np.float32])
+    for image in picture_of.values():
+        image.flags.writeable = False  # as frames are
+        assert np.array_equal(kernel.measure(image).parameters, expected.parameters)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize(
+    "motion",
+    [
+        {"u": 0.37, "v": -0.21},
+        {"u": 11.4, "v": -7.3},
+        {"du_dx": 0.004, "dv_dy": -0.0012, "u": 0.1},
+        {"du_dy": 0.006, "dv_dx": 0.006},
+        {"du_dy": -0.0175, "dv_dx": 0.0175},
+    ],
+)
+def test_imposed_motion_is_found_from_scratch(motion: dict, order: int) -> None:
+    kernel = PhaseKernel(picture(), GRID, KernelSettings(order=order))
+    field = kernel.measure(picture(**motion))
+    ok = field.ok
+    assert ok.mean() > 0.7
+    u, v = true_displacement(GRID, **motion)
+    assert np.max(np.abs(field.u - u)[ok]) < 3e-3
+    assert np.max(np.abs(field.v - v)[ok]) < 3e-3
+    for name in ("du_dx", "du_dy", "dv_dx", "dv_dy"):
+        assert np.abs(np.mean(getattr(field, name)[ok]) - motion.get(name, 0.0)) < 2e-5
+    assert np.isnan(field.u[~ok]).all() and (field.status[~ok] == Status.OUTSIDE).all()
+
+
+def test_values_do_not_depend_on_threads_or_other_zois() -> None:
+    reference, deformed = picture(0.01, 1), picture(0.01, 2, u=0.3, du_dx=0.002)
+    few = GRID.subset(every=3)
+    whole = PhaseKernel(reference, GRID, noise=41.0).measure(deformed, noise=41.0)
+    part = PhaseKernel(reference, few, noise=41.0).measure(deformed, noise=41.0)
+    threads = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        alone = PhaseKernel(reference, GRID, noise=41.0).measure(deformed, noise=41.0)
+    finally:
+        numba.set_num_threads(threads)
+    for name in FIELDS:
+        assert np.array_equal(getattr(whole, name), getattr(alone, name), equal_nan=True)
+        assert np.array_equal(getattr(whole, name)[few.active], getattr(part, name)[few.active])
+
+
+def test_a_start_gives_the_same_values_as_a_search() -> None:
+    kernel = PhaseKernel(picture(), GRID)
+    first = kernel.measure(picture(u=0.3))
+    second = kernel.measure(picture(u=0.5), start=first)
+    third = kernel.measure(picture(u=0.7), start=second)
+    fresh = kernel.measure(picture(u=0.7))
+    assert third.ok.all()
+    assert np.max(np.abs(third.u - fresh.u)) < 3e-4
+    assert third.iterations.mean() < fresh.iterations.mean()
+
+
+def test_predicted_uncertainty_is_the_scatter_and_noise_is_recognised() -> None:
+    noise = 0.02
+    kernel = PhaseKernel(picture(noise, 1), GRID, noise=noise * 4095)
+    fields = [kernel.measure(picture(noise, s, u=0.3), noise=noise * 4095) for s in range(2, 12)]
+    values = np.stack([f.u for f in fields])
+    current = np.sqrt(np.mean(values.var(axis=0, ddof=1)))
+    assert current == pytest.approx(np.sqrt(np.mean(fields[0].sigma("u", "current") ** 2)), rel=0.1)
+    whole = np.sqrt(np.mean((values - 0.3) ** 2))
+    assert whole == pytest.approx(np.mean(fields[0].sigma_u), rel=0.15)
+    unknown = PhaseKernel(picture(noise, 1), GRID).measure(picture(noise, 2, u=0.3))
+    assert np.mean(unknown.sigma_u) == pytest.approx(np.mean(fields[0].sigma_u), rel=0.1)
+    assert np.median(fields[0].residual) == pytest.approx(1, abs=0.15)
+
+
+def test_noise_model_scales_with_the_burst() -> None:
+    one = NoiseModel(gain=0.2, read=2.0)
+    kernel = PhaseKernel(picture(), GRID, noise=one)
+    single = kernel.measure(picture(u=0.2), noise=one)
+    burst = kernel.measure(picture(u=0.2), noise=one.averaged(16))
+    ratio = single.sigma("u", "current") / burst.sigma("u", "current")
+    assert np.allclose(ratio, 4, rtol=1e-3)
+    assert np.allclose(single.sigma("u", "reference"), burst.sigma("u", "reference"))
+
+
+def test_brightness_and_contrast_do_not_matter() -> None:
+    reference = picture()
+    deformed = picture(u=0.3).astype(np.float32) * 0.7 + 300
+    field = PhaseKernel(reference, GRID).measure(deformed)
+    assert np.nanmax(np.abs(field.u - 0.3)) < 2e-3
+    assert np.nanmean(field.gain) == pytest.approx(0.7, abs=0.01)
+
+
+def test_a_featureless_reference_is_refused_and_a_blank_frame_gives_no_numbers() -> None:
+    noise = np.random.default_rng(0).normal(0, 3, SHAPE)
+    for blank in (np.full(SHAPE, 100, np.uint8), (100 + noise).astype(np.uint8)):
+        with pytest.raises(PatternError):
+            PhaseKernel(blank, GRID)
+    field = PhaseKernel(picture(), GRID).measure((1000 + noise).astype(np.uint16))
+    assert field.n_valid == 0 and np.isnan(field.u).all()
+    assert np.isnan(field.mean("exx")).all()
+
+
+def test_clipped_zois_are_named() -> None:
+    mask = np.zeros(SHAPE, bool)
+    mask[:60, :60] = True
+    reference = picture()
+    field = PhaseKernel(reference, GRID, clipped=mask).measure(reference)
+    assert field.status[0, 0] == Status.CLIPPED and field.status[-1, -1] == Status.OK
+    field = PhaseKernel(reference, GRID).measure(reference, clipped=mask)
+    assert field.status[0, 0] == Status.CLIPPED and field.status[-1, -1] == Status.OK
+
+
+def test_wrong_input_is_refused_with_a_sentence() -> None:
+    with pytest.raises(ValueError, match="leaves the image"):
+        PhaseKernel(picture()[:100], GRID)
+    kernel = PhaseKernel(picture(), GRID)
+    with pytest.raises(ValueError, match="has 240 x 100 px"):
+        kernel.measure(picture()[:100])
+    with pytest.raises(ValueError, match="grey picture"):
+        kernel.measure(np.zeros((*SHAPE, 3), np.uint8))
+    with pytest.raises(ValueError, match="no ZOI"):
+        PhaseKernel(picture(), GRID.subset(active=np.zeros(GRID.shape, bool)))
+    with pytest.raises(ValueError, match="window"):
+        KernelSettings(window="round")  # type: ignore[arg-type]
+
+
+def test_inactive_zois_are_not_measured() -> None:
+    few = GRID.subset(every=2)
+    field = PhaseKernel(picture(), few).measure(picture(u=0.2))
+    assert np.array_equal(field.status == Status.NOT_MEASURED, ~few.active)
+    assert np.isnan(field.u[~few.active]).all() and np.isfinite(field.u[few.active]).all()
+
+
+GRID_BOX = ZoiGrid.cover(Roi(90, 60, 64, 64), size=32, step=16)
+
+
+def measured(settings: KernelSettings, motion: dict[str, float], start: StrainField | None) -> StrainField:
+    kernel = PhaseKernel(picture(), GRID_BOX, settings, noise=1.0)
+    return kernel.measure(picture(**motion), start=start, noise=1.0)
+
+
+@pytest.mark.parametrize(
+    "settings", [KernelSettings(), KernelSettings(order=2), KernelSettings(estimator="phase")]
+)
+@pytest.mark.parametrize("motion", [{}, {"u": 3.0, "dv_dy": 0.02}, {"u": 25.0, "v": -18.0}, {"u": 70.0}])
+def test_the_same_as_with_the_whole_image(
+    settings: KernelSettings, motion: dict[str, float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where the motion is beyond what the start made one expect, or leads out of the picture."""
+    still = StrainField.from_values(GRID_BOX, {})
+    own = measured(settings, motion, still)
+    monkeypatch.setattr(ReferencePicture, "reached", lambda self, guess: self.whole)
+    whole = measured(settings, motion, still)
+    assert np.array_equal(own.status, whole.status)
+    assert np.array_equal(own.parameters, whole.parameters, equal_nan=True)
+    assert np.array_equal(own.covariance, whole.covariance, equal_nan=True)
+
+
+def test_a_small_region_reaches_a_part_of_the_image() -> None:
+    kernel = PhaseKernel(picture(), GRID_BOX, noise=1.0)
+    box = kernel.reference.reached(np.zeros((len(kernel.reference.index), 6)))
+    assert (box.bottom - box.top) * (box.right - box.left) < 0.5 * picture().size
+    assert (
+        kernel.reference.reached(np.full((len(kernel.reference.index), 6), np.nan)) == kernel.reference.whole
+    )
+
+
+def test_zois_far_apart_ask_for_their_own_pixels() -> None:
+    """The distance of the ZOIs that are measured, not of the grid they were taken from, tells what to fetch."""
+    grid = ZoiGrid.cover(Roi(8, 8, 208, 168), size=32, step=8)
+    some = np.zeros(grid.shape, bool)
+    some[::2, ::3] = True
+    kernel = PhaseKernel(picture(), replace(grid, active=some), noise=1.0)
+    assert kernel.reference.spacing == 24
+    assert (kernel.measure(picture(), noise=1.0).status[some] == Status.OK).all()
+
+
+GRID_QUADRATURE = ZoiGrid.cover(Roi(16, 16, 208, 168), size=32, step=20)
+PHASE = KernelSettings(estimator="phase")
+
+
+def test_phases_alone_find_shift_and_strain() -> None:
+    kernel = PhaseKernel(picture(), GRID_QUADRATURE, PHASE)
+    field = kernel.measure(picture(u=0.3, v=-0.2, du_dx=0.002))
+    assert field.ok.all()
+    assert np.mean(field.u) == pytest.approx(0.3 + 0.002 * (np.mean(GRID_QUADRATURE.x) - 119.5), abs=2e-4)
+    assert np.mean(field.du_dx) == pytest.approx(0.002, abs=2e-5)
+    assert np.mean(field.dv_dy) == pytest.approx(0, abs=2e-5)
+
+
+def test_contrast_and_brightness_do_not_enter() -> None:
+    kernel = PhaseKernel(picture(), GRID_QUADRATURE, PHASE)
+    plain = kernel.measure(picture(u=0.3).astype(np.float32))
+    dim = kernel.measure(picture(u=0.3).astype(np.float32) * 0.6 + 500)
+    assert np.max(np.abs(plain.u - dim.u)) < 5e-4
+
+
+def test_predicted_uncertainty_is_the_scatter() -> None:
+    kernel = PhaseKernel(picture(0.01, 1), GRID_QUADRATURE, PHASE, noise=41.0)
+    values = np.stack([kernel.measure(picture(0.01, s), noise=41.0).u for s in range(2, 12)])
+    predicted = np.mean(kernel.measure(picture(0.01, 2), noise=41.0).sigma("u", "current"))
+    assert np.sqrt(np.mean(values.var(axis=0, ddof=1))) == pytest.approx(predicted, rel=0.1)
+
+
+def test_only_order_one() -> None:
+    with pytest.raises(ValueError, match="order 1"):
+        KernelSettings(estimator="phase", order=2)

@@ -1,0 +1,251 @@
+"""The outputs: every consumer gets its share, as its policy says; a trouble in one stops that one alone.
+
+The example of a consumer of one's own does what it says.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquire.errors import DataError
+from acquire.events import Event, EventKind
+from acquire.load_cell import LoadLog
+from acquire.load_sample import LoadSample
+from examples.second_consumer import main
+from live.pipeline.consumer import Consumer, Policy
+from live.pipeline.consumer_thread import MOST_EVENTS, Outputs
+from live.pipeline.event_log import EventLog
+from live.pipeline.history import History
+from live.pipeline.measurement import Measurement
+from tests.live.fakes import frame
+from tests.live.made_up import START, make_loads, make_measurement
+
+
+class Keeper(Consumer):
+    """Keeps the numbers of what comes; waits to be let on, and fails where it is told to."""
+
+    def __init__(self, **how: Any) -> None:
+        self.rows: list[int] = []
+        self.ended, self.fails_at, self.error = False, None, DataError("strain.h5: the disk is full")
+        self.go, self.busy = threading.Event(), threading.Event()
+        self.go.set()
+        for name, value in how.items():
+            setattr(self, name, value)
+
+    def measurement(self, measurement: Measurement) -> None:
+        self.busy.set()
+        self.go.wait(10)
+        if self.fails_at == len(self.rows):
+            raise self.error
+        self.rows.append(measurement.number)
+
+    def end(self) -> str:
+        self.ended = True
+        return "kept"
+
+
+def outputs(*consumers: Consumer, loads: LoadLog | None = None) -> tuple[Outputs, EventLog]:
+    journal = EventLog()
+    return Outputs(consumers, loads or LoadLog(), journal, History()), journal
+
+
+def give(out: Outputs, numbers: Sequence[int]) -> None:
+    for number in numbers:
+        out.add(make_measurement(number))
+
+
+@pytest.mark.parametrize("blocks", [True, False])
+def test_every_measurement_is_passed_on_and_kept(blocks: bool) -> None:
+    keeper = Keeper(policy=Policy.WAIT, blocks=blocks)
+    out, journal = outputs(keeper)
+    give(out, range(100))
+    out.end()
+    assert keeper.rows == list(range(100))
+    assert keeper.ended
+    assert [i.eyy for i in out.history.instants] == pytest.approx([1e-3] * 100)
+    assert not out.failed
+    assert not journal.events()
+    (report,) = out.reports
+    assert report.line() == "consumer: 100 measurements; kept"
+
+
+@pytest.mark.parametrize(
+    ("policy", "kept"),
+    [(Policy.NEWEST, [0, 8, 9]), (Policy.BOUNDED, [0, 1, 2])],
+    ids=["newest wins", "bounded"],
+)
+def test_one_that_falls_behind_is_served_as_its_policy_says(policy: Policy, kept: list[int]) -> None:
+    keeper = Keeper(policy=policy, room=2)
+    keeper.go.clear()
+    out, _ = outputs(keeper)
+    give(out, [0])
+    assert keeper.busy.wait(10)  # it has the first one in hand
+    give(out, range(1, 10))  # returns at once
+    keeper.go.set()
+    out.end()
+    assert keeper.rows == kept
+    assert out.reports[0].line() == "consumer: 3 measurements, 7 passed over; kept"
+
+
+class Putting(Keeper):
+    """Puts something off, and asks to be asked again."""
+
+    asked = 0
+
+    def idle(self) -> float:
+        self.asked += 1
+        if self.asked == 3:
+            self.go.set()
+        return 0.01 if self.asked < 3 else math.inf
+
+
+def test_one_that_puts_things_off_is_asked_when_nothing_comes() -> None:
+    keeper = Putting(policy=Policy.WAIT)
+    out, _ = outputs(keeper)
+    keeper.go.clear()
+    out.add(make_measurement(0))
+    keeper.go.set()
+    assert keeper.busy.wait(10)
+    keeper.go.clear()
+    assert keeper.go.wait(10)  # it was asked, although nothing came
+    out.end()
+    assert keeper.rows == [0]
+
+
+def test_one_that_waits_holds_the_measurement_up_and_loses_nothing() -> None:
+    keeper = Keeper(policy=Policy.WAIT, room=2)
+    keeper.go.clear()
+    out, _ = outputs(keeper)
+    giver = threading.Thread(target=give, args=(out, range(10)))
+    giver.start()
+    assert keeper.busy.wait(10)
+    giver.join(0.2)
+    assert giver.is_alive()
+    keeper.go.set()
+    giver.join(10)
+    out.end()
+    assert keeper.rows == list(range(10))
+
+
+@pytest.mark.parametrize("blocks", [True, False])
+@pytest.mark.parametrize(
+    ("error", "says"),
+    [(DataError("strain.h5: the disk is full"), "the disk is full"), (TypeError("oops"), "by a defect")],
+)
+def test_a_failure_stops_one_consumer_alone(error: Exception, says: str, blocks: bool) -> None:
+    broken = Keeper(policy=Policy.WAIT, fails_at=3, error=error, vital=True, blocks=blocks)
+    sound = Keeper(policy=Policy.WAIT)
+    out, journal = outputs(broken, sound)
+    give(out, range(200))
+    out.end()
+    assert broken.rows == [0, 1, 2]
+    assert broken.ended
+    assert sound.rows == list(range(200))
+    assert len(out.history.instants) == 200
+    assert out.failed
+    assert [says in event.text for event in journal.events("error")] == [True]
+    assert says in out.reports[0].line()
+
+
+def test_a_failure_of_one_that_is_not_vital_is_a_warning() -> None:
+    out, journal = outputs(Keeper(fails_at=0))
+    give(out, [0])
+    out.end()
+    assert not out.failed
+    assert len(journal.events("warning")) == 1
+
+
+def test_one_that_waits_and_fails_lets_the_measurement_go_on() -> None:
+    keeper = Keeper(policy=Policy.WAIT, room=1, fails_at=0)
+    keeper.go.clear()
+    out, _ = outputs(keeper)
+    giver = threading.Thread(target=give, args=(out, range(10)))
+    giver.start()
+    assert keeper.busy.wait(10)
+    keeper.go.set()
+    giver.join(10)
+    assert not giver.is_alive()
+    out.end()
+
+
+def test_one_that_is_stuck_is_left_behind() -> None:
+    keeper = Keeper(patience_s=0.05)
+    keeper.go.clear()
+    out, _ = outputs(keeper)
+    give(out, [0])
+    assert keeper.busy.wait(10)
+    out.end()
+    assert "left behind" in out.reports[0].line()
+    keeper.go.set()
+
+
+class Listener(Consumer):
+    """Takes everything but measurements as they come."""
+
+    name = "listener"
+
+    def __init__(self) -> None:
+        self.seen: dict[str, list[Any]] = {"frame": [], "settled": [], "load": [], "event": []}
+        self.begun, self.go = threading.Event(), threading.Event()
+
+    def begin(self) -> None:
+        self.begun.set()
+        self.go.wait(10)
+
+    def frame(self, frame: Any) -> None:
+        self.seen["frame"].append(frame.index)
+
+    def settled(self, measurement: Measurement) -> None:
+        self.seen["settled"].append(measurement.force)
+
+    def load(self, sample: LoadSample) -> None:
+        self.seen["load"].append(sample)
+
+    def event(self, event: Event) -> None:
+        self.seen["event"].append(event.text)
+
+
+def test_each_kind_reaches_those_who_define_it() -> None:
+    listener, keeper = Listener(), Keeper()
+    loads = make_loads(10.0, lambda t: 100.0 * t)
+    out, journal = outputs(listener, keeper, loads=loads)
+    assert listener.begun.wait(10)
+    assert out.wants_frames
+    assert not outputs(keeper)[0].wants_frames
+    give(out, [0, 1])
+    for index in range(3):
+        out.frame(frame(index))
+    sample = LoadSample(START, 5.0, unit="kg")
+    out.load(sample)
+    for k in range(MOST_EVENTS + 5):
+        journal.tell(EventKind.NOTE, "operator", str(k))
+    listener.go.set()
+    out.end()
+    assert listener.seen["frame"] == [2]  # a camera waits for nobody: the newest wins
+    assert listener.seen["settled"] == pytest.approx([0.0, 10.0], abs=1e-6)
+    assert listener.seen["load"] == [sample]
+    assert listener.seen["event"][0] == "5"
+    assert len(listener.seen["event"]) == MOST_EVENTS
+    line = out.reports[0].line()
+    assert (
+        line
+        == "listener: 2 measurements; 1 frames, 2 passed over; 1 load samples; 1000 events, 5 passed over"
+    )
+
+
+def test_it_sees_every_measurement_and_stands_in_the_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(str(tmp_path / "run")) == 0
+    lines = capsys.readouterr().out.splitlines()
+    printed = [line for line in lines if line.endswith("um/m") and line[:4].strip().isdigit()]
+    (report,) = [line for line in lines if line.startswith("largest strain:")]
+    assert "the last was" in report
+    assert len(printed) >= 3
+    assert printed[-1].split()[1] in report

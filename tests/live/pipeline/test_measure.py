@@ -1,0 +1,258 @@
+"""The measuring path by itself: noise handed on, the reference renewed, by itself and on demand.
+
+The axis of the load as it is found while a test runs.
+
+The smear guard: warns once when it begins and says when it ends.
+
+The means of an instant: their bits belong to the values alone.
+
+A measurement waits for its force, but not for ever.
+
+Instants as columns: what goes in comes out, in little memory.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tracemalloc
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+
+from acquire.burst.accumulate import burst_of
+from acquire.events import Event, EventKind
+from acquire.frame import Burst
+from acquire.load_cell.load_log import LoadLog
+from acquire.load_sample import LoadSample
+from analysis import KernelSettings, Roi, ZoiGrid
+from analysis.evaluate import GaugeValue
+from hw_mocks.deformation import Affine
+from hw_mocks.speckle import Speckle
+from live.pipeline import history as module
+from live.pipeline.history import AxisFinder, History
+from live.pipeline.measure import NewReference, SmearGuard, measure
+from live.pipeline.measurement import HOLD_S, ForceMatching, TimeStep, ordered_mean
+from live.pipeline.reference import averaged, frame_noise, motion_between, prepare
+from tests.live.fakes import frame
+from tests.live.made_up import START, make_loads, make_measurement
+
+SHAPE = (160, 192)
+GRID = ZoiGrid.cover(Roi(24, 24, 144, 112), size=32, step=16)
+
+
+def burst(image: np.ndarray, number: int, n: int = 1, noise: float = math.nan) -> Burst:
+    nothing = np.zeros(image.shape, bool)
+    return Burst(
+        image.astype(np.float32), n, noise, nothing, 8, float(number), 0.0, number, number, 0, "nominal"
+    )
+
+
+def picture(speckle: Speckle, **gradient: float) -> np.ndarray:
+    return np.asarray(255 * speckle.render(Affine(x0=96, y0=80, **gradient), SHAPE))
+
+
+@pytest.fixture(scope="module")
+def speckle() -> Speckle:
+    return Speckle(SHAPE, radius=2.0, seed=5)
+
+
+def test_noise_is_that_of_the_average() -> None:
+    image = np.zeros((4, 4))
+    assert frame_noise(burst(image, 0), None) is None
+    assert frame_noise(burst(image, 0, 8, 1.5), None) == 1.5
+    assert frame_noise(burst(image, 0, 8, 1.5), 3.0) == 3.0
+    assert frame_noise(burst(image, 0, 8, 0.0), None) is None  # no scatter at all tells nothing
+    assert averaged(2.0, 16) == 0.5
+    assert averaged(0.0, 1) == pytest.approx(12**-0.5)
+    assert averaged(None, 4) is None
+
+
+def test_each_burst_with_its_force(speckle: Speckle) -> None:
+    loads = LoadLog(10.0)
+    for t in range(4):
+        loads.append(LoadSample(t=float(t), force=100.0 * t))
+    kernel, noise = prepare(burst(picture(speckle), 0, 8, 1.0), GRID, KernelSettings(), None)
+    assert noise == 1.0
+    bursts = [burst(picture(speckle, v=0.3 * i, dv_dy=1e-3 * i), i) for i in (1, 2, 3)]
+    found = list(measure(bursts, kernel, loads, noise_GL=noise))
+    assert [m.number for m in found] == [0, 1, 2]
+    assert [m.force for m in found] == [100.0, 200.0, 300.0]
+    assert [m.field.mean("eyy")[0] for m in found] == pytest.approx([1e-3, 2e-3, 3e-3], abs=5e-6)
+
+
+def test_motion_between_halves(speckle: Speckle) -> None:
+    kernel, _ = prepare(burst(picture(speckle, u=0.05), 0), GRID, KernelSettings(), 1.0)
+    moved = motion_between(kernel, burst(picture(speckle), 1), burst(picture(speckle, u=0.1), 2))
+    assert moved == pytest.approx(0.1, abs=0.002)
+
+
+@pytest.mark.parametrize("on_demand", [True, False])
+def test_a_renewed_reference_stays_composed(speckle: Speckle, on_demand: bool) -> None:
+    told: list[Event] = []
+    images = [picture(speckle, u=2.0, du_dx=0.02), picture(speckle, u=3.0, du_dx=0.03)]
+    kernel, noise = prepare(burst(picture(speckle), 0), GRID, KernelSettings(), 1.0)
+    if on_demand:
+        steps = [burst(images[0], 1), NewReference(burst(images[0], 2)), burst(images[1], 3)]
+    else:
+        # Another pattern fades in: the first reference no longer fits the last picture.
+        other = Speckle(SHAPE, radius=2.0, seed=6)
+        fading = zip((0.96, 0.92), ({"u": 2.0, "du_dx": 0.02}, {"u": 3.0, "du_dx": 0.03}), strict=True)
+        mixed = [w * picture(speckle, **g) + (1 - w) * picture(other, **g) for w, g in fading]
+        steps = [burst(image, i) for i, image in enumerate(mixed, 1)]
+    found = list(measure(steps, kernel, LoadLog(), noise_GL=noise, renew_at=0.2, on_event=told.append))
+    renewals = [event for event in told if event.kind is EventKind.REFERENCE]
+    assert len(renewals) == 1
+    assert renewals[0].data["automatic"] is not on_demand
+    last = found[-1].field
+    assert np.isfinite(last.exx).mean() > (0.99 if on_demand else 0.7)
+    assert last.mean("exx")[0] == pytest.approx(0.03, abs=2e-5 if on_demand else 2e-3)
+
+
+def test_a_blank_picture_does_not_end_the_measurement(speckle: Speckle) -> None:
+    kernel, noise = prepare(burst(picture(speckle), 0), GRID, KernelSettings(), 1.0)
+    told: list[Event] = []
+    blank = np.full(SHAPE, 128.0)
+    steps = [burst(blank, 1), NewReference(burst(blank, 2)), burst(picture(speckle, u=0.4), 3)]
+    found = list(measure(steps, kernel, LoadLog(), noise_GL=noise, renew_at=0.2, on_event=told.append))
+    assert np.isnan(found[0].field.u).all()
+    assert np.isfinite(found[1].field.u).all()
+    assert found[1].field.mean("u")[0] == pytest.approx(0.4, abs=1e-3)
+    assert "was not renewed" in told[0].text
+
+
+def instants(count: int) -> list[TimeStep]:
+    """Still for a third, then pulled along x."""
+    one, rng = make_measurement(0).instant, np.random.default_rng(1)
+    found = []
+    for k in range(count):
+        e = 1e-3 * max(0.0, 3 * k / count - 1)
+        exx, eyy, exy = np.array([e, -0.3 * e, 0.0]) + rng.normal(0, 1e-6, 3)
+        found.append(replace(one, t=START + k, exx=exx, eyy=eyy, exy=exy))
+    return found
+
+
+@pytest.mark.parametrize("most", [2000, 50])
+def test_y_until_the_strains_tell(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
+    monkeypatch.setattr(module, "MOST_INSTANTS", most)
+    finder, course = AxisFinder("auto"), instants(300)
+    told = [finder.add(i) for i in course]
+    assert set(told[:100]) == {"y"} and set(told[130:]) == {"x"}
+    assert len(finder._strains.kept) <= most
+    again = AxisFinder("auto")
+    assert [again.add(i) for i in course for _ in range(2)][::2] == told, "told twice it counts once"
+
+
+def test_what_is_given_holds() -> None:
+    for axis in ("x", "y"):
+        finder = AxisFinder(axis)
+        assert {finder.add(i) for i in instants(100)} == {axis}
+
+
+def test_smear_is_told_when_it_begins_and_ends() -> None:
+    told: list[Event] = []
+    guard = SmearGuard(told.append)
+    burst = burst_of([frame(0), frame(1)])
+    for motion in (math.nan, 0.01, 0.2, 0.3, math.nan, 0.045, 0.06, 0.02, 0.01, 0.07):
+        guard.look(dataclasses.replace(burst, motion_px=motion))
+    assert [event.level for event in told] == ["warning", "info", "warning"]
+    assert "0.20 px during a burst of 2" in told[0].text
+    assert told[0].data == {"motion_px": 0.2, "n": 2}
+
+
+@pytest.mark.parametrize("size", [1, 7, 945, 15_129])
+def test_the_mean_does_not_depend_on_the_place_in_memory(size: int) -> None:
+    values = np.random.default_rng(size).normal(1e-3, 1.0, size).astype(np.float32)
+    means = set()
+    for offset in range(0, 64, 4):
+        room = np.empty(size * 4 + 64, np.uint8)
+        place = room[offset : offset + size * 4].view(np.float32)
+        place[:] = values
+        means.add(ordered_mean(place))
+    assert len(means) == 1
+    assert means.pop() == pytest.approx(math.fsum(values.tolist()) / size, rel=1e-12)
+
+
+def test_the_mean_of_nothing_is_not_a_number() -> None:
+    assert math.isnan(ordered_mean(np.empty(0, np.float32)))
+
+
+def test_a_measurement_waits_for_its_force() -> None:
+    loads = make_loads(0.15, lambda t: 100.0 * t)
+    settling = ForceMatching(loads)
+    settled = [m for k in range(3) for m in settling.add(make_measurement(k))]
+    assert (len(settled), len(settling)) == (2, 1)
+    for k in range(16, 40):
+        loads.append(LoadSample(START + k / 100, float(k)))
+    settled += settling.add(make_measurement(3))
+    assert len(settling) == 0
+    np.testing.assert_allclose([m.force for m in settled], [0.0, 10.0, 20.0, 30.0], atol=1e-6)
+    assert [m.number for m in settled] == [0, 1, 2, 3]
+
+
+def test_a_silent_load_cell_holds_measurements_back_only_so_long() -> None:
+    settling, settled = ForceMatching(LoadLog()), []
+    for k in range(40):
+        settled += settling.add(make_measurement(k))
+        assert len(settling) <= HOLD_S / 0.1 + 1
+    assert len(settled) == 40 - len(settling) > 10
+    settled += settling.rest()
+    assert len(settled) == 40
+    assert np.isnan([m.force for m in settled]).all()
+
+
+NUMBERS = [one.name for one in fields(TimeStep) if one.name not in ("refused", "gauges")]
+
+
+def some(i: int) -> TimeStep:
+    numbers = {name: (i * 31 + k) if name.startswith("n_") and "noise" not in name else i * 0.37 + k
+               for k, name in enumerate(NUMBERS)}  # fmt: skip
+    gauges = {
+        "axial": GaugeValue(i * 1e-5, 1e-6),
+        "hole": GaugeValue(math.nan, math.nan, f"{i % 3} ZOIs lost"),
+    }
+    return TimeStep(**numbers, refused=f"{i % 4} LOST", gauges=gauges)
+
+
+def test_what_goes_in_comes_out() -> None:
+    history, put = History(), [some(i) for i in range(40)]
+    for instant in put:
+        history.add(instant)
+    assert len(history.instants) == 40
+    assert [repr(instant) for instant in history.instants] == [repr(instant) for instant in put]
+    assert repr(history.instants[-1]) == repr(put[-1]) and isinstance(history.instants[-1].n_zoi, int)
+    assert repr(history.instants[3:9:2]) == repr(put[3:9:2])
+    for name in NUMBERS:
+        assert np.array_equal(history.column(name), [getattr(instant, name) for instant in put])
+    axial = history.gauge("axial")
+    assert axial is not None and np.array_equal(axial, [i * 1e-5 for i in range(40)])
+    for beyond in (40, -41):
+        with pytest.raises(IndexError):
+            history.instants[beyond]
+
+
+def test_a_gauge_that_comes_and_goes() -> None:
+    history, late = History(), {"late": GaugeValue(1.0, 0.1)}
+    for gauges in ({}, late, {}):
+        history.add(replace(some(0), gauges=gauges))
+    assert [dict(instant.gauges) for instant in history.instants] == [{}, late, {}]
+    assert history.gauge("late") is None, "the first instant has none of that name"
+
+
+def test_the_columns_grow_while_they_are_read() -> None:
+    history = History()
+    history.add(some(0))
+    column, axial = history.column("t"), history.gauge("axial")
+    history.add(some(1))
+    assert column.size == 1 and axial is not None and axial.size == 1
+
+
+def test_little_memory() -> None:
+    history = History()
+    tracemalloc.start()
+    for i in range(20_000):
+        history.add(some(i))
+    grown = tracemalloc.get_traced_memory()[0] / 20_000
+    tracemalloc.stop()
+    assert grown < 320, "bytes an instant with two gauges"

@@ -1,0 +1,222 @@
+"""Mailbox and buffer: newest wins, bounded, everything counted.
+
+A lost pace is told once, with its cause.
+
+A thread is made nicer alone.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+
+import pytest
+
+from live.pipeline import queues as channels
+from live.pipeline.latency import LatencyMonitor, LatencySample, Use, used, yield_to_others
+from live.pipeline.queues import BoundedQueue, LatestQueue
+
+
+def test_newest_wins_and_the_rest_is_counted() -> None:
+    box: LatestQueue[int] = LatestQueue()
+    for i in range(5):
+        box.put(i)
+    assert box.get(0) == 4
+    assert box.take_skipped() == [0, 1, 2, 3]
+    assert box.take_skipped() == []
+    assert box.get(0) is None
+
+
+def test_a_closed_mailbox_gives_what_lies_there() -> None:
+    box: LatestQueue[int] = LatestQueue()
+    box.put(1)
+    box.close()
+    assert not box.finished
+    assert box.get() == 1
+    assert box.finished
+    assert box.get() is None
+    box.put(2)
+    assert box.take_skipped() == [2]
+
+
+def test_a_waiting_mailbox_skips_nothing() -> None:
+    box: LatestQueue[int] = LatestQueue(waits=True)
+
+    def produce() -> None:
+        for i in range(200):
+            box.put(i)
+        box.close()
+
+    thread = threading.Thread(target=produce)
+    thread.start()
+    taken = []
+    while not box.finished:
+        item = box.get(1.0)
+        if item is not None:
+            taken.append(item)
+    thread.join()
+    assert taken == list(range(200))
+    assert box.take_skipped() == []
+
+
+def test_what_comes_while_the_reader_prepares_waits_for_it() -> None:
+    box: LatestQueue[int] = LatestQueue(at_first=3)
+    for i in range(5):
+        box.put(i)
+    assert box.take_skipped() == [0, 1]  # no more than three may wait
+    box.begin()
+    assert [box.get(0), box.get(0)] == [2, 3]
+    box.put(5)
+    assert [box.get(0), box.get(0), box.get(0)] == [4, 5, None]  # caught up: from now on the newest
+    box.put(6)
+    box.put(7)
+    assert box.get(0) == 7
+    assert box.take_skipped() == [6]
+
+
+def test_a_reader_who_never_catches_up_goes_on_with_the_newest() -> None:
+    box: LatestQueue[int] = LatestQueue(at_first=3)
+    box.begin()
+    taken = []
+    for i in range(0, 40, 2):
+        box.put(i)
+        box.put(i + 1)
+        taken.append(box.get(0))
+    assert taken[:2] == [0, 1]
+    assert taken[3:] == list(range(7, 40, 2))
+
+
+def test_a_slow_reader_is_not_kept_in_the_past(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(channels, "CATCH_UP_S", 0.05)
+    box: LatestQueue[int] = LatestQueue(at_first=50)
+    for i in range(40):
+        box.put(i)
+    box.begin()
+    assert box.get(0) == 0
+    time.sleep(0.1)
+    assert box.get(0) == 39
+    assert box.take_skipped() == list(range(1, 39))
+
+
+def test_closing_frees_a_waiting_producer() -> None:
+    box: LatestQueue[int] = LatestQueue(waits=True)
+    box.put(1)
+    thread = threading.Thread(target=box.put, args=(2,))
+    thread.start()
+    box.close()
+    thread.join(5)
+    assert not thread.is_alive()
+    assert box.take_skipped() == [2]
+
+
+def test_the_buffer_is_bounded_in_bytes() -> None:
+    buffer: BoundedQueue[str] = BoundedQueue(100)
+    assert buffer.put("a", 60)
+    assert not buffer.put("b", 60)
+    assert buffer.put("c", 40)
+    assert buffer.put("small", 500, always=True)
+    assert buffer.waiting_bytes == 600
+    assert [buffer.get(0), buffer.get(0), buffer.get(0), buffer.get(0)] == ["a", "c", "small", None]
+    assert buffer.put("large", 1000)  # an empty one takes anything, else it would never be written
+    buffer.close()
+    assert not buffer.put("late", 1)
+    assert buffer.get() == "large"
+    assert buffer.finished
+
+
+def test_a_waiting_buffer_loses_nothing() -> None:
+    buffer: BoundedQueue[int] = BoundedQueue(3, waits=True)
+    thread = threading.Thread(target=lambda: [buffer.put(i, 1) for i in range(100)] and buffer.close())
+    thread.start()
+    taken = []
+    while not buffer.finished:
+        item = buffer.get(1.0)
+        if item is not None:
+            taken.append(item)
+    thread.join()
+    assert taken == list(range(100))
+
+
+PERIOD_S = 1 / 30
+
+
+def told(latency_s: float, *, backlog: float = 0.0, kernel_s: float = 0.01, others: float = 0.0,
+         view: float = 0.0, seconds: float = 4.0) -> list[str]:  # fmt: skip
+    """The warnings of some seconds of measurements, ``others`` and ``view`` in cores."""
+    now = 0.0
+
+    def use() -> Use:
+        return Use(now, now * (1.0 + others + view), now * 1.0, now * view)
+
+    pace, warnings = LatencyMonitor(lambda: backlog, use), []
+    for k in range(round(seconds * 30)):
+        now = k * PERIOD_S
+        if words := pace.look(LatencySample(now, latency_s, kernel_s), PERIOD_S):
+            warnings.append(words)
+    assert pace.p95_s == pytest.approx(latency_s)
+    return warnings
+
+
+def test_nothing_is_said_while_all_is_well() -> None:
+    assert told(0.04) == []
+
+
+@pytest.mark.parametrize(
+    ("cause", "says"),
+    [
+        ({"backlog": 0.3}, "the disk is too slow"),
+        ({"others": 0.9}, "another program takes 0.9 processor cores"),
+        ({"kernel_s": 0.05}, "the kernel needs 50 ms"),
+        ({"view": 0.8}, "drawing takes 0.8 processor cores"),
+        ({}, "the processor is short"),
+    ],
+)
+def test_a_lost_pace_is_told_once_with_its_cause(cause: dict[str, float], says: str) -> None:
+    (warning,) = told(0.1, **cause)
+    assert "up to 100 ms late (p95), bursts every 33 ms" in warning
+    assert says in warning
+
+
+def test_bursts_that_come_seldom_have_a_latency_and_no_warning() -> None:
+    pace = LatencyMonitor(lambda: 0.0, lambda: Use(0.0, 0.0, 0.0, 0.0))
+    assert [pace.look(LatencySample(2.0 * k, 9.0, 0.01), 2.0) for k in range(20)] == [""] * 20
+    assert pace.p95_s == pytest.approx(9.0)
+
+
+def test_the_bursts_that_waited_for_the_first_result_tell_nothing() -> None:
+    pace = LatencyMonitor(lambda: 0.0, lambda: Use(0.0, 0.0, 0.0, 0.0))
+    late = [max(0.8 - 0.3 * k * PERIOD_S, 0.02) for k in range(150)]
+    assert not any(pace.look(LatencySample(k * PERIOD_S, late[k], 0.01), PERIOD_S) for k in range(150))
+    assert pace.p95_s < 0.05
+
+
+def test_it_is_told_again_when_it_lasts() -> None:
+    assert len(told(0.1, seconds=68)) == 3
+
+
+def test_this_machine_says_who_uses_it() -> None:
+    before = used()
+    assert before is not None
+    sum(k * k for k in range(2_000_000))
+    after = used()
+    assert after is not None
+    assert after.own > before.own
+    assert after.all >= before.all > 0
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="threads have a nice value of their own on Linux only")
+def test_only_the_calling_thread_becomes_nicer() -> None:
+    found: list[int] = []
+
+    def work() -> None:
+        yield_to_others(3)
+        found.append(os.getpriority(os.PRIO_PROCESS, threading.get_native_id()))
+
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert found == [min(before + 3, 19)]
+    assert os.getpriority(os.PRIO_PROCESS, 0) == before

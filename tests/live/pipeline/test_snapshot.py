@@ -1,0 +1,124 @@
+"""Where a test stands is the same wherever it is shown."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquire.load_sample import LoadSample
+from analysis.evaluate import GaugeValue
+from live.config.loading import load_config
+from live.config.sections import SpecimenConfig
+from live.pipeline.measurement import TimeStep
+from live.pipeline.run_state import RunState
+from live.pipeline.snapshot import Snapshot, peak_force
+from live.ui.terminal.status_line import status_line
+from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.page_consumer import PageConsumer
+from tests.live.made_up import make_measurement
+
+
+def instant(**more: Any) -> TimeStep:
+    return replace(make_measurement(0).instant, **more)
+
+
+def loaded(*forces: float, axis: str = "y") -> RunState:
+    """A test with these forces, one a second."""
+    books = RunState.new(1.0, specimen=SpecimenConfig(axis=axis, area_mm2=40.0))
+    books.vitals.state, books.vitals.began_t = "REC", 0.0
+    for t, force in enumerate(forces):
+        books.loads.append(LoadSample(t, force))
+        books.vitals.loaded(t, force)
+    return books
+
+
+class Run:
+    paused, recording, folder = False, True, Path("run")
+
+    def __init__(self, books: RunState) -> None:
+        self.books = books
+
+
+def on_the_page(books: RunState) -> dict[str, Any]:
+    page = PageConsumer(Broadcaster(), load_config(None, {"specimen.area_mm2": 40.0}), lambda: 5.0)
+    page.attend(Run(books))
+    return page.state()
+
+
+@pytest.mark.parametrize(
+    ("forces", "peak"),
+    [
+        ((10.0, 5000.0, 4000.0), 5000.0),
+        ((-10.0, -5000.0, -4000.0), -5000.0),
+        ((20.0, -5000.0, 300.0), -5000.0),
+        ((-20.0, math.nan, 300.0, math.inf, -299.0), 300.0),
+    ],
+)
+def test_the_peak_in_tension_and_compression_is_one_on_page_and_status_line(
+    forces: tuple[float, ...], peak: float
+) -> None:
+    books = loaded(*forces)
+    assert books.snapshot(5.0).peak_N == on_the_page(books)["peak_N"] == peak
+    assert f"  peak {peak:.1f} N" in status_line(books.snapshot(5.0), 200)
+
+
+def test_before_the_first_force_there_is_no_peak() -> None:
+    assert math.isnan(peak_force(math.nan, math.nan))
+    assert "peak" not in status_line(loaded().snapshot(5.0), 200)
+    assert peak_force(math.nan, 0.0) == 0.0
+
+
+def test_the_latency_on_page_and_status_line_is_that_of_the_monitor() -> None:
+    books = loaded(1.0)
+    books.vitals.latency_p95_s = 0.042
+    books.history.add(instant(latency_s=9.0))
+    assert on_the_page(books)["late_s"] == 0.042
+    assert "  p95 42 ms" in status_line(books.snapshot(5.0), 200)
+
+
+def test_the_snapshot_of_a_run() -> None:
+    books = loaded(800.0, 900.0)
+    books.ledger.add(grabbed=5, lost=2, unrecorded=1)
+    books.alarms.put("a", "a: too much")
+    i = instant(eyy=1e-3, sigma_eyy=2e-6)
+    books.history.add(i)
+    now = books.snapshot(5.0)
+    assert (now.elapsed_s, now.force_N, now.stress_Pa) == (5.0, 900.0, pytest.approx(900 / 40e-6))
+    assert (now.axial_name, now.axial, now.sigma_axial) == ("eyy", 1e-3, 2e-6)
+    assert (now.valid, now.zois, now.lost) == (i.n_valid, i.n_zoi, 3)
+    assert now.alarms == ("a: too much",) and now.instant is not None and now.instant.t == i.t
+    books.ledger.add(lost=5)
+    assert now.lost == 3, "what came later is not in it"
+
+
+def test_in_a_replay_the_force_is_that_of_the_instant() -> None:
+    books = loaded(800.0)
+    books.vitals.state = ""
+    assert math.isnan(books.snapshot(0.0).force_N)
+    now = books.snapshot(1.0, instant(force=123.0))
+    assert (now.state, now.force_N) == ("REPLAY", 123.0)
+
+
+@pytest.mark.parametrize(("axis", "mean"), [("x", "exx"), ("y", "eyy")])
+def test_axial_is_the_gauge_of_that_name_or_else_the_mean_along_the_load(axis: str, mean: str) -> None:
+    books, plain = loaded(axis=axis), instant(exx=1e-3, sigma_exx=1e-6, eyy=2e-3, sigma_eyy=2e-6)
+    now = books.snapshot(0.0, plain)
+    assert (now.axial_name, now.axial, now.sigma_axial) == (
+        mean, getattr(plain, mean), getattr(plain, f"sigma_{mean}")
+    )  # fmt: skip
+    lost = books.snapshot(0.0, replace(plain, gauges={"axial": GaugeValue(math.nan, math.nan, "lost")}))
+    assert lost.axial_name == "axial" and math.isnan(lost.axial), "a lost gauge is not replaced by the mean"
+    other = books.snapshot(0.0, replace(plain, gauges={mean: GaugeValue(0.5, 0.1)}))
+    assert other.axial == getattr(plain, mean), "a gauge that has the name of a mean is a gauge like others"
+
+
+def test_before_anything_is_measured_the_page_can_be_told() -> None:
+    page = PageConsumer(Broadcaster(), load_config(None, {}), lambda: 5.0)
+    assert page.state()["state"] == "opening" and page.state()["elapsed_s"] == 0.0
+    assert math.isnan(Snapshot(0.0).axial)
+    json.dumps(on_the_page(loaded(1.0)))

@@ -1,0 +1,87 @@
+"""The measure of strain is a setting; where small strains are false, a warning says so."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from acquire.events import Event
+from analysis import Roi, StrainField, ZoiGrid
+from hw_mocks.deformation import Affine
+from hw_mocks.speckle import Speckle
+from live.cli import main
+from live.pipeline.measure import StrainGuard
+from live.results import Strain
+
+SHAPE, TURN, STRAIN, NU = (160, 192), math.radians(3), 0.01, 0.3
+
+
+@pytest.fixture(scope="module")
+def turned(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A strip pulled along y by 1 %, turned by 3 degrees on the way."""
+    folder = tmp_path_factory.mktemp("turned")
+    speckle = Speckle(SHAPE, radius=2.0, seed=3)
+    for k, share in enumerate((0.0, 0.5, 1.0)):
+        c, s = math.cos(share * TURN), math.sin(share * TURN)
+        F = np.array([[c, -s], [s, c]]) @ np.diag([1 - NU * share * STRAIN, 1 + share * STRAIN])
+        place = Affine(0.0, 0.0, F[0, 0] - 1, F[0, 1], F[1, 0], F[1, 1] - 1, 96.0, 80.0)
+        cv2.imwrite(str(folder / f"a{k}.png"), np.rint(255 * speckle.render(place, SHAPE)).astype(np.uint8))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("measure", "axial", "across"),
+    [
+        ("", STRAIN, -NU * STRAIN),
+        ("engineering", STRAIN, -NU * STRAIN),
+        ("small", math.cos(TURN) * (1 + STRAIN) - 1, math.cos(TURN) * (1 - NU * STRAIN) - 1),
+        ("green", STRAIN + STRAIN**2 / 2, -NU * STRAIN + (NU * STRAIN) ** 2 / 2),
+        ("hencky", math.log(1 + STRAIN), math.log(1 - NU * STRAIN)),
+    ],
+)
+def test_every_file_is_in_the_measure_asked_for(
+    turned: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture, measure: str, axial: float, across: float
+) -> None:
+    caplog.set_level("INFO", logger="live")
+    arguments = ["--zoi", "48", "--step", "16", "--no-view", "--no-rrd", "--out", str(tmp_path / "out")]
+    more = ["--strain", measure] if measure else []
+    assert main(["replay", str(turned), *arguments, *more]) == 0
+    with Strain.open(tmp_path / "out" / "strain.h5") as strain:
+        assert strain.strain_measure == (measure or "engineering")
+        assert strain.config["measure"]["strain"] == strain.strain_measure
+        assert strain.values["eyy"][-1] == pytest.approx(axial, abs=3e-5)
+        assert strain.values["exx"][-1] == pytest.approx(across, abs=3e-5)
+        assert np.nanmean(strain.maps("eyy", -1)) == pytest.approx(axial, abs=3e-5)
+        assert np.nanmean(strain.maps("dv_dy", -1)) == pytest.approx(
+            math.cos(TURN) * (1 + STRAIN) - 1, abs=3e-5
+        )
+    row = (tmp_path / "out" / "strain.csv").read_text().splitlines()[-1].split(",")
+    assert float(row[4]) == pytest.approx(axial, abs=3e-5)
+    assert ("measure with --strain engineering" in caplog.text) is (measure == "small")
+
+
+def field(**values: float) -> StrainField:
+    return StrainField.from_values(ZoiGrid.cover(Roi(0, 0, 64, 64), 32, 16), values)
+
+
+def test_the_warning_comes_once_and_only_for_small_strains() -> None:
+    turned, pulled, calm = (
+        field(du_dy=-0.01, dv_dx=0.01),
+        field(dv_dy=0.021),
+        field(dv_dy=0.019, du_dy=-0.005, dv_dx=0.005),
+    )
+    for measure, seen, times in (
+        ("small", [calm, turned, turned, pulled], [2.0]),
+        ("small", [calm, pulled], [2.0]),
+        ("small", [calm, calm], []),
+        ("hencky", [turned, pulled], []),
+    ):
+        told: list[Event] = []
+        guard = StrainGuard(measure, told.append)  # type: ignore[arg-type]
+        for number, one in enumerate(seen):
+            guard.look(one, number + 1.0)
+        assert [event.t for event in told] == times

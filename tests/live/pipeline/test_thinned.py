@@ -1,0 +1,32 @@
+"""A bounded history is even, and has the newest."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from live.pipeline.history import Thinned
+
+
+@given(most=st.integers(2, 30), count=st.integers(0, 500))
+def test_evenly_thinned_from_the_first_to_the_newest(most: int, count: int) -> None:
+    history: Thinned[int] = Thinned(most)
+    for item in range(count):
+        history.append(item)
+    stride = 2**history.halvings
+    assert history.kept == list(range(0, count, stride))
+    assert len(history.kept) <= most and (stride == 1 or len(history.kept) > most // 2 - 1)
+    items = history.items()
+    assert items[-1:] == ([count - 1] if count else []) and len(set(items)) == len(items)
+
+
+@pytest.mark.parametrize("most", [4, 5])
+def test_what_is_kept_stays_until_the_next_halving(most: int) -> None:
+    history: Thinned[int] = Thinned(most)
+    before: tuple[int, list[int]] = (0, [])
+    for item in range(100):
+        history.append(item)
+        halvings, kept = before
+        assert history.halvings > halvings or history.kept[: len(kept)] == kept
+        before = history.halvings, list(history.kept)

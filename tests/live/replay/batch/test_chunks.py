@@ -1,0 +1,158 @@
+"""``phasedic batch --chunk``: one long session by several workers, told as one replay."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from acquire.frame import frozen
+from hw_mocks.deformation import Affine
+from hw_mocks.speckle import Speckle
+from live.cli import main
+from live.results import Strain
+from tests.live.made_run import session_writer
+from tests.live.made_up import START, make_frame
+from tests.live.replay.batch.running import is_gone, parts, pid_of, rows, started, until
+
+SETTINGS = ["--zoi", "48", "--step", "16"]
+CHUNK = ["--chunk", "10", "--workers", "2"]
+
+
+@pytest.fixture(scope="module")
+def whole(long: Path) -> Path:
+    out = long.parent.with_name("whole")
+    assert main(["replay", str(long), *SETTINGS, "--no-view", "--no-rrd", "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def cut(long: Path) -> Path:
+    out = long.parent.with_name("cut")
+    assert main(["batch", str(long), *SETTINGS, *CHUNK, "--out", str(out)]) == 0
+    return out
+
+
+def test_as_the_whole(whole: Path, cut: Path) -> None:
+    with Strain.open(whole / "strain.h5") as one, Strain.open(cut / "long" / "strain.h5") as other:
+        assert len(one.time_s) == 310
+        for name in ("frame", "last_frame", "n_valid", "lost", "time_s", "force_N", "noise_GL"):
+            np.testing.assert_array_equal(other.values[name], one.values[name], err_msg=name)
+        np.testing.assert_array_equal(other.maps("status"), one.maps("status"))
+        for name in ("u", "exx", "eyy", "exy"):
+            sigma = np.nanmedian(one.maps(f"sigma_{name}"))
+            assert np.nanmax(np.abs(other.maps(name) - one.maps(name))) < 0.005 * sigma, name
+            np.testing.assert_allclose(other.maps(f"sigma_{name}"), one.maps(f"sigma_{name}"), rtol=1e-4)
+        for name in ("exx", "eyy", "exy"):
+            error = other.values[f"sigma_{name}"] / one.values[f"sigma_{name}"] - 1
+            assert np.abs(error).max() < 1e-3  # of the means, which the kernel knows more of
+
+
+def test_the_first_chunk_is_bit_equal(whole: Path, cut: Path) -> None:
+    with Strain.open(whole / "strain.h5") as one, Strain.open(cut / "long" / "strain.h5") as other:
+        for name in ("u", "eyy", "sigma_eyy", "residual", "iterations"):
+            np.testing.assert_array_equal(other.maps(name)[:90], one.maps(name)[:90], err_msg=name)
+        assert np.any(other.maps("u")[90:] != one.maps("u")[90:])  # it was cut indeed
+
+
+def test_files_are_those_of_a_replay(whole: Path, cut: Path) -> None:
+    one, other = ((folder / "strain.csv").read_text().splitlines() for folder in (whole, cut / "long"))
+    assert one[0] == other[0]
+    assert len(one) == len(other) == 311
+    assert "joined of 3 chunks" in (cut / "long" / "replay.txt").read_text(encoding="utf-8")
+    assert [row["instants"] for row in rows(cut)] == ["310"]
+    assert sorted(path.name for path in cut.iterdir()) == ["long", "summary.csv", "summary.parquet"]
+
+
+def working(out: Path) -> list[Path]:
+    return [part for place in out.glob(".*.chunks") for part in parts(place)]
+
+
+def test_killed_in_the_middle(long: Path, tmp_path: Path) -> None:
+    """The chunks that are whole are not done again."""
+    out = tmp_path / "out"
+    words = (long, *SETTINGS, "--step", "4", *CHUNK, "--out", out)
+    caller = started(*words)
+    until(lambda: len(list(out.glob(".long.*.chunks/0*/batch.json"))) > 0)
+    whole = [path.stat().st_mtime_ns for path in out.glob(".long.*.chunks/0000/batch.json")]
+    caller.kill()
+    caller.wait()
+    left = working(out)
+    until(lambda: all(is_gone(pid_of(part)) for part in left))
+    assert not (out / "long").exists()
+    caller = started(*words)
+    until(lambda: any(not is_gone(pid_of(part)) for part in working(out)))
+    first = [path.stat().st_mtime_ns for path in out.glob(".long.*.chunks/0000/batch.json")]
+    assert not whole or first == whole
+    with contextlib.suppress(ProcessLookupError, StopIteration):  # where it has just ended
+        os.kill(next(pid for pid in map(pid_of, working(out)) if not is_gone(pid)), signal.SIGKILL)
+    assert caller.wait(120) == 0
+    assert [row["instants"] for row in rows(out)] == ["310"]
+    assert sorted(path.name for path in out.iterdir()) == ["long", "summary.csv", "summary.parquet"]
+
+
+def changing(folder: Path) -> Path:
+    """A session in which another pattern fades in, faster than a reference follows."""
+    (folder / "changing").mkdir()
+    shape, measure = (96, 128), {"zoi": 32, "step": 16, "burst": 1, "reference_burst": 1, "noise_GL": 16.0}
+    first, other = Speckle(shape, radius=2.0, seed=5), Speckle(shape, radius=2.0, seed=6)
+
+    def picture(share: float, strain: float) -> np.ndarray:
+        moved = Affine(x0=64, y0=48, u=100 * strain, du_dx=strain)
+        mixed = share * first.render(moved, shape) + (1 - share) * other.render(moved, shape)
+        return frozen(np.rint(4080 * np.asarray(mixed)).astype(np.uint16))
+
+    pictures = [picture(1.0, 0.0), picture(0.96, 0.02), picture(0.92, 0.03)]
+    with session_writer(folder / "changing", {"measure": measure}, {}) as writer:
+        for k in range(230):
+            image = pictures[(k >= 150) + (k >= 151)]
+            writer.write_frame(dataclasses.replace(make_frame(k, START + 0.1 * k), image=image))
+    return folder / "changing" / "session.h5"
+
+
+def test_a_renewed_reference_is_not_cut(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    """The pattern is another one from the middle on: the whole is done, as a replay does it."""
+    session = changing(tmp_path)
+    assert main(["batch", str(session), *CHUNK, "--out", str(tmp_path / "out")]) == 0
+    assert "a reference was renewed in it; it is not cut, but done whole" in capsys.readouterr().out
+    words = ["--no-view", "--no-rrd", "--out", str(tmp_path / "whole")]
+    assert main(["replay", str(session), *words]) == 0
+    assert "the reference was renewed" in caplog.text
+    with (
+        Strain.open(tmp_path / "whole" / "strain.h5") as one,
+        Strain.open(tmp_path / "out" / "changing" / "strain.h5") as other,
+    ):
+        np.testing.assert_array_equal(other.maps("eyy"), one.maps("eyy"))
+    assert not list((tmp_path / "out").glob(".*"))
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--chunk", "0"], "--chunk 0.0 is not possible"),
+        (["--chunk", "nan"], "--chunk nan is not possible"),
+        (["--chunk", "9", "--as-measured"], "leave --chunk out"),
+    ],
+)
+def test_what_is_refused(
+    long: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], words: list[str], says: str
+) -> None:
+    assert main(["batch", str(long), *words, "--out", str(tmp_path / "out")]) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_a_short_one_is_bit_equal(runs: Path, tmp_path: Path) -> None:
+    one = runs / "hole-1" / "session.h5"
+    words = [*SETTINGS, "--out"]
+    assert main(["batch", str(one), "--chunk", "0.5", *words, str(tmp_path / "cut")]) == 0
+    assert main(["batch", str(one), *words, str(tmp_path / "not")]) == 0
+    paths = [tmp_path / folder / "hole-1" / "strain.h5" for folder in ("cut", "not")]
+    with Strain.open(paths[0]) as first, Strain.open(paths[1]) as second:
+        np.testing.assert_array_equal(first.maps("eyy"), second.maps("eyy"))

@@ -1,0 +1,163 @@
+"""Workers that load their libraries while the campaign is planned, and the order of what they are given."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import pytest
+
+from acquire.errors import ConfigError, DataError
+from analysis import PICTURE_KINDS, warm_up
+from live.replay.batch import campaign
+from live.replay.batch.campaign import CampaignRequest, run_campaign
+from live.replay.batch.keys import longest_first
+from live.replay.batch.row import BatchRow, failed
+from live.replay.batch.task import Task
+from live.replay.batch.test_list import find_tests
+from live.replay.batch.worker_processes import Pool, WorkerProcess, WorkerProcesses
+from live.ui.terminal.screen import TerminalScreen
+from tests.live.replay.batch.running import is_gone
+
+
+class Counted(WorkerProcesses):
+    """Remembers its processes, and which were taken."""
+
+    made: list[Counted]
+
+    def __init__(self, count: int) -> None:
+        super().__init__(count)
+        self.pids, self.taken = [worker.pid for worker in self._idle], list[int]()
+        Counted.made.append(self)
+
+    def take(self) -> object:
+        worker = super().take()
+        self.taken.append(worker.pid)
+        return worker
+
+
+@pytest.fixture(autouse=True)
+def counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    Counted.made = []
+    monkeypatch.setattr(campaign, "Hands", Counted)
+
+
+def wanted(tmp_path: Path, tests: int, **more: object) -> CampaignRequest:
+    """Tests whose recordings are no recordings."""
+    for number in range(tests):
+        (tmp_path / f"{number}").mkdir()
+        (tmp_path / f"{number}" / "session.h5").write_bytes(b"nothing of a session")
+    found = find_tests([str(tmp_path / "[0-9]" / "session.h5")])
+    return CampaignRequest(**{"tests": found, "out": tmp_path / "out", "workers": 2, **more})
+
+
+def test_they_are_there_before_it_is_known_what_they_do(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    planned, before = campaign._planned, []
+
+    def plan(asked: CampaignRequest) -> object:
+        before.extend(Counted.made[0].pids)
+        return planned(asked)
+
+    monkeypatch.setattr(campaign, "_planned", plan)
+    run_campaign(wanted(tmp_path, 3), TerminalScreen(quiet=True), threading.Event())
+    (made,) = Counted.made
+    assert len(before) == 2
+    assert made.taken
+    assert set(made.taken) <= set(before), "others were started"
+    assert all(map(is_gone, before))
+
+
+def test_those_that_nobody_needs_are_let_go_of(tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "0").mkdir()  # of other settings
+    with pytest.raises(ConfigError, match="nothing is overwritten"):
+        run_campaign(wanted(tmp_path, 2), TerminalScreen(quiet=True), threading.Event())
+    (made,) = Counted.made
+    assert len(made.pids) == 1
+    assert not made.taken
+    assert all(map(is_gone, made.pids))
+
+
+def test_a_cluster_needs_none(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError):
+        run_campaign(
+            wanted(tmp_path, 1, scheduler="tcp://127.0.0.1:9x"), TerminalScreen(quiet=True), threading.Event()
+        )
+    assert not Counted.made[0].pids
+
+
+def test_a_pool_starts_more_where_they_are_not_enough(tmp_path: Path) -> None:
+    tasks = [Task(str(k), str(tmp_path), "nothing.h5", key="key") for k in range(2)]
+    rows = []
+    hands = Counted(1)
+    pool = Pool(tasks, 2, lambda task, progress: None, lambda task, row: rows.append(row) or (), hands)
+    while not pool.wait(0.05):
+        pass
+    pool.close()
+    hands.close()
+    assert [row.values["outcome"] for row in rows] == [failed("0", "", "", 1).values["outcome"]] * 2
+    assert hands.pids[0] in hands.taken
+    assert len(set(hands.taken)) == 2
+    assert all(map(is_gone, hands.taken))
+
+
+def test_what_is_not_compiled_is_compiled_by_the_caller(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Workers say what they find; only then are they given anything."""
+    asked: list[tuple[object, int]] = []
+    monkeypatch.setattr(WorkerProcess, "is_ready", lambda hand: False)
+    monkeypatch.setattr(
+        campaign, "compile_ahead", lambda kinds, **more: asked.append((kinds, len(Counted.made[0].taken)))
+    )
+    run_campaign(wanted(tmp_path, 1), TerminalScreen(quiet=True), threading.Event())
+    assert asked == [(PICTURE_KINDS, 0)]
+
+
+def test_the_first_word_of_a_worker() -> None:
+    warm_up()
+    hands = WorkerProcesses(1)
+    assert hands.are_ready()
+    killed = hands.take()
+    killed.end()
+    assert not killed.is_ready()
+
+
+def test_no_worker_can_be_started(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*words: object, **more: object) -> None:
+        raise BlockingIOError(11, "Resource temporarily unavailable")
+
+    asked = wanted(tmp_path, 1)
+    monkeypatch.setattr("live.replay.batch.worker_processes.subprocess.Popen", none)
+    with pytest.raises(DataError, match=r"no process can be started .* end other programs"):
+        run_campaign(asked, TerminalScreen(quiet=True), threading.Event())
+
+
+def test_no_worker_can_be_started_any_more(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    """Each task is a row with its error."""
+
+    class Empty(WorkerProcesses):
+        def take(self) -> WorkerProcess:
+            raise BlockingIOError("too many")
+
+    rows: list[BatchRow] = []
+    tasks = [Task(str(k), str(tmp_path), "nothing.h5", key="key") for k in range(3)]
+    pool = Pool(tasks, 2, lambda task, progress: None, lambda task, row: rows.append(row) or (), Empty(0))
+    assert pool.wait(10.0)
+    assert len(rows) == 3
+    assert all("memory enough" in str(row.values["error"]) for row in rows)
+    assert "too many" in caplog.text
+
+
+def test_the_longest_first(tmp_path: Path) -> None:
+    for name, length in (("short", 10), ("long", 1000), ("cut", 400)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "session.h5").write_bytes(b"x" * length)
+    (tmp_path / "cut" / "session.1.h5").write_bytes(b"x" * 800)  # where it was continued
+    (tmp_path / "pictures").mkdir()
+    sources = [tmp_path / name / "session.h5" for name in ("short", "long", "gone", "cut")]
+    tasks = [Task(source.parent.name, "", str(source)) for source in sources]
+    tasks.insert(0, Task("pictures", "", f"files:{tmp_path / 'pictures'}/*.tif"))
+    assert [task.name for task in longest_first(tasks)] == ["cut", "long", "short", "pictures", "gone"]

@@ -1,0 +1,179 @@
+"""What is asked of a replay is done, or refused in words and with its exit code."""
+
+from __future__ import annotations
+
+import csv
+import os
+import threading
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from acquire.session import Session
+from hw_mocks.deformation import Affine
+from hw_mocks.speckle import Speckle
+from live.cli import main
+from live.replay.replay import replay
+from live.replay.source import ReplayRequest
+from live.results import Strain
+from live.ui.terminal.screen import TerminalScreen
+
+SHAPE = (128, 160)
+STRAINS = (0.0, 0.001, 0.002, 0.003, 0.004, 0.005)
+SMALL = ["--zoi", "48", "--step", "24", "--no-view", "--no-rrd"]
+
+
+@pytest.fixture(scope="module")
+def shots(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("asked") / "shots"
+    folder.mkdir()
+    speckle = Speckle(SHAPE, radius=2.0, seed=3)
+    for i, strain in enumerate(STRAINS):
+        picture = 255 * speckle.render(Affine(dv_dy=strain, x0=80, y0=64), SHAPE)
+        cv2.imwrite(str(folder / f"a{i}.png"), np.rint(picture).astype(np.uint8))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def session(shots: Path) -> Path:
+    out = shots.parent / "run"
+    assert main(["run", "--camera", f"files:{shots}", "--burst", "1", *SMALL, "--out", str(out)]) == 0
+    return out / "session.h5"
+
+
+def measured(out: Path) -> list[float]:
+    with Strain.open(out / "strain.h5") as strain:
+        return [float(value) for value in strain.values["eyy"]]
+
+
+@pytest.mark.parametrize("source", ["session", "shots"])
+def test_a_reference_of_ones_own(
+    request: pytest.FixtureRequest, shots: Path, tmp_path: Path, source: str
+) -> None:
+    path = request.getfixturevalue(source)
+    assert (
+        main(
+            ["replay", str(path), "--reference", str(shots / "a2.png"), *SMALL, "--out", str(tmp_path / "a")]
+        )
+        == 0
+    )
+    assert measured(tmp_path / "a") == pytest.approx([strain - 0.002 for strain in STRAINS], abs=3e-4)
+
+
+@pytest.mark.parametrize("source", ["session", "shots"])
+@pytest.mark.parametrize(
+    ("more", "code", "says"),
+    [
+        (["--reference", "nowhere.png"], 4, "nowhere.png: cannot be read: No such file"),
+        (["--reference", "PIPE"], 4, "it is a pipe"),
+        (["--reference", "DEEP"], 4, "the reference has 16-bit samples"),
+        (["--reference", "SMALL"], 4, "the reference has 20 x 10 px"),
+        (["--from", "nan"], 2, "--from nan is not possible"),
+        (["--to", "nan"], 2, "--to nan is not possible"),
+        (["--from", "inf"], 2, "--from inf is not possible"),
+        (["--to", "-5"], 2, "--to -5.0 is not possible"),
+        (["--from", "-5"], 2, "--from -5.0 is not possible"),
+        (["--from", "3", "--to", "2"], 2, "--from 3.0 must be before --to 2.0"),
+        (["--from", "1000"], 4, "the last one is at 5.000 s"),
+        (["--burst", "200"], 4, "no whole burst after the reference"),
+    ],
+)
+def test_what_is_refused(
+    request: pytest.FixtureRequest, capsys: pytest.CaptureFixture[str], tmp_path: Path,
+    source: str, more: list[str], code: int, says: str,
+) -> None:  # fmt: skip
+    os.mkfifo(tmp_path / "PIPE")
+    (tmp_path / "DEEP").write_bytes(cv2.imencode(".png", np.zeros(SHAPE, np.uint16))[1].tobytes())
+    (tmp_path / "SMALL").write_bytes(cv2.imencode(".png", np.zeros((10, 20), np.uint8))[1].tobytes())
+    more = [str(tmp_path / word) if word.isupper() else word for word in more]
+    path = str(request.getfixturevalue(source))
+    assert main(["replay", path, *SMALL, "--out", str(tmp_path / "out"), *more]) == code
+    assert says in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_reference_beside_the_ones_of_the_run(
+    capsys: pytest.CaptureFixture[str], session: Path, shots: Path
+) -> None:
+    assert main(["replay", str(session), "--as-measured", "--reference", str(shots / "a0.png")]) == 2
+    assert "takes the references of the run" in capsys.readouterr().err
+
+
+def test_nothing_measured_is_told_with_its_reason(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, shots: Path
+) -> None:
+    """Pictures that have nothing in common with the reference, then over-exposed ones."""
+    first = (shots / "a0.png").read_bytes()
+    other = 255 * Speckle(SHAPE, radius=2.0, seed=99).render(Affine(), SHAPE)
+    for name, picture in (("other", other), ("white", np.full(SHAPE, 255.0))):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "a0.png").write_bytes(first)
+        cv2.imwrite(str(folder / "a1.png"), np.rint(picture).astype(np.uint8))
+        assert main(["replay", str(folder), *SMALL, "--out", str(folder / "out")]) == 5
+        told = capsys.readouterr().out
+        assert "nothing was measured: no ZOI has a value (" in told
+        assert "events above" not in told
+        assert "exit code 5" in told
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        (
+            ["--seconds", "0.5", "--reference-burst", "32"],
+            "the camera ended before the reference was complete",
+        ),
+        (["--seconds", "1", "--burst", "200", "--reference-burst", "4"], "gave no burst after the reference"),
+    ],
+)
+def test_a_run_without_a_measurement(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, more: list[str], says: str
+) -> None:
+    camera = "sim:uniform?lockstep=yes&seconds=3&fps=15&width=160&height=128&bits=12"
+    assert main(["run", "--camera", camera, *more, *SMALL, "--out", str(tmp_path / "out")]) == 5
+    told = capsys.readouterr().out
+    assert f"nothing was measured: {says}" in told or says in told
+    with Session.open(tmp_path / "out" / "session.h5") as session:
+        assert len(session) > 5
+
+
+def test_sources_without_a_scheme(session: Path, shots: Path, tmp_path: Path) -> None:
+    for number, source in enumerate((shots, f"{shots}/a?.p*g", shots / "a0.png", session)):
+        if source != shots / "a0.png":
+            assert main(["replay", str(source), *SMALL, "--out", str(tmp_path / str(number))]) == 0
+            assert len(measured(tmp_path / str(number))) == 5
+    assert main(["run", "--camera", str(shots), *SMALL, "--out", str(tmp_path / "run")]) == 0
+
+
+def test_a_part_is_cut_as_configured(shots: Path, tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_text(
+        "[camera]\ncrop = [10, 10, 120, 100]\n[view]\nenabled = false\nrrd = false\n"
+    )
+    request = ReplayRequest(
+        str(shots), False, None, None, None, tmp_path / "a.toml",
+        {"measure.zoi": 48, "measure.step": 24, "output.dir": str(tmp_path / "out")},
+    )  # fmt: skip
+    assert replay(request, TerminalScreen(quiet=True), threading.Event()).exit_code == 0
+    with Strain.open(tmp_path / "out" / "strain.h5") as strain:
+        assert strain.grid.x[-1] < 120
+
+
+def test_the_results_say_which_file_each_frame_was(shots: Path, session: Path, tmp_path: Path) -> None:
+    assert main(["replay", str(shots), *SMALL, "--out", str(tmp_path / "a")]) == 0
+    names = list(csv.DictReader((tmp_path / "a" / "pictures.csv").read_text(encoding="utf-8").splitlines()))
+    with Strain.open(tmp_path / "a" / "strain.h5") as strain:
+        found = [names[int(frame)]["file"] for frame in strain.values["frame"]]
+    assert found == [f"a{k}.png" for k in range(1, len(STRAINS))]
+    assert {row["page"] for row in names} == {"0"}
+    assert main(["replay", str(session), *SMALL, "--out", str(tmp_path / "b")]) == 0
+    assert not (tmp_path / "b" / "pictures.csv").exists()
+
+
+def test_a_report_at_the_end(shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert main(["replay", str(shots), *SMALL, "--report", "--out", str(out)]) == 0
+    assert str(out / "report.html") in capsys.readouterr().out
+    assert "<h2>Maps</h2>" in (out / "report.html").read_text(encoding="utf-8")

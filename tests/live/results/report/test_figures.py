@@ -1,0 +1,115 @@
+"""Instants and elastic line of tests whose truth is known.
+
+Virtual gauges and lag in the report and in what is exported.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from live.cli import main
+from live.results.report.comparison import summary
+from live.results.report.evaluation import EvaluatedCurve, instants, nearest_rows
+from live.results.report.record import times
+from live.results.report.report import ReportRequest, make_report
+from live.results.run_folder import open_run
+from live.ui.terminal.screen import TerminalScreen
+from tests.live.made_run import CONFIG, E_PA, GAUGES, PULLED, YIELD, make_run
+
+
+def test_the_line_and_the_instants(run_dir: Path) -> None:
+    with open_run(run_dir) as run:
+        curve = EvaluatedCurve.of(run)
+        found = instants(run, curve)
+    assert pytest.approx(E_PA, rel=0.01) == curve.figures.E.value
+    assert curve.figures.Rp02.value == pytest.approx(E_PA * YIELD, rel=3e-3)
+    # The line goes through the origin of a curve that does.
+    assert abs(curve.intercept) < 0.005 * E_PA * YIELD
+    words = {word: row for row, name in found.items() for word in name.split(", ")}
+    assert words["first"] == 0
+    assert words["last"] == len(PULLED) - 1
+    assert 0.1 * YIELD <= PULLED[words["elastic"]] <= 0.6 * YIELD
+    # 0.2 % of plastic strain beyond the yield of an ideally plastic curve.
+    step = PULLED[-1] - PULLED[-2]
+    assert YIELD + 0.002 - step <= PULLED[words["yield (0.2 %)"]] <= YIELD + 0.002 + 2 * step
+
+
+def test_chosen_instants(run_dir: Path) -> None:
+    with open_run(run_dir) as run:
+        assert nearest_rows(run, (2.04, 0.0)) == {0: "chosen", 20: "chosen"}
+
+
+def test_without_section_there_are_forces(tmp_path: Path) -> None:
+    config = {**CONFIG, "specimen": {"axis": "y"}}
+    with open_run(make_run(tmp_path, config=config)) as run:
+        curve = EvaluatedCurve.of(run)
+    assert not curve.is_stress
+    assert curve.figures.E.value == pytest.approx(E_PA * 20e-6, rel=0.01)
+
+
+def test_mean_and_scatter() -> None:
+    mean, deviation, n = summary([1.0, float("nan"), 3.0])
+    assert (mean, deviation, n) == (2.0, pytest.approx(np.sqrt(2)), 2)
+
+
+@pytest.fixture(scope="module")
+def gauged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return make_run(tmp_path_factory.mktemp("gauged"), config={**CONFIG, "gauges": GAUGES})
+
+
+def test_the_report_shows_every_gauge_with_its_band(gauged: Path) -> None:
+    with open_run(gauged) as run:
+        report = make_report(run, ReportRequest(), TerminalScreen(quiet=True))
+        axial = run.gauges["axial"]
+    figure = next(figure for figure in report.figures if figure.name == "gauges-time")
+    assert [curve.label for curve in figure.curves] == ["axial", "shear"]
+    for curve, gauge in zip(figure.curves, run.gauges.values(), strict=True):
+        assert curve.sigma is not None
+        np.testing.assert_allclose(curve.sigma / curve.y, gauge.sigma / gauge.value)
+    assert "kind line; start 64, 20; end 64, 76" in report.html
+    shown = re.search(r"([0-9.]+) ± ([0-9.]+) µm/m", report.html)
+    assert shown is not None
+    assert [float(word) for word in shown.groups()] == pytest.approx(
+        [1e6 * axial.value[-1], 1e6 * axial.sigma[-1]], rel=0.05
+    )
+    assert report.html.count('class="band') >= 5  # two gauges, three means
+
+
+def test_the_curve_is_that_of_the_gauge_axial(gauged: Path, run_dir: Path) -> None:
+    with open_run(gauged) as run, open_run(run_dir) as plain:
+        np.testing.assert_array_equal(EvaluatedCurve.of(run).axial, run.strain.values["gauge_axial"])
+        np.testing.assert_array_equal(EvaluatedCurve.of(plain).axial, plain.strain.values["eyy"])
+
+
+def test_the_lag_is_told_or_why_not(gauged: Path, tmp_path: Path) -> None:
+    with open_run(gauged) as run:
+        assert "lag of the load beside the frames" in times(run)
+        assert "not known: " in times(run) or " ms (95% interval" in times(run)
+    with open_run(make_run(tmp_path, [0.0, 1e-3], session=False)) as bare:
+        assert "no readings of a load cell were recorded" in times(bare)
+
+
+def _means(folder: Path, *more: str) -> tuple[str, dict[str, np.ndarray]]:
+    out = folder / f"means{len(more)}.csv"
+    assert main(["export", str(folder), "--to", "csv", "--layout", "means", "--out", str(out), *more]) == 0
+    text = out.read_text(encoding="utf-8")
+    lines = "".join(line for line in io.StringIO(text) if not line.startswith("#"))
+    rows = list(csv.DictReader(io.StringIO(lines)))
+    return text, {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+
+
+def test_exported_gauges_are_in_the_units_and_axes_asked_for(gauged: Path) -> None:
+    words, plain = _means(gauged)
+    _, turned = _means(gauged, "--y-up", "--percent")
+    assert "strain of the virtual gauge 'axial'; nan where it was lost (kind line" in words
+    np.testing.assert_allclose(turned["gauge_axial_percent"], 100 * plain["gauge_axial"], rtol=1e-6)
+    np.testing.assert_allclose(turned["gauge_shear_percent"], -100 * plain["gauge_shear"], rtol=1e-6)
+    np.testing.assert_allclose(
+        turned["sigma_gauge_shear_percent"], 100 * plain["sigma_gauge_shear"], rtol=1e-6
+    )

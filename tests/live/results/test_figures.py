@@ -1,0 +1,135 @@
+"""The figures of a test in words, by the standard that the configuration names."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from acquire.events import Event, EventKind
+from acquire.load_cell import LoadLog
+from acquire.load_sample import LoadSample
+from live.config.sections import SpecimenConfig
+from live.pipeline.event_log import EventLog
+from live.pipeline.frame_counts import FrameCounts
+from live.pipeline.history import History
+from live.pipeline.run_state import RunState
+from live.results.figures import alignment_line, elastic_lines, evaluate, figure_lines, lag_line
+from live.results.summary import summary_lines
+from tests.analysis.curves import Truth, composite, noisy, ramberg_osgood
+from tests.live.made_up import START, make_measurement
+
+AREA_M2 = 20e-6
+FLAT = SpecimenConfig(width_mm=10.0, thickness_mm=2.0)
+
+
+def kept(truth: Truth, lag: float = 0.0, tared_at: float | None = None) -> tuple[History, LoadLog]:
+    """A run whose mean strains and loads follow a curve, the load ``lag`` late, tared once in mid-test."""
+    curve, history, loads = noisy(truth, 1), History(), LoadLog()
+    assert curve.transverse is not None
+    one = make_measurement(0).instant
+    for t, axial, across in zip(curve.t, curve.strain, curve.transverse, strict=True):
+        history.add(replace(one, t=START + t, eyy=axial, exx=across))
+    true = truth.curve
+    zero = 0.0
+    for t in np.arange(0, true.t[-1] + 0.5, 1 / 80):
+        force = AREA_M2 * float(np.interp(t - lag, true.t, true.stress))
+        if tared_at is not None and not zero and t >= tared_at:
+            zero = force
+            loads.take_event(Event(START + t, EventKind.TARE, "a cell", "", "info", {"step_N": zero}))
+        loads.append(LoadSample(START + t, force - zero))
+    return history, loads
+
+
+def test_a_tare_in_mid_test_falsifies_no_figure() -> None:
+    truth = ramberg_osgood()
+    plain, tared = (
+        evaluate(*kept(truth, tared_at=at), FLAT) for at in (None, 0.3 * float(truth.curve.t[-1]))
+    )
+    for name in ("E", "Rm"):
+        assert getattr(tared, name).value == pytest.approx(getattr(plain, name).value, rel=2e-3)
+    books = RunState(EventLog(), FrameCounts(), *reversed(kept(truth, tared_at=1.0)))
+    assert any(line.strip().startswith("tared in mid-test by +") for line in summary_lines(books, FLAT))
+    books = RunState(EventLog(), FrameCounts(), *reversed(kept(truth)))
+    assert not any("tared" in line for line in summary_lines(books, FLAT))
+
+
+def test_a_metal_by_its_standard() -> None:
+    history, loads = kept(ramberg_osgood())
+    lines = figure_lines(evaluate(history, loads, FLAT), FLAT)
+    assert lines[0].startswith("E = ") and "GPa  nu = 0.3" in lines[0]
+    assert "Rp0.2 = 249.8" in lines[1] and "Rm = " in lines[1]
+    text = "\n".join(lines)
+    assert "iso6892: strains" in text and "counts as measured" in text
+    assert "within range 2" in text
+    assert "not known: ReH, ReL (no yield point" in text
+
+
+def test_a_laminate_has_no_proof_strength() -> None:
+    specimen = replace(FLAT, standard="astm-d3039", gauge_length_mm=50.0)
+    history, loads = kept(composite())
+    text = "\n".join(figure_lines(evaluate(history, loads, specimen), specimen))
+    assert "Rp0.2" not in text
+    assert "At = 1.19" in text and "(gauge length 50 mm)" in text
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"standard": "free", "modulus_between": (0.0002, 0.001)}, "free: strains 0.02"),
+        ({"zero": "toe"}, "toe compensation"),
+        ({"zero": "preload", "preload_MPa": 20.0}, "first reached the preload"),
+    ],
+)
+def test_interval_and_zero_are_options(settings: dict, says: str) -> None:
+    specimen = replace(FLAT, **settings)
+    history, loads = kept(ramberg_osgood())
+    assert says in "\n".join(figure_lines(evaluate(history, loads, specimen), specimen))
+
+
+def test_without_a_section_forces_stand_for_stresses() -> None:
+    history, loads = kept(ramberg_osgood())
+    specimen = SpecimenConfig(zero="preload")
+    lines = elastic_lines(evaluate(history, loads, specimen), specimen)
+    assert lines[0].startswith("EA = 1") and " kN (give [specimen]" in lines[0]
+    assert "Fp0.2 = " in lines[1] and "Fm = " in lines[1]
+
+
+def test_the_lag_of_the_load_is_told() -> None:
+    history, loads = kept(ramberg_osgood(), lag=0.15)
+    (line,) = lag_line(history, loads, FLAT)
+    told = float(line.split(": ")[1].split(" +-")[0])
+    assert abs(told - 150) < 40
+    assert lag_line(history, LoadLog(), FLAT) == []
+    (refused,) = lag_line(History(), loads, FLAT)
+    assert "not known (0 frames have a strain" in refused
+
+
+def test_the_direction_of_the_load_is_told() -> None:
+    history, loads = kept(ramberg_osgood())
+    assert "off y (clockwise); y was found" in alignment_line(history, FLAT)[0]
+    assert alignment_line(history, replace(FLAT, axis="y"))[0].endswith("off y (clockwise)")
+    assert "is specimen.axis = 'x' right?" in alignment_line(history, replace(FLAT, axis="x"))[0]
+    assert alignment_line(History(), FLAT) == []
+    books = RunState(EventLog(), FrameCounts(), loads, history)
+    assert any("off y" in line for line in summary_lines(books, FLAT))
+
+
+def test_the_axis_is_found_where_it_is_not_given() -> None:
+    history, loads = kept(ramberg_osgood())
+    turned = History()
+    for i in history.instants:
+        turned.add(replace(i, exx=i.eyy, eyy=i.exx))
+    assert "off x (clockwise); x was found" in alignment_line(turned, FLAT)[0]
+    upright, lying = (figure_lines(evaluate(h, loads, FLAT), FLAT) for h in (history, turned))
+    assert upright == lying
+    given = replace(FLAT, axis="y")
+    assert figure_lines(evaluate(turned, loads, given), given) != lying
+
+
+def test_any_section_gives_an_area() -> None:
+    assert FLAT.area_m2 == pytest.approx(AREA_M2)
+    assert SpecimenConfig(diameter_mm=10.0).area_m2 == pytest.approx(np.pi / 4 * 1e-4)
+    assert SpecimenConfig(area_mm2=7.0, width_mm=1.0, thickness_mm=1.0).area_m2 == pytest.approx(7e-6)
+    assert SpecimenConfig(width_mm=1.0).area_m2 is None

@@ -1,0 +1,192 @@
+"""A run's folder read back: results and recording together, pictures by instant, and what is not there.
+
+Gauges laid over a finished run are those that the test would have had.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+
+from acquire.errors import DataError
+from acquire.record_mode import RecordMode
+from live.cli import main
+from live.results.run_folder import add_gauges, open_run
+from tests.live.made_run import CONFIG, E_PA, GAUGES, PULLED, make_run, session_writer
+from tests.live.made_up import START, make_measurement
+
+
+def test_results_and_recording_are_tied_together(tmp_path: Path) -> None:
+    with open_run(make_run(tmp_path)) as run:
+        assert run.title == "S1"
+        assert (run.axial, run.transverse) == ("eyy", "exx")
+        assert run.strain.n == len(PULLED)
+        assert run.stress is not None
+        elastic = (run.strain.values["eyy"] > 1e-4) & (run.strain.values["eyy"] < 2.5e-3)
+        np.testing.assert_allclose(run.stress[elastic] / run.strain.values["eyy"][elastic], E_PA, rtol=0.02)
+        assert [e.kind for e in run.events] == ["start", "reference", "note"]
+        assert run.start_monotonic == START
+        assert run.session is not None
+        assert run.session.ledger is not None
+
+
+def test_pictures_are_those_of_the_middle_of_the_burst(tmp_path: Path) -> None:
+    with open_run(make_run(tmp_path)) as run:
+        assert run.pictures is not None
+        last = len(PULLED) - 1
+        levels = [int(image[0, 0]) - 100 for image in run.pictures.each([0, 3, last])]
+        assert [level // 8 for level in levels] == [0, 3, last]
+        assert all(level % 8 in (3, 4) for level in levels)
+
+
+def test_a_results_file_alone_is_a_run_without_pictures(tmp_path: Path) -> None:
+    make_run(tmp_path, session=False)
+    with open_run(tmp_path / "strain.h5") as run:
+        assert run.session is None
+        assert run.pictures is None
+        assert run.events == []
+        assert run.path == tmp_path
+
+
+def test_a_replay_finds_the_session_it_was_made_from(tmp_path: Path) -> None:
+    recorded = make_run(tmp_path / "live") / "session.h5"
+    config = {**CONFIG, "camera": {"address": f"session:{recorded}"}}
+    with open_run(make_run(tmp_path / "again", session=False, config=config)) as run:
+        assert run.session_path == recorded
+        assert run.pictures is not None
+
+
+@pytest.mark.parametrize(
+    ("source", "more", "shape"),
+    [
+        ("files:{folder}/*.png", [], (96, 128)),
+        ("{folder}/*.png", [], (96, 128)),
+        ("{folder}", ["0, 0, 96, 80"], (80, 96)),
+    ],
+)
+def test_a_replay_of_pictures_finds_them_again(
+    tmp_path: Path, source: str, more: list[str], shape: tuple[int, int]
+) -> None:
+    rng = np.random.default_rng(1)
+    pattern = cv2.GaussianBlur(rng.normal(size=(96, 128)).astype(np.float32), (0, 0), 2.0)
+    for k in range(4):
+        image = np.clip(128 + 300 * pattern + k, 0, 255).astype(np.uint8)
+        image[0, 0] = k
+        cv2.imwrite(str(tmp_path / f"a{k}.png"), image)
+    out = str(tmp_path / "out")
+    arguments = ["--zoi", "32", "--out", out, "--no-view", "--no-rrd"]
+    config = tmp_path / "crop.toml"
+    config.write_text(f"[camera]\ncrop = [{more[0]}]\n" if more else "")
+    assert main(["replay", source.format(folder=tmp_path), "--config", str(config), *arguments]) == 0
+    with open_run(out) as run:
+        assert run.pictures is not None
+        images = list(run.pictures.each([0, 2]))
+        assert [int(image[0, 0]) for image in images] == [1, 3]
+        assert (run.pictures.info.height, run.pictures.info.width) == images[0].shape == shape
+    for path in tmp_path.glob("a*.png"):
+        path.unlink()
+    with open_run(out) as run:
+        assert run.pictures is None
+
+
+def test_a_recording_of_bursts_gives_their_means(tmp_path: Path) -> None:
+    make_run(tmp_path, PULLED[:5], session=False)
+    image = np.arange(96 * 128, dtype=np.float32).reshape(96, 128) % 4000
+    with session_writer(tmp_path, {}, {}, RecordMode("bursts")) as writer:
+        for k in range(5):
+            burst = make_measurement(k).burst
+            mean = np.round(image + k)
+            clipped = np.zeros(mean.shape, bool)
+            writer.write_burst(dataclasses.replace(burst, mean=mean, clipped=clipped))
+    with open_run(tmp_path) as run:
+        assert run.pictures is not None
+        assert [float(picture[0, 0]) for picture in run.pictures.each([0, 2, 4])] == [0.0, 2.0, 4.0]
+
+
+def test_what_is_not_a_run_is_refused_in_words(tmp_path: Path) -> None:
+    with pytest.raises(DataError, match=r"no strain\.h5 there; give the folder"):
+        open_run(tmp_path)
+    make_run(tmp_path)
+    (tmp_path / "session.h5").write_bytes(b"no HDF5")
+    with open_run(tmp_path) as run, pytest.raises(DataError, match=r"session\.h5"):
+        _ = run.pictures
+    with h5py.File(tmp_path / "strain.h5", "a") as file:
+        del file["entry/config"]
+        file["entry/config"] = json.dumps({"specimen": {"width_mm": "wide"}})
+    with open_run(tmp_path) as run, pytest.raises(DataError, match=r"width_mm"):
+        _ = run.specimen
+
+
+TOML = """
+[gauges.axial]
+start = [64, 20]
+end = [64, 76]
+[gauges.shear]
+kind = "area"
+box = [40, 30, 50, 40]
+value = "exy"
+"""
+
+
+@pytest.fixture
+def toml(tmp_path: Path) -> Path:
+    path = tmp_path / "gauges.toml"
+    path.write_text(TOML, encoding="utf-8")
+    return path
+
+
+def test_they_are_those_of_the_test(run_dir: Path, toml: Path, tmp_path: Path) -> None:
+    with (
+        open_run(make_run(tmp_path / "with", config={**CONFIG, "gauges": GAUGES})) as with_gauges,
+        open_run(run_dir) as run,
+    ):
+        assert run.gauges == {}
+        assert add_gauges(run, toml) == ("axial", "shear")
+        for name, gauge in with_gauges.gauges.items():
+            np.testing.assert_allclose(run.gauges[name].value, gauge.value, atol=1e-10)
+            np.testing.assert_allclose(run.gauges[name].sigma, gauge.sigma, rtol=1e-5)
+        assert run.gauges["axial"].described["start"] == (64.0, 20.0)
+        np.testing.assert_array_equal(run.axial_strain, run.gauges["axial"].value)
+    with open_run(run_dir) as again:
+        assert again.gauges == {}, "the files stay as they are"
+
+
+def test_they_are_in_the_report_the_export_and_the_view(run_dir: Path, toml: Path, tmp_path: Path) -> None:
+    more = ["--gauges", str(toml)]
+    assert main(["report", str(run_dir), *more, "--out", str(tmp_path / "r.html")]) == 0
+    page = (tmp_path / "r.html").read_text(encoding="utf-8")
+    assert "<h2>Virtual gauges</h2>" in page
+    assert "box 40, 30, 50, 40; value exy" in page
+    out = tmp_path / "m.csv"
+    assert main(["export", str(run_dir), *more, "--to", "csv", "--layout", "means", "--out", str(out)]) == 0
+    heads = next(line for line in out.read_text(encoding="utf-8").splitlines() if not line.startswith("#"))
+    assert {"gauge_axial", "sigma_gauge_axial", "gauge_shear"} <= set(heads.split(","))
+    assert main(["show", str(run_dir), *more, "--every", "40", "--rrd", str(tmp_path / "a.rrd")]) == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("[measure]\nzoi = 32\n", "holds no gauge; give a table [gauges.NAME] each"),
+        ("[gauges.far]\nstart = [5000, 1]\nend = [5000, 9]\n", "gauges.far: no ZOI is there"),
+        ("[gauges.a\n", "gauges.toml"),
+    ],
+)
+def test_refusals(
+    run_dir: Path, toml: Path, capsys: pytest.CaptureFixture[str], text: str, says: str
+) -> None:
+    toml.write_text(text, encoding="utf-8")
+    assert main(["show", str(run_dir), "--gauges", str(toml)]) == 2
+    assert says in capsys.readouterr().err
+
+
+def test_a_window_that_is_no_window_is_taken_as_the_usual_one(tmp_path: Path) -> None:
+    config = {**CONFIG, "measure": {"window": "round"}}
+    with open_run(make_run(tmp_path, PULLED[:3], config=config)) as run:
+        assert run.field(0).window == "gaussian"

@@ -1,0 +1,119 @@
+"""One table of tensile figures: names, units, intervals, reasons; and all that show it agree."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.evaluate import Curve, Figure, evaluate_test
+from live.config.sections import SpecimenConfig
+from live.pipeline.event_log import EventLog
+from live.pipeline.frame_counts import FrameCounts
+from live.pipeline.run_state import RunState
+from live.replay.batch.row import COLUMNS
+from live.results.figures import TensileRow, headline, tensile_table
+from live.results.report import comparison
+from live.results.report.evaluation import EvaluatedCurve as RunCurve
+from live.results.report.report import tensile
+from live.results.run_folder import open_run
+from live.results.summary import summary_lines
+from live.ui.web.page_controller import ended
+from tests.analysis.curves import noisy, ramberg_osgood
+from tests.live.made_run import CONFIG, PULLED, make_run
+from tests.live.results.test_figures import AREA_M2, FLAT, kept
+
+FORCES = {**CONFIG, "specimen": {"axis": "y"}}
+
+
+@pytest.mark.parametrize("stresses", [True, False])
+def test_names_and_units(stresses: bool) -> None:
+    curve = noisy(ramberg_osgood(), 0)
+    scaled = Curve(curve.t, curve.strain, curve.stress * (1 if stresses else AREA_M2), curve.transverse)
+    figures = evaluate_test(scaled)
+    rows = headline(figures, stresses=stresses)
+    columns = ["E_GPa", "nu", "Rp0.2_MPa", "Rm_MPa"] if stresses else ["EA_kN", "nu", "Fp0.2_kN", "Fm_kN"]
+    assert [row.column for row in rows] == columns
+    assert {row.column + end for row in rows for end in ("", "_low", "_high")} <= set(COLUMNS)
+    one = 1 if stresses else AREA_M2
+    for row, true in zip(rows, (70e9 * one, 0.33, 250e6 * one), strict=False):
+        si = {"GPa": 1e9, "MPa": 1e6, "kN": 1e3, "": 1.0}[row.unit]
+        assert row.figure.value * si == pytest.approx(true, rel=0.03)
+        assert 0 < row.half < 0.1 * row.figure.value
+    names = [row.name for row in tensile_table(figures, stresses=stresses).values()]
+    assert len(set(names)) == len(names)
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(12.345, "12.345 +- 0.020 kN"), (1.2345, "1234 +- 20 N"), (math.nan, "not known")]
+)
+def test_small_forces_are_shown_in_newtons(value: float, text: str) -> None:
+    assert TensileRow("Fm", "kN", Figure(value, value - 0.02, value + 0.01)).text == text
+
+
+@pytest.mark.parametrize("specimen", [FLAT, SpecimenConfig()])
+def test_summary_and_page_agree(specimen: SpecimenConfig) -> None:
+    history, loads = kept(ramberg_osgood())
+    books = RunState(EventLog(), FrameCounts(), loads, history)
+    summary = "\n".join(summary_lines(books, specimen)).replace("+-", "±")
+    for one in ended(books, specimen, Path("runs"), "")["figures"]:
+        assert one["text"] is not None and f"{one['name']} = {one['text']}" in summary
+
+
+def read(folders: list[Path]) -> tuple[list[dict[str, str]], str]:
+    """The CSV and the page of a comparison."""
+    runs = [open_run(folder) for folder in folders]
+    tests = comparison.tests_of(runs)
+    file = io.StringIO()
+    comparison.write_table(tests, file)
+    html = comparison.compare(tests).html
+    for run in runs:
+        run.close()
+    return list(csv.DictReader(io.StringIO(file.getvalue()))), html
+
+
+def test_a_comparison_has_no_mean_of_half_widths(tmp_path: Path) -> None:
+    folders = [make_run(tmp_path / str(share), [share * e for e in PULLED]) for share in (1.0, 0.9)]
+    rows, html = read(folders)
+    assert "half, E" not in html and "half_" not in html
+    for folder, row in zip(folders, rows, strict=False):
+        with open_run(folder) as run:
+            figures = headline(RunCurve.of(run).figures, stresses=True)
+        for figure in figures:
+            if figure.figure.known:
+                assert float(row[figure.column]) == pytest.approx(figure.figure.value)
+                assert float(row[f"half_{figure.column}"]) == pytest.approx(figure.half)
+                value, _, unit = figure.text.partition(" +- ")[2].partition(" ")
+                assert f"± {value}" in html and unit != "not"
+    mean = next(row for row in rows if row["test"] == "mean")
+    assert float(mean["E_GPa"]) == pytest.approx(np.mean([float(row["E_GPa"]) for row in rows[:2]]))
+    assert {mean[name] for name in mean if name.startswith("half_")} == {""}
+
+
+@pytest.mark.parametrize("config", [CONFIG, FORCES])
+def test_a_comparison_has_what_the_single_report_has(tmp_path: Path, config: dict) -> None:
+    """Of three instants there is a highest force, and no modulus, in both."""
+    folders = [make_run(tmp_path / str(k), [0.0, 1e-3, k * 1e-3], config=config) for k in (2, 1)]
+    rows, html = read(folders)
+    name, column = ("Rm", "Rm_MPa") if config is CONFIG else ("Fm", "Fm_kN")
+    for folder, row in zip(folders, rows, strict=False):
+        with open_run(folder) as run:
+            found = tensile(RunCurve.of(run))
+        assert list(found) == [name]
+        shown, unit = found[name].split(" ±")[0].split()[0], found[name].split()[-1]
+        assert float(row[column]) * (1e3 if unit == "N" else 1) == pytest.approx(float(shown), rel=0.01)
+    assert 'title="strain and a tensile stress are known together at 3 points">not known<' in html
+
+
+def test_without_a_modulus_the_summary_has_the_strength_and_the_reason() -> None:
+    history, loads = kept(ramberg_osgood())
+    few = type(history)()
+    for instant in history.instants[::150]:
+        few.add(instant)
+    text = "\n".join(summary_lines(RunState(EventLog(), FrameCounts(), loads, few), FLAT))
+    assert "Rm = " in text
+    assert "not known: E, " in text

@@ -1,0 +1,244 @@
+"""One grammar of orders, whoever gives them: a line, an answer in a line.
+
+Orders over TCP: the same words, answered in a line.
+
+Tare as an order: never by one key under load in mid-test.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquire.errors import ConfigError
+from acquire.events import EventKind, Level
+from acquire.load_sample import LoadCellInfo, LoadSample
+from live.run.control import (
+    ENDED,
+    FORCED,
+    START,
+    STOP,
+    UNDO,
+    ControlPort,
+    ControlRefused,
+    TareControls,
+    answer,
+)
+from live.ui.terminal.screen import TerminalScreen
+from tests.live.run.test_tcp_lines import WORD, Caller
+
+
+class FakeLive:
+    """Notes what it is asked; refuses what ``refuses`` says."""
+
+    def __init__(self, refuses: str = "", says: str = "") -> None:
+        self.calls: list[Any] = []
+        self.paused, self.recording = False, True
+        self._refuses, self._says = refuses, says
+
+    def stop(self, reason: str) -> None:
+        self.calls.append(("stop", reason))
+
+    def command(self, kind: EventKind, note: str = "") -> str:
+        if self._refuses:
+            raise ControlRefused(self._refuses)
+        self.paused = kind is EventKind.PAUSE
+        self.calls.append((kind, note))
+        return self._says
+
+
+@pytest.mark.parametrize(
+    ("lines", "call"),
+    [
+        (("start", "s"), (EventKind.RECORD, START)),
+        (("stop",), (EventKind.RECORD, STOP)),
+        (("reference", "r\n", " r "), (EventKind.NEW_REFERENCE, "")),
+        (("tare", "t"), (EventKind.TARE, "")),
+        (("tare  force", "t!", "t force"), (EventKind.TARE, FORCED)),
+        (("tare undo", "u"), (EventKind.TARE, UNDO)),
+        (("pause", "p"), (EventKind.PAUSE, "")),
+        (("resume",), (EventKind.RESUME, "")),
+        (("note slipped in the grip", "n slipped in the grip\r\n"), (EventKind.NOTE, "slipped in the grip")),
+        (("alarm off", "a"), (EventKind.ALARM, "")),
+        (("quit", "q"), ("stop", ENDED)),
+    ],
+)
+def test_words_and_their_letters(lines: tuple[str, ...], call: tuple[Any, str]) -> None:
+    for line in lines:
+        live = FakeLive()
+        assert answer(line, live) == "ok"
+        assert live.calls == [call]
+
+
+def test_a_second_p_goes_on() -> None:
+    live = FakeLive()
+    for _ in range(3):
+        answer("p", live)
+    assert [call[0] for call in live.calls] == [EventKind.PAUSE, EventKind.RESUME, EventKind.PAUSE]
+
+
+@pytest.mark.parametrize(
+    "line", ["", "\n", "x", "n", "note", "stop it", "quit now", "alarm", "tare twice", "n" * 501]
+)
+def test_what_is_no_order_is_refused_with_a_reason(line: str) -> None:
+    live = FakeLive()
+    assert answer(line, live).startswith("no: ")
+    assert live.calls == []
+
+
+def test_whoever_carries_it_out_may_refuse_or_say_more() -> None:
+    assert answer("tare", FakeLive(refuses="800 N in\nmid-test")) == "no: 800 N in mid-test"
+    assert answer("stop", FakeLive(says="120 frames")) == "ok: 120 frames"
+
+
+def test_help_lists_the_orders() -> None:
+    said = answer("?", FakeLive())
+    assert said.startswith("ok: ") and "alarm off" in said and said == answer("help", FakeLive())
+
+
+@given(st.text())
+def test_whatever_comes_is_answered_in_one_printable_line(line: str) -> None:
+    said = answer(line, FakeLive())
+    assert said.startswith(("ok", "no: ")) and said.splitlines() == [said]
+
+
+def test_a_note_cannot_command_a_terminal() -> None:
+    live = FakeLive()
+    answer("note \x1b[2Jgone", live)
+    assert live.calls == [(EventKind.NOTE, "\\x1b[2Jgone")]
+
+
+def test_orders_are_carried_out_and_answered() -> None:
+    live, said = FakeLive(), io.StringIO()
+    port = ControlPort("0", None, TerminalScreen(said))
+    caller = Caller(port.open(live))
+    asked = [caller.ask(line) for line in ("pause", "note slipped", "nonsense", "quit")]
+    assert asked[:2] == ["ok", "ok"] and asked[2].startswith("no: ") and asked[3] == "ok"
+    assert live.calls == [(EventKind.PAUSE, ""), (EventKind.NOTE, "slipped"), ("stop", ENDED)]
+    assert "orders are taken at 127.0.0.1:" in said.getvalue()
+    caller.close()
+    port.close()
+    port.close()
+
+
+def test_beyond_this_machine_only_with_a_token(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="token_file"):
+        ControlPort("0.0.0.0:0", None, TerminalScreen(io.StringIO()))
+    path = tmp_path / "token"
+    path.write_text(WORD)
+    live = FakeLive()
+    port = ControlPort("0.0.0.0:0", str(path), TerminalScreen(io.StringIO()))
+    number = port.open(live)
+    wrong = Caller(number)
+    assert wrong.ask("quit").startswith("no: ")
+    wrong.close()
+    caller = Caller(number)
+    assert [caller.ask(f"token {WORD}"), caller.ask("quit")] == ["ok", "ok"]
+    assert live.calls == [("stop", ENDED)]
+    caller.close()
+    port.close()
+
+
+class FakeCell:
+    """Notes what it is asked."""
+
+    def __init__(self, capacity_N: float | None, protocol: str = "ascii") -> None:
+        self.info = LoadCellInfo("/dev/x", "a cell", protocol, capacity_N=capacity_N)
+        self.calls: list[str] = []
+
+    def tare(self, *, force: bool = False) -> None:
+        self.calls.append("forced" if force else "tare")
+
+    def undo_tare(self) -> None:
+        self.calls.append("undo")
+
+
+class Bench:
+    """Orders on a cell that shows a force; ``measured`` says whether the test is on."""
+
+    def __init__(
+        self, force: float = 800.0, *, measured: bool = True, capacity_N: float | None = None
+    ) -> None:
+        self.now, self.cell, self.told = 10.0, FakeCell(capacity_N), list[tuple[EventKind, Level, str]]()
+        sample = LoadSample(10.0, force)
+        self.orders = TareControls(self.cell, lambda: measured, lambda: sample, self._tell, lambda: self.now)
+
+    def _tell(self, kind: EventKind, source: str, text: str, level: Level) -> None:
+        self.told.append((kind, level, text))
+
+    def refused(self) -> str:
+        """Why an order to tare is not carried out."""
+        with pytest.raises(ControlRefused) as refused:
+            self.orders.order()
+        return str(refused.value)
+
+
+def test_under_load_in_mid_test_it_takes_two() -> None:
+    bench = Bench()
+    assert "800 N in mid-test" in bench.refused() and bench.cell.calls == [] and not bench.told
+    bench.now += 2.9
+    bench.orders.order()
+    assert bench.cell.calls == ["tare"] and bench.told[-1][0] is EventKind.TARE
+
+
+def test_a_late_second_order_is_a_first_one() -> None:
+    bench = Bench()
+    for _ in range(4):
+        bench.refused()
+        bench.now += 3.1
+    assert bench.cell.calls == []
+
+
+def test_a_third_order_asks_again() -> None:
+    bench = Bench()
+    bench.refused()
+    bench.orders.order()
+    bench.refused()
+    assert bench.cell.calls == ["tare"]
+
+
+@pytest.mark.parametrize(("force", "capacity_N"), [(0.0, None), (0.9, 1000.0)])
+def test_without_load_one_order_is_enough(force: float, capacity_N: float | None) -> None:
+    bench = Bench(force, capacity_N=capacity_N)
+    bench.orders.order()
+    assert bench.cell.calls == ["tare"]
+
+
+def test_before_the_test_one_order_is_enough() -> None:
+    bench = Bench(measured=False)
+    bench.orders.order()
+    assert bench.cell.calls == ["tare"]
+
+
+def test_a_load_that_is_not_known_is_not_none() -> None:
+    bench = Bench(math.nan)
+    assert "an unknown load" in bench.refused() and bench.cell.calls == []
+
+
+def test_without_a_load_cell_there_is_nothing_to_tare() -> None:
+    bench = Bench()
+    bench.cell = FakeCell(None, "none")
+    bench.orders = TareControls(bench.cell, lambda: False, lambda: None, bench._tell, lambda: bench.now)
+    assert "no load cell" in bench.refused()
+
+
+def test_forced_and_undone_at_once() -> None:
+    bench = Bench()
+    bench.orders.order(FORCED)
+    bench.orders.order(UNDO)
+    assert bench.cell.calls == ["forced", "undo"]
+    assert [kind for kind, *_ in bench.told] == [EventKind.TARE] * 2
+
+
+def test_an_undoing_is_no_confirmation() -> None:
+    bench = Bench()
+    bench.refused()
+    bench.orders.order(UNDO)
+    bench.refused()
+    assert bench.cell.calls == ["undo"]

@@ -1,0 +1,286 @@
+"""The recorder: takes everything, counts what it cannot write, and never ends a test.
+
+The gate before the recorder: what passes, what is kept, in which order, and that every frame is counted.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+from typing import Any
+
+import pytest
+
+from acquire.errors import DataError
+from acquire.events import Event, EventKind
+from acquire.load_sample import LoadSample
+from live.pipeline.event_log import EventLog
+from live.pipeline.frame_counts import FrameCounts
+from live.run.control import START, STOP, ControlRefused
+from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
+from live.run.recorder import Recorder
+from tests.live.fakes import frame
+
+
+class FakeWriter:
+    """Keeps what is written; fails from the k-th frame on; may be held up."""
+
+    def __init__(self, fails_at: int | None = None, error: Exception | None = None) -> None:
+        self.frames: list[int] = []
+        self.others: list[Any] = []
+        self.ledger: dict[str, Any] | None = None
+        self.closed = False
+        self._fails_at, self._error = fails_at, error or DataError("session.h5: the disk is full")
+        self.unflushed_frames = 0
+        self.go = threading.Event()
+        self.go.set()
+
+    def write_frame(self, item: Any) -> int:
+        self.go.wait(10)
+        if self._fails_at is not None and len(self.frames) >= self._fails_at:
+            raise self._error
+        self.frames.append(item.index)
+        self.unflushed_frames = len(self.frames) % 3
+        return len(self.frames) - 1
+
+    def write_load(self, sample: Any) -> None:
+        self.others.append(sample)
+
+    def write_event(self, event: Any) -> None:
+        self.others.append(event)
+
+    def write_clock(self, pair: Any) -> None:
+        pass
+
+    def write_ledger(self, ledger: dict[str, Any]) -> None:
+        self.ledger = ledger
+
+    def flush_when_due(self) -> float:
+        return math.inf
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def recorded(writer: FakeWriter, n: int, limit: int = 10**6) -> tuple[FrameCounts, EventLog]:
+    ledger, journal = FrameCounts(), EventLog()
+    recorder = Recorder(writer, ledger, journal, limit)  # type: ignore[arg-type]
+    for i in range(n):
+        ledger.add(grabbed=1, measured=1)
+        recorder.frame(frame(i))
+        recorder.sample(LoadSample(t=i, force=1.0))
+    writer.go.set()
+    recorder.close({"stop_reason": "test"})
+    return ledger, journal
+
+
+def test_everything_is_written_and_the_ledger_last() -> None:
+    writer = FakeWriter()
+    ledger, journal = recorded(writer, 20)
+    assert writer.frames == list(range(20))
+    assert len(writer.others) == 20
+    assert writer.ledger is not None
+    assert writer.ledger["recorded"] == 20
+    assert ledger.adds_up
+    assert not ledger.loss
+    assert writer.closed
+    assert not journal.events("warning", "error")
+
+
+def test_a_full_buffer_leaves_a_counted_gap() -> None:
+    writer = FakeWriter()
+    writer.go.clear()
+    size = frame(0).image.nbytes
+    ledger, journal = recorded(writer, 20, limit=3 * size)
+    assert ledger.recorded == len(writer.frames) <= 5
+    assert ledger.recorded + ledger.unrecorded == 20
+    assert ledger.loss
+    assert ledger.adds_up
+    assert "frames are not recorded; measuring goes on" in journal.events("error")[0].text
+
+
+def test_a_full_disk_stops_the_recording_alone() -> None:
+    writer = FakeWriter(fails_at=7)
+    ledger, journal = recorded(writer, 20)
+    assert (ledger.recorded, ledger.unrecorded) == (6, 14)  # the seventh was not flushed
+    assert ledger.adds_up
+    texts = [event.text for event in journal.events("error")]
+    assert texts == ["recording has stopped, measuring goes on: session.h5: the disk is full"]
+    assert writer.closed
+
+
+def test_a_defect_is_told_as_one() -> None:
+    ledger, journal = recorded(FakeWriter(fails_at=0, error=TypeError("oops")), 2)
+    assert ledger.unrecorded == 2
+    assert "a defect of the recorder: TypeError('oops')" in journal.events("error")[0].text
+
+
+class FakeRecorder:
+    """Notes what it is given, frames by their number."""
+
+    def __init__(self) -> None:
+        self.given: list[Any] = []
+        self.failed: str | None = None
+        self.backlog = 0.0
+
+    def frame(self, item: Any) -> None:
+        self.given.append(item.index)
+
+    def burst(self, burst: Any) -> None:
+        self.given.append(("burst", burst.first_index))
+
+    def sample(self, sample: LoadSample) -> None:
+        self.given.append(("load", sample.force))
+
+    def event(self, event: Event) -> None:
+        self.given.append((str(event.kind), event.data.get("first")))
+
+    def close(self, ledger: dict[str, Any]) -> None:
+        self.given.append("closed")
+
+
+class Bench:
+    """A gate with frames of 24 bytes, ten a second."""
+
+    def __init__(
+        self, seconds: float = 0.5, *, on: bool = False, most: int = 10**6, above_N: float = math.inf
+    ) -> None:
+        self.recorder, self.ledger = FakeRecorder(), FrameCounts()
+        self.gate = PreTriggerBuffer(
+            self.recorder, self.ledger, EventLog(), PreTrigger(seconds, most, above_N), on=on
+        )
+
+    def frames(self, *indices: int, needed: bool = False) -> None:
+        for index in indices:
+            self.gate.frame(frame(index), needed=needed)
+
+    def measured(self, first: int, last: int) -> None:
+        self.gate.event(
+            Event(
+                last / 10,
+                EventKind.MEASURED,
+                "m",
+                "",
+                "info",
+                {"first": first, "last": last, "n": last - first + 1},
+            )
+        )
+
+    @property
+    def given(self) -> list[Any]:
+        return self.recorder.given
+
+
+def test_what_came_a_little_before_goes_first_and_in_order() -> None:
+    bench = Bench()
+    bench.frames(*range(10))
+    bench.gate.sample(LoadSample(0.9, 5.0))  # the load is recorded all the time
+    bench.frames(10)
+    assert bench.given == [("load", 5.0)]
+    assert bench.gate.order(START) == "with 6 before"
+    bench.frames(11)
+    assert bench.given == [("load", 5.0), 5, 6, 7, 8, 9, 10, 11]
+    assert bench.ledger.thinned == 5
+    bench.gate.order(STOP)
+    bench.frames(12, 13)
+    bench.gate.close({})
+    assert bench.given[-2:] == [11, "closed"]
+    assert bench.ledger.thinned == 7
+
+
+def test_what_is_kept_is_bounded_in_bytes() -> None:
+    bench = Bench(60, most=24 * 3 + 10)
+    bench.frames(*range(8))
+    bench.gate.order(START)
+    assert bench.given == [5, 6, 7] and bench.ledger.thinned == 5
+
+
+def test_a_reference_passes_a_shut_gate() -> None:
+    bench = Bench()
+    bench.frames(0, 1)
+    bench.frames(2, 3, needed=True)
+    bench.gate.event(Event(0.3, EventKind.REFERENCE, "m", "", "info", {"first": 2, "last": 3, "n": 2}))
+    bench.frames(4)
+    bench.gate.order(START)
+    assert bench.given == [2, 3, ("reference", 2), 4] and bench.ledger.thinned == 2
+
+
+def test_measured_bursts_are_told_where_their_frames_are_recorded_whole() -> None:
+    bench = Bench(0.25)
+    bench.frames(0, 1, needed=True)
+    bench.frames(*range(2, 9))
+    for first in (2, 5, 6):
+        bench.measured(first, first + 1)
+    bench.gate.order(START)
+    bench.frames(9)
+    bench.measured(8, 9)
+    bench.gate.order(STOP)
+    bench.measured(7, 8)  # after the end, but its frames are there
+    bench.frames(10)
+    bench.measured(9, 10)
+    assert bench.given == [0, 1, 6, 7, 8, ("measured", 6), 9, ("measured", 8), ("measured", 7)]
+
+
+def test_with_nothing_kept_no_burst_from_before_is_told() -> None:
+    bench = Bench(most=10)
+    bench.frames(0, needed=True)
+    bench.frames(1, 2, 3)
+    bench.gate.order(START)
+    bench.given.clear()
+    bench.measured(1, 2)
+    bench.frames(4, 5)
+    bench.measured(3, 4)
+    bench.measured(4, 5)
+    assert bench.given == [4, 5, ("measured", 4)]
+
+
+def test_a_force_opens_it_once() -> None:
+    bench = Bench(above_N=10.0)
+    for force in (9.0, math.nan, -11.0):
+        assert not bench.gate.on
+        bench.gate.sample(LoadSample(0.1, force))
+    assert bench.gate.on and bench.given[-1] == ("load", -11.0)
+    bench.gate.order(STOP)
+    bench.gate.sample(LoadSample(0.2, 99.0))
+    assert not bench.gate.on
+
+
+def test_an_order_that_changes_nothing_is_refused() -> None:
+    bench = Bench(on=True)
+    with pytest.raises(ControlRefused, match="already"):
+        bench.gate.order(START)
+    bench.gate.order(STOP)
+    with pytest.raises(ControlRefused, match="not recording"):
+        bench.gate.order(STOP)
+    bench.recorder.failed = "the disk is full"
+    with pytest.raises(ControlRefused, match="disk is full"):
+        bench.gate.order(START)
+
+
+class TellingRecorder(FakeRecorder):
+    """Its own thread tells something while it takes a frame and while it is closed, and is waited for."""
+
+    gate: PreTriggerBuffer
+
+    def _tell(self) -> None:
+        event = Event(0.0, EventKind.RECORDER, "session.h5", "the disk is full in 20 s", "warning")
+        thread = threading.Thread(target=self.gate.event, args=(event,), daemon=True)
+        thread.start()
+        thread.join(5.0)
+        assert not thread.is_alive(), "it waits for whoever waits for it"
+
+    def frame(self, item: Any) -> None:
+        self._tell()
+        super().frame(item)
+
+    def close(self, ledger: dict[str, Any]) -> None:
+        self._tell()
+        super().close(ledger)
+
+
+def test_a_recorder_that_tells_something_does_not_hold_itself_up() -> None:
+    recorder = TellingRecorder()
+    recorder.gate = PreTriggerBuffer(recorder, FrameCounts(), EventLog(), PreTrigger(0.5, 10**6), on=True)
+    recorder.gate.frame(frame(0), needed=False)
+    recorder.gate.close({})
+    assert recorder.given == [("recorder", None), 0, ("recorder", None), "closed"]

@@ -1,0 +1,148 @@
+"""The server of lines with real sockets: answers, tokens, and clients that stall or misbehave."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from acquire.errors import ConfigError
+from live.config.listen_address import ListenAddress, read_token
+from live.run.tcp_lines import LineServer
+
+WORD = "a-long-and-secret-word"
+
+
+@contextmanager
+def server(**kinds: object) -> Iterator[LineServer]:
+    one = LineServer(ListenAddress.parse("0").listen("a test"), **kinds)  # type: ignore[arg-type]
+    one.start()
+    try:
+        yield one
+    finally:
+        one.close()
+
+
+class Caller:
+    """A client that blocks, with lines."""
+
+    def __init__(self, port: int, receive_buffer: int = 0) -> None:
+        self.socket = socket.socket()
+        if receive_buffer:
+            self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+        self.socket.settimeout(5)
+        self.socket.connect(("127.0.0.1", port))
+        self.lines = self.socket.makefile("r", encoding="utf-8", newline="\n")
+
+    def ask(self, text: str) -> str:
+        self.socket.sendall(text.encode() + b"\n")
+        return self.lines.readline().rstrip("\n")
+
+    def close(self) -> None:
+        self.lines.close()
+        self.socket.close()
+
+
+def test_each_line_is_answered() -> None:
+    with server(hear=str.upper) as one:
+        caller = Caller(one.port)
+        assert [caller.ask("abc"), caller.ask("d e\r")] == ["ABC", "D E"]
+        caller.socket.sendall(b"two\nlines")
+        assert caller.lines.readline() == "TWO\n"
+        assert caller.ask(" at once") == "LINES AT ONCE"
+        caller.close()
+
+
+def test_without_the_token_nothing_is_heard_or_told() -> None:
+    heard: list[str] = []
+    with server(token=WORD, hear=lambda line: heard.append(line) or "ok", greeting="welcome") as one:  # type: ignore[func-returns-value]
+        wrong, right = Caller(one.port), Caller(one.port)
+        assert wrong.ask("quit").startswith("no: ")
+        assert wrong.lines.readline() == ""  # let go
+        assert right.ask(f"token {WORD}") == "ok"
+        assert right.lines.readline() == "welcome\n"
+        assert right.ask("quit") == "ok" and heard == ["quit"]
+        wrong.close()
+        right.close()
+
+
+def test_a_browser_can_order_nothing() -> None:
+    heard: list[str] = []
+    with server(hear=lambda line: heard.append(line) or "ok") as one:  # type: ignore[func-returns-value]
+        caller = Caller(one.port)
+        caller.socket.sendall(b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\nquit\n")
+        assert caller.lines.readline() == ""
+        assert heard == []
+        caller.close()
+
+
+def test_a_client_that_stalls_is_skipped_and_counted_and_the_other_gets_all() -> None:
+    with server(greeting="0") as one:
+        stalled, good = Caller(one.port, receive_buffer=4096), Caller(one.port)
+        assert stalled.lines.readline() == good.lines.readline() == "0\n"
+        lines = [f"{number} " + "x" * 2000 for number in range(1, 1000)]
+        for line in lines:
+            one.tell(line)
+            assert good.lines.readline() == line + "\n"
+        good.close()
+        got = sum(1 for _ in read_what_is_there(stalled))
+    assert one.skipped > 100
+    assert one.taken == 2 + len(lines) + (len(lines) - one.skipped)
+    stalled.close()
+    assert 0 < got <= len(lines) - one.skipped
+
+
+def read_what_is_there(caller: Caller) -> Iterator[str]:
+    caller.socket.settimeout(0.2)
+    while True:
+        try:
+            line = caller.lines.readline()
+        except TimeoutError:
+            return
+        if not line.endswith("\n"):
+            return
+        assert line[0].isdigit()  # only whole lines
+        yield line
+
+
+def test_a_line_without_an_end_is_let_go() -> None:
+    with server(hear=str.upper) as one:
+        caller = Caller(one.port)
+        caller.socket.sendall(b"x" * 20_000)
+        with pytest.raises(ConnectionError):
+            if not caller.socket.recv(1):
+                raise ConnectionError
+        caller.close()
+
+
+@pytest.mark.parametrize(
+    "text", ["", "x", "80", "70000", "host:5000", "1.2.3:5000", "5000:", "::1:5000", "-1", "٣٣٣٣"]
+)
+def test_places_that_cannot_be(text: str) -> None:
+    with pytest.raises(ValueError, match="PORT"):
+        ListenAddress.parse(text)
+
+
+def test_beyond_this_machine_only_with_a_token(tmp_path: Path) -> None:
+    here, everywhere = ListenAddress.parse("localhost:5000"), ListenAddress.parse("0.0.0.0:5000")
+    assert here.is_here and not everywhere.is_here
+    assert read_token(here, None, "it") == ""
+    with pytest.raises(ConfigError, match="token_file"):
+        read_token(everywhere, None, "it")
+    path = tmp_path / "token"
+    for bad in ("", "short", "two words that are long"):
+        path.write_text(bad)
+        with pytest.raises(ConfigError, match="16 letters"):
+            read_token(everywhere, str(path), "it")
+    path.write_text(WORD + "\n")
+    assert read_token(everywhere, str(path), "it") == WORD
+    with pytest.raises(ConfigError, match="no token"):
+        read_token(here, str(tmp_path / "none"), "it")
+
+
+def test_a_taken_port_is_told() -> None:
+    with server() as one, pytest.raises(ConfigError, match="choose another port"):
+        ListenAddress.parse(str(one.port)).listen("it")

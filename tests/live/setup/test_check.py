@@ -1,0 +1,349 @@
+"""The check before a test: a good picture is ready, a bad one is not, and the reason is told.
+
+Predicted and measured strain noise on simulated frames, for noises, radii and contrasts.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from acquire.events import ignore_event
+from live.cli import main
+from live.config.loading import Config, load_config
+from live.setup.check.check_list import CheckFigures, automatic_controls, examine, table_lines
+from live.setup.check.noise_floor import BURSTS, StrainNoise, ZoiFloor
+from live.setup.check.sample import FrameStack, take
+from live.setup.check.verdict import advice, judge, reaching
+from live.setup.specimen_drawing import GOOD, POOR
+
+STILL = "sim:uniform?bits=8&fps=50&seconds=20&width=224&height=192&lockstep=yes"
+
+
+def checked(capsys: pytest.CaptureFixture[str], more: str, *arguments: str) -> tuple[int, str]:
+    small = ["--zoi", "48", "--step", "16", "--reference-burst", "16"]
+    code = main(["check", "--camera", STILL + more, *small, *arguments])
+    return code, capsys.readouterr().out
+
+
+def test_a_good_picture_is_ready(capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = checked(capsys, "")
+    assert code == 0, said
+    assert "LOOK" not in said
+    assert said.rstrip().endswith("GO: ready")
+    assert "\n*  48     1       105      33" in said
+
+
+@pytest.mark.parametrize(
+    ("more", "arguments", "says"),
+    [
+        ("&radius=12", (), "LOOK  speckle radius"),
+        ("&contrast=3", (), "LOOK  contrast"),
+        ("&brightness=1.6", (), "LOOK  saturated"),
+        ("&brightness=0.25", (), "LOOK  light"),
+        ("&noise=0", (), "LOOK  noise"),
+        ("", ("--target", "5"), "more than the 5.0 um/m asked for: "),
+        ("&hold=0.01&end=0.1&drift_x=40", (), "LOOK  drift"),
+    ],
+)
+def test_a_bad_picture_is_not(
+    capsys: pytest.CaptureFixture[str], more: str, arguments: tuple[str, ...], says: str
+) -> None:
+    code, said = checked(capsys, more, *arguments)
+    assert code == 6, said
+    assert says in said
+
+
+def test_too_short(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check"]) == 2
+    assert main(["check", "--camera", "sim:uniform?fps=50&seconds=0.1&width=224&height=192"]) == 4
+    assert "whole frames, a check needs 8" in capsys.readouterr().err
+
+
+def test_a_short_reference_is_checked_with_frames_enough(capsys: pytest.CaptureFixture[str]) -> None:
+    code = main(["check", "--camera", STILL, "--zoi", "48", "--reference-burst", "1", "--burst", "1"])
+    said = capsys.readouterr().out
+    assert code == 0, said
+    assert "reference of 1" in said
+    assert re.search(r"strain noise +\d+ um/m measured", said)
+
+
+@pytest.mark.parametrize("count", [1, 5])
+def test_a_few_pictures_are_judged_by_what_they_tell(
+    count: int, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """Light, bits, pattern and the predicted noise are those of many frames; what changes in time is not told."""
+    config = load_config(None, {"camera.address": STILL, "measure.zoi": 48, "measure.reference_burst": 16})
+    many = take(config)
+    whole = examine(many, config)
+    for k in range(count):
+        cv2.imwrite(str(tmp_path / f"{k}.png"), many.frames[k])
+    stated = ["--camera", f"files:{tmp_path}", "--zoi", "48", "--reference-burst", "16"]
+    assert main(["check", *stated, "--noise", f"{whole.noise:.3f}"]) == 0
+    said = capsys.readouterr().out
+    assert f"pictures               {count}, too few" in said
+    for what in ("noise in time", "flicker", "drift", "vibration"):
+        assert re.search(rf"\? +{what} +not told by {count} picture.*: it takes 8", said), what
+    assert "predicted from the noise as stated" in said
+    assert said.rstrip().splitlines()[-1].startswith(f"GO, as far as {count} picture")
+    assert "reference of 16" in said
+    assert main(["check", *stated[:4]]) in (0, 6)
+    assert "reference of 1\n" in capsys.readouterr().out
+    known = {**config_values(tmp_path), "measure.noise_GL": whole.noise}
+    few = examine(take(load_config(None, known)), load_config(None, known))
+    assert few.radius == pytest.approx(whole.radius, rel=0.03)
+    assert few.sharpness == pytest.approx(whole.sharpness, rel=0.03)
+    assert few.exposure.high == pytest.approx(whole.exposure.high, rel=0.02)
+    for one, other in zip(few.floors, whole.floors, strict=True):
+        assert [n.burst for n in one.noises] == [n.burst for n in other.noises]
+        for noise, more in zip(one.noises, other.noises, strict=True):
+            assert noise.predicted == pytest.approx(more.predicted, rel=0.1)
+            assert np.isnan(noise.measured)
+    # Without a stated noise the spectrum of the picture tells it.
+    spectral = examine(take(load_config(None, config_values(tmp_path))), config)
+    assert spectral.noise == pytest.approx(whole.noise, rel=0.2)
+
+
+def test_a_black_picture(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """No figure is made up where there is nothing to see."""
+    cv2.imwrite(str(tmp_path / "a.png"), np.zeros((200, 300), np.uint8))
+    assert main(["check", "--camera", f"files:{tmp_path}", "--zoi", "32"]) == 6
+    said = capsys.readouterr().out
+    assert "nan" not in said
+    for what in (
+        "speckle radius         none is seen",
+        "sharpness              no pattern",
+        "SSSIG of a ZOI         none",
+    ):
+        assert f"LOOK  {what}" in said
+
+
+def config_values(folder: Path) -> dict[str, object]:
+    return {"camera.address": f"files:{folder}", "measure.zoi": 48, "measure.reference_burst": 16}
+
+
+def test_the_load_cell_is_listened_to(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("live.commands.check.LISTEN_S", 0.5)
+    _, said = checked(capsys, "", "--load", "sim:?rate=50")
+    assert "load cell" in said
+    assert "1/s, noise" in said
+
+
+def test_the_snapshot_and_the_gauges(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """ZOIs are green where their noise is low enough, red where it is not; that of the gauges is told."""
+    shot = tmp_path / "shot.png"
+    code, said = checked(capsys, "", "--gauges", "auto", "--snapshot", str(shot), "--scale", "0.05")
+    assert code == 0, said
+    assert "l_10% mm" in said
+    noise = {
+        name: float(re.search(rf"noise of {name} +([0-9.]+) um/m", said)[1])  # type: ignore[index]
+        for name in ("the mean", "axial", "transverse", "area")
+    }
+    one = float(re.search(r"strain noise +(\d+) um/m measured", said)[1])  # type: ignore[index]
+    assert noise["the mean"] < one
+    assert noise["area"] < one
+    drawn = cv2.imread(str(shot))
+    assert (drawn == np.array(GOOD)).all(axis=2).sum() > 500
+    assert not (drawn == np.array(POOR)).all(axis=2).any()
+    code, said = checked(capsys, "", "--target", "1", "--snapshot", str(tmp_path / "red.png"))
+    assert code == 6
+    assert (cv2.imread(str(tmp_path / "red.png")) == np.array(POOR)).all(axis=2).sum() > 500
+    assert main(["check", "--camera", STILL, "--snapshot", str(shot)]) == 2
+    assert "nothing is overwritten" in capsys.readouterr().err
+
+
+def test_a_gauge_beside_the_specimen_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text("[gauges.far]\nkind = 'zoi'\nat = [900, 20]\n")
+    assert checked(capsys, "", "--config", str(rig))[0] == 2
+
+
+STILL_FLOOR = "sim:uniform?fps=50&seconds=20&hold=10&width=320&height=256&lockstep=yes"
+
+
+def figures(settings: str, zoi: int = 32, table: bool = False) -> CheckFigures:
+    config = load_config(
+        None, {"camera.address": STILL_FLOOR + settings, "measure.zoi": zoi, "measure.reference_burst": 32}
+    )
+    return examine(take(config), config, table=table)
+
+
+TRIALS = [
+    # bits, noise %, radius px, contrast %, ZOI
+    "8 0.5 2 18 32",
+    "8 2 2 18 32",
+    "8 4 2 18 48",
+    "12 0.2 1.5 18 32",
+    "12 1 1.2 18 32",
+    "12 1 4 18 48",
+    "12 0.5 3 6 48",
+    "12 2 2 10 48",
+]
+
+
+@pytest.mark.parametrize("trial", TRIALS)
+def test_predicted_and_measured_agree(trial: str) -> None:
+    bits, noise, radius, contrast, zoi = trial.split()
+    found = figures(f"&bits={bits}&noise={noise}&radius={radius}&contrast={contrast}", int(zoi)).floor
+    assert found is not None
+    for one in found.noises:
+        assert one.measured == pytest.approx(one.predicted, rel=0.2), (trial, one)
+
+
+def test_the_table_has_every_zoi_order_and_burst() -> None:
+    found = figures("&bits=12&noise=1", 64, table=True)
+    rows = {(f.zoi, f.order): f for f in found.floors}
+    assert set(rows) == {(zoi, order) for zoi in (32, 48, 64, 96) for order in (1, 2)}
+    for floor in found.floors:
+        assert [n.burst for n in floor.noises] == list(BURSTS), floor
+        known = [n.known for n in floor.noises]
+        assert known == sorted(known, reverse=True)
+    for noise in rows[32, 2].noises:
+        assert noise.measured == pytest.approx(noise.predicted, rel=0.2)
+    # A quadratic term is even: it does not widen the band of a strain.
+    assert rows[64, 2].l10 == rows[64, 1].l10 == pytest.approx(140, rel=0.01)
+    lines = table_lines(replace(found, px_per_mm=20.0))
+    assert "l_10% mm" in lines[1]
+    assert any(line.startswith("*  64     1      7.01    2.19") for line in lines), lines
+
+
+def test_a_reference_of_another_length_than_was_tried() -> None:
+    """16 and 16 frames taken, 8 wanted: the figures hold for 8."""
+    config = load_config(None, {"camera.address": STILL_FLOOR + "&bits=12&noise=1", "measure.zoi": 32})
+    shots = take(config)
+    short = replace(config, measure=replace(config.measure, reference_burst=8))
+    long, few = (examine(shots, c, table=False).floor for c in (config, short))
+    assert long is not None
+    assert few is not None
+    ratio = few.noises[0].predicted / long.noises[0].predicted
+    assert ratio == pytest.approx(math.sqrt((1 / 8 + 1 / 4) / (1 / 32 + 1 / 4)), rel=0.01)
+
+
+def floor(zoi: int, *values: float) -> ZoiFloor:
+    noises = tuple(StrainNoise(n, v * 1e-6, v * 1e-6) for n, v in zip(BURSTS, values, strict=True))
+    return ZoiFloor(zoi, 1, 2.2 * zoi, 0.7 * zoi, 50, noises, 32)
+
+
+FLOORS = (floor(32, 800, 560, 400, 290, 220), floor(64, 200, 140, 100, 70, 49), floor(96, 90, 64, 45, 33, 24))
+
+
+def asked(target_um_m: float, high: float) -> str:
+    made_up: Any = SimpleNamespace(
+        floors=FLOORS, floor=FLOORS[1], zoi=64, order=1, burst=4, exposure=SimpleNamespace(high=high)
+    )
+    return advice(made_up, target_um_m * 1e-6)
+
+
+@pytest.mark.parametrize(
+    ("target", "high", "says"),
+    [
+        (50, 0.2, "burst 16, or ZOI 96, or 4.0 times the light or exposure"),
+        (71, 0.4, "burst 8, or ZOI 96, or twice the light or exposure"),
+        (50, 0.9, "burst 16, or ZOI 96, or 1.9 times the contrast (light helps 1.1 times, then it saturates)"),
+        (30, 0.5, "ZOI 96 and burst 16, or burst 80 and a reference of 80 with ZOI 64"),
+    ],
+)  # fmt: skip
+def test_what_reaches_a_target(target: float, high: float, says: str) -> None:
+    assert asked(target, high).startswith(says), asked(target, high)
+
+
+def test_the_shortest_burst_of_each_zoi() -> None:
+    assert [(f.zoi, n) for f, n in reaching(FLOORS, 70e-6)] == [(64, 8), (96, 2)]
+    assert reaching(FLOORS, 1e-6) == []
+
+
+def shots_of(frames: np.ndarray, bits: int, fps: float = 30.0) -> FrameStack:
+    from live.setup.devices import open_rig
+
+    rig = open_rig(STILL_FLOOR, "none:", ignore_event)
+    rig.close()
+    height, width = frames.shape[1:]
+    camera = replace(rig.camera.info, width=width, height=height, bits=bits, fps=fps)
+    return FrameStack(frames, np.arange(len(frames)) / fps, 0, camera)
+
+
+@pytest.fixture(scope="module")
+def taken() -> FrameStack:
+    return take(load_config(None, {"camera.address": STILL_FLOOR + "&bits=8&noise=1"}))
+
+
+def said(shots: FrameStack, what: str) -> str:
+    config = Config()
+    lines = judge(examine(shots, replace(config, measure=replace(config.measure, zoi=48)), table=False))
+    return next(line.text() for line in lines if line.what == what)
+
+
+def test_lamps_on_the_mains_are_named(taken: FrameStack) -> None:
+    t = np.arange(len(taken)) / 30
+    bright = 1 + 0.05 * np.sin(2 * np.pi * 100 * t)
+    frames = np.clip(np.rint(taken.frames * bright[:, None, None]), 0, 255).astype(np.uint8)
+    text = said(shots_of(frames, 8), "flicker")
+    assert text.startswith("LOOK")
+    assert "lamps on 50 Hz mains (100 Hz, seen at 10.0 Hz)" in text
+    assert "multiple of 10.0 ms" in text
+
+
+def test_a_shaking_camera_is_seen_with_its_frequency(taken: FrameStack) -> None:
+    t = np.arange(len(taken)) / 30
+    moved = np.rint(1.0 * np.sin(2 * np.pi * 7.0 * t)).astype(int)
+    frames = np.stack([np.roll(f, k, axis=0)[8:-8] for f, k in zip(taken.frames, moved, strict=True)])
+    text = said(shots_of(frames, 8), "vibration")
+    assert text.startswith("LOOK")
+    assert "mainly at 7.0 Hz" in text
+
+
+def test_motion_is_that_of_what_has_a_pattern(taken: FrameStack) -> None:
+    """Of a specimen at one side of a region that is all of the picture."""
+    height, width = taken.frames.shape[1:]
+    frames = np.full((len(taken), height, width + 1200), 100, np.uint8)
+    frames[:, :, :width] = taken.frames
+    config = load_config(None, {"measure.zoi": 48, "measure.roi": "all"})
+    still = examine(shots_of(frames, 8), config, table=False).still
+    assert still.drift_px < 0.01
+    assert still.worse.vibration < 0.01
+
+
+def test_bits_that_never_change(taken: FrameStack) -> None:
+    coarse = (taken.frames.astype(np.uint16) & 0xF0) << 4
+    assert "4 of 12 change" in said(shots_of(coarse, 12), "bits")
+    deep = taken.frames.astype(np.uint16)
+    text = said(shots_of(deep, 16), "bits")
+    assert "the highest 8 are never used" in text
+    assert "saturation is not seen" in text
+
+
+def test_what_surrounds_the_specimen_decides_nothing(taken: FrameStack) -> None:
+    """A saturated, flickering background beside a good specimen."""
+    height, width = taken.frames.shape[1:]
+    frames = np.full((len(taken), height + 100, width + 400), 255, np.uint8)
+    frames[::2, :, :] = 200
+    frames[:, 50 : 50 + height, 200 : 200 + width] = taken.frames
+    config = load_config(None, {"measure.zoi": 48})
+    found = examine(shots_of(frames, 8), config, table=False)
+    assert found.region.found
+    bad = [line.text() for line in judge(found) if not line.good]
+    assert bad == []
+    assert found.noise == pytest.approx(examine(taken, config, table=False).noise, rel=0.05)
+
+
+def test_automatic_controls_by_name_and_value() -> None:
+    controls = {
+        "auto_exposure": "Aperture Priority Mode",
+        "white_balance_automatic": 1,
+        "focus_automatic_continuous": 0,
+        "exposure_auto": "Manual Mode",
+        "exposure_dynamic_framerate": 1,
+        "gain": 7,
+    }
+    found = automatic_controls(controls)
+    assert found == ("auto_exposure", "white_balance_automatic", "exposure_dynamic_framerate")

@@ -1,0 +1,195 @@
+"""The check that goes on: the peak of the sharpness is held, Ctrl-C leaves the last table."""
+
+from __future__ import annotations
+
+import importlib
+import io
+import os
+import signal
+import threading
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+from live.cli import main
+from live.commands import check_watch as watching
+from live.commands.check_watch import RenewedLines, card, peak_line
+from live.config.loading import load_config
+from live.setup.check.check_list import examine
+from live.setup.check.quick_check import SEARCH_EVERY, TURNS, QuickCheck, QuickChecker
+from live.setup.check.sample import take
+from live.setup.check.verdict import CheckLine
+from live.setup.region import Region
+from live.ui.terminal.screen import TerminalScreen
+
+STILL = "sim:uniform?bits=8&fps=50&width=224&height=192"
+SMALL = ["--zoi", "48", "--reference-burst", "8"]
+
+
+def test_the_peak_is_held() -> None:
+    said = {
+        "camera.address": STILL + "&seconds=5&lockstep=yes",
+        "measure.zoi": 48,
+        "measure.reference_burst": 8,
+    }
+    config = load_config(None, said)
+    sharp, watch, found = take(config), QuickChecker(config), []
+    for blur in (2.0, 1.0, 0.0, 1.5):
+        frames = np.stack([gaussian_filter(f.astype(np.float32), blur) for f in sharp.frames[:8]])
+        glance = watch.glance(replace(sharp, frames=np.round(frames).astype(np.uint8), times=sharp.times[:8]))
+        found.append(glance)
+    values = [glance.figures.sharpness for glance in found]
+    assert values[0] < values[1] < values[2] > values[3]
+    assert [glance.of_peak for glance in found[:3]] == [1.0, 1.0, 1.0]
+    assert found[3].peak == values[2]
+    assert f"{values[3] / values[2]:.0%} of the peak" in peak_line(found[3])
+    assert peak_line(found[3]).count("#") == round(30 * values[3] / values[2])
+    assert found[0].figures.floors == ()
+
+
+class FakeView:
+    """Keeps what it is shown."""
+
+    made: list[FakeView]
+
+    def __init__(self, setup: Any, **how: Any) -> None:
+        self.cards, self.pictures, self.closed = [], [], False
+        FakeView.made.append(self)
+
+    def picture(self, frame: Any) -> None:
+        self.pictures.append(frame)
+
+    def status(self, text: str) -> None:
+        self.cards.append(text)
+
+    def close(self, seconds: float) -> None:
+        self.closed = True
+
+
+def test_ctrl_c_leaves_the_table(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    FakeView.made = []
+    monkeypatch.setattr(watching, "View", FakeView)
+    glances = []
+
+    def seen(glance: Any) -> str:
+        glances.append(glance)
+        if len(glances) == 3:
+            threading.Thread(target=os.kill, args=(os.getpid(), signal.SIGINT)).start()
+        return peak_line(glance)
+
+    monkeypatch.setattr(watching, "peak_line", seen)
+    before = signal.getsignal(signal.SIGINT)
+    assert main(["check", "--watch", "--camera", STILL + "&seconds=100&hold=90", *SMALL]) == 0
+    assert signal.getsignal(signal.SIGINT) is before
+    said = capsys.readouterr().out
+    assert "sharpness 0." in said
+    assert "\n*  48     1       105      33" in said
+    assert said.rstrip().endswith("GO: ready")
+    (view,) = FakeView.made
+    assert view.closed
+    assert view.pictures
+    assert "| light |" in view.cards[0]
+
+
+def test_a_camera_that_ends(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["--camera", STILL + "&seconds=4&lockstep=yes", "--no-view", *SMALL]
+    assert main(["check", "--watch", *arguments]) == 0
+    assert "strain noise of one ZOI" in capsys.readouterr().out
+    short = ["--camera", STILL + "&seconds=0.1", "--no-view", *SMALL]
+    assert main(["check", "--watch", *short]) == 4
+    assert "whole frames, a check needs 8" in capsys.readouterr().err
+
+
+def test_the_work_of_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What takes long takes turns, the picture is averaged once; the figures are those of a check."""
+    said = {
+        "camera.address": STILL + "&seconds=5&lockstep=yes",
+        "measure.zoi": 48,
+        "measure.reference_burst": 8,
+    }
+    config = load_config(None, said)
+    sixteen = take(config)
+    shots = replace(sixteen, frames=sixteen.frames[:8], times=sixteen.times[:8])
+    done: list[str] = []
+
+    def counted(module: str, name: str, what: str) -> None:
+        real = getattr(importlib.import_module(module), name)
+
+        def call(*arguments: Any, **more: Any) -> Any:
+            done.append(what)
+            return real(*arguments, **more)
+
+        monkeypatch.setattr(f"{module}.{name}", call)
+
+    counted("live.setup.check.noise_floor", "prepare", "reference")
+    counted("live.setup.check.stillness", "prepare", "reference")
+    counted("live.setup.check.quick_check", "sought", "search")
+    counted("live.setup.check.check_list", "noise_floors", "table")
+    watch, work, glances = QuickChecker(config), list[list[str]](), list[QuickCheck]()
+    for _ in range(2 * SEARCH_EVERY):
+        glances.append(watch.glance(shots))
+        work.append(list(done))
+        done.clear()
+    assert work[0] == ["search", "reference", "reference"]
+    assert all(len(one) <= 1 for one in work[1:])
+    later = [what for one in work[SEARCH_EVERY:] for what in one]
+    assert (later.count("reference"), later.count("search")) == (2 * SEARCH_EVERY // TURNS, 1)
+    once, last = examine(shots, config, table=False), glances[-1].figures
+    assert (last.noise, last.exposure, last.radius, last.still, last.gauges) == (
+        once.noise, once.exposure, once.radius, once.still, once.gauges,
+    )  # fmt: skip
+    for name in ("sigma", "contrast", "sssig", "sharpness"):
+        np.testing.assert_array_equal(getattr(last.zois, name), getattr(once.zois, name))
+
+
+def test_the_region_stays_where_only_its_rim_is_found_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
+    config = load_config(None, {"camera.address": STILL + "&seconds=5&lockstep=yes", "measure.zoi": 48})
+    shots = take(config)
+    boxes = iter([(8, 8, 200, 176), (9, 8, 199, 176), (60, 8, 148, 176)])
+    monkeypatch.setattr(
+        "live.setup.check.quick_check.sought", lambda *_: Region(next(boxes), None, "found", True)
+    )
+    monkeypatch.setattr("live.setup.check.quick_check.SEARCH_EVERY", 1)
+    watch = QuickChecker(config)
+    assert [watch.glance(shots).figures.region.box for _ in range(3)] == [
+        (8, 8, 200, 176),
+        (8, 8, 200, 176),
+        (60, 8, 148, 176),
+    ]
+
+
+def test_pictures_that_are_few_leave_their_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    config = load_config(None, {"camera.address": STILL + "&seconds=5&lockstep=yes"})
+    cv2.imwrite(str(tmp_path / "one.png"), take(config).frames[0])
+    assert main(["check", "--watch", "--camera", f"files:{tmp_path}", "--no-view", *SMALL]) == 0
+    assert "GO, as far as 1 picture can tell" in capsys.readouterr().out
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is one."""
+
+    def isatty(self) -> bool:
+        return True
+
+
+def test_lines_are_renewed_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.get_terminal_size", lambda: (20, 24))
+    stream = Terminal()
+    show = RenewedLines(TerminalScreen(), stream)
+    show.lines(["one", "z" * 50, "bad\x1b[31m"], "")
+    show.lines(["two"], "")
+    assert stream.getvalue().count("z") == 19
+    assert "\x1b[31m" not in stream.getvalue()
+    assert stream.getvalue().endswith("\x1b[3A\x1b[2Ktwo\n\x1b[0J")
+
+
+def test_the_card_is_a_table() -> None:
+    glance: Any = type("G", (), {"of_peak": float("nan")})()
+    text = card(glance, [CheckLine("a|b", "1"), CheckLine("c", "2", False)])
+    assert "| a/b | 1 |" in text
+    assert "| **LOOK** | c | 2 |" in text

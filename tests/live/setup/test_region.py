@@ -1,0 +1,230 @@
+"""The region of a test: found where nothing is given, stored, the same in a replay.
+
+Gauges that place themselves: on the specimen, beside holes, right in any strain.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import h5py
+import numpy as np
+import pytest
+
+from acquire.errors import ConfigError
+from analysis import Roi, ZoiGrid
+from live.cli import main
+from live.config.gauges import gauges_for
+from live.config.loading import load_config
+from live.results import Strain
+from live.setup.devices import open_rig
+from live.setup.placement import auto_gauges, with_auto_gauges
+from live.setup.region import FirstLook, look, placed_on, region_of
+from tests.live.made_up import make_field
+
+SIM = "sim:hole?seconds=2&fps=20&width=320&height=320&hole=40&lockstep=yes"
+QUICK = ["--zoi", "32", "--step", "16", "--no-view", "--no-rrd"]
+
+
+def config_of(folder: Path) -> dict:
+    found: dict = json.loads((folder / "config.json").read_text())
+    return found
+
+
+def test_a_run_without_a_region_finds_the_specimen(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    live, again = tmp_path / "live", tmp_path / "again"
+    reference = ["--reference-burst", "4", "--burst", "2"]
+    assert main(["run", "--camera", SIM, "--gauges", "auto", *reference, "--out", str(live), *QUICK]) == 0
+    assert "the specimen was found" in capsys.readouterr().out
+    stored = config_of(live)["measure"]
+    assert stored["mask"] == str(live / "mask.png")
+    assert stored["gauges"] == "given"
+    mask = cv2.imread(stored["mask"], cv2.IMREAD_GRAYSCALE)
+    assert not mask[160, 160]
+    assert mask[100, 40]
+    assert main(["replay", str(live / "session.h5"), "--as-measured", "--out", str(again), *QUICK[-2:]]) == 0
+    with Strain.open(live / "strain.h5") as one, Strain.open(again / "strain.h5") as two:
+        assert not one.grid.active.all()
+        np.testing.assert_array_equal(one.maps("eyy", -1), two.maps("eyy", -1))
+    # A replay may look for itself: in the reference, with gauges that are placed anew.
+    third = tmp_path / "third"
+    said = ["--roi", "auto", "--gauges", "auto", "--zoi", "48", "--out", str(third), *QUICK[-2:]]
+    assert main(["replay", str(live / "session.h5"), *said]) == 0
+    assert "the specimen was found" in capsys.readouterr().out
+    with h5py.File(third / "strain.h5") as file:
+        assert set(file["entry/gauges"]) >= {"axial", "transverse", "area"}
+
+
+def pictures(folder: Path) -> str:
+    """Speckle on a disc, on grey; the disc moves by two pixels."""
+    rng = np.random.default_rng(3)
+    y, x = np.mgrid[:300, :340]
+    pattern = cv2.GaussianBlur(rng.normal(size=x.shape).astype(np.float32), (0, 0), 1.6)
+    disc = np.hypot(x - 170, y - 150) < 110
+    one = np.where(disc, 120 + 250 * pattern, 120) + rng.normal(0, 1, x.shape)
+    for k in range(2):
+        moved = np.roll(one, 2 * k, axis=1) + rng.normal(0, 0.5, x.shape)
+        cv2.imwrite(str(folder / f"p{k}.png"), np.clip(moved, 0, 255).astype(np.uint8))
+    return f"files:{folder}/p*.png"
+
+
+def test_pictures_are_replayed_on_the_specimen_alone(tmp_path: Path) -> None:
+    source = pictures(tmp_path)
+    assert main(["replay", source, "--out", str(tmp_path / "found"), *QUICK]) == 0
+    with Strain.open(tmp_path / "found" / "strain.h5") as strain:
+        x, y = np.meshgrid(strain.grid.x, strain.grid.y)
+        far = np.hypot(x - 169.5, y - 149.5)
+        assert not strain.grid.active[far > 110].any()
+        assert strain.grid.active[far < 75].all()
+        np.testing.assert_allclose(strain.maps("u", -1)[strain.grid.active], 2, atol=0.05)
+    assert (tmp_path / "found" / "mask.png").exists()
+    assert main(["replay", source, "--roi", "all", "--out", str(tmp_path / "all"), *QUICK]) == 0
+    with Strain.open(tmp_path / "all" / "strain.h5") as strain:
+        assert strain.grid.active.all()
+
+
+def test_the_edge_is_followed_to_half_a_zoi(tmp_path: Path) -> None:
+    """Of a disc whose edge is known, for several radii of the speckle and noises."""
+    pictures(tmp_path)
+    picture = cv2.imread(str(tmp_path / "p0.png"), cv2.IMREAD_GRAYSCALE)
+    region = region_of(load_config(None, {"measure.zoi": 32}), picture)
+    assert region.mask is not None
+    y, x = np.mgrid[:300, :340]
+    distance = np.hypot(x - 170, y - 150) - 110
+    assert not region.mask[distance > 16].any()
+    assert region.mask[distance < -16].all()
+
+
+def test_nothing_that_stands_out_is_told() -> None:
+    """Noise alone is no specimen: all but a rim is measured, and a line says so."""
+    from acquire.frame import CameraInfo
+
+    picture = np.random.default_rng(0).normal(100, 2, (200, 200)).astype(np.float32)
+    camera = CameraInfo("none", "none", 200, 200, 8, False, "nominal")
+    said: list[str] = []
+    config, mask = placed_on(
+        load_config(None, {"measure.zoi": 32}), FirstLook(picture, 2.0, camera), said.append
+    )
+    assert mask is None
+    assert config.measure.roi == "all"
+    assert said[0].startswith("no specimen was found that stands out")
+
+
+def test_a_camera_that_gives_nothing_at_first_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is waited for, and that is said; what is no trouble is not."""
+    from acquire.events import Event, EventKind
+
+    def troubled(address: str, load: str, on_event, **how):
+        on_event(Event(0.0, EventKind.LOST, "camera", "no picture for 2.0 s; still waiting", "warning"))
+        on_event(Event(0.0, EventKind.LOST, "camera", "opened", "info"))
+        return open_rig(address, load, on_event, **how)
+
+    monkeypatch.setattr("live.setup.region.open_rig", troubled)
+    said: list[str] = []
+    seen = look(load_config(None, {"camera.address": SIM}), said.append)
+    assert said == ["no picture for 2.0 s; still waiting"]
+    assert seen.size == (320, 320)
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "sim:hole?width=400&height=360&hole=50&lockstep=yes&seconds=2",
+        "sim:hole?width=400&height=360&hole=30&radius=3.5&noise=3&bits=8&lockstep=yes&seconds=2",
+        "sim:woven?width=300&height=260&lockstep=yes&seconds=2",
+    ],
+)
+def test_simulated_specimens(address: str) -> None:
+    """The mask is that of the simulated specimen, to half a ZOI."""
+    config = load_config(None, {"camera.address": address, "measure.zoi": 32})
+    rig = open_rig(address, "none:")
+    rig.close()
+    assert rig.specimen is not None
+    truth = rig.specimen.mask()
+    seen = look(config, print)
+    inside = region_of(config, seen.picture, seen.noise).inside(*seen.size, 32)
+    distance = [cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (truth, ~truth)]
+    assert not inside[distance[1] > 16].any()
+    deep = distance[0] > 16 if not truth.all() else truth
+    assert inside[4:-4, 4:-4][deep[4:-4, 4:-4]].all()
+
+
+BOX = Roi(100, 40, 120, 500)
+
+
+def strip(*holes: tuple[int, int, int], slope: float = 0.0) -> np.ndarray:
+    """A strip 120 px wide and 500 px high, with round holes (x, y, radius) or leaning by ``slope``."""
+    y, x = np.mgrid[:600, :400]
+    mask = (x >= 100 + slope * y) & (x < 220 + slope * y) & (y >= 40) & (y < 540)
+    for x0, y0, radius in holes:
+        mask &= np.hypot(x - x0, y - y0) > radius
+    return np.asarray(mask)
+
+
+def grid_on(mask: np.ndarray, size: int = 32, step: int = 8) -> ZoiGrid:
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    x, y = int(columns[0]), int(rows[0])
+    return ZoiGrid.cover(Roi(x, y, int(columns[-1]) + 1 - x, int(rows[-1]) + 1 - y), size, step, mask)
+
+
+def test_axial_spans_four_fifths_of_the_specimen_in_its_middle() -> None:
+    gauges = auto_gauges(grid_on(strip()), "y")
+    axial = gauges["axial"]
+    assert axial["end"][1] - axial["start"][1] == pytest.approx(0.8 * 500, abs=8)
+    assert axial["start"][0] == axial["end"][0] == pytest.approx(159.5, abs=4)
+    assert list(gauges) == ["axial", "transverse", "area"]
+
+
+@pytest.mark.parametrize("axis", ["x", "y"])
+@pytest.mark.parametrize(
+    "mask",
+    [strip(), strip((160, 290, 40)), strip((160, 90, 30)), strip(slope=0.3)],
+    ids=["plain", "hole", "hole at an end", "leaning"],
+)
+def test_all_are_on_zois_and_read_the_strain(mask: np.ndarray, axis: str) -> None:
+    mask = mask if axis == "y" else mask.T
+    grid = grid_on(mask)
+    config = load_config(None, {"measure.gauges": "auto", "specimen.axis": axis})
+    config = with_auto_gauges(config, grid)
+    assert config.measure.gauges == "given"
+    field = make_field(grid, 1e-3)
+    across = "exx" if axis == "y" else "eyy"
+    along = "eyy" if axis == "y" else "exx"
+    values = {g.name: g.measure(field) for g in gauges_for(config.gauges, config.specimen.first_axis, grid)}
+    assert list(values) == ["axial", "transverse", "area"]
+    assert values["area"].value == pytest.approx(field.mean(along)[0], abs=1e-9)
+    # The ends of a line on a leaning strip stand aslant.
+    assert values["transverse"].value == pytest.approx(field.mean(across)[0], rel=0.03)
+    assert values["axial"].value == pytest.approx(field.mean(along)[0], rel=0.15)
+
+
+def test_the_transverse_one_keeps_off_a_hole() -> None:
+    grid = grid_on(strip((160, 290, 40)))
+    box = auto_gauges(grid, "y")["transverse"]["box"]
+    assert box is not None
+    _, y, _, height = box
+    assert y > 290 + 40 or y + height < 290 - 40
+
+
+def test_what_is_given_stays(tmp_path: Any) -> None:
+    own = {"kind": "area", "box": [120, 100, 60, 60]}
+    config = load_config(None, {"measure.gauges": "auto", "gauges.axial": own, "gauges.mine": own})
+    placed = with_auto_gauges(config, grid_on(strip()))
+    assert placed.gauges["axial"]["kind"] == "area"
+    assert list(placed.gauges) == ["axial", "transverse", "area", "mine"]
+    assert with_auto_gauges(placed, grid_on(strip())) is placed
+
+
+def test_a_narrow_specimen_has_no_transverse_one() -> None:
+    grid = ZoiGrid.cover(Roi(10, 10, 36, 200), 32, 8)
+    assert list(auto_gauges(grid, "y")) == ["axial", "area"]
+
+
+def test_too_short_a_specimen_is_refused() -> None:
+    with pytest.raises(ConfigError, match="1 rows of ZOIs lie along the load"):
+        auto_gauges(ZoiGrid.cover(Roi(10, 10, 200, 36), 32, 8), "y")

@@ -1,0 +1,186 @@
+"""The scale of the picture against pictures whose scale is known; its tilt; what stands in the rig file.
+
+The scale that the test was configured with is that of its report and exports.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from acquire.errors import ConfigError, DataError
+from live.cli import main
+from live.config.loading import load_config
+from live.results.run_folder import open_run
+from live.setup.region import Region, region_of
+from live.setup.scale import Board, false_strain, from_board, from_points, from_width
+from tests.live.made_run import CONFIG, make_run
+
+CHECKER = Board(9, 6, 5.0)
+CHARUCO = Board(8, 6, 6.0, 4.5)
+
+
+def seen(board: Board, px_per_mm: float, degrees: float = 0.0, stand_off: float = 400.0) -> np.ndarray:
+    """The board by a pinhole camera at ``stand_off`` mm, turned about an upright axis; 700 x 500 px, noisy."""
+    fine = 12  # px of the print per mm
+    if board.marker_mm:
+        dictionary = cv2.aruco.getPredefinedDictionary(cv2.aruco.DICT_4X4_50)
+        made = cv2.aruco.CharucoBoard(
+            (board.columns, board.rows), board.square_mm, board.marker_mm, dictionary
+        )
+        size = int(board.columns * board.square_mm * fine), int(board.rows * board.square_mm * fine)
+        printed = np.asarray(made.generateImage(size, marginSize=0), np.float32)
+    else:
+        square = int(board.square_mm * fine)
+        rows, columns = np.mgrid[: (board.rows + 1) * square, : (board.columns + 1) * square] // square
+        printed = (255.0 * ((rows + columns) % 2 == 0)).astype(np.float32)
+    printed = np.pad(printed, 4 * fine, constant_values=255)
+    height, width = printed.shape
+    angle = math.radians(degrees)
+    corners = np.array([[0, 0], [width, 0], [width, height], [0, height]], np.float32)
+    mm = (corners - [width / 2, height / 2]) / fine
+    depth = 1 + mm[:, 0] * math.sin(angle) / stand_off
+    flat = np.stack([mm[:, 0] * math.cos(angle), mm[:, 1]], axis=1)
+    there = flat * px_per_mm / depth[:, None] + [350, 250]
+    # Twice the size, then halved: the edges of pixels are averages.
+    h = cv2.getPerspectiveTransform(corners, (2 * there).astype(np.float32))
+    large = cv2.warpPerspective(printed, h, (1400, 1000), flags=cv2.INTER_AREA, borderValue=180)
+    picture = cv2.GaussianBlur(cv2.resize(large, (700, 500), interpolation=cv2.INTER_AREA), (0, 0), 0.7)
+    noise = np.random.default_rng(0).normal(0, 2, picture.shape)
+    return np.asarray(np.clip(40 + 0.7 * picture + noise, 0, 255).astype(np.uint8))
+
+
+@pytest.mark.parametrize("board", [CHECKER, CHARUCO], ids=["checkerboard", "charuco"])
+@pytest.mark.parametrize("px_per_mm", [8.0, 11.0])
+def test_a_board_that_stands_square(board: Board, px_per_mm: float) -> None:
+    scale = from_board(seen(board, px_per_mm), board)
+    assert scale.mm_per_px == pytest.approx(1 / px_per_mm, abs=3 * scale.sigma)
+    assert scale.relative < 1e-3
+    assert scale.remarks == ()
+
+
+@pytest.mark.parametrize("degrees", [4.0, 12.0])
+def test_a_tilted_board_is_warned_of(degrees: float) -> None:
+    scale = from_board(seen(CHECKER, 8.0, degrees), CHECKER, stand_off_mm=400)
+    assert scale.mm_per_px == pytest.approx(1 / 8.0, abs=2 * scale.sigma)
+    said = re.search(r"about (\d+) degrees", scale.remarks[0])
+    assert said is not None
+    assert float(said[1]) == pytest.approx(degrees, abs=1)
+
+
+def test_a_length_that_is_not_known_well() -> None:
+    scale = from_points((10, 20, 310, 420), 50.0, sigma_mm=0.5)
+    assert scale.mm_per_px == pytest.approx(0.1)
+    assert scale.sigma == pytest.approx(0.1 * math.hypot(math.sqrt(2) / 500, 0.01))
+    with pytest.raises(ConfigError, match="more than 1 px apart"):
+        from_points((10, 20, 10, 20), 50.0)
+    assert from_board(seen(CHECKER, 8.0), CHECKER, sigma_mm=0.4).relative == pytest.approx(0.01, rel=0.05)
+
+
+def strip(left: float, right: float, lean: float = 0.0, ground: float = 0.0) -> np.ndarray:
+    """Speckle between two edges that lean, on a smooth ground or one with a pattern of its own."""
+    rng = np.random.default_rng(5)
+    y, x = np.mgrid[:480, :360]
+    pattern = cv2.GaussianBlur(rng.normal(size=x.shape).astype(np.float32), (0, 0), 1.5)
+    other = cv2.GaussianBlur(rng.normal(size=x.shape).astype(np.float32), (0, 0), 12)
+    at = x + 0.5 - lean * (y - 240)
+    inside = np.clip(at - left + 0.5, 0, 1) * np.clip(right - at + 0.5, 0, 1)
+    picture = 110 + inside * 260 * pattern + (1 - inside) * (ground * other + 0.1 * y)
+    return np.asarray(np.clip(picture + rng.normal(0, 1, x.shape), 0, 255).astype(np.uint8))
+
+
+@pytest.mark.parametrize("lean", [0.0, 0.04])
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_the_width_of_the_specimen(lean: float, axis: str) -> None:
+    picture = strip(100.3, 260.8, lean)
+    picture = picture if axis == "y" else np.ascontiguousarray(picture.T)
+    region = region_of(load_config(None, {"measure.zoi": 32}), picture)
+    scale = from_width(picture, region, axis, 16.05)
+    assert scale.mm_per_px == pytest.approx(0.1, abs=2 * scale.sigma)
+    assert scale.relative < 0.02
+
+
+def test_a_specimen_without_edges_has_no_width() -> None:
+    region = Region(None, None, "fills the picture", found=True)
+    with pytest.raises(DataError, match="give two points"):
+        from_width(strip(0, 400), region, "y", 10)
+
+
+def test_the_rig_file_gets_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    cv2.imwrite(str(tmp_path / "board.png"), seen(CHECKER, 8.0))
+    rig = tmp_path / "rig.toml"
+    rig.write_text(f"# mine\n[camera]\naddress = 'files:{tmp_path}/board.png'\n")
+    arguments = ["--config", str(rig), "--checkerboard", "9x6", "--square", "5", "--stand-off", "400"]
+    assert main(["scale", *arguments]) == 0
+    said = capsys.readouterr().out
+    assert "0.1 mm toward the camera at a stand-off of 400 mm feigns a strain of 250 um/m" in said
+    found = load_config(rig, {"measure.zoi": "5 mm"})
+    assert found.scale.mm_per_px == pytest.approx(0.125, rel=1e-3)
+    assert found.measure.zoi == 40
+    assert found.scale.sigma_mm_per_px is not None
+    assert 0 < found.scale.sigma_mm_per_px < 1e-3
+    assert found.scale.stand_off_mm == 400
+    assert found.scale.date is not None
+    assert "# mine" in rig.read_text()
+    assert main(["scale", "--config", str(rig), "--points", "0,0,100,0", "--length", "20"]) == 0
+    assert load_config(rig, {}).scale.mm_per_px == 0.2
+    assert load_config(rig, {}).scale.stand_off_mm == 400
+    assert false_strain(400) == 2.5e-4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "says"),
+    [
+        ([], 2, "give one of --points"),
+        (["--points", "1,2,3,4", "--width", "3"], 2, "not 2 of them"),
+        (["--points", "1,2,3"], 2, "give 4 numbers, as 12,30"),
+        (["--points", "1,2,nan,9", "--length", "3"], 2, "give 4 numbers"),
+        (["--points", "1,2,30,4"], 2, "--length MM is needed"),
+        (["--points", "1,2,30,4", "--length", "-1"], 2, "--length -1 is not possible"),
+        (["--width", "--camera", "sim:"], 2, "give the width of the specimen"),
+        (["--width", "10"], 2, "no camera is given"),
+        (["--checkerboard", "9by6", "--camera", "sim:uniform"], 2, "give 2 numbers, as 9x6"),
+        (["--checkerboard", "900x6", "--square", "1", "--camera", "sim:uniform"], 2, "3 to 60 columns"),
+        (["--checkerboard", "9x6", "--square", "1", "--camera", "sim:uniform"], 4, "no checkerboard of 9 x 6"),
+        (["--charuco", "9x6", "--square", "2", "--marker", "3", "--camera", "sim:uniform"], 2, "smaller than"),
+        (["--charuco", "9x6", "--square", "2", "--marker", "1", "--camera", "sim:uniform", "--dictionary", "!"],
+         2, "no dictionary of markers '!'"),
+        (["--charuco", "20x20", "--square", "2", "--marker", "1", "--camera", "sim:uniform"], 2, "too few markers"),
+        (["--charuco", "5x5", "--square", "2", "--marker", "1", "--camera", "sim:uniform"], 4, "no ChArUco board"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be(
+    capsys: pytest.CaptureFixture[str], arguments: list[str], code: int, says: str
+) -> None:
+    assert main(["scale", *arguments]) == code
+    assert says in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def scaled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    config = {**CONFIG, "scale": {"mm_per_px": 0.05}}
+    return make_run(tmp_path_factory.mktemp("scaled"), [0.0, 1e-3], config=config)
+
+
+@pytest.mark.parametrize(("more", "scale"), [([], 0.05), (["--scale", "0.1"], 0.1)])
+def test_lengths_are_in_mm(scaled: Path, tmp_path: Path, more: list[str], scale: float) -> None:
+    out = tmp_path / "a.npz"
+    assert main(["export", str(scaled), "--to", "npz", "--mm", *more, "--out", str(out)]) == 0
+    with np.load(out) as held, open_run(scaled) as run:
+        np.testing.assert_allclose(held["v"], scale * run.strain.maps("v"), rtol=1e-6)
+
+
+def test_the_report_shows_it(scaled: Path, tmp_path: Path) -> None:
+    assert main(["report", str(scaled), "--out", str(tmp_path / "r.html")]) == 0
+    assert "0.05 mm/px" in (tmp_path / "r.html").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("said", [None, "0.05", -1, 0, True, math.nan, math.inf, [1]])
+def test_what_is_no_scale_is_none(tmp_path: Path, said: object) -> None:
+    with open_run(make_run(tmp_path, [0.0], config={**CONFIG, "scale": {"mm_per_px": said}})) as run:
+        assert run.mm_per_px is None

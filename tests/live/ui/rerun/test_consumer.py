@@ -1,0 +1,125 @@
+"""View and status card as consumers: an offer costs the test next to nothing, whatever the view does."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import pytest
+
+from acquire.events import Event, EventKind
+from acquire.load_sample import LoadSample
+from live.config.sections import SpecimenConfig
+from live.pipeline.consumer_thread import Outputs
+from live.pipeline.event_log import EventLog
+from live.pipeline.run_state import RunState
+from live.pipeline.snapshot import Snapshot
+from live.results.summary import StatusCard
+from live.ui.rerun.consumer import CARD_INSTANTS, CardWriter, FiguresWriter, RerunConsumer
+from tests.live.made_up import START, make_frame, make_loads, make_measurement
+
+
+class KeptView:
+    """Keeps what it is given, as ``View`` would send it."""
+
+    failed = ""
+
+    def __init__(self) -> None:
+        self.given: list[tuple[str, Any]] = []
+        self.closed = False
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *what: self.given.append((name, what))
+
+    def close(self, seconds: float) -> None:
+        self.closed = True
+
+    report = "all drawn"
+
+
+def watched(*views: KeptView) -> tuple[Outputs, EventLog]:
+    books = RunState.new(1.0)
+    watching = [RerunConsumer(view, books) for view in views]  # type: ignore[arg-type]
+    return Outputs(watching, make_loads(10.0, lambda t: t), books.journal, books.history), books.journal
+
+
+def test_everything_is_offered() -> None:
+    view = KeptView()
+    out, journal = watched(view)
+    out.add(make_measurement(0))
+    out.frame(make_frame(0, START))
+    out.load(LoadSample(START, 5.0))
+    journal.tell(EventKind.NOTE, "operator", "hello")
+    out.end()
+    assert {name for name, _ in view.given} == {"show", "point", "picture", "load", "event"}
+    assert [what for name, what in view.given if name == "point"] == [(0.001, 0.0)]
+    assert view.closed
+    assert out.reports[0].words == "all drawn"
+
+
+def test_a_view_that_has_failed_is_told_once_and_all_else_goes_on() -> None:
+    broken, sound = KeptView(), KeptView()
+    out, journal = watched(broken, sound)
+    broken.failed = "its process does not start (ended with 1)"
+    for number in range(5):
+        out.add(make_measurement(number))
+    out.end()
+    events: list[Event] = journal.events("warning")
+    assert [broken.failed in event.text for event in events] == [True]
+    assert len([name for name, _ in sound.given if name == "show"]) == 5
+    assert not out.failed
+
+
+def test_the_card_is_written_once_a_second_from_a_bounded_history(monkeypatch: pytest.MonkeyPatch) -> None:
+    view, seen = KeptView(), []
+    card = StatusCard(SpecimenConfig(), make_loads(1.0, lambda t: t))
+    monkeypatch.setattr(card, "written", lambda now, history: seen.append(history.instants) or "card")
+    writer = CardWriter(view, card, RunState.new(1.0))  # type: ignore[arg-type]
+    last = make_measurement(0)
+    for number in range(3 * CARD_INSTANTS):
+        last = make_measurement(number) if number % 1000 == 0 else last
+        writer.measurement(last)
+    writer.measurement(newest := make_measurement(100_000))
+    assert [name for name, _ in view.given] == ["status"] * 7
+    assert max(len(instants) for instants in seen) <= CARD_INSTANTS + 2
+    assert seen[-1][-1].t == newest.instant.t
+
+
+def test_the_card_says_where_the_test_stands() -> None:
+    view = KeptView()
+    writer = CardWriter(
+        view, StatusCard(SpecimenConfig(), make_loads(10.0, lambda t: 1e3 * t)), RunState.new(1.0)
+    )  # type: ignore[arg-type]
+    begin = time.perf_counter()
+    for number in range(100):
+        writer.measurement(make_measurement(number, 1e-5 * number))
+    assert time.perf_counter() - begin < 10.0
+    (_, (text,)) = view.given[-1]
+    assert "33 of 34" in text.replace("*", "") or "ZOIs valid" in text
+
+
+class FakeView:
+    """Keeps the large figures."""
+
+    def __init__(self) -> None:
+        self.shown: list[Snapshot] = []
+
+    def figures(self, snapshot: Snapshot) -> None:
+        self.shown.append(snapshot)
+
+
+@pytest.mark.parametrize("state", ["ARMED", ""])
+def test_the_large_figures_before_and_after_the_first_measurement(state: str) -> None:
+    """Live the load is shown from the first frame on; a replay (no state) shows the force of each measurement."""
+    books, view = RunState.new(1.0, specimen=SpecimenConfig(area_mm2=40.0)), FakeView()
+    books.loads.append(LoadSample(START, 800.0))
+    books.vitals.state, books.vitals.frame_t = state, START + 1
+    writer = FiguresWriter(view, books)  # type: ignore[arg-type]
+    writer.idle()
+    assert [(f.state, f.force_N, f.zois) for f in view.shown] == ([("ARMED", 800.0, 0)] if state else [])
+    books.alarms.put("limit", "limit: too much")
+    writer.measurement(make_measurement(1, 1e-3, force=500.0))
+    last = view.shown[-1]
+    assert (last.state, last.force_N) == (("ARMED", 800.0) if state else ("REPLAY", 500.0))
+    assert last.axial == pytest.approx(1e-3) and last.alarms == ("limit: too much",)
+    assert last.stress_Pa == pytest.approx(last.force_N / 40e-6)

@@ -1,0 +1,313 @@
+"""The axes read well.
+
+What is drawn stands where it was drawn to, as often as it should.
+
+What is drawn on the picture lies where it belongs.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquire.events import Event, EventKind
+from analysis.field import StrainField
+from analysis.field.grid import Roi, ZoiGrid
+from live.pipeline.snapshot import Snapshot
+from live.ui.rerun.drawing.curve import force_axis, reduced, strain_axis, stress_axis
+from live.ui.rerun.drawing.layout import blueprint
+from live.ui.rerun.drawing.scene import ViewScene
+from live.ui.rerun.drawing.shapes import (
+    ArrowScale,
+    centres,
+    mean_motion,
+    region_edges,
+    sample_boxes,
+    thinned,
+    with_heads,
+)
+from live.ui.rerun.drawing.sinks import Rates, RerunSink
+from live.ui.rerun.messages import PictureMessage, ViewSetup, row_of
+from tests.live.made_up import START, make_field, make_frame, make_grid, make_measurement
+
+
+def test_axes_start_at_zero_and_leave_room() -> None:
+    axis = strain_axis(np.array([0.0, 1e-3, 3.3e-3]))
+    assert (axis.low, axis.unit) == (0.0, "µm/m")
+    assert 3.3e-3 < axis.high <= 5e-3
+    assert axis.place(np.array([0.0, axis.high])).tolist() == [0.0, 1.0]
+
+
+def test_axes_of_compression_end_at_zero() -> None:
+    axis = stress_axis(np.array([0.0, -120e6]))
+    assert axis.high == 0.0
+    assert axis.low <= -120e6
+    assert axis.unit == "MPa"
+
+
+def test_units_follow_the_size() -> None:
+    assert strain_axis(np.array([0.05])).unit == "%"
+    assert force_axis(np.array([8000.0])).unit == "N"
+    assert force_axis(np.array([25e3])).unit == "kN"
+
+
+def test_a_curve_of_nothing_but_zero_has_an_axis() -> None:
+    for axis in (strain_axis(np.zeros(1)), stress_axis(np.zeros(1)), force_axis(np.zeros(1))):
+        assert axis.high > axis.low
+        assert len(axis.ticks) >= 2
+
+
+chunk = pytest.importorskip("rerun.chunk")
+
+
+def make_setup(**more: Any) -> ViewSetup:
+    return ViewSetup("a test", 128, 96, 12, make_grid(), START, **more)
+
+
+def rows_in(path: Path) -> Counter[str]:
+    rows: Counter[str] = Counter()
+    for part in chunk.RrdReader(path).stream():
+        rows[str(part.entity_path)] += part.num_rows
+    return rows
+
+
+@contextlib.contextmanager
+def scene_into(
+    places: dict[Path, Rates], setup: ViewSetup | None = None
+) -> Iterator[tuple[ViewScene, RerunSink]]:
+    import rerun as rr
+
+    setup, made = setup or make_setup(), []
+    for path, rates in places.items():
+        stream = rr.RecordingStream("phasedic")
+        stream.set_sinks(rr.FileSink(str(path)))
+        stream.send_blueprint(blueprint(setup))
+        made.append(RerunSink(stream, rates))
+    scene = ViewScene(made, setup)
+    scene.begin()
+    yield scene, made[0]
+    scene.end()
+
+
+def draw_a_test(scene: ViewScene, seconds: float = 3.0) -> None:
+    scene.event(Event(START, EventKind.START, "phasedic", "test started"))
+    scene.status("**all is well**")
+    for k in range(round(10 * seconds)):
+        frame, measurement = make_frame(k, START + 0.1 * k), make_measurement(k, 1e-4 * k)
+        scene.picture(PictureMessage(frame.image, 12, frame.t, 1))
+        scene.loads([(START + 0.1 * k + 0.02 * j, 10.0 * k) for j in range(5)])
+        scene.points([(1e-4 * k, 10.0 * k)])
+        scene.means([row_of(measurement)])
+        scene.field(measurement.t, measurement.field)
+        scene.figures(Snapshot(measurement.t, "REC", axial=1e-3, force_N=10.0 * k, valid=12, zois=12))
+
+
+STATIC = 1
+
+
+def test_every_mean_is_drawn_and_pictures_and_maps_as_often_as_asked(tmp_path: Path) -> None:
+    fast, slow = tmp_path / "fast.rrd", tmp_path / "slow.rrd"
+    places = {fast: Rates(5.0, 10.0), slow: Rates(1.0, 2.0, 0.2)}
+    with scene_into(places, make_setup(area_m2=4e-5)) as (scene, _):
+        draw_a_test(scene)
+    for path, pictures, maps in ((fast, 15, 30), (slow, 3, 6)):
+        rows = rows_in(path)
+        assert rows["/strain/eyy"] == rows["/strain/exy"] == 30 + STATIC
+        assert rows["/load/force"] == 150 + STATIC
+        assert rows["/camera/picture"] == pictures
+        assert rows["/specimen/map/exx"] == maps + STATIC
+        assert (
+            rows["/specimen/map/status"]
+            == rows["/specimen/map/e1"]
+            == pytest.approx(maps / 4 + STATIC, abs=1)
+        )
+        assert rows["/figures"] == {10.0: 10, 2.0: 3}[maps / 3]
+        assert rows["/curve/line"] == maps
+        assert rows["/curve/axes"] >= 1  # drawn where it changes, in both
+        assert rows["/specimen/zoi/boxes"] == STATIC
+        assert rows["/events"] == rows["/status"] == 1
+
+
+def test_beyond_the_limit_pictures_and_maps_stop_and_curves_go_on(tmp_path: Path) -> None:
+    path = tmp_path / "view.rrd"
+    with scene_into({path: Rates(10.0, 10.0, limit_bytes=20e3)}) as (scene, place):
+        draw_a_test(scene)
+        assert 20e3 <= place.drawn_bytes < 40e3
+    rows = rows_in(path)
+    assert rows["/strain/eyy"] == 31
+    assert 1 <= rows["/camera/picture"] < 30
+    assert 1 <= rows["/specimen/map/exx"] < 30
+
+
+def test_what_a_server_forgets_is_sent_again(tmp_path: Path) -> None:
+    path = tmp_path / "view.rrd"
+    with scene_into({path: Rates(10.0, 10.0, repeat_bytes=20e3)}) as (scene, _):
+        draw_a_test(scene)
+    times: Counter[int] = Counter()
+    for part in chunk.RrdReader(path).stream():
+        if str(part.entity_path) == "/strain/eyy" and not part.is_static:
+            times.update(part.to_record_batch().column("time").cast("int64").to_pylist())
+    assert len(times) == 30
+    assert max(times.values()) >= 2
+
+
+def test_what_does_not_change_is_not_drawn_again(tmp_path: Path) -> None:
+    with scene_into({tmp_path / "a.rrd": Rates(math.inf, math.inf)}) as (scene, _):
+        for number in range(10):
+            scene.points([(1.9e-3 if number else 2e-3, 100.0)])
+            scene.field(START + 0.1 * number, make_measurement(number // 5).field)
+            scene.status("the same")
+    rows = rows_in(tmp_path / "a.rrd")
+    assert rows["/specimen/zoi/rejected"] == rows["/specimen/zoi/plain"] == rows["/zoi/words"] == 1
+    assert rows["/zoi/displacement"] == rows["/status"] == 10
+    assert rows["/curve/grid"] == rows["/bar/exx/ticks"] == rows["/bar/status/ticks"] == 1
+    assert rows["/curve/line"] == 10
+
+
+def test_a_thinned_picture_keeps_its_size_on_the_screen(tmp_path: Path) -> None:
+    path = tmp_path / "view.rrd"
+    with scene_into({path: Rates(5.0, 5.0)}) as (scene, _):
+        scene.picture(PictureMessage(np.zeros((48, 64), np.uint8), 8, START, 2))
+    columns = {
+        name
+        for part in chunk.RrdReader(path).stream()
+        if str(part.entity_path) == "/camera/picture"
+        for name in part.to_record_batch().schema.names
+    }
+    assert "Transform3D:scale" in columns
+
+
+def test_a_field_without_one_valid_zoi_is_drawn(tmp_path: Path) -> None:
+    grid, path = make_grid(), tmp_path / "view.rrd"
+    field = StrainField.from_values(grid, {}, status=np.full(grid.shape, 5))
+    with scene_into({path: Rates(5.0, 5.0)}, make_setup(axis="x")) as (scene, _):
+        scene.field(START, field)
+    assert rows_in(path)["/specimen/map/eyy"] == 1 + STATIC
+
+
+@pytest.mark.parametrize("bits", [8, 12, 16])
+def test_large_pictures_are_reduced_to_eight_bits(bits: int) -> None:
+    top = 2**bits - 1
+    image = np.full((300, 500), top, np.uint8 if bits == 8 else np.uint16)
+    image[:, :250] = 0
+    small, factor = reduced(image, bits, 200)
+    assert (factor, small.shape, small.dtype) == (3, (100, 166), np.uint8)
+    assert (small[0, 0], small[0, -1]) == (0, 255)
+
+
+def views_of(part: object) -> list[str]:
+    """The names of all views of a layout."""
+    inside = getattr(part, "contents", None)
+    named = [str(part.name)] if type(part).__name__.endswith("View") else []  # type: ignore[attr-defined]
+    return (
+        named + [name for one in inside if not isinstance(one, str) for name in views_of(one)]
+        if isinstance(inside, list | tuple)
+        else named
+    )
+
+
+@pytest.mark.parametrize(
+    ("more", "not_there"),
+    [({}, set()), ({"with_load": False}, {"Load, N", "Load – strain"}), ({"finished": True}, {"Now"})],
+)
+def test_nothing_empty_takes_room(more: dict[str, Any], not_there: set[str]) -> None:
+    shown = set(views_of(blueprint(make_setup(**more)).root_container))
+    everything = {"Now", "Camera", "eyy", "status", "Load, N", "Load – strain", "Status", "Events"}
+    assert everything - not_there <= shown and not not_there & shown
+
+
+def test_centres_are_half_a_pixel_further_in_the_viewer() -> None:
+    grid = ZoiGrid.cover(Roi(10, 20, 100, 80), size=33, step=16)
+    np.testing.assert_array_equal(centres(grid)[0, 0], [10 + 16 + 0.5, 20 + 16 + 0.5])
+
+
+def test_sample_boxes_are_active_and_do_not_overlap() -> None:
+    grid = ZoiGrid.cover(Roi(0, 0, 1000, 700), size=64, step=8)
+    boxes = sample_boxes(grid)
+    assert 4 <= len(boxes) <= 30
+    apart = np.abs(boxes[:, None] - boxes[None]).max(axis=-1) + 1e9 * np.eye(len(boxes))
+    assert apart.min() >= 64
+
+
+def test_few_zois_are_all_shown() -> None:
+    grid = ZoiGrid.cover(Roi(0, 0, 300, 300), size=40, step=100)
+    assert len(sample_boxes(grid)) == grid.n_active
+
+
+def test_very_many_points_are_thinned() -> None:
+    grid = ZoiGrid.cover(Roi(0, 0, 1000, 1000), size=20, step=5)
+    assert 1000 <= len(thinned(grid, np.ones(grid.shape, bool))) <= 2000
+    assert len(thinned(grid, np.zeros(grid.shape, bool))) == 0
+
+
+def test_the_maps_follow_the_specimen() -> None:
+    grid = make_grid()
+    x, y = np.meshgrid(grid.x, grid.y)
+    values = {"u": 3.0 + 0.01 * x - 0.02 * y, "v": -1.0 + 0.03 * x + 0.05 * y}
+    values |= {"du_dx": 0.01, "du_dy": -0.02, "dv_dx": 0.03, "dv_dy": 0.05}
+    matrix, shift = mean_motion(StrainField.from_values(grid, values))
+    place = np.array([40.0, 60.0, 0.0])
+    half = np.array([0.5, 0.5, 0.0])
+    moved = matrix @ (place + half) + shift - half
+    expected = [40 + 3.0 + 0.4 - 1.2, 60 - 1.0 + 1.2 + 3.0, 0.0]
+    np.testing.assert_allclose(moved, expected, atol=1e-9)
+
+
+def test_nothing_measured_moves_nothing() -> None:
+    grid = make_grid()
+    field = StrainField.from_values(grid, {}, status=np.full(grid.shape, 5))
+    matrix, shift = mean_motion(field)
+    np.testing.assert_array_equal(matrix, np.eye(3))
+    np.testing.assert_array_equal(shift, np.zeros(3))
+    origins, vectors, factor = ArrowScale().arrows(field)
+    assert (len(origins), len(vectors)) == (0, 0)
+    assert factor > 0
+
+
+@pytest.mark.parametrize("strain", [1e-4, 1e-3, 0.05])
+def test_arrows_are_magnified_to_be_seen(strain: float) -> None:
+    grid = ZoiGrid.cover(Roi(0, 0, 800, 800), size=64, step=16)
+    origins, vectors, factor = ArrowScale().arrows(make_field(grid, strain))
+    longest = np.hypot(*vectors.T).max()
+    assert 10 < longest < 150
+    assert len(origins) <= 300
+    assert factor in {m * 10.0**k for m in (1, 2, 5) for k in range(-3, 4)}
+
+
+def test_the_magnification_does_not_flicker() -> None:
+    grid = make_grid()
+    scale = ArrowScale()
+    factors = {scale.arrows(make_field(grid, strain))[2] for strain in (1e-3, 1.01e-3, 0.98e-3, 0.7e-3)}
+    assert len(factors) == 1
+
+
+def test_the_edge_of_the_region() -> None:
+    """Of a square ring of ZOIs: the outer square and the hole that no ZOI covers."""
+    grid = ZoiGrid.cover(Roi(10, 20, 70, 70), size=20, step=10)
+    active = np.ones(grid.shape, bool)
+    active[1:-1, 1:-1] = False
+    edges = region_edges(grid.subset(active=active))
+    squares = {(10, 20, 80, 90): 4, (30, 40, 60, 70): 4}
+    for (left, top, right, bottom), count in squares.items():
+        corners = {(left, top), (right, top), (right, bottom), (left, bottom)}
+        found = [e for e in edges.astype(int).tolist() if {tuple(e[0]), tuple(e[1])} <= corners]
+        assert len(found) == count
+    assert len(edges) == 8
+
+
+def test_no_region_has_no_edge() -> None:
+    grid = ZoiGrid.cover(Roi(10, 20, 70, 70), size=20, step=7)
+    assert region_edges(grid.subset(active=np.zeros(grid.shape, bool))).shape == (0, 2, 2)
+
+
+def test_an_arrow_has_its_head_at_its_tip() -> None:
+    ((start, tip, left, again, right),) = with_heads(np.array([[10.0, 20.0]]), np.array([[0.0, 40.0]]))
+    assert (*start, *tip, *again) == (10, 20, 10, 60, 10, 60)
+    assert sorted([*left, *right]) == pytest.approx([4, 16, 48, 48])

@@ -1,0 +1,51 @@
+"""The large figures as a picture, and what they say on the way to the process that draws."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from live.pipeline.snapshot import Snapshot
+from live.ui.rerun.drawing.board import HEIGHT, WIDTH, paint
+from live.ui.rerun.messages import figures_message, figures_of
+from live.ui.rerun.wire import Kind, Message, WireError
+
+NOW = Snapshot(
+    1.0, "REC", axial=2.271e-3, sigma_axial=9e-6, force_N=5757.6, stress_Pa=143.9e6, valid=1008, zois=1008
+)
+
+
+def test_figures_come_back_from_a_message() -> None:
+    some = replace(NOW, stress_Pa=math.nan, alarms=("strain limit: axial is 0.02",))
+    meta = json.loads(json.dumps(figures_message(some).meta, allow_nan=False))
+    back = figures_of(Message(Kind.FIGURES, meta))
+    assert math.isnan(back.stress_Pa)
+    assert paint(back).tobytes() == paint(some).tobytes()
+    for damaged in ({"state": "REC"}, meta | {"zois": "many"}, meta | {"axial": [1]}):
+        with pytest.raises(WireError):
+            figures_of(Message(Kind.FIGURES, damaged))
+
+
+def test_an_alarm_is_red_and_digits_are_large() -> None:
+    calm, alarmed = paint(NOW), paint(replace(NOW, alarms=("limit",)))
+    assert calm.shape == alarmed.shape == (HEIGHT, WIDTH, 3)
+    corner = alarmed[0, -1]
+    assert corner[2] > 150 > 60 > max(corner[:2]) and calm[0, -1].max() < 40
+    bright = (calm[:, 400:900].min(axis=2) > 200).any(axis=1)  # rows with digits of the strain
+    assert bright.sum() > HEIGHT / 3
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"force_N": math.nan},
+        {"axial": math.nan, "sigma_axial": math.nan},
+        {"force_N": -1e7, "state": "\u2603" * 40},
+    ],
+)
+def test_whatever_the_figures_are_they_are_painted(more: dict[str, Any]) -> None:
+    assert paint(replace(NOW, **more)).any()

@@ -1,0 +1,114 @@
+"""The door lets viewers in, and neither strangers nor those who hold everything up."""
+
+from __future__ import annotations
+
+import socket
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from live.ui.rerun.drawing import proxy as doors
+from live.ui.rerun.drawing.proxy import ViewerProxy, hidden, is_welcome
+
+PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+
+
+@pytest.mark.parametrize(
+    ("head", "welcome"),
+    [
+        (b"PRI * HTTP/2.0\r\n\r\n", True),
+        (b"POST /x HTTP/1.1\r\nHost: 127.0.0.1:9876\r\n\r\n", True),
+        (b"POST /x HTTP/1.1\r\nhost:LOCALHOST:1\r\n\r\n", True),
+        (b"POST /x HTTP/1.1\r\nHost: [::1]:9876\r\n\r\n", True),
+        (b"POST /x HTTP/1.1\r\nHost: evil.example:9876\r\n\r\n", False),
+        (b"POST /x HTTP/1.1\r\nHost: 127.0.0.1.evil.example\r\n\r\n", False),
+        (b"POST /x HTTP/1.1\r\nHost: localhost\r\nHost: evil.example\r\n\r\n", False),
+        (b"POST /x HTTP/1.1\r\n\r\n", False),
+    ],
+)
+def test_who_is_let_in(head: bytes, welcome: bool) -> None:
+    assert is_welcome(head) is welcome
+
+
+@pytest.fixture
+def server() -> Iterator[socket.socket]:
+    """What stands behind the door: says back what it is told."""
+    with socket.socket() as listening:
+        listening.bind(("127.0.0.1", 0))
+        listening.listen()
+
+        def echo() -> None:
+            while True:
+                try:
+                    guest, _ = listening.accept()
+                except OSError:
+                    return
+                with guest:
+                    while data := guest.recv(2**16):
+                        guest.sendall(data)
+
+        threading.Thread(target=echo, daemon=True).start()
+        yield listening
+        listening.shutdown(socket.SHUT_RDWR)
+
+
+def opened(server: socket.socket, told: list[str]) -> ViewerProxy:
+    door = ViewerProxy(0, told.append)
+    door.open(*server.getsockname())
+    return door
+
+
+def test_it_passes_on_both_ways_and_refuses_strangers(server: socket.socket) -> None:
+    door = opened(server, [])
+    with socket.create_connection(("127.0.0.1", door.port), 10) as viewer:
+        viewer.sendall(PREFACE)
+        assert viewer.recv(100).startswith(b"PRI * HTTP/2.0\r\n\r\n")
+    with socket.create_connection(("127.0.0.1", door.port), 10) as page:
+        page.sendall(b"POST /x HTTP/1.1\r\nHost: evil.example\r\n\r\n")
+        assert page.recv(100).startswith(b"HTTP/1.1 403")
+        assert page.recv(100) == b""
+
+
+def ended(viewer: socket.socket, door: ViewerProxy) -> bool:
+    """Whether the door hangs up on a viewer that takes nothing while more and more is drawn."""
+    for k in range(1, 40):
+        door.drawn(k * (doors.PATIENCE_BYTES + 1))
+        try:
+            return viewer.recv(100) == b""
+        except TimeoutError:
+            continue
+        except ConnectionResetError:
+            return True
+    return False
+
+
+def test_one_that_takes_nothing_is_let_go(server: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(doors, "PATIENCE_S", 0.2)
+    told: list[str] = []
+    door = opened(server, told)
+    with socket.create_connection(("127.0.0.1", door.port), 10) as viewer:
+        viewer.sendall(PREFACE + b"x" * 20_000)
+        came = 0
+        while came < len(PREFACE) + 20_000:
+            came += len(viewer.recv(2**16))
+        viewer.settimeout(0.5)
+        assert ended(viewer, door)
+    assert len(told) == 1
+    assert "let go" in told[0]
+
+
+def test_no_two_doors_have_one_port() -> None:
+    first = ViewerProxy(0, print)
+    second = ViewerProxy(first.port, print)
+    assert first.port < second.port < first.port + doors.TRIES
+    first.close()
+    second.close()
+    with pytest.raises(OSError, match="no free port from 65536"):
+        ViewerProxy(65_536, print)
+
+
+def test_the_address_behind_is_of_this_machine_alone() -> None:
+    host, port = hidden()
+    assert host.startswith("127.")
+    assert 1024 < port < 65_536

@@ -1,0 +1,256 @@
+"""The view's process: it draws all it is told, comes back when it dies, and never holds up the test."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from acquire.events import Event, EventKind
+from live.ui.rerun import supervisor as keeper
+from live.ui.rerun.outbox import MOST_ROWS, Pending
+from live.ui.rerun.view import View, has_display, spawn_viewer, url, viewer_binary
+from live.ui.rerun.wire import Kind
+from tests.live.made_up import START, make_frame, make_measurement
+from tests.live.ui.rerun.test_drawing import make_setup, rows_in
+
+LONG_S = 60.0
+"""For whatever takes a moment; the machine may be busy."""
+
+
+class Watched:
+    """A view, what it told, and how often it was served."""
+
+    def __init__(self, port: int | None, rrd: Path | None, **more: Any) -> None:
+        self.told: list[str] = []
+        self.served: list[int | None] = []
+        self.view = View(
+            make_setup(**more),
+            port=port,
+            rrd=rrd,
+            tell=lambda text, level: self.told.append(f"{level}: {text}"),
+            serving=lambda view: self.served.append(view.port),
+        )
+
+    def close(self) -> None:
+        self.view.close(LONG_S)
+
+
+@pytest.fixture
+def make() -> Iterator[Callable[..., Watched]]:
+    made: list[Watched] = []
+
+    def make(port: int | None, rrd: Path | None, **more: Any) -> Watched:
+        made.append(Watched(port, rrd, **more))
+        return made[-1]
+
+    yield make
+    for watched in made:
+        watched.close()
+
+
+def until(ready: Callable[[], object]) -> None:
+    end = time.monotonic() + LONG_S
+    while not ready():
+        assert time.monotonic() < end, "in vain"
+        time.sleep(0.02)
+
+
+def show(view: View, first: int = 0, count: int = 30) -> None:
+    view.event(Event(START, EventKind.START, "phasedic", "test started"))
+    view.status("**E** 70 GPa")
+    for k in range(first, first + count):
+        view.picture(make_frame(k, START + 0.1 * k))
+        for j in range(10):
+            view.load(START + 0.1 * k + 0.01 * j, 10.0 * k)
+        view.show(make_measurement(k, 1e-4 * k))
+        view.point(1e-4 * k, 10.0 * k)
+
+
+def is_gone(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return True
+    # An orphan that nobody reaps stays as a zombie.
+    return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
+
+
+def test_what_was_shown_stands_in_the_file(make: Callable[..., Watched], tmp_path: Path) -> None:
+    watched = make(None, tmp_path / "view.rrd", area_m2=4e-5)
+    show(watched.view)
+    watched.close()
+    assert (watched.view.failed, watched.told) == ("", [])
+    assert watched.view.address.startswith("later: ")
+    rows = rows_in(tmp_path / "view.rrd")
+    static = 1
+    assert rows["/strain/eyy"] == 30 + static  # every mean, however many fields were passed over
+    assert rows["/load/force"] == 150 + static  # 50 a second
+    assert rows["/curve/line"] >= 1
+    assert rows["/events"] == rows["/status"] == 1
+    assert "pictures drawn" in watched.view.report
+    assert "dropped" not in watched.view.report
+    assert watched.view.pid is None
+
+
+def test_it_serves_on_the_next_port_when_the_wanted_one_is_taken(make: Callable[..., Watched]) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        wanted = taken.getsockname()[1]
+        both = [make(wanted, None), make(wanted, None)]
+        until(lambda: all(watched.served for watched in both))
+    ports = {watched.view.port for watched in both}
+    assert len(ports) == 2
+    assert wanted not in ports
+    for watched in both:
+        assert f"port {wanted} is taken" in watched.told[0]
+        assert url(watched.view.port or 0) in watched.view.address
+
+
+def test_killed_it_comes_back_on_its_port_and_knows_the_past(
+    make: Callable[..., Watched], tmp_path: Path
+) -> None:
+    watched = make(0, tmp_path / "view.rrd")
+    view = watched.view
+    until(lambda: watched.served)
+    show(view)
+    until(lambda: not view.report.startswith("0 maps"))
+    os.kill(view.pid or 0, signal.SIGKILL)
+    until(lambda: len(watched.served) == 2)
+    show(view, first=30)
+    watched.close()
+    assert watched.served[0] == watched.served[1]
+    assert watched.told == ["warning: the view's process was ended by SIGKILL and is started anew"]
+    assert view.rrd == tmp_path / "view-2.rrd"
+    assert rows_in(tmp_path / "view-2.rrd")["/strain/eyy"] == 60 + 1
+    assert "started 2 times" in view.report
+
+
+def test_stopped_it_is_replaced_and_holds_nothing_up(
+    make: Callable[..., Watched], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(keeper, "STUCK_S", 2.0)  # a busy machine may keep the new one waiting for a second
+    watched = make(None, tmp_path / "view.rrd")
+    until(lambda: watched.served)
+    stopped = watched.view.pid or 0
+    os.kill(stopped, signal.SIGSTOP)
+    longest, k = 0.0, 0
+    while not watched.told:
+        begin = time.perf_counter()
+        watched.view.picture(make_frame(k, START + 0.2 * k, (1024, 1280)))
+        watched.view.show(make_measurement(k))
+        longest = max(longest, time.perf_counter() - begin)
+        k += 1
+        time.sleep(0.01)
+    until(lambda: len(watched.served) == 2)
+    watched.close()
+    assert longest < 1.0
+    assert is_gone(stopped)
+    assert watched.told == ["warning: the view's process took nothing for 2 s (stopped?) and is started anew"]
+    assert rows_in(tmp_path / "view-2.rrd")["/strain/eyy"] == k + 1
+
+
+def test_at_the_end_a_stopped_one_is_killed_and_told(make: Callable[..., Watched], tmp_path: Path) -> None:
+    watched = make(None, tmp_path / "view.rrd")
+    until(lambda: watched.served)
+    stopped = watched.view.pid or 0
+    os.kill(stopped, signal.SIGSTOP)
+    watched.view.close(0.3)
+    assert is_gone(stopped)
+    assert len(watched.told) == 1
+    assert "did not finish in time" in watched.told[0]
+
+
+PARENT = """
+    import time
+    from pathlib import Path
+    from tests.live.ui.rerun.test_view import Watched, show
+
+    watched = Watched(None, Path("view.rrd"))
+    show(watched.view)
+    while watched.view.report.startswith("0 maps"):
+        time.sleep(0.02)
+    print(watched.view.pid, flush=True)
+    time.sleep(600)
+"""
+
+
+def test_it_ends_with_the_test_however_that_ends(tmp_path: Path) -> None:
+    code = textwrap.dedent(PARENT)
+    root = str(Path(__file__).parents[4])
+    with subprocess.Popen(
+        [sys.executable, "-c", code],
+        stdout=subprocess.PIPE,
+        text=True,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": root},
+    ) as parent:
+        assert parent.stdout is not None
+        child = int(parent.stdout.readline())
+        os.kill(child, signal.SIGINT)
+        os.kill(child, signal.SIGHUP)
+        assert not is_gone(child)
+        parent.kill()
+    until(lambda: is_gone(child))
+    assert rows_in(tmp_path / "view.rrd")["/strain/eyy"] > 1
+
+
+def test_a_file_that_exists_is_left_alone_and_told(make: Callable[..., Watched], tmp_path: Path) -> None:
+    path = tmp_path / "view.rrd"
+    path.write_text("precious")
+    watched = make(None, path)
+    until(lambda: watched.view.failed)
+    assert "exists already and is not overwritten" in watched.view.failed
+    assert watched.told == [f"warning: {watched.view.failed}"]
+    assert watched.view.rrd is None
+    assert path.read_text() == "precious"
+
+
+def test_a_folder_that_is_not_there_is_told_and_the_rest_goes_on(
+    make: Callable[..., Watched], tmp_path: Path
+) -> None:
+    watched = make(0, tmp_path / "no" / "view.rrd")
+    until(lambda: watched.served)
+    watched.close()
+    assert (watched.view.failed, watched.view.rrd) == ("", None)
+    assert len(watched.told) == 1
+    assert "all else goes on" in watched.told[0]
+
+
+def test_one_that_cannot_start_is_given_up(
+    make: Callable[..., Watched], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(keeper, "MOST_STARTS", 2)
+    monkeypatch.setenv("PYTHONHOME", "/nowhere")
+    watched = make(0, None)
+    until(lambda: watched.view.failed)
+    assert "does not start (ended with 1)" in watched.view.failed
+    assert len(watched.told) == 1
+
+
+def test_what_waits_is_bounded_and_counted() -> None:
+    waiting = Pending()
+    for k in range(MOST_ROWS + 100):
+        waiting.row(Kind.LOADS, (float(k), 0.0))
+    assert len(waiting.rows[Kind.LOADS]) == MOST_ROWS
+    assert waiting.rows[Kind.LOADS][0][0] == 100.0
+    assert waiting.dropped == 100
+
+
+def test_the_viewer_is_found_but_not_opened_without_a_display(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert viewer_binary() is not None
+    monkeypatch.setattr("sys.platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert not has_display()
+    assert spawn_viewer(9876) is None

@@ -1,0 +1,164 @@
+"""Screen, ledger, journal and numbers in words."""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import math
+from typing import Any
+
+import pytest
+
+from acquire.events import Event, EventKind
+from live.pipeline.event_log import EventLog, sentence
+from live.pipeline.frame_counts import FrameCounts
+from live.pipeline.measurement import TimeStep
+from live.pipeline.snapshot import Snapshot
+from live.results.figures import quantity
+from live.ui.terminal.screen import TerminalScreen
+from live.ui.terminal.status_line import status_line
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+class Gone(Terminal):
+    def write(self, text: str) -> int:
+        raise OSError(5, "Input/output error")
+
+
+def test_the_status_line_is_renewed_in_place_and_not_too_often() -> None:
+    now = [0.0]
+    stream = Terminal()
+    screen = TerminalScreen(stream, now=lambda: now[0])
+    screen.status("one long line")
+    screen.status("too early")
+    now[0] = 1.0
+    screen.status("two")
+    screen.say("stays")
+    assert stream.getvalue() == "one long line\rtwo          \r   \rstays\n"
+
+
+def test_the_progress_of_a_replay_is_one_line() -> None:
+    stream = io.StringIO()
+    now = iter(range(0, 100, 10))
+    screen = TerminalScreen(stream, now=lambda: next(now))
+    screen.progress(instant(), 5, 20, 2.5)
+    screen.progress(instant(), 5, None, 0.0)
+    screen.progress(instant(), 21, 20, 2.5)
+    screen.progress(instant(), 1, 100_000, 1.0)
+    assert stream.getvalue().splitlines() == [
+        "5 of 20 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs  20 ZOI/s  0:08 left",
+        "5 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs",
+        "21 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs  84 ZOI/s",
+        "1 of 100000 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs  10 ZOI/s  27:46:39 left",
+    ]
+
+
+def instant() -> TimeStep:
+    numbers = {f.name: 0.0 for f in dataclasses.fields(TimeStep) if f.default is dataclasses.MISSING}
+    told: Any = {**numbers, "force": 7.0, "exx": 1e-4, "eyy": -2e-4, "n_valid": 8, "n_zoi": 10}
+    return TimeStep(**told)
+
+
+def snapshot(**more: Any) -> Snapshot:
+    ledger = FrameCounts()
+    ledger.add(grabbed=200, measured=120, skipped=8)
+    known = {"force_N": 1234.5, "stress_Pa": 1234.5 / 40e-6, "latency_p95_s": 0.0421, "disk_s": 7200.0}
+    told: Any = known | more
+    return Snapshot(0.0, "REC", 75.0, 29.9, frames=ledger.as_dict(), instant=instant(), **told)
+
+
+def test_the_status_line_has_everything_where_there_is_room() -> None:
+    assert status_line(snapshot(peak_N=1500.0), 200) == (
+        "REC  1:15  1234.5 N  30.9 MPa  peak 1500.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs"
+        "  30 fps  measured 120  skipped 8  lost 0  p95 42 ms  disk 120 min"
+    )
+
+
+@pytest.mark.parametrize("width", [0, 3, 20, 40, 80, 100, 120])
+def test_the_status_line_fits_any_width_and_force_and_alarm_go_last(width: int) -> None:
+    line = status_line(snapshot(alarms=("axial: axial is 0.021",)), width)
+    assert len(line) <= width
+    assert width < 40 or line.startswith("ALARM axial: axial is 0.021")
+    assert width < 40 or "1234.5 N" in line
+    assert "eyy -200" in line or width < 80
+
+
+def test_what_is_typed_is_not_overwritten() -> None:
+    now = [0.0]
+    stream = Terminal()
+    screen = TerminalScreen(stream, now=lambda: now[0])
+    screen.status("status")
+    screen.prompt(": note sl_")
+    now[0] = 9.0
+    screen.status("hidden")
+    screen.say("stays")
+    screen.prompt(None)
+    screen.status("again")
+    assert stream.getvalue().split("\r") == [
+        "status",
+        ": note sl_",
+        "          ",
+        "stays\n: note sl_",
+        "          ",
+        "again",
+        "",
+    ]
+
+
+def test_a_device_is_told_by_its_name() -> None:
+    address = "sim:woven?bits=12&fps=60"
+    event = Event(1.0, EventKind.DEVICE, address, f"{address}: the stream stalls")
+    assert sentence(event, {address: "camera"}) == "camera: the stream stalls"
+
+
+def test_an_address_is_told_once_and_without_its_settings() -> None:
+    long = "sim:woven?bits=12&fps=60&note=a:b"
+    for text in ("the stream stalls: 1.5 s", f"{long}: the stream stalls: 1.5 s"):
+        event = Event(1.0, EventKind.DEVICE, long, text)
+        assert sentence(event) == "sim:woven: the stream stalls: 1.5 s"
+    assert sentence(Event(1.0, EventKind.NOTE, "operator", "is x?a=b right")) == "operator: is x?a=b right"
+
+
+def test_a_lost_terminal_does_not_matter() -> None:
+    screen = TerminalScreen(Gone())
+    screen.say("nobody reads this")
+    screen.say("nor this")
+
+
+def test_the_ledger_tells_when_it_does_not_add_up() -> None:
+    ledger = FrameCounts()
+    ledger.add(grabbed=10, measured=6, skipped=2, reference=1, left_out=1, recorded=10)
+    assert ledger.adds_up
+    assert not ledger.loss
+    ledger.add(grabbed=1)
+    assert not ledger.adds_up
+    assert "DOES NOT ADD UP" in ledger.line()
+    ledger.add(left_out=1, unrecorded=1)
+    assert ledger.adds_up
+    assert ledger.loss
+
+
+def test_late_listeners_hear_everything_once() -> None:
+    journal, heard = EventLog(), []
+    journal(Event(1.0, EventKind.DEVICE, "a", "first"))
+    journal.add_listener(heard.append)
+    journal(Event(2.0, EventKind.LOST, "a", "second", "warning"))
+    assert [event.text for event in heard] == ["first", "second"]
+    assert [event.text for event in journal.events("warning")] == ["second"]
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "says"),
+    [
+        (70.123456, 0.0234, "70.123 +- 0.023 GPa"),
+        (70.1, math.nan, "70.1 GPa"),
+        (math.nan, 1.0, "not known"),
+        (123456.0, 1200.0, "123456 +- 1200 GPa"),
+    ],
+)
+def test_quantities_have_the_digits_they_deserve(value: float, sigma: float, says: str) -> None:
+    assert quantity(value, sigma, "GPa") == says

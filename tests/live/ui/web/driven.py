@@ -1,0 +1,142 @@
+"""``phasedic page`` as a program, and a headless browser that looks at it."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from live.results.report.saving import find_browser
+
+ROOT = Path(__file__).parents[4]
+FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
+PATIENCE_S = 60.0
+
+
+def chromium() -> str:
+    """The browser; the test is skipped without one, or without Playwright."""
+    pytest.importorskip("playwright.sync_api")
+    found = shutil.which("chromium") or find_browser()
+    if found is None:
+        pytest.skip("needs chromium")
+    return str(found)
+
+
+class Program:
+    """``phasedic page`` in a folder of its own."""
+
+    def __init__(self, folder: Path, *words: str) -> None:
+        self._log = (folder / "err.txt").open("w")
+        command = [sys.executable, "-m", "live.cli", *words]
+        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        self.process = subprocess.Popen(
+            command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=self._log, text=True
+        )
+        self.said = ""
+        self.address = self._address()
+
+    def _address(self) -> str:
+        assert self.process.stdout is not None
+        for line in self.process.stdout:
+            self.said += line
+            if found := re.search(r"http://127\.0\.0\.1:\d+/\S+", line):
+                return found[0]
+        raise AssertionError(f"no page: {self.said}")
+
+    @contextmanager
+    def frozen(self) -> Iterator[None]:
+        """As if it hung."""
+        self.process.send_signal(signal.SIGSTOP)
+        try:
+            yield
+        finally:
+            self.process.send_signal(signal.SIGCONT)
+
+    def end(self) -> int:
+        """Wait for its end, or make one."""
+        try:
+            self.said += self.process.communicate(timeout=30)[0]
+        except subprocess.TimeoutExpired:
+            self.kill()
+        return self.process.returncode
+
+    def kill(self) -> None:
+        """Now, where it still runs."""
+        if self.process.poll() is None:
+            self.process.kill()
+            self.said += self.process.communicate()[0]
+        self._log.close()
+
+
+class Page:
+    """A page of the browser with what it asked for and complained of."""
+
+    def __init__(self, page: Any) -> None:
+        self.page = page
+        self.asked: list[str] = []
+        self.posted: list[dict[str, Any]] = []
+        self.complaints: list[str] = []
+        page.on("request", self._request)
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("console", self._said)
+
+    def _said(self, message: Any) -> None:
+        if message.type in ("error", "warning"):
+            self.complaints.append(message.text)
+
+    def _request(self, request: Any) -> None:
+        self.asked.append(request.url)
+        if request.method == "POST":
+            self.posted.append(json.loads(request.post_data))
+
+    def until(self, holds: Callable[[], bool], what: str) -> None:
+        """Wait until it holds."""
+        end = time.monotonic() + PATIENCE_S
+        while not holds():
+            if time.monotonic() > end:
+                raise AssertionError(f"not within {PATIENCE_S:g} s: {what}; {self.complaints}")
+            self.page.wait_for_timeout(100)
+
+    def text(self, id_: str) -> str:
+        """What stands in an element."""
+        return str(self.page.text_content(f"#{id_}"))
+
+    def stage(self) -> str:
+        """Where the page is."""
+        return str(self.page.get_attribute("body", "data-stage"))
+
+    def answered(self) -> None:
+        """Wait for the answer to the last order."""
+        self.until(lambda: bool(self.text("answer")), "an answer")
+
+    def on_screen(self, points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+        """Places of the picture, px, as places of the mouse."""
+        script = """points => { const m = document.getElementById("drawing").getScreenCTM();
+            return points.map(([x, y]) => { const p = new DOMPoint(x, y).matrixTransform(m); return [p.x, p.y]; }); }"""
+        return [tuple(p) for p in self.page.evaluate(script, points)]
+
+    def drag(self, *points: tuple[float, float]) -> None:
+        """Press, move along places of the picture, and let go."""
+        first, *others = self.on_screen(list(points))
+        mouse = self.page.mouse
+        mouse.move(*first)
+        mouse.down()
+        for place in others:
+            mouse.move(*place, steps=4)
+        mouse.up()
+
+    def click(self, *points: tuple[float, float]) -> None:
+        """Click places of the picture."""
+        for place in self.on_screen(list(points)):
+            self.page.mouse.click(*place)

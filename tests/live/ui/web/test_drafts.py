@@ -1,0 +1,277 @@
+"""The scale from a board, as the page asks for it: the same as ``phasedic scale`` takes from that picture.
+
+The rig file in the making.
+
+What is drawn with the mouse becomes exactly those pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquire.errors import ConfigError, DataError
+from acquire.frame import Frame, frozen
+from live.config.loading import load_config
+from live.setup.pictures import read_mask
+from live.setup.scale import from_board
+from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.config_draft import ConfigDraft, counted_up, still, with_setting
+from live.ui.web.draft_changes import CHANGES
+from live.ui.web.drawn_region import DrawnRegion
+from live.ui.web.setup_session import SetupSession
+from tests.live.setup.test_scale import CHARUCO, CHECKER, seen
+
+PX_PER_MM = 9.0
+AS_CHECKER = {"columns": 9, "rows": 6, "square": 5, "marker": 0, "dictionary": "4X4_50"}
+AS_CHARUCO = {"columns": 8, "rows": 6, "square": 6, "marker": 4.5, "dictionary": "4X4_50"}
+
+
+class Looking:
+    """The camera, which sees one picture for ever."""
+
+    info, trouble, collecting = None, "", False
+
+    def __init__(self) -> None:
+        self.frames: list[Frame] = []
+
+    def recent(self) -> list[Frame]:
+        return self.frames
+
+
+@pytest.fixture
+def looking(tmp_path: Path) -> Iterator[tuple[SetupSession, Looking]]:
+    rig = tmp_path / "rig.toml"
+    rig.write_text("[scale]\nstand_off_mm = 400\n")
+    bench, eye = SetupSession(ConfigDraft(load_config(rig, {}), rig, {}), Broadcaster()), Looking()
+    bench.eye = eye  # type: ignore[assignment]
+    yield bench, eye
+    bench._folder.cleanup()
+
+
+def show(eye: Looking, picture: np.ndarray) -> None:
+    eye.frames = [Frame(frozen(picture), k, k / 10, "nominal", 0, 8, k / 10) for k in range(3)]
+
+
+@pytest.mark.parametrize(
+    ("board", "said"), [(CHECKER, AS_CHECKER), (CHARUCO, AS_CHARUCO)], ids=["checker", "charuco"]
+)
+def test_a_board_gives_the_scale(
+    looking: tuple[SetupSession, Looking], board: Any, said: dict[str, Any]
+) -> None:
+    bench, eye = looking
+    picture = seen(board, PX_PER_MM)
+    show(eye, picture)
+    CHANGES["board"](bench, said)
+    scale = bench.draft.config.scale
+    assert scale.px_per_mm == pytest.approx(PX_PER_MM, rel=1e-3)
+    assert scale.mm_per_px == pytest.approx(from_board(picture.astype(np.float32), board).mm_per_px, rel=1e-6)
+    assert scale.method is not None and "corners" in scale.method and scale.sigma_mm_per_px
+    assert bench.state()["remarks"] == []
+
+
+def test_a_tilt_is_told_until_the_scale_is_taken_anew(looking: tuple[SetupSession, Looking]) -> None:
+    bench, eye = looking
+    show(eye, seen(CHECKER, PX_PER_MM, degrees=12.0))
+    CHANGES["board"](bench, {"columns": 9, "rows": 6, "square": 5})
+    (remark,) = bench.state()["remarks"]
+    assert "the board is tilted, about 11 degrees" in remark
+    CHANGES["scale"](bench, {"points": [[10, 10], [110, 10]], "mm": 5})
+    assert bench.state()["remarks"] == []
+
+
+def test_no_board_no_scale(looking: tuple[SetupSession, Looking]) -> None:
+    bench, eye = looking
+    with pytest.raises(DataError, match="no picture yet"):
+        CHANGES["board"](bench, AS_CHECKER)
+    show(eye, np.full((200, 200), 90, np.uint8))
+    with pytest.raises(DataError, match="no checkerboard of 9 x 6 inner corners"):
+        CHANGES["board"](bench, AS_CHECKER)
+    assert bench.draft.config.scale.px_per_mm is None
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"columns": 2}, {"columns": 9.5}, {"rows": "6"}, {"columns": True}, {"columns": 10**9},
+        {"square": 0}, {"square": -1}, {"square": float("nan")}, {"square": 10**400}, {"square": None},
+        {"marker": 7}, {"marker": "x"}, {"dictionary": 3}, {"dictionary": "__class__", "marker": 3},
+    ],
+)  # fmt: skip
+def test_what_is_no_board_is_refused(looking: tuple[SetupSession, Looking], wrong: dict[str, Any]) -> None:
+    bench, eye = looking
+    show(eye, seen(CHECKER, PX_PER_MM))
+    with pytest.raises(ConfigError):
+        CHANGES["board"](bench, AS_CHECKER | wrong)
+    assert not bench.draft.changes
+
+
+RIG = """# the rig of bench 3
+[camera]
+address = "sim:hole?bits=12"  # the blue one
+[measure]
+zoi = 48  # found by trial
+"""
+
+
+@pytest.fixture
+def draft(tmp_path: Path) -> ConfigDraft:
+    path = tmp_path / "rig.toml"
+    path.write_text(RIG)
+    return ConfigDraft(load_config(path, {"measure.step": 12}), path, {"measure.step": 12})
+
+
+def test_saved_with_its_comments_and_loaded_again(draft: ConfigDraft) -> None:
+    draft.change_all(
+        {"measure.burst": 8, "gauges.axial": {"kind": "line", "start": [10, 20], "end": [10, 90]}}
+    )
+    mask = np.zeros((40, 50), bool)
+    mask[5:20, 10:30] = True
+    draft.save(mask)
+    text = draft.path.read_text()
+    assert "# the rig of bench 3" in text and "# the blue one" in text and "# found by trial" in text
+    assert draft.path.with_name("rig.toml.bak").read_text() == RIG
+    config = load_config(draft.path, {})
+    assert (config.measure.zoi, config.measure.step, config.measure.burst) == (48, 12, 8)
+    assert config.gauges["axial"]["end"] == (10, 90)
+    assert np.array_equal(read_mask(config.measure.mask, 50, 40), mask)
+    assert draft.changes == {} and draft.config == config
+
+
+def test_a_second_mask_is_a_file_of_its_own(draft: ConfigDraft) -> None:
+    first, second = np.eye(40, dtype=bool), ~np.eye(40, dtype=bool)
+    draft.save(first)
+    before = load_config(draft.path, {}).measure.mask
+    draft.save(second)
+    assert np.array_equal(read_mask(before, 40, 40), first)
+    assert np.array_equal(read_mask(load_config(draft.path, {}).measure.mask, 40, 40), second)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"measure.zoi": 4},
+        {"measure.zoi": 32, "measure.step": "wide"},
+        {"gauges.1a": {"kind": "line"}},
+        {"gauges.a": {"kind": "spiral"}},
+        {"record.enabled": False},
+        {"output.dir": "/etc"},
+        {"measure.nothing": 1},
+        {"nothing.at": 1},
+    ],
+)
+def test_what_is_impossible_changes_nothing(draft: ConfigDraft, changes: dict[str, object]) -> None:
+    before, file = draft.config, draft.path.read_text()
+    with pytest.raises(ConfigError):
+        draft.change_all(changes)
+    assert draft.config == before and draft.path.read_text() == file
+
+
+def test_taken_out(draft: ConfigDraft) -> None:
+    draft.change_all({"gauges.a": {"kind": "zoi", "at": [5, 5]}, "specimen.width_mm": 20})
+    draft.save(None)
+    draft.change_all({"gauges.a": None, "specimen.width_mm": None})
+    draft.save(None)
+    config = load_config(draft.path, {})
+    assert config.gauges == {} and config.specimen.width_mm is None
+
+
+def test_settings_of_an_address() -> None:
+    assert with_setting("/dev/video0", "gain", 3) == "/dev/video0?gain=3"
+    assert with_setting("/dev/video0?gain=3&fps=30", "gain", 7.5) == "/dev/video0?gain=7.5&fps=30"
+    assert with_setting("files:a?b/*.tif", "fps", 3) == "files:a?b/*.tif?fps=3"
+
+
+def test_only_a_simulated_specimen_has_to_be_held() -> None:
+    assert still("/dev/video0?fps=30") == "/dev/video0?fps=30"
+    assert "max_strain=0" in still("sim:hole?max_strain=0.01") and "max_strain=0.01" not in still(
+        "sim:?max_strain=0.01"
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "following"),
+    [("bar-6", "bar-7"), ("bar-009", "bar-010"), ("B7", "B8"), ("bar", "bar-2"), ("3", "4")],
+)
+def test_counted_up(name: str, following: str) -> None:
+    assert counted_up(name) == following
+
+
+SHAPE = (60, 80)
+Y, X = np.mgrid[: SHAPE[0], : SHAPE[1]].astype(float)
+
+
+def drawn(*strokes: dict[str, object], start: bool = False) -> DrawnRegion:
+    found = DrawnRegion(np.full(SHAPE, start), "as given")
+    found.draw(strokes)
+    return found
+
+
+def test_a_rectangle_from_any_corner() -> None:
+    for points in ([[10.4, 20.2], [30.6, 40.0]], [[30.6, 20.2], [10.4, 40.0]]):
+        found = drawn({"tool": "rectangle", "points": points})
+        assert np.array_equal(found.mask, (X >= 10.4) & (X <= 30.6) & (Y >= 20.2) & (Y <= 40.0))
+        assert found.box == (11, 21, 20, 20) and found.is_box and found.words == "as drawn"
+
+
+def test_a_rectangle_is_the_region_alone_unless_it_is_added() -> None:
+    first = {"tool": "rectangle", "points": [[0, 0], [9, 9]]}
+    other = {"tool": "rectangle", "points": [[20, 20], [29, 29]]}
+    assert drawn(first, other).box == (20, 20, 10, 10)
+    both = drawn(first, other | {"add": True})
+    assert both.box == (0, 0, 30, 30) and not both.is_box and both.mask.sum() == 200
+
+
+def test_a_polygon() -> None:
+    found = drawn({"tool": "polygon", "points": [[10, 10], [50, 10], [10, 50]]})
+    inside = (X > 10) & (Y > 10) & (X + Y < 60)
+    edge = (np.abs(X - 10) < 1) | (np.abs(Y - 10) < 1) | (np.abs(X + Y - 60) < 1)
+    assert np.array_equal(found.mask[~edge], inside[~edge])
+
+
+def test_brush_and_eraser() -> None:
+    way = {"points": [[20, 30], [60, 30]], "radius": 5}
+    painted = drawn({"tool": "brush", **way})
+    near = np.hypot(X - np.clip(X, 20, 60), Y - 30) <= 5
+    assert np.array_equal(painted.mask, near)
+    assert np.array_equal(drawn({"tool": "eraser", **way}, start=True).mask, ~near)
+
+
+def test_outside_the_picture_nothing_is_drawn() -> None:
+    found = drawn({"tool": "rectangle", "points": [[-100, -100], [-50, -50]]})
+    assert found.box is None and not found.is_box
+    assert drawn({"tool": "brush", "points": [[-3, 10]], "radius": 5}).box == (0, 6, 3, 9)
+
+
+def test_undo_goes_back_to_what_was_given() -> None:
+    found = drawn({"tool": "rectangle", "points": [[0, 0], [9, 9]]}, start=True)
+    found.undo()
+    found.undo()
+    assert found.mask.all() and found.words == "as given"
+
+
+@pytest.mark.parametrize(
+    "stroke",
+    [
+        {},
+        {"tool": "axe", "points": [[1, 1], [2, 2]]},
+        {"tool": "rectangle", "points": [[1, 1]]},
+        {"tool": "rectangle", "points": "ab"},
+        {"tool": "rectangle", "points": [[1, 1], [2, float("nan")]]},
+        {"tool": "rectangle", "points": [[1, 1], [2, 1e300]]},
+        {"tool": "rectangle", "points": [[1, 1], [True, 2]]},
+        {"tool": "polygon", "points": [[1, 1], [2, 2]]},
+        {"tool": "brush", "points": [[1, 1]], "radius": 0},
+        {"tool": "brush", "points": [[1, 1]], "radius": "5"},
+        {"tool": "brush", "points": [[1, 1]] * 5001},
+    ],
+)
+def test_what_is_no_stroke_changes_nothing(stroke: dict[str, object]) -> None:
+    found = drawn({"tool": "rectangle", "points": [[0, 0], [9, 9]]})
+    with pytest.raises(ConfigError):
+        found.draw([{"tool": "rectangle", "points": [[20, 20], [29, 29]]}, stroke])
+    assert found.box == (0, 0, 10, 10)

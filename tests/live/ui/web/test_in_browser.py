@@ -1,0 +1,262 @@
+"""From an unconfigured rig to a report by mouse and keyboard, in a real browser."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from live.config.loading import load_config
+from live.setup.compiling import compile_ahead
+from live.setup.pictures import read_mask
+from live.ui.web.authorization import RequestGuard
+from tests.live.setup.test_scale import CHARUCO, seen
+from tests.live.ui.web.driven import FLAGS, Page, Program, chromium
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
+WIDTH, HEIGHT = 480, 384
+CAMERA = f"sim:uniform?width={WIDTH}&height={HEIGHT}&fps=15&seconds=42&hold=16&end=1&buffers=64"
+WATCH_LAYOUT = """() => { window.moved = []; new PerformanceObserver(list => window.moved.push(...list.getEntries()
+    .filter(e => !e.hadRecentInput).map(e => e.value))).observe({ type: "layout-shift" }); }"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    path = chromium()
+    compile_ahead(("uint16", "float32"))  # here, so that the patience of the tests need not cover it
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as driver:
+        opened = driver.chromium.launch(
+            executable_path=path, headless=True, chromium_sandbox=False, args=FLAGS
+        )
+        yield opened
+        opened.close()
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Callable[..., Program]]:
+    """Starts ``phasedic`` in a folder of its own; whatever happens, it does not run on."""
+    programs: list[Program] = []
+
+    def begin(*words: str) -> Program:
+        programs.append(Program(tmp_path, *words))
+        return programs[-1]
+
+    yield begin
+    for program in programs:
+        program.kill()
+
+
+def opened(browser: Any, program: Program, **wanted: Any) -> Page:
+    context = browser.new_context(viewport={"width": 1280, "height": 800}, locale="en-US", **wanted)
+    page = Page(context.new_page())
+    page.page.goto(program.address)
+    return page
+
+
+def distance_to_way(points: list[list[float]]) -> np.ndarray:
+    """Of each pixel to a way of the mouse, by brute force: many places along each piece."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH].astype(float)
+    nearest = np.hypot(x - points[0][0], y - points[0][1])
+    for (x0, y0), (x1, y1) in itertools.pairwise(points):
+        for part in np.linspace(0, 1, 60):
+            nearest = np.minimum(nearest, np.hypot(x - x0 - part * (x1 - x0), y - y0 - part * (y1 - y0)))
+    return nearest
+
+
+def test_from_nothing_to_a_report(browser: Any, tmp_path: Path, start: Callable[..., Program]) -> None:
+    words = ["page", "--camera", CAMERA, "--load", "sim:", "--no-view", "--no-rrd", "--page-port", "0"]
+    program = start(*words)
+    page = opened(browser, program)
+    set_up(page, tmp_path)
+    run(page, program)
+    after(page, tmp_path)
+    assert program.end() == 0, program.said
+    here = program.address.partition("/?")[0]
+    assert page.asked and all(url.startswith((here, "data:")) for url in page.asked), "asks somebody else"
+    assert not [one for one in page.complaints if "ERR_" not in one], page.complaints
+
+
+def set_up(page: Page, folder: Path) -> None:
+    page.until(lambda: "specimen" in page.text("region"), "the specimen is found")
+    page.drag((60.0, 50.0), (420.0, 330.0))
+    page.until(lambda: "as drawn" in page.text("region"), "the rectangle is taken")
+    page.page.keyboard.press("4")
+    page.drag((60.0, 60.0), (100.0, 60.0), (100.0, 100.0))
+    page.page.keyboard.press("5")
+    page.drag((240.0, 100.0), (240.0, 290.0))
+    page.page.keyboard.press("6")
+    page.drag((160.0, 150.0), (320.0, 250.0))
+    page.page.keyboard.press("8")
+    page.click((300.0, 200.0))
+    page.until(lambda: page.page.locator("#gauges li").count() == 3, "three gauges")
+    page.page.fill("#gauges li:nth-child(3) input", "middle")
+    page.page.press("#gauges li:nth-child(3) input", "Enter")
+    for key, value in (("specimen.width_mm", "20"), ("specimen.thickness_mm", "2")):
+        page.page.fill(f'[data-set="{key}"]', value)
+        page.page.press(f'[data-set="{key}"]', "Tab")
+    page.until(lambda: page.posted[-1].get("key") == "specimen.thickness_mm", "the section is sent")
+    page.page.evaluate("() => document.activeElement.blur()")
+    page.page.keyboard.press("0")
+    page.click((100.0, 200.0), (300.0, 200.0))
+    page.page.fill("#scale input", "10")
+    page.page.press("#scale input", "Enter")
+    page.until(lambda: "px/mm" in page.text("scale"), "the scale is taken")
+    page.page.keyboard.press("w")
+    page.until(lambda: "· saved" in page.text("file"), "it is saved")
+    check_saved(page, folder)
+    page.page.keyboard.press("c")
+    page.until(lambda: page.text("verdict") == "GO", "the check says GO")
+    assert page.page.locator("#table tr").count() > 3
+
+
+def check_saved(page: Page, folder: Path) -> None:
+    config = load_config(folder / "rig.toml", {})
+    assert config.camera.address == CAMERA and config.specimen.area_m2 == pytest.approx(40e-6)
+    x, y, w, h = config.measure.roi
+    assert np.allclose((x, y, x + w - 1, y + h - 1), (60, 50, 420, 330), atol=1)
+    assert set(config.gauges) == {"axial", "transverse", "middle"}
+    assert config.scale.px_per_mm == pytest.approx(20, rel=0.01)
+    axial, across, middle = (config.gauges[name] for name in ("axial", "transverse", "middle"))
+    assert np.allclose([axial["start"], axial["end"]], [(240, 100), (240, 290)], atol=1)
+    assert np.allclose(across["box"], (160, 150, 160, 100), atol=1)
+    assert np.allclose(middle["at"], (300, 200), atol=1)
+    strokes = [one["strokes"][0] for one in page.posted if one.get("do") == "draw"]
+    erased = next(one for one in strokes if one["tool"] == "eraser")
+    mask = read_mask(config.measure.mask, WIDTH, HEIGHT)
+    painted = np.zeros((HEIGHT, WIDTH), bool)
+    painted[y : y + h, x : x + w] = True
+    far = distance_to_way(erased["points"])
+    painted &= far > erased["radius"]
+    sure = np.abs(far - erased["radius"]) > 0.02  # the brute force knows the way to a hundredth of a px
+    assert mask is not None and np.array_equal(mask[sure], painted[sure])
+    assert np.allclose(erased["points"][0], (60, 60), atol=1) and np.allclose(
+        erased["points"][-1], (100, 100), atol=1
+    )
+
+
+def run(page: Page, program: Program) -> None:
+    page.page.keyboard.press("s")
+    page.until(lambda: page.page.get_attribute("#state", "data-word") == "measuring", "it measures")
+    page.page.wait_for_timeout(1500)
+    page.page.evaluate(WATCH_LAYOUT)
+    assert_a_second_page_without_the_token_sees_nothing(page, program)
+    page.page.keyboard.press("t")
+    page.until(lambda: "tare" in page.text("answer"), "an answer to the tare")
+    if "order it again" in page.text("answer"):  # in mid-test, unless the noise is just zero
+        page.page.keyboard.press("t")
+    page.until(lambda: "tare ✓" in page.text("answer"), "tared")
+    page.page.keyboard.press("n")
+    page.page.keyboard.type("grip slipped")
+    page.page.keyboard.press("Enter")
+    page.until(lambda: "grip slipped" in page.text("events"), "the note is an event")
+    page.page.keyboard.press("p")
+    page.until(lambda: page.page.get_attribute("#state", "data-word") == "paused", "paused")
+    page.page.keyboard.press("p")
+    page.until(lambda: page.page.get_attribute("#state", "data-word") == "measuring", "measuring again")
+    page.page.select_option("#component", "e1")
+    page.until(
+        lambda: page.page.evaluate("() => document.getElementById('map').naturalWidth") == WIDTH, "a map"
+    )
+    with program.frozen():
+        page.until(lambda: page.page.is_visible("#nolink"), "NO LINK")
+    page.until(lambda: not page.page.is_visible("#nolink"), "the link is back")
+    page.until(lambda: page.stage() == "after", "the test is over")
+    moved = page.page.evaluate("() => window.moved")
+    assert sum(moved) < 0.01, f"the layout moved: {moved}"
+
+
+def assert_a_second_page_without_the_token_sees_nothing(page: Page, program: Program) -> None:
+    context = page.page.context.browser.new_context()
+    stranger = context.new_page()
+    answer = stranger.goto(program.address.partition("?")[0])
+    assert answer.status == 403
+    context.close()
+
+
+def after(page: Page, folder: Path) -> None:
+    page.until(lambda: page.page.get_attribute("#report", "aria-disabled") == "false", "the report is made")
+    modulus = page.page.text_content("#results div:first-child output")
+    value = float(modulus.split()[0])
+    assert modulus.endswith("GPa") and 66 < value < 74, modulus
+    answer = page.page.context.request.get(page.page.url.rstrip("/") + "/report")
+    assert answer.status == 200 and "sandbox" in answer.headers["content-security-policy"]
+    assert "<html" in answer.text() and (folder / "runs" / "specimen-1" / "report.html").exists()
+    page.page.keyboard.press("s")
+    page.until(lambda: page.stage() == "setup", "the next specimen is set up")
+    page.until(lambda: page.page.input_value('[data-set="metadata.specimen"]') == "specimen-2", "counted up")
+    page.until(lambda: "as drawn" in page.text("region"), "the same region")
+    for _ in range(2):
+        page.page.click("#setup [data-line=quit]")
+    page.until(lambda: page.stage() == "gone", "it has ended")
+
+
+def test_the_scale_from_a_board(browser: Any, tmp_path: Path, start: Callable[..., Program]) -> None:
+    picture = seen(CHARUCO, 9.0)
+    (tmp_path / "shots").mkdir()
+    for k in range(300):
+        cv2.imwrite(str(tmp_path / "shots" / f"{k:03}.png"), picture)
+    program = start("page", "--camera", "files:shots?fps=10", "--roi", "all", "--page-port", "0")
+    page = opened(browser, program)
+    page.until(lambda: bool(page.text("camera")), "the camera is seen")
+    page.page.keyboard.press("b")
+    assert "inner corners" in page.text("hint")
+    for name, value in (("columns", 8), ("rows", 6), ("square", 6), ("marker", 4.5)):
+        page.page.fill(f"#scale [name={name}]", str(value))
+    page.page.click("#scale button")
+    page.until(lambda: page.text("scale").startswith("9.00 px/mm"), "the scale is told")
+    assert page.text("answer") == "board ✓" and not page.complaints
+
+
+def test_a_page_that_is_killed_changes_nothing(browser: Any, start: Callable[..., Program]) -> None:
+    words = ["run", "--page", "--camera", CAMERA, "--load", "sim:", "--no-view", "--no-rrd", "--out", "out"]
+    program = start(*words)
+    page = opened(browser, program, color_scheme="dark")
+    page.until(lambda: page.page.get_attribute("#state", "data-word") == "measuring", "it measures")
+    assert page.page.get_attribute("html", "data-theme") == "dark"
+    page.page.context.close()
+    page = opened(browser, program, color_scheme="light")
+    page.until(
+        lambda: page.stage() == "run" and any(map(str.isdigit, page.text("force"))), "another sees it too"
+    )
+    assert page.page.get_attribute("html", "data-theme") == "light"
+    page.page.keyboard.press("q")
+    assert page.stage() == "run", "what ends the test is asked for twice"
+    page.page.keyboard.press("q")
+    page.until(lambda: page.page.evaluate("() => document.body.classList.contains('ended')"), "it ends")
+    assert page.stage() == "after" and "ZOIs valid" in page.text("summary"), "what came out stays on the page"
+    assert program.end() == 0, program.said
+    assert "adds up" in program.said and "STOPPED" not in program.said
+
+
+def test_another_site_gets_nothing(browser: Any, start: Callable[..., Program]) -> None:
+    """A page of another origin: its request carries no cookie, and is refused whatever it says."""
+    program = start("page", "--camera", CAMERA, "--page-port", "0")
+    page = opened(browser, program)
+    page.until(lambda: page.stage() == "setup", "it is there")
+    port = int(program.address.partition("/?")[0].rpartition(":")[2])
+    door = RequestGuard(port, "x")
+    context = page.page.context
+    other = context.new_page()
+    other.route("http://evil.example/", lambda route: route.fulfill(body="<p>", content_type="text/html"))
+    other.goto("http://evil.example/")
+    tried = other.evaluate(
+        """origin => Promise.all(["no-cors", "cors"].map(mode => fetch(origin + "/order", { method: "POST", mode,
+            credentials: "include", headers: { "Content-Type": mode === "cors" ? "application/json" : "text/plain" },
+            body: JSON.stringify({ line: "quit" }) }).then(r => r.type, e => "refused")))""",
+        door.origin,
+    )
+    assert tried[1] == "refused" and tried[0] in ("refused", "opaque")
+    other.close()
+    page.page.wait_for_timeout(500)
+    assert page.stage() == "setup" and program.process.poll() is None
+    for _ in range(2):
+        page.page.click("#setup [data-line=quit]")
+    page.until(lambda: page.stage() == "gone", "its own page ends it")
+    assert program.end() == 0

@@ -1,0 +1,165 @@
+"""Pages that stop reading, or are killed, beside a real run: no result changes, and they cost next to nothing."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import struct
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import h5py
+import numpy as np
+import pytest
+
+from live.cli import main
+from live.config.loading import load_config
+from live.pipeline.consumer_thread import ConsumerThread
+from live.ui.web.broadcaster import MOST_STREAMS
+from live.ui.web.page_controller import PageController
+from tests.live.ui.web.driven import Program
+from tests.live.ui.web.test_page_consumer import costs_of, measurement
+
+CAMERA = "sim:uniform?width=256&height=192&fps=20&seconds=12"
+RUN = [
+    "run",
+    "--page",
+    "--camera",
+    CAMERA,
+    "--load",
+    "sim:",
+    "--no-view",
+    "--no-rrd",
+    "--out",
+    "out",
+    "--zoi",
+    "32",
+]
+HARMLESS = ("latency_s", "kernel_s")  # of the machine, not of the specimen
+
+
+class Browser:
+    """A page as far as the server sees it: the cookie, then the events, which are read or not."""
+
+    def __init__(self, address: str) -> None:
+        url = urlsplit(address)
+        self.port = url.port or 0
+        answer = self._ask(f"/?{url.query}", "")
+        cookie = answer.partition("Set-Cookie: ")[2].partition(";")[0]
+        assert cookie, answer
+        self.socket = self._opened()
+        self.socket.sendall(self._request("/events", cookie))
+        assert self.socket.recv(12) == b"HTTP/1.1 200"
+
+    def _opened(self) -> socket.socket:
+        opened = socket.socket()
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)  # soon full
+        opened.settimeout(10)
+        opened.connect(("127.0.0.1", self.port))
+        return opened
+
+    def _request(self, path: str, cookie: str) -> bytes:
+        return f"GET {path} HTTP/1.1\r\nHost: 127.0.0.1:{self.port}\r\nCookie: {cookie}\r\n\r\n".encode()
+
+    def _ask(self, path: str, cookie: str) -> str:
+        with self._opened() as one:
+            one.sendall(self._request(path, cookie))
+            return one.recv(4096).decode()
+
+    def read_for(self, seconds: float) -> int:
+        """Bytes that were read in this time."""
+        end, got = time.monotonic() + seconds, 0
+        while time.monotonic() < end:
+            got += len(self.socket.recv(2**16))
+        return got
+
+    def rest(self) -> bytes:
+        """What still comes, to its end."""
+        found = b""
+        with self.socket as one, contextlib.suppress(ConnectionResetError):
+            while piece := one.recv(2**16):
+                found += piece
+        return found
+
+    def kill(self) -> None:
+        """Gone without a word, as a browser that is killed: the connection is reset."""
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+        self.socket.close()
+
+
+def numbers(folder: Path) -> dict[str, np.ndarray]:
+    """Everything that strain.h5 says of the specimen: maps, and means with their uncertainties."""
+    with h5py.File(folder / "strain.h5") as file:
+        found = {}
+        for group in ("entry/strain", "entry/mean"):
+            items = file[group].items()
+            found |= {f"{group}/{name}": item[()] for name, item in items if name not in HARMLESS}
+        return found
+
+
+def ended_well(program: Program) -> None:
+    """A busy machine may lose frames of the simulated camera, with a page or without; all else is in order."""
+    code, said = program.end(), program.said
+    assert code == 0 or (code == 5 and "frames were lost" in said), said
+    assert "adds up" in said and "STOPPED" not in said
+
+
+def assert_untouched(folder: Path) -> None:
+    """The results are those of a replay, where no page was."""
+    again = folder.with_name("again")
+    arguments = ["replay", str(folder / "session.h5"), "--as-measured", "--out", str(again)]
+    assert main([*arguments, "--no-view", "--no-rrd"]) == 0
+    seen, alone = numbers(folder), numbers(again)
+    assert len(seen["entry/mean/eyy"]) > 20 and seen.keys() == alone.keys()
+    for name, values in seen.items():
+        np.testing.assert_array_equal(values, alone[name], err_msg=name)
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Iterator[Program]:
+    started = Program(tmp_path, *RUN)
+    yield started
+    started.kill()
+
+
+def test_eight_pages_that_do_not_read_change_no_result(program: Program, tmp_path: Path) -> None:
+    pages = [Browser(program.address) for _ in range(MOST_STREAMS)]
+    ended_well(program)
+    for page in pages:
+        assert b"event: gone" not in page.rest(), "it did not stand in the way"
+    assert_untouched(tmp_path / "out")
+
+
+def test_eight_pages_that_do_not_read_cost_under_a_millisecond_a_measurement() -> None:
+    """In the time of the thread that measures: another busy program is not the page's doing."""
+    config, m = load_config(None, {}), measurement()
+    with PageController(None, port=0) as desk:
+        watching = desk.begin(config)
+        worker = ConsumerThread(watching, lambda *told: pytest.fail(str(told)))
+        worker.start()
+        pages = [Browser(desk.address) for _ in range(MOST_STREAMS)]
+        streams = list(desk._hub._streams)
+        desk._hub.tell("large", "x" * 200_000)
+        until = time.monotonic() + 10
+        while not all(stream._waiting for stream in streams) and time.monotonic() < until:
+            time.sleep(0.05)
+        costs = costs_of(worker, m)
+        assert len(streams) == MOST_STREAMS and all(stream._waiting for stream in streams), "they are blocked"
+        worker.end()
+        for page in pages:
+            page.kill()
+    assert np.percentile(costs, 95) < 1e-3
+
+
+def test_a_browser_that_is_killed_changes_no_result(program: Program, tmp_path: Path) -> None:
+    for seconds in (1.0, 0.5, 0.0):
+        page = Browser(program.address)
+        page.read_for(seconds)
+        page.kill()
+    page = Browser(program.address)
+    assert page.read_for(2.0) > 1000, "who comes after them is told all"
+    page.kill()
+    ended_well(program)
+    assert_untouched(tmp_path / "out")

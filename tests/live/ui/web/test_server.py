@@ -1,0 +1,197 @@
+"""What the page's server answers, and every refusal."""
+
+from __future__ import annotations
+
+import http.client
+import socket
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import pytest
+
+from live.ui.web.broadcaster import MOST_STREAMS, Broadcaster
+from live.ui.web.server import PageServer, of_json
+from tests.live.replay.batch.running import until
+
+
+@pytest.fixture
+def page() -> Iterator[PageServer]:
+    server = PageServer(
+        Broadcaster(),
+        {"/picture": lambda query: of_json(dict(query))},
+        {"/order": lambda value: {"got": value}},
+        port=0,
+    )
+    yield server
+    server.close()
+
+
+class Asked:
+    """An answer, read."""
+
+    def __init__(self, response: http.client.HTTPResponse) -> None:
+        self.status, self.headers, self.body = response.status, response.headers, response.read()
+
+
+def ask(
+    page: PageServer,
+    path: str,
+    headers: Mapping[str, str] | None = None,
+    *,
+    method: str = "GET",
+    body: Any = None,
+) -> Asked:
+    """As our own page asks, but for ``headers``; a header of "" is left out."""
+    door = page.door
+    own = {"Host": door.host, "Cookie": door.cookie.partition(";")[0], "Sec-Fetch-Site": "same-origin"}
+    if method == "POST":
+        own |= {"Origin": door.origin, "Content-Type": "application/json"}
+    sent = {key: value for key, value in (own | dict(headers or {})).items() if value}
+    connection = http.client.HTTPConnection("127.0.0.1", door.port, timeout=5)
+    try:
+        connection.putrequest(method, path, skip_host=True)
+        for key, value in sent.items():
+            connection.putheader(key, value)
+        if body is not None and "Content-Length" not in sent:
+            connection.putheader("Content-Length", str(len(body)))
+        connection.endheaders(body)
+        return Asked(connection.getresponse())
+    finally:
+        connection.close()
+
+
+def test_only_this_machine_is_listened_to(page: PageServer) -> None:
+    assert page.address.startswith("http://127.0.0.1:")
+    others = {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} - {
+        "127.0.0.1"
+    }
+    for other in others:
+        with pytest.raises(OSError), socket.create_connection((other, page.door.port), timeout=1):
+            pass
+
+
+def test_the_address_sets_the_cookie_and_hides_the_token(page: PageServer) -> None:
+    answer = ask(page, f"/?token={page.door.token}", {"Cookie": "", "Sec-Fetch-Site": "none"})
+    assert answer.status == 303 and answer.headers["Location"] == "/"
+    cookie = answer.headers["Set-Cookie"]
+    assert page.door.token in cookie and "HttpOnly" in cookie and "SameSite=Strict" in cookie
+
+
+def test_the_page_is_ours_alone(page: PageServer) -> None:
+    answer = ask(page, "/picture?a=1")
+    assert answer.status == 200 and answer.body == b'{"a":"1"}'
+    policy = answer.headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "unsafe" not in policy
+    assert (
+        "Access-Control-Allow-Origin" not in answer.headers
+        and answer.headers["X-Content-Type-Options"] == "nosniff"
+    )
+
+
+def test_an_order_is_taken(page: PageServer) -> None:
+    assert ask(page, "/order", method="POST", body=b'{"line":"tare"}').body == b'{"got":{"line":"tare"}}'
+
+
+@pytest.mark.parametrize(
+    ("status", "path", "headers"),
+    [
+        (403, "/?token=wrong", {"Cookie": ""}),
+        (403, "/?token=", {"Cookie": ""}),
+        (403, "/", {"Cookie": ""}),
+        (403, "/", {"Cookie": "phasedic=x"}),
+        (403, "/events", {"Cookie": ""}),
+        (403, "/picture", {"Cookie": ""}),
+        (403, "/", {"Host": "evil.example"}),
+        (403, "/", {"Host": ""}),
+        (403, "/?token={token}", {"Host": "evil.example:{port}"}),
+        (403, "/", {"Host": "localhost:{port}"}),
+        (403, "/", {"Sec-Fetch-Site": "cross-site"}),
+        (403, "/?token={token}", {"Sec-Fetch-Site": "cross-site"}),
+        (403, "/picture", {"Sec-Fetch-Site": "same-site"}),
+        (404, "/static/../server.py", {}),
+        (404, "/static/..%2fserver.py", {}),
+        (404, "/static//etc/passwd", {}),
+        (404, "/../../etc/passwd", {}),
+        (404, "/nothing", {}),
+    ],
+)
+def test_what_is_not_shown(page: PageServer, status: int, path: str, headers: dict[str, str]) -> None:
+    known = {"token": page.door.token, "port": page.door.port}
+    answer = ask(page, path.format(**known), {key: value.format(**known) for key, value in headers.items()})
+    assert answer.status == status
+    assert page.door.token.encode() not in answer.body and page.door.token not in str(answer.headers)
+
+
+@pytest.mark.parametrize(
+    ("status", "headers", "body"),
+    [
+        (403, {"Origin": ""}, b"{}"),
+        (403, {"Origin": "null"}, b"{}"),
+        (403, {"Origin": "http://evil.example"}, b"{}"),
+        (403, {"Origin": "http://localhost:{port}"}, b"{}"),
+        (403, {"Origin": "http://127.0.0.1:1"}, b"{}"),
+        (403, {"Host": "evil.example"}, b"{}"),
+        (403, {"Cookie": ""}, b"{}"),
+        (403, {"Sec-Fetch-Site": "cross-site"}, b"{}"),
+        (403, {"Content-Type": "text/plain"}, b"{}"),
+        (403, {"Content-Type": "application/x-www-form-urlencoded"}, b"{}"),
+        (403, {"Content-Type": ""}, b"{}"),
+        (413, {"Content-Length": "1000001"}, b""),
+        (413, {"Content-Length": "9" * 300}, b""),
+        (411, {"Content-Length": "-1"}, b""),
+        (411, {"Transfer-Encoding": "chunked"}, b"0\r\n\r\n"),
+        (400, {}, b"{"),
+        (400, {}, b"[" * 100_000),
+        (400, {}, b"[1]"),
+    ],
+)
+def test_what_is_not_taken(page: PageServer, status: int, headers: dict[str, str], body: bytes) -> None:
+    asked = {key: value.format(port=page.door.port) for key, value in headers.items()}
+    assert ask(page, "/order", asked, method="POST", body=body).status == status
+
+
+def test_no_preflight_is_answered(page: PageServer) -> None:
+    asked = {"Origin": "http://evil.example", "Access-Control-Request-Method": "POST", "Cookie": ""}
+    answer = ask(page, "/order", asked, method="OPTIONS")
+    assert answer.status >= 400
+    assert not [name for name in answer.headers if name.lower().startswith("access-control")]
+
+
+def stream(page: PageServer) -> http.client.HTTPResponse:
+    connection = http.client.HTTPConnection("127.0.0.1", page.door.port, timeout=5)
+    connection.request("GET", "/events", headers={"Cookie": page.door.cookie.partition(";")[0]})
+    return connection.getresponse()
+
+
+def test_a_ninth_page_is_refused_until_one_goes(page: PageServer) -> None:
+    streams = [stream(page) for _ in range(MOST_STREAMS)]
+    assert {one.status for one in streams} == {200}
+    assert ask(page, "/events").status == 503
+    streams[0].close()
+
+    def gone() -> bool:
+        page.hub.tell("state", "x" * 10)  # the server sees that a page has gone when it writes to it
+        return page.hub.watched < MOST_STREAMS
+
+    until(gone)
+    again = stream(page)
+    assert again.status == 200
+    for one in [*streams[1:], again]:
+        one.close()
+
+
+def test_a_page_is_told_the_newest_and_then_what_comes(page: PageServer) -> None:
+    for number in range(3):
+        page.hub.tell("state", {"n": number, "nan": float("nan")})
+    with stream(page) as told:
+        assert told.fp.readline() == b"event: state\n"
+        assert told.fp.readline() == b'data: {"n":2,"nan":null}\n'
+
+
+def test_a_frozen_page_holds_up_nobody() -> None:
+    hub = Broadcaster()
+    frozen = [hub.open() for _ in range(MOST_STREAMS)]
+    for number in range(1000):
+        hub.tell("state", number)
+    assert hub.open() is None
+    assert [one.take(0) for one in frozen if one] == [{"state": b"999"}] * MOST_STREAMS
