@@ -22,7 +22,7 @@ class Largest(Consumer):
     last = 0.0
 
     def measurement(self, measurement: Measurement) -> None:
-        self.last = measurement.instant.largest
+        self.last = measurement.time_step.largest
         print(f"{measurement.number:4}  {self.last * 1e6:+8.0f} um/m")
 
     def end(self) -> str:

@@ -118,12 +118,12 @@ def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> 
     screen = TerminalScreen()
     port = ControlPort(str(ORDERS), None, screen)
 
-    def hands(live: LiveRun) -> None:
+    def on_start(live: LiveRun) -> None:
         port.open(live)
         threading.Thread(target=control, args=(rate, until), daemon=True).start()
 
     try:
-        return run_live(config, screen, consumers=standard_consumers(screen), hands=hands)
+        return run_live(config, screen, consumers=standard_consumers(screen), on_start=on_start)
     finally:
         port.close()
 

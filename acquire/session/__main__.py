@@ -14,7 +14,7 @@ def main(path: str) -> int:
     try:
         with SessionPart(path, probed=True) as part:
             part.walk_pictures()
-            for read in (part.load_samples, part.events, part.clock_pairs, part.ledger):
+            for read in (part.load_samples, part.events, part.clock_pairs, part.frame_counts):
                 read()
     except DataError as error:
         print(error)

@@ -147,7 +147,7 @@ class SessionPart(Closing):
         self._sums = stored.open_sums(bursts, self.camera)
         self._lines = open_dataset(self._groups["load"], "lines", stored.LINES)
         self._events = open_dataset(self.entry, "events", stored.EVENTS)
-        self._ledger = open_dataset(self.entry, "ledger", stored.LEDGER)
+        self._frame_counts = open_dataset(self.entry, "ledger", stored.LEDGER)
 
     def _check_order(self) -> None:
         """Frames are found by their sequence numbers."""
@@ -253,10 +253,10 @@ class SessionPart(Closing):
                 for t, utc in zip(columns["monotonic_s"], columns["utc"].tolist(), strict=True)
             ]
 
-    def ledger(self) -> dict[str, Any] | None:
+    def frame_counts(self) -> dict[str, Any] | None:
         """The final counts; None where the writer did not come to its end."""
         with _reading(self.path, "the ledger cannot be read"):
-            return stored.ledger_from(self._ledger[0], f"{self.path}: the ledger")
+            return stored.ledger_from(self._frame_counts[0], f"{self.path}: the ledger")
 
     def walk_pictures(self) -> None:
         """Go through the index of all pictures, without reading them.

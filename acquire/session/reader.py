@@ -122,9 +122,9 @@ class RotatingWriter(Closing):
         """See ``SessionWriter``."""
         self._writer.write_clock(pair)
 
-    def write_ledger(self, ledger: Mapping[str, Any]) -> None:
+    def write_ledger(self, frame_counts: Mapping[str, Any]) -> None:
         """See ``SessionWriter``; it stands in the last file."""
-        self._writer.write_ledger(ledger)
+        self._writer.write_ledger(frame_counts)
 
     def flush_when_due(self) -> float:
         """See ``SessionWriter``."""
@@ -262,9 +262,9 @@ class Session(Closing):
         return [event for part in self._parts for event in part.events()]
 
     @property
-    def ledger(self) -> dict[str, Any] | None:
+    def frame_counts(self) -> dict[str, Any] | None:
         """The final counts; None where the run did not come to its end."""
-        return self._parts[-1].ledger()
+        return self._parts[-1].frame_counts()
 
     @property
     def clock_pairs(self) -> list[ClockPair]:

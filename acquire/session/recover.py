@@ -105,9 +105,9 @@ def _copy(part: SessionPart, writer: SessionWriter) -> Recovered:
     for pair in _try(part.clock_pairs, unreadable) or []:
         if pair != part.start:
             writer.write_clock(pair)
-    ledger = _try(part.ledger, unreadable)
-    if ledger is not None:
-        writer.write_ledger(ledger)
+    frame_counts = _try(part.frame_counts, unreadable)
+    if frame_counts is not None:
+        writer.write_ledger(frame_counts)
     done = Recovered(writer.path, frames, bursts, len(samples), len(events), tuple(unreadable))
     writer.write_event(_note(part, done))
     return done

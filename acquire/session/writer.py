@@ -112,7 +112,7 @@ class SessionWriter(Closing):
         self._lines = GrowingDataset(entry["load/lines"])
         self._events = GrowingDataset(entry["events"])
         self._clock = RowTable(entry["clock"], list(layout.CLOCK_COLUMNS))
-        self._ledger: h5py.Dataset = entry["ledger"]
+        self._frame_counts: h5py.Dataset = entry["ledger"]
         self._bursts = BurstTable(entry["bursts"], self._mode)
 
     def write_frame(self, frame: Frame) -> int:
@@ -181,13 +181,13 @@ class SessionWriter(Closing):
         self._clock.hold(self._clock.row({"monotonic_s": pair.monotonic, "utc": pair.iso().encode()}))
         self._written(0)
 
-    def write_ledger(self, ledger: Mapping[str, Any]) -> None:
+    def write_ledger(self, frame_counts: Mapping[str, Any]) -> None:
         """Store the final counts."""
-        text = to_json(ledger).encode()
+        text = to_json(frame_counts).encode()
         if len(text) > layout.LEDGER_BYTES:
             raise ValueError(f"a ledger of {len(text)} bytes; there is room for {layout.LEDGER_BYTES}")
         with self._guarded():
-            self._ledger[0] = text
+            self._frame_counts[0] = text
         self._written(0)
 
     def _written(self, size: int, frames: int = 0) -> None:

@@ -30,7 +30,7 @@ from live.ui.rerun.view import View, spawn_viewer
 WHAT = "strain out"
 
 
-def signals_of(about: RunInfo, books: RunState, screen: Screen) -> list[Consumer]:
+def signals_of(about: RunInfo, run_state: RunState, screen: Screen) -> list[Consumer]:
     """Alarms and strain out of a live run; none of a replay.
 
     Raises
@@ -43,7 +43,7 @@ def signals_of(about: RunInfo, books: RunState, screen: Screen) -> list[Consumer
     outs: list[StrainOut] = []
     with ExitStack() as opened:
         for make in (_tcp, _udp, _serial):
-            out = make(about.config, _lines(about, books))
+            out = make(about.config, _lines(about, run_state))
             if out is not None:
                 opened.callback(out.end)
                 outs.append(out)
@@ -51,21 +51,21 @@ def signals_of(about: RunInfo, books: RunState, screen: Screen) -> list[Consumer
         opened.pop_all()
     means = ActionMeans(screen.bell, about.end, outs)
     alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
-    return [*_watch(alarms, about, books), *outs]
+    return [*_watch(alarms, about, run_state), *outs]
 
 
-def _watch(alarms: Sequence[Alarm], about: RunInfo, books: RunState) -> list[Consumer]:
+def _watch(alarms: Sequence[Alarm], about: RunInfo, run_state: RunState) -> list[Consumer]:
     if not alarms:
         return []
-    readings, vitals = ChannelValues(about.start.monotonic, books.snapshot), books.vitals
-    return [AlarmWatch(alarms, readings, vitals.channels, books.alarms, books.journal)]
+    readings, health = ChannelValues(about.start.monotonic, run_state.snapshot), run_state.health
+    return [AlarmWatch(alarms, readings, health.channels, run_state.alarms, run_state.event_log)]
 
 
-def _lines(about: RunInfo, books: RunState) -> Lines:
+def _lines(about: RunInfo, run_state: RunState) -> Lines:
     config = about.config
     gauges = tuple(f"{prefix}gauge_{name}" for name in config.gauges for prefix in ("", "sigma_"))
     channels = config.strain_out.channels or (*STANDARD, *gauges)
-    return Lines(ChannelValues(about.start.monotonic, books.snapshot), channels, config.strain_out.format)
+    return Lines(ChannelValues(about.start.monotonic, run_state.snapshot), channels, config.strain_out.format)
 
 
 def _tcp(config: Config, lines: Lines) -> StrainOut | None:
@@ -100,23 +100,23 @@ def standard_consumers(screen: Screen, more: Sequence[Consumer] = ()) -> Compose
     DataError where a file of the results exists already, or cannot be made.
     """
 
-    def compose(about: RunInfo, books: RunState) -> Sequence[Consumer]:
-        signals = signals_of(about, books, screen)
-        return [*write_results(about, books), *_shown(about, books, screen), *more, *signals]
+    def compose(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
+        signals = signals_of(about, run_state, screen)
+        return [*write_results(about, run_state), *_shown(about, run_state, screen), *more, *signals]
 
     return compose
 
 
-def _shown(about: RunInfo, books: RunState, screen: Screen) -> list[Consumer]:
+def _shown(about: RunInfo, run_state: RunState, screen: Screen) -> list[Consumer]:
     """The view, and what keeps its words and figures new."""
-    view = _view(about, books, screen)
+    view = _view(about, run_state, screen)
     if view is None:
         return []
-    card = StatusCard(about.config.specimen, books.loads)
-    return [CardWriter(view, card, books), FiguresWriter(view, books), RerunConsumer(view, books)]
+    card = StatusCard(about.config.specimen, run_state.loads)
+    return [CardWriter(view, card, run_state), FiguresWriter(view, run_state), RerunConsumer(view, run_state)]
 
 
-def _view(about: RunInfo, books: RunState, screen: Screen) -> View | None:
+def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
     v = about.config.view
     if not (v.enabled or v.rrd):
         return None
@@ -139,10 +139,10 @@ def _view(about: RunInfo, books: RunState, screen: Screen) -> View | None:
     rrd = about.folder / "view.rrd" if v.rrd else None
 
     def tell(text: str, level: Level) -> None:
-        books.journal.tell(EventKind.VIEW, "view", text, level)
+        run_state.event_log.tell(EventKind.VIEW, "view", text, level)
 
     def serving(view: View) -> None:
-        books.vitals.view_port = view.port
+        run_state.health.view_port = view.port
         _announce(view, v.spawn, screen, lambda text: tell(text, "warning"))
 
     port = v.port if v.enabled else None

@@ -99,7 +99,7 @@ class Kept(Consumer):
 
     def measurement(self, measurement: Measurement) -> None:
         """Keep means of the small strains, which the truth is, sigmas and which ZOIs they are over."""
-        m, i = measurement, measurement.instant
+        m, i = measurement, measurement.time_step
         small = m.field.strain("small")
         times = m.t + np.linspace(-0.5, 0.5, m.burst.n) * m.burst.duration
         self.measurements.append(
@@ -182,7 +182,7 @@ def compare(outcome: Outcome, kept: Kept, config: Config, say: Callable[[str], N
     say("against the simulated truth (elastic part; exx, eyy, exy):")
     agreed = _say_strain(np.array(ratios), np.array(errors), say)
     _say_force(outcome, specimen, say)
-    figures = evaluate(outcome.books.history, outcome.books.loads, config.specimen)
+    figures = evaluate(outcome.run_state.history, outcome.run_state.loads, config.specimen)
     rows = tensile_table(figures, stresses=True)
     say(f"  E  {rows['E'].text}, true {specimen.E / 1e9:g} GPa")
     say(f"  nu {rows['nu'].text}, true {specimen.nu:g}")
@@ -205,7 +205,7 @@ def _say_strain(ratios: Array, errors: Array, say: Callable[[str], None]) -> boo
 
 
 def _say_force(outcome: Outcome, specimen: VirtualSpecimen, say: Callable[[str], None]) -> None:
-    t, force = outcome.books.loads.arrays()
+    t, force = outcome.run_state.loads.arrays()
     true = specimen.force(np.array([specimen.elapsed(time) for time in t]))
     error = (force - true)[np.isfinite(force)]
     if error.size:

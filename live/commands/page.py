@@ -42,24 +42,24 @@ def command(arguments: argparse.Namespace) -> int:
         found = find_devices(said, screen)
         draft.change_all({"camera.address": found.camera, "load.address": found.load})
     interrupted = threading.Event()
-    with PageController(draft, arguments.page_port) as desk:
+    with PageController(draft, arguments.page_port) as controller:
 
         def interrupt() -> None:
             interrupted.set()
-            desk.quit()
+            controller.quit()
 
         with signals(interrupt, screen.say):
-            invite(desk, screen)
-            serve(desk, screen, interrupted)
+            invite(controller, screen)
+            serve(controller, screen, interrupted)
     return EXIT_INTERRUPTED if interrupted.is_set() else 0
 
 
-def serve(desk: PageController, screen: Screen, interrupted: threading.Event) -> None:
+def serve(controller: PageController, screen: Screen, interrupted: threading.Event) -> None:
     """Specimen after specimen."""
     words = ""
-    while not interrupted.is_set() and (config := desk.set_up(words)) is not None:
+    while not interrupted.is_set() and (config := controller.set_up(words)) is not None:
         try:
-            outcome = watched(desk, config, screen)
+            outcome = watched(controller, config, screen)
         except PhasedicError as error:
             words = brief(error)
             screen.say(f"the test did not begin: {words}")
@@ -71,6 +71,6 @@ def serve(desk: PageController, screen: Screen, interrupted: threading.Event) ->
         report = outcome.folder / "report.html"
         if not report.exists():
             write_report(outcome.folder, screen)
-        desk.reported(report if report.exists() else None)
-        if not desk.after():
+        controller.reported(report if report.exists() else None)
+        if not controller.after():
             return

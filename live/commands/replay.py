@@ -46,7 +46,7 @@ def command(arguments: argparse.Namespace) -> int:
     with signals(stopping.set, screen.say):
         done = replay(request, screen, stopping, standard_consumers(screen))
     screen.say()
-    summary = summary_lines(done.books, done.config.specimen)
+    summary = summary_lines(done.run_state, done.config.specimen)
     for line in [*summary, *done.lines, *file_lines(done.folder)]:
         screen.say(line)
     if done.config.output.report:

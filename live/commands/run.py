@@ -58,28 +58,28 @@ def run_beside_page(config: Config, screen: Screen) -> Outcome:
     """Run with the operator's page, which ends with the run."""
     from live.ui.web.page_controller import PageController
 
-    with PageController(None) as desk:
-        invite(desk, screen)
-        return watched(desk, config, screen)
+    with PageController(None) as controller:
+        invite(controller, screen)
+        return watched(controller, config, screen)
 
 
-def watched(desk: PageController, config: Config, screen: Screen) -> Outcome:
+def watched(controller: PageController, config: Config, screen: Screen) -> Outcome:
     """One test, with the page, told to its end."""
     from live.ui.web.page_controller import ended
 
-    desk.viewer = _open_viewer
-    outcome = run_to_the_end(config, screen, [desk.begin(config)], desk.attend)
+    controller.viewer = _open_viewer
+    outcome = run_to_the_end(config, screen, [controller.begin(config)], controller.attend)
     conclude(outcome, screen)
     words = EXIT_WORDS.get(outcome.exit_code, "")
-    desk.end(ended(outcome.books, outcome.config.specimen, outcome.folder, words))
+    controller.end(ended(outcome.run_state, outcome.config.specimen, outcome.folder, words))
     return outcome
 
 
-def invite(desk: PageController, screen: Screen) -> None:
+def invite(controller: PageController, screen: Screen) -> None:
     """Open the page where there is a display; say how to open it."""
-    if has_display() and webbrowser.open(desk.address):
+    if has_display() and webbrowser.open(controller.address):
         screen.say("the page opens in the browser")
-    screen.say(f"the page: {desk.address}")
+    screen.say(f"the page: {controller.address}")
 
 
 def _open_viewer(port: int) -> str:
@@ -103,7 +103,7 @@ def run_to_the_end(
     with contextlib.ExitStack() as stack:
         port = ControlPort(operate.orders, operate.token_file, screen) if operate.orders else None
 
-        def hands(live: LiveRun) -> None:
+        def on_start(live: LiveRun) -> None:
             keyboard = listen(live, sys.stdin, screen)
             if keyboard is not None:
                 stack.callback(keyboard.close)
@@ -115,23 +115,23 @@ def run_to_the_end(
             stack.callback(port.close)
         stack.enter_context(signals(lambda: stop.ask(INTERRUPTED), screen.say))
         return run_live(
-            config, screen, stop=stop, consumers=standard_consumers(screen, consumers), hands=hands
+            config, screen, stop=stop, consumers=standard_consumers(screen, consumers), on_start=on_start
         )
 
 
 def conclude(outcome: Outcome, screen: Screen) -> None:
     """Print the summary, the ledger, the losses and the files."""
     screen.say()
-    books = outcome.books
-    for line in summary_lines(books, outcome.config.specimen):
+    run_state = outcome.run_state
+    for line in summary_lines(run_state, outcome.config.specimen):
         screen.say(line)
-    screen.say(books.ledger.line())
+    screen.say(run_state.frame_counts.line())
     for report in outcome.outputs.reports:
         screen.say(f"  {report.line()}")
-    troubles = books.journal.events("warning", "error")
+    troubles = run_state.event_log.events("warning", "error")
     if troubles:
         screen.say(
-            f"{len(troubles)} warnings and errors, the last: {sentence(troubles[-1], books.journal.names)}"
+            f"{len(troubles)} warnings and errors, the last: {sentence(troubles[-1], run_state.event_log.names)}"
         )
     for line in file_lines(outcome.folder):
         screen.say(line)

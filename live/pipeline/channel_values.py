@@ -31,7 +31,7 @@ class ChannelValues:
 
     def read(self, measurement: Measurement) -> dict[str, float]:
         """All channels by name; NaN where one is not known."""
-        i = measurement.instant
+        i = measurement.time_step
         now = self._snapshot(i.t, i)
         values = {
             "time_s": i.t - self._start,

@@ -190,7 +190,7 @@ class Outputs:
     consumers : sequence of Consumer
     loads : LoadLog
         Says when the force of a measurement is final.
-    journal : EventLog
+    event_log : EventLog
         Told where a consumer fails; its events go to the consumers.
     history : History
         Gets the means of every measurement.
@@ -201,23 +201,23 @@ class Outputs:
     """
 
     def __init__(
-        self, consumers: Sequence[Consumer], loads: LoadLog, journal: EventLog, history: History
+        self, consumers: Sequence[Consumer], loads: LoadLog, event_log: EventLog, history: History
     ) -> None:
-        self.history, self._journal = history, journal
+        self.history, self._event_log = history, event_log
         self._settling = ForceMatching(loads)
         self._reports: Sequence[ConsumerReport] = ()
         self._workers = [ConsumerThread(consumer, self._failure) for consumer in consumers]
         for worker in self._workers:
             worker.start()
-        journal.add_listener(self.event)
+        event_log.add_listener(self.event)
 
     def add(self, measurement: Measurement) -> TimeStep:
         """Take one measurement."""
-        self.history.add(measurement.instant)
+        self.history.add(measurement.time_step)
         self._give("measurement", measurement)
         for settled in self._settling.add(measurement):
             self._give("settled", settled)
-        return measurement.instant
+        return measurement.time_step
 
     def frame(self, frame: Frame) -> None:
         """Take a frame; never waits."""
@@ -258,4 +258,4 @@ class Outputs:
 
     def _failure(self, name: str, why: str, vital: bool) -> None:
         text = f"{name} stopped, all else goes on: {why}"
-        self._journal.tell(EventKind.VIEW, name, text, "error" if vital else "warning")
+        self._event_log.tell(EventKind.VIEW, name, text, "error" if vital else "warning")

@@ -36,16 +36,16 @@ class TimeSeries(Sequence[TimeStep]):
         self._gauges: dict[str, _GaugeColumn] = {}
         self._count = 0
 
-    def append(self, instant: TimeStep) -> None:
+    def append(self, time_step: TimeStep) -> None:
         """Add the newest."""
         for name, kept in self._numbers.items():
-            kept.append(getattr(instant, name))
-        self._refused.append(instant.refused)
-        for name in instant.gauges:
+            kept.append(getattr(time_step, name))
+        self._refused.append(time_step.refused)
+        for name in time_step.gauges:
             if name not in self._gauges:
                 self._gauges[name] = _GaugeColumn(self._count)
         for name, column in self._gauges.items():
-            column.append(instant.gauges.get(name))
+            column.append(time_step.gauges.get(name))
         # Counted last: whoever reads meanwhile sees whole instants only.
         self._count += 1
 
@@ -190,12 +190,12 @@ class History:
     """
 
     def __init__(self, axis: str = "y") -> None:
-        self.instants, self._finder = TimeSeries(), AxisFinder(axis)
+        self.time_steps, self._finder = TimeSeries(), AxisFinder(axis)
 
-    def add(self, instant: TimeStep) -> None:
-        """Keep ``instant``."""
-        self.instants.append(instant)
-        self._finder.add(instant)
+    def add(self, time_step: TimeStep) -> None:
+        """Keep ``time_step``."""
+        self.time_steps.append(time_step)
+        self._finder.add(time_step)
 
     @property
     def axis_by_now(self) -> Literal["x", "y"]:
@@ -209,7 +209,7 @@ class History:
 
     def column(self, name: str) -> Array:
         """One quantity over time, (N,) float64."""
-        return self.instants.column(name)
+        return self.time_steps.column(name)
 
     def forces(self, loads: LoadLog) -> Array:
         """The force at each instant with all samples that have come by now, (N,) float64, N.
@@ -230,7 +230,7 @@ class History:
     def along(self, axis: str) -> tuple[Array, Array]:
         """Strain along and across the load: the gauges ``axial`` and ``transverse``, or else the means."""
         chosen = axis if axis in ("x", "y") else self.axis(axis).axis
-        axial, transverse = strains_along(self.instants.gauges, chosen)
+        axial, transverse = strains_along(self.time_steps.gauges, chosen)
         return self._strain(axial), self._strain(transverse)
 
     def _strain(self, name: str) -> Array:
@@ -239,7 +239,7 @@ class History:
 
     def gauge(self, name: str) -> Array | None:
         """A gauge over time, (N,) float64; None where there is none of that name."""
-        return self.instants.gauge(name)
+        return self.time_steps.gauge(name)
 
 
 class AxisFinder:
@@ -262,11 +262,11 @@ class AxisFinder:
         self._count, self._next = 0, _FIRST
         self._t = -math.inf
 
-    def add(self, instant: TimeStep) -> Literal["x", "y"]:
+    def add(self, time_step: TimeStep) -> Literal["x", "y"]:
         """The axis with one instant more; one that is told again counts once."""
-        if self._seeks and instant.t > self._t:
-            self._t, self._count = instant.t, self._count + 1
-            self._strains.append((instant.exx, instant.eyy, instant.exy))
+        if self._seeks and time_step.t > self._t:
+            self._t, self._count = time_step.t, self._count + 1
+            self._strains.append((time_step.exx, time_step.eyy, time_step.exy))
             if self._count >= self._next:
                 self._next = math.ceil(self._count * _GROWTH)
                 exx, eyy, exy = np.array(self._strains.kept, np.float64).T

@@ -148,13 +148,13 @@ class Measurement:
         0, 1, 2 ... of the measured bursts.
     burst : Burst
     field : StrainField
-    instant : TimeStep
+    time_step : TimeStep
     """
 
     number: int
     burst: Burst
     field: StrainField
-    instant: TimeStep
+    time_step: TimeStep
 
     @classmethod
     def of(
@@ -176,15 +176,15 @@ class Measurement:
     @property
     def force(self) -> float:
         """Force at that time, N; NaN where no load is known (yet)."""
-        return self.instant.force
+        return self.time_step.force
 
     def with_latency(self, latency_s: float) -> Measurement:
         """The same once it is known how long it took, from the stamp of the last frame."""
-        return replace(self, instant=replace(self.instant, latency_s=latency_s))
+        return replace(self, time_step=replace(self.time_step, latency_s=latency_s))
 
     def with_force(self, force: float, raw: float = math.nan, zero: float = 0.0) -> Measurement:
         """The same once the force is known; ``raw`` as stamped, where a lag was taken off; ``zero`` by tares."""
-        return replace(self, instant=replace(self.instant, force=force, force_raw=raw, zero=zero))
+        return replace(self, time_step=replace(self.time_step, force=force, force_raw=raw, zero=zero))
 
 
 HOLD_S = 2.0

@@ -100,21 +100,21 @@ class RunState:
 
     Attributes
     ----------
-    journal : EventLog
-    ledger : FrameCounts
+    event_log : EventLog
+    frame_counts : FrameCounts
     loads : LoadLog
     history : History
     alarms : ActiveAlarms
-    vitals : Health
+    health : Health
     specimen : SpecimenConfig
     """
 
-    journal: EventLog
-    ledger: FrameCounts
+    event_log: EventLog
+    frame_counts: FrameCounts
     loads: LoadLog
     history: History
     alarms: ActiveAlarms = field(default_factory=ActiveAlarms)
-    vitals: Health = field(default_factory=Health)
+    health: Health = field(default_factory=Health)
     specimen: SpecimenConfig = field(default_factory=SpecimenConfig)
 
     @classmethod
@@ -124,35 +124,35 @@ class RunState:
         loads, history = LoadLog(max_gap_s, lag_s), History(specimen.axis)
         return cls(EventLog(), FrameCounts(), loads, history, specimen=specimen)
 
-    def snapshot(self, t: float, instant: TimeStep | None = None) -> Snapshot:
-        """Where the test stands at ``t`` (s, monotonic), with ``instant`` or else the last that was measured.
+    def snapshot(self, t: float, time_step: TimeStep | None = None) -> Snapshot:
+        """Where the test stands at ``t`` (s, monotonic), with ``time_step`` or else the last that was measured.
 
         The force is the newest of the load cell; in a replay, and before the first sample, that of the instant.
         """
-        if instant is None and self.history.instants:
-            instant = self.history.instants[-1]
-        vitals, area, axis = self.vitals, self.specimen.area_m2, self.history.axis_by_now
-        sample = self.loads.latest if vitals.state else None
-        force = math.nan if instant is None else instant.force
+        if time_step is None and self.history.time_steps:
+            time_step = self.history.time_steps[-1]
+        health, area, axis = self.health, self.specimen.area_m2, self.history.axis_by_now
+        sample = self.loads.latest if health.state else None
+        force = math.nan if time_step is None else time_step.force
         if sample is not None:
             force = sample.force
-        axial, sigma = instant.axial(axis) if instant else (math.nan, math.nan)
+        axial, sigma = time_step.axial(axis) if time_step else (math.nan, math.nan)
         return Snapshot(
             t=t,
-            state=vitals.state or "REPLAY",
-            elapsed_s=t - vitals.began_t,
-            fps=vitals.fps,
+            state=health.state or "REPLAY",
+            elapsed_s=t - health.began_t,
+            fps=health.fps,
             force_N=force,
             stress_Pa=force / area if area else math.nan,
-            peak_N=vitals.peak_N,
-            axial_name=strains_along(instant.gauges if instant else (), axis)[0],
+            peak_N=health.peak_N,
+            axial_name=strains_along(time_step.gauges if time_step else (), axis)[0],
             axial=axial,
             sigma_axial=sigma,
-            valid=instant.n_valid if instant else 0,
-            zois=instant.n_zoi if instant else 0,
-            latency_p95_s=vitals.latency_p95_s,
-            disk_s=vitals.disk_s,
+            valid=time_step.n_valid if time_step else 0,
+            zois=time_step.n_zoi if time_step else 0,
+            latency_p95_s=health.latency_p95_s,
+            disk_s=health.disk_s,
             alarms=self.alarms.texts,
-            frames=self.ledger.as_dict(),
-            instant=instant,
+            frames=self.frame_counts.as_dict(),
+            time_step=time_step,
         )

@@ -41,7 +41,7 @@ class Snapshot:
         Words of the alarms that are on.
     frames : mapping of str to int
         The counts of frames by name.
-    instant : TimeStep or None
+    time_step : TimeStep or None
         The last that was measured.
     """
 
@@ -61,7 +61,7 @@ class Snapshot:
     disk_s: float = math.inf
     alarms: tuple[str, ...] = ()
     frames: Mapping[str, int] = field(default_factory=dict)
-    instant: TimeStep | None = None
+    time_step: TimeStep | None = None
 
     @property
     def lost(self) -> int:

@@ -53,7 +53,7 @@ def rehearse(camera: CameraInfo, grid: ZoiGrid, settings: KernelSettings, bursts
     again: list[Burst] = [reference.burst, reference.burst]
     history = History()
     for measurement in measure(again, kernel, LoadLog(), noise_GL=noise_GL):
-        history.add(measurement.instant)
+        history.add(measurement.time_step)
 
 
 def _averaged(camera: CameraInfo, images: list[NDArray[Any]], n: int) -> ReferenceBurst:

@@ -80,21 +80,21 @@ def open_material(request: ReplayRequest) -> Iterator[tuple[ReplaySource, Config
 
 
 def prepared(
-    material: ReplaySource,
+    source_of_bursts: ReplaySource,
     config: Config,
     source: str,
     screen: Screen,
     stopped: Callable[[], bool] = lambda: False,
 ) -> PreparedKernel:
     """Look for the specimen where that is asked for, and prepare the kernel; raises as ``replay``."""
-    camera = material.camera
+    camera = source_of_bursts.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
     if AUTO in (config.measure.roi, config.measure.gauges):
-        seen = FirstLook(material.reference.mean, _noise_of(material.reference), camera)
+        seen = FirstLook(source_of_bursts.reference.mean, _noise_of(source_of_bursts.reference), camera)
         config, mask = placed_on(config, seen, screen.say)
     plan = MeasurePlan.of(config, camera, mask)
     plan.compile(camera, screen.status, stopped)
-    return plan.on(material.reference, f"the reference of {source}")
+    return plan.on(source_of_bursts.reference, f"the reference of {source}")
 
 
 def _noise_of(reference: Burst) -> float | None:

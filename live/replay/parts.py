@@ -65,16 +65,16 @@ def measure_part(request: ReplayRequest, file: IO[bytes], run_in: int, screen: S
         if event.kind is EventKind.REFERENCE:
             renewed.append(event)
 
-    with opened_session(path, request, screen) as (material, config):
-        ready = prepared(material, config, request.source, screen)
-        work = ahead(material.bursts)
+    with opened_session(path, request, screen) as (source_of_bursts, config):
+        ready = prepared(source_of_bursts, config, request.source, screen)
+        work = ahead(source_of_bursts.bursts)
         try:
-            for m in ready.measurements(work, material.loads, listen):
+            for m in ready.measurements(work, source_of_bursts.loads, listen):
                 if renewed:
                     return False
                 if m.number >= run_in:
                     _put(m, file)
-                screen.progress(m.instant, m.number + 1, material.expected, 0.0)
+                screen.progress(m.time_step, m.number + 1, source_of_bursts.expected, 0.0)
         finally:
             work.close()
     return not renewed

@@ -50,7 +50,7 @@ class Replayed:
     Attributes
     ----------
     folder : Path
-    books : RunState
+    run_state : RunState
     config : Config
     exit_code : int
     lines : tuple of str
@@ -60,7 +60,7 @@ class Replayed:
     """
 
     folder: Path
-    books: RunState
+    run_state: RunState
     config: Config
     exit_code: int
     lines: tuple[str, ...] = ()
@@ -82,8 +82,8 @@ def replay(
     if path is None:
         return _replay_pictures(request, screen, stopping, consumers)
     with opened_session(path, request, screen) as (found, config):
-        material = _with_forces(found, request, config)
-        return _run(material, config, request, screen, stopping, EventLog(), consumers)
+        source_of_bursts = _with_forces(found, request, config)
+        return _run(source_of_bursts, config, request, screen, stopping, EventLog(), consumers)
 
 
 # -- pictures -----------------------------------------------------------------------------------
@@ -101,33 +101,35 @@ def _replay_pictures(
         load=replace(config.load, address="none:"),
         measure=replace(config.measure, roi=region),
     )
-    journal = EventLog()
-    rig = open_rig(config.camera.address, "none:", _in_test_time(journal), crop=config.camera.crop)
+    event_log = EventLog()
+    rig = open_rig(config.camera.address, "none:", _in_test_time(event_log), crop=config.camera.crop)
     try:
         with rig.camera as camera:
-            material = _with_forces(picture_material(camera, request, config), request, config)
-            return _run(material, config, request, screen, stopping, journal, consumers)
+            source_of_bursts = _with_forces(picture_material(camera, request, config), request, config)
+            return _run(source_of_bursts, config, request, screen, stopping, event_log, consumers)
     finally:
         rig.close()
 
 
-def _with_forces(material: ReplaySource, request: ReplayRequest, config: Config) -> ReplaySource:
+def _with_forces(source_of_bursts: ReplaySource, request: ReplayRequest, config: Config) -> ReplaySource:
     """The same with the forces of the CSV that was given."""
     if request.forces is None:
-        return material
+        return source_of_bursts
     address, table = parse_address(with_scheme(request.source)), read_forces(request.forces)
     names = picture_times(address) if table.names and address.scheme == "files" else None
-    samples = table.samples(names, material.start.monotonic)
+    samples = table.samples(names, source_of_bursts.start.monotonic)
     return replace(
-        material, samples=tuple(samples), loads=table.log(samples, config.load.max_gap_s, config.load.lag_s)
+        source_of_bursts,
+        samples=tuple(samples),
+        loads=table.log(samples, config.load.max_gap_s, config.load.lag_s),
     )
 
 
-def _in_test_time(journal: EventLog) -> EventSink:
+def _in_test_time(event_log: EventLog) -> EventSink:
     """Events of a picture have its time, which is data of theirs."""
 
     def record(event: Event) -> None:
-        journal.record(replace(event, t=float(event.data.get("t", 0.0))))
+        event_log.record(replace(event, t=float(event.data.get("t", 0.0))))
 
     return record
 
@@ -136,37 +138,48 @@ def _in_test_time(journal: EventLog) -> EventSink:
 
 
 def _run(
-    material: ReplaySource,
+    source_of_bursts: ReplaySource,
     config: Config,
     request: ReplayRequest,
     screen: Screen,
     stopping: threading.Event,
-    journal: EventLog,
+    event_log: EventLog,
     consumers: Compose,
 ) -> Replayed:
-    ready = prepared(material, config, request.source, screen, stopping.is_set)
+    ready = prepared(source_of_bursts, config, request.source, screen, stopping.is_set)
     stored = StoredResults.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements
-    bursts = _not_empty(stored.bursts() if stored else material.bursts, request.source)
+    bursts = _not_empty(stored.bursts() if stored else source_of_bursts.bursts, request.source)
     folder = make_folder(ready.plan.config.output.dir, datetime.datetime.now(datetime.UTC))
     config = _settled(with_mask(ready.plan.config, ready.plan.mask, folder), request.settled)
-    books = RunState(
-        journal, FrameCounts(), material.loads, History(config.specimen.axis), specimen=config.specimen
+    run_state = RunState(
+        event_log,
+        FrameCounts(),
+        source_of_bursts.loads,
+        History(config.specimen.axis),
+        specimen=config.specimen,
     )
     write_names(request.source, folder / "pictures.csv")
     screen.say(f"replaying {request.source} into {request.settled or folder}")
     about = RunInfo(
-        config, folder, material.camera, ready.plan.grid, material.start, aside=request.settled is not None
+        config,
+        folder,
+        source_of_bursts.camera,
+        ready.plan.grid,
+        source_of_bursts.start,
+        aside=request.settled is not None,
     )
-    outputs = Outputs(consumers(about, books), books.loads, journal, books.history)
+    outputs = Outputs(consumers(about, run_state), run_state.loads, event_log, run_state.history)
     began, work = time.perf_counter(), ahead(bursts)
     try:
-        _give_past(material, outputs)
-        for m in measured(work, material.loads, books.journal):
-            books.ledger.add(measured=m.burst.n, grabbed=m.burst.n, lost=m.burst.lost)
+        _give_past(source_of_bursts, outputs)
+        for m in measured(work, source_of_bursts.loads, run_state.event_log):
+            run_state.frame_counts.add(measured=m.burst.n, grabbed=m.burst.n, lost=m.burst.lost)
             if outputs.wants_frames:
                 outputs.frame(picture_of(m.burst))
-            screen.progress(outputs.add(m), m.number + 1, material.expected, time.perf_counter() - began)
+            screen.progress(
+                outputs.add(m), m.number + 1, source_of_bursts.expected, time.perf_counter() - began
+            )
             del m  # its pictures are not kept while the next burst is measured
             if stopping.is_set():
                 break
@@ -174,12 +187,12 @@ def _run(
     finally:
         work.close()
         outputs.end()
-    pace = f"joined of {len(request.parts)} chunks" if request.parts else pace_line(books.history, took)
-    lines = [*_account(material, books), pace]
-    left_out = material.seen.left_out if material.seen else 0
-    lossy = outputs.failed or not books.history.told_something or left_out > 0
+    pace = f"joined of {len(request.parts)} chunks" if request.parts else pace_line(run_state.history, took)
+    lines = [*_account(source_of_bursts, run_state), pace]
+    left_out = source_of_bursts.seen.left_out if source_of_bursts.seen else 0
+    lossy = outputs.failed or not run_state.history.told_something or left_out > 0
     code = 130 if stopping.is_set() else 5 if lossy else 0
-    return Replayed(folder, books, config, code, tuple(lines), left_out)
+    return Replayed(folder, run_state, config, code, tuple(lines), left_out)
 
 
 def _settled(config: Config, folder: Path | None) -> Config:
@@ -194,14 +207,14 @@ def _settled(config: Config, folder: Path | None) -> Config:
     )
 
 
-def _account(material: ReplaySource, books: RunState) -> list[str]:
+def _account(source_of_bursts: ReplaySource, run_state: RunState) -> list[str]:
     """The fate of every picture, and why some were left out."""
-    seen = material.seen
+    seen = source_of_bursts.seen
     if seen is None or not seen.left_out:
         return []
-    why = [event.text for event in books.journal.events("warning") if event.kind is EventKind.DEVICE]
+    why = [event.text for event in run_state.event_log.events("warning") if event.kind is EventKind.DEVICE]
     more = [f"... and {len(why) - _MOST_TOLD} more; the log (-v) has all"] if len(why) > _MOST_TOLD else []
-    measured = books.ledger.measured
+    measured = run_state.frame_counts.measured
     words = (
         f"{seen.pictures} pictures: reference {seen.reference}, measured {measured}, left out {seen.left_out}"
     )
@@ -212,7 +225,7 @@ def _account(material: ReplaySource, books: RunState) -> list[str]:
 
 def pace_line(history: History, seconds: float) -> str:
     """How fast it went, and how much of the time the kernel took."""
-    n, zois = len(history.instants), history.column("n_zoi").sum()
+    n, zois = len(history.time_steps), history.column("n_zoi").sum()
     share = history.column("measure_s").sum() / seconds
     return (
         f"{n} bursts in {seconds:.3g} s: {n / seconds:.3g} bursts/s, {zois / seconds:,.0f} ZOI/s, of that time"
@@ -238,10 +251,10 @@ def _after(first: list[Work], rest: Iterator[Work]) -> Iterator[Work]:
     yield from rest
 
 
-def _give_past(material: ReplaySource, outputs: Outputs) -> None:
+def _give_past(source_of_bursts: ReplaySource, outputs: Outputs) -> None:
     """What was recorded beside the pictures: events and loads."""
-    for event in material.events:
+    for event in source_of_bursts.events:
         if event.kind is not EventKind.MEASURED:
             outputs.event(event)
-    for sample in material.samples:
+    for sample in source_of_bursts.samples:
         outputs.load(sample)

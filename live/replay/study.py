@@ -56,7 +56,7 @@ NEVER: Seconds = (math.inf, -math.inf)
 """The still window of a test in which nothing was still."""
 
 
-def take_windows(material: ReplaySource, still: Seconds | None, loaded: Seconds | None) -> Windows:
+def take_windows(source_of_bursts: ReplaySource, still: Seconds | None, loaded: Seconds | None) -> Windows:
     """Read the bursts of both windows, s since the start; without one, as the force tells it; ``NEVER`` for none.
 
     Raises
@@ -64,12 +64,12 @@ def take_windows(material: ReplaySource, still: Seconds | None, loaded: Seconds 
     DataError
         There are not enough bursts in one, or no force tells it.
     """
-    told = (still or still_window(material), loaded or _loaded(material))
+    told = (still or still_window(source_of_bursts), loaded or _loaded(source_of_bursts))
     found: tuple[list[Burst], list[Burst]] = ([], [])
-    for item in material.bursts:
+    for item in source_of_bursts.bursts:
         if not isinstance(item, Burst):
             raise DataError("the reference was renewed in this session; a study needs one without")
-        t = item.t - material.start.monotonic
+        t = item.t - source_of_bursts.start.monotonic
         for (low, high), bursts in zip(told, found, strict=True):
             if low <= t <= high:
                 bursts.append(item)
@@ -89,14 +89,14 @@ def _untold(option: str) -> DataError:
     return DataError(f"no force tells when it was still and when loaded; give --{option} A,B in seconds")
 
 
-def _forces(material: ReplaySource, option: str) -> tuple[np.ndarray, np.ndarray]:
-    t, force = material.loads.arrays()
+def _forces(source_of_bursts: ReplaySource, option: str) -> tuple[np.ndarray, np.ndarray]:
+    t, force = source_of_bursts.loads.arrays()
     if not len(t) or not np.isfinite(force).any():
         raise _untold(option)
-    return t - material.start.monotonic, force
+    return t - source_of_bursts.start.monotonic, force
 
 
-def still_window(material: ReplaySource) -> Seconds:
+def still_window(source_of_bursts: ReplaySource) -> Seconds:
     """The still phase by the force at the bursts, as report and batch find it once they are measured.
 
     Raises
@@ -104,16 +104,16 @@ def still_window(material: ReplaySource) -> Seconds:
     DataError
         No force tells it.
     """
-    times = np.zeros(0) if material.times is None else material.times
-    count = still_phase(material.loads.forces_one_zero(times.tolist()))
+    times = np.zeros(0) if source_of_bursts.times is None else source_of_bursts.times
+    count = still_phase(source_of_bursts.loads.forces_one_zero(times.tolist()))
     if not count:
         raise _untold("static")
-    return -math.inf, float(times[count - 1]) - material.start.monotonic
+    return -math.inf, float(times[count - 1]) - source_of_bursts.start.monotonic
 
 
-def _loaded(material: ReplaySource) -> Seconds:
+def _loaded(source_of_bursts: ReplaySource) -> Seconds:
     """About the highest force, for as long as it stays near it."""
-    t, force = _forces(material, "loaded")
+    t, force = _forces(source_of_bursts, "loaded")
     high = np.abs(force) >= _LOADED_FORCE * np.nanmax(np.abs(force))
     top = low = int(np.nanargmax(np.abs(force)))
     while low > 0 and high[low - 1]:
@@ -196,7 +196,7 @@ class Advice:
 
 
 def study(
-    material: ReplaySource, windows: Windows, config: Config, settings: Sequence[StudySetting]
+    source_of_bursts: ReplaySource, windows: Windows, config: Config, settings: Sequence[StudySetting]
 ) -> Iterator[StudyResult]:
     """Measure both windows with one setting after the other.
 
@@ -208,15 +208,15 @@ def study(
     for setting in settings:
         measure = dataclasses.replace(config.measure, **dataclasses.asdict(setting))
         one = dataclasses.replace(config, measure=measure, gauges={})  # none is read
-        yield _found(setting, one.specimen.axis, *_fields(material, windows, one))
+        yield _found(setting, one.specimen.axis, *_fields(source_of_bursts, windows, one))
 
 
 def _fields(
-    material: ReplaySource, windows: Windows, config: Config
+    source_of_bursts: ReplaySource, windows: Windows, config: Config
 ) -> tuple[list[StrainField], list[StrainField]]:
-    camera = material.camera
+    camera = source_of_bursts.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
-    ready = MeasurePlan.of(config, camera, mask).on(material.reference)
+    ready = MeasurePlan.of(config, camera, mask).on(source_of_bursts.reference)
 
     def measured(bursts: Sequence[Burst]) -> list[StrainField]:
         start, found = None, []

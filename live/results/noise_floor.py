@@ -24,12 +24,12 @@ class StillPhase:
 
     Attributes
     ----------
-    instants : int
+    time_steps : int
     floors : mapping of str to NoiseFloor
         Of u, v (px), exx, eyy and exy; empty where the instants are too few, without those that too few ZOIs have.
     """
 
-    instants: int
+    time_steps: int
     floors: dict[str, NoiseFloor]
 
 

@@ -82,36 +82,36 @@ def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any
 def _values(
     measurement: Measurement, maps: dict[str, NDArray[Any]], info: RowInfo, axis: str
 ) -> dict[str, float | int]:
-    burst, instant = measurement.burst, measurement.instant
+    burst, time_step = measurement.burst, measurement.time_step
     values: dict[str, float | int] = {
         "frame": burst.first_index,
         "time_s": burst.t - info.start_monotonic,
-        "force_N": instant.force,
+        "force_N": time_step.force,
     }
-    values |= {name: _mean(name, getattr(instant, name), maps, info.strain_measure) for name in STRAINS}
-    values |= {f"sigma_{name}": getattr(instant, f"sigma_{name}") for name in STRAINS}
+    values |= {name: _mean(name, getattr(time_step, name), maps, info.strain_measure) for name in STRAINS}
+    values |= {f"sigma_{name}": getattr(time_step, f"sigma_{name}") for name in STRAINS}
     values |= {
-        "n_valid": instant.n_valid,
-        "n_zoi": instant.n_zoi,
+        "n_valid": time_step.n_valid,
+        "n_zoi": time_step.n_zoi,
         "noise_GL": burst.noise,
         "n_frames": burst.n,
         "last_frame": burst.last_index,
         "lost": burst.lost,
         "duration_s": burst.duration,
-        "u_px": instant.u,
-        "v_px": instant.v,
-        "latency_s": instant.latency_s,
-        "kernel_s": instant.measure_s or math.nan,
-        "zero_N": instant.zero,
+        "u_px": time_step.u,
+        "v_px": time_step.v,
+        "latency_s": time_step.latency_s,
+        "kernel_s": time_step.measure_s or math.nan,
+        "zero_N": time_step.zero,
     }
-    for name, gauge in instant.gauges.items():
+    for name, gauge in time_step.gauges.items():
         values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma), strict=True))
     if info.area_m2 is not None:
-        values["stress_Pa"] = stress = instant.force / info.area_m2
+        values["stress_Pa"] = stress = time_step.force / info.area_m2
         stretch = _stretch(measurement, values, info.strain_measure, axis)
         values |= {"true_strain": math.log(stretch), "true_stress_Pa": stress * stretch}
     if info.lagged:
-        values["force_raw_N"] = instant.force_raw
+        values["force_raw_N"] = time_step.force_raw
     return values
 
 
@@ -119,7 +119,7 @@ def _stretch(
     measurement: Measurement, values: Mapping[str, float], measure: StrainMeasure, axis: str
 ) -> float:
     """Length over first length along the load: of the gauge ``axial``, or else of the mean strain."""
-    gauges = measurement.instant.gauges
+    gauges = measurement.time_step.gauges
     name, _ = strains_along(gauges, axis)
     stretch = 1 + gauges[name].value if name == AXIAL else _stretched(values[name], measure)
     return stretch if stretch > 0 else math.nan

@@ -42,35 +42,36 @@ def latency_lines(history: History) -> list[str]:
     return [f"{words}, largest {np.nanmax(late):.0f} ms; the kernel took {kernel:.1f} ms"]
 
 
-def why_nothing(books: RunState) -> str:
+def why_nothing(run_state: RunState) -> str:
     """Why no ZOI has a value, in a sentence."""
-    instants, troubles = books.history.instants, books.journal.events("warning", "error")
-    if instants:
-        return f"nothing was measured: no ZOI has a value ({instants[-1].refused or 'none was asked for'})"
+    time_steps, troubles = run_state.history.time_steps, run_state.event_log.events("warning", "error")
+    if time_steps:
+        return f"nothing was measured: no ZOI has a value ({time_steps[-1].refused or 'none was asked for'})"
     if troubles:
         return f"nothing was measured: {brief(troubles[-1].text)}"
-    return f"nothing was measured: {books.ledger.grabbed} frames gave no burst after the reference; take shorter ones"
+    grabbed = run_state.frame_counts.grabbed
+    return f"nothing was measured: {grabbed} frames gave no burst after the reference; take shorter ones"
 
 
-def summary_lines(books: RunState, specimen: SpecimenConfig) -> list[str]:
+def summary_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     """The summary, a line each."""
-    history = books.history
+    history = run_state.history
     valid = np.flatnonzero(history.column("n_valid"))
     if not valid.size:
-        return [why_nothing(books)]
-    last, strains = history.instants[int(valid[-1])], history.column("largest")[valid]
+        return [why_nothing(run_state)]
+    last, strains = history.time_steps[int(valid[-1])], history.column("largest")[valid]
     largest = strains[np.argmax(np.abs(strains))]
     refused = f" ({last.refused})" if last.refused else ""
     lines = [
-        f"measured {len(history.instants)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
+        f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
         f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} um/m;"
         f" largest of any ZOI {largest * 1e6:+.0f} um/m",
         noise_line(history),
     ]
     lines += latency_lines(history)
-    figures = figure_lines(evaluate(history, books.loads, specimen), specimen)
+    figures = figure_lines(evaluate(history, run_state.loads, specimen), specimen)
     if figures:
-        figures += tare_line(history, books.loads) + lag_line(history, books.loads, specimen)
+        figures += tare_line(history, run_state.loads) + lag_line(history, run_state.loads, specimen)
     return lines + figures + alignment_line(history, specimen)
 
 
@@ -105,7 +106,7 @@ class StatusCard:
         return "\n\n".join(self._lines(snapshot, history))
 
     def _lines(self, snapshot: Snapshot, history: History) -> list[str]:
-        i, frames, lost = history.instants[-1], snapshot.frames, snapshot.lost
+        i, frames, lost = history.time_steps[-1], snapshot.frames, snapshot.lost
         lines = [
             f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
             f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, mean **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",

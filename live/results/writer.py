@@ -75,7 +75,7 @@ class Results(Closing):
             The file cannot be written (a full disk); what was written before stays readable.
             Stop adding then.
         """
-        row = StrainRow.of(measurement, self._info, self._axis.add(measurement.instant))
+        row = StrainRow.of(measurement, self._info, self._axis.add(measurement.time_step))
         self._h5.write(row)
         self._csv.write(row)
         self.written += 1
@@ -132,7 +132,7 @@ class Files(Consumer):
         return ""
 
 
-def write_results(about: RunInfo, books: RunState) -> Sequence[Consumer]:
+def write_results(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
     """The results alone.
 
     Raises

@@ -21,14 +21,14 @@ class BurstQueue:
     Parameters
     ----------
     grabber : Grabber
-    ledger : FrameCounts
+    frame_counts : FrameCounts
         Told of every burst that is not measured.
     idle : callable
         Called with a few words whenever nothing has come for a while, and after each burst with "".
     """
 
-    def __init__(self, grabber: Grabber, ledger: FrameCounts, idle: Callable[[str], None]) -> None:
-        self._grabber, self._ledger, self._idle = grabber, ledger, idle
+    def __init__(self, grabber: Grabber, frame_counts: FrameCounts, idle: Callable[[str], None]) -> None:
+        self._grabber, self._frame_counts, self._idle = grabber, frame_counts, idle
         self._held: Burst | None = None
         self._reference_end = self._lost = 0
         self.paused = False
@@ -108,7 +108,7 @@ class BurstQueue:
             self._skip(burst)
 
     def _skip(self, burst: Burst) -> None:
-        self._ledger.add(skipped=burst.n)
+        self._frame_counts.add(skipped=burst.n)
         if burst.first_index > self._reference_end:
             self._lost += burst.lost
 

@@ -67,7 +67,7 @@ class Grabber:
     camera : Camera
         Entered before ``start``.
     plan : GrabPlan
-    books : RunState
+    run_state : RunState
     on_frame, on_burst : callable
         Told of every frame, and of every burst; they must not wait.
 
@@ -84,11 +84,15 @@ class Grabber:
         self,
         camera: Camera,
         plan: GrabPlan,
-        books: RunState,
+        run_state: RunState,
         on_frame: Callable[[Frame], None] = lambda frame: None,
         on_burst: Callable[[Burst], None] = lambda burst: None,
     ) -> None:
-        self._camera, self._journal, self._ledger = camera, books.journal, books.ledger
+        self._camera, self._event_log, self._frame_counts = (
+            camera,
+            run_state.event_log,
+            run_state.frame_counts,
+        )
         self._plan, self._on_frame, self._on_burst = plan, on_frame, on_burst
         self.references: queue.SimpleQueue[ReferenceBurst] = queue.SimpleQueue()
         self.bursts: LatestQueue[Burst] = LatestQueue(
@@ -139,15 +143,15 @@ class Grabber:
             log.exception("the grab thread failed")
             self._ended_by(error, f"a defect in the grab thread: {error!r}")
         finally:
-            self._ledger.add(left_out=self._fed)
+            self._frame_counts.add(left_out=self._fed)
             self.bursts.close()
 
     def _ended_by(self, error: Exception, text: str) -> None:
         self.error = error
-        self._journal.tell(EventKind.DEVICE, self._camera.info.address, text, "error")
+        self._event_log.tell(EventKind.DEVICE, self._camera.info.address, text, "error")
 
     def _take(self, frame: Frame) -> None:
-        self._ledger.add(grabbed=1, lost=frame.lost_before)
+        self._frame_counts.add(grabbed=1, lost=frame.lost_before)
         if frame.lost_before:
             self._tell_loss(frame)
         self._rate(frame)
@@ -170,7 +174,7 @@ class Grabber:
             return
         text = f"{self._unsaid} frames were lost, the last before frame {frame.index}"
         data = {"count": self._unsaid, "before": frame.index}
-        self._journal.tell(EventKind.LOST, self._camera.info.address, text, "warning", data)
+        self._event_log.tell(EventKind.LOST, self._camera.info.address, text, "warning", data)
         self._unsaid = 0
 
     def _feed_reference(self, taker: ReferenceTaker, frame: Frame) -> None:
@@ -179,12 +183,12 @@ class Grabber:
             return
         self._used(reference.burst.n)
         self._on_burst(reference.burst)
-        self._ledger.add(reference=reference.burst.n)
+        self._frame_counts.add(reference=reference.burst.n)
         self._taker, self._accumulator = None, BurstAccumulator(self._plan.burst)
         self.references.put(reference)
 
     def _used(self, n: int) -> None:
-        self._ledger.add(left_out=self._fed - n)
+        self._frame_counts.add(left_out=self._fed - n)
         self._fed = 0
 
     def _rate(self, frame: Frame) -> None:

@@ -50,8 +50,8 @@ class LiveRun:
 
     Parameters
     ----------
-    setting : PreparedRun
-    books : RunState
+    prepared : PreparedRun
+    run_state : RunState
     outputs : Outputs
     recording : PreTriggerBuffer or None
         None: nothing is recorded.
@@ -61,34 +61,34 @@ class LiveRun:
 
     def __init__(
         self,
-        setting: PreparedRun,
-        books: RunState,
+        prepared: PreparedRun,
+        run_state: RunState,
         outputs: Outputs,
         recording: PreTriggerBuffer | None,
         screen: Screen,
         stop: StopSignal,
     ) -> None:
-        self._setting, self._books, self._outputs = setting, books, outputs
+        self._prepared, self._run_state, self._outputs = prepared, run_state, outputs
         self._recording, self._screen, self._stop = recording, screen, stop
-        self._rig = setting.rig
-        seconds = setting.config.output.seconds
+        self._rig = prepared.rig
+        seconds = prepared.config.output.seconds
         self._deadline = math.inf if seconds is None else time.monotonic() + seconds + _GRACE_S
-        plan = GrabPlan.of(setting.config, setting.bursts)
-        self.grabber = Grabber(self._rig.camera, plan, books, self._take, self._averaged)
-        books.vitals.began_t, self._hinted = time.monotonic(), False
+        plan = GrabPlan.of(prepared.config, prepared.bursts)
+        self.grabber = Grabber(self._rig.camera, plan, run_state, self._take, self._averaged)
+        run_state.health.began_t, self._hinted = time.monotonic(), False
         self._has_recorded = self.recording
-        self._feed = BurstQueue(self.grabber, books.ledger, self._idle)
-        self._load = LoadThread(self._rig.load, books, outputs, recording)
-        self._tares = tare_orders(self._rig.load, books)
-        pace = LatencyMonitor(lambda: recording.backlog if recording else 0.0)
-        self._measuring = Measuring(setting, books, outputs, self._feed, pace, self._show)
+        self._burst_queue = BurstQueue(self.grabber, run_state.frame_counts, self._idle)
+        self._load = LoadThread(self._rig.load, run_state, outputs, recording)
+        self._tares = tare_orders(self._rig.load, run_state)
+        latency = LatencyMonitor(lambda: recording.backlog if recording else 0.0)
+        self._measuring = Measuring(prepared, run_state, outputs, self._burst_queue, latency, self._show)
 
     # -- what may be called from other threads ------------------------------------------------
 
     @property
     def paused(self) -> bool:
         """Whether measuring is paused."""
-        return self._feed.paused
+        return self._burst_queue.paused
 
     @property
     def recording(self) -> bool:
@@ -96,14 +96,14 @@ class LiveRun:
         return self._recording is not None and self._recording.on
 
     @property
-    def books(self) -> RunState:
+    def run_state(self) -> RunState:
         """What is kept of the test so far."""
-        return self._books
+        return self._run_state
 
     @property
     def folder(self) -> Path:
         """Of the files."""
-        return self._setting.folder
+        return self._prepared.folder
 
     def stop(self, reason: str) -> None:
         """End the run cleanly, soon."""
@@ -131,20 +131,20 @@ class LiveRun:
         return ""
 
     def _pause(self, wanted: bool) -> None:
-        if wanted is self._feed.paused:
+        if wanted is self._burst_queue.paused:
             raise ControlRefused("measuring is paused already" if wanted else "measuring is not paused")
         kind = EventKind.PAUSE if wanted else EventKind.RESUME
         self._told(kind, "measuring is paused" if wanted else "measuring goes on")
-        self._feed.paused = wanted
+        self._burst_queue.paused = wanted
 
     def _silence(self) -> None:
-        names = self._books.alarms.silence()
+        names = self._run_state.alarms.silence()
         if not names:
             raise ControlRefused("no alarm is on")
         self._told(EventKind.ALARM, f"silenced: {', '.join(names)}")
 
     def _told(self, kind: EventKind, text: str) -> None:
-        self._books.journal.tell(kind, "operator", text)
+        self._run_state.event_log.tell(kind, "operator", text)
 
     # -- the run ------------------------------------------------------------------------------
 
@@ -154,8 +154,8 @@ class LiveRun:
             stack.enter_context(self._rig.load)
             self._stop.then(self._rig.camera.stop)
             waits = "" if self.recording or self._recording is None else _ARMED
-            self._books.vitals.state = self.state
-            self._books.journal.tell(EventKind.START, "phasedic", f"the test begins{waits}")
+            self._run_state.health.state = self.state
+            self._run_state.event_log.tell(EventKind.START, "phasedic", f"the test begins{waits}")
             self._load.start()
             self.grabber.start()
             stack.pop_all()
@@ -175,9 +175,9 @@ class LiveRun:
         self._rig.load.stop()
         self.grabber.bursts.close()
         self.grabber.join()
-        self._feed.count_skipped()
+        self._burst_queue.count_skipped()
         self._load.join()
-        self._books.loads.close()
+        self._run_state.loads.close()
         self._rig.load.close()
         self._rig.camera.close()
 
@@ -191,14 +191,14 @@ class LiveRun:
             return failure
         if self._stop.reason == INTERRUPTED:
             return 130
-        ledger = self._books.ledger
+        frame_counts = self._run_state.frame_counts
         unwritten = self._recording is not None and self._recording.failed is not None
-        lossy = ledger.loss or self._outputs.failed or unwritten
-        return 5 if lossy or not ledger.adds_up or not self._books.history.told_something else 0
+        lossy = frame_counts.loss or self._outputs.failed or unwritten
+        return 5 if lossy or not frame_counts.adds_up or not self._run_state.history.told_something else 0
 
     def _take(self, frame: Frame) -> None:
-        vitals = self._books.vitals
-        vitals.frame_t, vitals.fps = time.monotonic(), self.grabber.fps
+        health = self._run_state.health
+        health.frame_t, health.fps = time.monotonic(), self.grabber.fps
         if self._recording is not None:
             self._recording.frame(frame, needed=self.grabber.taking_reference)
         self._outputs.frame(frame)
@@ -210,7 +210,7 @@ class LiveRun:
     def _idle(self, words: str) -> None:
         """Between bursts; a camera that gives nothing must not keep a timed run alive for ever."""
         if words or self.paused:
-            silent = not time.monotonic() - self._books.vitals.frame_t < _SILENT_S
+            silent = not time.monotonic() - self._run_state.health.frame_t < _SILENT_S
             self._show(words if silent or not self._has_measured else "")
         if words == TAKING:
             self._hint_once()
@@ -219,25 +219,25 @@ class LiveRun:
 
     def _hint_once(self) -> None:
         """A reference needs frames in a row: where they are lost again and again, say what helps."""
-        n, ledger = self._setting.bursts[0], self._books.ledger
-        if self._hinted or self._has_measured or not ledger.lost or ledger.grabbed < _HINT_AFTER * n:
+        n, counts = self._prepared.bursts[0], self._run_state.frame_counts
+        if self._hinted or self._has_measured or not counts.lost or counts.grabbed < _HINT_AFTER * n:
             return
         self._hinted = True
         text = (
-            f"no {n} frames in a row for the reference, {ledger.lost} were lost: lower the rate of the camera, or take"
+            f"no {n} frames in a row for the reference, {counts.lost} were lost: lower the rate of the camera, or take"
             " --reference-burst smaller"
         )
-        self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "warning")
+        self._run_state.event_log.tell(EventKind.MEASUREMENT, "reference", text, "warning")
 
     def _show(self, words: str = "") -> None:
         """Renew the status line; called with every measurement."""
-        self._books.vitals.state = self.state
+        self._run_state.health.state = self.state
         if self._screen.is_due:
-            self._screen.snapshot(self._books.snapshot(time.monotonic()), words)
+            self._screen.snapshot(self._run_state.snapshot(time.monotonic()), words)
 
     @property
     def _has_measured(self) -> bool:
-        return bool(self._books.history.instants)
+        return bool(self._run_state.history.time_steps)
 
     @property
     def state(self) -> str:
@@ -257,7 +257,7 @@ def run_live(
     *,
     stop: StopSignal | None = None,
     consumers: Compose = write_results,
-    hands: Callable[[LiveRun], object] = lambda live: None,
+    on_start: Callable[[LiveRun], object] = lambda live: None,
 ) -> Outcome:
     """Run a test from opening the devices to closing the files.
 
@@ -269,7 +269,7 @@ def run_live(
         Ends the test from anywhere, also while the devices are being opened.
     consumers : callable taking RunInfo and RunState
         Makes the consumers of the test; ``live.commands.consumers`` has the standard ones.
-    hands : callable taking the LiveRun
+    on_start : callable taking the LiveRun
         Called once when the test has begun, for a keyboard and the like.
 
     Raises
@@ -279,25 +279,27 @@ def run_live(
     """
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (phasedic devices lists what is there)")
-    stop, books = (
+    stop, run_state = (
         stop or StopSignal(),
         RunState.new(config.load.max_gap_s, config.load.lag_s, config.specimen),
     )
-    books.journal.names |= device_names(config)
+    run_state.event_log.names |= device_names(config)
     screen.say(f"opening {config.camera.address}")
-    rig = open_rig(config.camera.address, config.load.address, books.journal, crop=config.camera.crop)
+    rig = open_rig(config.camera.address, config.load.address, run_state.event_log, crop=config.camera.crop)
     try:
-        setting = set_up(config, rig, books.journal, screen, stop)
-        for line in announcement(rig, setting.folder):
+        prepared = set_up(config, rig, run_state.event_log, screen, stop)
+        for line in announcement(rig, prepared.folder):
             screen.say(line)
         about = RunInfo(
-            setting.config, setting.folder, rig.camera.info, setting.plan.grid, setting.start, stop.ask
+            prepared.config, prepared.folder, rig.camera.info, prepared.plan.grid, prepared.start, stop.ask
         )
-        outputs = Outputs(consumers(about, books), books.loads, books.journal, books.history)
-        code = _with_outputs(setting, books, outputs, screen, stop, hands)
+        outputs = Outputs(
+            consumers(about, run_state), run_state.loads, run_state.event_log, run_state.history
+        )
+        code = _with_outputs(prepared, run_state, outputs, screen, stop, on_start)
     finally:
         rig.close()
-    return Outcome(setting.folder, setting.config, books, outputs, rig, setting.plan.grid, code)
+    return Outcome(prepared.folder, prepared.config, run_state, outputs, rig, prepared.plan.grid, code)
 
 
 def announcement(rig: Rig, folder: Path) -> Iterator[str]:
@@ -317,31 +319,33 @@ def device_names(config: Config) -> dict[str, str]:
 
 
 def _with_outputs(
-    setting: PreparedRun,
-    books: RunState,
+    prepared: PreparedRun,
+    run_state: RunState,
     outputs: Outputs,
     screen: Screen,
     stop: StopSignal,
-    hands: Callable[[LiveRun], object],
+    on_start: Callable[[LiveRun], object],
 ) -> int:
     """The run proper; outputs and recording are closed whatever happens, the recording last."""
     with ExitStack() as closing:
         closing.callback(outputs.end)
-        config = json.dumps(setting.config.as_dict(), indent=1)
-        (setting.folder / "config.json").write_text(config, encoding="utf-8")
-        recording = open_recording(setting, books, screen, stop)
+        config = json.dumps(prepared.config.as_dict(), indent=1)
+        (prepared.folder / "config.json").write_text(config, encoding="utf-8")
+        recording = open_recording(prepared, run_state, screen, stop)
         closing.pop_all()
-        closing.callback(lambda: _close(recording, books, outputs, stop))
-        live = LiveRun(setting, books, outputs, recording, screen, stop)
+        closing.callback(lambda: _close(recording, run_state, outputs, stop))
+        live = LiveRun(prepared, run_state, outputs, recording, screen, stop)
         with live:
-            hands(live)
+            on_start(live)
             live.to_the_end()
     return live.exit_code
 
 
-def _close(recording: PreTriggerBuffer | None, books: RunState, outputs: Outputs, stop: StopSignal) -> None:
+def _close(
+    recording: PreTriggerBuffer | None, run_state: RunState, outputs: Outputs, stop: StopSignal
+) -> None:
     outputs.end()
     reason = stop.reason or "camera ended"
-    books.journal.tell(EventKind.STOP, "phasedic", f"the test ends: {reason}")
+    run_state.event_log.tell(EventKind.STOP, "phasedic", f"the test ends: {reason}")
     if recording is not None:
         recording.close({"stop_reason": reason})

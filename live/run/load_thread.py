@@ -24,7 +24,7 @@ class LoadThread:
     Parameters
     ----------
     cell : LoadCell
-    books : RunState
+    run_state : RunState
     outputs : Outputs
     recording : PreTriggerBuffer or None
 
@@ -35,15 +35,15 @@ class LoadThread:
     """
 
     def __init__(
-        self, cell: LoadCell, books: RunState, outputs: Outputs, recording: PreTriggerBuffer | None
+        self, cell: LoadCell, run_state: RunState, outputs: Outputs, recording: PreTriggerBuffer | None
     ) -> None:
-        self._cell, self._books, self._outputs, self._recording = cell, books, outputs, recording
+        self._cell, self._run_state, self._outputs, self._recording = cell, run_state, outputs, recording
         self.failure = 0
         self._thread = threading.Thread(target=self._work, name="load", daemon=True)
 
     def start(self) -> None:
         """Begin; the load cell must have been entered."""
-        self._books.journal.add_listener(self._books.loads.take_event)
+        self._run_state.event_log.add_listener(self._run_state.loads.take_event)
         self._thread.start()
 
     def join(self) -> None:
@@ -55,9 +55,9 @@ class LoadThread:
         yield_to_others(LOAD)
         try:
             for sample in self._cell:
-                self._books.loads.append(sample)
-                self._books.vitals.loaded(time.monotonic(), sample.force)
-                self._books.ledger.add(load_samples=1)
+                self._run_state.loads.append(sample)
+                self._run_state.health.loaded(time.monotonic(), sample.force)
+                self._run_state.frame_counts.add(load_samples=1)
                 if self._recording is not None:
                     self._recording.sample(sample)
                 self._outputs.load(sample)
@@ -66,15 +66,17 @@ class LoadThread:
                 log.exception("the load thread failed")
             self.failure = getattr(error, "exit_code", 1)
             text = f"the load is lost, images go on: {error}"
-            self._books.journal.tell(EventKind.DEVICE, self._cell.info.address, text, "error")
+            self._run_state.event_log.tell(EventKind.DEVICE, self._cell.info.address, text, "error")
         finally:
-            self._books.loads.close()
+            self._run_state.loads.close()
 
 
-def tare_orders(cell: LoadCell, books: RunState) -> TareControls:
+def tare_orders(cell: LoadCell, run_state: RunState) -> TareControls:
     """What carries out orders to tare ``cell`` in this test."""
 
     def measured() -> bool:
-        return bool(books.history.instants)
+        return bool(run_state.history.time_steps)
 
-    return TareControls(cell, measured, lambda: books.loads.latest, books.journal.tell, time.monotonic)
+    return TareControls(
+        cell, measured, lambda: run_state.loads.latest, run_state.event_log.tell, time.monotonic
+    )

@@ -33,13 +33,13 @@ class ReferenceStep:
 
     Parameters
     ----------
-    setting : PreparedRun
-    books : RunState
-    feed : BurstQueue
+    prepared : PreparedRun
+    run_state : RunState
+    burst_queue : BurstQueue
     """
 
-    def __init__(self, setting: PreparedRun, books: RunState, feed: BurstQueue) -> None:
-        self._setting, self._books, self._feed = setting, books, feed
+    def __init__(self, prepared: PreparedRun, run_state: RunState, burst_queue: BurstQueue) -> None:
+        self._prepared, self._run_state, self._burst_queue = prepared, run_state, burst_queue
 
     def take(self) -> PreparedKernel | None:
         """The kernel on it; None where the run ended before there was a reference.
@@ -51,27 +51,27 @@ class ReferenceStep:
         ConfigError
             The grid does not fit.
         """
-        reference = self._feed.next_reference()
+        reference = self._burst_queue.next_reference()
         if reference is None:
-            text = f"the camera ended before the reference was complete ({self._books.ledger.grabbed} frames)"
-            self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "error")
+            text = f"the camera ended before the reference was complete ({self._run_state.frame_counts.grabbed} frames)"
+            self._run_state.event_log.tell(EventKind.MEASUREMENT, "reference", text, "error")
             return None
-        what = f"the reference from {self._setting.config.camera.address}"
+        what = f"the reference from {self._prepared.config.camera.address}"
         for attempt in itertools.count(1):
-            ready = self._setting.plan.on(reference.burst, what)
+            ready = self._prepared.plan.on(reference.burst, what)
             moved = _moved(ready, reference)
-            if moved <= self._setting.config.measure.reference_shift_px:
+            if moved <= self._prepared.config.measure.reference_shift_px:
                 break
             again = self._another(moved, attempt)
             if again is None and math.isnan(moved):
                 text = "no reference could be measured; keep the specimen still, look at light and focus"
-                self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "error")
+                self._run_state.event_log.tell(EventKind.MEASUREMENT, "reference", text, "error")
                 return None
             if again is None:
                 text = f"the reference moved by {moved:.3f} px; keep the specimen still when strains must be absolute"
-                self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "warning")
+                self._run_state.event_log.tell(EventKind.MEASUREMENT, "reference", text, "warning")
                 break
-            self._books.ledger.add(reference=-reference.burst.n, left_out=reference.burst.n)
+            self._run_state.frame_counts.add(reference=-reference.burst.n, left_out=reference.burst.n)
             reference = again
         self._tell(reference.burst, moved)
         return ready
@@ -87,14 +87,16 @@ class ReferenceStep:
         if math.isnan(moved):
             what = "the reference burst cannot be measured (fast motion, glare, no focus?)"
         if attempt < TRIES:
-            self._books.journal.tell(EventKind.MEASUREMENT, "reference", f"{what}; taking another", "warning")
+            self._run_state.event_log.tell(
+                EventKind.MEASUREMENT, "reference", f"{what}; taking another", "warning"
+            )
         elif attempt == TRIES:
             text = f"{what}; tried again until the picture is still"
-            self._books.journal.tell(EventKind.MEASUREMENT, "reference", text, "error")
-        return self._feed.another_reference()
+            self._run_state.event_log.tell(EventKind.MEASUREMENT, "reference", text, "error")
+        return self._burst_queue.another_reference()
 
     def _tell(self, burst: Burst, moved: float) -> None:
-        force, n = self._books.loads.mean(burst.t - burst.duration / 2, burst.t + burst.duration / 2)
+        force, n = self._run_state.loads.mean(burst.t - burst.duration / 2, burst.t + burst.duration / 2)
         data = {
             "first": burst.first_index,
             "last": burst.last_index,
@@ -105,7 +107,9 @@ class ReferenceStep:
         }
         noise = f", noise of one {burst.noise:.2f} GL, motion {moved:.4f} px" if burst.n > 1 else ""
         text = f"reference: {burst.n} frames{noise}" + (f", force {force:.2f} N" if n else "")
-        self._books.journal.record(Event(burst.t, EventKind.REFERENCE, "measurement", text, "info", data))
+        self._run_state.event_log.record(
+            Event(burst.t, EventKind.REFERENCE, "measurement", text, "info", data)
+        )
 
 
 def _moved(ready: PreparedKernel, reference: ReferenceBurst) -> float:
@@ -127,11 +131,11 @@ class Measuring:
 
     Parameters
     ----------
-    setting : PreparedRun
-    books : RunState
+    prepared : PreparedRun
+    run_state : RunState
     outputs : Outputs
-    feed : BurstQueue
-    pace : LatencyMonitor
+    burst_queue : BurstQueue
+    latency : LatencyMonitor
     show : callable
         Called after every measurement.
 
@@ -143,15 +147,20 @@ class Measuring:
 
     def __init__(
         self,
-        setting: PreparedRun,
-        books: RunState,
+        prepared: PreparedRun,
+        run_state: RunState,
         outputs: Outputs,
-        feed: BurstQueue,
-        pace: LatencyMonitor,
+        burst_queue: BurstQueue,
+        latency: LatencyMonitor,
         show: Callable[[], None],
     ) -> None:
-        self._setting, self._books, self._outputs, self._feed = setting, books, outputs, feed
-        self._pace, self._show = pace, show
+        self._prepared, self._run_state, self._outputs, self._burst_queue = (
+            prepared,
+            run_state,
+            outputs,
+            burst_queue,
+        )
+        self._latency, self._show = latency, show
         self.failure = 0
         self._refused: PhasedicError | None = None
         self._thread = threading.Thread(target=self._work, name="measure", daemon=True)
@@ -172,9 +181,9 @@ class Measuring:
     def _work(self) -> None:
         yield_to_others(MEASURE)
         try:
-            ready = ReferenceStep(self._setting, self._books, self._feed).take()
+            ready = ReferenceStep(self._prepared, self._run_state, self._burst_queue).take()
             if ready is None:
-                self._feed.let_pass()
+                self._burst_queue.let_pass()
             else:
                 self._measure(ready)
         except PhasedicError as error:
@@ -183,15 +192,15 @@ class Measuring:
             log.exception("the measurement failed")
             self.failure = 1
             text = f"measuring has stopped by a defect, recording goes on: {error!r}"
-            self._books.journal.tell(EventKind.MEASUREMENT, "measurement", text, "error")
-            self._feed.let_pass()
+            self._run_state.event_log.tell(EventKind.MEASUREMENT, "measurement", text, "error")
+            self._burst_queue.let_pass()
 
     def _measure(self, ready: PreparedKernel) -> None:
-        journal = self._books.journal
-        guard = SmearGuard(journal.record)
-        for m in ready.measurements(self._feed.bursts(), self._books.loads, journal.record):
-            self._books.ledger.add(measured=m.burst.n)
-            journal.record(_measured(m.burst))
+        event_log = self._run_state.event_log
+        guard = SmearGuard(event_log.record)
+        for m in ready.measurements(self._burst_queue.bursts(), self._run_state.loads, event_log.record):
+            self._run_state.frame_counts.add(measured=m.burst.n)
+            event_log.record(_measured(m.burst))
             m = self._timed(m)
             self._outputs.add(m)
             self._show()
@@ -205,14 +214,14 @@ class Measuring:
         return m.with_latency(time.monotonic() - (m.t + m.burst.duration / 2))
 
     def _keep_pace(self, m: Measurement) -> None:
-        if math.isnan(m.instant.latency_s):
+        if math.isnan(m.time_step.latency_s):
             return
-        lag = LatencySample(m.t, m.instant.latency_s, m.instant.measure_s)
-        warning = self._pace.look(lag, m.burst.n / max(self._feed.fps, 1e-3))
-        self._books.vitals.latency_p95_s = self._pace.p95_s
+        lag = LatencySample(m.t, m.time_step.latency_s, m.time_step.measure_s)
+        warning = self._latency.look(lag, m.burst.n / max(self._burst_queue.fps, 1e-3))
+        self._run_state.health.latency_p95_s = self._latency.p95_s
         if warning:
             event = Event(m.t, EventKind.MEASUREMENT, "measurement", warning, "warning")
-            self._books.journal.record(event)
+            self._run_state.event_log.record(event)
 
 
 def _measured(burst: Burst) -> Event:

@@ -30,7 +30,7 @@ class Outcome:
     folder : Path
     config : Config
         As it was in force.
-    books : RunState
+    run_state : RunState
         Events, ledger, loads, and the means of every measured instant.
     outputs : Outputs
     rig : Rig
@@ -41,7 +41,7 @@ class Outcome:
 
     folder: Path
     config: Config
-    books: RunState
+    run_state: RunState
     outputs: Outputs
     rig: Rig
     grid: ZoiGrid

@@ -39,7 +39,7 @@ class Recorded(Protocol):
 
     def event(self, event: Event) -> None: ...
 
-    def close(self, ledger: dict[str, Any]) -> None: ...
+    def close(self, frame_counts: dict[str, Any]) -> None: ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,9 +75,20 @@ class PreTriggerBuffer:
     """
 
     def __init__(
-        self, recorder: Recorded, ledger: FrameCounts, journal: EventLog, keep: PreTrigger, *, on: bool = True
+        self,
+        recorder: Recorded,
+        frame_counts: FrameCounts,
+        event_log: EventLog,
+        keep: PreTrigger,
+        *,
+        on: bool = True,
     ) -> None:
-        self._recorder, self._ledger, self._journal, self._keep = recorder, ledger, journal, keep
+        self._recorder, self._frame_counts, self._event_log, self._keep = (
+            recorder,
+            frame_counts,
+            event_log,
+            keep,
+        )
         self.on = on
         self._kept: deque[tuple[float, int, Item]] = deque()
         self._bytes = 0
@@ -136,12 +147,12 @@ class PreTriggerBuffer:
             raise ControlRefused("recording already" if self.on else "not recording")
         return self._open("ordered") if what == START else self._shut()
 
-    def close(self, ledger: dict[str, Any]) -> None:
+    def close(self, frame_counts: dict[str, Any]) -> None:
         """Let go what is kept, and close the recording."""
         with self._lock:
             self._let_go()
         # Without the lock: what is still to be written may be told of.
-        self._recorder.close(ledger)
+        self._recorder.close(frame_counts)
 
     def _open(self, why: str) -> str:
         with self._lock:
@@ -154,13 +165,13 @@ class PreTriggerBuffer:
             for _, _, item in kept:
                 self._pass(item)
         text = f"recording begins ({why}), with {len(pictures)} {'bursts' if self._keep.bursts else 'frames'} before"
-        self._journal.tell(EventKind.RECORD, "operator", text, data={"on": True, "before": len(pictures)})
+        self._event_log.tell(EventKind.RECORD, "operator", text, data={"on": True, "before": len(pictures)})
         return f"with {len(pictures)} before"
 
     def _shut(self) -> str:
         with self._lock:
             self.on = False
-        self._journal.tell(
+        self._event_log.tell(
             EventKind.RECORD, "operator", "recording ends, measuring goes on", data={"on": False}
         )
         return ""
@@ -206,7 +217,7 @@ class PreTriggerBuffer:
         _, size, item = self._kept.popleft()
         self._bytes -= size
         if isinstance(item, Frame):
-            self._ledger.add(thinned=1)
+            self._frame_counts.add(thinned=1)
 
     def _let_go(self) -> None:
         while self._kept:

@@ -54,7 +54,7 @@ class PreparedRun:
         return self.plan.config
 
 
-def set_up(config: Config, rig: Rig, journal: EventLog, screen: Screen, stop: StopSignal) -> PreparedRun:
+def set_up(config: Config, rig: Rig, event_log: EventLog, screen: Screen, stop: StopSignal) -> PreparedRun:
     """Lay the grid, run everything once, and make the folder.
 
     Raises
@@ -74,7 +74,7 @@ def set_up(config: Config, rig: Rig, journal: EventLog, screen: Screen, stop: St
     rehearse(camera, plan.grid, plan.settings, bursts)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
     in_force = with_flat_field(with_mask(config, plan.mask, folder), folder)
-    return PreparedRun(rig, replace(plan, config=in_force), bursts, folder, _time_zero(rig, journal))
+    return PreparedRun(rig, replace(plan, config=in_force), bursts, folder, _time_zero(rig, event_log))
 
 
 def _mask(config: Config, rig: Rig) -> NDArray[np.bool_] | None:
@@ -93,10 +93,10 @@ def _burst_lengths(config: Config, live: bool) -> tuple[int, int]:
     return reference, m.burst or (DEFAULT_BURST if live else 1)
 
 
-def _time_zero(rig: Rig, journal: EventLog) -> ClockPair:
+def _time_zero(rig: Rig, event_log: EventLog) -> ClockPair:
     """Now; pictures with nominal times begin at 0 whatever the clock says."""
     now = ClockPair.now()
     if rig.camera.info.clock != "nominal":
         return now
-    journal.origin = now.monotonic
+    event_log.origin = now.monotonic
     return ClockPair(0.0, now.utc)

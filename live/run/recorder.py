@@ -43,7 +43,7 @@ Item = Frame | Burst | LoadSample | Event
 
 
 def open_recording(
-    setting: PreparedRun, books: RunState, screen: Screen, stop: StopSignal
+    prepared: PreparedRun, run_state: RunState, screen: Screen, stop: StopSignal
 ) -> PreTriggerBuffer | None:
     """The recording that the configuration asks for, in the folder of the run; None where it asks for none.
 
@@ -52,37 +52,39 @@ def open_recording(
     DataError
         The file exists, or cannot be made.
     """
-    record, camera = setting.config.record, setting.rig.camera.info
+    record, camera = prepared.config.record, prepared.rig.camera.info
     if not record.enabled:
         return None
-    path, mode = setting.folder / "session.h5", RecordMode.parse(record.mode)
-    writer = _open_writer(path, setting, mode)
-    books.vitals.disk_s = _tell_room(path, camera, mode, screen)
+    path, mode = prepared.folder / "session.h5", RecordMode.parse(record.mode)
+    writer = _open_writer(path, prepared, mode)
+    run_state.health.disk_s = _tell_room(path, camera, mode, screen)
     recorder = Recorder(
         writer,
-        books.ledger,
-        books.journal,
+        run_state.frame_counts,
+        run_state.event_log,
         int(record.buffer_MB * 1e6),
         mode=mode,
         waits=not camera.live,
         on_failure=lambda: stop.ask("recording failed") if record.when_full == "stop" else None,
-        vitals=books.vitals,
+        health=run_state.health,
     )
     keep = PreTrigger(
         record.keep_s, int(record.buffer_MB * 5e5), record.start_above_N or math.inf, mode.kind == "bursts"
     )
-    gate = PreTriggerBuffer(recorder, books.ledger, books.journal, keep, on=not record.armed)
-    books.journal.add_listener(gate.event)
-    return gate
+    pre_trigger = PreTriggerBuffer(
+        recorder, run_state.frame_counts, run_state.event_log, keep, on=not record.armed
+    )
+    run_state.event_log.add_listener(pre_trigger.event)
+    return pre_trigger
 
 
-def _open_writer(path: Path, setting: PreparedRun, mode: RecordMode) -> SessionWriter | RotatingWriter:
+def _open_writer(path: Path, prepared: PreparedRun, mode: RecordMode) -> SessionWriter | RotatingWriter:
     """A new session file, or a set of files that begins another one when it has grown."""
-    config, rotate_MB = setting.config, setting.config.record.rotate_MB
+    config, rotate_MB = prepared.config, prepared.config.record.rotate_MB
     info = SessionInfo(
-        camera=setting.rig.camera.info,
-        load=setting.rig.load.info,
-        start=setting.start,
+        camera=prepared.rig.camera.info,
+        load=prepared.rig.load.info,
+        start=prepared.start,
         config=config.as_dict(),
         metadata=dict(config.metadata),
         versions=versions(),
@@ -113,8 +115,8 @@ class Recorder:
         Used from the recorder's thread only, and closed by it.
     mode : RecordMode
         Which frames are written, or bursts in their place.
-    ledger : FrameCounts
-    journal : EventLog
+    frame_counts : FrameCounts
+    event_log : EventLog
         Told of gaps and of a disk that takes no more.
     limit : int, bytes
         What may wait for the disk.
@@ -122,7 +124,7 @@ class Recorder:
         Wait for room instead of leaving a gap (sources that wait for their reader).
     on_failure : callable
         Called once when nothing more can be written.
-    vitals : Health, optional
+    health : Health, optional
         Told how long the disk lasts.
     now : callable
         The clock, s.
@@ -131,22 +133,22 @@ class Recorder:
     def __init__(
         self,
         writer: SessionWriter | RotatingWriter,
-        ledger: FrameCounts,
-        journal: EventLog,
+        frame_counts: FrameCounts,
+        event_log: EventLog,
         limit: int,
         *,
         mode: RecordMode | None = None,
         waits: bool = False,
         on_failure: Callable[[], None] = lambda: None,
-        vitals: Health | None = None,
+        health: Health | None = None,
         now: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._writer, self._ledger, self._journal = writer, ledger, journal
+        self._writer, self._frame_counts, self._event_log = writer, frame_counts, event_log
         self._buffer: BoundedQueue[Item] = BoundedQueue(limit, waits=waits)
         self._limit, self._on_failure = limit, on_failure
         self._mode = mode or RecordMode()
         self._number = self._gap = 0
-        self._vitals, self._now = vitals or Health(), now
+        self._health, self._now = health or Health(), now
         self._began = now()
         self._next_clock = self._began + _CLOCK_EVERY_S
         self._next_disk = self._began + _DISK_EVERY_S
@@ -160,16 +162,16 @@ class Recorder:
         """Queue a frame, where the mode keeps it; one that finds no room is part of a counted gap."""
         self._number += 1
         if not self._mode.keeps(self._number - 1):
-            self._ledger.add(thinned=1)
+            self._frame_counts.add(thinned=1)
         elif not self._queued(frame, frame.image.nbytes, 1, frame.index):
-            self._ledger.add(unrecorded=1)
+            self._frame_counts.add(unrecorded=1)
 
     def burst(self, burst: Burst) -> None:
         """Queue a burst, where bursts are what is recorded; its frames then count as recorded."""
         if self._mode.kind == "bursts" and not self._queued(
             burst, burst.mean.nbytes, burst.n, burst.first_index
         ):
-            self._ledger.add(unrecorded=burst.n, thinned=-burst.n)
+            self._frame_counts.add(unrecorded=burst.n, thinned=-burst.n)
 
     def _queued(self, item: Frame | Burst, size: int, n: int, index: int) -> bool:
         if self.failed is None and self._buffer.put(item, size):
@@ -177,7 +179,7 @@ class Recorder:
             return True
         if self._gap == 0 and self.failed is None:
             text = "the disk is too slow, frames are not recorded; measuring goes on"
-            self._journal.tell(EventKind.RECORDER, "recorder", text, "error", {"from": index})
+            self._event_log.tell(EventKind.RECORDER, "recorder", text, "error", {"from": index})
         self._gap += n
         return False
 
@@ -185,7 +187,7 @@ class Recorder:
         if not self._gap:
             return
         text = f"recording again after {self._gap} frames that are not in the session"
-        self._journal.tell(EventKind.RECORDER, "recorder", text, "warning", {"count": self._gap})
+        self._event_log.tell(EventKind.RECORDER, "recorder", text, "warning", {"count": self._gap})
         self._gap = 0
 
     def sample(self, sample: LoadSample) -> None:
@@ -206,12 +208,12 @@ class Recorder:
         """What waits for the disk."""
         return self._buffer.waiting_bytes
 
-    def close(self, ledger: dict[str, Any]) -> None:
+    def close(self, frame_counts: dict[str, Any]) -> None:
         """Write what waits, then the ledger, and close the file."""
         self._buffer.close()
         self._thread.join()
         if self.failed is None:
-            self._guarded(lambda: self._writer.write_ledger(ledger | self._ledger.as_dict()))
+            self._guarded(lambda: self._writer.write_ledger(frame_counts | self._frame_counts.as_dict()))
             self._guarded(lambda: self._writer.write_clock(ClockPair.now()))
         self._guarded(self._writer.close)
 
@@ -239,19 +241,21 @@ class Recorder:
 
     def _look_at_the_disk(self, elapsed_s: float) -> None:
         rate = self._writer.bytes_written / elapsed_s
-        left = self._vitals.disk_s = forecast(self._writer.path, rate)
+        left = self._health.disk_s = forecast(self._writer.path, rate)
         if left < _DISK_WARN_S and not self._disk_told:
             text = f"the disk is full in {left:.0f} s at this rate; free some space, the recording goes on"
-            self._journal.tell(EventKind.RECORDER, str(self._writer.path), text, "warning", {"seconds": left})
+            self._event_log.tell(
+                EventKind.RECORDER, str(self._writer.path), text, "warning", {"seconds": left}
+            )
         self._disk_told = left < _DISK_WARN_S
 
     def _write(self, item: Item) -> None:
         if isinstance(item, Frame):
             written = self.failed is None and self._guarded(lambda: self._writer.write_frame(item))
-            self._ledger.add(**{"recorded" if written else "unrecorded": 1})
+            self._frame_counts.add(**{"recorded" if written else "unrecorded": 1})
         elif isinstance(item, Burst):
             written = self.failed is None and self._guarded(lambda: self._writer.write_burst(item))
-            self._ledger.add(**{"recorded" if written else "unrecorded": item.n, "thinned": -item.n})
+            self._frame_counts.add(**{"recorded" if written else "unrecorded": item.n, "thinned": -item.n})
         elif self.failed is not None:
             return
         elif isinstance(item, LoadSample):
@@ -277,7 +281,7 @@ class Recorder:
             return
         self.failed = why
         lost = self._writer.unflushed_frames  # written, and gone with the file
-        self._ledger.add(recorded=-lost, unrecorded=lost)
+        self._frame_counts.add(recorded=-lost, unrecorded=lost)
         text = f"recording has stopped, measuring goes on: {why}"
-        self._journal.tell(EventKind.RECORDER, "recorder", text, "error")
+        self._event_log.tell(EventKind.RECORDER, "recorder", text, "error")
         self._on_failure()

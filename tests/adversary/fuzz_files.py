@@ -46,7 +46,7 @@ def look_at_session(path: Path) -> Numbers:
             numbers[f"frame {frame.index}"] = (frame.t, crc(frame.image))
         for sample in session.load_samples():
             numbers[f"load {sample.t}"] = (repr(sample.force), sample.raw)
-        session.events(), session.ledger, session.clock_pairs
+        session.events(), session.frame_counts, session.clock_pairs
         for as_measured in (True, False):
             request = ReplayRequest(str(path), as_measured, None, None, None, None, {})
             config = session_config(session, request, {}, path)
@@ -66,7 +66,7 @@ def look_at_recovered(path: Path) -> Numbers:
     try:
         recover(path, copy)
         with Session.open(copy) as session:
-            session.load_samples(), session.events(), session.ledger, session.clock_pairs
+            session.load_samples(), session.events(), session.frame_counts, session.clock_pairs
             return {f"frame {frame.index}": (frame.t, crc(frame.image)) for frame in session.frames()}
     finally:
         copy.unlink(missing_ok=True)

@@ -100,9 +100,9 @@ def test_a_device_clock_that_jumps_loses_no_frame(
 
     outcome = run(60, stamp)
     assert outcome.exit_code == 0
-    assert outcome.books.ledger.adds_up
-    assert outcome.books.ledger.recorded == 60
-    assert len(times(tmp_path / "out")) == outcome.books.ledger.measured == 56
+    assert outcome.run_state.frame_counts.adds_up
+    assert outcome.run_state.frame_counts.recorded == 60
+    assert len(times(tmp_path / "out")) == outcome.run_state.frame_counts.measured == 56
     again(tmp_path / "out")
 
 
@@ -131,13 +131,13 @@ def test_twelve_hours_at_one_frame_a_second(run: Callable[..., Outcome], tmp_pat
     hours = 12 * 3600
     outcome = run(hours + 4, lambda k: began + k, **{"measure.burst": 60, "record.mode": "bursts"})
     assert outcome.exit_code == 0
-    ledger = outcome.books.ledger
-    assert (ledger.grabbed, ledger.measured, ledger.left_out) == (hours + 4, hours, 0)
-    assert ledger.adds_up
+    frame_counts = outcome.run_state.frame_counts
+    assert (frame_counts.grabbed, frame_counts.measured, frame_counts.left_out) == (hours + 4, hours, 0)
+    assert frame_counts.adds_up
     seen = times(tmp_path / "out")
     assert len(seen) == 720
     assert np.allclose(np.diff(seen), 60, atol=1e-6)
-    assert len(outcome.books.journal.events()) < 20
+    assert len(outcome.run_state.event_log.events()) < 20
     again(tmp_path / "out")
 
 

@@ -93,10 +93,12 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
 def test_a_test_goes_on_beside_it(kind: str, talk: str, tmp_path: Path) -> None:
     with PEERS[kind](TALKS[talk]) as peer:
         outcome = run_beside(f"{peer.url}?unit=N&wait=0.2", tmp_path / "run")
-    ledger = outcome.books.ledger
-    assert ledger.grabbed + ledger.lost == 45 and ledger.measured > 10 and ledger.adds_up
-    stops = [event for event in outcome.books.journal.events() if event.kind == "stop"]
-    begun = [event for event in outcome.books.journal.events() if event.kind == "start"]
+    frame_counts = outcome.run_state.frame_counts
+    assert (
+        frame_counts.grabbed + frame_counts.lost == 45 and frame_counts.measured > 10 and frame_counts.adds_up
+    )
+    stops = [event for event in outcome.run_state.event_log.events() if event.kind == "stop"]
+    begun = [event for event in outcome.run_state.event_log.events() if event.kind == "start"]
     assert stops[0].t - begun[0].t < 1.5 + SOON_S
 
 
@@ -201,7 +203,7 @@ def test_a_stream_with_wrong_check_digits_gives_no_value(name: str) -> None:
     sent = [answer(1000 + k) for k in range(3000)]
     wrong = [WRONG[name](sound) for sound in sent if WRONG[name](sound) != sound]
     for damaged in wrong:
-        values += [reading.value for reading in modbus.feed(damaged) + modbus.silence()]
+        values += [reading.value for reading in modbus.burst_queue(damaged) + modbus.silence()]
     assert len(values) >= len(wrong) > 2900 and all(math.isnan(value) for value in values)
 
 
@@ -210,7 +212,7 @@ def test_sound_answers_between_wrong_ones_are_read(name: str) -> None:
     modbus, values = parser("modbus", PROFILE), []
     for k in range(300):
         wrong = k % 3 == 0
-        readings = modbus.feed(WRONG[name](answer(k)) if wrong else answer(k)) + modbus.silence()
+        readings = modbus.burst_queue(WRONG[name](answer(k)) if wrong else answer(k)) + modbus.silence()
         values += [math.nan if wrong and len(readings) > 1 else readings[0].value]
     good = [value for value in values if not math.isnan(value)]
     assert good == [k for k in range(300) if k % 3]
@@ -224,7 +226,7 @@ def test_every_flip_of_up_to_two_bits_is_found() -> None:
     for flip in flips:
         modbus = parser("modbus", PROFILE)
         damaged = (whole ^ flip).to_bytes(len(sound), "big") if flip.bit_count() else sound
-        readings = modbus.feed(damaged) + modbus.silence()
+        readings = modbus.burst_queue(damaged) + modbus.silence()
         assert all(math.isnan(reading.value) for reading in readings)
 
 

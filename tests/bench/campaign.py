@@ -98,8 +98,8 @@ def empty(folder: Path, count: int) -> list[dict[str, Any]]:
         task.folder.mkdir()
         row = failed(task.name, task.source, "", 0).values
         (task.folder / "batch.json").write_text(json.dumps({"key": task.key, "row": row}), encoding="utf-8")
-    with contextlib.closing(WorkerProcesses(0)) as hands:
-        found = [_emptied("pool", tasks, lambda told, done: Pool(tasks, 2, told, done, hands))]
+    with contextlib.closing(WorkerProcesses(0)) as on_start:
+        found = [_emptied("pool", tasks, lambda told, done: Pool(tasks, 2, told, done, on_start))]
     with running(folder) as cluster:
         screen = TerminalScreen(quiet=True)
         made = _emptied("Dask", tasks, lambda told, done: Cluster(tasks, cluster.address, told, done, screen))

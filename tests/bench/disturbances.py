@@ -168,14 +168,14 @@ def run(name: str, folder: Path) -> dict[str, Any]:
     with attached(folder) if "viewer" in name else contextlib.nullcontext():
         screen = TerminalScreen(quiet=True)
         outcome = run_live(config, screen, consumers=standard_consumers(screen, [watch]))
-    rows, ledger = watch.rows(), outcome.books.ledger
+    rows, frame_counts = watch.rows(), outcome.run_state.frame_counts
     after = rows[rows[:, 0] > watch.over_t]
     late = after[after[:, 3] > IN_TIME_S]
     return {
-        "skipped": ledger.skipped, "lost": ledger.lost, "not recorded": ledger.unrecorded,
+        "skipped": frame_counts.skipped, "lost": frame_counts.lost, "not recorded": frame_counts.unrecorded,
         "in time again after s": round(float(late[-1, 0] - watch.over_t), 2) if len(late) else 0.0,
         "p95 ms after it": round(float(np.percentile(after[:, 3], 95)) * 1e3, 1),
-        "load samples": ledger.load_samples, "exit code": outcome.exit_code,
+        "load samples": frame_counts.load_samples, "exit code": outcome.exit_code,
     }  # fmt: skip
 
 

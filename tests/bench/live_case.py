@@ -47,7 +47,7 @@ class Watch(Consumer):
         self._numbers = array("d")  # not a list of tuples: a soak looks at what grows
 
     def measurement(self, measurement: Measurement) -> None:
-        i, b = measurement.instant, measurement.burst
+        i, b = measurement.time_step, measurement.burst
         self._numbers.extend((b.t, b.first_index, b.last_index, i.latency_s, i.measure_s, i.n_valid))
 
     def rows(self) -> np.ndarray:
@@ -134,7 +134,7 @@ def _is_served() -> bool:
 def figures(case: argparse.Namespace, outcome: Outcome, rows: np.ndarray) -> dict[str, Any]:
     late = rows[rows[:, 0] > rows[0, 0] + SETTLED_S]
     p50, p95 = np.percentile(late[:, 3], (50, 95)) * 1e3
-    ledger = outcome.books.ledger
+    frame_counts = outcome.run_state.frame_counts
     return {
         "fps": case.fps,
         "burst": case.burst,
@@ -147,8 +147,8 @@ def figures(case: argparse.Namespace, outcome: Outcome, rows: np.ndarray) -> dic
         "kernel ms": float(np.median(late[:, 4])) * 1e3,
         "bursts skipped at the start": skipped_at_start(case, rows),
         "first ms": rows[0, 3] * 1e3,
-        "lost in the ring": ledger.lost,
-        "not recorded": ledger.unrecorded,
+        "lost in the ring": frame_counts.lost,
+        "not recorded": frame_counts.unrecorded,
         "exit code": outcome.exit_code,
     }
 

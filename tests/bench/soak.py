@@ -121,7 +121,7 @@ def run(case: argparse.Namespace, folder: Path) -> tuple[dict[str, object], Curv
         "skipped %": round(100 * skipped_share(rows), 3),
         "p95 ms of minutes 2 to 5": round(float(np.percentile(early, 95)) * 1e3, 1) if len(early) else None,
         "p95 ms of the last 5": round(float(np.percentile(late, 95)) * 1e3, 1),
-        "lost": outcome.books.ledger.lost, "not recorded": outcome.books.ledger.unrecorded,
+        "lost": outcome.run_state.frame_counts.lost, "not recorded": outcome.run_state.frame_counts.unrecorded,
         "exit code": outcome.exit_code, "processes": curve.slopes(),
     }  # fmt: skip
     return found, curve

@@ -51,7 +51,7 @@ def live_run(
         load_config(None, overrides),
         screen,
         consumers=standard_consumers(screen, [watcher] if watcher else []),
-        hands=watcher.lives.append if watcher else lambda live: None,
+        on_start=watcher.lives.append if watcher else lambda live: None,
     )
 
 
@@ -88,7 +88,7 @@ def test_the_strain_is_that_of_the_specimen(recorded: tuple[Path, Outcome]) -> N
     _, outcome = recorded
     specimen = outcome.rig.specimen
     assert specimen is not None
-    last = outcome.books.history.instants[-1]
+    last = outcome.run_state.history.time_steps[-1]
     true = float(specimen.axial_strain(specimen.elapsed(last.t)))
     assert last.n_valid == last.n_zoi > 10
     # The ZOIs do not cover a whole number of cells, so the mean is near the mean strain, not at it.
@@ -98,15 +98,15 @@ def test_the_strain_is_that_of_the_specimen(recorded: tuple[Path, Outcome]) -> N
 
 def test_everything_is_accounted_for(recorded: tuple[Path, Outcome]) -> None:
     folder, outcome = recorded
-    ledger = outcome.books.ledger
+    frame_counts = outcome.run_state.frame_counts
     assert outcome.exit_code == 0
-    assert ledger.adds_up
-    assert ledger.recorded == ledger.grabbed == 46
-    assert (ledger.reference, ledger.skipped, ledger.lost) == (4, 0, 0)
+    assert frame_counts.adds_up
+    assert frame_counts.recorded == frame_counts.grabbed == 46
+    assert (frame_counts.reference, frame_counts.skipped, frame_counts.lost) == (4, 0, 0)
     with Session.open(folder / "session.h5") as session:
         assert len(session) == 46
-        assert session.ledger is not None
-        assert session.ledger["measured"] == ledger.measured
+        assert session.frame_counts is not None
+        assert session.frame_counts["measured"] == frame_counts.measured
         kinds = [event.kind for event in session.events()]
         assert kinds.count(EventKind.MEASURED) == 14
         assert kinds.count(EventKind.REFERENCE) == 1
@@ -133,7 +133,7 @@ def test_the_csv_has_a_row_a_measurement(recorded: tuple[Path, Outcome]) -> None
             "n_zoi",
         ]
     )
-    assert float(rows[-1]["eyy"]) == pytest.approx(outcome.books.history.instants[-1].eyy, rel=1e-5)
+    assert float(rows[-1]["eyy"]) == pytest.approx(outcome.run_state.history.time_steps[-1].eyy, rel=1e-5)
 
 
 def test_replay_as_measured_is_bit_equal(recorded: tuple[Path, Outcome], tmp_path: Path) -> None:
@@ -186,8 +186,8 @@ def test_replay_with_forced_skips_is_bit_equal(tmp_path: Path, monkeypatch: pyte
 
     monkeypatch.setattr(live_module, "open_rig", hasty)
     outcome = live_run(folder, each=slow)
-    assert outcome.books.ledger.skipped > 0
-    assert outcome.books.ledger.adds_up
+    assert outcome.run_state.frame_counts.skipped > 0
+    assert outcome.run_state.frame_counts.adds_up
     out = tmp_path / "again"
     session = str(folder / "session.h5")
     assert main(["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]) == 0
@@ -230,9 +230,9 @@ def test_losses_are_the_same_live_and_again(
 
     monkeypatch.setattr(live_module, "open_rig", lossy)
     outcome = live_run(folder, each=slow, **{"measure.burst": 2})
-    ledger = outcome.books.ledger
-    assert ledger.adds_up
-    assert (ledger.skipped > 0) is skips
+    frame_counts = outcome.run_state.frame_counts
+    assert frame_counts.adds_up
+    assert (frame_counts.skipped > 0) is skips
     session = str(folder / "session.h5")
     assert main(["replay", session, "--as-measured", "--out", str(out), "--no-view", "--no-rrd"]) == 0
     for name in ("lost", "frame", "last_frame", "n_frames"):
@@ -256,11 +256,11 @@ def test_a_new_reference_is_composed_and_replayed(tmp_path: Path) -> None:
             live.command(EventKind.NEW_REFERENCE)
 
     outcome = live_run(folder, each=ask)
-    assert outcome.books.ledger.adds_up
-    assert outcome.books.ledger.reference == 8
+    assert outcome.run_state.frame_counts.adds_up
+    assert outcome.run_state.frame_counts.reference == 8
     specimen = outcome.rig.specimen
     assert specimen is not None
-    last = outcome.books.history.instants[-1]
+    last = outcome.run_state.history.time_steps[-1]
     assert last.eyy == pytest.approx(float(specimen.axial_strain(specimen.elapsed(last.t))), rel=0.25)
     out = tmp_path / "again"
     session = str(folder / "session.h5")
@@ -285,8 +285,13 @@ def test_an_armed_run_records_from_a_little_before_the_order_to_the_end_of_it(
     outcome = live_run(folder, each=order, **more)
     assert answers[4].startswith("ok: with ") and answers[8] == "ok"
     assert (answers[5], answers[9]) == ("no: recording already", "no: not recording")
-    ledger = outcome.books.ledger
-    assert ledger.adds_up and ledger.measured == 14 * 3 and 4 < ledger.recorded < 32 and not ledger.loss
+    frame_counts = outcome.run_state.frame_counts
+    assert (
+        frame_counts.adds_up
+        and frame_counts.measured == 14 * 3
+        and 4 < frame_counts.recorded < 32
+        and not frame_counts.loss
+    )
     session = str(folder / "session.h5")
     for extra in ([], ["--as-measured"]):
         again = out / str(len(extra))
@@ -311,7 +316,7 @@ def test_an_armed_run_records_from_a_little_before_the_order_to_the_end_of_it(
 def test_what_is_recorded_in_part_replays_bit_equal(tmp_path: Path, how: dict[str, Any]) -> None:
     folder, out = tmp_path / "run", tmp_path / "again"
     outcome = live_run(folder, **how)
-    assert outcome.books.ledger.adds_up
+    assert outcome.run_state.frame_counts.adds_up
     session = str(folder / "session.h5")
     for extra in ([], ["--as-measured"]):
         assert (
@@ -330,7 +335,10 @@ def test_a_lag_is_taken_off_on_request_and_both_forces_are_stored(
     assert main([*replay, "--lag", str(lag)]) == 0
     before, forces, raw = mean(folder, "force_N"), mean(out, "force_N"), mean(out, "force_raw_N")
     np.testing.assert_array_equal(raw, before)
-    loads, start = outcome.books.loads, outcome.books.history.instants[0].t - mean(folder, "time_s")[0]
+    loads, start = (
+        outcome.run_state.loads,
+        outcome.run_state.history.time_steps[0].t - mean(folder, "time_s")[0],
+    )
     expected = [loads.force_at(t + lag) for t in mean(folder, "time_s") + start]
     np.testing.assert_allclose(forces, expected, rtol=1e-6)
     assert np.nanmax(np.abs(forces - raw)) > 50  # a ramp
@@ -372,10 +380,10 @@ def test_a_rotated_recording_is_one_session(tmp_path: Path) -> None:
 def test_every_third_frame_is_a_slower_camera(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder, out = tmp_path / "run", tmp_path / "again"
     outcome = live_run(folder, **{"record.mode": "every=3"})
-    ledger = outcome.books.ledger
-    assert (ledger.recorded, ledger.thinned) == (16, 30)
-    assert ledger.adds_up
-    assert not ledger.loss
+    frame_counts = outcome.run_state.frame_counts
+    assert (frame_counts.recorded, frame_counts.thinned) == (16, 30)
+    assert frame_counts.adds_up
+    assert not frame_counts.loss
     session = str(folder / "session.h5")
     assert main(["replay", session, "--out", str(out), "--no-view", "--no-rrd"]) == 0
     assert len(strains(out)["time_s"]) == 14
@@ -412,7 +420,7 @@ def test_stopping_from_outside_closes_everything(tmp_path: Path) -> None:
     folder = tmp_path / "run"
     outcome = live_run(folder, each=lambda live, m: live.stop("interrupted") if m.number == 3 else None)
     assert outcome.exit_code == 130
-    assert outcome.books.ledger.adds_up
+    assert outcome.run_state.frame_counts.adds_up
     with Session.open(folder / "session.h5") as session:
-        assert session.ledger is not None
-        assert len(session) == outcome.books.ledger.recorded
+        assert session.frame_counts is not None
+        assert len(session) == outcome.run_state.frame_counts.recorded

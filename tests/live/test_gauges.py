@@ -45,7 +45,7 @@ def gauges_in(folder: Path) -> dict[str, np.ndarray]:
 def test_gauges_are_read_and_written(recorded: tuple[Path, Outcome]) -> None:
     folder, outcome = recorded
     assert outcome.exit_code == 0
-    last = outcome.books.history.instants[-1]
+    last = outcome.run_state.history.time_steps[-1]
     assert list(last.gauges) == list(NAMES)
     written = gauges_in(folder)
     for name, gauge in last.gauges.items():
@@ -62,10 +62,10 @@ def test_gauges_are_read_and_written(recorded: tuple[Path, Outcome]) -> None:
 
 
 def test_the_curve_is_that_of_the_gauges(recorded: tuple[Path, Outcome]) -> None:
-    history = recorded[1].books.history
+    history = recorded[1].run_state.history
     axial, transverse = history.along("y")
-    assert np.array_equal(axial, [i.gauges["axial"].value for i in history.instants])
-    assert np.array_equal(transverse, [i.gauges["transverse"].value for i in history.instants])
+    assert np.array_equal(axial, [i.gauges["axial"].value for i in history.time_steps])
+    assert np.array_equal(transverse, [i.gauges["transverse"].value for i in history.time_steps])
     assert History().gauge("axial") is None
 
 
@@ -87,7 +87,7 @@ def test_a_replay_is_bit_equal_and_takes_other_gauges(recorded: tuple[Path, Outc
 
 
 def test_the_status_line_shows_gauges() -> None:
-    found = make_measurement(0).instant
+    found = make_measurement(0).time_step
     gauges = {"axial": GaugeValue(1.234e-3, 3e-6), "hole": GaugeValue(float("nan"), float("nan"), "lost")}
     words = gauge_words(replace(found, gauges=gauges))
     assert words == ["axial +1234 +- 3", "hole lost"]

@@ -29,10 +29,10 @@ def reported(folder: Path) -> tuple[int, str]:
     """Still instants, and the noise of eyy in um/m, as the page has them."""
     with open_run(folder) as run:
         html = make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html
-    instants = re.search(r"in the first (\d+) instants", html)
+    time_steps = re.search(r"in the first (\d+) instants", html)
     eyy = re.search(r"<td>eyy</td><td[^>]*>([\d.]+)</td>", html)
-    assert instants is not None and eyy is not None
-    return int(instants[1]), eyy[1]
+    assert time_steps is not None and eyy is not None
+    return int(time_steps[1]), eyy[1]
 
 
 def test_one_still_phase_and_one_table_in_report_batch_and_study(tmp_path: Path) -> None:
@@ -50,9 +50,9 @@ def test_one_still_phase_and_one_table_in_report_batch_and_study(tmp_path: Path)
         value = pytest.approx(figure.figure.value) if figure.figure.known else None
         assert row[figure.column] == value, figure.name
     assert [figure.name for figure in found if figure.figure.known] == ["Fm"]
-    instants, noise = reported(tmp_path / "again")
-    assert instants == row["still_instants"] == studied == 7
-    assert reported(tmp_path / "run") == (instants, noise)
+    time_steps, noise = reported(tmp_path / "again")
+    assert time_steps == row["still_instants"] == studied == 7
+    assert reported(tmp_path / "run") == (time_steps, noise)
     assert isinstance(row["strain_noise_measured"], float)
     assert float(noise) == pytest.approx(1e6 * row["strain_noise_measured"], rel=5e-3)
 
@@ -66,7 +66,7 @@ def test_the_noise_floor_is_that_of_the_maps(tmp_path: Path, share: float) -> No
     )
     with open_run(folder) as run:
         still = still_phase_of(run.strain)
-    assert still.instants == 60
+    assert still.time_steps == 60
     for name in ("u", "v", "exx", "eyy"):
         assert still.floors[name].measured == pytest.approx(1e-5, rel=0.06), name
         assert still.floors[name].predicted == pytest.approx(share * 1e-5, rel=1e-3)
@@ -77,10 +77,10 @@ def test_without_a_force_the_strains_tell(tmp_path: Path) -> None:
     strains = (*[0.0] * 10, *np.linspace(1e-4, 3e-3, 20))
     with open_run(make_run(tmp_path, strains, session=False)) as run:
         run.strain.values["force_N"][:] = np.nan
-        assert still_phase_of(run.strain).instants == 10
+        assert still_phase_of(run.strain).time_steps == 10
 
 
 def test_one_still_instant_gives_no_floor(tmp_path: Path) -> None:
     with open_run(make_run(tmp_path, [0.0, *np.linspace(1e-4, 3e-3, 20)], session=False)) as run:
         still = still_phase_of(run.strain)
-    assert (still.instants, still.floors) == (1, {})
+    assert (still.time_steps, still.floors) == (1, {})

@@ -155,7 +155,7 @@ def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Ev
     """
     load_config(Path(wanted.config) if wanted.config else None, wanted.overrides)
     _make(wanted.out)
-    with closing(_hands(wanted)) as hands:
+    with closing(_processes(wanted)) as processes:
         rows, tasks = _planned(wanted)
         _sweep(wanted.out, rows, tasks)
         ready = len(wanted.tests) - len(tasks)
@@ -163,7 +163,7 @@ def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Ev
             f"{len(wanted.tests)} tests: {ready} as they are, {len(tasks)} to replay into {wanted.out}"
         )
         if tasks:
-            _work(wanted, longest_first(tasks), rows, screen, stopping, hands)
+            _work(wanted, longest_first(tasks), rows, screen, stopping, processes)
     _sweep(wanted.out, rows, tasks)
     if stopping.is_set():
         return Campaign(tuple(rows.values()), len(tasks), (), 130)
@@ -173,7 +173,7 @@ def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Ev
     return Campaign(found, len(tasks), tuple(files), code)
 
 
-def _hands(wanted: CampaignRequest) -> WorkerProcesses:
+def _processes(wanted: CampaignRequest) -> WorkerProcesses:
     """Processes for what is missing at first sight: they load while this one plans."""
     missing = sum(not (wanted.out / test.name).exists() for test in wanted.tests)
     try:
@@ -252,15 +252,15 @@ def _work(
     rows: dict[str, BatchRow],
     screen: Screen,
     stopping: threading.Event,
-    hands: WorkerProcesses,
+    processes: WorkerProcesses,
 ) -> None:
     standing = BatchProgress(len(tasks), time.monotonic)
     course = Scheduler(tasks, _cuts(tasks, screen), rows, standing, screen)
     first = course.first()
     workers: Pool | Cluster
     if wanted.scheduler is None:
-        _compile(hands, screen, stopping)
-        workers = Pool(first, wanted.workers, course.told, course.done, hands)
+        _compile(processes, screen, stopping)
+        workers = Pool(first, wanted.workers, course.told, course.done, processes)
     else:
         workers = Cluster(first, wanted.scheduler, course.told, course.done, screen)
     try:
@@ -271,10 +271,10 @@ def _work(
     screen.say(standing.words())
 
 
-def _compile(hands: WorkerProcesses, screen: Screen, stopping: threading.Event) -> None:
+def _compile(processes: WorkerProcesses, screen: Screen, stopping: threading.Event) -> None:
     """Have compiled what is missing, before workers need it."""
     try:
-        ready = hands.are_ready()
+        ready = processes.are_ready()
     except OSError as error:
         raise _no_process(error) from error
     if not ready:

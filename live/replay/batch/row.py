@@ -75,7 +75,7 @@ def row_of_chunk(name: str, source: str, as_the_whole: bool, seconds: float) -> 
 
 def row_of(name: str, source: str, done: Replayed, seconds: float) -> BatchRow:
     """The row of a test that was replayed."""
-    history, code = done.books.history, done.exit_code
+    history, code = done.run_state.history, done.exit_code
     said = (
         "" if code == 0 else "; ".join(done.lines[:1]) if history.told_something else "nothing was measured"
     )
@@ -89,10 +89,10 @@ def row_of(name: str, source: str, done: Replayed, seconds: float) -> BatchRow:
             **_settings(done.config),
             "burst": done.config.measure.burst or _burst(done),
             **_counts(history),
-            **_figures(evaluate(history, done.books.loads, done.config.specimen), done.config),
+            **_figures(evaluate(history, done.run_state.loads, done.config.specimen), done.config),
             **_noise(history),
             **_noise_floor(done.folder / "strain.h5"),
-            "frames_lost": done.books.ledger.lost,
+            "frames_lost": done.run_state.frame_counts.lost,
             "pictures_left_out": done.left_out,
             "seconds": round(seconds, 3),
         }
@@ -108,13 +108,13 @@ def _settings(config: Config) -> dict[str, Any]:
 
 def _burst(done: Replayed) -> int | None:
     """Frames in a burst where nobody said how many."""
-    instants = len(done.books.history.instants)
-    return round(done.books.ledger.measured / instants) if instants else None
+    time_steps = len(done.run_state.history.time_steps)
+    return round(done.run_state.frame_counts.measured / time_steps) if time_steps else None
 
 
 def _counts(history: History) -> dict[str, Any]:
-    last = history.instants[-1] if history.instants else None
-    found: dict[str, Any] = {"instants": len(history.instants)}
+    last = history.time_steps[-1] if history.time_steps else None
+    found: dict[str, Any] = {"instants": len(history.time_steps)}
     return found if last is None else {**found, "zois": last.n_zoi, "valid_last": last.n_valid}
 
 
@@ -136,7 +136,7 @@ def _noise_floor(results: Path) -> dict[str, Any]:
     with Strain.open(results) as strain:
         still = still_phase_of(strain, ("eyy",))
     floor = still.floors.get("eyy")
-    return {"still_instants": still.instants, "strain_noise_measured": floor and floor.measured}
+    return {"still_instants": still.time_steps, "strain_noise_measured": floor and floor.measured}
 
 
 def _median(history: History, column: str) -> float:

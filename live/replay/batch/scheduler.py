@@ -48,8 +48,8 @@ def cut(task: Task) -> ChunkPlan:
     if not is_session(task.source):
         return ChunkPlan(why="pictures are not cut")
     try:
-        with open_material(task.request(task.folder)) as (material, _):
-            times = material.times
+        with open_material(task.request(task.folder)) as (source_of_bursts, _):
+            times = source_of_bursts.times
     except PhasedicError:
         return ChunkPlan()  # the replay will tell
     if times is None:  # --as-measured, which the command refuses beside --chunk
@@ -141,12 +141,12 @@ class BatchProgress:
         """Sessions, instants, ZOIs a second and the time that is left."""
         with self._lock:
             took = self._now() - self._began
-            instants = sum(progress.done for progress in self._last.values())
+            time_steps = sum(progress.done for progress in self._last.values())
             zois = sum(progress.zois for progress in self._last.values())
             share = sum(share * self._part(title) for title, share in self._shares.items()) / self._tests
         left = f"  {duration(took * (1 - share) / share)} left" if 0 < share < 1 else ""
         rate = f"  {zois / took:,.0f} ZOI/s" if took > 0 else ""
-        return f"{self._ended} of {self._tests} tests  {instants} instants{rate}{left}"
+        return f"{self._ended} of {self._tests} tests  {time_steps} instants{rate}{left}"
 
     def _part(self, title: str) -> float:
         """How much of a task is done."""

@@ -193,7 +193,7 @@ def _replayed(task: Task, part: Path, tell: Tell) -> BatchRow:
     with (part / SAID).open("w", encoding="utf-8") as file:
         screen, began = _Telling(file, tell), time.monotonic()
         done = replay(task.request(part), screen, threading.Event())
-        for line in [*summary_lines(done.books, done.config.specimen), *done.lines]:
+        for line in [*summary_lines(done.run_state, done.config.specimen), *done.lines]:
             screen.say(line)
     tell(screen.last)
     before = sum(_seconds(Path(chunk)) for chunk in task.chunks)

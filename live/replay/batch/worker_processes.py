@@ -140,13 +140,13 @@ class Pool:
     """``workers`` processes at work on ``tasks``; ``told`` and ``done`` are called from threads.
 
     A task whose worker died three times is a failed row; those of other workers go on untouched. The
-    processes come from ``hands``; whoever made that closes it.
+    processes come from ``processes``; whoever made that closes it.
     """
 
     def __init__(
-        self, tasks: Sequence[Task], workers: int, told: Told, done: Done, hands: WorkerProcesses
+        self, tasks: Sequence[Task], workers: int, told: Told, done: Done, processes: WorkerProcesses
     ) -> None:
-        self._hands = hands
+        self._processes = processes
         self._waiting, self._deaths = deque(tasks), dict.fromkeys((task.title for task in tasks), 0)
         self._told, self._done = told, done
         self._stopped = threading.Event()
@@ -198,7 +198,7 @@ class Pool:
     def _new(self) -> WorkerProcess | None:
         """None where no process can be started."""
         try:
-            worker = self._hands.take()
+            worker = self._processes.take()
         except OSError as error:
             log.error("no worker could be started: %s", error)
             return None

@@ -91,7 +91,7 @@ def _long(job: Job, file: TextIO) -> None:
     _line(file, [job.display.column(name) for name in heads])
     places = _places(job)
     for _, number in job.steps():
-        same = [np.full(len(places[0]), value) for value in (number, *_instant(job, number))]
+        same = [np.full(len(places[0]), value) for value in (number, *_time_step(job, number))]
         _rows(file, [*same, *places, *_values(job, number)])
 
 
@@ -120,11 +120,12 @@ def _wide(job: Job, folder: Path) -> None:
             _line(file, heads)
             for _, number in job.steps():
                 _rows(
-                    file, [[value] for value in (*_instant(job, number), *job.map(name, number)[grid.active])]
+                    file,
+                    [[value] for value in (*_time_step(job, number), *job.map(name, number)[grid.active])],
                 )
 
 
-def _instant(job: Job, number: int) -> list[float]:
+def _time_step(job: Job, number: int) -> list[float]:
     return [float(job.strain.values[name][number]) for name in _OF_AN_INSTANT]
 
 

@@ -84,7 +84,7 @@ def lag_of(run: RunFolder) -> Figure:
     return find_lag(strain, Track(t, force))
 
 
-def instants(run: RunFolder, curve: EvaluatedCurve) -> dict[int, str]:
+def time_steps(run: RunFolder, curve: EvaluatedCurve) -> dict[int, str]:
     """Row -> what it is: first, elastic, yield, maximum, last; each row once, in order of time."""
     found = {0: ["first"]}
 

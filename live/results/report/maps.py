@@ -62,12 +62,12 @@ def shots(run: RunFolder, rows: list[int]) -> MapPictures:
     return MapPictures(images, levels, (pictures.info.width, pictures.info.height), pictures.info)
 
 
-def maps(run: RunFolder, name: str, instants: Mapping[int, str], taken: MapPictures, longest: int) -> Html:
+def maps(run: RunFolder, name: str, time_steps: Mapping[int, str], taken: MapPictures, longest: int) -> Html:
     """One map at all instants beside its picture."""
-    scale = ColourScale.of_run(run.strain, name, list(instants))
+    scale = ColourScale.of_run(run.strain, name, list(time_steps))
     painter = Painter(run.strain, name, scale, taken.size, longest)
     pairs = []
-    for row, words in instants.items():
+    for row, words in time_steps.items():
         base = painter.picture(taken.images[row], taken.levels)
         beside = [_picture(painter.over(base, row), f"{name}, {words}")]
         if taken.images[row] is not None:

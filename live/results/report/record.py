@@ -79,9 +79,9 @@ def times(run: RunFolder) -> Html:
     return facts(found)
 
 
-def ledger(run: RunFolder) -> Html:
+def frame_counts(run: RunFolder) -> Html:
     """The counts of frames."""
-    found = run.session.ledger if run.session is not None else None
+    found = run.session.frame_counts if run.session is not None else None
     return facts(found) if found else paragraph("No ledger was recorded.", "dim")
 
 

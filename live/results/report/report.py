@@ -13,7 +13,7 @@ from live.pipeline.screen import Screen
 from live.results.figures import axis_words, figure_lines, headline
 from live.results.noise_floor import StillPhase, still_phase_of
 from live.results.report import curves
-from live.results.report.evaluation import EvaluatedCurve, instants, nearest_rows
+from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
 from live.results.report.maps import MapPictures, maps, shots, statuses
 from live.results.report.page import (
     Html,
@@ -28,7 +28,7 @@ from live.results.report.page import (
     tiles,
 )
 from live.results.report.practice import PracticeValues, reporting_table
-from live.results.report.record import definitions, events, gauges, hashes, ledger, times, version_table
+from live.results.report.record import definitions, events, frame_counts, gauges, hashes, times, version_table
 from live.results.report.svg import Plot, draw
 from live.results.run_folder import RunFolder
 
@@ -69,7 +69,7 @@ class _Content:
     run: RunFolder
     curve: EvaluatedCurve
     figures: tuple[Plot, ...]
-    instants: dict[int, str]
+    time_steps: dict[int, str]
     shots: MapPictures
     still: StillPhase
     files: Html
@@ -95,7 +95,7 @@ def make_report(run: RunFolder, wanted: ReportRequest, screen: Screen) -> Report
 
 def _content(run: RunFolder, wanted: ReportRequest, screen: Screen) -> _Content:
     curve = EvaluatedCurve.of(run)
-    chosen = nearest_rows(run, wanted.times) if wanted.times else instants(run, curve)
+    chosen = nearest_rows(run, wanted.times) if wanted.times else time_steps(run, curve)
     still = still_phase_of(run.strain)
     return _Content(
         run, curve, _figures(run, curve), chosen, shots(run, list(chosen)), still, hashes(run, screen)
@@ -109,7 +109,7 @@ def _figures(run: RunFolder, curve: EvaluatedCurve) -> tuple[Plot, ...]:
 
 
 def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
-    run, taken, chosen = content.run, content.shots, content.instants
+    run, taken, chosen = content.run, content.shots, content.time_steps
     fields = wanted.fields or (run.axial,)
     reference = next((image for image in taken.images.values() if image is not None), None)
     known = PracticeValues(run, taken.camera, reference, content.still.floors, wanted.mm_per_px)
@@ -123,7 +123,7 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
         section("Maps", *(maps(run, name, chosen, taken, side) for name in fields)),
         section("Noise floor", *_noise_section(content)),
         section("Status of the ZOIs", statuses(run, max(chosen), taken, min(side, 480))),
-        section("Ledger and events", ledger(run), events(run)),
+        section("Ledger and events", frame_counts(run), events(run)),
         section("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
         section("Definitions", definitions(run)),
         section("Versions and files", version_table(run), content.files),
@@ -219,7 +219,7 @@ def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
 
 
 def _noise_section(content: _Content) -> list[Html]:
-    n = content.still.instants
+    n = content.still.time_steps
     if not content.still.floors:
         words = (
             "No still phase was found: fewer than two instants before anything moves. With the specimen at rest"

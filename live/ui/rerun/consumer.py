@@ -30,8 +30,8 @@ class RerunConsumer(Consumer):
     name = "view"
     blocks = False
 
-    def __init__(self, view: View, books: RunState) -> None:
-        self._view, self._books = view, books
+    def __init__(self, view: View, run_state: RunState) -> None:
+        self._view, self._run_state = view, run_state
 
     def frame(self, frame: Frame) -> None:
         """Offer a frame; a few a second are taken."""
@@ -45,7 +45,7 @@ class RerunConsumer(Consumer):
 
     def settled(self, measurement: Measurement) -> None:
         """Offer a point of the curve."""
-        axial, _ = measurement.instant.axial(self._books.history.axis_by_now)
+        axial, _ = measurement.time_step.axial(self._run_state.history.axis_by_now)
         self._view.point(axial, measurement.force)
 
     def load(self, sample: LoadSample) -> None:
@@ -54,7 +54,9 @@ class RerunConsumer(Consumer):
 
     def event(self, event: Event) -> None:
         """Offer an event, a device by its name."""
-        self._view.event(replace(event, source=self._books.journal.names.get(event.source, event.source)))
+        self._view.event(
+            replace(event, source=self._run_state.event_log.names.get(event.source, event.source))
+        )
 
     def end(self) -> str:
         """Let it draw what waits, and close it."""
@@ -69,18 +71,18 @@ class CardWriter(Consumer):
 
     name = "status card"
 
-    def __init__(self, view: View, card: StatusCard, books: RunState) -> None:
-        self._view, self._card, self._books = view, card, books
-        self._instants: Thinned[TimeStep] = Thinned(CARD_INSTANTS)
+    def __init__(self, view: View, card: StatusCard, run_state: RunState) -> None:
+        self._view, self._card, self._run_state = view, card, run_state
+        self._time_steps: Thinned[TimeStep] = Thinned(CARD_INSTANTS)
 
     def measurement(self, measurement: Measurement) -> None:
         """Keep its means, and write the card where the last one is old."""
-        self._instants.append(measurement.instant)
+        self._time_steps.append(measurement.time_step)
         if self._card.is_due(measurement.t):
             history = History()
-            for instant in self._instants.items():
-                history.add(instant)
-            snapshot = self._books.snapshot(measurement.t, measurement.instant)
+            for time_step in self._time_steps.items():
+                history.add(time_step)
+            snapshot = self._run_state.snapshot(measurement.t, measurement.time_step)
             self._view.status(self._card.written(snapshot, history))
 
 
@@ -89,21 +91,21 @@ class FiguresWriter(Consumer):
 
     name = "figures"
 
-    def __init__(self, view: View, books: RunState) -> None:
-        self._view, self._books = view, books
+    def __init__(self, view: View, run_state: RunState) -> None:
+        self._view, self._run_state = view, run_state
         self._last: TimeStep | None = None
 
     def measurement(self, measurement: Measurement) -> None:
         """Show the newest."""
-        self._last = measurement.instant
-        self._view.figures(self._books.snapshot(measurement.t, self._last))
+        self._last = measurement.time_step
+        self._view.figures(self._run_state.snapshot(measurement.t, self._last))
 
     def event(self, event: Event) -> None:
         """Wake up: the first one comes before the first frame."""
 
     def idle(self) -> float:
         """Show what has changed meanwhile, also before anything is measured."""
-        vitals = self._books.vitals
-        if vitals.state and not math.isnan(vitals.frame_t):
-            self._view.figures(self._books.snapshot(vitals.frame_t, self._last))
+        health = self._run_state.health
+        if health.state and not math.isnan(health.frame_t):
+            self._view.figures(self._run_state.snapshot(health.frame_t, self._last))
         return IDLE_S

@@ -131,10 +131,8 @@ def setup_message(setup: ViewSetup, where: Where) -> Message:
     names = ("title", "width", "height", "bits", "start_monotonic", "area_m2", "axis", "strain_range")
     more = ("picture_hz", "finished", "with_load", "outlines", "gauges", "light", "scale")
     meta = {name: getattr(setup, name) for name in (*names, *more)}
-    places = {"port": where.port, "rrd": where.rrd, "recording": where.recording}
-    return Message(
-        Kind.SETUP, {**meta, **places, "grid": setup.grid.to_dict()}, {"active": setup.grid.active}
-    )
+    sinks = {"port": where.port, "rrd": where.rrd, "recording": where.recording}
+    return Message(Kind.SETUP, {**meta, **sinks, "grid": setup.grid.to_dict()}, {"active": setup.grid.active})
 
 
 def setup_of(message: Message) -> tuple[ViewSetup, Where]:
@@ -149,7 +147,7 @@ def setup_of(message: Message) -> tuple[ViewSetup, Where]:
 
 def row_of(measurement: Measurement) -> Row:
     """Time (s), and mean and sigma of each strain."""
-    i = measurement.instant
+    i = measurement.time_step
     return (i.t, i.exx, i.sigma_exx, i.eyy, i.sigma_eyy, i.exy, i.sigma_exy)
 
 

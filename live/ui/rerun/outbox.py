@@ -111,7 +111,7 @@ class Outbox:
     Parameters
     ----------
     setup : ViewSetup
-    waiting : Pending
+    pending : Pending
     story : callable
         Gives what else there is to tell, message by message and from the beginning, as fast as it is taken.
 
@@ -121,8 +121,8 @@ class Outbox:
         Fields and pictures.
     """
 
-    def __init__(self, setup: ViewSetup, waiting: Pending, story: Story = lambda: ()) -> None:
-        self._setup, self._waiting, self._past = setup, waiting, PastMessages()
+    def __init__(self, setup: ViewSetup, pending: Pending, story: Story = lambda: ()) -> None:
+        self._setup, self._pending, self._past = setup, pending, PastMessages()
         self._story = story
         self._first: Iterator[Message] = iter(())
         self._due_t = {Kind.FIELD: -math.inf, Kind.PICTURE: -math.inf}
@@ -151,32 +151,32 @@ class Outbox:
         return next(self._first, None) or self._small() or self._large(now) or self._last()
 
     def _small(self) -> Message | None:
-        waiting, past = self._waiting, self._past
-        for kind, kept in waiting.rows.items():
+        pending, past = self._pending, self._past
+        for kind, kept in pending.rows.items():
             if kept:
                 rows = taken(kept)
                 for row in rows:
                     past.rows[kind].append(row)
                 return rows_message(kind, rows)
-        if waiting.events:
-            events = taken(waiting.events)
+        if pending.events:
+            events = taken(pending.events)
             past.events.extend(events)
             return events_message(events)
-        if waiting.status is not None:
-            past.status, waiting.status = waiting.status, None
+        if pending.status is not None:
+            past.status, pending.status = pending.status, None
             return Message(Kind.STATUS, {"markdown": past.status})
-        if waiting.figures is not None:
-            figures, waiting.figures = waiting.figures, None
+        if pending.figures is not None:
+            figures, pending.figures = pending.figures, None
             return figures_message(figures)
         return None
 
     def _large(self, now: float) -> Message | None:
-        waiting = self._waiting
-        if waiting.field is not None and self._is_due(Kind.FIELD, now):
-            (t, field), waiting.field = waiting.field, None
+        pending = self._pending
+        if pending.field is not None and self._is_due(Kind.FIELD, now):
+            (t, field), pending.field = pending.field, None
             return self._paced(field_message(t, field), now, FIELD_HZ)
-        if waiting.picture is not None and self._is_due(Kind.PICTURE, now):
-            frame, waiting.picture = waiting.picture, None
+        if pending.picture is not None and self._is_due(Kind.PICTURE, now):
+            frame, pending.picture = pending.picture, None
             return self._paced(picture_message(frame), now, self._setup.picture_hz)
         return None
 

@@ -60,14 +60,14 @@ class RenderProcess:
             ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BYTES)
         ours.setblocking(False)
         self._socket, self._reader = ours, Reader(ours)
-        self._waiting: deque[memoryview] = deque()
+        self._pending: deque[memoryview] = deque()
         self.pid, self.progress_t = self._process.pid, time.monotonic()
 
     def send(self, message: Message) -> None:
         """Put ``message`` behind what waits."""
-        if not self._waiting:
+        if not self._pending:
             self.progress_t = time.monotonic()
-        self._waiting.extend(encoded(message))
+        self._pending.extend(encoded(message))
 
     def pushed(self) -> bool:
         """Hand over what the process takes at once; whether all is gone.
@@ -77,9 +77,9 @@ class RenderProcess:
         OSError
             The process is gone.
         """
-        while self._waiting:
+        while self._pending:
             try:
-                sent = self._socket.sendmsg(list(self._waiting)[:16])
+                sent = self._socket.sendmsg(list(self._pending)[:16])
             except BlockingIOError:
                 return False
             self.progress_t = time.monotonic()
@@ -88,9 +88,9 @@ class RenderProcess:
 
     def _let_go(self, sent: int) -> None:
         while sent:
-            piece = self._waiting.popleft()
+            piece = self._pending.popleft()
             if sent < piece.nbytes:
-                self._waiting.appendleft(piece[sent:])
+                self._pending.appendleft(piece[sent:])
                 return
             sent -= piece.nbytes
 
@@ -155,7 +155,7 @@ class Supervisor:
 
     Parameters
     ----------
-    supply : Outbox
+    outbox : Outbox
     where : Where
         As it is wanted.
     tell : callable
@@ -174,8 +174,8 @@ class Supervisor:
     starts : int
     """
 
-    def __init__(self, supply: Outbox, where: Where, tell: Tell, serving: Callable[[], None]) -> None:
-        self._supply, self._where, self._tell, self._serving = supply, where, tell, serving
+    def __init__(self, outbox: Outbox, where: Where, tell: Tell, serving: Callable[[], None]) -> None:
+        self._outbox, self._where, self._tell, self._serving = outbox, where, tell, serving
         self.served = replace(where, port=None, rrd=None)
         self.failed = ""
         self.pid: int | None = None
@@ -203,7 +203,7 @@ class Supervisor:
         while not self._closing.is_set() and not self.failed:
             self._guarded(self._turn)
         if self._child is not None or not self.starts:
-            self._supply.end()
+            self._outbox.end()
             self._finish(time.monotonic() + self._patience_s)
 
     # -- talking ------------------------------------------------------------------------------
@@ -220,7 +220,7 @@ class Supervisor:
         for message in child.replies():
             self._hear(message)
         while child.pushed():
-            more = self._supply.next(time.monotonic())
+            more = self._outbox.next(time.monotonic())
             if more is None:
                 return True
             child.send(more)
@@ -256,7 +256,7 @@ class Supervisor:
         self._why, self._begun_t = "", now
         self._child = RenderProcess()
         self.pid = self._child.pid
-        self._supply.begin(self._next_where())
+        self._outbox.begin(self._next_where())
         return self._child
 
     def _next_where(self) -> Where:

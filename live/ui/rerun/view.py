@@ -180,12 +180,12 @@ class View:
         serving: Callable[[View], None] = lambda view: None,
         story: Story = lambda: (),
     ) -> None:
-        self._setup, self._waiting = setup, Pending()
-        self._supply = Outbox(setup, self._waiting, story)
+        self._setup, self._pending = setup, Pending()
+        self._outbox = Outbox(setup, self._pending, story)
         where = Where(port, None if rrd is None else str(rrd.absolute()), str(uuid.uuid4()))
-        self._keeper = Supervisor(self._supply, where, tell, lambda: serving(self))
+        self._supervisor = Supervisor(self._outbox, where, tell, lambda: serving(self))
         self._picture_t = self._load_t = -math.inf
-        self._keeper.start()
+        self._supervisor.start()
 
     # -- what is shown ------------------------------------------------------------------------
 
@@ -193,71 +193,71 @@ class View:
         """Offer a frame; ``picture_hz`` of them are taken per second of the test, at most."""
         if frame.t - self._picture_t >= 0.999 / self._setup.picture_hz:
             self._picture_t = frame.t
-            self._waiting.picture = frame
+            self._pending.picture = frame
 
     def show(self, measurement: Measurement) -> None:
         """Offer a measurement: its means are shown, its field where no newer one comes first."""
-        self._waiting.row(Kind.MEANS, row_of(measurement))
-        self._waiting.field = measurement.t, measurement.field
+        self._pending.row(Kind.MEANS, row_of(measurement))
+        self._pending.field = measurement.t, measurement.field
 
     def point(self, axial: float, force: float) -> None:
         """Offer a point of the curve: strain along the load, and its final force (N); NaN is not drawn."""
-        self._waiting.row(Kind.POINTS, (axial, force))
+        self._pending.row(Kind.POINTS, (axial, force))
 
     def load(self, t: float, force: float) -> None:
         """Offer a load sample (monotonic s, N); 50 a second are shown."""
         if t - self._load_t >= 0.999 * LOAD_STEP_S and math.isfinite(force):
             self._load_t = t
-            self._waiting.row(Kind.LOADS, (t, force))
+            self._pending.row(Kind.LOADS, (t, force))
 
     def event(self, event: Event) -> None:
         """Offer an event."""
-        self._waiting.event(event)
+        self._pending.event(event)
 
     def status(self, text_markdown: str) -> None:
         """Set the status card."""
-        self._waiting.status = text_markdown
+        self._pending.status = text_markdown
 
     def figures(self, snapshot: Snapshot) -> None:
         """Set the large figures."""
-        self._waiting.figures = snapshot
+        self._pending.figures = snapshot
 
     def close(self, seconds: float) -> None:
         """Draw what waits, finish the file and end; a process that takes longer is killed, and it is told."""
-        self._keeper.close(seconds)
+        self._supervisor.close(seconds)
 
     # -- what a person or a test asks ---------------------------------------------------------
 
     @property
     def port(self) -> int | None:
         """Where it is really served; None until it is."""
-        return self._keeper.served.port
+        return self._supervisor.served.port
 
     @property
     def rrd(self) -> Path | None:
         """The file that is written; None until it is."""
-        rrd = self._keeper.served.rrd
+        rrd = self._supervisor.served.rrd
         return None if rrd is None else Path(rrd)
 
     @property
     def pid(self) -> int | None:
         """Of the process that draws, while there is one."""
-        return self._keeper.pid
+        return self._supervisor.pid
 
     @property
     def failed(self) -> str:
         """Why the view has ended for good; empty while all is well."""
-        return self._keeper.failed
+        return self._supervisor.failed
 
     @property
     def report(self) -> str:
         """What was sent and what was not, in a few words."""
-        fields, pictures = (self._supply.sent[kind] for kind in (Kind.FIELD, Kind.PICTURE))
+        fields, pictures = (self._outbox.sent[kind] for kind in (Kind.FIELD, Kind.PICTURE))
         said = [f"{fields} maps and {pictures} pictures drawn"]
-        if self._waiting.dropped:
-            said.append(f"{self._waiting.dropped} rows or events dropped")
-        if self._keeper.starts > 1:
-            said.append(f"its process was started {self._keeper.starts} times")
+        if self._pending.dropped:
+            said.append(f"{self._pending.dropped} rows or events dropped")
+        if self._supervisor.starts > 1:
+            said.append(f"its process was started {self._supervisor.starts} times")
         return ", ".join(said)
 
     @property

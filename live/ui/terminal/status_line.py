@@ -20,7 +20,7 @@ Part = tuple[int, str]
 
 def status_line(s: Snapshot, width: int, words: str = "") -> str:
     """The line, at most ``width`` letters; ``words`` say what is waited for."""
-    return fitted([*_test(s), (3, words), *_strain(s.instant), *_machine(s)], width)
+    return fitted([*_test(s), (3, words), *_strain(s.time_step), *_machine(s)], width)
 
 
 def fitted(parts: Sequence[Part], width: int) -> str:
@@ -50,7 +50,7 @@ def _strain(i: TimeStep | None) -> list[Part]:
 def _machine(s: Snapshot) -> list[Part]:
     frames = s.frames
     late = "" if math.isnan(s.latency_p95_s) else f"p95 {s.latency_p95_s * 1e3:.0f} ms"
-    measured = f"measured {frames['measured']}" if s.instant is not None else f"{frames['grabbed']} frames"
+    measured = f"measured {frames['measured']}" if s.time_step is not None else f"{frames['grabbed']} frames"
     return [
         (9, f"{s.fps:.0f} fps"),
         (12, measured),

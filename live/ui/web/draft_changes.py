@@ -22,67 +22,67 @@ LONGEST_MM = 1e5
 MOST_POINTS = 100  # of a gauge
 
 
-def _drawn(bench: SetupSession) -> DrawnRegion:
-    if bench.drawn is None:
+def _drawn(session: SetupSession) -> DrawnRegion:
+    if session.drawn is None:
         raise DataError("the camera has given no picture yet")
-    return bench.drawn
+    return session.drawn
 
 
-def draw(bench: SetupSession, said: Said) -> None:
+def draw(session: SetupSession, said: Said) -> None:
     """Strokes of a tool."""
     strokes = said.get("strokes")
     if not isinstance(strokes, list) or not 1 <= len(strokes) <= 500:
         raise ConfigError("strokes are a list")
     if not all(isinstance(one, dict) for one in strokes):
         raise ConfigError("a stroke has a tool and points")
-    _drawn(bench).draw(strokes)
-    bench.region_changed()
+    _drawn(session).draw(strokes)
+    session.region_changed()
 
 
-def undo(bench: SetupSession, said: Said) -> None:
+def undo(session: SetupSession, said: Said) -> None:
     """The region as it was before."""
-    _drawn(bench).undo()
-    bench.region_changed()
+    _drawn(session).undo()
+    session.region_changed()
 
 
-def find(bench: SetupSession, said: Said) -> None:
+def find(session: SetupSession, said: Said) -> None:
     """The specimen in the picture."""
-    bench.find()
+    session.find()
 
 
-def everything(bench: SetupSession, said: Said) -> None:
+def everything(session: SetupSession, said: Said) -> None:
     """The whole picture."""
-    drawn = _drawn(bench)
+    drawn = _drawn(session)
     drawn.take(np.ones_like(drawn.mask), "the whole picture")
-    bench.region_changed()
+    session.region_changed()
 
 
-def overlay(bench: SetupSession, said: Said) -> None:
+def overlay(session: SetupSession, said: Said) -> None:
     """Something laid over the picture, or taken off."""
     if said.get("name") not in OVERLAYS:
         raise ConfigError(f"there are {', '.join(OVERLAYS)}")
-    bench.overlays[str(said["name"])] = said.get("on") is True
+    session.overlays[str(said["name"])] = said.get("on") is True
 
 
-def camera(bench: SetupSession, said: Said) -> None:
+def camera(session: SetupSession, said: Said) -> None:
     """A setting of the camera's address; the camera is opened anew and tells what is in force."""
     key, value = said.get("key"), said.get("value")
-    info = bench.eye.info
+    info = session.preview.info
     known = [] if info is None else [setting.key for setting in info.settings]
     if key not in known:
         raise ConfigError(f"a number for one of {', '.join(known) or 'the settings of an open camera'}")
     number = _number(str(key), value)
-    bench.eye.reopen(with_setting(bench.draft.config.camera.address, str(key), number))
+    session.preview.reopen(with_setting(session.draft.config.camera.address, str(key), number))
 
 
-def address(bench: SetupSession, said: Said) -> None:
+def address(session: SetupSession, said: Said) -> None:
     """Another camera."""
     if not isinstance(said.get("value"), str):
         raise ConfigError("an address is a text")
-    bench.eye.reopen(said["value"])
+    session.preview.reopen(said["value"])
 
 
-def put(bench: SetupSession, said: Said) -> None:
+def put(session: SetupSession, said: Said) -> None:
     """A key of the configuration, such as specimen.width_mm."""
     key, value = said.get("key"), said.get("value")
     if (
@@ -91,17 +91,17 @@ def put(bench: SetupSession, said: Said) -> None:
         or key in ("measure.roi", "measure.mask")
     ):
         raise ConfigError(f"{key} is not changed like this")
-    bench.draft.change_all({key: None if value == "" else value})
+    session.draft.change_all({key: None if value == "" else value})
     if key.startswith("measure."):
-        bench.region_changed()
+        session.region_changed()
 
 
-def gauge(bench: SetupSession, said: Said) -> None:
+def gauge(session: SetupSession, said: Said) -> None:
     """A gauge made of a table or of places (``kind`` and ``points``), moved to others, or taken away.
 
     ``was`` is its name so far; a new one without a name gets the usual one of its kind.
     """
-    gauges, name = bench.draft.config.gauges, said.get("name")
+    gauges, name = session.draft.config.gauges, said.get("name")
     was = said.get("was", name)
     before = dict(gauges[was]) if isinstance(was, str) and was in gauges else {}
     table = said.get("gauge", before)
@@ -116,7 +116,7 @@ def gauge(bench: SetupSession, said: Said) -> None:
         if name in gauges:
             raise ConfigError(f"there is a gauge {name} already")
         changes[f"gauges.{was}"] = None
-    bench.draft.change_all(changes | {f"gauges.{name}": table})
+    session.draft.change_all(changes | {f"gauges.{name}": table})
 
 
 def _placed(kind: object, points: object) -> dict[str, Any]:
@@ -134,24 +134,24 @@ def _unused(usual: str, taken: Container[str]) -> str:
     return next(name for name in names if name not in taken)
 
 
-def place(bench: SetupSession, said: Said) -> None:
+def place(session: SetupSession, said: Said) -> None:
     """Gauges that place themselves on the region; others stay."""
-    bench.place_gauges()
+    session.place_gauges()
 
 
-def scale(bench: SetupSession, said: Said) -> None:
+def scale(session: SetupSession, said: Said) -> None:
     """mm per px from two points and their distance."""
     points = said.get("points")
     if not _are_points(points):
         raise ConfigError("a scale is two points in px and their distance in mm")
     x1, y1, x2, y2 = (_number("a point", v) for point in points for v in point)
     mm = _number("a distance", said.get("mm"))
-    bench.draft.change_all(from_points((x1, y1, x2, y2), mm).changes())
-    bench.scaled()
-    bench.region_changed()
+    session.draft.change_all(from_points((x1, y1, x2, y2), mm).changes())
+    session.scaled()
+    session.region_changed()
 
 
-def board(bench: SetupSession, said: Said) -> None:
+def board(session: SetupSession, said: Said) -> None:
     """mm per px from a board that is held where the specimen will be; without ``marker`` a checkerboard."""
     columns, rows = said.get("columns"), said.get("rows")
     words = said.get("dictionary", "4X4_50")
@@ -162,8 +162,8 @@ def board(bench: SetupSession, said: Said) -> None:
     square = _number("a square in mm", said.get("square"), 0, LONGEST_MM)
     marker = _number("a marker in mm", said.get("marker", 0), 0, LONGEST_MM)
     seen = Board(columns, rows, square, marker, words)
-    bench.draft.change_all(bench.scale_from(seen).changes())
-    bench.region_changed()
+    session.draft.change_all(session.scale_from(seen).changes())
+    session.region_changed()
 
 
 def _number(what: str, value: object, low: float = -math.inf, high: float = math.inf) -> float:
@@ -185,19 +185,19 @@ def _is_place(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6
 
 
-def check(bench: SetupSession, said: Said) -> None:
+def check(session: SetupSession, said: Said) -> None:
     """The whole check, with its table."""
-    bench.check()
+    session.check()
 
 
-def forget(bench: SetupSession, said: Said) -> None:
+def forget(session: SetupSession, said: Said) -> None:
     """The peak of the sharpness."""
-    bench.forget_peak()
+    session.forget_peak()
 
 
-def save(bench: SetupSession, said: Said) -> None:
+def save(session: SetupSession, said: Said) -> None:
     """Into the rig file."""
-    bench.save()
+    session.save()
 
 
 CHANGES: dict[str, Callable[[SetupSession, Said], None]] = {

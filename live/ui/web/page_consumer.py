@@ -87,7 +87,7 @@ class Running(Protocol):
     def recording(self) -> bool: ...
 
     @property
-    def books(self) -> RunState: ...
+    def run_state(self) -> RunState: ...
 
     @property
     def folder(self) -> Path: ...
@@ -98,7 +98,7 @@ class PageConsumer(Consumer):
 
     Parameters
     ----------
-    hub : Broadcaster
+    broadcaster : Broadcaster
     config : Config
     now : callable giving monotonic seconds
 
@@ -113,8 +113,10 @@ class PageConsumer(Consumer):
     policy = Policy.NEWEST
     patience_s = 5.0
 
-    def __init__(self, hub: Broadcaster, config: Config, now: Callable[[], float] = time.monotonic) -> None:
-        self._hub, self._config, self._now = hub, config, now
+    def __init__(
+        self, broadcaster: Broadcaster, config: Config, now: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._broadcaster, self._config, self._now = broadcaster, config, now
         axis = config.specimen.first_axis
         self._component = f"e{axis * 2}"
         self._maps = FieldMaps(axis, config.view.strain_range)
@@ -135,7 +137,7 @@ class PageConsumer(Consumer):
 
     def attend(self, running: Running) -> None:
         """The run has begun, and can be asked."""
-        self._running, self._began = running, running.books.vitals.began_t
+        self._running, self._began = running, running.run_state.health.began_t
 
     def choose(self, component: str) -> str:
         """Show another map; a refusal in words, or empty."""
@@ -152,10 +154,12 @@ class PageConsumer(Consumer):
 
     def settled(self, measurement: Measurement) -> None:
         """A point of the curves."""
-        i = measurement.instant
+        i = measurement.time_step
         if math.isnan(self._t0):
             self._t0 = i.t
-        axis = self._running.books.history.axis_by_now if self._running else self._config.specimen.first_axis
+        axis = (
+            self._running.run_state.history.axis_by_now if self._running else self._config.specimen.first_axis
+        )
         gauges = [
             i.gauges[name].value if name in i.gauges else getattr(i, name, math.nan) for name in self._names
         ]
@@ -171,7 +175,7 @@ class PageConsumer(Consumer):
         """Keep the last ones."""
         if event.kind is EventKind.MEASURED:
             return
-        names = {} if self._running is None else self._running.books.journal.names
+        names = {} if self._running is None else self._running.run_state.event_log.names
         text = printable(sentence(event, names))
         told = {"level": event.level, "kind": str(event.kind), "text": text}
         self._events.append((self._now(), told))
@@ -181,8 +185,8 @@ class PageConsumer(Consumer):
         now = self._now()
         if now >= self._due["state"]:
             self._due["state"] = now + STATE_S
-            self._hub.tell("run", self.state())
-        if now >= self._due["picture"] and self._fresh and self._hub.watched:
+            self._broadcaster.tell("run", self.state())
+        if now >= self._due["picture"] and self._fresh and self._broadcaster.watched:
             self._draw()
             # No more than a fifth of the time is spent on drawing, however large the pictures are.
             self._due["picture"] = max(now + PICTURE_S, self._now() + 4 * (self._now() - now))
@@ -190,7 +194,7 @@ class PageConsumer(Consumer):
 
     def end(self) -> str:
         """A last word to the pages."""
-        self._hub.tell("run", self.state() | {"state": "ended"})
+        self._broadcaster.tell("run", self.state() | {"state": "ended"})
         return f"{self._shown} pictures shown"
 
     # -- what is told -------------------------------------------------------------------------
@@ -198,7 +202,7 @@ class PageConsumer(Consumer):
     def state(self) -> dict[str, Any]:
         """Where the run stands."""
         running, now = self._running, self._now()
-        s = Snapshot(now, elapsed_s=now - self._began) if running is None else running.books.snapshot(now)
+        s = Snapshot(now, elapsed_s=now - self._began) if running is None else running.run_state.snapshot(now)
         told: dict[str, Any] = {
             "state": self._word(s),
             "elapsed_s": s.elapsed_s,
@@ -221,7 +225,7 @@ class PageConsumer(Consumer):
     def _word(self, s: Snapshot) -> str:
         if self._running is None:
             return "opening"
-        if s.instant is None:
+        if s.time_step is None:
             return "reference"
         return "paused" if self._running.paused else "measuring"
 
@@ -231,7 +235,7 @@ class PageConsumer(Consumer):
         if m is not None:
             picture, scale = shrunk(m.burst.mean, m.burst.bits)
             painted = self._maps.paint(m.field, (self._component,))[self._component]
-            lay_cells(picture, scale, m.field.grid, painted.rgba, (m.instant.u, m.instant.v))
+            lay_cells(picture, scale, m.field.grid, painted.rgba, (m.time_step.u, m.time_step.v))
             self._scale = _scale_of(painted)
             size = m.burst.mean.shape
         elif frame is not None:
@@ -268,7 +272,7 @@ def gauges_of(config: Config) -> dict[str, Any]:
 
 
 def _measured(s: Snapshot) -> dict[str, Any]:
-    i = s.instant
+    i = s.time_step
     if i is None:
         return {}
     gauges = [

@@ -62,7 +62,7 @@ class PageController:
     Attributes
     ----------
     stage : str
-    bench : SetupSession or None
+    session : SetupSession or None
         While it is set up.
     server : PageServer
     viewer : callable
@@ -72,9 +72,9 @@ class PageController:
     def __init__(self, draft: ConfigDraft | None, port: int = DEFAULT_PORT) -> None:
         self.draft = draft
         self.stage = RUN if draft is None else SET_UP
-        self.bench: SetupSession | None = None
+        self.session: SetupSession | None = None
         self._drawn: DrawnRegion | None = None
-        self._hub = Broadcaster()
+        self._broadcaster = Broadcaster()
         self._watching: PageConsumer | None = None
         self._live: ControlledRun | None = None
         self._report: Path | None = None
@@ -90,14 +90,14 @@ class PageController:
             "/report": self._show_report,
         }
         posts = {"/order": self._order, "/setup": self._change, "/map": self._map, "/viewer": self._viewer}
-        self.server = PageServer(self._hub, gets, posts, port)
+        self.server = PageServer(self._broadcaster, gets, posts, port)
         self._tell_stage()
 
     def __enter__(self) -> PageController:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._hub.tell("gone", True)  # of its own kind: a page must still hear of the stage before
+        self._broadcaster.tell("gone", True)  # of its own kind: a page must still hear of the stage before
         threading.Event().wait(GOODBYE_S)
         self.server.close()
         self._folder.cleanup()
@@ -124,15 +124,15 @@ class PageController:
         assert self.draft is not None
         if not self.draft.config.metadata.get("specimen"):
             self.draft.change_all({"metadata.specimen": self._unused(FIRST)})
-        with SetupSession(self.draft, self._hub, self._drawn) as bench:
-            self.bench = bench
+        with SetupSession(self.draft, self._broadcaster, self._drawn) as session:
+            self.session = session
             self._enter(SET_UP, words)
             started = self._wishes.get() == START
-        self.bench, self._drawn = None, bench.drawn
-        return self._to_run(bench) if started else None
+        self.session, self._drawn = None, session.drawn
+        return self._to_run(session) if started else None
 
-    def _to_run(self, bench: SetupSession) -> Config:
-        config = bench.config(Path(self._folder.name))
+    def _to_run(self, session: SetupSession) -> Config:
+        config = session.config(Path(self._folder.name))
         wanted = self._folder_of(str(config.metadata["specimen"]))
         tries = (wanted.with_name(f"{wanted.name}_{n}") for n in range(2, 10_000))
         folder = next(one for one in tries if not one.exists()) if wanted.exists() else wanted
@@ -152,7 +152,7 @@ class PageController:
 
     def begin(self, config: Config) -> PageConsumer:
         """A run begins; what is to watch it."""
-        self._watching, self._live = PageConsumer(self._hub, config), None
+        self._watching, self._live = PageConsumer(self._broadcaster, config), None
         self._enter(RUN, "")
         return self._watching
 
@@ -169,14 +169,14 @@ class PageController:
         if self.draft is not None:
             name = self._unused(counted_up(str(self.draft.config.metadata.get("specimen", FIRST))))
         self._after = {**told, "report": False, "next": name}
-        self._hub.tell("after", self._after)
+        self._broadcaster.tell("after", self._after)
         self._enter(AFTER, "")
 
     def reported(self, report: Path | None) -> None:
         """The report of the last run is there, or could not be made."""
         self._report = report
         self._after |= {"report": report is not None}
-        self._hub.tell("after", self._after)
+        self._broadcaster.tell("after", self._after)
 
     def after(self) -> bool:
         """Wait for the operator; whether a next specimen is to be set up."""
@@ -197,7 +197,7 @@ class PageController:
             {"kind": name, "label": one.label, "hint": one.hint, "gesture": one.gesture}
             for name, one in GAUGE_KINDS.items()
         ]
-        self._hub.tell("stage", said | {"components": FIELD_MAPS, "ramp": RAMP, "kinds": kinds})
+        self._broadcaster.tell("stage", said | {"components": FIELD_MAPS, "ramp": RAMP, "kinds": kinds})
 
     # -- what a page asks ---------------------------------------------------------------------
 
@@ -210,14 +210,14 @@ class PageController:
         return of_json(self._watching.curve.since(int(edition), int(count)))
 
     def _picture(self, query: Mapping[str, str]) -> Response:
-        bench, watching = self.bench, self._watching
-        content = bench.picture if bench is not None else b"" if watching is None else watching.picture
+        session, watching = self.session, self._watching
+        content = session.picture if session is not None else b"" if watching is None else watching.picture
         return jpeg(content) if content else Response(as_png(np.zeros((1, 1), np.uint8)), "image/png")
 
     def _mask(self, query: Mapping[str, str]) -> Response:
-        if self.bench is None:
+        if self.session is None:
             raise HttpError(404, "nothing is set up")
-        return Response(self.bench.mask_picture(), "image/png")
+        return Response(self.session.mask_picture(), "image/png")
 
     def _show_report(self, query: Mapping[str, str]) -> Response:
         if self._report is None:
@@ -232,7 +232,7 @@ class PageController:
 
     def _viewer(self, said: Mapping[str, Any]) -> dict[str, str]:
         """Open it at the port that the view has told: another than was wanted where that was taken."""
-        port = None if self._live is None else self._live.books.vitals.view_port
+        port = None if self._live is None else self._live.run_state.health.view_port
         if port is None:
             return {"answer": "no: the view is switched off, or not there yet; after a test see its view.rrd"}
         return {"answer": self.viewer(port)}
@@ -246,14 +246,14 @@ class PageController:
         live, word = self._live, line.strip()
         if live is not None:
             return answer(line, live)
-        if self.stage == RUN or (self.stage == SET_UP and self.bench is None):
+        if self.stage == RUN or (self.stage == SET_UP and self.session is None):
             return "no: the test is being opened"
         allowed = (START, QUIT) if self.stage == SET_UP else (NEXT, QUIT)
         if word not in allowed or self.draft is None:
             return f"no: now there are {', '.join(allowed)}"
         try:
-            if word == START and self.bench is not None:
-                self.bench.ready(Path(self._folder.name))
+            if word == START and self.session is not None:
+                self.session.ready(Path(self._folder.name))
         except PhasedicError as error:
             return f"no: {printable(brief(error))}"
         self._wishes.put(word)
@@ -261,31 +261,31 @@ class PageController:
 
     def _change(self, said: Mapping[str, Any]) -> dict[str, str]:
         """A change of the rig."""
-        bench = self.bench
-        if bench is None:
+        session = self.session
+        if session is None:
             return {"answer": "no: nothing is set up now"}
         change = CHANGES.get(str(said.get("do")))
         if change is None:
             return {"answer": f"no: there are {', '.join(CHANGES)}"}
         try:
-            change(bench, said)
+            change(session, said)
         except (ConfigError, DataError) as error:
             return {"answer": f"no: {printable(brief(error))}"}
-        bench.refresh()
+        session.refresh()
         return {"answer": "ok"}
 
 
-def ended(books: RunState, specimen: SpecimenConfig, folder: Path, words: str) -> dict[str, Any]:
+def ended(run_state: RunState, specimen: SpecimenConfig, folder: Path, words: str) -> dict[str, Any]:
     """Figures, summary, ledger and losses; ``words`` say how the run ended, empty where it ended well."""
-    figures = evaluate(books.history, books.loads, specimen) if books.history.instants else None
-    troubles = books.journal.events("warning", "error")
+    figures = evaluate(run_state.history, run_state.loads, specimen) if run_state.history.time_steps else None
+    troubles = run_state.event_log.events("warning", "error")
     return {
         "folder": str(folder),
         "words": words,
         "figures": [] if figures is None else _figures(figures, specimen),
-        "lines": [line.strip() for line in summary_lines(books, specimen)],
-        "ledger": books.ledger.line(),
-        "troubles": [sentence(event, books.journal.names) for event in troubles[-5:]],
+        "lines": [line.strip() for line in summary_lines(run_state, specimen)],
+        "ledger": run_state.frame_counts.line(),
+        "troubles": [sentence(event, run_state.event_log.names) for event in troubles[-5:]],
     }
 
 

@@ -1,6 +1,6 @@
 """The page's server: the standard library's, on 127.0.0.1 alone, a thread for each request.
 
-Requests of a page are few; what is told to it goes as server-sent events (``hub``). ``door`` judges every
+Requests of a page are few; what is told to it goes as server-sent events (``broadcaster``). ``guard`` judges every
 request before anything is done.
 
 What a request is answered with: pages and pictures of ours, each with what a browser may do with it.
@@ -107,7 +107,7 @@ class PageServer:
 
     Parameters
     ----------
-    hub : Broadcaster
+    broadcaster : Broadcaster
     gets, posts : mapping of path to callable
         What is answered beside the files of the page and the events.
     port : int
@@ -115,7 +115,7 @@ class PageServer:
 
     Attributes
     ----------
-    door : RequestGuard
+    guard : RequestGuard
 
     Raises
     ------
@@ -124,12 +124,16 @@ class PageServer:
     """
 
     def __init__(
-        self, hub: Broadcaster, gets: Mapping[str, Get], posts: Mapping[str, Post], port: int = DEFAULT_PORT
+        self,
+        broadcaster: Broadcaster,
+        gets: Mapping[str, Get],
+        posts: Mapping[str, Post],
+        port: int = DEFAULT_PORT,
     ) -> None:
-        self.hub, self.gets, self.posts = hub, gets, posts
+        self.broadcaster, self.gets, self.posts = broadcaster, gets, posts
         self._closed = threading.Event()
         self._server = _open_server(port)
-        self.door = RequestGuard(self._server.server_address[1], secrets.token_urlsafe(24))
+        self.guard = RequestGuard(self._server.server_address[1], secrets.token_urlsafe(24))
         self._server.page = self
         self._threads = [
             threading.Thread(target=self._server.serve_forever, args=(0.2,), name="page", daemon=True),
@@ -141,12 +145,12 @@ class PageServer:
     @property
     def address(self) -> str:
         """What a person opens in a browser."""
-        return self.door.address
+        return self.guard.address
 
     def close(self) -> None:
         """End all streams and give the port back."""
         self._closed.set()
-        self.hub.close()
+        self.broadcaster.close()
         self._server.shutdown()
         self._server.server_close()
 
@@ -154,7 +158,7 @@ class PageServer:
         beats = 0
         while not self._closed.wait(BEAT_S):
             beats += 1
-            self.hub.tell("beat", beats)
+            self.broadcaster.tell("beat", beats)
 
 
 class _Server(ThreadingHTTPServer):
@@ -202,7 +206,7 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _guarded(self, step: Callable[[], None]) -> None:
         try:
-            self.server.page.door.check_place(self.headers)
+            self.server.page.guard.check_place(self.headers)
             step()
         except HttpError as refused:
             self.close_connection = True
@@ -220,9 +224,9 @@ class _Handler(BaseHTTPRequestHandler):
         if parts.path == "/" and "token" in query:
             self._let_in(query["token"])
             return
-        page.door.check_cookie(self.headers)
+        page.guard.check_cookie(self.headers)
         if parts.path == "/events":
-            self._events(page.hub)
+            self._events(page.broadcaster)
         elif parts.path in page.gets:
             self._send(page.gets[parts.path](query))
         else:
@@ -231,19 +235,19 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _let_in(self, word: str) -> None:
         """Put the token into a cookie and take it out of the address, where it could be read or handed on."""
-        door = self.server.page.door
-        if not door.is_key(word):
+        guard = self.server.page.guard
+        if not guard.is_key(word):
             raise HttpError(403, "a wrong token; open the address that phasedic has printed")
         self.send_response(303)
         self.send_header("Location", "/")
-        self.send_header("Set-Cookie", door.cookie)
+        self.send_header("Set-Cookie", guard.cookie)
         self.send_header("Content-Length", "0")
         self.end_headers()
 
     def _post(self) -> None:
         page = self.server.page
-        length = page.door.check_post(self.headers)
-        page.door.check_cookie(self.headers)
+        length = page.guard.check_post(self.headers)
+        page.guard.check_cookie(self.headers)
         handler = page.posts.get(urlsplit(self.path).path)
         if handler is None:
             raise HttpError(404, "there is no such thing")
@@ -255,9 +259,9 @@ class _Handler(BaseHTTPRequestHandler):
             raise HttpError(400, "an object is expected")
         self._send(of_json(handler(value)))
 
-    def _events(self, hub: Broadcaster) -> None:
+    def _events(self, broadcaster: Broadcaster) -> None:
         """Server-sent events until the page goes or all is over."""
-        stream = hub.open()
+        stream = broadcaster.open()
         if stream is None:
             raise HttpError(503, "too many pages are open; close one")
         try:
@@ -269,7 +273,7 @@ class _Handler(BaseHTTPRequestHandler):
                     self.wfile.write(b"event: %s\ndata: %s\n\n" % (kind.encode(), message))
                 self.wfile.flush()
         finally:
-            hub.leave(stream)
+            broadcaster.leave(stream)
 
     def _send(self, answer: Response, status: int = 200) -> None:
         self._head(status, answer.kind, answer.policy, len(answer.content))

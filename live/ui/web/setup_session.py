@@ -1,6 +1,6 @@
-"""Setting up: the camera is looked at, the still specimen judged again and again, the region drawn.
+"""Set-up before a test: the live picture, the region drawn on it, and the check of the still specimen.
 
-The camera's thread (``eye``) draws a few pictures a second, another judges (``live.setup.check``) what was last seen.
+The camera's thread (``preview``) draws a few pictures a second; another judges the newest (``live.setup.check``).
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ class SetupSession:
     Parameters
     ----------
     draft : ConfigDraft
-    hub : Broadcaster
+    broadcaster : Broadcaster
         Told what there is to see.
     drawn : DrawnRegion, optional
         The region of the specimen before.
@@ -71,9 +71,11 @@ class SetupSession:
         None until there is a picture.
     """
 
-    def __init__(self, draft: ConfigDraft, hub: Broadcaster, drawn: DrawnRegion | None = None) -> None:
-        self.draft, self._hub, self.drawn = draft, hub, drawn
-        self.eye = CameraPreview(draft, self._opened, self._show)
+    def __init__(
+        self, draft: ConfigDraft, broadcaster: Broadcaster, drawn: DrawnRegion | None = None
+    ) -> None:
+        self.draft, self._broadcaster, self.drawn = draft, broadcaster, drawn
+        self.preview = CameraPreview(draft, self._opened, self._show)
         self.picture = b""
         self.overlays = {"saturated": True, "quality": False}
         self._figures: CheckFigures | None = None
@@ -87,13 +89,13 @@ class SetupSession:
         self._judging = threading.Thread(target=self._work, name="page-judge", daemon=True)
 
     def __enter__(self) -> SetupSession:
-        self.eye.start()
+        self.preview.start()
         self._judging.start()
         return self
 
     def __exit__(self, *_: object) -> None:
         self._leave.set()
-        self.eye.close()
+        self.preview.close()
         self._judging.join()
         self._folder.cleanup()
 
@@ -101,11 +103,11 @@ class SetupSession:
 
     def refresh(self) -> None:
         """Tell the pages anew, after a change."""
-        self._hub.tell("setup", self.state())
+        self._broadcaster.tell("setup", self.state())
 
     def check(self) -> None:
         """Take as many frames as ``phasedic check`` does, and judge them with the table."""
-        self.eye.collect(self._enough())
+        self.preview.collect(self._enough())
         self._told |= {"checking": True, "go": None}
 
     def forget_peak(self) -> None:
@@ -120,7 +122,7 @@ class SetupSession:
 
     def find(self) -> None:
         """Look for the specimen in what is seen now; raises DataError where nothing is seen."""
-        frames, info = self.eye.recent(), self.eye.info
+        frames, info = self.preview.recent(), self.preview.info
         if not frames or info is None:
             raise DataError("the camera has given no picture yet")
         stack = np.stack([frame.image for frame in frames]).astype(np.float32)
@@ -132,7 +134,7 @@ class SetupSession:
 
     def scale_from(self, board: Board) -> Scale:
         """The scale from a board in what is seen now; raises DataError where none is."""
-        frames = self.eye.recent()
+        frames = self.preview.recent()
         if not frames:
             raise DataError("the camera has given no picture yet")
         picture = np.stack([frame.image for frame in frames]).mean(axis=0, dtype=np.float32)
@@ -203,11 +205,11 @@ class SetupSession:
 
     def state(self) -> dict[str, Any]:
         """All that the page shows of it."""
-        info, config, drawn = self.eye.info, self.draft.config, self.drawn
+        info, config, drawn = self.preview.info, self.draft.config, self.drawn
         m, specimen = config.measure, config.specimen
         return {
             **self._told,
-            "trouble": self.eye.trouble,
+            "trouble": self.preview.trouble,
             "camera": None if info is None else camera_values(info),
             "picture": self._shown,
             "overlays": self.overlays,
@@ -234,7 +236,7 @@ class SetupSession:
     def _show(self, frame: Frame) -> float:
         """Draw, where somebody looks; when to draw again."""
         began = time.monotonic()
-        if self._hub.watched:
+        if self._broadcaster.watched:
             picture, scale = shrunk(frame.image, frame.bits)
             figures = self._figures
             if self.overlays["quality"] and figures is not None:
@@ -262,15 +264,15 @@ class SetupSession:
             self._leave.wait(JUDGE_S)
 
     def _judge(self) -> None:
-        info, frames = self.eye.info, self.eye.recent()
-        if info is None or len(frames) < RECENT or self.eye.collecting:
+        info, frames = self.preview.info, self.preview.recent()
+        if info is None or len(frames) < RECENT or self.preview.collecting:
             return  # frames that a check needs must not be lost for want of processor time
         self._compile(info)
         if self.drawn is None:
             self._begin(info)
             if self.draft.config.measure.gauges == AUTO:
                 self.place_gauges()
-        collected = self.eye.collected()
+        collected = self.preview.collected()
         if collected is not None:
             self._check(collected, info)
         else:
@@ -314,7 +316,7 @@ class SetupSession:
         self.region_changed()
 
     def _enough(self) -> int:
-        info = self.eye.info
+        info = self.preview.info
         if info is None:
             raise DataError("the camera has given no picture yet")
         wanted = 2 * (self.draft.config.measure.reference_burst or DEFAULT_REFERENCE_BURST)

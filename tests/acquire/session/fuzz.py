@@ -80,7 +80,7 @@ def outcome(path: Path) -> str:
     try:
         with Session.open(path) as session:
             wrong = any(not _right(session, number) for number in range(len(session)))
-            session.load_samples(), session.events(), session.ledger, session.clock_pairs
+            session.load_samples(), session.events(), session.frame_counts, session.clock_pairs
             short = len(session) != FRAMES
     except DataError:
         return "refused"

@@ -89,7 +89,7 @@ def test_recover_makes_a_clean_copy(tmp_path: Path) -> None:
     assert (done.frames, done.load_samples, done.unreadable) == (6, 6, ())
     assert done.path.name == "killed.recovered.h5" and path.read_bytes() == before
     with Session.open(done.path) as back:
-        assert back.recovered is None and back.ledger is None
+        assert back.recovered is None and back.frame_counts is None
         assert back.indices.tolist() == [5, 6, 7, 8, 9, 10]
         assert back.metadata == {"operator": "Zoé"}
         assert "copied from killed.h5" in back.events()[-1].text
@@ -114,7 +114,7 @@ def test_a_frame_that_cannot_be_read_becomes_a_counted_loss(tmp_path: Path) -> N
     assert done.frames == 3 and len(done.unreadable) == 1 and "1 things could not be read" in done.line()
     with Session.open(done.path) as back:
         assert [f.lost_before for f in back.frames()] == [0, 1, 0]
-        assert back.ledger == {"grabbed": 4}
+        assert back.frame_counts == {"grabbed": 4}
 
 
 def test_a_cropped_session_keeps_its_crop(tmp_path: Path) -> None:

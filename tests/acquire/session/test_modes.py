@@ -127,7 +127,7 @@ def test_a_rotated_set_opens_as_one(tmp_path: Path, opened: str) -> None:
         for k, found in enumerate(back.frames()):
             np.testing.assert_array_equal(found.image, frame(k).image)
         assert len(back.load_samples()) == 10
-        assert back.ledger == {"grabbed": 10} and back.clock_pairs == [START]
+        assert back.frame_counts == {"grabbed": 10} and back.clock_pairs == [START]
         assert back.recovered is None
 
 

@@ -86,7 +86,7 @@ def test_what_was_said_once_comes_back(path: Path) -> None:
         assert back.config == {"measure": {"zoi": 64}}
         assert back.metadata == {"operator": "Zoé"}
         assert back.start_utc == START.utc and back.start_monotonic == START.monotonic
-        assert back.ledger is None
+        assert back.frame_counts is None
         assert len(back) == 0 and back.load_samples() == [] and back.events() == []
 
 
@@ -122,7 +122,7 @@ def test_ledger_and_clock_pairs(path: Path) -> None:
         session.write_clock(later)
         session.write_ledger({"grabbed": 3, "lost": 0})
     with Session.open(path) as back:
-        assert back.ledger == {"grabbed": 3, "lost": 0}
+        assert back.frame_counts == {"grabbed": 3, "lost": 0}
         assert back.clock_pairs == [START, later]
 
 

@@ -133,20 +133,20 @@ def test_recover(tmp_path: Path) -> None:
 
 
 def test_the_port_that_is_told_is_the_one_that_is_served(tmp_path: Path) -> None:
-    books = RunState.new(0.5)
+    run_state = RunState.new(0.5)
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         wanted = taken.getsockname()[1]
         config = load_config(None, {"view.port": wanted, "view.rrd": False, "view.spawn": False})
         about = RunInfo(config, tmp_path, CAMERA, make_grid(), ClockPair(START, datetime.now(UTC)))
-        consumers = standard_consumers(TerminalScreen())(about, books)
-        outputs = Outputs(consumers, books.loads, books.journal, books.history)
+        consumers = standard_consumers(TerminalScreen())(about, run_state)
+        outputs = Outputs(consumers, run_state.loads, run_state.event_log, run_state.history)
         try:
             end = time.monotonic() + 60
-            while books.vitals.view_port is None and time.monotonic() < end:
+            while run_state.health.view_port is None and time.monotonic() < end:
                 time.sleep(0.05)
-            port = books.vitals.view_port
+            port = run_state.health.view_port
             assert port is not None and port != wanted
             socket.create_connection(("127.0.0.1", port), 5).close()
         finally:

@@ -51,8 +51,8 @@ class Keeper(Consumer):
 
 
 def outputs(*consumers: Consumer, loads: LoadLog | None = None) -> tuple[Outputs, EventLog]:
-    journal = EventLog()
-    return Outputs(consumers, loads or LoadLog(), journal, History()), journal
+    event_log = EventLog()
+    return Outputs(consumers, loads or LoadLog(), event_log, History()), event_log
 
 
 def give(out: Outputs, numbers: Sequence[int]) -> None:
@@ -63,14 +63,14 @@ def give(out: Outputs, numbers: Sequence[int]) -> None:
 @pytest.mark.parametrize("blocks", [True, False])
 def test_every_measurement_is_passed_on_and_kept(blocks: bool) -> None:
     keeper = Keeper(policy=Policy.WAIT, blocks=blocks)
-    out, journal = outputs(keeper)
+    out, event_log = outputs(keeper)
     give(out, range(100))
     out.end()
     assert keeper.rows == list(range(100))
     assert keeper.ended
-    assert [i.eyy for i in out.history.instants] == pytest.approx([1e-3] * 100)
+    assert [i.eyy for i in out.history.time_steps] == pytest.approx([1e-3] * 100)
     assert not out.failed
-    assert not journal.events()
+    assert not event_log.events()
     (report,) = out.reports
     assert report.line() == "consumer: 100 measurements; kept"
 
@@ -141,24 +141,24 @@ def test_one_that_waits_holds_the_measurement_up_and_loses_nothing() -> None:
 def test_a_failure_stops_one_consumer_alone(error: Exception, says: str, blocks: bool) -> None:
     broken = Keeper(policy=Policy.WAIT, fails_at=3, error=error, vital=True, blocks=blocks)
     sound = Keeper(policy=Policy.WAIT)
-    out, journal = outputs(broken, sound)
+    out, event_log = outputs(broken, sound)
     give(out, range(200))
     out.end()
     assert broken.rows == [0, 1, 2]
     assert broken.ended
     assert sound.rows == list(range(200))
-    assert len(out.history.instants) == 200
+    assert len(out.history.time_steps) == 200
     assert out.failed
-    assert [says in event.text for event in journal.events("error")] == [True]
+    assert [says in event.text for event in event_log.events("error")] == [True]
     assert says in out.reports[0].line()
 
 
 def test_a_failure_of_one_that_is_not_vital_is_a_warning() -> None:
-    out, journal = outputs(Keeper(fails_at=0))
+    out, event_log = outputs(Keeper(fails_at=0))
     give(out, [0])
     out.end()
     assert not out.failed
-    assert len(journal.events("warning")) == 1
+    assert len(event_log.events("warning")) == 1
 
 
 def test_one_that_waits_and_fails_lets_the_measurement_go_on() -> None:
@@ -214,7 +214,7 @@ class Listener(Consumer):
 def test_each_kind_reaches_those_who_define_it() -> None:
     listener, keeper = Listener(), Keeper()
     loads = make_loads(10.0, lambda t: 100.0 * t)
-    out, journal = outputs(listener, keeper, loads=loads)
+    out, event_log = outputs(listener, keeper, loads=loads)
     assert listener.begun.wait(10)
     assert out.wants_frames
     assert not outputs(keeper)[0].wants_frames
@@ -224,7 +224,7 @@ def test_each_kind_reaches_those_who_define_it() -> None:
     sample = LoadSample(START, 5.0, unit="kg")
     out.load(sample)
     for k in range(MOST_EVENTS + 5):
-        journal.tell(EventKind.NOTE, "operator", str(k))
+        event_log.tell(EventKind.NOTE, "operator", str(k))
     listener.go.set()
     out.end()
     assert listener.seen["frame"] == [2]  # a camera waits for nobody: the newest wins

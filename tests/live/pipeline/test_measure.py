@@ -122,9 +122,9 @@ def test_a_blank_picture_does_not_end_the_measurement(speckle: Speckle) -> None:
     assert "was not renewed" in told[0].text
 
 
-def instants(count: int) -> list[TimeStep]:
+def time_steps(count: int) -> list[TimeStep]:
     """Still for a third, then pulled along x."""
-    one, rng = make_measurement(0).instant, np.random.default_rng(1)
+    one, rng = make_measurement(0).time_step, np.random.default_rng(1)
     found = []
     for k in range(count):
         e = 1e-3 * max(0.0, 3 * k / count - 1)
@@ -136,7 +136,7 @@ def instants(count: int) -> list[TimeStep]:
 @pytest.mark.parametrize("most", [2000, 50])
 def test_y_until_the_strains_tell(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
     monkeypatch.setattr(module, "MOST_INSTANTS", most)
-    finder, course = AxisFinder("auto"), instants(300)
+    finder, course = AxisFinder("auto"), time_steps(300)
     told = [finder.add(i) for i in course]
     assert set(told[:100]) == {"y"} and set(told[130:]) == {"x"}
     assert len(finder._strains.kept) <= most
@@ -147,7 +147,7 @@ def test_y_until_the_strains_tell(monkeypatch: pytest.MonkeyPatch, most: int) ->
 def test_what_is_given_holds() -> None:
     for axis in ("x", "y"):
         finder = AxisFinder(axis)
-        assert {finder.add(i) for i in instants(100)} == {axis}
+        assert {finder.add(i) for i in time_steps(100)} == {axis}
 
 
 def test_smear_is_told_when_it_begins_and_ends() -> None:
@@ -217,26 +217,26 @@ def some(i: int) -> TimeStep:
 
 def test_what_goes_in_comes_out() -> None:
     history, put = History(), [some(i) for i in range(40)]
-    for instant in put:
-        history.add(instant)
-    assert len(history.instants) == 40
-    assert [repr(instant) for instant in history.instants] == [repr(instant) for instant in put]
-    assert repr(history.instants[-1]) == repr(put[-1]) and isinstance(history.instants[-1].n_zoi, int)
-    assert repr(history.instants[3:9:2]) == repr(put[3:9:2])
+    for time_step in put:
+        history.add(time_step)
+    assert len(history.time_steps) == 40
+    assert [repr(time_step) for time_step in history.time_steps] == [repr(time_step) for time_step in put]
+    assert repr(history.time_steps[-1]) == repr(put[-1]) and isinstance(history.time_steps[-1].n_zoi, int)
+    assert repr(history.time_steps[3:9:2]) == repr(put[3:9:2])
     for name in NUMBERS:
-        assert np.array_equal(history.column(name), [getattr(instant, name) for instant in put])
+        assert np.array_equal(history.column(name), [getattr(time_step, name) for time_step in put])
     axial = history.gauge("axial")
     assert axial is not None and np.array_equal(axial, [i * 1e-5 for i in range(40)])
     for beyond in (40, -41):
         with pytest.raises(IndexError):
-            history.instants[beyond]
+            history.time_steps[beyond]
 
 
 def test_a_gauge_that_comes_and_goes() -> None:
     history, late = History(), {"late": GaugeValue(1.0, 0.1)}
     for gauges in ({}, late, {}):
         history.add(replace(some(0), gauges=gauges))
-    assert [dict(instant.gauges) for instant in history.instants] == [{}, late, {}]
+    assert [dict(time_step.gauges) for time_step in history.time_steps] == [{}, late, {}]
     assert history.gauge("late") is None, "the first instant has none of that name"
 
 

@@ -23,30 +23,30 @@ from live.ui.web.page_consumer import PageConsumer
 from tests.live.made_up import make_measurement
 
 
-def instant(**more: Any) -> TimeStep:
-    return replace(make_measurement(0).instant, **more)
+def time_step(**more: Any) -> TimeStep:
+    return replace(make_measurement(0).time_step, **more)
 
 
 def loaded(*forces: float, axis: str = "y") -> RunState:
     """A test with these forces, one a second."""
-    books = RunState.new(1.0, specimen=SpecimenConfig(axis=axis, area_mm2=40.0))
-    books.vitals.state, books.vitals.began_t = "REC", 0.0
+    run_state = RunState.new(1.0, specimen=SpecimenConfig(axis=axis, area_mm2=40.0))
+    run_state.health.state, run_state.health.began_t = "REC", 0.0
     for t, force in enumerate(forces):
-        books.loads.append(LoadSample(t, force))
-        books.vitals.loaded(t, force)
-    return books
+        run_state.loads.append(LoadSample(t, force))
+        run_state.health.loaded(t, force)
+    return run_state
 
 
 class Run:
     paused, recording, folder = False, True, Path("run")
 
-    def __init__(self, books: RunState) -> None:
-        self.books = books
+    def __init__(self, run_state: RunState) -> None:
+        self.run_state = run_state
 
 
-def on_the_page(books: RunState) -> dict[str, Any]:
+def on_the_page(run_state: RunState) -> dict[str, Any]:
     page = PageConsumer(Broadcaster(), load_config(None, {"specimen.area_mm2": 40.0}), lambda: 5.0)
-    page.attend(Run(books))
+    page.attend(Run(run_state))
     return page.state()
 
 
@@ -62,9 +62,9 @@ def on_the_page(books: RunState) -> dict[str, Any]:
 def test_the_peak_in_tension_and_compression_is_one_on_page_and_status_line(
     forces: tuple[float, ...], peak: float
 ) -> None:
-    books = loaded(*forces)
-    assert books.snapshot(5.0).peak_N == on_the_page(books)["peak_N"] == peak
-    assert f"  peak {peak:.1f} N" in status_line(books.snapshot(5.0), 200)
+    run_state = loaded(*forces)
+    assert run_state.snapshot(5.0).peak_N == on_the_page(run_state)["peak_N"] == peak
+    assert f"  peak {peak:.1f} N" in status_line(run_state.snapshot(5.0), 200)
 
 
 def test_before_the_first_force_there_is_no_peak() -> None:
@@ -74,46 +74,46 @@ def test_before_the_first_force_there_is_no_peak() -> None:
 
 
 def test_the_latency_on_page_and_status_line_is_that_of_the_monitor() -> None:
-    books = loaded(1.0)
-    books.vitals.latency_p95_s = 0.042
-    books.history.add(instant(latency_s=9.0))
-    assert on_the_page(books)["late_s"] == 0.042
-    assert "  p95 42 ms" in status_line(books.snapshot(5.0), 200)
+    run_state = loaded(1.0)
+    run_state.health.latency_p95_s = 0.042
+    run_state.history.add(time_step(latency_s=9.0))
+    assert on_the_page(run_state)["late_s"] == 0.042
+    assert "  p95 42 ms" in status_line(run_state.snapshot(5.0), 200)
 
 
 def test_the_snapshot_of_a_run() -> None:
-    books = loaded(800.0, 900.0)
-    books.ledger.add(grabbed=5, lost=2, unrecorded=1)
-    books.alarms.put("a", "a: too much")
-    i = instant(eyy=1e-3, sigma_eyy=2e-6)
-    books.history.add(i)
-    now = books.snapshot(5.0)
+    run_state = loaded(800.0, 900.0)
+    run_state.frame_counts.add(grabbed=5, lost=2, unrecorded=1)
+    run_state.alarms.put("a", "a: too much")
+    i = time_step(eyy=1e-3, sigma_eyy=2e-6)
+    run_state.history.add(i)
+    now = run_state.snapshot(5.0)
     assert (now.elapsed_s, now.force_N, now.stress_Pa) == (5.0, 900.0, pytest.approx(900 / 40e-6))
     assert (now.axial_name, now.axial, now.sigma_axial) == ("eyy", 1e-3, 2e-6)
     assert (now.valid, now.zois, now.lost) == (i.n_valid, i.n_zoi, 3)
-    assert now.alarms == ("a: too much",) and now.instant is not None and now.instant.t == i.t
-    books.ledger.add(lost=5)
+    assert now.alarms == ("a: too much",) and now.time_step is not None and now.time_step.t == i.t
+    run_state.frame_counts.add(lost=5)
     assert now.lost == 3, "what came later is not in it"
 
 
 def test_in_a_replay_the_force_is_that_of_the_instant() -> None:
-    books = loaded(800.0)
-    books.vitals.state = ""
-    assert math.isnan(books.snapshot(0.0).force_N)
-    now = books.snapshot(1.0, instant(force=123.0))
+    run_state = loaded(800.0)
+    run_state.health.state = ""
+    assert math.isnan(run_state.snapshot(0.0).force_N)
+    now = run_state.snapshot(1.0, time_step(force=123.0))
     assert (now.state, now.force_N) == ("REPLAY", 123.0)
 
 
 @pytest.mark.parametrize(("axis", "mean"), [("x", "exx"), ("y", "eyy")])
 def test_axial_is_the_gauge_of_that_name_or_else_the_mean_along_the_load(axis: str, mean: str) -> None:
-    books, plain = loaded(axis=axis), instant(exx=1e-3, sigma_exx=1e-6, eyy=2e-3, sigma_eyy=2e-6)
-    now = books.snapshot(0.0, plain)
+    run_state, plain = loaded(axis=axis), time_step(exx=1e-3, sigma_exx=1e-6, eyy=2e-3, sigma_eyy=2e-6)
+    now = run_state.snapshot(0.0, plain)
     assert (now.axial_name, now.axial, now.sigma_axial) == (
         mean, getattr(plain, mean), getattr(plain, f"sigma_{mean}")
     )  # fmt: skip
-    lost = books.snapshot(0.0, replace(plain, gauges={"axial": GaugeValue(math.nan, math.nan, "lost")}))
+    lost = run_state.snapshot(0.0, replace(plain, gauges={"axial": GaugeValue(math.nan, math.nan, "lost")}))
     assert lost.axial_name == "axial" and math.isnan(lost.axial), "a lost gauge is not replaced by the mean"
-    other = books.snapshot(0.0, replace(plain, gauges={mean: GaugeValue(0.5, 0.1)}))
+    other = run_state.snapshot(0.0, replace(plain, gauges={mean: GaugeValue(0.5, 0.1)}))
     assert other.axial == getattr(plain, mean), "a gauge that has the name of a mean is a gauge like others"
 
 

@@ -28,7 +28,7 @@ def kept(truth: Truth, lag: float = 0.0, tared_at: float | None = None) -> tuple
     """A run whose mean strains and loads follow a curve, the load ``lag`` late, tared once in mid-test."""
     curve, history, loads = noisy(truth, 1), History(), LoadLog()
     assert curve.transverse is not None
-    one = make_measurement(0).instant
+    one = make_measurement(0).time_step
     for t, axial, across in zip(curve.t, curve.strain, curve.transverse, strict=True):
         history.add(replace(one, t=START + t, eyy=axial, exx=across))
     true = truth.curve
@@ -49,10 +49,10 @@ def test_a_tare_in_mid_test_falsifies_no_figure() -> None:
     )
     for name in ("E", "Rm"):
         assert getattr(tared, name).value == pytest.approx(getattr(plain, name).value, rel=2e-3)
-    books = RunState(EventLog(), FrameCounts(), *reversed(kept(truth, tared_at=1.0)))
-    assert any(line.strip().startswith("tared in mid-test by +") for line in summary_lines(books, FLAT))
-    books = RunState(EventLog(), FrameCounts(), *reversed(kept(truth)))
-    assert not any("tared" in line for line in summary_lines(books, FLAT))
+    run_state = RunState(EventLog(), FrameCounts(), *reversed(kept(truth, tared_at=1.0)))
+    assert any(line.strip().startswith("tared in mid-test by +") for line in summary_lines(run_state, FLAT))
+    run_state = RunState(EventLog(), FrameCounts(), *reversed(kept(truth)))
+    assert not any("tared" in line for line in summary_lines(run_state, FLAT))
 
 
 def test_a_metal_by_its_standard() -> None:
@@ -112,14 +112,14 @@ def test_the_direction_of_the_load_is_told() -> None:
     assert alignment_line(history, replace(FLAT, axis="y"))[0].endswith("off y (clockwise)")
     assert "is specimen.axis = 'x' right?" in alignment_line(history, replace(FLAT, axis="x"))[0]
     assert alignment_line(History(), FLAT) == []
-    books = RunState(EventLog(), FrameCounts(), loads, history)
-    assert any("off y" in line for line in summary_lines(books, FLAT))
+    run_state = RunState(EventLog(), FrameCounts(), loads, history)
+    assert any("off y" in line for line in summary_lines(run_state, FLAT))
 
 
 def test_the_axis_is_found_where_it_is_not_given() -> None:
     history, loads = kept(ramberg_osgood())
     turned = History()
-    for i in history.instants:
+    for i in history.time_steps:
         turned.add(replace(i, exx=i.eyy, eyy=i.exx))
     assert "off x (clockwise); x was found" in alignment_line(turned, FLAT)[0]
     upright, lying = (figure_lines(evaluate(h, loads, FLAT), FLAT) for h in (history, turned))

@@ -33,7 +33,7 @@ def test_results_and_recording_are_tied_together(tmp_path: Path) -> None:
         assert [e.kind for e in run.events] == ["start", "reference", "note"]
         assert run.start_monotonic == START
         assert run.session is not None
-        assert run.session.ledger is not None
+        assert run.session.frame_counts is not None
 
 
 def test_pictures_are_those_of_the_middle_of_the_burst(tmp_path: Path) -> None:

@@ -58,9 +58,9 @@ def test_small_forces_are_shown_in_newtons(value: float, text: str) -> None:
 @pytest.mark.parametrize("specimen", [FLAT, SpecimenConfig()])
 def test_summary_and_page_agree(specimen: SpecimenConfig) -> None:
     history, loads = kept(ramberg_osgood())
-    books = RunState(EventLog(), FrameCounts(), loads, history)
-    summary = "\n".join(summary_lines(books, specimen)).replace("+-", "±")
-    for one in ended(books, specimen, Path("runs"), "")["figures"]:
+    run_state = RunState(EventLog(), FrameCounts(), loads, history)
+    summary = "\n".join(summary_lines(run_state, specimen)).replace("+-", "±")
+    for one in ended(run_state, specimen, Path("runs"), "")["figures"]:
         assert one["text"] is not None and f"{one['name']} = {one['text']}" in summary
 
 
@@ -112,8 +112,8 @@ def test_a_comparison_has_what_the_single_report_has(tmp_path: Path, config: dic
 def test_without_a_modulus_the_summary_has_the_strength_and_the_reason() -> None:
     history, loads = kept(ramberg_osgood())
     few = type(history)()
-    for instant in history.instants[::150]:
-        few.add(instant)
+    for time_step in history.time_steps[::150]:
+        few.add(time_step)
     text = "\n".join(summary_lines(RunState(EventLog(), FrameCounts(), loads, few), FLAT))
     assert "Rm = " in text
     assert "not known: E, " in text

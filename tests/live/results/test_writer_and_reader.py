@@ -177,7 +177,9 @@ def test_the_axis_of_the_load_is_stored(tmp_path: Path, given: str) -> None:
     with open_results(tmp_path, axis=given, area_m2=1e-5) as results:
         for k in range(40):
             m, e = make_measurement(k, 0.0, force=1.0), 1e-4 * k
-            results.add(dataclasses.replace(m, instant=dataclasses.replace(m.instant, exx=e, eyy=-0.3 * e)))
+            results.add(
+                dataclasses.replace(m, time_step=dataclasses.replace(m.time_step, exx=e, eyy=-0.3 * e))
+            )
     with h5py.File(tmp_path / "strain.h5") as file:
         attributes = dict(file["entry/mean"].attrs)
     if given == "y":
@@ -207,9 +209,9 @@ def test_what_silx_and_nexpy_make_of_it(tmp_path: Path) -> None:
 
 def test_time_of_the_kernel_and_latency_are_columns(tmp_path: Path) -> None:
     live = make_measurement(0)
-    instant = dataclasses.replace(live.instant, measure_s=0.012, latency_s=0.025)
+    time_step = dataclasses.replace(live.time_step, measure_s=0.012, latency_s=0.025)
     with open_results(tmp_path) as results:
-        results.add(dataclasses.replace(live, instant=instant))
+        results.add(dataclasses.replace(live, time_step=time_step))
         results.add(make_measurement(1))
     with Strain.open(tmp_path / "strain.h5") as strain:
         np.testing.assert_array_equal(strain.values["kernel_s"], [0.012, math.nan])

@@ -136,10 +136,10 @@ def test_a_silenced_alarm_comes_again_only_after_it_has_gone() -> None:
 
 
 def test_the_vital_signs() -> None:
-    vitals = Health()
-    assert math.isnan(vitals.channels(5.0)["silent_s"])
-    vitals.frame_t, vitals.disk_s = 3.0, 120.0
-    assert vitals.channels(5.0)["silent_s"] == 2.0 and vitals.channels(5.0)["disk_min"] == 2.0
+    health = Health()
+    assert math.isnan(health.channels(5.0)["silent_s"])
+    health.frame_t, health.disk_s = 3.0, 120.0
+    assert health.channels(5.0)["silent_s"] == 2.0 and health.channels(5.0)["disk_min"] == 2.0
 
 
 @pytest.mark.parametrize(
@@ -183,7 +183,7 @@ def test_from_the_stamp_of_the_frame_to_the_action_within_two_measurement_period
     said: list[str] = []
 
     def silence(live: Any, measurement: Any) -> None:
-        if measurement.instant.eyy > 0.001 and not said:
+        if measurement.time_step.eyy > 0.001 and not said:
             said.extend(answer("alarm off", live) for _ in range(2))
 
     outcome = live_run(tmp_path / "run", REAL, each=silence, alarm=alarms, **{"measure.burst": 2})
@@ -194,7 +194,7 @@ def test_from_the_stamp_of_the_frame_to_the_action_within_two_measurement_period
     assert [event.data["alarm"] for event in came] == ["axial above 0.0005", "force_N above 3000"]
     assert all(0 < event.data["after_s"] < 2 * period_s for event in came)
     assert said == ["ok", "no: no alarm is on"]
-    assert outcome.books.history.instants[-1].force < 5000  # it ended there
+    assert outcome.run_state.history.time_steps[-1].force < 5000  # it ended there
 
 
 CAMERA = "sim:uniform?seconds=6&fps=30&buffers=64&width=224&height=192&bits=12&hold=1.5"
@@ -245,7 +245,7 @@ def test_a_test_with_all_that_there_is(tmp_path: Path) -> None:
     assert json.loads(read(serial, 1)[0])["frame"] == first["frame"]
     serial.close()
     assert answers[0] == "ok" and answers[1] == "no: recording already"
-    came = [e for e in outcome.books.journal.events() if e.kind is EventKind.ALARM and e.data.get("on")]
+    came = [e for e in outcome.run_state.event_log.events() if e.kind is EventKind.ALARM and e.data.get("on")]
     assert [event.data["alarm"] for event in came] == ["limit"]
     _against_the_truth(outcome)
     replay = [
@@ -271,15 +271,15 @@ def test_a_test_with_all_that_there_is(tmp_path: Path) -> None:
 
 def _against_the_truth(outcome: Any) -> None:
     """The gauges within 1 % and five sigma."""
-    specimen, instants = outcome.rig.specimen, outcome.books.history.instants
-    reference = next(e for e in outcome.books.journal.events() if e.kind is EventKind.REFERENCE)
+    specimen, time_steps = outcome.rig.specimen, outcome.run_state.history.time_steps
+    reference = next(e for e in outcome.run_state.event_log.events() if e.kind is EventKind.REFERENCE)
     assert specimen.axial_strain(specimen.elapsed(reference.t)) < 1e-5, "the reference was taken late"
-    t = specimen.elapsed(np.array([i.t for i in instants]))
+    t = specimen.elapsed(np.array([i.t for i in time_steps]))
     for name, truth in (
         ("axial", specimen.axial_strain(t)),
         ("part", specimen.axial_strain(t)),
         ("across", specimen.transverse_strain(t)),
     ):
-        values = np.array([i.gauges[name].value for i in instants])
-        sigmas = np.array([i.gauges[name].sigma for i in instants])
+        values = np.array([i.gauges[name].value for i in time_steps])
+        sigmas = np.array([i.gauges[name].sigma for i in time_steps])
         assert (np.abs(values - truth) < 0.01 * np.abs(truth) + 5 * sigmas).all(), name

@@ -110,8 +110,8 @@ def test_a_signal_closes_everything(tmp_path: Path, number: signal.Signals, mome
     assert "adds up" in rest
     with Session.open(tmp_path / "run" / "session.h5") as session:
         assert session.recovered is None
-        assert session.ledger is not None
-        assert session.ledger["recorded"] == len(session)
+        assert session.frame_counts is not None
+        assert session.frame_counts["recorded"] == len(session)
 
 
 def test_a_lost_terminal_does_not_end_the_test(tmp_path: Path) -> None:
@@ -122,5 +122,5 @@ def test_a_lost_terminal_does_not_end_the_test(tmp_path: Path) -> None:
     process.send_signal(signal.SIGHUP)
     assert process.wait(timeout=60) == 0
     with Session.open(tmp_path / "run" / "session.h5") as session:
-        assert session.ledger is not None
-        assert session.ledger["recorded"] == len(session) > 60
+        assert session.frame_counts is not None
+        assert session.frame_counts["recorded"] == len(session) > 60

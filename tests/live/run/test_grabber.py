@@ -47,57 +47,57 @@ from tests.live.test_end_to_end import live_run
 
 
 def grabbed(camera: ListCamera, *, burst: int = 2, reference: int = 4, seconds: float | None = None):
-    books, seen = RunState.new(0.5), []
-    ledger, journal = books.ledger, books.journal
+    run_state, seen = RunState.new(0.5), []
+    frame_counts, event_log = run_state.frame_counts, run_state.event_log
     plan = GrabPlan(burst, reference, math.inf if seconds is None else seconds)
-    grabber = Grabber(camera, plan, books, seen.append)
+    grabber = Grabber(camera, plan, run_state, seen.append)
     grabber.start()
     bursts: list[Burst] = []
     while not grabber.bursts.finished:
         item = grabber.bursts.get(1.0)
         if item is not None:
             bursts.append(item)
-            ledger.add(measured=item.n)
+            frame_counts.add(measured=item.n)
     grabber.join()
     for item in grabber.bursts.take_skipped():
-        ledger.add(skipped=item.n)
-    return grabber, bursts, ledger, journal, seen
+        frame_counts.add(skipped=item.n)
+    return grabber, bursts, frame_counts, event_log, seen
 
 
 def test_reference_then_bursts() -> None:
-    grabber, bursts, ledger, _, seen = grabbed(ListCamera(frame(i) for i in range(11)))
+    grabber, bursts, frame_counts, _, seen = grabbed(ListCamera(frame(i) for i in range(11)))
     reference = grabber.references.get()
     assert (reference.burst.first_index, reference.burst.n) == (0, 4)
     assert reference.halves is not None
     assert [(b.first_index, b.last_index) for b in bursts] == [(4, 5), (6, 7), (8, 9)]
-    assert len(seen) == ledger.grabbed == 11
-    assert (ledger.reference, ledger.measured, ledger.left_out) == (4, 6, 1)
-    assert ledger.adds_up
+    assert len(seen) == frame_counts.grabbed == 11
+    assert (frame_counts.reference, frame_counts.measured, frame_counts.left_out) == (4, 6, 1)
+    assert frame_counts.adds_up
 
 
 def test_gaps_and_damage_are_left_out_and_told() -> None:
     frames = [frame(i) for i in range(5)] + [frame(8, lost=3), frame(9), frame(10, damaged=True), frame(11)]
-    _, bursts, ledger, journal, _ = grabbed(ListCamera(frames), reference=1)
+    _, bursts, frame_counts, event_log, _ = grabbed(ListCamera(frames), reference=1)
     assert [(b.first_index, b.last_index) for b in bursts] == [(1, 2), (3, 4), (8, 9)]
-    assert ledger.lost == 3
-    assert ledger.left_out == 2
-    assert ledger.adds_up
+    assert frame_counts.lost == 3
+    assert frame_counts.left_out == 2
+    assert frame_counts.adds_up
     assert any(
-        "3 frames were lost, the last before frame 8" in event.text for event in journal.events("warning")
+        "3 frames were lost, the last before frame 8" in event.text for event in event_log.events("warning")
     )
 
 
 def test_the_end_of_the_time_ends_the_run() -> None:
-    _, _, ledger, _, _ = grabbed(ListCamera(frame(i) for i in range(1000)), seconds=2.0)
-    assert ledger.grabbed == 21
+    _, _, frame_counts, _, _ = grabbed(ListCamera(frame(i) for i in range(1000)), seconds=2.0)
+    assert frame_counts.grabbed == 21
 
 
 def test_a_camera_that_dies_is_told_and_kept() -> None:
     camera = ListCamera([frame(0), frame(1)], error=DeviceError("list: is gone; plug it in again"))
-    grabber, _, ledger, journal, _ = grabbed(camera, reference=1)
+    grabber, _, frame_counts, event_log, _ = grabbed(camera, reference=1)
     assert isinstance(grabber.error, DeviceError)
-    assert ledger.adds_up
-    assert journal.events("error")[0].text == "list: is gone; plug it in again"
+    assert frame_counts.adds_up
+    assert event_log.events("error")[0].text == "list: is gone; plug it in again"
 
 
 def test_a_live_source_never_waits() -> None:
@@ -154,8 +154,8 @@ def test_the_reference_is_taken_once_the_picture_is_still(tmp_path: Path, speed:
         references = [
             event for event in session.events() if "first" in event.data and "force_N" in event.data
         ]
-        assert session.ledger is not None
-        assert FrameCounts(**{key: session.ledger[key] for key in FrameCounts().as_dict()}).adds_up
+        assert session.frame_counts is not None
+        assert FrameCounts(**{key: session.frame_counts[key] for key in FrameCounts().as_dict()}).adds_up
     assert [event.data["first"] >= 4 for event in references] == [True]
 
 
@@ -166,8 +166,8 @@ def test_another_pattern_in_every_picture_gives_no_reference(
     assert "nothing was measured: no reference could be measured" in capsys.readouterr().out
     with Session.open(tmp_path / "out" / "session.h5") as session:
         assert len(session) == 24
-        assert session.ledger is not None
-        assert FrameCounts(**{key: session.ledger[key] for key in FrameCounts().as_dict()}).adds_up
+        assert session.frame_counts is not None
+        assert FrameCounts(**{key: session.frame_counts[key] for key in FrameCounts().as_dict()}).adds_up
         warned = [event for event in session.events() if "cannot be measured" in event.text]
     assert [event.level for event in warned] == ["warning", "warning", "error"]
 
@@ -184,7 +184,7 @@ class Watch(Consumer):
         self._each, self.late = each, list[tuple[float, float]]()
 
     def measurement(self, measurement: Measurement) -> None:
-        self.late.append((measurement.t, measurement.instant.latency_s))
+        self.late.append((measurement.t, measurement.time_step.latency_s))
         self._each(measurement)
 
 
@@ -208,7 +208,7 @@ def disturbed(
     watch = Watch(each)
     screen = TerminalScreen(quiet=True)
     outcome = run_live(load_config(None, settings), screen, consumers=standard_consumers(screen, [watch]))
-    assert outcome.books.ledger.adds_up
+    assert outcome.run_state.frame_counts.adds_up
     return outcome, np.array(watch.late)
 
 
@@ -227,10 +227,10 @@ def test_a_measurement_held_up_skips_and_catches_up(tmp_path: Path) -> None:
             paused.append(time.monotonic())
 
     outcome, rows = disturbed(tmp_path, hold)
-    ledger = outcome.books.ledger
-    assert ledger.skipped >= 0.5 * FPS
-    assert (ledger.unrecorded, ledger.lost) == (0, 0)
-    assert ledger.recorded == ledger.grabbed
+    frame_counts = outcome.run_state.frame_counts
+    assert frame_counts.skipped >= 0.5 * FPS
+    assert (frame_counts.unrecorded, frame_counts.lost) == (0, 0)
+    assert frame_counts.recorded == frame_counts.grabbed
     assert recovered(rows, paused[0])
 
 
@@ -247,11 +247,11 @@ def test_a_slow_disk_is_borne_by_the_buffer_or_leaves_a_counted_gap(
 
     monkeypatch.setattr(SessionWriter, "write_frame", slow)
     outcome, rows = disturbed(tmp_path, **{"record.buffer_MB": buffer_MB})
-    ledger = outcome.books.ledger
-    assert (ledger.unrecorded > 0) is gap
-    assert ledger.recorded + ledger.unrecorded == ledger.grabbed
+    frame_counts = outcome.run_state.frame_counts
+    assert (frame_counts.unrecorded > 0) is gap
+    assert frame_counts.recorded + frame_counts.unrecorded == frame_counts.grabbed
     assert (outcome.exit_code == 5) is gap
-    assert ledger.lost == 0
+    assert frame_counts.lost == 0
     assert recovered(rows, float(rows[-1, 0]) - 1.5)
 
 
@@ -272,8 +272,8 @@ def test_a_flood_of_load_lines_does_not_hold_up_the_pictures(
         live_module, "open_rig", lambda *given, **named: replace(opened(*given, **named), load=Flood())
     )
     outcome, rows = disturbed(tmp_path)
-    assert outcome.books.ledger.load_samples == 10_000
-    assert (outcome.books.ledger.unrecorded, outcome.books.ledger.lost) == (0, 0)
+    assert outcome.run_state.frame_counts.load_samples == 10_000
+    assert (outcome.run_state.frame_counts.unrecorded, outcome.run_state.frame_counts.lost) == (0, 0)
     assert recovered(rows, float(rows[0, 0]) + 1.2)
 
 
@@ -284,12 +284,12 @@ def test_another_program_on_a_core_loses_no_frame(tmp_path: Path) -> None:
             outcome, _ = disturbed(tmp_path)
         finally:
             other.kill()
-    assert (outcome.books.ledger.unrecorded, outcome.books.ledger.lost) == (0, 0)
+    assert (outcome.run_state.frame_counts.unrecorded, outcome.run_state.frame_counts.lost) == (0, 0)
 
 
 def test_frames_that_never_make_a_reference_come_with_a_hint(tmp_path: Path) -> None:
     faults = ",".join(f"drop@{0.4 * k + 0.2:g}" for k in range(10))
     camera = f"sim:uniform?fps=40&width=224&height=192&bits=12&seconds=4&faults={faults}"
     outcome = live_run(tmp_path / "run", camera, **{"measure.reference_burst": 32})
-    hints = [e.text for e in outcome.books.journal.events("warning") if e.source == "reference"]
+    hints = [e.text for e in outcome.run_state.event_log.events("warning") if e.source == "reference"]
     assert len(hints) == 1 and "no 32 frames in a row" in hints[0] and "--reference-burst" in hints[0]

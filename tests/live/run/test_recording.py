@@ -28,7 +28,7 @@ class FakeWriter:
     def __init__(self, fails_at: int | None = None, error: Exception | None = None) -> None:
         self.frames: list[int] = []
         self.others: list[Any] = []
-        self.ledger: dict[str, Any] | None = None
+        self.frame_counts: dict[str, Any] | None = None
         self.closed = False
         self._fails_at, self._error = fails_at, error or DataError("session.h5: the disk is full")
         self.unflushed_frames = 0
@@ -52,8 +52,8 @@ class FakeWriter:
     def write_clock(self, pair: Any) -> None:
         pass
 
-    def write_ledger(self, ledger: dict[str, Any]) -> None:
-        self.ledger = ledger
+    def write_ledger(self, frame_counts: dict[str, Any]) -> None:
+        self.frame_counts = frame_counts
 
     def flush_when_due(self) -> float:
         return math.inf
@@ -63,56 +63,56 @@ class FakeWriter:
 
 
 def recorded(writer: FakeWriter, n: int, limit: int = 10**6) -> tuple[FrameCounts, EventLog]:
-    ledger, journal = FrameCounts(), EventLog()
-    recorder = Recorder(writer, ledger, journal, limit)  # type: ignore[arg-type]
+    frame_counts, event_log = FrameCounts(), EventLog()
+    recorder = Recorder(writer, frame_counts, event_log, limit)  # type: ignore[arg-type]
     for i in range(n):
-        ledger.add(grabbed=1, measured=1)
+        frame_counts.add(grabbed=1, measured=1)
         recorder.frame(frame(i))
         recorder.sample(LoadSample(t=i, force=1.0))
     writer.go.set()
     recorder.close({"stop_reason": "test"})
-    return ledger, journal
+    return frame_counts, event_log
 
 
 def test_everything_is_written_and_the_ledger_last() -> None:
     writer = FakeWriter()
-    ledger, journal = recorded(writer, 20)
+    frame_counts, event_log = recorded(writer, 20)
     assert writer.frames == list(range(20))
     assert len(writer.others) == 20
-    assert writer.ledger is not None
-    assert writer.ledger["recorded"] == 20
-    assert ledger.adds_up
-    assert not ledger.loss
+    assert writer.frame_counts is not None
+    assert writer.frame_counts["recorded"] == 20
+    assert frame_counts.adds_up
+    assert not frame_counts.loss
     assert writer.closed
-    assert not journal.events("warning", "error")
+    assert not event_log.events("warning", "error")
 
 
 def test_a_full_buffer_leaves_a_counted_gap() -> None:
     writer = FakeWriter()
     writer.go.clear()
     size = frame(0).image.nbytes
-    ledger, journal = recorded(writer, 20, limit=3 * size)
-    assert ledger.recorded == len(writer.frames) <= 5
-    assert ledger.recorded + ledger.unrecorded == 20
-    assert ledger.loss
-    assert ledger.adds_up
-    assert "frames are not recorded; measuring goes on" in journal.events("error")[0].text
+    frame_counts, event_log = recorded(writer, 20, limit=3 * size)
+    assert frame_counts.recorded == len(writer.frames) <= 5
+    assert frame_counts.recorded + frame_counts.unrecorded == 20
+    assert frame_counts.loss
+    assert frame_counts.adds_up
+    assert "frames are not recorded; measuring goes on" in event_log.events("error")[0].text
 
 
 def test_a_full_disk_stops_the_recording_alone() -> None:
     writer = FakeWriter(fails_at=7)
-    ledger, journal = recorded(writer, 20)
-    assert (ledger.recorded, ledger.unrecorded) == (6, 14)  # the seventh was not flushed
-    assert ledger.adds_up
-    texts = [event.text for event in journal.events("error")]
+    frame_counts, event_log = recorded(writer, 20)
+    assert (frame_counts.recorded, frame_counts.unrecorded) == (6, 14)  # the seventh was not flushed
+    assert frame_counts.adds_up
+    texts = [event.text for event in event_log.events("error")]
     assert texts == ["recording has stopped, measuring goes on: session.h5: the disk is full"]
     assert writer.closed
 
 
 def test_a_defect_is_told_as_one() -> None:
-    ledger, journal = recorded(FakeWriter(fails_at=0, error=TypeError("oops")), 2)
-    assert ledger.unrecorded == 2
-    assert "a defect of the recorder: TypeError('oops')" in journal.events("error")[0].text
+    frame_counts, event_log = recorded(FakeWriter(fails_at=0, error=TypeError("oops")), 2)
+    assert frame_counts.unrecorded == 2
+    assert "a defect of the recorder: TypeError('oops')" in event_log.events("error")[0].text
 
 
 class FakeRecorder:
@@ -135,7 +135,7 @@ class FakeRecorder:
     def event(self, event: Event) -> None:
         self.given.append((str(event.kind), event.data.get("first")))
 
-    def close(self, ledger: dict[str, Any]) -> None:
+    def close(self, frame_counts: dict[str, Any]) -> None:
         self.given.append("closed")
 
 
@@ -145,17 +145,17 @@ class Bench:
     def __init__(
         self, seconds: float = 0.5, *, on: bool = False, most: int = 10**6, above_N: float = math.inf
     ) -> None:
-        self.recorder, self.ledger = FakeRecorder(), FrameCounts()
-        self.gate = PreTriggerBuffer(
-            self.recorder, self.ledger, EventLog(), PreTrigger(seconds, most, above_N), on=on
+        self.recorder, self.frame_counts = FakeRecorder(), FrameCounts()
+        self.pre_trigger = PreTriggerBuffer(
+            self.recorder, self.frame_counts, EventLog(), PreTrigger(seconds, most, above_N), on=on
         )
 
     def frames(self, *indices: int, needed: bool = False) -> None:
         for index in indices:
-            self.gate.frame(frame(index), needed=needed)
+            self.pre_trigger.frame(frame(index), needed=needed)
 
     def measured(self, first: int, last: int) -> None:
-        self.gate.event(
+        self.pre_trigger.event(
             Event(
                 last / 10,
                 EventKind.MEASURED,
@@ -174,35 +174,35 @@ class Bench:
 def test_what_came_a_little_before_goes_first_and_in_order() -> None:
     bench = Bench()
     bench.frames(*range(10))
-    bench.gate.sample(LoadSample(0.9, 5.0))  # the load is recorded all the time
+    bench.pre_trigger.sample(LoadSample(0.9, 5.0))  # the load is recorded all the time
     bench.frames(10)
     assert bench.given == [("load", 5.0)]
-    assert bench.gate.order(START) == "with 6 before"
+    assert bench.pre_trigger.order(START) == "with 6 before"
     bench.frames(11)
     assert bench.given == [("load", 5.0), 5, 6, 7, 8, 9, 10, 11]
-    assert bench.ledger.thinned == 5
-    bench.gate.order(STOP)
+    assert bench.frame_counts.thinned == 5
+    bench.pre_trigger.order(STOP)
     bench.frames(12, 13)
-    bench.gate.close({})
+    bench.pre_trigger.close({})
     assert bench.given[-2:] == [11, "closed"]
-    assert bench.ledger.thinned == 7
+    assert bench.frame_counts.thinned == 7
 
 
 def test_what_is_kept_is_bounded_in_bytes() -> None:
     bench = Bench(60, most=24 * 3 + 10)
     bench.frames(*range(8))
-    bench.gate.order(START)
-    assert bench.given == [5, 6, 7] and bench.ledger.thinned == 5
+    bench.pre_trigger.order(START)
+    assert bench.given == [5, 6, 7] and bench.frame_counts.thinned == 5
 
 
 def test_a_reference_passes_a_shut_gate() -> None:
     bench = Bench()
     bench.frames(0, 1)
     bench.frames(2, 3, needed=True)
-    bench.gate.event(Event(0.3, EventKind.REFERENCE, "m", "", "info", {"first": 2, "last": 3, "n": 2}))
+    bench.pre_trigger.event(Event(0.3, EventKind.REFERENCE, "m", "", "info", {"first": 2, "last": 3, "n": 2}))
     bench.frames(4)
-    bench.gate.order(START)
-    assert bench.given == [2, 3, ("reference", 2), 4] and bench.ledger.thinned == 2
+    bench.pre_trigger.order(START)
+    assert bench.given == [2, 3, ("reference", 2), 4] and bench.frame_counts.thinned == 2
 
 
 def test_measured_bursts_are_told_where_their_frames_are_recorded_whole() -> None:
@@ -211,10 +211,10 @@ def test_measured_bursts_are_told_where_their_frames_are_recorded_whole() -> Non
     bench.frames(*range(2, 9))
     for first in (2, 5, 6):
         bench.measured(first, first + 1)
-    bench.gate.order(START)
+    bench.pre_trigger.order(START)
     bench.frames(9)
     bench.measured(8, 9)
-    bench.gate.order(STOP)
+    bench.pre_trigger.order(STOP)
     bench.measured(7, 8)  # after the end, but its frames are there
     bench.frames(10)
     bench.measured(9, 10)
@@ -225,7 +225,7 @@ def test_with_nothing_kept_no_burst_from_before_is_told() -> None:
     bench = Bench(most=10)
     bench.frames(0, needed=True)
     bench.frames(1, 2, 3)
-    bench.gate.order(START)
+    bench.pre_trigger.order(START)
     bench.given.clear()
     bench.measured(1, 2)
     bench.frames(4, 5)
@@ -237,34 +237,34 @@ def test_with_nothing_kept_no_burst_from_before_is_told() -> None:
 def test_a_force_opens_it_once() -> None:
     bench = Bench(above_N=10.0)
     for force in (9.0, math.nan, -11.0):
-        assert not bench.gate.on
-        bench.gate.sample(LoadSample(0.1, force))
-    assert bench.gate.on and bench.given[-1] == ("load", -11.0)
-    bench.gate.order(STOP)
-    bench.gate.sample(LoadSample(0.2, 99.0))
-    assert not bench.gate.on
+        assert not bench.pre_trigger.on
+        bench.pre_trigger.sample(LoadSample(0.1, force))
+    assert bench.pre_trigger.on and bench.given[-1] == ("load", -11.0)
+    bench.pre_trigger.order(STOP)
+    bench.pre_trigger.sample(LoadSample(0.2, 99.0))
+    assert not bench.pre_trigger.on
 
 
 def test_an_order_that_changes_nothing_is_refused() -> None:
     bench = Bench(on=True)
     with pytest.raises(ControlRefused, match="already"):
-        bench.gate.order(START)
-    bench.gate.order(STOP)
+        bench.pre_trigger.order(START)
+    bench.pre_trigger.order(STOP)
     with pytest.raises(ControlRefused, match="not recording"):
-        bench.gate.order(STOP)
+        bench.pre_trigger.order(STOP)
     bench.recorder.failed = "the disk is full"
     with pytest.raises(ControlRefused, match="disk is full"):
-        bench.gate.order(START)
+        bench.pre_trigger.order(START)
 
 
 class TellingRecorder(FakeRecorder):
     """Its own thread tells something while it takes a frame and while it is closed, and is waited for."""
 
-    gate: PreTriggerBuffer
+    pre_trigger: PreTriggerBuffer
 
     def _tell(self) -> None:
         event = Event(0.0, EventKind.RECORDER, "session.h5", "the disk is full in 20 s", "warning")
-        thread = threading.Thread(target=self.gate.event, args=(event,), daemon=True)
+        thread = threading.Thread(target=self.pre_trigger.event, args=(event,), daemon=True)
         thread.start()
         thread.join(5.0)
         assert not thread.is_alive(), "it waits for whoever waits for it"
@@ -273,14 +273,16 @@ class TellingRecorder(FakeRecorder):
         self._tell()
         super().frame(item)
 
-    def close(self, ledger: dict[str, Any]) -> None:
+    def close(self, frame_counts: dict[str, Any]) -> None:
         self._tell()
-        super().close(ledger)
+        super().close(frame_counts)
 
 
 def test_a_recorder_that_tells_something_does_not_hold_itself_up() -> None:
     recorder = TellingRecorder()
-    recorder.gate = PreTriggerBuffer(recorder, FrameCounts(), EventLog(), PreTrigger(0.5, 10**6), on=True)
-    recorder.gate.frame(frame(0), needed=False)
-    recorder.gate.close({})
+    recorder.pre_trigger = PreTriggerBuffer(
+        recorder, FrameCounts(), EventLog(), PreTrigger(0.5, 10**6), on=True
+    )
+    recorder.pre_trigger.frame(frame(0), needed=False)
+    recorder.pre_trigger.close({})
     assert recorder.given == [("recorder", None), 0, ("recorder", None), "closed"]

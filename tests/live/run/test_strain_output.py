@@ -38,10 +38,10 @@ CHANNELS = ("time_s", "frame", "axial", "force_N", "stress_MPa", "lost_share", "
 
 
 def readings(force: float = 800.0) -> ChannelValues:
-    books = RunState.new(1.0, specimen=SpecimenConfig(axis="y", area_mm2=40.0))
-    books.vitals.state = "REC"
-    books.loads.append(LoadSample(START, force))
-    return ChannelValues(START, books.snapshot)
+    run_state = RunState.new(1.0, specimen=SpecimenConfig(axis="y", area_mm2=40.0))
+    run_state.health.state = "REC"
+    run_state.loads.append(LoadSample(START, force))
+    return ChannelValues(START, run_state.snapshot)
 
 
 def test_a_measurement_as_json_and_as_csv() -> None:
@@ -199,9 +199,9 @@ def test_the_strain_rate_is_held_through_yield(tmp_path: Path) -> None:
     """Within the 20 % of ISO 6892-1 over a second, where the machine alone would be 40 % off."""
     outcome = main(str(tmp_path / "run"), RATE, UNTIL)
     assert outcome.exit_code == 0
-    instants, specimen = outcome.books.history.instants, outcome.rig.specimen
+    time_steps, specimen = outcome.run_state.history.time_steps, outcome.rig.specimen
     assert specimen is not None
-    times = np.array([specimen.elapsed(instant.t) for instant in instants])
+    times = np.array([specimen.elapsed(time_step.t) for time_step in time_steps])
     truth = specimen.axial_strain(times)
     assert UNTIL < truth[-1] < UNTIL + 1e-3
     pulled = times[truth > 2e-4]
@@ -210,7 +210,7 @@ def test_the_strain_rate_is_held_through_yield(tmp_path: Path) -> None:
     settled = (specimen.axial_strain(grid) > 2.6e-3) | (specimen.axial_strain(grid + 1.0) < 2e-3)
     assert np.abs(rates[settled] / RATE - 1).max() < 0.2
     assert np.abs(rates / RATE - 1).max() < 0.6
-    notes = [e.text for e in outcome.books.journal.events() if e.kind is EventKind.NOTE]
+    notes = [e.text for e in outcome.run_state.event_log.events() if e.kind is EventKind.NOTE]
     assert notes == ["strain rate 0.0005 1/s"]
 
 

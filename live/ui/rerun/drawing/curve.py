@@ -45,7 +45,7 @@ class Axis:
     unit: str
     ticks: tuple[float, ...]
 
-    def place(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def sink(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """0..1 along the axis."""
         placed: NDArray[np.float64] = (values - self.low) / (self.high - self.low)
         return placed
@@ -88,11 +88,11 @@ GREY, DIM = (170, 175, 185), (62, 66, 74)
 ORANGE, CYAN, YELLOW = (255, 169, 64), (64, 224, 255), (255, 212, 59)
 
 
-def words(places: Any, labels: list[str], colour: Any = GREY) -> Any:
+def words(sinks: Any, labels: list[str], colour: Any = GREY) -> Any:
     """Text hung below its places."""
     import rerun as rr
 
-    return rr.Points2D(places, labels=labels, colors=colour, radii=0.0, show_labels=True, draw_order=40)
+    return rr.Points2D(sinks, labels=labels, colors=colour, radii=0.0, show_labels=True, draw_order=40)
 
 
 def lines(strips: Any, colour: tuple[int, int, int], radius: float) -> Any:
@@ -166,7 +166,7 @@ class CurveDrawing:
             self._axes = axes
             self._draw_axes(*axes)
         across, up = axes
-        placed = np.stack([across.place(points[:, 0]) * CURVE_WIDTH, 1.0 - up.place(vertical)], axis=1)
+        placed = np.stack([across.sink(points[:, 0]) * CURVE_WIDTH, 1.0 - up.sink(vertical)], axis=1)
         self._log(
             "curve/line",
             rr.LineStrips2D([placed], colors=ORANGE, radii=rr.Radius.ui_points(1.25), draw_order=10),
@@ -179,18 +179,18 @@ class CurveDrawing:
         self._log("curve/value", words([beside], [label], ORANGE))
 
     def _draw_axes(self, across: Axis, up: Axis) -> None:
-        x = across.place(np.array(across.ticks)) * CURVE_WIDTH
-        y = 1.0 - up.place(np.array(up.ticks))
+        x = across.sink(np.array(across.ticks)) * CURVE_WIDTH
+        y = 1.0 - up.sink(np.array(up.ticks))
         rules = [[[xk, 0.0], [xk, 1.0]] for xk in x] + [[[0.0, yk], [CURVE_WIDTH, yk]] for yk in y]
         self._log_change("curve/grid", lines(rules, DIM, 0.5))
-        x0, y0 = float(across.place(np.array(0.0))) * CURVE_WIDTH, 1.0 - float(up.place(np.array(0.0)))
+        x0, y0 = float(across.sink(np.array(0.0))) * CURVE_WIDTH, 1.0 - float(up.sink(np.array(0.0)))
         self._log_change(
             "curve/axes", lines([[[0.0, y0], [CURVE_WIDTH, y0]], [[x0, 0.0], [x0, 1.0]]], GREY, 0.75)
         )
         # rerun hangs a label below its place: a little higher puts it on the line.
-        places = [*([xk, 1.03] for xk in x), *([-0.13, yk - 0.05] for yk in y)]
+        sinks = [*([xk, 1.03] for xk in x), *([-0.13, yk - 0.05] for yk in y)]
         labels = [number(v * across.factor) for v in across.ticks] + [number(v * up.factor) for v in up.ticks]
         what = "stress" if self._setup.area_m2 else "load"
         names = [f"axial strain ({across.unit})", f"{what} ({up.unit})"]
         titles = [[CURVE_WIDTH / 2, 1.15], [0.0, -0.2]]
-        self._log_change("curve/ticks", words([*places, *titles], [*labels, *names]))
+        self._log_change("curve/ticks", words([*sinks, *titles], [*labels, *names]))

@@ -92,12 +92,12 @@ def main() -> int:
     follow(there)
     try:
         setup, where = setup_of(reader.next())
-        places = _open(setup, where, line)
-        if not places:
+        sinks = _open(setup, where, line)
+        if not sinks:
             return 3
         # Only now: a machine without a free core would be long in loading rerun.
         os.nice(_NICE - os.nice(0))
-        _draw(reader, ViewScene(places, setup), line, MOST_MIB + FINISHED_MIB * setup.finished)
+        _draw(reader, ViewScene(sinks, setup), line, MOST_MIB + FINISHED_MIB * setup.finished)
     except EOFError:
         return 1
     except Exception as error:
@@ -108,28 +108,28 @@ def main() -> int:
 
 
 def _open(setup: ViewSetup, where: Where, line: ReplyLine) -> list[RerunSink]:
-    places, port, rrd, troubles = [], None, None, []
+    sinks, port, rrd, troubles = [], None, None, []
     try:
         if where.port is not None:
-            place, port = serve(setup, where, line.tell)
-            places.append(place)
+            sink, port = serve(setup, where, line.tell)
+            sinks.append(sink)
     except Exception as error:
         troubles.append(f"the view's server did not start: {error}")
     try:
         if where.rrd is not None:
-            places.append(write(setup, where))
+            sinks.append(write(setup, where))
             rrd = where.rrd
     except FileExistsError:
         troubles.append(f"the view's file did not start: {where.rrd} exists already and is not overwritten")
     except Exception as error:
         troubles.append(f"the view's file did not start: {error}")
-    if not places and not troubles:
+    if not sinks and not troubles:
         troubles.append("the view has nowhere to draw to")
     for text in troubles:
-        line.say(Kind.TROUBLE, text=f"{text}; all else goes on", lasting=not places)
-    if places:
+        line.say(Kind.TROUBLE, text=f"{text}; all else goes on", lasting=not sinks)
+    if sinks:
         line.say(Kind.SERVING, port=port, rrd=rrd)
-    return places
+    return sinks
 
 
 def _draw(reader: Reader, scene: ViewScene, line: ReplyLine, most_MiB: float) -> None:

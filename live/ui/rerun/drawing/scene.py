@@ -1,7 +1,7 @@
 """Draws a test: pictures, maps, curves, events, status; once, for all places.
 
 Knows rerun and the arrays; nothing of threads, processes or servers. Rates are per second of the
-test (``places``).
+test (``sinks``).
 """
 
 from __future__ import annotations
@@ -61,17 +61,17 @@ _MORE = tuple(name for name in MAPS if name not in STRAINS)
 
 
 class ViewScene:
-    """Draws into ``places``; every method may raise whatever rerun raises.
+    """Draws into ``sinks``; every method may raise whatever rerun raises.
 
     Parameters
     ----------
-    places : sequence of RerunSink
+    sinks : sequence of RerunSink
     setup : ViewSetup
     """
 
-    def __init__(self, places: Sequence[RerunSink], setup: ViewSetup) -> None:
-        self._places, self._setup = places, setup
-        self._due: Sequence[RerunSink] = places
+    def __init__(self, sinks: Sequence[RerunSink], setup: ViewSetup) -> None:
+        self._sinks, self._setup = sinks, setup
+        self._due: Sequence[RerunSink] = sinks
         symmetric = setup.scale == "symmetric"
         self._maps = FieldMaps(setup.axis, setup.strain_range, about_zero=symmetric, alpha=_ALPHA)
         self._drawn: dict[str, object] = {}
@@ -101,10 +101,10 @@ class ViewScene:
 
     def end(self) -> None:
         """All is drawn: let it reach its places, and close those."""
-        for place in self._places:
-            place.send_rows(_columns)
-            place.close()
-        self._places = []
+        for sink in self._sinks:
+            sink.send_rows(_columns)
+            sink.close()
+        self._sinks = []
 
     # -- pictures and maps ------------------------------------------------------------------
 
@@ -112,7 +112,7 @@ class ViewScene:
         """A picture, as JPEG, no more often than the rates say."""
         import rerun as rr
 
-        self._due = [place for place in self._places if place.takes("picture", picture.t)]
+        self._due = [sink for sink in self._sinks if sink.takes("picture", picture.t)]
         if not self._due:
             return
         light = self._setup.light
@@ -128,7 +128,7 @@ class ViewScene:
 
     def field(self, t: float, field: StrainField) -> None:
         """A strain field at ``t`` (s, monotonic) as maps, no more often than the rates say; and the curve."""
-        self._due = [place for place in self._places if place.takes("map", t)]
+        self._due = [sink for sink in self._sinks if sink.takes("map", t)]
         if not self._due:
             return
         self._at(t)
@@ -138,7 +138,7 @@ class ViewScene:
             self._values(field)
         points = np.array(self._curve.items(), np.float64).reshape(-1, 2)
         self._drawn_curve.draw(points)
-        self._due = [place for place in self._due if place.takes("more", t)]
+        self._due = [sink for sink in self._due if sink.takes("more", t)]
         if self._due:
             self._draw_maps(field, _MORE)
 
@@ -149,8 +149,8 @@ class ViewScene:
         step = float(grid.step)
         corner = (float(grid.x[0]) + 0.5 - step / 2, float(grid.y[0]) + 0.5 - step / 2, 0.0)
         for name in MAPS:
-            place = rr.Transform3D(translation=corner, scale=(step, step, 1.0))
-            self._log(f"specimen/map/{name}", place, static=True)
+            sink = rr.Transform3D(translation=corner, scale=(step, step, 1.0))
+            self._log(f"specimen/map/{name}", sink, static=True)
         lines = [[np.array(line) + 0.5 for line in lines] for lines in self._setup.outlines.values()]
         strips = [strip for gauge in lines for strip in gauge]
         if strips:
@@ -199,8 +199,8 @@ class ViewScene:
         some = f"{outlined} of {number(total)}" if outlined < total else f"all {total}"
         text = f"displacement ×{number(factor)} · {some} ZOIs outlined"
         if self._changed("words", text):
-            place = [[0.5 * self._setup.width, -0.08 * bar_unit(self._setup)]]
-            self._log("zoi/words", words(place, [text], CYAN))
+            sink = [[0.5 * self._setup.width, -0.08 * bar_unit(self._setup)]]
+            self._log("zoi/words", words(sink, [text], CYAN))
         plain = field.status == Status.NO_PATTERN  # background, where nothing is to be lost
         for name, wanted, colour in (("plain", plain, DIM), ("rejected", ~plain & np.isnan(field.exx), RED)):
             dots = thinned(field.grid, wanted & field.grid.active)
@@ -239,16 +239,16 @@ class ViewScene:
         self._log(f"bar/{name}/ramp", rr.EncodedImage(contents=data, media_type="image/png"), static=True)
         unit = bar_unit(self._setup)
         scale = (BAR_WIDTH * unit / _RAMP[0], BAR_HEIGHT * h / _RAMP[1], 1.0)
-        place = rr.Transform3D(translation=(w + BAR_GAP * unit, BAR_TOP * h, 0.0), scale=scale)
-        self._log(f"bar/{name}/ramp", place, static=True)
+        sink = rr.Transform3D(translation=(w + BAR_GAP * unit, BAR_TOP * h, 0.0), scale=scale)
+        self._log(f"bar/{name}/ramp", sink, static=True)
 
     def _ticks(self, painted: Painted) -> Any:
         length, height = bar_unit(self._setup), self._setup.height
         x, top = self._setup.width + BAR_LABEL * length, BAR_TOP * height
         if painted.scale is None:
-            places = [[x, top + 0.1 * k * length] for k in range(len(painted.legend))]
+            sinks = [[x, top + 0.1 * k * length] for k in range(len(painted.legend))]
             texts = [f"{one.name} {one.count}" for one in painted.legend]
-            return words(places, texts, [one.rgb for one in painted.legend])
+            return words(sinks, texts, [one.rgb for one in painted.legend])
         scale, share = painted.scale, np.array([1.0, 0.75, 0.5, 0.25, 0.0])
         y = (BAR_TOP + BAR_HEIGHT * (1 - share)) * height - LETTER * length
         points = [*([x, yk] for yk in y), [x - 0.04 * length, top - 0.09 * length]]
@@ -288,18 +288,18 @@ class ViewScene:
             self._add(t, f"strain/{name}", (row[0], *row[2 * k + 1 : 2 * k + 3]))
 
     def _add(self, t: float, path: str, row: Row) -> None:
-        for place in self._places:
-            place.add_row(path, row)
-            if place.takes("rows", t):
-                place.send_rows(_columns)
+        for sink in self._sinks:
+            sink.add_row(path, row)
+            if sink.takes("rows", t):
+                sink.send_rows(_columns)
 
     def _repeat(self) -> None:
-        forgetting = [place for place in self._places if place.forgets()]
-        for place in forgetting:
-            place.send("load/force", self._forces.items(), _columns)
+        forgetting = [sink for sink in self._sinks if sink.forgets()]
+        for sink in forgetting:
+            sink.send("load/force", self._forces.items(), _columns)
             for k, name in enumerate(STRAINS):
                 rows = [(row[0], *row[2 * k + 1 : 2 * k + 3]) for row in self._strains.items()]
-                place.send(f"strain/{name}", rows, _columns)
+                sink.send(f"strain/{name}", rows, _columns)
         if forgetting:
             self._drawn = {}
             self._drawn_curve.forget()
@@ -321,7 +321,7 @@ class ViewScene:
         """The large figures, no more often than the rates say."""
         import rerun as rr
 
-        self._due = [place for place in self._places if place.takes("figures", snapshot.t)]
+        self._due = [sink for sink in self._sinks if sink.takes("figures", snapshot.t)]
         if self._due:
             data = encode(".jpg", paint(snapshot), FIGURES_QUALITY)
             self._at(snapshot.t)
@@ -341,21 +341,21 @@ class ViewScene:
         return max(t - self._setup.start_monotonic, 0.0)
 
     def _at(self, t: float) -> None:
-        for place in self._places:
-            place.stream.set_time("time", duration=self._since_start(t))
+        for sink in self._sinks:
+            sink.stream.set_time("time", duration=self._since_start(t))
 
     def _log(self, path: str, what: Any, *, static: bool = False) -> None:
         """To all places: what is drawn only where it changes."""
-        for place in self._places:
-            place.stream.log(path, what, static=static)
+        for sink in self._sinks:
+            sink.stream.log(path, what, static=static)
 
     def _log_due(self, path: str, what: Any) -> None:
-        for place in self._due:
-            place.stream.log(path, what)
+        for sink in self._due:
+            sink.stream.log(path, what)
 
     def _count(self, data: bytes) -> None:
-        for place in self._due:
-            place.count(data)
+        for sink in self._due:
+            sink.count(data)
 
 
 def _columns(path: str, values: Sequence[Any]) -> Any:

@@ -27,8 +27,8 @@ _MOST_BOXES, _MOST_ARROWS, _MOST_POINTS = 16, 240, 2000
 def centres(grid: ZoiGrid) -> Points:
     """(R, C, 2) centres of all ZOIs, px of the viewer."""
     x, y = np.meshgrid(np.asarray(grid.x, np.float64), np.asarray(grid.y, np.float64))
-    places: Points = np.stack([x, y], axis=-1) + 0.5
-    return places
+    sinks: Points = np.stack([x, y], axis=-1) + 0.5
+    return sinks
 
 
 def every(grid: ZoiGrid, most: int, apart_px: float = 0.0) -> tuple[slice, slice]:
@@ -139,7 +139,7 @@ def value_dots(field: StrainField) -> tuple[Any, Any]:
         numbers[f"{name}_um_m"] = getattr(field, name) * MICROSTRAIN.factor
         numbers[f"sigma_{name}_um_m"] = getattr(field, f"sigma_{name}") * MICROSTRAIN.factor
     found = {name: np.asarray(values[wanted], np.float64) for name, values in numbers.items()}
-    places, rows, columns = centres(field.grid)[wanted], *np.nonzero(wanted)
+    sinks, rows, columns = centres(field.grid)[wanted], *np.nonzero(wanted)
     words = [
         _words(row, column, status, {name: values[k] for name, values in found.items()})
         for k, (row, column, status) in enumerate(
@@ -147,7 +147,7 @@ def value_dots(field: StrainField) -> tuple[Any, Any]:
         )
     ]
     dots = rr.Points2D(
-        places,
+        sinks,
         radii=rr.Radius.ui_points(1.2),
         colors=_DOT,
         labels=words,

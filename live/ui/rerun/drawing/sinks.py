@@ -146,18 +146,18 @@ def serve(setup: ViewSetup, where: Where, tell: Callable[[str], None]) -> tuple[
     import rerun as rr
 
     wanted = where.port or 0
-    door = ViewerProxy(wanted, tell)
-    if wanted and door.port != wanted:
-        tell(f"port {wanted} is taken; the view is on {door.port}")
+    proxy = ViewerProxy(wanted, tell)
+    if wanted and proxy.port != wanted:
+        tell(f"port {wanted} is taken; the view is on {proxy.port}")
     host, port = hidden()
     memory = FINISHED_MIB if setup.finished else SERVER_MIB
     live = Rates(setup.picture_hz, 1.0 if setup.light else 10.0, repeat_bytes=SERVER_MIB * 2**20 / 4)
     rates = ALL if setup.finished else live
     sink = rr.GrpcServerSink(host, port, server_memory_limit=f"{memory}MiB")
-    place = _place(sink, setup, where.recording, rates, door.drawn)
+    place = _sink(sink, setup, where.recording, rates, proxy.drawn)
     wait_for(host, port)
-    door.open(host, port)
-    return place, door.port
+    proxy.open(host, port)
+    return place, proxy.port
 
 
 def write(setup: ViewSetup, where: Where) -> RerunSink:
@@ -179,10 +179,10 @@ def write(setup: ViewSetup, where: Where) -> RerunSink:
         else Rates(1.0, 2.0, 0.2, gather_s=5.0, parcel_bytes=2**16, limit_bytes=RRD_LIMIT_BYTES)
     )
     # Two streams of one name in a process would be one stream.
-    return _place(rr.FileSink(str(path)), setup, f"{where.recording}-file", rates)
+    return _sink(rr.FileSink(str(path)), setup, f"{where.recording}-file", rates)
 
 
-def _place(
+def _sink(
     sink: Any,
     setup: ViewSetup,
     recording: str,

@@ -91,16 +91,16 @@ def test_a_cluster_needs_none(tmp_path: Path) -> None:
 def test_a_pool_starts_more_where_they_are_not_enough(tmp_path: Path) -> None:
     tasks = [Task(str(k), str(tmp_path), "nothing.h5", key="key") for k in range(2)]
     rows = []
-    hands = Counted(1)
-    pool = Pool(tasks, 2, lambda task, progress: None, lambda task, row: rows.append(row) or (), hands)
+    processes = Counted(1)
+    pool = Pool(tasks, 2, lambda task, progress: None, lambda task, row: rows.append(row) or (), processes)
     while not pool.wait(0.05):
         pass
     pool.close()
-    hands.close()
+    processes.close()
     assert [row.values["outcome"] for row in rows] == [failed("0", "", "", 1).values["outcome"]] * 2
-    assert hands.pids[0] in hands.taken
-    assert len(set(hands.taken)) == 2
-    assert all(map(is_gone, hands.taken))
+    assert processes.pids[0] in processes.taken
+    assert len(set(processes.taken)) == 2
+    assert all(map(is_gone, processes.taken))
 
 
 def test_what_is_not_compiled_is_compiled_by_the_caller(
@@ -108,7 +108,7 @@ def test_what_is_not_compiled_is_compiled_by_the_caller(
 ) -> None:
     """Workers say what they find; only then are they given anything."""
     asked: list[tuple[object, int]] = []
-    monkeypatch.setattr(WorkerProcess, "is_ready", lambda hand: False)
+    monkeypatch.setattr(WorkerProcess, "is_ready", lambda process: False)
     monkeypatch.setattr(
         campaign, "compile_ahead", lambda kinds, **more: asked.append((kinds, len(Counted.made[0].taken)))
     )
@@ -118,9 +118,9 @@ def test_what_is_not_compiled_is_compiled_by_the_caller(
 
 def test_the_first_word_of_a_worker() -> None:
     warm_up()
-    hands = WorkerProcesses(1)
-    assert hands.are_ready()
-    killed = hands.take()
+    processes = WorkerProcesses(1)
+    assert processes.are_ready()
+    killed = processes.take()
     killed.end()
     assert not killed.is_ready()
 

@@ -15,7 +15,7 @@ import pytest
 
 from live.cli import main
 from live.results.report.comparison import summary
-from live.results.report.evaluation import EvaluatedCurve, instants, nearest_rows
+from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
 from live.results.report.record import times
 from live.results.report.report import ReportRequest, make_report
 from live.results.run_folder import open_run
@@ -26,7 +26,7 @@ from tests.live.made_run import CONFIG, E_PA, GAUGES, PULLED, YIELD, make_run
 def test_the_line_and_the_instants(run_dir: Path) -> None:
     with open_run(run_dir) as run:
         curve = EvaluatedCurve.of(run)
-        found = instants(run, curve)
+        found = time_steps(run, curve)
     assert pytest.approx(E_PA, rel=0.01) == curve.figures.E.value
     assert curve.figures.Rp02.value == pytest.approx(E_PA * YIELD, rel=3e-3)
     # The line goes through the origin of a curve that does.

@@ -38,18 +38,20 @@ class KeptView:
 
 
 def watched(*views: KeptView) -> tuple[Outputs, EventLog]:
-    books = RunState.new(1.0)
-    watching = [RerunConsumer(view, books) for view in views]  # type: ignore[arg-type]
-    return Outputs(watching, make_loads(10.0, lambda t: t), books.journal, books.history), books.journal
+    run_state = RunState.new(1.0)
+    watching = [RerunConsumer(view, run_state) for view in views]  # type: ignore[arg-type]
+    return Outputs(
+        watching, make_loads(10.0, lambda t: t), run_state.event_log, run_state.history
+    ), run_state.event_log
 
 
 def test_everything_is_offered() -> None:
     view = KeptView()
-    out, journal = watched(view)
+    out, event_log = watched(view)
     out.add(make_measurement(0))
     out.frame(make_frame(0, START))
     out.load(LoadSample(START, 5.0))
-    journal.tell(EventKind.NOTE, "operator", "hello")
+    event_log.tell(EventKind.NOTE, "operator", "hello")
     out.end()
     assert {name for name, _ in view.given} == {"show", "point", "picture", "load", "event"}
     assert [what for name, what in view.given if name == "point"] == [(0.001, 0.0)]
@@ -59,12 +61,12 @@ def test_everything_is_offered() -> None:
 
 def test_a_view_that_has_failed_is_told_once_and_all_else_goes_on() -> None:
     broken, sound = KeptView(), KeptView()
-    out, journal = watched(broken, sound)
+    out, event_log = watched(broken, sound)
     broken.failed = "its process does not start (ended with 1)"
     for number in range(5):
         out.add(make_measurement(number))
     out.end()
-    events: list[Event] = journal.events("warning")
+    events: list[Event] = event_log.events("warning")
     assert [broken.failed in event.text for event in events] == [True]
     assert len([name for name, _ in sound.given if name == "show"]) == 5
     assert not out.failed
@@ -73,7 +75,7 @@ def test_a_view_that_has_failed_is_told_once_and_all_else_goes_on() -> None:
 def test_the_card_is_written_once_a_second_from_a_bounded_history(monkeypatch: pytest.MonkeyPatch) -> None:
     view, seen = KeptView(), []
     card = StatusCard(SpecimenConfig(), make_loads(1.0, lambda t: t))
-    monkeypatch.setattr(card, "written", lambda now, history: seen.append(history.instants) or "card")
+    monkeypatch.setattr(card, "written", lambda now, history: seen.append(history.time_steps) or "card")
     writer = CardWriter(view, card, RunState.new(1.0))  # type: ignore[arg-type]
     last = make_measurement(0)
     for number in range(3 * CARD_INSTANTS):
@@ -81,8 +83,8 @@ def test_the_card_is_written_once_a_second_from_a_bounded_history(monkeypatch: p
         writer.measurement(last)
     writer.measurement(newest := make_measurement(100_000))
     assert [name for name, _ in view.given] == ["status"] * 7
-    assert max(len(instants) for instants in seen) <= CARD_INSTANTS + 2
-    assert seen[-1][-1].t == newest.instant.t
+    assert max(len(time_steps) for time_steps in seen) <= CARD_INSTANTS + 2
+    assert seen[-1][-1].t == newest.time_step.t
 
 
 def test_the_card_says_where_the_test_stands() -> None:
@@ -111,13 +113,13 @@ class FakeView:
 @pytest.mark.parametrize("state", ["ARMED", ""])
 def test_the_large_figures_before_and_after_the_first_measurement(state: str) -> None:
     """Live the load is shown from the first frame on; a replay (no state) shows the force of each measurement."""
-    books, view = RunState.new(1.0, specimen=SpecimenConfig(area_mm2=40.0)), FakeView()
-    books.loads.append(LoadSample(START, 800.0))
-    books.vitals.state, books.vitals.frame_t = state, START + 1
-    writer = FiguresWriter(view, books)  # type: ignore[arg-type]
+    run_state, view = RunState.new(1.0, specimen=SpecimenConfig(area_mm2=40.0)), FakeView()
+    run_state.loads.append(LoadSample(START, 800.0))
+    run_state.health.state, run_state.health.frame_t = state, START + 1
+    writer = FiguresWriter(view, run_state)  # type: ignore[arg-type]
     writer.idle()
     assert [(f.state, f.force_N, f.zois) for f in view.shown] == ([("ARMED", 800.0, 0)] if state else [])
-    books.alarms.put("limit", "limit: too much")
+    run_state.alarms.put("limit", "limit: too much")
     writer.measurement(make_measurement(1, 1e-3, force=500.0))
     last = view.shown[-1]
     assert (last.state, last.force_N) == (("ARMED", 800.0) if state else ("REPLAY", 500.0))

@@ -42,7 +42,7 @@ def test_axes_start_at_zero_and_leave_room() -> None:
     axis = strain_axis(np.array([0.0, 1e-3, 3.3e-3]))
     assert (axis.low, axis.unit) == (0.0, "µm/m")
     assert 3.3e-3 < axis.high <= 5e-3
-    assert axis.place(np.array([0.0, axis.high])).tolist() == [0.0, 1.0]
+    assert axis.sink(np.array([0.0, axis.high])).tolist() == [0.0, 1.0]
 
 
 def test_axes_of_compression_end_at_zero() -> None:
@@ -80,12 +80,12 @@ def rows_in(path: Path) -> Counter[str]:
 
 @contextlib.contextmanager
 def scene_into(
-    places: dict[Path, Rates], setup: ViewSetup | None = None
+    sinks: dict[Path, Rates], setup: ViewSetup | None = None
 ) -> Iterator[tuple[ViewScene, RerunSink]]:
     import rerun as rr
 
     setup, made = setup or make_setup(), []
-    for path, rates in places.items():
+    for path, rates in sinks.items():
         stream = rr.RecordingStream("phasedic")
         stream.set_sinks(rr.FileSink(str(path)))
         stream.send_blueprint(blueprint(setup))
@@ -114,8 +114,8 @@ STATIC = 1
 
 def test_every_mean_is_drawn_and_pictures_and_maps_as_often_as_asked(tmp_path: Path) -> None:
     fast, slow = tmp_path / "fast.rrd", tmp_path / "slow.rrd"
-    places = {fast: Rates(5.0, 10.0), slow: Rates(1.0, 2.0, 0.2)}
-    with scene_into(places, make_setup(area_m2=4e-5)) as (scene, _):
+    sinks = {fast: Rates(5.0, 10.0), slow: Rates(1.0, 2.0, 0.2)}
+    with scene_into(sinks, make_setup(area_m2=4e-5)) as (scene, _):
         draw_a_test(scene)
     for path, pictures, maps in ((fast, 15, 30), (slow, 3, 6)):
         rows = rows_in(path)
@@ -137,9 +137,9 @@ def test_every_mean_is_drawn_and_pictures_and_maps_as_often_as_asked(tmp_path: P
 
 def test_beyond_the_limit_pictures_and_maps_stop_and_curves_go_on(tmp_path: Path) -> None:
     path = tmp_path / "view.rrd"
-    with scene_into({path: Rates(10.0, 10.0, limit_bytes=20e3)}) as (scene, place):
+    with scene_into({path: Rates(10.0, 10.0, limit_bytes=20e3)}) as (scene, sink):
         draw_a_test(scene)
-        assert 20e3 <= place.drawn_bytes < 40e3
+        assert 20e3 <= sink.drawn_bytes < 40e3
     rows = rows_in(path)
     assert rows["/strain/eyy"] == 31
     assert 1 <= rows["/camera/picture"] < 30
@@ -253,9 +253,9 @@ def test_the_maps_follow_the_specimen() -> None:
     values = {"u": 3.0 + 0.01 * x - 0.02 * y, "v": -1.0 + 0.03 * x + 0.05 * y}
     values |= {"du_dx": 0.01, "du_dy": -0.02, "dv_dx": 0.03, "dv_dy": 0.05}
     matrix, shift = mean_motion(StrainField.from_values(grid, values))
-    place = np.array([40.0, 60.0, 0.0])
+    sink = np.array([40.0, 60.0, 0.0])
     half = np.array([0.5, 0.5, 0.0])
-    moved = matrix @ (place + half) + shift - half
+    moved = matrix @ (sink + half) + shift - half
     expected = [40 + 3.0 + 0.4 - 1.2, 60 - 1.0 + 1.2 + 3.0, 0.0]
     np.testing.assert_allclose(moved, expected, atol=1e-9)
 

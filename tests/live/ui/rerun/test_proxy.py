@@ -54,26 +54,26 @@ def server() -> Iterator[socket.socket]:
 
 
 def opened(server: socket.socket, told: list[str]) -> ViewerProxy:
-    door = ViewerProxy(0, told.append)
-    door.open(*server.getsockname())
-    return door
+    proxy = ViewerProxy(0, told.append)
+    proxy.open(*server.getsockname())
+    return proxy
 
 
 def test_it_passes_on_both_ways_and_refuses_strangers(server: socket.socket) -> None:
-    door = opened(server, [])
-    with socket.create_connection(("127.0.0.1", door.port), 10) as viewer:
+    proxy = opened(server, [])
+    with socket.create_connection(("127.0.0.1", proxy.port), 10) as viewer:
         viewer.sendall(PREFACE)
         assert viewer.recv(100).startswith(b"PRI * HTTP/2.0\r\n\r\n")
-    with socket.create_connection(("127.0.0.1", door.port), 10) as page:
+    with socket.create_connection(("127.0.0.1", proxy.port), 10) as page:
         page.sendall(b"POST /x HTTP/1.1\r\nHost: evil.example\r\n\r\n")
         assert page.recv(100).startswith(b"HTTP/1.1 403")
         assert page.recv(100) == b""
 
 
-def ended(viewer: socket.socket, door: ViewerProxy) -> bool:
+def ended(viewer: socket.socket, proxy: ViewerProxy) -> bool:
     """Whether the door hangs up on a viewer that takes nothing while more and more is drawn."""
     for k in range(1, 40):
-        door.drawn(k * (doors.PATIENCE_BYTES + 1))
+        proxy.drawn(k * (doors.PATIENCE_BYTES + 1))
         try:
             return viewer.recv(100) == b""
         except TimeoutError:
@@ -86,14 +86,14 @@ def ended(viewer: socket.socket, door: ViewerProxy) -> bool:
 def test_one_that_takes_nothing_is_let_go(server: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doors, "PATIENCE_S", 0.2)
     told: list[str] = []
-    door = opened(server, told)
-    with socket.create_connection(("127.0.0.1", door.port), 10) as viewer:
+    proxy = opened(server, told)
+    with socket.create_connection(("127.0.0.1", proxy.port), 10) as viewer:
         viewer.sendall(PREFACE + b"x" * 20_000)
         came = 0
         while came < len(PREFACE) + 20_000:
             came += len(viewer.recv(2**16))
         viewer.settimeout(0.5)
-        assert ended(viewer, door)
+        assert ended(viewer, proxy)
     assert len(told) == 1
     assert "let go" in told[0]
 

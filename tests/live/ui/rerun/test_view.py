@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from acquire.events import Event, EventKind
-from live.ui.rerun import supervisor as keeper
+from live.ui.rerun import supervisor as supervisor
 from live.ui.rerun.outbox import MOST_ROWS, Pending
 from live.ui.rerun.view import View, has_display, spawn_viewer, url, viewer_binary
 from live.ui.rerun.wire import Kind
@@ -139,7 +139,9 @@ def test_killed_it_comes_back_on_its_port_and_knows_the_past(
 def test_stopped_it_is_replaced_and_holds_nothing_up(
     make: Callable[..., Watched], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(keeper, "STUCK_S", 2.0)  # a busy machine may keep the new one waiting for a second
+    monkeypatch.setattr(
+        supervisor, "STUCK_S", 2.0
+    )  # a busy machine may keep the new one waiting for a second
     watched = make(None, tmp_path / "view.rrd")
     until(lambda: watched.served)
     stopped = watched.view.pid or 0
@@ -230,7 +232,7 @@ def test_a_folder_that_is_not_there_is_told_and_the_rest_goes_on(
 def test_one_that_cannot_start_is_given_up(
     make: Callable[..., Watched], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(keeper, "MOST_STARTS", 2)
+    monkeypatch.setattr(supervisor, "MOST_STARTS", 2)
     monkeypatch.setenv("PYTHONHOME", "/nowhere")
     watched = make(0, None)
     until(lambda: watched.view.failed)
@@ -239,12 +241,12 @@ def test_one_that_cannot_start_is_given_up(
 
 
 def test_what_waits_is_bounded_and_counted() -> None:
-    waiting = Pending()
+    pending = Pending()
     for k in range(MOST_ROWS + 100):
-        waiting.row(Kind.LOADS, (float(k), 0.0))
-    assert len(waiting.rows[Kind.LOADS]) == MOST_ROWS
-    assert waiting.rows[Kind.LOADS][0][0] == 100.0
-    assert waiting.dropped == 100
+        pending.row(Kind.LOADS, (float(k), 0.0))
+    assert len(pending.rows[Kind.LOADS]) == MOST_ROWS
+    assert pending.rows[Kind.LOADS][0][0] == 100.0
+    assert pending.dropped == 100
 
 
 def test_the_viewer_is_found_but_not_opened_without_a_display(monkeypatch: pytest.MonkeyPatch) -> None:

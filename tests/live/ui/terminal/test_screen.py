@@ -45,10 +45,10 @@ def test_the_progress_of_a_replay_is_one_line() -> None:
     stream = io.StringIO()
     now = iter(range(0, 100, 10))
     screen = TerminalScreen(stream, now=lambda: next(now))
-    screen.progress(instant(), 5, 20, 2.5)
-    screen.progress(instant(), 5, None, 0.0)
-    screen.progress(instant(), 21, 20, 2.5)
-    screen.progress(instant(), 1, 100_000, 1.0)
+    screen.progress(time_step(), 5, 20, 2.5)
+    screen.progress(time_step(), 5, None, 0.0)
+    screen.progress(time_step(), 21, 20, 2.5)
+    screen.progress(time_step(), 1, 100_000, 1.0)
     assert stream.getvalue().splitlines() == [
         "5 of 20 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs  20 ZOI/s  0:08 left",
         "5 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs",
@@ -57,18 +57,18 @@ def test_the_progress_of_a_replay_is_one_line() -> None:
     ]
 
 
-def instant() -> TimeStep:
+def time_step() -> TimeStep:
     numbers = {f.name: 0.0 for f in dataclasses.fields(TimeStep) if f.default is dataclasses.MISSING}
     told: Any = {**numbers, "force": 7.0, "exx": 1e-4, "eyy": -2e-4, "n_valid": 8, "n_zoi": 10}
     return TimeStep(**told)
 
 
 def snapshot(**more: Any) -> Snapshot:
-    ledger = FrameCounts()
-    ledger.add(grabbed=200, measured=120, skipped=8)
+    frame_counts = FrameCounts()
+    frame_counts.add(grabbed=200, measured=120, skipped=8)
     known = {"force_N": 1234.5, "stress_Pa": 1234.5 / 40e-6, "latency_p95_s": 0.0421, "disk_s": 7200.0}
     told: Any = known | more
-    return Snapshot(0.0, "REC", 75.0, 29.9, frames=ledger.as_dict(), instant=instant(), **told)
+    return Snapshot(0.0, "REC", 75.0, 29.9, frames=frame_counts.as_dict(), time_step=time_step(), **told)
 
 
 def test_the_status_line_has_everything_where_there_is_room() -> None:
@@ -130,25 +130,25 @@ def test_a_lost_terminal_does_not_matter() -> None:
 
 
 def test_the_ledger_tells_when_it_does_not_add_up() -> None:
-    ledger = FrameCounts()
-    ledger.add(grabbed=10, measured=6, skipped=2, reference=1, left_out=1, recorded=10)
-    assert ledger.adds_up
-    assert not ledger.loss
-    ledger.add(grabbed=1)
-    assert not ledger.adds_up
-    assert "DOES NOT ADD UP" in ledger.line()
-    ledger.add(left_out=1, unrecorded=1)
-    assert ledger.adds_up
-    assert ledger.loss
+    frame_counts = FrameCounts()
+    frame_counts.add(grabbed=10, measured=6, skipped=2, reference=1, left_out=1, recorded=10)
+    assert frame_counts.adds_up
+    assert not frame_counts.loss
+    frame_counts.add(grabbed=1)
+    assert not frame_counts.adds_up
+    assert "DOES NOT ADD UP" in frame_counts.line()
+    frame_counts.add(left_out=1, unrecorded=1)
+    assert frame_counts.adds_up
+    assert frame_counts.loss
 
 
 def test_late_listeners_hear_everything_once() -> None:
-    journal, heard = EventLog(), []
-    journal(Event(1.0, EventKind.DEVICE, "a", "first"))
-    journal.add_listener(heard.append)
-    journal(Event(2.0, EventKind.LOST, "a", "second", "warning"))
+    event_log, heard = EventLog(), []
+    event_log(Event(1.0, EventKind.DEVICE, "a", "first"))
+    event_log.add_listener(heard.append)
+    event_log(Event(2.0, EventKind.LOST, "a", "second", "warning"))
     assert [event.text for event in heard] == ["first", "second"]
-    assert [event.text for event in journal.events("warning")] == ["second"]
+    assert [event.text for event in event_log.events("warning")] == ["second"]
 
 
 @pytest.mark.parametrize(

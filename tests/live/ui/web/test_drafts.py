@@ -47,14 +47,14 @@ class Looking:
 def looking(tmp_path: Path) -> Iterator[tuple[SetupSession, Looking]]:
     rig = tmp_path / "rig.toml"
     rig.write_text("[scale]\nstand_off_mm = 400\n")
-    bench, eye = SetupSession(ConfigDraft(load_config(rig, {}), rig, {}), Broadcaster()), Looking()
-    bench.eye = eye  # type: ignore[assignment]
-    yield bench, eye
-    bench._folder.cleanup()
+    session, preview = SetupSession(ConfigDraft(load_config(rig, {}), rig, {}), Broadcaster()), Looking()
+    session.preview = preview  # type: ignore[assignment]
+    yield session, preview
+    session._folder.cleanup()
 
 
-def show(eye: Looking, picture: np.ndarray) -> None:
-    eye.frames = [Frame(frozen(picture), k, k / 10, "nominal", 0, 8, k / 10) for k in range(3)]
+def show(preview: Looking, picture: np.ndarray) -> None:
+    preview.frames = [Frame(frozen(picture), k, k / 10, "nominal", 0, 8, k / 10) for k in range(3)]
 
 
 @pytest.mark.parametrize(
@@ -63,35 +63,35 @@ def show(eye: Looking, picture: np.ndarray) -> None:
 def test_a_board_gives_the_scale(
     looking: tuple[SetupSession, Looking], board: Any, said: dict[str, Any]
 ) -> None:
-    bench, eye = looking
+    session, preview = looking
     picture = seen(board, PX_PER_MM)
-    show(eye, picture)
-    CHANGES["board"](bench, said)
-    scale = bench.draft.config.scale
+    show(preview, picture)
+    CHANGES["board"](session, said)
+    scale = session.draft.config.scale
     assert scale.px_per_mm == pytest.approx(PX_PER_MM, rel=1e-3)
     assert scale.mm_per_px == pytest.approx(from_board(picture.astype(np.float32), board).mm_per_px, rel=1e-6)
     assert scale.method is not None and "corners" in scale.method and scale.sigma_mm_per_px
-    assert bench.state()["remarks"] == []
+    assert session.state()["remarks"] == []
 
 
 def test_a_tilt_is_told_until_the_scale_is_taken_anew(looking: tuple[SetupSession, Looking]) -> None:
-    bench, eye = looking
-    show(eye, seen(CHECKER, PX_PER_MM, degrees=12.0))
-    CHANGES["board"](bench, {"columns": 9, "rows": 6, "square": 5})
-    (remark,) = bench.state()["remarks"]
+    session, preview = looking
+    show(preview, seen(CHECKER, PX_PER_MM, degrees=12.0))
+    CHANGES["board"](session, {"columns": 9, "rows": 6, "square": 5})
+    (remark,) = session.state()["remarks"]
     assert "the board is tilted, about 11 degrees" in remark
-    CHANGES["scale"](bench, {"points": [[10, 10], [110, 10]], "mm": 5})
-    assert bench.state()["remarks"] == []
+    CHANGES["scale"](session, {"points": [[10, 10], [110, 10]], "mm": 5})
+    assert session.state()["remarks"] == []
 
 
 def test_no_board_no_scale(looking: tuple[SetupSession, Looking]) -> None:
-    bench, eye = looking
+    session, preview = looking
     with pytest.raises(DataError, match="no picture yet"):
-        CHANGES["board"](bench, AS_CHECKER)
-    show(eye, np.full((200, 200), 90, np.uint8))
+        CHANGES["board"](session, AS_CHECKER)
+    show(preview, np.full((200, 200), 90, np.uint8))
     with pytest.raises(DataError, match="no checkerboard of 9 x 6 inner corners"):
-        CHANGES["board"](bench, AS_CHECKER)
-    assert bench.draft.config.scale.px_per_mm is None
+        CHANGES["board"](session, AS_CHECKER)
+    assert session.draft.config.scale.px_per_mm is None
 
 
 @pytest.mark.parametrize(
@@ -103,11 +103,11 @@ def test_no_board_no_scale(looking: tuple[SetupSession, Looking]) -> None:
     ],
 )  # fmt: skip
 def test_what_is_no_board_is_refused(looking: tuple[SetupSession, Looking], wrong: dict[str, Any]) -> None:
-    bench, eye = looking
-    show(eye, seen(CHECKER, PX_PER_MM))
+    session, preview = looking
+    show(preview, seen(CHECKER, PX_PER_MM))
     with pytest.raises(ConfigError):
-        CHANGES["board"](bench, AS_CHECKER | wrong)
-    assert not bench.draft.changes
+        CHANGES["board"](session, AS_CHECKER | wrong)
+    assert not session.draft.changes
 
 
 RIG = """# the rig of bench 3
@@ -143,7 +143,7 @@ def test_saved_with_its_comments_and_loaded_again(draft: ConfigDraft) -> None:
 
 
 def test_a_second_mask_is_a_file_of_its_own(draft: ConfigDraft) -> None:
-    first, second = np.eye(40, dtype=bool), ~np.eye(40, dtype=bool)
+    first, second = np.preview(40, dtype=bool), ~np.preview(40, dtype=bool)
     draft.save(first)
     before = load_config(draft.path, {}).measure.mask
     draft.save(second)

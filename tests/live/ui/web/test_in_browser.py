@@ -241,7 +241,7 @@ def test_another_site_gets_nothing(browser: Any, start: Callable[..., Program]) 
     page = opened(browser, program)
     page.until(lambda: page.stage() == "setup", "it is there")
     port = int(program.address.partition("/?")[0].rpartition(":")[2])
-    door = RequestGuard(port, "x")
+    guard = RequestGuard(port, "x")
     context = page.page.context
     other = context.new_page()
     other.route("http://evil.example/", lambda route: route.fulfill(body="<p>", content_type="text/html"))
@@ -250,7 +250,7 @@ def test_another_site_gets_nothing(browser: Any, start: Callable[..., Program]) 
         """origin => Promise.all(["no-cors", "cors"].map(mode => fetch(origin + "/order", { method: "POST", mode,
             credentials: "include", headers: { "Content-Type": mode === "cors" ? "application/json" : "text/plain" },
             body: JSON.stringify({ line: "quit" }) }).then(r => r.type, e => "refused")))""",
-        door.origin,
+        guard.origin,
     )
     assert tried[1] == "refused" and tried[0] in ("refused", "opaque")
     other.close()

@@ -135,13 +135,13 @@ def test_eight_pages_that_do_not_read_change_no_result(program: Program, tmp_pat
 def test_eight_pages_that_do_not_read_cost_under_a_millisecond_a_measurement() -> None:
     """In the time of the thread that measures: another busy program is not the page's doing."""
     config, m = load_config(None, {}), measurement()
-    with PageController(None, port=0) as desk:
-        watching = desk.begin(config)
+    with PageController(None, port=0) as controller:
+        watching = controller.begin(config)
         worker = ConsumerThread(watching, lambda *told: pytest.fail(str(told)))
         worker.start()
-        pages = [Browser(desk.address) for _ in range(MOST_STREAMS)]
-        streams = list(desk._hub._streams)
-        desk._hub.tell("large", "x" * 200_000)
+        pages = [Browser(controller.address) for _ in range(MOST_STREAMS)]
+        streams = list(controller._broadcaster._streams)
+        controller._broadcaster.tell("large", "x" * 200_000)
         until = time.monotonic() + 10
         while not all(stream._waiting for stream in streams) and time.monotonic() < until:
             time.sleep(0.05)

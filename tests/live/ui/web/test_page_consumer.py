@@ -40,8 +40,8 @@ def measurement() -> Measurement:
 class Told:
     """The newest of each kind that a page was told."""
 
-    def __init__(self, hub: Broadcaster) -> None:
-        stream = hub.open()
+    def __init__(self, broadcaster: Broadcaster) -> None:
+        stream = broadcaster.open()
         assert stream is not None
         self._stream = stream
 
@@ -62,8 +62,8 @@ class Run:
     paused, recording, folder = False, True, Path("run")
 
     def __init__(self, config: Config) -> None:
-        self.books = RunState.new(1.0, specimen=config.specimen)
-        self.books.vitals.state, self.books.vitals.began_t = "REC", 0.0
+        self.run_state = RunState.new(1.0, specimen=config.specimen)
+        self.run_state.health.state, self.run_state.health.began_t = "REC", 0.0
 
 
 def ready(watching: PageConsumer) -> PageConsumer:
@@ -72,18 +72,18 @@ def ready(watching: PageConsumer) -> PageConsumer:
 
 
 def test_what_is_told(config: Config) -> None:
-    hub, run = Broadcaster(), Run(config)
-    told, watching = Told(hub), ready(PageConsumer(hub, config))
+    broadcaster, run = Broadcaster(), Run(config)
+    told, watching = Told(broadcaster), ready(PageConsumer(broadcaster, config))
     watching.attend(run)
     m = measurement()
     i = replace(
-        m.instant, gauges={"axial": GaugeValue(0.001, 2e-6), "b": GaugeValue(math.nan, math.nan, "lost")}
+        m.time_step, gauges={"axial": GaugeValue(0.001, 2e-6), "b": GaugeValue(math.nan, math.nan, "lost")}
     )
-    watching.measurement(replace(m, instant=i))
-    run.books.history.add(i)
+    watching.measurement(replace(m, time_step=i))
+    run.run_state.history.add(i)
     for t, force in enumerate((500.0, -400.0)):
-        run.books.loads.append(LoadSample(t, force))
-        run.books.vitals.loaded(t, force)
+        run.run_state.loads.append(LoadSample(t, force))
+        run.run_state.health.loaded(t, force)
     watching.event(Event(0.0, EventKind.DEVICE, "camera", "a \x1b[31mfault", "error"))
     watching.idle()
     state = told["run"]
@@ -95,12 +95,12 @@ def test_what_is_told(config: Config) -> None:
 
 
 def test_the_map_is_made_only_while_somebody_looks(config: Config) -> None:
-    hub = Broadcaster()
-    watching = ready(PageConsumer(hub, config))
+    broadcaster = Broadcaster()
+    watching = ready(PageConsumer(broadcaster, config))
     watching.measurement(measurement())
     watching.idle()
     assert watching.picture == b""
-    hub.open()
+    broadcaster.open()
     watching.idle()
     m = measurement()
     picture = cv2.imdecode(np.frombuffer(watching.picture, np.uint8), cv2.IMREAD_COLOR)
@@ -108,9 +108,9 @@ def test_the_map_is_made_only_while_somebody_looks(config: Config) -> None:
 
 
 def test_another_map(config: Config) -> None:
-    hub = Broadcaster()
-    hub.open()
-    watching = ready(PageConsumer(hub, config))
+    broadcaster = Broadcaster()
+    broadcaster.open()
+    watching = ready(PageConsumer(broadcaster, config))
     for name in ("exx", "e1", "u", "sigma", "status"):
         watching.measurement(measurement())
         assert watching.choose(name) == ""
@@ -142,10 +142,10 @@ def test_points_are_bounded_and_a_page_gets_what_it_lacks() -> None:
 
 @pytest.fixture
 def worker(config: Config) -> Iterator[ConsumerThread]:
-    hub = Broadcaster()
+    broadcaster = Broadcaster()
     for _ in range(8):
-        assert hub.open() is not None
-    worker = ConsumerThread(PageConsumer(hub, config), lambda *told: pytest.fail(str(told)))
+        assert broadcaster.open() is not None
+    worker = ConsumerThread(PageConsumer(broadcaster, config), lambda *told: pytest.fail(str(told)))
     worker.start()
     yield worker
     worker.end()

@@ -31,11 +31,13 @@ class At:
             f'# bench 3\n[camera]\naddress = "{CAMERA}"\n[measure]\nzoi = 32\ngauges = "auto"\n'
         )
         said = {"output.dir": str(folder)}
-        self.desk = PageController(ConfigDraft(load_config(self.rig, said), self.rig, said), port=0)
+        self.controller = PageController(ConfigDraft(load_config(self.rig, said), self.rig, said), port=0)
         self.started: list[Config | None] = []
-        self._thread = threading.Thread(target=lambda: self.started.append(self.desk.set_up()), daemon=True)
+        self._thread = threading.Thread(
+            target=lambda: self.started.append(self.controller.set_up()), daemon=True
+        )
         self._thread.start()
-        self.until(lambda: self.desk.bench is not None)
+        self.until(lambda: self.controller.session is not None)
 
     def until(self, holds: Callable[[], bool]) -> None:
         end = time.monotonic() + LONG_S
@@ -45,7 +47,7 @@ class At:
 
     def post(self, path: str, value: dict[str, Any]) -> str:
         body = json.dumps(value).encode()
-        answer = ask(self.desk.server, path, method="POST", body=body)
+        answer = ask(self.controller.server, path, method="POST", body=body)
         return str(json.loads(answer.body)["answer"])
 
     def order(self, line: str) -> str:
@@ -55,9 +57,9 @@ class At:
         return self.post("/setup", value)
 
     def end(self) -> None:
-        self.desk.quit()
+        self.controller.quit()
         self._thread.join(LONG_S)
-        self.desk.__exit__()
+        self.controller.__exit__()
 
     def has_ended(self) -> Config | None:
         self._thread.join(LONG_S)
@@ -72,10 +74,10 @@ def at(tmp_path: Path) -> Iterator[At]:
 
 
 def test_set_up_changed_saved_and_started(at: At, tmp_path: Path) -> None:
-    bench = at.desk.bench
-    assert bench is not None
-    at.until(lambda: bench.drawn is not None and bool(bench.draft.config.gauges))
-    assert set(bench.draft.config.gauges) == {"axial", "transverse", "area"}, "placed, as the rig asks for"
+    session = at.controller.session
+    assert session is not None
+    at.until(lambda: session.drawn is not None and bool(session.draft.config.gauges))
+    assert set(session.draft.config.gauges) == {"axial", "transverse", "area"}, "placed, as the rig asks for"
     assert at.order("tare").startswith("no:") and at.order("next").startswith("no:")
     assert at.change(do="draw", strokes=[{"tool": "rectangle", "points": [[20, 20], [200, 170]]}]) == "ok"
     assert at.change(do="draw", strokes=[{"tool": "brush", "points": []}]).startswith("no:")
@@ -97,8 +99,8 @@ def test_set_up_changed_saved_and_started(at: At, tmp_path: Path) -> None:
     assert at.change(do="gauge", kind="line", points=[[50.04, 40], [50, 120]]) == "ok"
     assert at.change(do="gauge", name="axial2", points=[[60, 40], [60, 130]]) == "ok", "moved by its handles"
     assert at.change(do="gauge", name="long", was="axial2") == "ok"
-    assert bench.draft.config.gauges["long"] == {"kind": "line", "start": (60, 40), "end": (60, 130)}
-    drawn = bench.state()["gauges"]["long"]
+    assert session.draft.config.gauges["long"] == {"kind": "line", "start": (60, 40), "end": (60, 130)}
+    drawn = session.state()["gauges"]["long"]
     assert drawn["handles"] == ((60, 40), (60, 130)) and drawn["outline"][0] == [(60, 40), (60, 130)]
     for wrong in (
         {"kind": "spiral"},
@@ -133,16 +135,16 @@ def test_set_up_changed_saved_and_started(at: At, tmp_path: Path) -> None:
 
 
 def test_a_camera_setting_that_is_refused_leaves_the_camera_as_it_was(at: At) -> None:
-    bench = at.desk.bench
-    assert bench is not None
-    at.until(lambda: bench.eye.info is not None)
+    session = at.controller.session
+    assert session is not None
+    at.until(lambda: session.preview.info is not None)
     assert at.change(do="camera", key="exposure_us", value=3000) == "ok"
-    assert bench.eye.info is not None and bench.eye.info.exposure_s == pytest.approx(3e-3)
-    before = bench.draft.config.camera.address
+    assert session.preview.info is not None and session.preview.info.exposure_s == pytest.approx(3e-3)
+    before = session.draft.config.camera.address
     assert at.change(do="camera", key="exposure_us", value=1e9).startswith("no:")
     assert at.change(do="camera", key="format", value=1).startswith("no:")
-    assert bench.draft.config.camera.address == before
-    at.until(lambda: len(bench.eye.recent()) > 2)
+    assert session.draft.config.camera.address == before
+    at.until(lambda: len(session.preview.recent()) > 2)
 
 
 class Run:
@@ -152,7 +154,7 @@ class Run:
 
     def __init__(self) -> None:
         self.heard: list[str] = []
-        self.books = RunState.new(0.5)
+        self.run_state = RunState.new(0.5)
 
     def stop(self, reason: str) -> None:
         self.heard.append("quit")
@@ -163,24 +165,24 @@ class Run:
 
 
 def test_orders_during_a_run_and_after(at: At) -> None:
-    at.desk.quit()
+    at.controller.quit()
     assert at.has_ended() is None
-    at.desk.begin(load_config(None, {}))
+    at.controller.begin(load_config(None, {}))
     assert at.order("tare") == "no: the test is being opened"
     run: Any = Run()
-    at.desk.attend(run)
+    at.controller.attend(run)
     assert at.order("tare") == "ok" and at.order("note a b") == "ok" and at.order("quit") == "ok"
     assert at.order("fly").startswith("no:") and at.post("/order", {"line": 3}).startswith("no:")
     assert run.heard == ["tare", "note a b", "quit"]
     assert at.change(do="all") == "no: nothing is set up now"
     assert at.post("/map", {"of": "e1"}) == "ok" and at.post("/map", {"of": "x"}).startswith("no:")
     opened: list[int] = []
-    at.desk.viewer = lambda port: opened.append(port) or "ok"  # type: ignore[func-returns-value]
+    at.controller.viewer = lambda port: opened.append(port) or "ok"  # type: ignore[func-returns-value]
     assert at.post("/viewer", {}).startswith("no:"), "the view does not serve yet"
-    run.books.vitals.view_port = 9999
+    run.run_state.health.view_port = 9999
     assert at.post("/viewer", {}) == "ok" and opened == [9999]
-    at.desk.end({"figures": []})
+    at.controller.end({"figures": []})
     assert at.post("/viewer", {}).startswith("no:") and opened == [9999], "the view ends with the run"
     assert at.order("tare").startswith("no:") and at.order("next") == "ok"
-    assert at.desk.after()
-    assert at.desk.draft is not None and at.desk.draft.config.metadata["specimen"] == "specimen-2"
+    assert at.controller.after()
+    assert at.controller.draft is not None and at.controller.draft.config.metadata["specimen"] == "specimen-2"

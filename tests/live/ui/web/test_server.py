@@ -42,12 +42,12 @@ def ask(
     body: Any = None,
 ) -> Asked:
     """As our own page asks, but for ``headers``; a header of "" is left out."""
-    door = page.door
-    own = {"Host": door.host, "Cookie": door.cookie.partition(";")[0], "Sec-Fetch-Site": "same-origin"}
+    guard = page.guard
+    own = {"Host": guard.host, "Cookie": guard.cookie.partition(";")[0], "Sec-Fetch-Site": "same-origin"}
     if method == "POST":
-        own |= {"Origin": door.origin, "Content-Type": "application/json"}
+        own |= {"Origin": guard.origin, "Content-Type": "application/json"}
     sent = {key: value for key, value in (own | dict(headers or {})).items() if value}
-    connection = http.client.HTTPConnection("127.0.0.1", door.port, timeout=5)
+    connection = http.client.HTTPConnection("127.0.0.1", guard.port, timeout=5)
     try:
         connection.putrequest(method, path, skip_host=True)
         for key, value in sent.items():
@@ -66,15 +66,15 @@ def test_only_this_machine_is_listened_to(page: PageServer) -> None:
         "127.0.0.1"
     }
     for other in others:
-        with pytest.raises(OSError), socket.create_connection((other, page.door.port), timeout=1):
+        with pytest.raises(OSError), socket.create_connection((other, page.guard.port), timeout=1):
             pass
 
 
 def test_the_address_sets_the_cookie_and_hides_the_token(page: PageServer) -> None:
-    answer = ask(page, f"/?token={page.door.token}", {"Cookie": "", "Sec-Fetch-Site": "none"})
+    answer = ask(page, f"/?token={page.guard.token}", {"Cookie": "", "Sec-Fetch-Site": "none"})
     assert answer.status == 303 and answer.headers["Location"] == "/"
     cookie = answer.headers["Set-Cookie"]
-    assert page.door.token in cookie and "HttpOnly" in cookie and "SameSite=Strict" in cookie
+    assert page.guard.token in cookie and "HttpOnly" in cookie and "SameSite=Strict" in cookie
 
 
 def test_the_page_is_ours_alone(page: PageServer) -> None:
@@ -116,10 +116,10 @@ def test_an_order_is_taken(page: PageServer) -> None:
     ],
 )
 def test_what_is_not_shown(page: PageServer, status: int, path: str, headers: dict[str, str]) -> None:
-    known = {"token": page.door.token, "port": page.door.port}
+    known = {"token": page.guard.token, "port": page.guard.port}
     answer = ask(page, path.format(**known), {key: value.format(**known) for key, value in headers.items()})
     assert answer.status == status
-    assert page.door.token.encode() not in answer.body and page.door.token not in str(answer.headers)
+    assert page.guard.token.encode() not in answer.body and page.guard.token not in str(answer.headers)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +146,7 @@ def test_what_is_not_shown(page: PageServer, status: int, path: str, headers: di
     ],
 )
 def test_what_is_not_taken(page: PageServer, status: int, headers: dict[str, str], body: bytes) -> None:
-    asked = {key: value.format(port=page.door.port) for key, value in headers.items()}
+    asked = {key: value.format(port=page.guard.port) for key, value in headers.items()}
     assert ask(page, "/order", asked, method="POST", body=body).status == status
 
 
@@ -158,8 +158,8 @@ def test_no_preflight_is_answered(page: PageServer) -> None:
 
 
 def stream(page: PageServer) -> http.client.HTTPResponse:
-    connection = http.client.HTTPConnection("127.0.0.1", page.door.port, timeout=5)
-    connection.request("GET", "/events", headers={"Cookie": page.door.cookie.partition(";")[0]})
+    connection = http.client.HTTPConnection("127.0.0.1", page.guard.port, timeout=5)
+    connection.request("GET", "/events", headers={"Cookie": page.guard.cookie.partition(";")[0]})
     return connection.getresponse()
 
 
@@ -170,8 +170,8 @@ def test_a_ninth_page_is_refused_until_one_goes(page: PageServer) -> None:
     streams[0].close()
 
     def gone() -> bool:
-        page.hub.tell("state", "x" * 10)  # the server sees that a page has gone when it writes to it
-        return page.hub.watched < MOST_STREAMS
+        page.broadcaster.tell("state", "x" * 10)  # the server sees that a page has gone when it writes to it
+        return page.broadcaster.watched < MOST_STREAMS
 
     until(gone)
     again = stream(page)
@@ -182,16 +182,16 @@ def test_a_ninth_page_is_refused_until_one_goes(page: PageServer) -> None:
 
 def test_a_page_is_told_the_newest_and_then_what_comes(page: PageServer) -> None:
     for number in range(3):
-        page.hub.tell("state", {"n": number, "nan": float("nan")})
+        page.broadcaster.tell("state", {"n": number, "nan": float("nan")})
     with stream(page) as told:
         assert told.fp.readline() == b"event: state\n"
         assert told.fp.readline() == b'data: {"n":2,"nan":null}\n'
 
 
 def test_a_frozen_page_holds_up_nobody() -> None:
-    hub = Broadcaster()
-    frozen = [hub.open() for _ in range(MOST_STREAMS)]
+    broadcaster = Broadcaster()
+    frozen = [broadcaster.open() for _ in range(MOST_STREAMS)]
     for number in range(1000):
-        hub.tell("state", number)
-    assert hub.open() is None
+        broadcaster.tell("state", number)
+    assert broadcaster.open() is None
     assert [one.take(0) for one in frozen if one] == [{"state": b"999"}] * MOST_STREAMS
