@@ -60,7 +60,7 @@ def compile_ahead(
         return 0.0
     began = time.monotonic()
     words = [",".join(kinds), "phase" if phase else "-"]
-    commands = [[sys.executable, "-m", "live.setup", part, *words] for part in COMPILE_PARTS]
+    commands = [[sys.executable, "-m", "live.setup.compiling", part, *words] for part in COMPILE_PARTS]
     with held_back(signal.SIGINT):
         processes = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]
     try:
