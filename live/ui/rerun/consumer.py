@@ -20,7 +20,7 @@ CLOSE_S = 10.0
 """For drawing what waits and closing the file at the end of a test."""
 
 IDLE_S = 0.5
-CARD_INSTANTS = 2000
+CARD_TIME_STEPS = 2000
 """The figures of the card are of so many instants at most, evenly thinned; those of the summary of all."""
 
 
@@ -73,7 +73,7 @@ class CardWriter(Consumer):
 
     def __init__(self, view: View, card: StatusCard, run_state: RunState) -> None:
         self._view, self._card, self._run_state = view, card, run_state
-        self._time_steps: Thinned[TimeStep] = Thinned(CARD_INSTANTS)
+        self._time_steps: Thinned[TimeStep] = Thinned(CARD_TIME_STEPS)
 
     def measurement(self, measurement: Measurement) -> None:
         """Keep its means, and write the card where the last one is old."""

@@ -85,7 +85,7 @@ class ViewSetup:
 
 Row = tuple[float, ...]
 
-MOST_PICTURE_BYTES = 8_000_000
+MAX_PICTURE_BYTES = 8_000_000
 """A larger picture is sent as every second (third ...) pixel of every second row.
 
 To slice 20 megapixels costs the test 0.7 ms, to send them whole 4 ms, to reduce them well 14 ms.
@@ -98,7 +98,7 @@ _NUMBERS = ("t", "axial", "sigma_axial", "force_N", "stress_Pa")
 
 
 @dataclass(frozen=True, slots=True)
-class Where:
+class ViewTarget:
     """Where the view is to be shown.
 
     Attributes
@@ -126,21 +126,21 @@ class PictureMessage:
     step: int
 
 
-def setup_message(setup: ViewSetup, where: Where) -> Message:
+def setup_message(setup: ViewSetup, target: ViewTarget) -> Message:
     """The first message: what is shown, and where."""
     names = ("title", "width", "height", "bits", "start_monotonic", "area_m2", "axis", "strain_range")
     more = ("picture_hz", "finished", "with_load", "outlines", "gauges", "light", "scale")
     meta = {name: getattr(setup, name) for name in (*names, *more)}
-    sinks = {"port": where.port, "rrd": where.rrd, "recording": where.recording}
+    sinks = {"port": target.port, "rrd": target.rrd, "recording": target.recording}
     return Message(Kind.SETUP, {**meta, **sinks, "grid": setup.grid.to_dict()}, {"active": setup.grid.active})
 
 
-def setup_of(message: Message) -> tuple[ViewSetup, Where]:
+def setup_of(message: Message) -> tuple[ViewSetup, ViewTarget]:
     """What ``setup_message`` was made of."""
     meta = dict(message.meta)
     try:
-        where = Where(*(meta.pop(name) for name in ("port", "rrd", "recording")))
-        return ViewSetup(grid=_grid(meta.pop("grid"), message), **meta), where
+        target = ViewTarget(*(meta.pop(name) for name in ("port", "rrd", "recording")))
+        return ViewSetup(grid=_grid(meta.pop("grid"), message), **meta), target
     except (KeyError, TypeError) as error:
         raise WireError(f"the first message to the view lacks or has too much: {error}") from error
 
@@ -202,7 +202,7 @@ def field_of(message: Message) -> tuple[float, StrainField]:
 
 def picture_message(frame: Frame) -> Message:
     """A frame, thinned where it is very large."""
-    step = max(1, math.ceil(math.sqrt(frame.image.nbytes / MOST_PICTURE_BYTES)))
+    step = max(1, math.ceil(math.sqrt(frame.image.nbytes / MAX_PICTURE_BYTES)))
     image = frame.image if step == 1 else frame.image[::step, ::step]
     return Message(Kind.PICTURE, {"t": frame.t, "bits": frame.bits, "step": step}, {"image": image})
 

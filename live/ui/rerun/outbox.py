@@ -18,7 +18,7 @@ from live.pipeline.snapshot import Snapshot
 from live.ui.rerun.messages import (
     Row,
     ViewSetup,
-    Where,
+    ViewTarget,
     events_message,
     field_message,
     figures_message,
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     from acquire.frame import Frame
     from analysis.field import StrainField
 
-MOST_ROWS, MOST_EVENTS = 20_000, 1000
-PAST_ROWS = {Kind.MEANS: 5000, Kind.LOADS: 10_000, Kind.POINTS: 800}
+MAX_ROWS, MAX_EVENTS = 20_000, 1000
+HISTORY_ROWS = {Kind.MEANS: 5000, Kind.LOADS: 10_000, Kind.POINTS: 800}
 """What is kept of each to be told again."""
 
 
@@ -55,7 +55,7 @@ class Pending:
     """
 
     def __init__(self) -> None:
-        self.rows: dict[Kind, deque[Row]] = {kind: deque() for kind in PAST_ROWS}
+        self.rows: dict[Kind, deque[Row]] = {kind: deque() for kind in HISTORY_ROWS}
         self.events: deque[Event] = deque()
         self.field: tuple[float, StrainField] | None = None
         self.picture: Frame | None = None
@@ -65,22 +65,22 @@ class Pending:
 
     def row(self, kind: Kind, row: Row) -> None:
         """Keep a row; of too many the oldest goes."""
-        self._keep(self.rows[kind], row, MOST_ROWS)
+        self._keep(self.rows[kind], row, MAX_ROWS)
 
     def event(self, event: Event) -> None:
         """Keep an event; of too many the oldest goes."""
-        self._keep(self.events, event, MOST_EVENTS)
+        self._keep(self.events, event, MAX_EVENTS)
 
-    def _keep(self, kept: deque[Any], item: Any, most: int) -> None:
-        if len(kept) >= most:
-            kept.popleft()
+    def _keep(self, waiting: deque[Any], item: Any, limit: int) -> None:
+        if len(waiting) >= limit:
+            waiting.popleft()
             self.dropped += 1
-        kept.append(item)
+        waiting.append(item)
 
 
-def taken(kept: deque[Any]) -> list[Any]:
+def drained(waiting: deque[Any]) -> list[Any]:
     """All of it, which is then gone from there; another thread may append meanwhile."""
-    return [kept.popleft() for _ in range(len(kept))]
+    return [waiting.popleft() for _ in range(len(waiting))]
 
 
 class PastMessages:
@@ -94,14 +94,14 @@ class PastMessages:
     """
 
     def __init__(self) -> None:
-        self.rows: dict[Kind, Thinned[Row]] = {kind: Thinned(most) for kind, most in PAST_ROWS.items()}
-        self.events: deque[Event] = deque(maxlen=MOST_EVENTS)
+        self.rows: dict[Kind, Thinned[Row]] = {kind: Thinned(limit) for kind, limit in HISTORY_ROWS.items()}
+        self.events: deque[Event] = deque(maxlen=MAX_EVENTS)
         self.status: str | None = None
 
 
-Story = Callable[[], Iterable[Message]]
+MessageSource = Callable[[], Iterable[Message]]
 FIELD_HZ = 10.0
-MOST_BYTES_S = 60e6
+MAX_BYTES_S = 60e6
 """Of fields, and of pictures; very large ones are sent less often."""
 
 
@@ -121,30 +121,30 @@ class Outbox:
         Fields and pictures.
     """
 
-    def __init__(self, setup: ViewSetup, pending: Pending, story: Story = lambda: ()) -> None:
+    def __init__(self, setup: ViewSetup, pending: Pending, playback: MessageSource = lambda: ()) -> None:
         self._setup, self._pending, self._past = setup, pending, PastMessages()
-        self._story = story
+        self._playback = playback
         self._first: Iterator[Message] = iter(())
         self._due_t = {Kind.FIELD: -math.inf, Kind.PICTURE: -math.inf}
         self._ending = False
         self.sent = dict.fromkeys(self._due_t, 0)
 
-    def begin(self, where: Where) -> None:
+    def begin(self, target: ViewTarget) -> None:
         """A process was started: it must be told everything."""
-        self._first = self._all(where)
+        self._first = self._all(target)
 
     def end(self) -> None:
         """Nothing comes any more: when all is sent, say so."""
         self._ending = True
 
-    def _all(self, where: Where) -> Iterator[Message]:
-        yield setup_message(self._setup, where)
+    def _all(self, target: ViewTarget) -> Iterator[Message]:
+        yield setup_message(self._setup, target)
         for kind, rows in self._past.rows.items():
             yield rows_message(kind, rows.items())
         yield events_message(list(self._past.events))
         if self._past.status is not None:
             yield Message(Kind.STATUS, {"markdown": self._past.status})
-        yield from self._story()
+        yield from self._playback()
 
     def next(self, now: float) -> Message | None:
         """What is to be sent at ``now`` (s, monotonic); None: nothing for the moment."""
@@ -152,14 +152,14 @@ class Outbox:
 
     def _small(self) -> Message | None:
         pending, past = self._pending, self._past
-        for kind, kept in pending.rows.items():
-            if kept:
-                rows = taken(kept)
+        for kind, waiting in pending.rows.items():
+            if waiting:
+                rows = drained(waiting)
                 for row in rows:
                     past.rows[kind].append(row)
                 return rows_message(kind, rows)
         if pending.events:
-            events = taken(pending.events)
+            events = drained(pending.events)
             past.events.extend(events)
             return events_message(events)
         if pending.status is not None:
@@ -185,7 +185,7 @@ class Outbox:
 
     def _paced(self, message: Message, now: float, rate: float) -> Message:
         size = sum(array.nbytes for array in message.arrays.values())
-        period = max(1 / rate, size / MOST_BYTES_S)
+        period = max(1 / rate, size / MAX_BYTES_S)
         self._due_t[message.kind] = max(self._due_t[message.kind] + period, now + period / 2)
         self.sent[message.kind] += 1
         return message

@@ -36,11 +36,11 @@ from live.ui.rerun.messages import (
 from live.ui.rerun.view import View, spawn_viewer
 from live.ui.rerun.wire import Kind, Message
 
-MOST_BYTES = 500e6
+MAX_BYTES = 500e6
 """Of pictures and maps, as they are drawn: the viewer keeps them all in memory."""
 
 _BYTES_PX, _BYTES_ZOI = 0.35, 250.0  # of a JPEG of speckle; of three maps and the values of a ZOI
-_LONGEST_PX = 1280  # larger pictures are drawn reduced
+_MAX_PX = 1280  # larger pictures are drawn reduced
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class ShowRequest:
     every: int | None = None
 
 
-def chosen(run: RunFolder, asked: ShowRequest) -> tuple[int, ...]:
+def selected_rows(run: RunFolder, request: ShowRequest) -> tuple[int, ...]:
     """Rows of the instants that are shown, the last of them always.
 
     Raises
@@ -73,24 +73,24 @@ def chosen(run: RunFolder, asked: ShowRequest) -> tuple[int, ...]:
     t = run.strain.time_s
     if not len(t):
         raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to show")
-    low = -math.inf if asked.start_s is None else asked.start_s
-    high = math.inf if asked.end_s is None else asked.end_s
+    low = -math.inf if request.start_s is None else request.start_s
+    high = math.inf if request.end_s is None else request.end_s
     rows = np.flatnonzero((t >= low) & (t <= high))
     if not len(rows):
         raise ConfigError(
             f"--from, --to: no measurement between {low:g} and {high:g} s; they reach from {t[0]:.6g} to {t[-1]:.6g} s"
         )
-    every = asked.every or math.ceil(len(rows) * _bytes_each(run) / MOST_BYTES)
+    every = request.every or math.ceil(len(rows) * _bytes_each(run) / MAX_BYTES)
     return tuple(int(row) for row in rows[::-1][::every][::-1])
 
 
 def _bytes_each(run: RunFolder) -> float:
-    width, height = size_of(run)
-    reduced = max(1, math.ceil(max(width, height) / _LONGEST_PX))
+    width, height = picture_size(run)
+    reduced = max(1, math.ceil(max(width, height) / _MAX_PX))
     return _BYTES_PX * width * height / reduced**2 + _BYTES_ZOI * run.strain.grid.n_active
 
 
-def size_of(run: RunFolder) -> tuple[int, int]:
+def picture_size(run: RunFolder) -> tuple[int, int]:
     """Width and height of the pictures, px; without any, as far as the ZOIs reach."""
     if run.pictures is not None:
         return run.pictures.info.width, run.pictures.info.height
@@ -100,7 +100,7 @@ def size_of(run: RunFolder) -> tuple[int, int]:
 
 def setup_of(run: RunFolder) -> ViewSetup:
     """What is shown, and how."""
-    width, height = size_of(run)
+    width, height = picture_size(run)
     return ViewSetup(
         title=run.title,
         width=width,
@@ -127,7 +127,7 @@ def _outlines(run: RunFolder) -> dict[str, tuple[tuple[tuple[float, float], ...]
         return {}
 
 
-def story(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Message]:
+def playback(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Message]:
     """Everything, times in seconds since the start of the test.
 
     Raises
@@ -189,47 +189,47 @@ def _status(run: RunFolder) -> str:
     return "\n\n".join([head, *(line.strip().replace("+-", "±") for line in lines)])
 
 
-_LOOK_S, _CLOSE_S = 0.1, 600.0
+_POLL_S, _CLOSE_S = 0.1, 600.0
 
 
 def show(
     run: RunFolder,
-    asked: ShowRequest,
+    request: ShowRequest,
     screen: Screen,
-    enough: threading.Event,
+    stop: threading.Event,
     *,
     port: int,
     rrd: Path | None = None,
 ) -> None:
-    """Show ``run`` until ``enough`` is set; with ``rrd`` into that file alone, until all is written.
+    """Show ``run`` until ``stop`` is set; with ``rrd`` into that file alone, until all is written.
 
     Raises
     ------
     ConfigError, DataError
         Nothing can be shown, a file cannot be read, or the view's process fails.
     """
-    rows = chosen(run, asked)
-    _tell_of_choice(len(rows), run, screen)
-    told = _Told(run, rows, screen)
+    rows = selected_rows(run, request)
+    _report_selection(len(rows), run, screen)
+    played = _PlayedMessages(run, rows, screen)
     view = View(
         setup_of(run),
         port=None if rrd else port,
         rrd=rrd,
-        tell=lambda text, level: None if enough.is_set() else _say(screen, text, level),
-        serving=lambda view: _announce(view, screen),
-        story=told.messages,
+        notify=lambda text, level: None if stop.is_set() else _print(screen, text, level),
+        on_serving=lambda view: _announce(view, screen),
+        playback=played.messages,
     )
     try:
-        while not view.failed and not told.trouble and not (told.all if rrd else enough).wait(_LOOK_S):
-            if enough.is_set():
+        while not view.failed and not played.trouble and not (played.all if rrd else stop).wait(_POLL_S):
+            if stop.is_set():
                 break
     finally:
-        view.close(_CLOSE_S if rrd and not enough.is_set() else 0.0)
-    if told.trouble or view.failed:
-        raise DataError(told.trouble or view.failed)
+        view.close(_CLOSE_S if rrd and not stop.is_set() else 0.0)
+    if played.trouble or view.failed:
+        raise DataError(played.trouble or view.failed)
 
 
-class _Told:
+class _PlayedMessages:
     """The story as it is taken, from the beginning each time a process is started.
 
     Attributes
@@ -247,7 +247,7 @@ class _Told:
     def messages(self) -> Iterator[Message]:
         try:
             done = 0
-            for message in story(self._run, self._rows):
+            for message in playback(self._run, self._rows):
                 yield message
                 done += message.kind is Kind.FIELD
                 self._screen.status(f"instant {done} of {len(self._rows)}")
@@ -256,14 +256,14 @@ class _Told:
         self.all.set()
 
 
-def _tell_of_choice(shown: int, run: RunFolder, screen: Screen) -> None:
+def _report_selection(shown: int, run: RunFolder, screen: Screen) -> None:
     if shown < run.strain.n:
         screen.say(f"{shown} of {run.strain.n} instants are shown; --from, --to and --every choose others")
     if run.pictures is None:
         screen.say("note: the pictures that were measured are not here any more; maps alone")
 
 
-def _say(screen: Screen, text: str, level: Level) -> None:
+def _print(screen: Screen, text: str, level: Level) -> None:
     screen.say(text if level == "info" else f"{level}: {text}")
 
 
@@ -275,5 +275,5 @@ def _announce(view: View, screen: Screen) -> None:
         screen.say("the viewer opens in a window of its own; Ctrl-C here ends it")
         return
     screen.say("no viewer is opened here (no display); this shows it, Ctrl-C ends it:")
-    for line in view.address.splitlines():
+    for line in view.instructions.splitlines():
         screen.say(f"  {line}")

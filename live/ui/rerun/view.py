@@ -28,9 +28,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
-from live.ui.rerun.messages import ViewSetup, Where, row_of
-from live.ui.rerun.outbox import Outbox, Pending, Story
-from live.ui.rerun.supervisor import Supervisor, Tell
+from live.ui.rerun.messages import ViewSetup, ViewTarget, row_of
+from live.ui.rerun.outbox import MessageSource, Outbox, Pending
+from live.ui.rerun.supervisor import Notify, Supervisor
 from live.ui.rerun.wire import Kind
 
 if TYPE_CHECKING:
@@ -42,11 +42,11 @@ if TYPE_CHECKING:
 _log = logging.getLogger(__name__)
 
 HOST = "127.0.0.1"
-NEEDS = "apt install libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 mesa-vulkan-drivers"
+VIEWER_PACKAGES = "apt install libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0 mesa-vulkan-drivers"
 """What brings the libraries of a window and of drawing in it to a Debian without desktop."""
 
 _OPENING_S = 10.0
-_ESCAPES, _PLACES = re.compile(r"\x1b\[[0-9;]*m"), re.compile(r"os error at \S+ ")
+_ANSI_CODES, _OS_ERROR = re.compile(r"\x1b\[[0-9;]*m"), re.compile(r"os error at \S+ ")
 
 
 def url(port: int) -> str:
@@ -54,7 +54,7 @@ def url(port: int) -> str:
     return f"rerun+http://{HOST}:{port}/proxy"
 
 
-def from_elsewhere(port: int) -> str:
+def remote_access(port: int) -> str:
     """How to watch on a machine with a display what is served on this one, to which nothing else may connect."""
     return f"ssh -N -L {port}:{HOST}:{port} {socket.gethostname()}, and there: rerun --connect {url(port)}"
 
@@ -75,7 +75,7 @@ def has_display() -> bool:
 
 
 def spawn_viewer(
-    port: int, tell: Callable[[str], None] = lambda text: None, memory_limit: str = "2GB"
+    port: int, notify: Callable[[str], None] = lambda text: None, memory_limit: str = "2GB"
 ) -> subprocess.Popen[bytes] | None:
     """Open a viewer window on the view at ``port``.
 
@@ -111,11 +111,11 @@ def spawn_viewer(
         words.close()
         _log.warning("the viewer %s did not start: %s", binary, error)
         return None
-    threading.Thread(target=_see_open, args=(process, words, tell), name="viewer", daemon=True).start()
+    threading.Thread(target=_watch_start, args=(process, words, notify), name="viewer", daemon=True).start()
     return process
 
 
-def _see_open(process: subprocess.Popen[bytes], words: IO[bytes], tell: Callable[[str], None]) -> None:
+def _watch_start(process: subprocess.Popen[bytes], words: IO[bytes], notify: Callable[[str], None]) -> None:
     """Tell where the viewer ends with an error instead of opening."""
     with words:
         try:
@@ -124,16 +124,16 @@ def _see_open(process: subprocess.Popen[bytes], words: IO[bytes], tell: Callable
             return
         if failed:
             words.seek(0)
-            tell(no_window(words.read().decode(errors="replace")))
+            notify(viewer_failure(words.read().decode(errors="replace")))
 
 
-def no_window(words: str) -> str:
+def viewer_failure(words: str) -> str:
     """The sentence for a viewer that ended as it started, from what it wrote."""
-    lines = [line.strip() for line in _ESCAPES.sub("", words).splitlines()]
+    lines = [line.strip() for line in _ANSI_CODES.sub("", words).splitlines()]
     why = next(
         (line.removeprefix("Error: ") for line in lines if line.startswith("Error: ")), "no reason given"
     )
-    return f"the viewer did not open ({_PLACES.sub('', why)}); on a Debian without desktop it needs: {NEEDS}"
+    return f"the viewer did not open ({_OS_ERROR.sub('', why)}); on a Debian without desktop it needs: {VIEWER_PACKAGES}"
 
 
 def rerun_command() -> str:
@@ -176,14 +176,14 @@ class View:
         *,
         port: int | None,
         rrd: Path | None,
-        tell: Tell = lambda text, level: None,
-        serving: Callable[[View], None] = lambda view: None,
-        story: Story = lambda: (),
+        notify: Notify = lambda text, level: None,
+        on_serving: Callable[[View], None] = lambda view: None,
+        playback: MessageSource = lambda: (),
     ) -> None:
         self._setup, self._pending = setup, Pending()
-        self._outbox = Outbox(setup, self._pending, story)
-        where = Where(port, None if rrd is None else str(rrd.absolute()), str(uuid.uuid4()))
-        self._supervisor = Supervisor(self._outbox, where, tell, lambda: serving(self))
+        self._outbox = Outbox(setup, self._pending, playback)
+        target = ViewTarget(port, None if rrd is None else str(rrd.absolute()), str(uuid.uuid4()))
+        self._supervisor = Supervisor(self._outbox, target, notify, lambda: on_serving(self))
         self._picture_t = self._load_t = -math.inf
         self._supervisor.start()
 
@@ -261,13 +261,13 @@ class View:
         return ", ".join(said)
 
     @property
-    def address(self) -> str:
+    def instructions(self) -> str:
         """How to look, now and later: one line for each way."""
         lines = []
         if self.port is not None:
             lines.append(f"watch: {rerun_command()} --connect {url(self.port)}")
             if not has_display():
-                lines.append(f"watch from a machine with a display: {from_elsewhere(self.port)}")
+                lines.append(f"watch from a machine with a display: {remote_access(self.port)}")
         if self.rrd is not None:
             lines.append(f"later: {rerun_command()} {self.rrd}")
         return "\n".join(lines)

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from acquire.errors import DataError
 
 MAGIC, VERSION = b"pdvw", 1
-MOST_META, MOST_BYTES = 2**23, 2**28
+MAX_META_BYTES, MAX_BYTES = 2**23, 2**28
 """Of one message: beyond these it is not one of ours."""
 
 _HEADER = struct.Struct("<4sHHIQ")
@@ -146,7 +146,7 @@ def _checked_header(header: bytes) -> tuple[Kind, int, int]:
     magic, version, number, meta, total = _HEADER.unpack(header)
     if (magic, version) != (MAGIC, VERSION):
         raise WireError(f"not a message of version {VERSION} to or from the view: {header[:6]!r}")
-    if meta > MOST_META or total > MOST_BYTES:
+    if meta > MAX_META_BYTES or total > MAX_BYTES:
         raise WireError(f"a message of {meta} + {total} bytes is too long for the view")
     try:
         return Kind(number), meta, total

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from acquire.printable import duration, printable
 from live.pipeline.screen import Screen
-from live.ui.terminal.status_line import GAP, force, gauge_words, status_line
+from live.ui.terminal.status_line import GAP, force, gauge_texts, status_line
 
 if TYPE_CHECKING:
     from live.pipeline.measurement import TimeStep
@@ -103,7 +103,7 @@ class TerminalScreen(Screen):
         if elapsed_s > 0:
             rate = f"  {done * i.n_zoi / elapsed_s:.0f} ZOI/s"
         self.status(
-            f"{done}{of} bursts{_load(i)}  {GAP.join(gauge_words(i))} um/m  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}"
+            f"{done}{of} bursts{_load(i)}  {GAP.join(gauge_texts(i))} um/m  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}"
         )
 
     def _write(self, text: str) -> None:

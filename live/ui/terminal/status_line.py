@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from live.pipeline.snapshot import Snapshot
 
 GAP = "  "
-MOST_GAUGES = 4
+MAX_GAUGES = 4
 Part = tuple[int, str]
 """How soon it has to go where the line is too long (the highest first), and its words."""
 
@@ -42,7 +42,7 @@ def _test(s: Snapshot) -> list[Part]:
 def _strain(i: TimeStep | None) -> list[Part]:
     if i is None:
         return []
-    parts = [(5 if number == 0 else 10, text) for number, text in enumerate(gauge_words(i))]
+    parts = [(5 if number == 0 else 10, text) for number, text in enumerate(gauge_texts(i))]
     parts[-1] = parts[-1][0], f"{parts[-1][1]} um/m"
     return [*parts, (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
 
@@ -66,7 +66,7 @@ def force(value: float) -> str:
     return "" if math.isnan(value) else f"{value:.1f} N"
 
 
-def gauge_words(i: TimeStep) -> list[str]:
+def gauge_texts(i: TimeStep) -> list[str]:
     """The virtual gauges with their sigmas in um/m, or the means where there are none."""
     if not i.gauges:
         return [
@@ -75,5 +75,5 @@ def gauge_words(i: TimeStep) -> list[str]:
         ]
     return [
         f"{name} lost" if gauge.reason else f"{name} {gauge.value * 1e6:+.0f} +- {gauge.sigma * 1e6:.0f}"
-        for name, gauge in list(i.gauges.items())[:MOST_GAUGES]
+        for name, gauge in list(i.gauges.items())[:MAX_GAUGES]
     ]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from email.message import Message
 from http.cookies import CookieError, SimpleCookie
 
-MOST_BYTES = 1_000_000
+MAX_POST_BYTES = 1_000_000
 """Of what is posted."""
 
 
@@ -27,9 +27,9 @@ class HttpError(Exception):
         For a person.
     """
 
-    def __init__(self, status: int, why: str) -> None:
-        super().__init__(why)
-        self.status, self.why = status, why
+    def __init__(self, status: int, reason: str) -> None:
+        super().__init__(reason)
+        self.status, self.reason = status, reason
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +70,11 @@ class RequestGuard:
     def _name(self) -> str:
         return f"phasedic_{self.port}"
 
-    def is_key(self, word: str) -> bool:
+    def is_token(self, word: str) -> bool:
         """Whether ``word`` is the token."""
         return hmac.compare_digest(word.encode(), self.token.encode())
 
-    def check_place(self, headers: Message) -> None:
+    def check_host(self, headers: Message) -> None:
         """Raise ``HttpError`` unless the request is for this address, and not sent by another site's page."""
         if headers.get("Host", "") != self.host:
             raise HttpError(403, "this is not the address of the page")
@@ -87,7 +87,7 @@ class RequestGuard:
             morsel = SimpleCookie(headers.get("Cookie", "")).get(self._name)
         except CookieError:
             morsel = None
-        if morsel is None or not self.is_key(morsel.value):
+        if morsel is None or not self.is_token(morsel.value):
             raise HttpError(403, "open the address that phasedic has printed, with its token")
 
     def check_post(self, headers: Message) -> int:
@@ -99,6 +99,6 @@ class RequestGuard:
         length = headers.get("Content-Length", "")
         if not (length.isascii() and length.isdigit()) or "Transfer-Encoding" in headers:
             raise HttpError(411, "say how long it is")
-        if len(length) > 12 or int(length) > MOST_BYTES:
-            raise HttpError(413, f"more than {MOST_BYTES} bytes")
+        if len(length) > 12 or int(length) > MAX_POST_BYTES:
+            raise HttpError(413, f"more than {MAX_POST_BYTES} bytes")
         return int(length)

@@ -7,7 +7,7 @@ import math
 import threading
 from typing import Any
 
-MOST_STREAMS = 8
+MAX_STREAMS = 8
 """Pages that are told at one time."""
 
 
@@ -22,7 +22,7 @@ def plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
 
 
-def encoded(value: Any) -> bytes:
+def json_bytes(value: Any) -> bytes:
     """JSON in one line."""
     return json.dumps(plain(value), allow_nan=False, separators=(",", ":")).encode()
 
@@ -60,43 +60,43 @@ class Broadcaster:
     """Passes messages on to all streams; a stream that is opened begins with the newest of each kind."""
 
     def __init__(self) -> None:
-        self._streams: set[Subscriber] = set()
+        self._subscribers: set[Subscriber] = set()
         self._newest: dict[str, bytes] = {}
         self._lock = threading.Lock()
         self._closed = False
 
     @property
-    def watched(self) -> int:
+    def open_pages(self) -> int:
         """Pages that are open."""
-        return len(self._streams)
+        return len(self._subscribers)
 
-    def tell(self, kind: str, value: Any) -> None:
+    def publish(self, kind: str, value: Any) -> None:
         """Tell every page."""
-        message = encoded(value)
+        message = json_bytes(value)
         with self._lock:
             self._newest[kind] = message
-            for stream in self._streams:
-                stream.put(kind, message)
+            for subscriber in self._subscribers:
+                subscriber.put(kind, message)
 
     def open(self) -> Subscriber | None:
-        """A new stream; None where ``MOST_STREAMS`` are open, or all is over."""
+        """A new stream; None where ``MAX_STREAMS`` are open, or all is over."""
         with self._lock:
-            if self._closed or len(self._streams) >= MOST_STREAMS:
+            if self._closed or len(self._subscribers) >= MAX_STREAMS:
                 return None
-            stream = Subscriber()
+            subscriber = Subscriber()
             for kind, message in self._newest.items():
-                stream.put(kind, message)
-            self._streams.add(stream)
-            return stream
+                subscriber.put(kind, message)
+            self._subscribers.add(subscriber)
+            return subscriber
 
-    def leave(self, stream: Subscriber) -> None:
+    def leave(self, subscriber: Subscriber) -> None:
         """The page has gone."""
         with self._lock:
-            self._streams.discard(stream)
+            self._subscribers.discard(subscriber)
 
     def close(self) -> None:
         """End all streams."""
         with self._lock:
             self._closed = True
-            for stream in self._streams:
-                stream.close()
+            for subscriber in self._subscribers:
+                subscriber.close()

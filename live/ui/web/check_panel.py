@@ -20,13 +20,13 @@ GOOD, BAD = 50e-6, 1000e-6
 """Strain noise of a ZOI that is shown green, and red."""
 
 
-def shots_of(frames: Sequence[Frame], info: CameraInfo) -> FrameStack:
+def frame_stack(frames: Sequence[Frame], info: CameraInfo) -> FrameStack:
     """Frames in a row as what is judged."""
     lost = sum(frame.lost_before for frame in frames[1:])
     return FrameStack(np.stack([f.image for f in frames]), np.array([f.t for f in frames]), lost, info)
 
 
-def quality(figures: CheckFigures) -> NDArray[np.uint8]:
+def quality_colours(figures: CheckFigures) -> NDArray[np.uint8]:
     """Colours of the ZOIs by their predicted strain noise; none where nothing is asked for."""
     cells = traffic_light(figures.zois.sigma, GOOD, BAD)
     cells[~figures.zois.grid.active] = 0

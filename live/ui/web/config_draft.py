@@ -29,7 +29,7 @@ CHANGEABLE = frozenset(
 )  # fmt: skip
 """Keys that a page may change, beside gauges."""
 
-OF_TODAY = ("output.", "view.")
+TRANSIENT = ("output.", "view.")
 
 
 class ConfigDraft:
@@ -42,7 +42,7 @@ class ConfigDraft:
     path : Path
         Of the rig file; need not be there yet.
     said : mapping of "section.key" to value
-        What the command line says: saved with the rest, but for what is of this time alone (``OF_TODAY``).
+        What the command line says: saved with the rest, but for what is of this time alone (``TRANSIENT``).
 
     Attributes
     ----------
@@ -50,12 +50,12 @@ class ConfigDraft:
         Not saved yet; None takes a key out.
     """
 
-    def __init__(self, given: Config, path: Path, said: Mapping[str, Any]) -> None:
+    def __init__(self, given: Config, path: Path, overrides: Mapping[str, Any]) -> None:
         self.path = path
-        self._of_today = {key: value for key, value in said.items() if key.startswith(OF_TODAY)}
+        self._transient = {key: value for key, value in overrides.items() if key.startswith(TRANSIENT)}
         in_file = settings_in(path) if path.exists() else {}
-        lasting = {key: value for key, value in said.items() if key not in self._of_today}
-        self.changes: dict[str, Any] = {key: v for key, v in lasting.items() if in_file.get(key) != v}
+        permanent = {key: value for key, value in overrides.items() if key not in self._transient}
+        self.changes: dict[str, Any] = {key: v for key, v in permanent.items() if in_file.get(key) != v}
         self._config = given
 
     @property
@@ -86,12 +86,12 @@ class ConfigDraft:
             It cannot be written; then nothing is changed.
         """
         if mask is not None:
-            self.change_all({"measure.mask": str(self._mask_beside(mask))})
+            self.change_all({"measure.mask": str(self._write_mask(mask))})
         write_rig(self.path, self.changes)
-        self._config = load_config(self.path, self._of_today)
+        self._config = load_config(self.path, self._transient)
         self.changes = {}
 
-    def _mask_beside(self, mask: NDArray[np.bool_]) -> Path:
+    def _write_mask(self, mask: NDArray[np.bool_]) -> Path:
         """A new file each time: a rig file kept as .bak still means its own."""
         stem = self.path.resolve().with_suffix("")
         tries = (stem.with_name(f"{stem.name}-mask-{n}.png") for n in range(1, 10_000))
@@ -113,7 +113,7 @@ def with_setting(address: str, key: str, value: float) -> str:
 _SAFE = "/:,@+-_.*~"
 
 
-def still(address: str) -> str:
+def at_rest(address: str) -> str:
     """The address of a rig that is looked at and not pulled: a simulated one would begin by itself."""
     if parse_address(address).scheme != "sim":
         return address
@@ -125,7 +125,7 @@ def still(address: str) -> str:
 NUMBERED = re.compile(r"^(.*?)-?(\d{1,6})$")
 
 
-def counted_up(name: str) -> str:
+def next_name(name: str) -> str:
     """The name of the next specimen: bar-7 after bar-6."""
     found = NUMBERED.match(name)
     if found is None:

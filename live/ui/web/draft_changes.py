@@ -17,56 +17,56 @@ from live.ui.web.config_draft import with_setting
 from live.ui.web.drawn_region import DrawnRegion
 from live.ui.web.setup_session import OVERLAYS, SetupSession
 
-Said = Mapping[str, Any]
-LONGEST_MM = 1e5
-MOST_POINTS = 100  # of a gauge
+Request = Mapping[str, Any]
+MAX_MM = 1e5
+MAX_GAUGE_POINTS = 100  # of a gauge
 
 
-def _drawn(session: SetupSession) -> DrawnRegion:
+def _region(session: SetupSession) -> DrawnRegion:
     if session.drawn is None:
         raise DataError("the camera has given no picture yet")
     return session.drawn
 
 
-def draw(session: SetupSession, said: Said) -> None:
+def draw(session: SetupSession, request: Request) -> None:
     """Strokes of a tool."""
-    strokes = said.get("strokes")
+    strokes = request.get("strokes")
     if not isinstance(strokes, list) or not 1 <= len(strokes) <= 500:
         raise ConfigError("strokes are a list")
     if not all(isinstance(one, dict) for one in strokes):
         raise ConfigError("a stroke has a tool and points")
-    _drawn(session).draw(strokes)
+    _region(session).draw(strokes)
     session.region_changed()
 
 
-def undo(session: SetupSession, said: Said) -> None:
+def undo(session: SetupSession, request: Request) -> None:
     """The region as it was before."""
-    _drawn(session).undo()
+    _region(session).undo()
     session.region_changed()
 
 
-def find(session: SetupSession, said: Said) -> None:
+def find(session: SetupSession, request: Request) -> None:
     """The specimen in the picture."""
     session.find()
 
 
-def everything(session: SetupSession, said: Said) -> None:
+def whole_picture(session: SetupSession, request: Request) -> None:
     """The whole picture."""
-    drawn = _drawn(session)
-    drawn.take(np.ones_like(drawn.mask), "the whole picture")
+    drawn = _region(session)
+    drawn.replace(np.ones_like(drawn.mask), "the whole picture")
     session.region_changed()
 
 
-def overlay(session: SetupSession, said: Said) -> None:
+def overlay(session: SetupSession, request: Request) -> None:
     """Something laid over the picture, or taken off."""
-    if said.get("name") not in OVERLAYS:
+    if request.get("name") not in OVERLAYS:
         raise ConfigError(f"there are {', '.join(OVERLAYS)}")
-    session.overlays[str(said["name"])] = said.get("on") is True
+    session.overlays[str(request["name"])] = request.get("on") is True
 
 
-def camera(session: SetupSession, said: Said) -> None:
+def camera(session: SetupSession, request: Request) -> None:
     """A setting of the camera's address; the camera is opened anew and tells what is in force."""
-    key, value = said.get("key"), said.get("value")
+    key, value = request.get("key"), request.get("value")
     info = session.preview.info
     known = [] if info is None else [setting.key for setting in info.settings]
     if key not in known:
@@ -75,16 +75,16 @@ def camera(session: SetupSession, said: Said) -> None:
     session.preview.reopen(with_setting(session.draft.config.camera.address, str(key), number))
 
 
-def address(session: SetupSession, said: Said) -> None:
+def address(session: SetupSession, request: Request) -> None:
     """Another camera."""
-    if not isinstance(said.get("value"), str):
+    if not isinstance(request.get("value"), str):
         raise ConfigError("an address is a text")
-    session.preview.reopen(said["value"])
+    session.preview.reopen(request["value"])
 
 
-def put(session: SetupSession, said: Said) -> None:
+def set_key(session: SetupSession, request: Request) -> None:
     """A key of the configuration, such as specimen.width_mm."""
-    key, value = said.get("key"), said.get("value")
+    key, value = request.get("key"), request.get("value")
     if (
         not isinstance(key, str)
         or key.startswith(("camera.", "gauges."))
@@ -96,19 +96,19 @@ def put(session: SetupSession, said: Said) -> None:
         session.region_changed()
 
 
-def gauge(session: SetupSession, said: Said) -> None:
+def gauge(session: SetupSession, request: Request) -> None:
     """A gauge made of a table or of places (``kind`` and ``points``), moved to others, or taken away.
 
     ``was`` is its name so far; a new one without a name gets the usual one of its kind.
     """
-    gauges, name = session.draft.config.gauges, said.get("name")
-    was = said.get("was", name)
+    gauges, name = session.draft.config.gauges, request.get("name")
+    was = request.get("was", name)
     before = dict(gauges[was]) if isinstance(was, str) and was in gauges else {}
-    table = said.get("gauge", before)
-    if "points" in said:
-        kind = said.get("kind", before.get("kind"))
-        table = before | {"kind": kind, **_placed(kind, said["points"])}
-        name = name or _unused(GAUGE_KINDS[kind].usual, gauges)
+    table = request.get("gauge", before)
+    if "points" in request:
+        kind = request.get("kind", before.get("kind"))
+        table = before | {"kind": kind, **_parameters_at(kind, request["points"])}
+        name = name or _free_name(GAUGE_KINDS[kind].usual, gauges)
     if not isinstance(name, str) or not isinstance(table, dict | None):
         raise ConfigError("a gauge has a name and a table")
     changes: dict[str, Any] = {}
@@ -119,50 +119,55 @@ def gauge(session: SetupSession, said: Said) -> None:
     session.draft.change_all(changes | {f"gauges.{name}": table})
 
 
-def _placed(kind: object, points: object) -> dict[str, Any]:
+def _parameters_at(kind: object, points: object) -> dict[str, Any]:
     """The parameters of a gauge of ``kind`` at the places that a page has sent."""
     if not isinstance(kind, str) or kind not in GAUGE_KINDS:
         raise ConfigError(f"there is no such kind of gauge; there are {', '.join(GAUGE_KINDS)}")
-    if not _are_points(points, 1, MOST_POINTS):
-        raise ConfigError(f"a gauge has 1 to {MOST_POINTS} places, x and y in px")
+    if not are_points(points, 1, MAX_GAUGE_POINTS):
+        raise ConfigError(f"a gauge has 1 to {MAX_GAUGE_POINTS} places, x and y in px")
     return GAUGE_KINDS[kind].placed([(float(x), float(y)) for x, y in points])
 
 
-def _unused(usual: str, taken: Container[str]) -> str:
+def _free_name(usual: str, taken: Container[str]) -> str:
     """The first of axial, axial2 ... that is free."""
     names = (usual if n == 1 else f"{usual}{n}" for n in count(1))
     return next(name for name in names if name not in taken)
 
 
-def place(session: SetupSession, said: Said) -> None:
+def place(session: SetupSession, request: Request) -> None:
     """Gauges that place themselves on the region; others stay."""
     session.place_gauges()
 
 
-def scale(session: SetupSession, said: Said) -> None:
+def scale(session: SetupSession, request: Request) -> None:
     """mm per px from two points and their distance."""
-    points = said.get("points")
-    if not _are_points(points):
+    points = request.get("points")
+    if not are_points(points):
         raise ConfigError("a scale is two points in px and their distance in mm")
     x1, y1, x2, y2 = (_number("a point", v) for point in points for v in point)
-    mm = _number("a distance", said.get("mm"))
+    mm = _number("a distance", request.get("mm"))
     session.draft.change_all(from_points((x1, y1, x2, y2), mm).changes())
-    session.scaled()
+    session.clear_remarks()
     session.region_changed()
 
 
-def board(session: SetupSession, said: Said) -> None:
+def board(session: SetupSession, request: Request) -> None:
     """mm per px from a board that is held where the specimen will be; without ``marker`` a checkerboard."""
-    columns, rows = said.get("columns"), said.get("rows")
-    words = said.get("dictionary", "4X4_50")
-    if type(columns) is not int or type(rows) is not int or not isinstance(words, str) or len(words) > 40:
+    columns, rows = request.get("columns"), request.get("rows")
+    dictionary = request.get("dictionary", "4X4_50")
+    if (
+        type(columns) is not int
+        or type(rows) is not int
+        or not isinstance(dictionary, str)
+        or len(dictionary) > 40
+    ):
         raise ConfigError(
             "a board has whole numbers of columns and rows, and a dictionary where it has markers"
         )
-    square = _number("a square in mm", said.get("square"), 0, LONGEST_MM)
-    marker = _number("a marker in mm", said.get("marker", 0), 0, LONGEST_MM)
-    seen = Board(columns, rows, square, marker, words)
-    session.draft.change_all(session.scale_from(seen).changes())
+    square = _number("a square in mm", request.get("square"), 0, MAX_MM)
+    marker = _number("a marker in mm", request.get("marker", 0), 0, MAX_MM)
+    calibration_board = Board(columns, rows, square, marker, dictionary)
+    session.draft.change_all(session.scale_from(calibration_board).changes())
     session.region_changed()
 
 
@@ -173,11 +178,11 @@ def _number(what: str, value: object, low: float = -math.inf, high: float = math
         raise ConfigError(f"{what} is {allowed}") from None
 
 
-def _are_points(said: object, fewest: int = 2, most: int = 2) -> TypeGuard[list[list[Any]]]:
+def are_points(request: object, min_points: int = 2, max_points: int = 2) -> TypeGuard[list[list[Any]]]:
     return (
-        isinstance(said, list)
-        and fewest <= len(said) <= most
-        and all(isinstance(p, list) and len(p) == 2 and all(map(_is_place, p)) for p in said)
+        isinstance(request, list)
+        and min_points <= len(request) <= max_points
+        and all(isinstance(p, list) and len(p) == 2 and all(map(_is_place, p)) for p in request)
     )
 
 
@@ -185,35 +190,35 @@ def _is_place(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6
 
 
-def check(session: SetupSession, said: Said) -> None:
+def check(session: SetupSession, request: Request) -> None:
     """The whole check, with its table."""
     session.check()
 
 
-def forget(session: SetupSession, said: Said) -> None:
+def reset_peak(session: SetupSession, request: Request) -> None:
     """The peak of the sharpness."""
-    session.forget_peak()
+    session.reset_peak()
 
 
-def save(session: SetupSession, said: Said) -> None:
+def save(session: SetupSession, request: Request) -> None:
     """Into the rig file."""
     session.save()
 
 
-CHANGES: dict[str, Callable[[SetupSession, Said], None]] = {
+CHANGES: dict[str, Callable[[SetupSession, Request], None]] = {
     "draw": draw,
     "undo": undo,
     "find": find,
-    "all": everything,
+    "all": whole_picture,
     "overlay": overlay,
     "camera": camera,
     "address": address,
-    "set": put,
+    "set": set_key,
     "gauge": gauge,
     "place": place,
     "scale": scale,
     "board": board,
     "check": check,
-    "forget": forget,
+    "forget": reset_peak,
     "save": save,
 }

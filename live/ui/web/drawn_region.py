@@ -18,8 +18,8 @@ from acquire.errors import ConfigError
 from analysis.evaluate import inside_polygon
 
 TOOLS = ("rectangle", "polygon", "brush", "eraser")
-MOST_POINTS = 5000
-_KEPT = 12  # masks that can be gone back to
+MAX_POINTS = 5000
+_MAX_UNDO = 12  # masks that can be gone back to
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -47,19 +47,19 @@ class Stroke:
     add: bool
 
     @classmethod
-    def read(cls, said: Mapping[str, Any]) -> Stroke:
+    def parse(cls, request: Mapping[str, Any]) -> Stroke:
         """From what a page has sent; raises ConfigError where it is no stroke."""
-        tool, points, radius = said.get("tool"), said.get("points"), said.get("radius", 8)
-        fewest = {"rectangle": 2, "polygon": 3}.get(str(tool), 1)
+        tool, points, radius = request.get("tool"), request.get("points"), request.get("radius", 8)
+        min_points = {"rectangle": 2, "polygon": 3}.get(str(tool), 1)
         if tool not in TOOLS:
             raise ConfigError(f"no such tool; there are {', '.join(TOOLS)}")
-        if not isinstance(points, list) or not fewest <= len(points) <= MOST_POINTS:
-            raise ConfigError(f"a {tool} has {fewest} to {MOST_POINTS} points")
+        if not isinstance(points, list) or not min_points <= len(points) <= MAX_POINTS:
+            raise ConfigError(f"a {tool} has {min_points} to {MAX_POINTS} points")
         if not all(isinstance(p, list) and len(p) == 2 and all(map(_is_place, p)) for p in points):
             raise ConfigError("a point is two numbers, x and y in px")
         if not _is_place(radius) or not 0.5 <= radius <= 1000:
             raise ConfigError("a brush has a radius from 0.5 to 1000 px")
-        return cls(str(tool), np.array(points, np.float64), float(radius), said.get("add") is True)
+        return cls(str(tool), np.array(points, np.float64), float(radius), request.get("add") is True)
 
     def drawn_on(self, mask: Bools) -> Bools:
         """The mask after this stroke."""
@@ -82,7 +82,7 @@ class Stroke:
         elif self.tool == "polygon":
             found[rows, columns] = inside_polygon(x, y, self.points)
         else:
-            found[rows, columns] = near_way(x, y, self.points, self.radius)
+            found[rows, columns] = near_path(x, y, self.points, self.radius)
         return found
 
 
@@ -90,10 +90,10 @@ def _is_place(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6
 
 
-def near_way(x: Floats, y: Floats, way: Floats, radius: float) -> Bools:
-    """Whether the points lie within ``radius`` of the line through the points of ``way``."""
-    near = np.hypot(x - way[0, 0], y - way[0, 1]) <= radius
-    for (x0, y0), (x1, y1) in itertools.pairwise(way):
+def near_path(x: Floats, y: Floats, path: Floats, radius: float) -> Bools:
+    """Whether the points lie within ``radius`` of the line through the points of ``path``."""
+    near = np.hypot(x - path[0, 0], y - path[0, 1]) <= radius
+    for (x0, y0), (x1, y1) in itertools.pairwise(path):
         length = (x1 - x0) ** 2 + (y1 - y0) ** 2
         along = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / length if length else np.zeros(x.shape)
         along = np.clip(along, 0.0, 1.0)
@@ -112,8 +112,8 @@ class DrawnRegion:
         Where that comes from.
     """
 
-    def __init__(self, mask: Bools, words: str) -> None:
-        self._masks: list[tuple[Bools, str]] = [(mask, words)]
+    def __init__(self, mask: Bools, origin: str) -> None:
+        self._masks: list[tuple[Bools, str]] = [(mask, origin)]
 
     @property
     def mask(self) -> Bools:
@@ -121,7 +121,7 @@ class DrawnRegion:
         return self._masks[-1][0]
 
     @property
-    def words(self) -> str:
+    def origin(self) -> str:
         """Where it comes from, for a person."""
         return self._masks[-1][1]
 
@@ -140,17 +140,17 @@ class DrawnRegion:
         box = self.box
         return box is not None and int(self.mask.sum()) == box[2] * box[3]
 
-    def draw(self, said: Sequence[Mapping[str, Any]]) -> None:
+    def draw(self, request: Sequence[Mapping[str, Any]]) -> None:
         """Draw strokes; raises ConfigError, and nothing is drawn, where one of them is none."""
         mask = self.mask
-        for stroke in [Stroke.read(one) for one in said]:
+        for stroke in [Stroke.parse(one) for one in request]:
             mask = stroke.drawn_on(mask)
-        self.take(mask, "as drawn")
+        self.replace(mask, "as drawn")
 
-    def take(self, mask: Bools, words: str) -> None:
+    def replace(self, mask: Bools, origin: str) -> None:
         """Another mask, of the same size."""
-        kept = self._masks[-_KEPT:]
-        self._masks = [*kept, (mask, words)]
+        kept = self._masks[-_MAX_UNDO:]
+        self._masks = [*kept, (mask, origin)]
 
     def undo(self) -> None:
         """Take the last change back."""

@@ -32,7 +32,7 @@ from live.results.maps.painting import lay_cells
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.painting import as_jpeg, shrunk
 
-MOST_POINTS = 4000
+MAX_POINTS = 4000
 
 
 class CurveHistory:
@@ -46,7 +46,7 @@ class CurveHistory:
 
     def __init__(self, names: Sequence[str]) -> None:
         self._names = list(names)
-        self._rows: Thinned[Sequence[float]] = Thinned(MOST_POINTS)
+        self._rows: Thinned[Sequence[float]] = Thinned(MAX_POINTS)
         self._lock = threading.Lock()
 
     def add(self, row: Sequence[float]) -> None:
@@ -55,7 +55,7 @@ class CurveHistory:
             self._rows.append(row)
 
     @property
-    def place(self) -> tuple[int, int]:
+    def position(self) -> tuple[int, int]:
         """Edition (what a page has of another is of no use) and number of rows."""
         with self._lock:
             return self._rows.halvings, len(self._rows.kept)
@@ -74,7 +74,7 @@ class CurveHistory:
 
 STATE_S, PICTURE_S = 0.1, 0.25
 """Between states and between pictures."""
-MOST_EVENTS = 30
+MAX_EVENTS = 30
 
 
 class Running(Protocol):
@@ -130,16 +130,16 @@ class PageConsumer(Consumer):
         self._newest: Measurement | None = None
         self._frame: Frame | None = None
         self._fresh = False
-        self._events: deque[tuple[float, dict[str, Any]]] = deque(maxlen=MOST_EVENTS)
-        self._began = now()
+        self._events: deque[tuple[float, dict[str, Any]]] = deque(maxlen=MAX_EVENTS)
+        self._start_t = now()
         self._t0 = math.nan
         self._due = {"state": 0.0, "picture": 0.0}
 
-    def attend(self, running: Running) -> None:
+    def attach(self, running: Running) -> None:
         """The run has begun, and can be asked."""
-        self._running, self._began = running, running.run_state.health.began_t
+        self._running, self._start_t = running, running.run_state.health.began_t
 
-    def choose(self, component: str) -> str:
+    def select_map(self, component: str) -> str:
         """Show another map; a refusal in words, or empty."""
         if component not in FIELD_MAPS:
             return f"there is no map {component!r}; there are {', '.join(FIELD_MAPS)}"
@@ -177,16 +177,16 @@ class PageConsumer(Consumer):
             return
         names = {} if self._running is None else self._running.run_state.event_log.names
         text = printable(sentence(event, names))
-        told = {"level": event.level, "kind": str(event.kind), "text": text}
-        self._events.append((self._now(), told))
+        values = {"level": event.level, "kind": str(event.kind), "text": text}
+        self._events.append((self._now(), values))
 
     def idle(self) -> float:
         """Tell and draw what is due."""
         now = self._now()
         if now >= self._due["state"]:
             self._due["state"] = now + STATE_S
-            self._broadcaster.tell("run", self.state())
-        if now >= self._due["picture"] and self._fresh and self._broadcaster.watched:
+            self._broadcaster.publish("run", self.state())
+        if now >= self._due["picture"] and self._fresh and self._broadcaster.open_pages:
             self._draw()
             # No more than a fifth of the time is spent on drawing, however large the pictures are.
             self._due["picture"] = max(now + PICTURE_S, self._now() + 4 * (self._now() - now))
@@ -194,7 +194,7 @@ class PageConsumer(Consumer):
 
     def end(self) -> str:
         """A last word to the pages."""
-        self._broadcaster.tell("run", self.state() | {"state": "ended"})
+        self._broadcaster.publish("run", self.state() | {"state": "ended"})
         return f"{self._shown} pictures shown"
 
     # -- what is told -------------------------------------------------------------------------
@@ -202,16 +202,20 @@ class PageConsumer(Consumer):
     def state(self) -> dict[str, Any]:
         """Where the run stands."""
         running, now = self._running, self._now()
-        s = Snapshot(now, elapsed_s=now - self._began) if running is None else running.run_state.snapshot(now)
-        told: dict[str, Any] = {
-            "state": self._word(s),
+        s = (
+            Snapshot(now, elapsed_s=now - self._start_t)
+            if running is None
+            else running.run_state.snapshot(now)
+        )
+        values: dict[str, Any] = {
+            "state": self._state_name(s),
             "elapsed_s": s.elapsed_s,
             "force_N": s.force_N,
             "peak_N": s.peak_N,
             "stress_Pa": s.stress_Pa,
-            "points": self.curve.place,
+            "points": self.curve.position,
             "picture": {"n": self._shown, "of": self._component, **self._scale},
-            "events": [{"s": max(at - self._began, 0.0), **event} for at, event in self._events],
+            "events": [{"s": max(at - self._start_t, 0.0), **event} for at, event in self._events],
             "late_s": s.latency_p95_s,
             "fps": s.fps,
             "ledger": s.frames,
@@ -219,10 +223,10 @@ class PageConsumer(Consumer):
             "disk_min": s.disk_s / 60,
         }
         if running is not None:
-            told |= {"recording": running.recording, "folder": str(running.folder)}
-        return told | _measured(s)
+            values |= {"recording": running.recording, "folder": str(running.folder)}
+        return values | _measured(s)
 
-    def _word(self, s: Snapshot) -> str:
+    def _state_name(self, s: Snapshot) -> str:
         if self._running is None:
             return "opening"
         if s.time_step is None:
@@ -243,7 +247,7 @@ class PageConsumer(Consumer):
             size = frame.image.shape
         else:
             return
-        self._scale |= {"width": size[1], "height": size[0], "gauges": gauges_of(self._config)}
+        self._scale |= {"width": size[1], "height": size[0], "gauges": gauge_shapes(self._config)}
         self.picture = as_jpeg(picture)
         self._shown += 1
 
@@ -257,7 +261,7 @@ def _scale_of(painted: Painted) -> dict[str, Any]:
     return {"legend": legend}
 
 
-def gauges_of(config: Config) -> dict[str, Any]:
+def gauge_shapes(config: Config) -> dict[str, Any]:
     """The gauges of a configuration as the page draws them: kind, handles and lines, px."""
     found = complete_gauges(config.gauges, config.specimen.first_axis)
     zoi = config.measure.zoi

@@ -32,12 +32,12 @@ from live.results.summary import summary_lines
 from live.run.control import Controls, answer
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.config_draft import ConfigDraft, counted_up
+from live.ui.web.config_draft import ConfigDraft, next_name
 from live.ui.web.draft_changes import CHANGES
 from live.ui.web.drawn_region import DrawnRegion
 from live.ui.web.page_consumer import PageConsumer, Running
 from live.ui.web.painting import RAMP, as_png
-from live.ui.web.server import ALONE, DEFAULT_PORT, PageServer, Response, jpeg, of_json
+from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response, json_response
 from live.ui.web.setup_session import SetupSession
 
 SET_UP, RUN, AFTER = "setup", "run", "after"
@@ -75,13 +75,13 @@ class PageController:
         self.session: SetupSession | None = None
         self._drawn: DrawnRegion | None = None
         self._broadcaster = Broadcaster()
-        self._watching: PageConsumer | None = None
+        self._consumer: PageConsumer | None = None
         self._live: ControlledRun | None = None
         self._report: Path | None = None
-        self._after: dict[str, Any] = {}
-        self._wishes: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._result: dict[str, Any] = {}
+        self._requests: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._folder = TemporaryDirectory(prefix="phasedic-")
-        self._said = ""
+        self._message = ""
         self.viewer: Callable[[int], str] = lambda port: "no: there is no viewer here"
         gets = {
             "/points": self._points,
@@ -89,15 +89,15 @@ class PageController:
             "/mask": self._mask,
             "/report": self._show_report,
         }
-        posts = {"/order": self._order, "/setup": self._change, "/map": self._map, "/viewer": self._viewer}
+        posts = {"/order": self._command, "/setup": self._change, "/map": self._map, "/viewer": self._viewer}
         self.server = PageServer(self._broadcaster, gets, posts, port)
-        self._tell_stage()
+        self._publish_stage()
 
     def __enter__(self) -> PageController:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._broadcaster.tell("gone", True)  # of its own kind: a page must still hear of the stage before
+        self._broadcaster.publish("gone", True)  # of its own kind: a page must still hear of the stage before
         threading.Event().wait(GOODBYE_S)
         self.server.close()
         self._folder.cleanup()
@@ -109,7 +109,7 @@ class PageController:
 
     def quit(self) -> None:
         """Leave the set-up, or what comes after a test."""
-        self._wishes.put(QUIT)
+        self._requests.put(QUIT)
 
     # -- the stages ---------------------------------------------------------------------------
 
@@ -123,11 +123,11 @@ class PageController:
         """
         assert self.draft is not None
         if not self.draft.config.metadata.get("specimen"):
-            self.draft.change_all({"metadata.specimen": self._unused(FIRST)})
+            self.draft.change_all({"metadata.specimen": self._free_name(FIRST)})
         with SetupSession(self.draft, self._broadcaster, self._drawn) as session:
             self.session = session
             self._enter(SET_UP, words)
-            started = self._wishes.get() == START
+            started = self._requests.get() == START
         self.session, self._drawn = None, session.drawn
         return self._to_run(session) if started else None
 
@@ -144,75 +144,77 @@ class PageController:
         plain = re.sub(r"[^\w.-]+", "_", name).strip("._-")[:80]
         return Path(self.draft.config.output.dir or "runs") / (plain or FIRST)
 
-    def _unused(self, name: str) -> str:
+    def _free_name(self, name: str) -> str:
         """The first name from here on whose folder is not there."""
         while self._folder_of(name).exists():
-            name = counted_up(name)
+            name = next_name(name)
         return name
 
     def begin(self, config: Config) -> PageConsumer:
         """A run begins; what is to watch it."""
-        self._watching, self._live = PageConsumer(self._broadcaster, config), None
+        self._consumer, self._live = PageConsumer(self._broadcaster, config), None
         self._enter(RUN, "")
-        return self._watching
+        return self._consumer
 
-    def attend(self, live: ControlledRun) -> None:
+    def attach(self, live: ControlledRun) -> None:
         """The run takes orders from now on."""
         self._live = live
-        if self._watching is not None:
-            self._watching.attend(live)
+        if self._consumer is not None:
+            self._consumer.attach(live)
 
-    def end(self, told: Mapping[str, Any]) -> None:
+    def end(self, result: Mapping[str, Any]) -> None:
         """The run has ended."""
         self._live, self._report = None, None
         name = None
         if self.draft is not None:
-            name = self._unused(counted_up(str(self.draft.config.metadata.get("specimen", FIRST))))
-        self._after = {**told, "report": False, "next": name}
-        self._broadcaster.tell("after", self._after)
+            name = self._free_name(next_name(str(self.draft.config.metadata.get("specimen", FIRST))))
+        self._result = {**result, "report": False, "next": name}
+        self._broadcaster.publish("after", self._result)
         self._enter(AFTER, "")
 
     def reported(self, report: Path | None) -> None:
         """The report of the last run is there, or could not be made."""
         self._report = report
-        self._after |= {"report": report is not None}
-        self._broadcaster.tell("after", self._after)
+        self._result |= {"report": report is not None}
+        self._broadcaster.publish("after", self._result)
 
     def after(self) -> bool:
         """Wait for the operator; whether a next specimen is to be set up."""
         assert self.draft is not None
-        if self._wishes.get() != NEXT:
+        if self._requests.get() != NEXT:
             return False
-        self.draft.change_all({"metadata.specimen": self._after["next"]})
+        self.draft.change_all({"metadata.specimen": self._result["next"]})
         return True
 
     def _enter(self, stage: str, words: str) -> None:
-        self.stage, self._said = stage, printable(words)
-        self._wishes = queue.SimpleQueue()
-        self._tell_stage()
+        self.stage, self._message = stage, printable(words)
+        self._requests = queue.SimpleQueue()
+        self._publish_stage()
 
-    def _tell_stage(self) -> None:
-        said = {"stage": self.stage, "words": self._said, "alone": self.draft is None}
+    def _publish_stage(self) -> None:
+        request = {"stage": self.stage, "words": self._message, "alone": self.draft is None}
         kinds = [
             {"kind": name, "label": one.label, "hint": one.hint, "gesture": one.gesture}
             for name, one in GAUGE_KINDS.items()
         ]
-        self._broadcaster.tell("stage", said | {"components": FIELD_MAPS, "ramp": RAMP, "kinds": kinds})
+        self._broadcaster.publish("stage", request | {"components": FIELD_MAPS, "ramp": RAMP, "kinds": kinds})
 
     # -- what a page asks ---------------------------------------------------------------------
 
     def _points(self, query: Mapping[str, str]) -> Response:
-        if self._watching is None:
+        if self._consumer is None:
             raise HttpError(404, "nothing has been measured")
         edition, count = (query.get(key, "") for key in ("edition", "count"))
         if not all(word.isascii() and word.isdigit() and len(word) < 10 for word in (edition, count)):
             raise HttpError(400, "edition and count are whole numbers")
-        return of_json(self._watching.curve.since(int(edition), int(count)))
+        return json_response(self._consumer.curve.since(int(edition), int(count)))
 
     def _picture(self, query: Mapping[str, str]) -> Response:
-        session, watching = self.session, self._watching
+        session, watching = self.session, self._consumer
         content = session.picture if session is not None else b"" if watching is None else watching.picture
-        return jpeg(content) if content else Response(as_png(np.zeros((1, 1), np.uint8)), "image/png")
+        return (
+            jpeg_response(content) if content else Response(as_png(np.zeros((1, 1), np.uint8)), "image/png")
+        )
 
     def _mask(self, query: Mapping[str, str]) -> Response:
         if self.session is None:
@@ -222,27 +224,29 @@ class PageController:
     def _show_report(self, query: Mapping[str, str]) -> Response:
         if self._report is None:
             raise HttpError(404, "there is no report yet")
-        return Response(self._report.read_bytes(), "text/html; charset=utf-8", ALONE)
+        return Response(self._report.read_bytes(), "text/html; charset=utf-8", REPORT_POLICY)
 
-    def _map(self, said: Mapping[str, Any]) -> dict[str, str]:
+    def _map(self, request: Mapping[str, Any]) -> dict[str, str]:
         refusal = (
-            "nothing is measured" if self._watching is None else self._watching.choose(str(said.get("of")))
+            "nothing is measured"
+            if self._consumer is None
+            else self._consumer.select_map(str(request.get("of")))
         )
         return {"answer": f"no: {refusal}" if refusal else "ok"}
 
-    def _viewer(self, said: Mapping[str, Any]) -> dict[str, str]:
+    def _viewer(self, request: Mapping[str, Any]) -> dict[str, str]:
         """Open it at the port that the view has told: another than was wanted where that was taken."""
         port = None if self._live is None else self._live.run_state.health.view_port
         if port is None:
             return {"answer": "no: the view is switched off, or not there yet; after a test see its view.rrd"}
         return {"answer": self.viewer(port)}
 
-    def _order(self, said: Mapping[str, Any]) -> dict[str, str]:
+    def _command(self, request: Mapping[str, Any]) -> dict[str, str]:
         """One line, one answer."""
-        line = said.get("line")
-        return {"answer": self._answered(line) if isinstance(line, str) else "no: an order is a line"}
+        line = request.get("line")
+        return {"answer": self._answer_to(line) if isinstance(line, str) else "no: an order is a line"}
 
-    def _answered(self, line: str) -> str:
+    def _answer_to(self, line: str) -> str:
         live, word = self._live, line.strip()
         if live is not None:
             return answer(line, live)
@@ -256,26 +260,26 @@ class PageController:
                 self.session.ready(Path(self._folder.name))
         except PhasedicError as error:
             return f"no: {printable(brief(error))}"
-        self._wishes.put(word)
+        self._requests.put(word)
         return "ok"
 
-    def _change(self, said: Mapping[str, Any]) -> dict[str, str]:
+    def _change(self, request: Mapping[str, Any]) -> dict[str, str]:
         """A change of the rig."""
         session = self.session
         if session is None:
             return {"answer": "no: nothing is set up now"}
-        change = CHANGES.get(str(said.get("do")))
+        change = CHANGES.get(str(request.get("do")))
         if change is None:
             return {"answer": f"no: there are {', '.join(CHANGES)}"}
         try:
-            change(session, said)
+            change(session, request)
         except (ConfigError, DataError) as error:
             return {"answer": f"no: {printable(brief(error))}"}
         session.refresh()
         return {"answer": "ok"}
 
 
-def ended(run_state: RunState, specimen: SpecimenConfig, folder: Path, words: str) -> dict[str, Any]:
+def run_result(run_state: RunState, specimen: SpecimenConfig, folder: Path, words: str) -> dict[str, Any]:
     """Figures, summary, ledger and losses; ``words`` say how the run ended, empty where it ended well."""
     figures = evaluate(run_state.history, run_state.loads, specimen) if run_state.history.time_steps else None
     troubles = run_state.event_log.events("warning", "error")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from live.results.maps.colours import ramp
 
-MOST_SIDE = 960
+MAX_SIDE_PX = 960
 """Of a picture, px; larger ones are shown smaller."""
 QUALITY = 80
 RED = (40, 40, 255)  # of OpenCV: blue, green, red
@@ -21,7 +21,7 @@ RAMP = [f"#{bytes(row).hex()}" for row in ramp(11, 1)[:, 0]]
 """The colours of a map from its highest value down."""
 
 
-def shrunk(image: NDArray[Any], bits: int, most: int = MOST_SIDE) -> tuple[Bytes, float]:
+def shrunk(image: NDArray[Any], bits: int, most: int = MAX_SIDE_PX) -> tuple[Bytes, float]:
     """Grey levels as (h, w, 3) uint8, and how many px of it are one of ``image``."""
     height, width = image.shape
     scale = min(1.0, most / max(height, width))

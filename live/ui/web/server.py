@@ -24,14 +24,14 @@ from acquire.errors import DeviceError
 from live.config.listen_address import listening
 from live.pipeline.latency import OUTPUT, yield_to_others
 from live.ui.web.authorization import HttpError, RequestGuard
-from live.ui.web.broadcaster import Broadcaster, encoded
+from live.ui.web.broadcaster import Broadcaster, json_bytes
 
-OURS = (
+PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self';"
     " base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 """What our page may load: nothing but from here."""
-ALONE = (
+REPORT_POLICY = (
     "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none';"
     " form-action 'none'; frame-ancestors 'none'"
 )
@@ -60,17 +60,17 @@ class Response:
 
     content: bytes
     kind: str = "application/json"
-    policy: str = OURS
+    policy: str = PAGE_POLICY
 
 
-def jpeg(content: bytes) -> Response:
+def jpeg_response(content: bytes) -> Response:
     """A picture."""
     return Response(content, "image/jpeg")
 
 
-def of_json(value: Any) -> Response:
+def json_response(value: Any) -> Response:
     """Plain values."""
-    return Response(encoded(value))
+    return Response(json_bytes(value))
 
 
 def static_names() -> frozenset[str]:
@@ -92,7 +92,7 @@ log = logging.getLogger(__name__)
 
 HOST = "127.0.0.1"
 DEFAULT_PORT, TRIES = 8765, 10
-BEAT_S = 0.5
+HEARTBEAT_S = 0.5
 """Between heartbeats; the page says NO LINK after 2 s without."""
 _UNREAD_BYTES = 2**14  # held for a page that does not read; more would be old when it reads again
 _SLOW_S = 10.0  # a page that does not take what is sent to it for so long has gone
@@ -137,7 +137,7 @@ class PageServer:
         self._server.page = self
         self._threads = [
             threading.Thread(target=self._server.serve_forever, args=(0.2,), name="page", daemon=True),
-            threading.Thread(target=self._beat, name="page-beat", daemon=True),
+            threading.Thread(target=self._send_heartbeats, name="page-beat", daemon=True),
         ]
         for thread in self._threads:
             thread.start()
@@ -154,11 +154,11 @@ class PageServer:
         self._server.shutdown()
         self._server.server_close()
 
-    def _beat(self) -> None:
+    def _send_heartbeats(self) -> None:
         beats = 0
-        while not self._closed.wait(BEAT_S):
+        while not self._closed.wait(HEARTBEAT_S):
             beats += 1
-            self.broadcaster.tell("beat", beats)
+            self.broadcaster.publish("beat", beats)
 
 
 class _Server(ThreadingHTTPServer):
@@ -198,19 +198,19 @@ class _Handler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         """A file of the page, the events, or what ``gets`` has."""
-        self._guarded(self._get)
+        self._checked(self._get)
 
     def do_POST(self) -> None:
         """An order or a change."""
-        self._guarded(self._post)
+        self._checked(self._post)
 
-    def _guarded(self, step: Callable[[], None]) -> None:
+    def _checked(self, step: Callable[[], None]) -> None:
         try:
-            self.server.page.guard.check_place(self.headers)
+            self.server.page.guard.check_host(self.headers)
             step()
         except HttpError as refused:
             self.close_connection = True
-            self._send(Response(refused.why.encode(), "text/plain; charset=utf-8"), refused.status)
+            self._send(Response(refused.reason.encode(), "text/plain; charset=utf-8"), refused.status)
         except (OSError, ValueError):  # the browser has gone, or sends no HTTP
             self.close_connection = True
         except Exception:
@@ -222,7 +222,7 @@ class _Handler(BaseHTTPRequestHandler):
         page, parts = self.server.page, urlsplit(self.path)
         query = {key: values[-1] for key, values in parse_qs(parts.query).items()}
         if parts.path == "/" and "token" in query:
-            self._let_in(query["token"])
+            self._log_in(query["token"])
             return
         page.guard.check_cookie(self.headers)
         if parts.path == "/events":
@@ -233,10 +233,10 @@ class _Handler(BaseHTTPRequestHandler):
             name = "index.html" if parts.path == "/" else parts.path.removeprefix("/static/")
             self._send(static(name))
 
-    def _let_in(self, word: str) -> None:
+    def _log_in(self, word: str) -> None:
         """Put the token into a cookie and take it out of the address, where it could be read or handed on."""
         guard = self.server.page.guard
-        if not guard.is_key(word):
+        if not guard.is_token(word):
             raise HttpError(403, "a wrong token; open the address that phasedic has printed")
         self.send_response(303)
         self.send_header("Location", "/")
@@ -257,23 +257,23 @@ class _Handler(BaseHTTPRequestHandler):
             raise HttpError(400, "not JSON") from None
         if not isinstance(value, dict):
             raise HttpError(400, "an object is expected")
-        self._send(of_json(handler(value)))
+        self._send(json_response(handler(value)))
 
     def _events(self, broadcaster: Broadcaster) -> None:
         """Server-sent events until the page goes or all is over."""
-        stream = broadcaster.open()
-        if stream is None:
+        subscriber = broadcaster.open()
+        if subscriber is None:
             raise HttpError(503, "too many pages are open; close one")
         try:
             self.close_connection = True
             self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _UNREAD_BYTES)
-            self._head(200, "text/event-stream", OURS, None)
-            while (messages := stream.take(BEAT_S)) is not None:
+            self._head(200, "text/event-stream", PAGE_POLICY, None)
+            while (messages := subscriber.take(HEARTBEAT_S)) is not None:
                 for kind, message in messages.items():
                     self.wfile.write(b"event: %s\ndata: %s\n\n" % (kind.encode(), message))
                 self.wfile.flush()
         finally:
-            broadcaster.leave(stream)
+            broadcaster.leave(subscriber)
 
     def _send(self, answer: Response, status: int = 200) -> None:
         self._head(status, answer.kind, answer.policy, len(answer.content))

@@ -37,16 +37,23 @@ from live.setup.region import region_of
 from live.setup.scale import Board, Scale, from_board
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.camera_preview import RECENT, CameraPreview
-from live.ui.web.check_panel import camera_values, figure_values, line_values, quality, shots_of, table_values
+from live.ui.web.check_panel import (
+    camera_values,
+    figure_values,
+    frame_stack,
+    line_values,
+    quality_colours,
+    table_values,
+)
 from live.ui.web.config_draft import ConfigDraft
 from live.ui.web.drawn_region import DrawnRegion
-from live.ui.web.page_consumer import gauges_of
+from live.ui.web.page_consumer import gauge_shapes
 from live.ui.web.painting import as_jpeg, as_png, mark_saturated, shrunk
 
 log = logging.getLogger(__name__)
 
-PICTURE_S, JUDGE_S = 0.2, 0.4
-MOST_BYTES = 400_000_000  # of frames held for a check
+PICTURE_S, EVALUATE_S = 0.2, 0.4
+MAX_BYTES = 400_000_000  # of frames held for a check
 OVERLAYS = ("saturated", "quality")
 SHADE = (60, 20, 0, 150)
 """Over what is not measured: blue, green, red, opacity."""
@@ -79,38 +86,38 @@ class SetupSession:
         self.picture = b""
         self.overlays = {"saturated": True, "quality": False}
         self._figures: CheckFigures | None = None
-        self._watch, self._watched = QuickChecker(draft.config), tuple[Any, ...]()
-        self._told: dict[str, Any] = {"table": None, "go": None, "lines": [], "checking": False}
-        self._told |= {"doubt": "", "busy": "", "remarks": []}
+        self._checker, self._checked_for = QuickChecker(draft.config), tuple[Any, ...]()
+        self._values: dict[str, Any] = {"table": None, "go": None, "lines": [], "checking": False}
+        self._values |= {"doubt": "", "busy": "", "remarks": []}
         self._peak, self._shown, self._edition = 0.0, 0, 0
         self._lock = threading.RLock()
-        self._leave = threading.Event()
+        self._closing = threading.Event()
         self._folder = TemporaryDirectory(prefix="phasedic-")
-        self._judging = threading.Thread(target=self._work, name="page-judge", daemon=True)
+        self._evaluating = threading.Thread(target=self._work, name="page-judge", daemon=True)
 
     def __enter__(self) -> SetupSession:
         self.preview.start()
-        self._judging.start()
+        self._evaluating.start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._leave.set()
+        self._closing.set()
         self.preview.close()
-        self._judging.join()
+        self._evaluating.join()
         self._folder.cleanup()
 
     # -- what the page asks for ---------------------------------------------------------------
 
     def refresh(self) -> None:
         """Tell the pages anew, after a change."""
-        self._broadcaster.tell("setup", self.state())
+        self._broadcaster.publish("setup", self.state())
 
     def check(self) -> None:
         """Take as many frames as ``phasedic check`` does, and judge them with the table."""
-        self.preview.collect(self._enough())
-        self._told |= {"checking": True, "go": None}
+        self.preview.collect(self._frames_needed())
+        self._values |= {"checking": True, "go": None}
 
-    def forget_peak(self) -> None:
+    def reset_peak(self) -> None:
         """Begin the peak hold of the sharpness anew."""
         self._peak = 0.0
 
@@ -118,7 +125,7 @@ class SetupSession:
         """Judge, and show, the region as it is drawn now."""
         with self._lock:
             self._edition += 1
-            self._told |= {"table": None, "go": None, "lines": []}
+            self._values |= {"table": None, "go": None, "lines": []}
 
     def find(self) -> None:
         """Look for the specimen in what is seen now; raises DataError where nothing is seen."""
@@ -128,9 +135,9 @@ class SetupSession:
         stack = np.stack([frame.image for frame in frames]).astype(np.float32)
         noise = float(np.diff(stack, axis=0).std()) / 2**0.5 / len(stack) ** 0.5 if len(stack) > 1 else None
         m = self.draft.config.measure
-        sought = replace(self.draft.config, measure=replace(m, roi=None, mask=None))
-        region = region_of(sought, stack.mean(axis=0), noise or None)
-        self._take(DrawnRegion(region.inside(info.width, info.height, m.zoi), region.words))
+        automatic = replace(self.draft.config, measure=replace(m, roi=None, mask=None))
+        region = region_of(automatic, stack.mean(axis=0), noise or None)
+        self._set_region(DrawnRegion(region.inside(info.width, info.height, m.zoi), region.words))
 
     def scale_from(self, board: Board) -> Scale:
         """The scale from a board in what is seen now; raises DataError where none is."""
@@ -139,12 +146,12 @@ class SetupSession:
             raise DataError("the camera has given no picture yet")
         picture = np.stack([frame.image for frame in frames]).mean(axis=0, dtype=np.float32)
         scale = from_board(picture, board, stand_off_mm=self.draft.config.scale.stand_off_mm)
-        self._told["remarks"] = [printable(remark) for remark in scale.remarks]
+        self._values["remarks"] = [printable(remark) for remark in scale.remarks]
         return scale
 
-    def scaled(self) -> None:
+    def clear_remarks(self) -> None:
         """The scale has been taken another way: what was said of a board is old."""
-        self._told["remarks"] = []
+        self._values["remarks"] = []
 
     def place_gauges(self) -> None:
         """Gauges on the region as it is drawn; raises DataError or ConfigError where there is no room."""
@@ -208,15 +215,15 @@ class SetupSession:
         info, config, drawn = self.preview.info, self.draft.config, self.drawn
         m, specimen = config.measure, config.specimen
         return {
-            **self._told,
+            **self._values,
             "trouble": self.preview.trouble,
             "camera": None if info is None else camera_values(info),
             "picture": self._shown,
             "overlays": self.overlays,
             "region": None
             if drawn is None
-            else {"words": drawn.words, "box": drawn.box, "edition": self._edition},
-            "gauges": gauges_of(config),
+            else {"words": drawn.origin, "box": drawn.box, "edition": self._edition},
+            "gauges": gauge_shapes(config),
             "measure": {"zoi": m.zoi, "step": m.step, "burst": m.burst or DEFAULT_BURST},
             "specimen": {key: getattr(specimen, key) for key in ("width_mm", "thickness_mm", "axis")},
             "metadata": dict(config.metadata),
@@ -228,7 +235,7 @@ class SetupSession:
     # -- the camera ---------------------------------------------------------------------------
 
     def _opened(self, info: CameraInfo) -> None:
-        self._told["checking"] = False
+        self._values["checking"] = False
         with self._lock:
             if self.drawn is not None and self.drawn.mask.shape != (info.height, info.width):
                 self.drawn = None
@@ -236,11 +243,11 @@ class SetupSession:
     def _show(self, frame: Frame) -> float:
         """Draw, where somebody looks; when to draw again."""
         began = time.monotonic()
-        if self._broadcaster.watched:
+        if self._broadcaster.open_pages:
             picture, scale = shrunk(frame.image, frame.bits)
             figures = self._figures
             if self.overlays["quality"] and figures is not None:
-                lay_cells(picture, scale, figures.zois.grid, quality(figures))
+                lay_cells(picture, scale, figures.zois.grid, quality_colours(figures))
             if self.overlays["saturated"]:
                 mark_saturated(picture, scale, frame.image, frame.bits)
             self.picture = as_jpeg(picture)
@@ -252,18 +259,18 @@ class SetupSession:
 
     def _work(self) -> None:
         yield_to_others(OUTPUT)
-        while not self._leave.is_set():
+        while not self._closing.is_set():
             try:
-                self._judge()
+                self._evaluate()
             except PhasedicError as error:
-                self._told |= {"doubt": printable(brief(error)), "checking": False}
+                self._values |= {"doubt": printable(brief(error)), "checking": False}
             except Exception as error:
                 log.exception("judging the specimen failed")
-                self._told |= {"doubt": f"a defect: {error!r}", "checking": False}
+                self._values |= {"doubt": f"a defect: {error!r}", "checking": False}
             self.refresh()
-            self._leave.wait(JUDGE_S)
+            self._closing.wait(EVALUATE_S)
 
-    def _judge(self) -> None:
+    def _evaluate(self) -> None:
         info, frames = self.preview.info, self.preview.recent()
         if info is None or len(frames) < RECENT or self.preview.collecting:
             return  # frames that a check needs must not be lost for want of processor time
@@ -276,25 +283,25 @@ class SetupSession:
         if collected is not None:
             self._check(collected, info)
         else:
-            self._glance(frames, info)
+            self._quick_check(frames, info)
 
-    def _glance(self, frames: list[Frame], info: CameraInfo) -> None:
+    def _quick_check(self, frames: list[Frame], info: CameraInfo) -> None:
         """What changes while lens and light are turned; what takes the kernel, in turns."""
         edition, config = self._edition, self.config(Path(self._folder.name))
-        if self._watched != (edition, config, info):
-            self._watched, self._watch = (edition, config, info), QuickChecker(config)
-        self._note(self._watch.glance(shots_of(frames, info)).figures)
+        if self._checked_for != (edition, config, info):
+            self._checked_for, self._checker = (edition, config, info), QuickChecker(config)
+        self._keep_figures(self._checker.glance(frame_stack(frames, info)).figures)
 
     def _compile(self, info: CameraInfo) -> None:
         """By processes of their own: the test that follows must not measure with what this one has compiled."""
 
-        def tell(text: str) -> None:
-            self._told["busy"] = text
+        def report(text: str) -> None:
+            self._values["busy"] = text
             self.refresh()
 
         phase = self.draft.config.measure.estimator == "phase"
-        compile_ahead(kinds_of(info), phase=phase, say=tell, stopped=self._leave.is_set)
-        self._told["busy"] = ""
+        compile_ahead(kinds_of(info), phase=phase, say=report, stopped=self._closing.is_set)
+        self._values["busy"] = ""
 
     def _begin(self, info: CameraInfo) -> None:
         """The region as the rig has it, or the specimen that is found."""
@@ -305,45 +312,45 @@ class SetupSession:
         region = region_of(self.draft.config, np.zeros((info.height, info.width), np.float32))
         given = read_mask(m.mask, info.width, info.height)
         inside = region.inside(info.width, info.height, m.zoi)
-        self._take(DrawnRegion(inside if given is None else inside & given, region.words))
+        self._set_region(DrawnRegion(inside if given is None else inside & given, region.words))
 
-    def _take(self, found: DrawnRegion) -> None:
+    def _set_region(self, found: DrawnRegion) -> None:
         with self._lock:
             if self.drawn is None:
                 self.drawn = found
             else:
-                self.drawn.take(found.mask, found.words)
+                self.drawn.replace(found.mask, found.origin)
         self.region_changed()
 
-    def _enough(self) -> int:
+    def _frames_needed(self) -> int:
         info = self.preview.info
         if info is None:
             raise DataError("the camera has given no picture yet")
         wanted = 2 * (self.draft.config.measure.reference_burst or DEFAULT_REFERENCE_BURST)
-        return max(min(wanted, MOST_BYTES // (2 * info.width * info.height)), RECENT)
+        return max(min(wanted, MAX_BYTES // (2 * info.width * info.height)), RECENT)
 
-    def _note(self, figures: CheckFigures) -> None:
+    def _keep_figures(self, figures: CheckFigures) -> None:
         sharpness = figures.sharpness
         self._figures = figures
         self._peak = max(self._peak, sharpness if np.isfinite(sharpness) else 0.0)
-        self._told |= figure_values(figures) | {"peak": self._peak, "doubt": ""}
+        self._values |= figure_values(figures) | {"peak": self._peak, "doubt": ""}
 
     def _check(self, frames: list[Frame], info: CameraInfo) -> None:
         folder, edition = Path(self._folder.name), self._edition
         config = self.config(folder)
-        figures = examine(shots_of(frames, info), config)
-        lines = [*judge(figures, None, config.measure.reference_shift_px), self._fitting(folder)]
-        self._note(figures)
-        self._told["checking"] = False
+        figures = examine(frame_stack(frames, info), config)
+        lines = [*judge(figures, None, config.measure.reference_shift_px), self._gauge_line(folder)]
+        self._keep_figures(figures)
+        self._values["checking"] = False
         if edition == self._edition:  # else the region has been changed meanwhile
             go = all(line.good for line in lines)
-            self._told |= {
+            self._values |= {
                 "lines": [line_values(line) for line in lines],
                 "go": go,
                 "table": table_values(figures),
             }
 
-    def _fitting(self, folder: Path) -> CheckLine:
+    def _gauge_line(self, folder: Path) -> CheckLine:
         """Whether every gauge lies on ZOIs."""
         try:
             names = ", ".join(self.ready(folder).gauges)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from live.ui.rerun.drawing.board import HEIGHT, WIDTH
+from live.ui.rerun.drawing.large_figures import HEIGHT, WIDTH
 from live.ui.rerun.messages import MAPS, ViewSetup
 
 BAR_GAP, BAR_WIDTH, BAR_LABEL, BAR_ROOM = 0.03, 0.035, 0.16, 0.275

@@ -22,7 +22,7 @@ from live.ui.rerun.drawing.scene import ViewScene
 from live.ui.rerun.drawing.sinks import FINISHED_MIB, RerunSink, serve, write
 from live.ui.rerun.messages import (
     ViewSetup,
-    Where,
+    ViewTarget,
     events_of,
     field_of,
     figures_of,
@@ -36,12 +36,12 @@ GRACE_S = 5.0
 """For drawing what waits and closing the file once the parent has gone."""
 
 
-def follow(parent: socket.socket) -> None:
+def end_with(parent: socket.socket) -> None:
     """End this process ``GRACE_S`` after ``parent`` is closed at the other end, wherever it hangs then."""
-    threading.Thread(target=_follow, args=(parent.fileno(),), name="guard", daemon=True).start()
+    threading.Thread(target=_end_with, args=(parent.fileno(),), name="guard", daemon=True).start()
 
 
-def _follow(number: int) -> None:
+def _end_with(number: int) -> None:
     poll = select.poll()
     poll.register(number, 0)  # a closed end is told unasked
     poll.poll()
@@ -61,10 +61,10 @@ def memory_MiB() -> float:
 
 log = logging.getLogger(__name__)
 
-MOST_MIB = 640
+MAX_MIB = 640
 """Of the whole process; beyond, it closes its file and ends, and the test starts it anew."""
 
-_LOOK_S, _NICE = 2.0, 19
+_POLL_S, _NICE = 2.0, 19
 
 
 class ReplyLine:
@@ -79,7 +79,7 @@ class ReplyLine:
             for piece in encoded(Message(kind, meta)):
                 self._there.sendall(piece)
 
-    def tell(self, text: str) -> None:
+    def notify(self, text: str) -> None:
         """Something for a person."""
         self.say(Kind.TROUBLE, text=text, lasting=False)
 
@@ -89,38 +89,38 @@ def main() -> int:
     there = socket.socket(fileno=os.dup(0))
     there.setblocking(True)
     line, reader = ReplyLine(there), Reader(there)
-    follow(there)
+    end_with(there)
     try:
-        setup, where = setup_of(reader.next())
-        sinks = _open(setup, where, line)
+        setup, target = setup_of(reader.next())
+        sinks = _open(setup, target, line)
         if not sinks:
             return 3
         # Only now: a machine without a free core would be long in loading rerun.
         os.nice(_NICE - os.nice(0))
-        _draw(reader, ViewScene(sinks, setup), line, MOST_MIB + FINISHED_MIB * setup.finished)
+        _draw(reader, ViewScene(sinks, setup), line, MAX_MIB + FINISHED_MIB * setup.finished)
     except EOFError:
         return 1
     except Exception as error:
         log.exception("the view's process stopped")
-        line.tell(f"the view's process stopped by a defect: {error!r}")
+        line.notify(f"the view's process stopped by a defect: {error!r}")
         return 1
     return 0
 
 
-def _open(setup: ViewSetup, where: Where, line: ReplyLine) -> list[RerunSink]:
+def _open(setup: ViewSetup, target: ViewTarget, line: ReplyLine) -> list[RerunSink]:
     sinks, port, rrd, troubles = [], None, None, []
     try:
-        if where.port is not None:
-            sink, port = serve(setup, where, line.tell)
+        if target.port is not None:
+            sink, port = serve(setup, target, line.notify)
             sinks.append(sink)
     except Exception as error:
         troubles.append(f"the view's server did not start: {error}")
     try:
-        if where.rrd is not None:
-            sinks.append(write(setup, where))
-            rrd = where.rrd
+        if target.rrd is not None:
+            sinks.append(write(setup, target))
+            rrd = target.rrd
     except FileExistsError:
-        troubles.append(f"the view's file did not start: {where.rrd} exists already and is not overwritten")
+        troubles.append(f"the view's file did not start: {target.rrd} exists already and is not overwritten")
     except Exception as error:
         troubles.append(f"the view's file did not start: {error}")
     if not sinks and not troubles:
@@ -132,15 +132,15 @@ def _open(setup: ViewSetup, where: Where, line: ReplyLine) -> list[RerunSink]:
     return sinks
 
 
-def _draw(reader: Reader, scene: ViewScene, line: ReplyLine, most_MiB: float) -> None:
+def _draw(reader: Reader, scene: ViewScene, line: ReplyLine, max_MiB: float) -> None:
     scene.begin()
-    look_t = time.monotonic()
+    checked_t = time.monotonic()
     try:
         while (message := reader.next()).kind is not Kind.END:
             _show(scene, message)
-            if time.monotonic() - look_t > _LOOK_S:
-                look_t = time.monotonic()
-                if (grown := memory_MiB()) > most_MiB:
+            if time.monotonic() - checked_t > _POLL_S:
+                checked_t = time.monotonic()
+                if (grown := memory_MiB()) > max_MiB:
                     line.say(Kind.FULL, memory_MiB=round(grown))
                     return
         scene.end()

@@ -25,7 +25,7 @@ from collections.abc import Callable
 from live.config.listen_address import listening
 
 HOST, TRIES = "127.0.0.1", 50
-PATIENCE_S, PATIENCE_BYTES = 10.0, 500_000
+STOPPED_S, STOPPED_BYTES = 10.0, 500_000
 """A viewer that took nothing for so long while so much was drawn has stopped."""
 
 _VIEWER_BYTES = 2**14  # who took less asked for something else than the test
@@ -51,11 +51,11 @@ class ViewerProxy:
         Fifty ports in a row are taken.
     """
 
-    def __init__(self, wanted: int, tell: Callable[[str], None]) -> None:
+    def __init__(self, wanted: int, notify: Callable[[str], None]) -> None:
         self._socket = _listening(wanted)
-        self._tell = tell
+        self._notify = notify
         self._drawn = 0
-        self._guests: list[_Guest] = []
+        self._connections: list[_Connection] = []
         self.port: int = self._socket.getsockname()[1]
 
     def open(self, host: str, port: int) -> None:
@@ -72,52 +72,52 @@ class ViewerProxy:
         self._drawn = count
 
     async def _serve(self, host: str, port: int) -> None:
-        async def let_in(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        async def accept(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
             with contextlib.suppress(OSError, EOFError, asyncio.LimitOverrunError, TimeoutError):
-                await self._let_in(reader, writer, host, port)
+                await self._connect(reader, writer, host, port)
             writer.close()
 
-        server = await asyncio.start_server(let_in, sock=self._socket, limit=_HEAD_BYTES)
+        server = await asyncio.start_server(accept, sock=self._socket, limit=_HEAD_BYTES)
         await server.start_serving()
         while True:
             await asyncio.sleep(1.0)
-            self._let_go()
+            self._drop_stopped()
 
-    async def _let_in(
+    async def _connect(
         self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter, host: str, port: int
     ) -> None:
-        async with asyncio.timeout(PATIENCE_S):
+        async with asyncio.timeout(STOPPED_S):
             head = await reader.readuntil(b"\r\n\r\n")
-        if not is_welcome(head):
+        if not host_allowed(head):
             writer.write(_FORBIDDEN)
             await writer.drain()
             return
         inside, outside = await asyncio.open_connection(host, port)
         outside.write(head)
-        guest = _Guest(writer, self._drawn)
-        self._guests.append(guest)
+        connection = _Connection(writer, self._drawn)
+        self._connections.append(connection)
         ways = [
             asyncio.create_task(_pass(reader, outside, lambda count: None)),
-            asyncio.create_task(_pass(inside, writer, lambda count: guest.took(count, self._drawn))),
+            asyncio.create_task(_pass(inside, writer, lambda count: connection.took(count, self._drawn))),
         ]
         try:
             done, _ = await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
             for way in done:
                 way.result()
         finally:
-            self._guests.remove(guest)
+            self._connections.remove(connection)
             for way in ways:
                 way.cancel()
             outside.close()
 
-    def _let_go(self) -> None:
-        for guest in self._guests:
-            if guest.has_stopped(self._drawn):
-                guest.writer.transport.abort()
-                self._tell(f"a viewer took nothing for {PATIENCE_S:.0f} s (stopped?) and was let go")
+    def _drop_stopped(self) -> None:
+        for connection in self._connections:
+            if connection.has_stopped(self._drawn):
+                connection.writer.transport.abort()
+                self._notify(f"a viewer took nothing for {STOPPED_S:.0f} s (stopped?) and was let go")
 
 
-class _Guest:
+class _Connection:
     """A connection to a viewer, and when it last took something."""
 
     def __init__(self, writer: asyncio.StreamWriter, drawn: int) -> None:
@@ -129,8 +129,8 @@ class _Guest:
         self._drawn, self._t = drawn, time.monotonic()
 
     def has_stopped(self, drawn: int) -> bool:
-        missed = drawn - self._drawn > PATIENCE_BYTES and self._total > _VIEWER_BYTES
-        return missed and time.monotonic() - self._t > PATIENCE_S and not self.writer.is_closing()
+        missed = drawn - self._drawn > STOPPED_BYTES and self._total > _VIEWER_BYTES
+        return missed and time.monotonic() - self._t > STOPPED_S and not self.writer.is_closing()
 
 
 async def _pass(
@@ -142,7 +142,7 @@ async def _pass(
         took(len(piece))
 
 
-def is_welcome(head: bytes) -> bool:
+def host_allowed(head: bytes) -> bool:
     """Whether a connection that begins so is from a viewer, or from a page of this machine."""
     if head == _HTTP2:
         return True
@@ -157,7 +157,7 @@ def _listening(wanted: int) -> socket.socket:
         raise OSError(f"no free port from {wanted} on; set another view.port") from None
 
 
-def hidden() -> tuple[str, int]:
+def hidden_address() -> tuple[str, int]:
     """An address and port that nobody listens on, and on Linux nobody guesses."""
     numbers = random.SystemRandom()
     host = f"127.{'.'.join(str(numbers.randint(1, 254)) for _ in range(3))}"

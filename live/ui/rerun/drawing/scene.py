@@ -18,8 +18,8 @@ from live.pipeline.history import Thinned
 from live.pipeline.snapshot import Snapshot
 from live.results.maps.colours import MICROSTRAIN, number, ramp
 from live.results.maps.field_maps import FieldMaps, Painted
-from live.ui.rerun.drawing.board import paint
 from live.ui.rerun.drawing.curve import CYAN, DIM, MAX_POINTS, YELLOW, CurveDrawing, encode, reduced, words
+from live.ui.rerun.drawing.large_figures import paint
 from live.ui.rerun.drawing.layout import (
     BAR_GAP,
     BAR_HEIGHT,
@@ -52,9 +52,9 @@ RED, GAUGE, GAUGE_NAME = (255, 90, 60), (255, 0, 255), (255, 200, 255)
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 _RAMP = (8, 256)
 _STRAINS_KEPT, _FORCES_KEPT = 5000, 10_000
-QUALITY, LONGEST_PX = 80, 1280
+QUALITY, MAX_PX = 80, 1280
 FIGURES_QUALITY = 70
-LIGHT_QUALITY, LIGHT_LONGEST_PX = 50, 640
+LIGHT_QUALITY, LIGHT_MAX_PX = 50, 640
 """Of the JPEG, 1..100; larger pictures are reduced by a whole factor."""
 _ALPHA = 225  # of the maps, 0..255
 _MORE = tuple(name for name in MAPS if name not in STRAINS)
@@ -116,7 +116,7 @@ class ViewScene:
         if not self._due:
             return
         light = self._setup.light
-        image, factor = reduced(picture.image, picture.bits, LIGHT_LONGEST_PX if light else LONGEST_PX)
+        image, factor = reduced(picture.image, picture.bits, LIGHT_MAX_PX if light else MAX_PX)
         data = encode(".jpg", image, LIGHT_QUALITY if light else QUALITY)
         self._at(picture.t)
         self._log_due(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 Points = NDArray[np.float64]
 _DOT = (255, 255, 255, 70)
 _HEAD = 0.3, 0.15  # of an arrow: length and half the width
-_MOST_BOXES, _MOST_ARROWS, _MOST_POINTS = 16, 240, 2000
+_MAX_BOXES, _MAX_ARROWS, _MAX_POINTS = 16, 240, 2000
 
 
 def centres(grid: ZoiGrid) -> Points:
@@ -44,7 +44,7 @@ def _centred(count: int, step: int) -> slice:
 
 def sample_boxes(grid: ZoiGrid) -> Points:
     """(N, 2) centres of a few active ZOIs that do not overlap, spread over the grid."""
-    pick = every(grid, _MOST_BOXES, 1.5 * grid.size)
+    pick = every(grid, _MAX_BOXES, 1.5 * grid.size)
     return np.asarray(centres(grid)[pick][grid.active[pick]])
 
 
@@ -73,7 +73,7 @@ def _runs(edges: NDArray[np.bool_]) -> NDArray[np.float64]:
 def thinned(grid: ZoiGrid, wanted: NDArray[np.bool_]) -> Points:
     """(N, 2) centres of the wanted ZOIs; every second, third ... where there are very many."""
     found = centres(grid)[wanted]
-    return np.asarray(found[:: max(1, math.ceil(len(found) / _MOST_POINTS))])
+    return np.asarray(found[:: max(1, math.ceil(len(found) / _MAX_POINTS))])
 
 
 def mean_motion(field: StrainField) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -102,15 +102,15 @@ class ArrowScale:
 
     def arrows(self, field: StrainField) -> tuple[Points, Points, float]:
         """(N, 2) origins, (N, 2) vectors as drawn (px), and the factor of magnification."""
-        pick = every(field.grid, _MOST_ARROWS)
+        pick = every(field.grid, _MAX_ARROWS)
         shown = np.stack([field.u[pick], field.v[pick]], axis=-1).astype(np.float64)
         valid = np.isfinite(shown).all(axis=-1)
         origins, vectors = centres(field.grid)[pick][valid], shown[valid]
         room = field.grid.step * (pick[0].step or 1)
-        self._follow(vectors, 1.6 * room)
+        self._adapt(vectors, 1.6 * room)
         return origins, vectors * self._factor, self._factor
 
-    def _follow(self, vectors: Points, room: float) -> None:
+    def _adapt(self, vectors: Points, room: float) -> None:
         longest = float(np.percentile(np.hypot(*vectors.T), 95)) if len(vectors) else 0.0
         fits = room / max(longest, 1e-3)
         if not fits / 5 < self._factor <= fits:

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from live.ui.rerun.drawing.layout import blueprint
-from live.ui.rerun.drawing.proxy import ViewerProxy, hidden, wait_for
-from live.ui.rerun.messages import ViewSetup, Where
+from live.ui.rerun.drawing.proxy import ViewerProxy, hidden_address, wait_for
+from live.ui.rerun.messages import ViewSetup, ViewTarget
 
 APPLICATION = "phasedic"
 SERVER_MIB = 64
@@ -135,7 +135,7 @@ class RerunSink:
         self.stream.disconnect()
 
 
-def serve(setup: ViewSetup, where: Where, tell: Callable[[str], None]) -> tuple[RerunSink, int]:
+def serve(setup: ViewSetup, target: ViewTarget, notify: Callable[[str], None]) -> tuple[RerunSink, int]:
     """A server, and the port where viewers connect.
 
     Raises
@@ -145,22 +145,22 @@ def serve(setup: ViewSetup, where: Where, tell: Callable[[str], None]) -> tuple[
     """
     import rerun as rr
 
-    wanted = where.port or 0
-    proxy = ViewerProxy(wanted, tell)
+    wanted = target.port or 0
+    proxy = ViewerProxy(wanted, notify)
     if wanted and proxy.port != wanted:
-        tell(f"port {wanted} is taken; the view is on {proxy.port}")
-    host, port = hidden()
+        notify(f"port {wanted} is taken; the view is on {proxy.port}")
+    host, port = hidden_address()
     memory = FINISHED_MIB if setup.finished else SERVER_MIB
     live = Rates(setup.picture_hz, 1.0 if setup.light else 10.0, repeat_bytes=SERVER_MIB * 2**20 / 4)
     rates = ALL if setup.finished else live
     sink = rr.GrpcServerSink(host, port, server_memory_limit=f"{memory}MiB")
-    place = _sink(sink, setup, where.recording, rates, proxy.drawn)
+    place = _sink(sink, setup, target.recording, rates, proxy.drawn)
     wait_for(host, port)
     proxy.open(host, port)
     return place, proxy.port
 
 
-def write(setup: ViewSetup, where: Where) -> RerunSink:
+def write(setup: ViewSetup, target: ViewTarget) -> RerunSink:
     """A file.
 
     Raises
@@ -170,7 +170,7 @@ def write(setup: ViewSetup, where: Where) -> RerunSink:
     """
     import rerun as rr
 
-    path = Path(where.rrd or "")
+    path = Path(target.rrd or "")
     with path.open("xb"):  # rerun overwrites
         pass
     rates = (
@@ -179,7 +179,7 @@ def write(setup: ViewSetup, where: Where) -> RerunSink:
         else Rates(1.0, 2.0, 0.2, gather_s=5.0, parcel_bytes=2**16, limit_bytes=RRD_LIMIT_BYTES)
     )
     # Two streams of one name in a process would be one stream.
-    return _sink(rr.FileSink(str(path)), setup, f"{where.recording}-file", rates)
+    return _sink(rr.FileSink(str(path)), setup, f"{target.recording}-file", rates)
 
 
 def _sink(

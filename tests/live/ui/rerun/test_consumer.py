@@ -15,7 +15,7 @@ from live.pipeline.event_log import EventLog
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import Snapshot
 from live.results.summary import StatusCard
-from live.ui.rerun.consumer import CARD_INSTANTS, CardWriter, FiguresWriter, RerunConsumer
+from live.ui.rerun.consumer import CARD_TIME_STEPS, CardWriter, FiguresWriter, RerunConsumer
 from tests.live.made_up import START, make_frame, make_loads, make_measurement
 
 
@@ -51,7 +51,7 @@ def test_everything_is_offered() -> None:
     out.add(make_measurement(0))
     out.frame(make_frame(0, START))
     out.load(LoadSample(START, 5.0))
-    event_log.tell(EventKind.NOTE, "operator", "hello")
+    event_log.notify(EventKind.NOTE, "operator", "hello")
     out.end()
     assert {name for name, _ in view.given} == {"show", "point", "picture", "load", "event"}
     assert [what for name, what in view.given if name == "point"] == [(0.001, 0.0)]
@@ -78,12 +78,12 @@ def test_the_card_is_written_once_a_second_from_a_bounded_history(monkeypatch: p
     monkeypatch.setattr(card, "written", lambda now, history: seen.append(history.time_steps) or "card")
     writer = CardWriter(view, card, RunState.new(1.0))  # type: ignore[arg-type]
     last = make_measurement(0)
-    for number in range(3 * CARD_INSTANTS):
+    for number in range(3 * CARD_TIME_STEPS):
         last = make_measurement(number) if number % 1000 == 0 else last
         writer.measurement(last)
     writer.measurement(newest := make_measurement(100_000))
     assert [name for name, _ in view.given] == ["status"] * 7
-    assert max(len(time_steps) for time_steps in seen) <= CARD_INSTANTS + 2
+    assert max(len(time_steps) for time_steps in seen) <= CARD_TIME_STEPS + 2
     assert seen[-1][-1].t == newest.time_step.t
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from live.pipeline.snapshot import Snapshot
-from live.ui.rerun.drawing.board import HEIGHT, WIDTH, paint
+from live.ui.rerun.drawing.large_figures import HEIGHT, WIDTH, paint
 from live.ui.rerun.messages import figures_message, figures_of
 from live.ui.rerun.wire import Kind, Message, WireError
 

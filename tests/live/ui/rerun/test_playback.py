@@ -14,7 +14,7 @@ from live.cli import main
 from live.pipeline.screen import Screen
 from live.results.run_folder import RunFolder, open_run
 from live.ui.rerun.messages import events_of, field_of, picture_of, rows_of
-from live.ui.rerun.playback import ShowRequest, chosen, setup_of, show, story
+from live.ui.rerun.playback import ShowRequest, playback, selected_rows, setup_of, show
 from live.ui.rerun.wire import Kind
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
 
@@ -43,7 +43,7 @@ def drawn(path: Path) -> dict[str, list[Any]]:
 
 
 def test_the_story_is_what_the_files_hold(run: RunFolder) -> None:
-    messages = list(story(run, (0, 50, N - 1)))
+    messages = list(playback(run, (0, 50, N - 1)))
     kinds = [message.kind for message in messages]
     assert kinds.count(Kind.FIELD) == kinds.count(Kind.PICTURE) == 3
     t, field = field_of(messages[-1])
@@ -103,17 +103,17 @@ def test_all_of_it_is_drawn_and_every_zoi_tells_its_values(
 
 
 def test_it_serves_until_it_is_enough(run: RunFolder) -> None:
-    enough, said = threading.Event(), list[str]()
+    stop, said = threading.Event(), list[str]()
 
     class Heard(Screen):
         def say(self, text: str = "") -> None:
             said.append(text)
             if "--connect" in text:
-                enough.set()
+                stop.set()
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("live.ui.rerun.playback.spawn_viewer", lambda port, tell: None)
-        show(run, ShowRequest(every=40), Heard(), enough, port=19876)
+        patch.setattr("live.ui.rerun.playback.spawn_viewer", lambda port, notify: None)
+        show(run, ShowRequest(every=40), Heard(), stop, port=19876)
     assert any("this shows it, Ctrl-C ends it" in line for line in said)
     assert said[0] == "3 of 96 instants are shown; --from, --to and --every choose others"
 
@@ -126,16 +126,16 @@ def test_it_serves_until_it_is_enough(run: RunFolder) -> None:
         (ShowRequest(1.0, 1.25), (10, 11, 12)),
     ],
 )
-def test_what_is_chosen(run: RunFolder, asked: ShowRequest, rows: tuple[int, ...]) -> None:
+def test_what_is_chosen(run: RunFolder, request: ShowRequest, rows: tuple[int, ...]) -> None:
     run.strain.values["time_s"][:] = 0.1 * np.arange(N)
-    assert chosen(run, asked) == rows
+    assert selected_rows(run, request) == rows
 
 
 def test_a_long_run_is_thinned_to_what_the_viewer_keeps(
     run: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("live.ui.rerun.playback.MOST_BYTES", 1e5)
-    rows = chosen(run, ShowRequest())
+    monkeypatch.setattr("live.ui.rerun.playback.MAX_BYTES", 1e5)
+    rows = selected_rows(run, ShowRequest())
     assert 1 < len(rows) < 20
     assert rows[-1] == N - 1
 

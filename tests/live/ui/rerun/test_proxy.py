@@ -8,8 +8,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from live.ui.rerun.drawing import proxy as doors
-from live.ui.rerun.drawing.proxy import ViewerProxy, hidden, is_welcome
+from live.ui.rerun.drawing import proxy as viewer_proxy
+from live.ui.rerun.drawing.proxy import ViewerProxy, hidden_address, host_allowed
 
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 
@@ -28,7 +28,7 @@ PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
     ],
 )
 def test_who_is_let_in(head: bytes, welcome: bool) -> None:
-    assert is_welcome(head) is welcome
+    assert host_allowed(head) is welcome
 
 
 @pytest.fixture
@@ -41,12 +41,12 @@ def server() -> Iterator[socket.socket]:
         def echo() -> None:
             while True:
                 try:
-                    guest, _ = listening.accept()
+                    connection, _ = listening.accept()
                 except OSError:
                     return
-                with guest:
-                    while data := guest.recv(2**16):
-                        guest.sendall(data)
+                with connection:
+                    while data := connection.recv(2**16):
+                        connection.sendall(data)
 
         threading.Thread(target=echo, daemon=True).start()
         yield listening
@@ -73,7 +73,7 @@ def test_it_passes_on_both_ways_and_refuses_strangers(server: socket.socket) -> 
 def ended(viewer: socket.socket, proxy: ViewerProxy) -> bool:
     """Whether the door hangs up on a viewer that takes nothing while more and more is drawn."""
     for k in range(1, 40):
-        proxy.drawn(k * (doors.PATIENCE_BYTES + 1))
+        proxy.drawn(k * (viewer_proxy.STOPPED_BYTES + 1))
         try:
             return viewer.recv(100) == b""
         except TimeoutError:
@@ -84,7 +84,7 @@ def ended(viewer: socket.socket, proxy: ViewerProxy) -> bool:
 
 
 def test_one_that_takes_nothing_is_let_go(server: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doors, "PATIENCE_S", 0.2)
+    monkeypatch.setattr(viewer_proxy, "STOPPED_S", 0.2)
     told: list[str] = []
     proxy = opened(server, told)
     with socket.create_connection(("127.0.0.1", proxy.port), 10) as viewer:
@@ -101,7 +101,7 @@ def test_one_that_takes_nothing_is_let_go(server: socket.socket, monkeypatch: py
 def test_no_two_doors_have_one_port() -> None:
     first = ViewerProxy(0, print)
     second = ViewerProxy(first.port, print)
-    assert first.port < second.port < first.port + doors.TRIES
+    assert first.port < second.port < first.port + viewer_proxy.TRIES
     first.close()
     second.close()
     with pytest.raises(OSError, match="no free port from 65536"):
@@ -109,6 +109,6 @@ def test_no_two_doors_have_one_port() -> None:
 
 
 def test_the_address_behind_is_of_this_machine_alone() -> None:
-    host, port = hidden()
+    host, port = hidden_address()
     assert host.startswith("127.")
     assert 1024 < port < 65_536

@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 
 from acquire.events import Event, EventKind
-from live.ui.rerun import supervisor as supervisor
-from live.ui.rerun.outbox import MOST_ROWS, Pending
+from live.ui.rerun import supervisor
+from live.ui.rerun.outbox import MAX_ROWS, Pending
 from live.ui.rerun.view import View, has_display, spawn_viewer, url, viewer_binary
 from live.ui.rerun.wire import Kind
 from tests.live.made_up import START, make_frame, make_measurement
@@ -37,8 +37,8 @@ class Watched:
             make_setup(**more),
             port=port,
             rrd=rrd,
-            tell=lambda text, level: self.told.append(f"{level}: {text}"),
-            serving=lambda view: self.served.append(view.port),
+            notify=lambda text, level: self.told.append(f"{level}: {text}"),
+            on_serving=lambda view: self.served.append(view.port),
         )
 
     def close(self) -> None:
@@ -90,7 +90,7 @@ def test_what_was_shown_stands_in_the_file(make: Callable[..., Watched], tmp_pat
     show(watched.view)
     watched.close()
     assert (watched.view.failed, watched.told) == ("", [])
-    assert watched.view.address.startswith("later: ")
+    assert watched.view.instructions.startswith("later: ")
     rows = rows_in(tmp_path / "view.rrd")
     static = 1
     assert rows["/strain/eyy"] == 30 + static  # every mean, however many fields were passed over
@@ -114,7 +114,7 @@ def test_it_serves_on_the_next_port_when_the_wanted_one_is_taken(make: Callable[
     assert wanted not in ports
     for watched in both:
         assert f"port {wanted} is taken" in watched.told[0]
-        assert url(watched.view.port or 0) in watched.view.address
+        assert url(watched.view.port or 0) in watched.view.instructions
 
 
 def test_killed_it_comes_back_on_its_port_and_knows_the_past(
@@ -232,7 +232,7 @@ def test_a_folder_that_is_not_there_is_told_and_the_rest_goes_on(
 def test_one_that_cannot_start_is_given_up(
     make: Callable[..., Watched], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(supervisor, "MOST_STARTS", 2)
+    monkeypatch.setattr(supervisor, "MAX_STARTS", 2)
     monkeypatch.setenv("PYTHONHOME", "/nowhere")
     watched = make(0, None)
     until(lambda: watched.view.failed)
@@ -242,9 +242,9 @@ def test_one_that_cannot_start_is_given_up(
 
 def test_what_waits_is_bounded_and_counted() -> None:
     pending = Pending()
-    for k in range(MOST_ROWS + 100):
+    for k in range(MAX_ROWS + 100):
         pending.row(Kind.LOADS, (float(k), 0.0))
-    assert len(pending.rows[Kind.LOADS]) == MOST_ROWS
+    assert len(pending.rows[Kind.LOADS]) == MAX_ROWS
     assert pending.rows[Kind.LOADS][0][0] == 100.0
     assert pending.dropped == 100
 

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from acquire.events import Event, EventKind
 from live.ui.rerun.messages import (
-    MOST_PICTURE_BYTES,
+    MAX_PICTURE_BYTES,
     ViewSetup,
-    Where,
+    ViewTarget,
     events_message,
     events_of,
     field_message,
@@ -51,8 +51,8 @@ def there_and_back(message: Message) -> Message:
 
 def test_a_setup() -> None:
     setup = ViewSetup("a test", 128, 96, 12, make_grid(), START, area_m2=4e-5, axis="x", strain_range=0.01)
-    again, where = setup_of(there_and_back(setup_message(setup, Where(9876, "/tmp/view.rrd", "id"))))
-    assert where == Where(9876, "/tmp/view.rrd", "id")
+    again, target = setup_of(there_and_back(setup_message(setup, ViewTarget(9876, "/tmp/view.rrd", "id"))))
+    assert target == ViewTarget(9876, "/tmp/view.rrd", "id")
     assert (again.title, again.area_m2, again.axis, again.strain_range) == ("a test", 4e-5, "x", 0.01)
     assert again.grid.to_dict() == setup.grid.to_dict()
     np.testing.assert_array_equal(again.grid.active, setup.grid.active)
@@ -71,7 +71,7 @@ def test_a_field() -> None:
 def test_a_picture(shape: tuple[int, int]) -> None:
     frame = make_frame(0, START, shape)
     picture = picture_of(there_and_back(picture_message(frame)))
-    assert picture.image.nbytes <= MOST_PICTURE_BYTES
+    assert picture.image.nbytes <= MAX_PICTURE_BYTES
     assert picture.step == (1 if shape[0] < 100 else 2)
     np.testing.assert_array_equal(picture.image, frame.image[:: picture.step, :: picture.step])
     assert (picture.bits, picture.t) == (12, START)

@@ -20,7 +20,7 @@ from live.config.loading import load_config
 from live.setup.pictures import read_mask
 from live.setup.scale import from_board
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.config_draft import ConfigDraft, counted_up, still, with_setting
+from live.ui.web.config_draft import ConfigDraft, at_rest, next_name, with_setting
 from live.ui.web.draft_changes import CHANGES
 from live.ui.web.drawn_region import DrawnRegion
 from live.ui.web.setup_session import SetupSession
@@ -187,8 +187,8 @@ def test_settings_of_an_address() -> None:
 
 
 def test_only_a_simulated_specimen_has_to_be_held() -> None:
-    assert still("/dev/video0?fps=30") == "/dev/video0?fps=30"
-    assert "max_strain=0" in still("sim:hole?max_strain=0.01") and "max_strain=0.01" not in still(
+    assert at_rest("/dev/video0?fps=30") == "/dev/video0?fps=30"
+    assert "max_strain=0" in at_rest("sim:hole?max_strain=0.01") and "max_strain=0.01" not in at_rest(
         "sim:?max_strain=0.01"
     )
 
@@ -198,7 +198,7 @@ def test_only_a_simulated_specimen_has_to_be_held() -> None:
     [("bar-6", "bar-7"), ("bar-009", "bar-010"), ("B7", "B8"), ("bar", "bar-2"), ("3", "4")],
 )
 def test_counted_up(name: str, following: str) -> None:
-    assert counted_up(name) == following
+    assert next_name(name) == following
 
 
 SHAPE = (60, 80)
@@ -215,7 +215,7 @@ def test_a_rectangle_from_any_corner() -> None:
     for points in ([[10.4, 20.2], [30.6, 40.0]], [[30.6, 20.2], [10.4, 40.0]]):
         found = drawn({"tool": "rectangle", "points": points})
         assert np.array_equal(found.mask, (X >= 10.4) & (X <= 30.6) & (Y >= 20.2) & (Y <= 40.0))
-        assert found.box == (11, 21, 20, 20) and found.is_box and found.words == "as drawn"
+        assert found.box == (11, 21, 20, 20) and found.is_box and found.origin == "as drawn"
 
 
 def test_a_rectangle_is_the_region_alone_unless_it_is_added() -> None:
@@ -251,7 +251,7 @@ def test_undo_goes_back_to_what_was_given() -> None:
     found = drawn({"tool": "rectangle", "points": [[0, 0], [9, 9]]}, start=True)
     found.undo()
     found.undo()
-    assert found.mask.all() and found.words == "as given"
+    assert found.mask.all() and found.origin == "as given"
 
 
 @pytest.mark.parametrize(

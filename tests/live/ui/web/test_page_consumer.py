@@ -17,7 +17,7 @@ import cv2
 import numpy as np
 import pytest
 
-import live.serve
+import live.ui.web
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from analysis.evaluate import GAUGE_KINDS, GaugeValue
@@ -28,7 +28,7 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.results.maps.field_maps import FIELD_MAPS
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.page_consumer import MOST_POINTS, CurveHistory, PageConsumer
+from live.ui.web.page_consumer import MAX_POINTS, CurveHistory, PageConsumer
 from tests.live.made_up import make_frame, make_measurement
 
 
@@ -74,7 +74,7 @@ def ready(watching: PageConsumer) -> PageConsumer:
 def test_what_is_told(config: Config) -> None:
     broadcaster, run = Broadcaster(), Run(config)
     told, watching = Told(broadcaster), ready(PageConsumer(broadcaster, config))
-    watching.attend(run)
+    watching.attach(run)
     m = measurement()
     i = replace(
         m.time_step, gauges={"axial": GaugeValue(0.001, 2e-6), "b": GaugeValue(math.nan, math.nan, "lost")}
@@ -113,11 +113,11 @@ def test_another_map(config: Config) -> None:
     watching = ready(PageConsumer(broadcaster, config))
     for name in ("exx", "e1", "u", "sigma", "status"):
         watching.measurement(measurement())
-        assert watching.choose(name) == ""
+        assert watching.select_map(name) == ""
         before = watching.picture
         while watching.picture == before:
             watching.idle()
-    assert "there is no map" in watching.choose("exx; rm")
+    assert "there is no map" in watching.select_map("exx; rm")
 
 
 def test_points_are_bounded_and_a_page_gets_what_it_lacks() -> None:
@@ -130,14 +130,14 @@ def test_points_are_bounded_and_a_page_gets_what_it_lacks() -> None:
         "first": 7,
         "rows": [[7, 7], [8, 8], [9, 9]],
     }
-    for n in range(10, 5 * MOST_POINTS):
+    for n in range(10, 5 * MAX_POINTS):
         curve.add([n, n])
-    edition, count = curve.place
-    assert edition > 0 and count < MOST_POINTS
+    edition, count = curve.position
+    assert edition > 0 and count < MAX_POINTS
     anew = curve.since(0, 7)
     times = [row[0] for row in anew["rows"]]
     assert anew["first"] == 0 and len(times) == count
-    assert times[0] == 0 and len(set(np.diff(times))) == 1 and times[-1] > 5 * MOST_POINTS - 20
+    assert times[0] == 0 and len(set(np.diff(times))) == 1 and times[-1] > 5 * MAX_POINTS - 20
 
 
 @pytest.fixture

@@ -170,7 +170,7 @@ def test_orders_during_a_run_and_after(at: At) -> None:
     at.controller.begin(load_config(None, {}))
     assert at.order("tare") == "no: the test is being opened"
     run: Any = Run()
-    at.controller.attend(run)
+    at.controller.attach(run)
     assert at.order("tare") == "ok" and at.order("note a b") == "ok" and at.order("quit") == "ok"
     assert at.order("fly").startswith("no:") and at.post("/order", {"line": 3}).startswith("no:")
     assert run.heard == ["tare", "note a b", "quit"]

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from live.ui.web.broadcaster import MOST_STREAMS, Broadcaster
-from live.ui.web.server import PageServer, of_json
+from live.ui.web.broadcaster import MAX_STREAMS, Broadcaster
+from live.ui.web.server import PageServer, json_response
 from tests.live.replay.batch.running import until
 
 
@@ -18,7 +18,7 @@ from tests.live.replay.batch.running import until
 def page() -> Iterator[PageServer]:
     server = PageServer(
         Broadcaster(),
-        {"/picture": lambda query: of_json(dict(query))},
+        {"/picture": lambda query: json_response(dict(query))},
         {"/order": lambda value: {"got": value}},
         port=0,
     )
@@ -164,14 +164,16 @@ def stream(page: PageServer) -> http.client.HTTPResponse:
 
 
 def test_a_ninth_page_is_refused_until_one_goes(page: PageServer) -> None:
-    streams = [stream(page) for _ in range(MOST_STREAMS)]
+    streams = [stream(page) for _ in range(MAX_STREAMS)]
     assert {one.status for one in streams} == {200}
     assert ask(page, "/events").status == 503
     streams[0].close()
 
     def gone() -> bool:
-        page.broadcaster.tell("state", "x" * 10)  # the server sees that a page has gone when it writes to it
-        return page.broadcaster.watched < MOST_STREAMS
+        page.broadcaster.publish(
+            "state", "x" * 10
+        )  # the server sees that a page has gone when it writes to it
+        return page.broadcaster.open_pages < MAX_STREAMS
 
     until(gone)
     again = stream(page)
@@ -182,7 +184,7 @@ def test_a_ninth_page_is_refused_until_one_goes(page: PageServer) -> None:
 
 def test_a_page_is_told_the_newest_and_then_what_comes(page: PageServer) -> None:
     for number in range(3):
-        page.broadcaster.tell("state", {"n": number, "nan": float("nan")})
+        page.broadcaster.publish("state", {"n": number, "nan": float("nan")})
     with stream(page) as told:
         assert told.fp.readline() == b"event: state\n"
         assert told.fp.readline() == b'data: {"n":2,"nan":null}\n'
@@ -190,8 +192,8 @@ def test_a_page_is_told_the_newest_and_then_what_comes(page: PageServer) -> None
 
 def test_a_frozen_page_holds_up_nobody() -> None:
     broadcaster = Broadcaster()
-    frozen = [broadcaster.open() for _ in range(MOST_STREAMS)]
+    frozen = [broadcaster.open() for _ in range(MAX_STREAMS)]
     for number in range(1000):
-        broadcaster.tell("state", number)
+        broadcaster.publish("state", number)
     assert broadcaster.open() is None
-    assert [one.take(0) for one in frozen if one] == [{"state": b"999"}] * MOST_STREAMS
+    assert [one.take(0) for one in frozen if one] == [{"state": b"999"}] * MAX_STREAMS
