@@ -1,9 +1,7 @@
-"""What is sent next: the small things all and at once, of fields and pictures the newest, a few a second.
+"""What is sent to the process of the view: rows and events all and at once, the newest field and picture at a rate.
 
-What has come for the view and was not yet sent; everything bounded, what goes is counted.
-
-Filled by the threads of the test with one append each, emptied by the view's own. Rows are kept
-all, of fields and pictures the newest.
+The threads of the test append to ``Pending``; the thread of the view empties it through ``Outbox``. Everything is
+bounded; what is dropped is counted.
 """
 
 from __future__ import annotations
@@ -35,7 +33,13 @@ if TYPE_CHECKING:
 
 MAX_ROWS, MAX_EVENTS = 20_000, 1000
 HISTORY_ROWS = {Kind.MEANS: 5000, Kind.LOADS: 10_000, Kind.POINTS: 800}
-"""What is kept of each to be told again."""
+"""Rows kept of each kind for a restarted process."""
+
+FIELD_HZ = 10.0
+MAX_BYTES_S = 60e6
+"""Of fields, and of pictures, each; very large ones are sent less often."""
+
+MessageSource = Callable[[], Iterable[Message]]
 
 
 class Pending:
@@ -51,7 +55,7 @@ class Pending:
         Markdown.
     figures : Snapshot or None
     dropped : int
-        Rows and events that were too many.
+        Rows and events dropped because too many waited.
     """
 
     def __init__(self) -> None:
@@ -64,11 +68,11 @@ class Pending:
         self.dropped = 0
 
     def row(self, kind: Kind, row: Row) -> None:
-        """Keep a row; of too many the oldest goes."""
+        """Keep a row; the oldest is dropped where too many wait."""
         self._keep(self.rows[kind], row, MAX_ROWS)
 
     def event(self, event: Event) -> None:
-        """Keep an event; of too many the oldest goes."""
+        """Keep an event; the oldest is dropped where too many wait."""
         self._keep(self.events, event, MAX_EVENTS)
 
     def _keep(self, waiting: deque[Any], item: Any, limit: int) -> None:
@@ -79,12 +83,12 @@ class Pending:
 
 
 def drained(waiting: deque[Any]) -> list[Any]:
-    """All of it, which is then gone from there; another thread may append meanwhile."""
+    """Remove and return all items; another thread may append meanwhile."""
     return [waiting.popleft() for _ in range(len(waiting))]
 
 
 class PastMessages:
-    """What a process that is started anew must be told: rows thinned, the last events and the status.
+    """What a restarted process gets: thinned rows, the last events and the status.
 
     Attributes
     ----------
@@ -99,26 +103,20 @@ class PastMessages:
         self.status: str | None = None
 
 
-MessageSource = Callable[[], Iterable[Message]]
-FIELD_HZ = 10.0
-MAX_BYTES_S = 60e6
-"""Of fields, and of pictures; very large ones are sent less often."""
-
-
 class Outbox:
-    """Makes messages of what waits, and keeps what a process that is started anew must be told.
+    """Makes messages of what waits, and keeps what a restarted process gets.
 
     Parameters
     ----------
     setup : ViewSetup
     pending : Pending
-    story : callable
-        Gives what else there is to tell, message by message and from the beginning, as fast as it is taken.
+    playback : callable
+        Gives further messages for each new process, from the beginning, one at a time.
 
     Attributes
     ----------
     sent : dict of Kind to int
-        Fields and pictures.
+        Numbers of fields and pictures sent.
     """
 
     def __init__(self, setup: ViewSetup, pending: Pending, playback: MessageSource = lambda: ()) -> None:
@@ -130,11 +128,11 @@ class Outbox:
         self.sent = dict.fromkeys(self._due_t, 0)
 
     def begin(self, target: ViewTarget) -> None:
-        """A process was started: it must be told everything."""
+        """A process was started: send everything."""
         self._first = self._all(target)
 
     def end(self) -> None:
-        """Nothing comes any more: when all is sent, say so."""
+        """Send END after what waits."""
         self._ending = True
 
     def _all(self, target: ViewTarget) -> Iterator[Message]:
@@ -147,7 +145,7 @@ class Outbox:
         yield from self._playback()
 
     def next(self, now: float) -> Message | None:
-        """What is to be sent at ``now`` (s, monotonic); None: nothing for the moment."""
+        """The message due at ``now`` (s, monotonic); None: nothing yet."""
         return next(self._first, None) or self._small() or self._large(now) or self._last()
 
     def _small(self) -> Message | None:
@@ -193,6 +191,6 @@ class Outbox:
     def _last(self) -> Message | None:
         if not self._ending:
             return None
-        # Said once to each process.
+        # Once for each process.
         self._ending = False
         return Message(Kind.END)

@@ -156,11 +156,11 @@ class Supervisor:
     Parameters
     ----------
     outbox : Outbox
-    where : Where
+    target : ViewTarget
         As it is wanted.
-    tell : callable
+    notify : callable
         Told what a person should know: words and level.
-    serving : callable
+    on_serving : callable
         Called once viewers can connect, and again where they must anew.
 
     Attributes

@@ -42,7 +42,7 @@ class ViewerProxy:
     ----------
     wanted : int
         The first port that is tried.
-    tell : callable
+    notify : callable
         Told what a person should know; called from the door's thread.
 
     Raises

@@ -114,7 +114,7 @@ def listing(*arrays: Any) -> bytes:
     [
         (framed(b"{}", magic=b"RRF2"), "not a message"),
         (framed(b"{}", version=2), "not a message of version 1"),
-        (framed(b"{}", kind=99), "knows no message 99"),
+        (framed(b"{}", kind=99), "has no message 99"),
         (framed(b"{}", total=2**60), "too long"),
         (framed(b"{}"), "damaged"),
         (framed(b"\xff"), "damaged"),
