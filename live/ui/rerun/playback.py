@@ -1,6 +1,6 @@
-"""The view of a finished run: opened, told everything, and kept until a person has seen enough.
+"""Shows a finished run in the view, until a person ends it.
 
-What the view is told of a finished run: setup, curves, events, then picture and maps instant by instant.
+The view gets the curves and events first, then picture and maps time step by time step.
 """
 
 from __future__ import annotations
@@ -37,159 +37,28 @@ from live.ui.rerun.view import View, spawn_viewer
 from live.ui.rerun.wire import Kind, Message
 
 MAX_BYTES = 500e6
-"""Of pictures and maps, as they are drawn: the viewer keeps them all in memory."""
+"""Of pictures and maps as drawn: the viewer keeps them all in memory."""
 
-_BYTES_PX, _BYTES_ZOI = 0.35, 250.0  # of a JPEG of speckle; of three maps and the values of a ZOI
+_BYTES_PX, _BYTES_ZOI = 0.35, 250.0  # of a JPEG of speckle; of a ZOI in three maps, with its values
 _MAX_PX = 1280  # larger pictures are drawn reduced
+_POLL_S, _CLOSE_S = 0.1, 600.0
 
 
 @dataclass(frozen=True, slots=True)
 class ShowRequest:
-    """Which part of the run.
+    """The part of a run that is shown.
 
     Attributes
     ----------
     start_s, end_s : float or None, s
         Since the start of the test.
     every : int or None
-        One instant in so many; None: as many as the viewer can keep.
+        One time step in so many; None: as many as the viewer can keep.
     """
 
     start_s: float | None = None
     end_s: float | None = None
     every: int | None = None
-
-
-def selected_rows(run: RunFolder, request: ShowRequest) -> tuple[int, ...]:
-    """Rows of the instants that are shown, the last of them always.
-
-    Raises
-    ------
-    ConfigError
-        None is left.
-    DataError
-        The run holds none.
-    """
-    t = run.strain.time_s
-    if not len(t):
-        raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to show")
-    low = -math.inf if request.start_s is None else request.start_s
-    high = math.inf if request.end_s is None else request.end_s
-    rows = np.flatnonzero((t >= low) & (t <= high))
-    if not len(rows):
-        raise ConfigError(
-            f"--from, --to: no measurement between {low:g} and {high:g} s; they reach from {t[0]:.6g} to {t[-1]:.6g} s"
-        )
-    every = request.every or math.ceil(len(rows) * _bytes_each(run) / MAX_BYTES)
-    return tuple(int(row) for row in rows[::-1][::every][::-1])
-
-
-def _bytes_each(run: RunFolder) -> float:
-    width, height = picture_size(run)
-    reduced = max(1, math.ceil(max(width, height) / _MAX_PX))
-    return _BYTES_PX * width * height / reduced**2 + _BYTES_ZOI * run.strain.grid.n_active
-
-
-def picture_size(run: RunFolder) -> tuple[int, int]:
-    """Width and height of the pictures, px; without any, as far as the ZOIs reach."""
-    if run.pictures is not None:
-        return run.pictures.info.width, run.pictures.info.height
-    roi = run.strain.grid.roi
-    return 2 * roi.x + roi.width, 2 * roi.y + roi.height
-
-
-def setup_of(run: RunFolder) -> ViewSetup:
-    """What is shown, and how."""
-    width, height = picture_size(run)
-    return ViewSetup(
-        title=run.title,
-        width=width,
-        height=height,
-        bits=run.pictures.info.bits if run.pictures is not None else 8,
-        grid=run.strain.grid,
-        start_monotonic=0.0,
-        area_m2=run.specimen.area_m2,
-        axis=run.load_axis.axis,
-        finished=True,
-        with_load=bool(np.isfinite(run.force).any()),
-        outlines=_outlines(run),
-        gauges=tuple(run.gauges),
-    )
-
-
-def _outlines(run: RunFolder) -> dict[str, tuple[tuple[tuple[float, float], ...], ...]]:
-    """Where the gauges lie; of one whose place the file does not tell, nothing."""
-    described = {name: gauge.described for name, gauge in run.gauges.items()}
-    try:
-        gauges = from_dict({"gauges": described}, {}, str(run.path)).gauges
-        return outlines(gauges, run.strain.grid.size)
-    except ConfigError:
-        return {}
-
-
-def playback(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Message]:
-    """Everything, times in seconds since the start of the test.
-
-    Raises
-    ------
-    DataError
-        A file cannot be read.
-    """
-    yield Message(Kind.STATUS, {"markdown": _status(run)})
-    yield from _curves(run)
-    yield from _events(run)
-    pictures = iter(()) if run.pictures is None else run.pictures.each(rows)
-    since = 0
-    for row, image in zip_longest(rows, pictures):
-        t = float(run.strain.time_s[row])
-        if image is not None and run.pictures is not None:
-            yield picture_message(_frame(image, t, run.pictures.info.bits))
-        yield rows_message(Kind.POINTS, _points(run, since, row + 1))
-        since = row + 1
-        yield field_message(t, run.field(row))
-
-
-def _frame(image: NDArray[Any], t: float, bits: int) -> Frame:
-    kind = np.uint8 if bits <= 8 else np.uint16
-    whole = image if image.dtype == kind else np.rint(image).astype(kind)
-    return Frame(frozen(whole), 0, t, "nominal", 0, bits, t)
-
-
-def _curves(run: RunFolder) -> Iterator[Message]:
-    values, t = run.strain.values, np.asarray(run.strain.time_s, np.float64)
-    columns = [values[column] for name in STRAINS for column in (name, f"sigma_{name}")]
-    yield rows_message(Kind.MEANS, zip(t, *columns, strict=True))
-    for name, gauge in run.gauges.items():
-        yield rows_message(Kind.GAUGE, zip(t, gauge.value, gauge.sigma, strict=True), name)
-    loads = [(t[row], run.force[row]) for row in range(run.strain.n)]
-    if run.session is not None and (samples := run.session.load_samples()):
-        loads = [(sample.t - run.start_monotonic, sample.force) for sample in samples]
-    yield rows_message(Kind.LOADS, (row for row in loads if math.isfinite(row[1])))
-
-
-def _points(run: RunFolder, start: int, stop: int) -> list[tuple[float, float]]:
-    """Strain and N of some instants, for the curve that grows with the slider."""
-    found = zip(run.axial_strain[start:stop].tolist(), run.force[start:stop].tolist(), strict=True)
-    return list(found)
-
-
-def _events(run: RunFolder) -> Iterator[Message]:
-    yield events_message([replace(event, t=event.t - run.start_monotonic) for event in run.events])
-
-
-def _status(run: RunFolder) -> str:
-    """The figures of the test and the gauges at its end, as Markdown."""
-    lines = figure_lines(evaluate_test(run.curve, options_of(run.specimen)), run.specimen)
-    lines += [
-        f"gauge **{name}** {gauge.value[-1] * 1e6:+.0f} ± {gauge.sigma[-1] * 1e6:.0f} µm/m at the end"
-        for name, gauge in run.gauges.items()
-    ]
-    values = run.strain.values
-    head = f"**{run.title}**, {run.strain.n} instants, {values['n_valid'][-1]} of {values['n_zoi'][-1]} ZOIs at the end"
-    return "\n\n".join([head, *(line.strip().replace("+-", "±") for line in lines)])
-
-
-_POLL_S, _CLOSE_S = 0.1, 600.0
 
 
 def show(
@@ -212,10 +81,10 @@ def show(
     _report_selection(len(rows), run, screen)
     played = _PlayedMessages(run, rows, screen)
     view = View(
-        setup_of(run),
+        view_setup(run),
         port=None if rrd else port,
         rrd=rrd,
-        notify=lambda text, level: None if stop.is_set() else _print(screen, text, level),
+        notify=lambda text, level: None if stop.is_set() else _notify(screen, text, level),
         on_serving=lambda view: _announce(view, screen),
         playback=played.messages,
     )
@@ -230,14 +99,14 @@ def show(
 
 
 class _PlayedMessages:
-    """The story as it is taken, from the beginning each time a process is started.
+    """The messages of a run, from the beginning for each process that is started.
 
     Attributes
     ----------
     all : Event
-        Once everything was taken.
+        Set once all were sent.
     trouble : str
-        Why the story ended early.
+        Why they ended early.
     """
 
     def __init__(self, run: RunFolder, rows: tuple[int, ...], screen: Screen) -> None:
@@ -247,7 +116,7 @@ class _PlayedMessages:
     def messages(self) -> Iterator[Message]:
         try:
             done = 0
-            for message in playback(self._run, self._rows):
+            for message in playback_messages(self._run, self._rows):
                 yield message
                 done += message.kind is Kind.FIELD
                 self._screen.status(f"instant {done} of {len(self._rows)}")
@@ -263,12 +132,12 @@ def _report_selection(shown: int, run: RunFolder, screen: Screen) -> None:
         screen.say("note: the pictures that were measured are not here any more; maps alone")
 
 
-def _print(screen: Screen, text: str, level: Level) -> None:
+def _notify(screen: Screen, text: str, level: Level) -> None:
     screen.say(text if level == "info" else f"{level}: {text}")
 
 
 def _announce(view: View, screen: Screen) -> None:
-    """Open the viewer where there is a display; else say how to look."""
+    """Open the viewer where there is a display; else print how to watch."""
     if view.port is None:
         return
     if spawn_viewer(view.port, screen.say) is not None:
@@ -277,3 +146,131 @@ def _announce(view: View, screen: Screen) -> None:
     screen.say("no viewer is opened here (no display); this shows it, Ctrl-C ends it:")
     for line in view.instructions.splitlines():
         screen.say(f"  {line}")
+
+
+def selected_rows(run: RunFolder, request: ShowRequest) -> tuple[int, ...]:
+    """Rows of the time steps that are shown, always with the last.
+
+    Raises
+    ------
+    ConfigError
+        No time step is in the range.
+    DataError
+        The run has no time step.
+    """
+    t = run.strain.time_s
+    if not len(t):
+        raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to show")
+    low = -math.inf if request.start_s is None else request.start_s
+    high = math.inf if request.end_s is None else request.end_s
+    rows = np.flatnonzero((t >= low) & (t <= high))
+    if not len(rows):
+        raise ConfigError(
+            f"--from, --to: no measurement between {low:g} and {high:g} s; they reach from {t[0]:.6g} to {t[-1]:.6g} s"
+        )
+    every = request.every or math.ceil(len(rows) * _bytes_each(run) / MAX_BYTES)
+    return tuple(int(row) for row in rows[::-1][::every][::-1])
+
+
+def _bytes_each(run: RunFolder) -> float:
+    width, height = picture_size(run)
+    reduced = max(1, math.ceil(max(width, height) / _MAX_PX))
+    return _BYTES_PX * width * height / reduced**2 + _BYTES_ZOI * run.strain.grid.n_active
+
+
+def picture_size(run: RunFolder) -> tuple[int, int]:
+    """Width and height of the pictures, px; without pictures, those that the ZOIs need."""
+    if run.pictures is not None:
+        return run.pictures.info.width, run.pictures.info.height
+    roi = run.strain.grid.roi
+    return 2 * roi.x + roi.width, 2 * roi.y + roi.height
+
+
+def view_setup(run: RunFolder) -> ViewSetup:
+    """Settings of the view for ``run``."""
+    width, height = picture_size(run)
+    return ViewSetup(
+        title=run.title,
+        width=width,
+        height=height,
+        bits=run.pictures.info.bits if run.pictures is not None else 8,
+        grid=run.strain.grid,
+        start_monotonic=0.0,
+        area_m2=run.specimen.area_m2,
+        axis=run.load_axis.axis,
+        finished=True,
+        with_load=bool(np.isfinite(run.force).any()),
+        outlines=_outlines(run),
+        gauges=tuple(run.gauges),
+    )
+
+
+def _outlines(run: RunFolder) -> dict[str, tuple[tuple[tuple[float, float], ...], ...]]:
+    """Outlines of the gauges; none where the file does not have their positions."""
+    described = {name: gauge.described for name, gauge in run.gauges.items()}
+    try:
+        gauges = from_dict({"gauges": described}, {}, str(run.path)).gauges
+        return outlines(gauges, run.strain.grid.size)
+    except ConfigError:
+        return {}
+
+
+def playback_messages(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Message]:
+    """All messages, with times in seconds since the start of the test.
+
+    Raises
+    ------
+    DataError
+        A file cannot be read.
+    """
+    yield Message(Kind.STATUS, {"markdown": _status(run)})
+    yield from _curves(run)
+    yield from _events(run)
+    pictures = iter(()) if run.pictures is None else run.pictures.each(rows)
+    since = 0
+    for row, image in zip_longest(rows, pictures):
+        t = float(run.strain.time_s[row])
+        if image is not None and run.pictures is not None:
+            yield picture_message(_frame(image, t, run.pictures.info.bits))
+        yield rows_message(Kind.POINTS, _points(run, since, row + 1))
+        since = row + 1
+        yield field_message(t, run.field(row))
+
+
+def _frame(image: NDArray[Any], t: float, bits: int) -> Frame:
+    kind = np.uint8 if bits <= 8 else np.uint16
+    levels = image if image.dtype == kind else np.rint(image).astype(kind)
+    return Frame(frozen(levels), 0, t, "nominal", 0, bits, t)
+
+
+def _curves(run: RunFolder) -> Iterator[Message]:
+    values, t = run.strain.values, np.asarray(run.strain.time_s, np.float64)
+    columns = [values[column] for name in STRAINS for column in (name, f"sigma_{name}")]
+    yield rows_message(Kind.MEANS, zip(t, *columns, strict=True))
+    for name, gauge in run.gauges.items():
+        yield rows_message(Kind.GAUGE, zip(t, gauge.value, gauge.sigma, strict=True), name)
+    loads = [(t[row], run.force[row]) for row in range(run.strain.n)]
+    if run.session is not None and (samples := run.session.load_samples()):
+        loads = [(sample.t - run.start_monotonic, sample.force) for sample in samples]
+    yield rows_message(Kind.LOADS, (row for row in loads if math.isfinite(row[1])))
+
+
+def _points(run: RunFolder, start: int, stop: int) -> list[tuple[float, float]]:
+    """Strain and N of some time steps, for the curve up to the time of the slider."""
+    return list(zip(run.axial_strain[start:stop].tolist(), run.force[start:stop].tolist(), strict=True))
+
+
+def _events(run: RunFolder) -> Iterator[Message]:
+    yield events_message([replace(event, t=event.t - run.start_monotonic) for event in run.events])
+
+
+def _status(run: RunFolder) -> str:
+    """The figures of the test and the final values of the gauges, as Markdown."""
+    lines = figure_lines(evaluate_test(run.curve, options_of(run.specimen)), run.specimen)
+    lines += [
+        f"gauge **{name}** {gauge.value[-1] * 1e6:+.0f} ± {gauge.sigma[-1] * 1e6:.0f} µm/m at the end"
+        for name, gauge in run.gauges.items()
+    ]
+    values = run.strain.values
+    head = f"**{run.title}**, {run.strain.n} instants, {values['n_valid'][-1]} of {values['n_zoi'][-1]} ZOIs at the end"
+    return "\n\n".join([head, *(line.strip().replace("+-", "±") for line in lines)])

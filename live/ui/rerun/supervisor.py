@@ -1,10 +1,9 @@
-"""Keeps a process that draws alive and supplied: one thread, which alone may wait for it.
+"""Supervises the process that draws: starts it, sends it messages, restarts it where it ends.
 
-One process that draws, and the socket to it; nothing here waits for it but ``end``.
-
-The process is a plain child in our own session, so that its nice value counts against our threads. It
-ignores Ctrl-C, since a terminal sends that to all, and ends by itself when our end of the socket closes,
-also when we are killed.
+All of it runs in one thread of the view; only that thread may wait for the process. The process is a plain
+child in the session of the test, so that its nice value counts against the threads of the test. It ignores
+Ctrl-C, since a terminal sends that to all processes, and ends when the other end of its socket is closed, also
+where the test is killed.
 """
 
 from __future__ import annotations
@@ -30,6 +29,19 @@ from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
 from live.ui.rerun.wire import Kind, Message, Reader, WireError, encoded
 
+TICK_S = 0.05
+STUCK_S, START_S = 15.0, 90.0
+"""A process that takes nothing for so long is replaced (a busy machine starts one slowly)."""
+
+MAX_STARTS, MAX_REPORTED = 5, 3
+"""Failures in a row: until the view is given up; that are reported."""
+
+_STABLE_S, _MAX_DELAY_S = 60.0, 60.0
+"""A process that ran so long starts the count of failures again; the longest delay of a restart."""
+
+Notify = Callable[[str, Level], None]
+"""Takes a message for a person and its level."""
+
 _SEND_BYTES = 1 << 20
 _ROOT = str(Path(__file__).parents[3])
 _MODULE = "live.ui.rerun.drawing"
@@ -37,19 +49,19 @@ _KILLED_S = 5.0
 
 
 class RenderProcess:
-    """A process that draws, from its start to its end.
+    """A process that draws, and the socket to it; only ``wait`` and ``end`` wait for it.
 
     Attributes
     ----------
     pid : int
     progress_t : float, s
-        When it last took or gave something (``time.monotonic``).
+        When it last received or sent something (``time.monotonic``).
     """
 
     def __init__(self) -> None:
         ours, its = socket.socketpair()
         with its, held_back(signal.SIGINT, signal.SIGHUP):
-            # It lets them through once it ignores them.
+            # The process unblocks them once it ignores them.
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", _MODULE],
                 stdin=its.fileno(),
@@ -64,18 +76,18 @@ class RenderProcess:
         self.pid, self.progress_t = self._process.pid, time.monotonic()
 
     def send(self, message: Message) -> None:
-        """Put ``message`` behind what waits."""
+        """Queue ``message``."""
         if not self._pending:
             self.progress_t = time.monotonic()
         self._pending.extend(encoded(message))
 
     def flush(self) -> bool:
-        """Hand over what the process takes at once; whether all is gone.
+        """Send as much as the socket takes now; whether nothing is left.
 
         Raises
         ------
         OSError
-            The process is gone.
+            The process has ended.
         """
         while self._pending:
             try:
@@ -95,12 +107,12 @@ class RenderProcess:
             sent -= piece.nbytes
 
     def replies(self) -> Iterator[Message]:
-        """What it has said since.
+        """The messages received since the last call.
 
         Raises
         ------
         EOFError, OSError
-            The process is gone.
+            The process has ended.
         """
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -109,11 +121,11 @@ class RenderProcess:
                 yield message
 
     def wait(self, seconds: float, *, to_send: bool) -> None:
-        """Until it says something (or takes something), at most ``seconds``."""
+        """Wait for a message (or for room to send), at most ``seconds``."""
         select.select([self._socket], [self._socket] if to_send else [], [], seconds)
 
     def end(self, seconds: float = 0.0) -> int:
-        """Close the socket and see the process off, killed after ``seconds``; what it ended with."""
+        """Close the socket, wait ``seconds`` and kill the process after that; its exit code."""
         self._socket.close()
         try:
             return self._process.wait(seconds)
@@ -125,52 +137,39 @@ class RenderProcess:
 
 
 def _environment() -> dict[str, str]:
-    """Ours, with this very code in front; -P keeps the folder we were started in out of it.
+    """The environment of the process, with this code first in its path; -P keeps the current folder out of it.
 
-    Rerun's allocator is to give back at once what its server lets go: a tenth less memory in a long test.
+    The allocator of rerun returns freed memory at once: a tenth less memory in a long test.
     """
     paths = [_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])]
     return {"MIMALLOC_PURGE_DELAY": "0", **os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
-TICK_S = 0.05
-STUCK_S, START_S = 15.0, 90.0
-"""A process that takes nothing for so long is replaced (a busy machine starts one slowly)."""
-
-MAX_STARTS, MAX_REPORTED = 5, 3
-"""Without success, in a row: starts until it is given up, ends of the process that are told."""
-
-_STABLE_S, _MAX_DELAY_S = 60.0, 60.0
-"""A process that lived so long begins a new row; the longest wait before a start."""
-
-Notify = Callable[[str, Level], None]
-
-
 class Stuck(OSError):
-    """The process takes nothing any more."""
+    """The process receives nothing any more."""
 
 
 class Supervisor:
-    """Starts the process, talks to it, starts it anew where it ends; gives up where that is of no use.
+    """Starts the process, exchanges messages, restarts it where it ends; gives up after ``MAX_STARTS`` failures.
 
     Parameters
     ----------
     outbox : Outbox
     target : ViewTarget
-        As it is wanted.
+        As configured.
     notify : callable
-        Told what a person should know: words and level.
+        Called with a message for a person and its level.
     on_serving : callable
-        Called once viewers can connect, and again where they must anew.
+        Called once viewers can connect, and again after a restart.
 
     Attributes
     ----------
-    served : Where
-        What there really is: port and file, None until they are.
+    served : ViewTarget
+        The port that is served and the file that is written; None until they are.
     failed : str
-        Why there is no view any more; empty while all is well.
+        Why there is no view any more; empty while it runs.
     pid : int or None
-        Of the process.
+        Process id, while there is one.
     starts : int
     """
 
@@ -190,12 +189,12 @@ class Supervisor:
         self._thread = threading.Thread(target=self._run, name="view", daemon=True)
 
     def start(self) -> None:
-        """Begin; the process inherits the nice value of the caller, which the thread's would make slow to start."""
+        """Start the process, which inherits the nice value of the caller, then the thread, which has its own."""
         self._guarded(self._start_process)
         self._thread.start()
 
     def close(self, seconds: float) -> None:
-        """Have all drawn and the file closed within ``seconds``; else the process is killed, and it is told."""
+        """Draw all and close the file within ``seconds``; else kill the process and warn."""
         self._close_s = seconds
         self._closing.set()
         self._thread.join(seconds + STUCK_S)
@@ -208,7 +207,7 @@ class Supervisor:
             self._outbox.end()
             self._finish(time.monotonic() + self._close_s)
 
-    # -- talking ------------------------------------------------------------------------------
+    # -- messages -----------------------------------------------------------------------------
 
     def _step(self) -> None:
         renderer = self._renderer or self._start_process()
@@ -218,7 +217,7 @@ class Supervisor:
             renderer.wait(TICK_S, to_send=True)
 
     def _exchange(self, renderer: RenderProcess) -> bool:
-        """Talk with it; whether it has taken all there is."""
+        """Receive and send; whether everything was sent."""
         for message in renderer.replies():
             self._handle(message)
         while renderer.flush():
@@ -247,7 +246,7 @@ class Supervisor:
         elif message.kind is Kind.ENDED:
             self._is_done = True
 
-    # -- its life -----------------------------------------------------------------------------
+    # -- start and end ------------------------------------------------------------------------
 
     def _start_process(self) -> RenderProcess | None:
         now = time.monotonic()
@@ -262,7 +261,7 @@ class Supervisor:
         return self._renderer
 
     def _next_target(self) -> ViewTarget:
-        """The port that viewers know, and a file that is not there yet: view.rrd, view-2.rrd ..."""
+        """The same port as before, and a new file: view.rrd, view-2.rrd ..."""
         target = self._target
         if self.served.port is not None:
             target = replace(target, port=self.served.port)
@@ -278,7 +277,7 @@ class Supervisor:
             self._handle_loss(error)
 
     def _handle_loss(self, error: Exception) -> None:
-        """The process is gone, or as good as gone."""
+        """The process has ended or hangs: end it, and schedule a restart."""
         renderer, self._renderer, self.pid = self._renderer, None, None
         code = renderer.end() if renderer is not None else 0
         if self.failed:
@@ -292,10 +291,10 @@ class Supervisor:
             0.0 if self._cause else min(2.0 ** (self._failures - 1), _MAX_DELAY_S)
         )
         if self._cause:
-            self._notify(f"the view's process {self._cause} and is started anew", "info")
+            self._notify(f"the view's process {self._cause} and is restarted", "info")
         elif self._failures <= MAX_REPORTED:
-            last = "; that is not told again" * (self._failures == MAX_REPORTED)
-            self._notify(f"the view's process {_reason(code, error)} and is started anew{last}", "warning")
+            last = "; further restarts are not reported" * (self._failures == MAX_REPORTED)
+            self._notify(f"the view's process {_reason(code, error)} and is restarted{last}", "warning")
 
     def _finish(self, until: float) -> None:
         try:

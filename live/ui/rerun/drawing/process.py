@@ -1,6 +1,6 @@
-"""Reads what the test says, and draws it.
+"""The main loop of the process: reads messages and draws them.
 
-What ends the process that draws when nobody else does: a parent that has gone, a memory that has grown.
+It ends with the test, also with one that is killed, and where its memory has grown too large.
 """
 
 from __future__ import annotations
@@ -32,70 +32,46 @@ from live.ui.rerun.messages import (
 )
 from live.ui.rerun.wire import Kind, Message, Reader, encoded
 
-GRACE_S = 5.0
-"""For drawing what waits and closing the file once the parent has gone."""
-
-
-def end_with(parent: socket.socket) -> None:
-    """End this process ``GRACE_S`` after ``parent`` is closed at the other end, wherever it hangs then."""
-    threading.Thread(target=_end_with, args=(parent.fileno(),), name="guard", daemon=True).start()
-
-
-def _end_with(number: int) -> None:
-    poll = select.poll()
-    poll.register(number, 0)  # a closed end is told unasked
-    poll.poll()
-    threading.Event().wait(GRACE_S)
-    os.kill(os.getpid(), signal.SIGKILL)  # it may hang anywhere
-
-
-def memory_MiB() -> float:
-    """Resident memory of this process (its largest so far where the system does not tell)."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
-        return pages * resource.getpagesize() / 2**20
-    except (OSError, ValueError, IndexError):
-        most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        return most / 2**20 if sys.platform == "darwin" else most / 2**10
-
-
 log = logging.getLogger(__name__)
 
 MAX_MIB = 640
-"""Of the whole process; beyond, it closes its file and ends, and the test starts it anew."""
+"""Of the whole process; beyond it the process closes its file and ends, and the test restarts it."""
+
+GRACE_S = 5.0
+"""To draw what waits and to close the file after the test has ended."""
 
 _POLL_S, _NICE = 2.0, 19
 
 
 class ReplyLine:
-    """The way back to the test, for several threads."""
+    """Sends messages to the test, from several threads."""
 
-    def __init__(self, there: socket.socket) -> None:
-        self._there, self._lock = there, threading.Lock()
+    def __init__(self, parent: socket.socket) -> None:
+        self._parent, self._lock = parent, threading.Lock()
 
-    def say(self, kind: Kind, **meta: Any) -> None:
-        """Tell the test; nothing where it has gone."""
+    def send(self, kind: Kind, **meta: Any) -> None:
+        """Send a message; ignored where the test has ended."""
         with self._lock, contextlib.suppress(OSError):
             for piece in encoded(Message(kind, meta)):
-                self._there.sendall(piece)
+                self._parent.sendall(piece)
 
     def notify(self, text: str) -> None:
-        """Something for a person."""
-        self.say(Kind.TROUBLE, text=text, lasting=False)
+        """Send a message for a person."""
+        self.send(Kind.TROUBLE, text=text, lasting=False)
 
 
 def main() -> int:
-    """Draw until the test ends or goes; what the process ends with."""
-    there = socket.socket(fileno=os.dup(0))
-    there.setblocking(True)
-    line, reader = ReplyLine(there), Reader(there)
-    end_with(there)
+    """Draw until the test ends; the exit code."""
+    parent = socket.socket(fileno=os.dup(0))
+    parent.setblocking(True)
+    line, reader = ReplyLine(parent), Reader(parent)
+    end_with(parent)
     try:
         setup, target = setup_of(reader.next())
         sinks = _open(setup, target, line)
         if not sinks:
             return 3
-        # Only now: a machine without a free core would be long in loading rerun.
+        # Only now: with a low priority a busy machine takes long to load rerun.
         os.nice(_NICE - os.nice(0))
         _draw(reader, ViewScene(sinks, setup), line, MAX_MIB + FINISHED_MIB * setup.finished)
     except EOFError:
@@ -126,9 +102,9 @@ def _open(setup: ViewSetup, target: ViewTarget, line: ReplyLine) -> list[RerunSi
     if not sinks and not troubles:
         troubles.append("the view has nowhere to draw to")
     for text in troubles:
-        line.say(Kind.TROUBLE, text=f"{text}; all else goes on", lasting=not sinks)
+        line.send(Kind.TROUBLE, text=f"{text}; all else goes on", lasting=not sinks)
     if sinks:
-        line.say(Kind.SERVING, port=port, rrd=rrd)
+        line.send(Kind.SERVING, port=port, rrd=rrd)
     return sinks
 
 
@@ -141,10 +117,10 @@ def _draw(reader: Reader, scene: ViewScene, line: ReplyLine, max_MiB: float) -> 
             if time.monotonic() - checked_t > _POLL_S:
                 checked_t = time.monotonic()
                 if (grown := memory_MiB()) > max_MiB:
-                    line.say(Kind.FULL, memory_MiB=round(grown))
+                    line.send(Kind.FULL, memory_MiB=round(grown))
                     return
         scene.end()
-        line.say(Kind.ENDED)
+        line.send(Kind.ENDED)
     finally:
         scene.end()
 
@@ -170,3 +146,26 @@ def _show(scene: ViewScene, message: Message) -> None:
         scene.status(str(message.meta.get("markdown", "")))
     elif kind is Kind.FIGURES:
         scene.figures(figures_of(message))
+
+
+def end_with(parent: socket.socket) -> None:
+    """End this process ``GRACE_S`` after the other end of ``parent`` is closed, even where it hangs."""
+    threading.Thread(target=_end_with, args=(parent.fileno(),), name="guard", daemon=True).start()
+
+
+def _end_with(number: int) -> None:
+    poll = select.poll()
+    poll.register(number, 0)  # a closed end is reported in any case
+    poll.poll()
+    threading.Event().wait(GRACE_S)
+    os.kill(os.getpid(), signal.SIGKILL)  # a hanging thread does not stop this
+
+
+def memory_MiB() -> float:
+    """Resident memory of this process (its peak where the system does not report the current value)."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        return pages * resource.getpagesize() / 2**20
+    except (OSError, ValueError, IndexError):
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return peak / 2**20 if sys.platform == "darwin" else peak / 2**10

@@ -14,7 +14,7 @@ from live.cli import main
 from live.pipeline.screen import Screen
 from live.results.run_folder import RunFolder, open_run
 from live.ui.rerun.messages import events_of, field_of, picture_of, rows_of
-from live.ui.rerun.playback import ShowRequest, playback, selected_rows, setup_of, show
+from live.ui.rerun.playback import ShowRequest, playback_messages, selected_rows, show, view_setup
 from live.ui.rerun.wire import Kind
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
 
@@ -43,7 +43,7 @@ def drawn(path: Path) -> dict[str, list[Any]]:
 
 
 def test_the_story_is_what_the_files_hold(run: RunFolder) -> None:
-    messages = list(playback(run, (0, 50, N - 1)))
+    messages = list(playback_messages(run, (0, 50, N - 1)))
     kinds = [message.kind for message in messages]
     assert kinds.count(Kind.FIELD) == kinds.count(Kind.PICTURE) == 3
     t, field = field_of(messages[-1])
@@ -61,7 +61,7 @@ def test_the_story_is_what_the_files_hold(run: RunFolder) -> None:
     points = [row for message in messages if message.kind is Kind.POINTS for row in rows_of(message)]
     np.testing.assert_array_equal([row[0] for row in points], run.strain.values["gauge_axial"])
     gauges = {message.meta["name"]: rows_of(message) for message in messages if message.kind is Kind.GAUGE}
-    assert list(gauges) == list(setup_of(run).gauges) == ["axial", "shear"]
+    assert list(gauges) == list(view_setup(run).gauges) == ["axial", "shear"]
     axial = np.stack([run.strain.time_s, run.gauges["axial"].value, run.gauges["axial"].sigma], axis=1)
     np.testing.assert_array_equal(gauges["axial"], axial)
     status = next(message for message in messages if message.kind is Kind.STATUS)
@@ -70,18 +70,18 @@ def test_the_story_is_what_the_files_hold(run: RunFolder) -> None:
 
 
 def test_the_gauges_are_drawn_where_they_lie(run: RunFolder, tmp_path: Path) -> None:
-    drawn = setup_of(run).outlines
+    drawn = view_setup(run).outlines
     assert set(drawn) == {"axial", "shear"}
     assert drawn["axial"][0] == ((64.0, 20.0), (64.0, 76.0))
     np.testing.assert_allclose(np.mean(drawn["axial"][2][1:], axis=0), (64, 76), atol=1e-9)
     assert drawn["shear"] == (((40, 30), (90, 30), (90, 70), (40, 70), (40, 30)),)
-    assert setup_of(run).with_load
+    assert view_setup(run).with_load
     run.strain.config["gauges"] = {"axial": {"kind": "spiral"}}
     del run.gauges
-    assert setup_of(run).outlines == {}
+    assert view_setup(run).outlines == {}
     with open_run(make_run(tmp_path, PULLED[:3], session=False)) as plain:
         plain.strain.values["force_N"][:] = np.nan
-        assert not setup_of(plain).with_load
+        assert not view_setup(plain).with_load
 
 
 def test_all_of_it_is_drawn_and_every_zoi_tells_its_values(

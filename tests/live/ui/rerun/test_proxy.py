@@ -1,4 +1,4 @@
-"""The door lets viewers in, and neither strangers nor those who hold everything up."""
+"""The proxy passes viewers, refuses foreign pages, and disconnects a viewer that has stopped."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 
 
 @pytest.mark.parametrize(
-    ("head", "welcome"),
+    ("head", "allowed"),
     [
         (b"PRI * HTTP/2.0\r\n\r\n", True),
         (b"POST /x HTTP/1.1\r\nHost: 127.0.0.1:9876\r\n\r\n", True),
@@ -27,13 +27,13 @@ PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
         (b"POST /x HTTP/1.1\r\n\r\n", False),
     ],
 )
-def test_who_is_let_in(head: bytes, welcome: bool) -> None:
-    assert host_allowed(head) is welcome
+def test_which_requests_pass(head: bytes, allowed: bool) -> None:
+    assert host_allowed(head) is allowed
 
 
 @pytest.fixture
 def server() -> Iterator[socket.socket]:
-    """What stands behind the door: says back what it is told."""
+    """The server behind the proxy: it echoes what it receives."""
     with socket.socket() as listening:
         listening.bind(("127.0.0.1", 0))
         listening.listen()
@@ -59,7 +59,7 @@ def opened(server: socket.socket, told: list[str]) -> ViewerProxy:
     return proxy
 
 
-def test_it_passes_on_both_ways_and_refuses_strangers(server: socket.socket) -> None:
+def test_it_passes_on_both_ways_and_refuses_foreign_pages(server: socket.socket) -> None:
     proxy = opened(server, [])
     with socket.create_connection(("127.0.0.1", proxy.port), 10) as viewer:
         viewer.sendall(PREFACE)
@@ -71,7 +71,7 @@ def test_it_passes_on_both_ways_and_refuses_strangers(server: socket.socket) -> 
 
 
 def ended(viewer: socket.socket, proxy: ViewerProxy) -> bool:
-    """Whether the door hangs up on a viewer that takes nothing while more and more is drawn."""
+    """Whether the proxy disconnects a viewer that receives nothing while more and more is drawn."""
     for k in range(1, 40):
         proxy.drawn(k * (viewer_proxy.STOPPED_BYTES + 1))
         try:
@@ -83,22 +83,22 @@ def ended(viewer: socket.socket, proxy: ViewerProxy) -> bool:
     return False
 
 
-def test_one_that_takes_nothing_is_let_go(server: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stopped_viewer_is_disconnected(server: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(viewer_proxy, "STOPPED_S", 0.2)
     told: list[str] = []
     proxy = opened(server, told)
     with socket.create_connection(("127.0.0.1", proxy.port), 10) as viewer:
         viewer.sendall(PREFACE + b"x" * 20_000)
-        came = 0
-        while came < len(PREFACE) + 20_000:
-            came += len(viewer.recv(2**16))
+        received = 0
+        while received < len(PREFACE) + 20_000:
+            received += len(viewer.recv(2**16))
         viewer.settimeout(0.5)
         assert ended(viewer, proxy)
     assert len(told) == 1
-    assert "let go" in told[0]
+    assert "disconnected" in told[0]
 
 
-def test_no_two_doors_have_one_port() -> None:
+def test_no_two_proxies_have_one_port() -> None:
     first = ViewerProxy(0, print)
     second = ViewerProxy(first.port, print)
     assert first.port < second.port < first.port + viewer_proxy.TRIES
@@ -108,7 +108,7 @@ def test_no_two_doors_have_one_port() -> None:
         ViewerProxy(65_536, print)
 
 
-def test_the_address_behind_is_of_this_machine_alone() -> None:
+def test_the_hidden_address_is_of_this_machine_alone() -> None:
     host, port = hidden_address()
     assert host.startswith("127.")
     assert 1024 < port < 65_536

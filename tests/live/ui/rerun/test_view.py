@@ -130,7 +130,7 @@ def test_killed_it_comes_back_on_its_port_and_knows_the_past(
     show(view, first=30)
     watched.close()
     assert watched.served[0] == watched.served[1]
-    assert watched.told == ["warning: the view's process was ended by SIGKILL and is started anew"]
+    assert watched.told == ["warning: the view's process was ended by SIGKILL and is restarted"]
     assert view.rrd == tmp_path / "view-2.rrd"
     assert rows_in(tmp_path / "view-2.rrd")["/strain/eyy"] == 60 + 1
     assert "started 2 times" in view.report
@@ -158,7 +158,7 @@ def test_stopped_it_is_replaced_and_holds_nothing_up(
     watched.close()
     assert longest < 1.0
     assert is_gone(stopped)
-    assert watched.told == ["warning: the view's process took nothing for 2 s (stopped?) and is started anew"]
+    assert watched.told == ["warning: the view's process took nothing for 2 s (stopped?) and is restarted"]
     assert rows_in(tmp_path / "view-2.rrd")["/strain/eyy"] == k + 1
 
 
