@@ -43,7 +43,7 @@ GRACE_S = 5.0
 _POLL_S, _NICE = 2.0, 19
 
 
-class ReplyLine:
+class ReplyChannel:
     """Sends messages to the test, from several threads."""
 
     def __init__(self, parent: socket.socket) -> None:
@@ -64,30 +64,30 @@ def main() -> int:
     """Draw until the test ends; the exit code."""
     parent = socket.socket(fileno=os.dup(0))
     parent.setblocking(True)
-    line, reader = ReplyLine(parent), Reader(parent)
+    channel, reader = ReplyChannel(parent), Reader(parent)
     end_with(parent)
     try:
         setup, target = setup_of(reader.next())
-        sinks = _open(setup, target, line)
+        sinks = _open(setup, target, channel)
         if not sinks:
             return 3
         # Only now: with a low priority a busy machine takes long to load rerun.
         os.nice(_NICE - os.nice(0))
-        _draw(reader, ViewScene(sinks, setup), line, MAX_MIB + FINISHED_MIB * setup.finished)
+        _draw(reader, ViewScene(sinks, setup), channel, MAX_MIB + FINISHED_MIB * setup.finished)
     except EOFError:
         return 1
     except Exception as error:
         log.exception("the view's process stopped")
-        line.notify(f"the view's process stopped by a defect: {error!r}")
+        channel.notify(f"the view's process stopped by a defect: {error!r}")
         return 1
     return 0
 
 
-def _open(setup: ViewSetup, target: ViewTarget, line: ReplyLine) -> list[RerunSink]:
+def _open(setup: ViewSetup, target: ViewTarget, channel: ReplyChannel) -> list[RerunSink]:
     sinks, port, rrd, troubles = [], None, None, []
     try:
         if target.port is not None:
-            sink, port = serve(setup, target, line.notify)
+            sink, port = serve(setup, target, channel.notify)
             sinks.append(sink)
     except Exception as error:
         troubles.append(f"the view's server did not start: {error}")
@@ -102,13 +102,13 @@ def _open(setup: ViewSetup, target: ViewTarget, line: ReplyLine) -> list[RerunSi
     if not sinks and not troubles:
         troubles.append("the view has nowhere to draw to")
     for text in troubles:
-        line.send(Kind.TROUBLE, text=f"{text}; all else goes on", lasting=not sinks)
+        channel.send(Kind.TROUBLE, text=f"{text}; all else goes on", lasting=not sinks)
     if sinks:
-        line.send(Kind.SERVING, port=port, rrd=rrd)
+        channel.send(Kind.SERVING, port=port, rrd=rrd)
     return sinks
 
 
-def _draw(reader: Reader, scene: ViewScene, line: ReplyLine, max_MiB: float) -> None:
+def _draw(reader: Reader, scene: ViewScene, channel: ReplyChannel, max_MiB: float) -> None:
     scene.begin()
     checked_t = time.monotonic()
     try:
@@ -117,10 +117,10 @@ def _draw(reader: Reader, scene: ViewScene, line: ReplyLine, max_MiB: float) -> 
             if time.monotonic() - checked_t > _POLL_S:
                 checked_t = time.monotonic()
                 if (grown := memory_MiB()) > max_MiB:
-                    line.send(Kind.FULL, memory_MiB=round(grown))
+                    channel.send(Kind.FULL, memory_MiB=round(grown))
                     return
         scene.end()
-        line.send(Kind.ENDED)
+        channel.send(Kind.ENDED)
     finally:
         scene.end()
 
