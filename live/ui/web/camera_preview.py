@@ -1,4 +1,4 @@
-"""Looking through the camera while the rig is set up: drained by a thread, the last frames kept."""
+"""The live picture during set-up: a thread reads the camera and keeps the last frames."""
 
 from __future__ import annotations
 
@@ -22,27 +22,28 @@ from live.ui.web.config_draft import ConfigDraft, at_rest
 log = logging.getLogger(__name__)
 
 RECENT = 8
-"""Frames that are kept."""
+"""Frames kept."""
+
 RETRY_S, OPEN_S = 1.0, 20.0
-"""Between tries to open the camera; and how long a camera may take to open."""
+"""Delay before the camera is opened again; time limit for opening it."""
 
 
 class CameraPreview:
-    """The camera of ``draft``, opened again and again where it fails.
+    """Reads the camera of ``draft``, and opens it again where it fails.
 
     Parameters
     ----------
     draft : ConfigDraft
     on_open : callable taking a CameraInfo
-        Before the first frame of a camera.
-    on_frame : callable taking a Frame, giving seconds
-        Called with the newest frame; when to be called again.
+        Called before the first frame of a camera.
+    on_frame : callable taking a Frame, giving monotonic s
+        Called with the newest frame; returns when to be called again.
 
     Attributes
     ----------
     info : CameraInfo or None
     trouble : str
-        What is wrong with the camera; empty while it gives frames.
+        The fault of the camera; empty while it delivers frames.
     """
 
     def __init__(
@@ -60,17 +61,17 @@ class CameraPreview:
         self._thread = threading.Thread(target=self._work, name="page-camera", daemon=True)
 
     def start(self) -> None:
-        """Begin to look."""
+        """Start the thread."""
         self._thread.start()
 
     def close(self) -> None:
-        """Give the camera back."""
+        """Close the camera and end the thread."""
         self._closing.set()
         self._stop()
         self._thread.join()
 
     def reopen(self, address: str) -> None:
-        """Open the camera with another address; raises, and the old one is kept, where that cannot be."""
+        """Open the camera with another address; where that fails, raise and keep the old address."""
         before = self._draft.config.camera.address
         self._draft.change_all({"camera.address": address})
         self._opened = queue.SimpleQueue()
@@ -93,13 +94,13 @@ class CameraPreview:
 
     @property
     def collecting(self) -> bool:
-        """Whether frames are still to come."""
+        """Whether ``collect`` still waits for frames."""
         with self._lock:
             found = self._collected
             return found is not None and len(found) != found.maxlen
 
     def collected(self) -> list[Frame] | None:
-        """Those, once they are there; then they are forgotten."""
+        """The frames of ``collect`` once they are complete; they are returned once."""
         with self._lock:
             found = self._collected
             if found is None or len(found) != found.maxlen:
@@ -120,7 +121,7 @@ class CameraPreview:
             except PhasedicError as error:
                 self.trouble = printable(brief(error))
             except Exception as error:
-                log.exception("looking through the camera failed")
+                log.exception("the preview of the camera failed")
                 self.trouble = f"a defect: {error!r}"
             if self.trouble and not self._reopen.is_set():
                 self._closing.wait(RETRY_S)
@@ -130,7 +131,7 @@ class CameraPreview:
         config = self._draft.config.camera
         if not config.address:
             raise DataError(
-                "no camera is given: start with --camera ADDRESS (phasedic devices lists what is there)"
+                "no camera is given: start with --camera ADDRESS (phasedic devices lists the cameras)"
             )
         try:
             rig = open_rig(at_rest(config.address), "none:", self._on_event, crop=config.crop)

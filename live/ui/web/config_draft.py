@@ -1,4 +1,4 @@
-"""The rig as it is being set up: what was given, and what has been changed on the page and not saved yet."""
+"""The configuration during set-up: as it was loaded, with the changes that are not saved yet."""
 
 from __future__ import annotations
 
@@ -30,6 +30,10 @@ CHANGEABLE = frozenset(
 """Keys that a page may change, beside gauges."""
 
 TRANSIENT = ("output.", "view.")
+"""Keys of the command line with these beginnings are not saved."""
+
+_SAFE = "/:,@+-_.*~"
+_NUMBERED = re.compile(r"^(.*?)-?(\d{1,6})$")
 
 
 class ConfigDraft:
@@ -38,16 +42,16 @@ class ConfigDraft:
     Parameters
     ----------
     given : Config
-        As the file and the command line have it.
+        Of the file and the command line.
     path : Path
-        Of the rig file; need not be there yet.
-    said : mapping of "section.key" to value
-        What the command line says: saved with the rest, but for what is of this time alone (``TRANSIENT``).
+        Of the rig file; it need not exist yet.
+    overrides : mapping of "section.key" to value
+        Of the command line: saved with the changes, except for ``TRANSIENT``.
 
     Attributes
     ----------
     changes : dict of "section.key" to value
-        Not saved yet; None takes a key out.
+        Not saved yet; None removes a key.
     """
 
     def __init__(self, given: Config, path: Path, overrides: Mapping[str, Any]) -> None:
@@ -60,16 +64,16 @@ class ConfigDraft:
 
     @property
     def config(self) -> Config:
-        """With all changes."""
+        """The configuration with all changes."""
         return self._config
 
     def change_all(self, changes: Mapping[str, Any]) -> None:
-        """Change keys, all or none; raises ConfigError where a value is impossible, and nothing is changed then."""
+        """Change keys, all or none; raises ConfigError for an invalid value, and changes nothing then."""
         tree: dict[str, Any] = json.loads(json.dumps(self._config.as_dict()))
         for dotted, value in changes.items():
             section, _, key = dotted.partition(".")
             if section != "gauges" and dotted not in CHANGEABLE:
-                raise ConfigError(f"{dotted} is not changed here; change it in {self.path}")
+                raise ConfigError(f"{dotted} cannot be changed here; change it in {self.path}")
             if value is None:
                 tree[section].pop(key, None)
             else:
@@ -78,12 +82,12 @@ class ConfigDraft:
         self.changes |= changes
 
     def save(self, mask: NDArray[np.bool_] | None) -> None:
-        """Write the changes into the rig file, the old one kept beside it; ``mask`` as a picture beside it.
+        """Write the changes into the rig file and ``mask`` into a picture beside it; the old rig file is kept.
 
         Raises
         ------
         ConfigError
-            It cannot be written; then nothing is changed.
+            A file cannot be written; then nothing is changed.
         """
         if mask is not None:
             self.change_all({"measure.mask": str(self._write_mask(mask))})
@@ -92,7 +96,7 @@ class ConfigDraft:
         self.changes = {}
 
     def _write_mask(self, mask: NDArray[np.bool_]) -> Path:
-        """A new file each time: a rig file kept as .bak still means its own."""
+        """Write a new file each time: a rig file kept as .bak refers to the old one."""
         stem = self.path.resolve().with_suffix("")
         tries = (stem.with_name(f"{stem.name}-mask-{n}.png") for n in range(1, 10_000))
         path = next(one for one in tries if not one.exists())
@@ -104,17 +108,14 @@ class ConfigDraft:
 
 
 def with_setting(address: str, key: str, value: float) -> str:
-    """The address with one of its settings changed."""
-    known = dict(parse_address(address).settings) | {key: f"{value:g}"}
+    """The address with one setting changed."""
+    settings = dict(parse_address(address).settings) | {key: f"{value:g}"}
     body = address.partition("?")[0] if parse_address(address).settings else address
-    return f"{body}?{'&'.join(f'{k}={quote(v, safe=_SAFE)}' for k, v in known.items())}"
-
-
-_SAFE = "/:,@+-_.*~"
+    return f"{body}?{'&'.join(f'{k}={quote(v, safe=_SAFE)}' for k, v in settings.items())}"
 
 
 def at_rest(address: str) -> str:
-    """The address of a rig that is looked at and not pulled: a simulated one would begin by itself."""
+    """The address of a rig without load: a simulated test would start by itself."""
     if parse_address(address).scheme != "sim":
         return address
     for key, value in (("max_strain", 0.0), ("seconds", 3600.0), ("hold", 1.0), ("end", 1.0)):
@@ -122,12 +123,9 @@ def at_rest(address: str) -> str:
     return address
 
 
-NUMBERED = re.compile(r"^(.*?)-?(\d{1,6})$")
-
-
 def next_name(name: str) -> str:
     """The name of the next specimen: bar-7 after bar-6."""
-    found = NUMBERED.match(name)
+    found = _NUMBERED.match(name)
     if found is None:
         return f"{name}-2"
     stem, number = found[1], found[2]

@@ -1,11 +1,11 @@
-"""What a page may change while the rig is set up; each a word, checked, and refused in a sentence."""
+"""The changes that a page can request during set-up: one function each; a refusal is a ConfigError or DataError."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Container, Mapping
 from itertools import count
-from typing import Any, TypeGuard
+from typing import Any
 
 import numpy as np
 
@@ -14,12 +14,12 @@ from acquire.errors import ConfigError, DataError
 from analysis.evaluate import GAUGE_KINDS
 from live.setup.scale import Board, from_points
 from live.ui.web.config_draft import with_setting
-from live.ui.web.drawn_region import DrawnRegion
+from live.ui.web.drawn_region import DrawnRegion, are_points
 from live.ui.web.setup_session import OVERLAYS, SetupSession
 
 Request = Mapping[str, Any]
 MAX_MM = 1e5
-MAX_GAUGE_POINTS = 100  # of a gauge
+MAX_GAUGE_POINTS = 100
 
 
 def _region(session: SetupSession) -> DrawnRegion:
@@ -29,7 +29,7 @@ def _region(session: SetupSession) -> DrawnRegion:
 
 
 def draw(session: SetupSession, request: Request) -> None:
-    """Strokes of a tool."""
+    """Draw strokes of a tool."""
     strokes = request.get("strokes")
     if not isinstance(strokes, list) or not 1 <= len(strokes) <= 500:
         raise ConfigError("strokes are a list")
@@ -40,66 +40,66 @@ def draw(session: SetupSession, request: Request) -> None:
 
 
 def undo(session: SetupSession, request: Request) -> None:
-    """The region as it was before."""
+    """Undo the last change of the region."""
     _region(session).undo()
     session.region_changed()
 
 
 def find(session: SetupSession, request: Request) -> None:
-    """The specimen in the picture."""
+    """Find the specimen in the picture."""
     session.find()
 
 
 def whole_picture(session: SetupSession, request: Request) -> None:
-    """The whole picture."""
+    """Measure the whole picture."""
     drawn = _region(session)
     drawn.replace(np.ones_like(drawn.mask), "the whole picture")
     session.region_changed()
 
 
 def overlay(session: SetupSession, request: Request) -> None:
-    """Something laid over the picture, or taken off."""
+    """Show or hide an overlay of the picture."""
     if request.get("name") not in OVERLAYS:
-        raise ConfigError(f"there are {', '.join(OVERLAYS)}")
+        raise ConfigError(f"the overlays are {', '.join(OVERLAYS)}")
     session.overlays[str(request["name"])] = request.get("on") is True
 
 
 def camera(session: SetupSession, request: Request) -> None:
-    """A setting of the camera's address; the camera is opened anew and tells what is in force."""
+    """Change a setting of the address of the camera, and open the camera again."""
     key, value = request.get("key"), request.get("value")
     info = session.preview.info
-    known = [] if info is None else [setting.key for setting in info.settings]
-    if key not in known:
-        raise ConfigError(f"a number for one of {', '.join(known) or 'the settings of an open camera'}")
+    keys = [] if info is None else [setting.key for setting in info.settings]
+    if key not in keys:
+        raise ConfigError(f"a number for one of {', '.join(keys) or 'the settings of an open camera'}")
     number = _number(str(key), value)
     session.preview.reopen(with_setting(session.draft.config.camera.address, str(key), number))
 
 
 def address(session: SetupSession, request: Request) -> None:
-    """Another camera."""
+    """Open another camera."""
     if not isinstance(request.get("value"), str):
         raise ConfigError("an address is a text")
     session.preview.reopen(request["value"])
 
 
 def set_key(session: SetupSession, request: Request) -> None:
-    """A key of the configuration, such as specimen.width_mm."""
+    """Change a key of the configuration, such as specimen.width_mm."""
     key, value = request.get("key"), request.get("value")
     if (
         not isinstance(key, str)
         or key.startswith(("camera.", "gauges."))
         or key in ("measure.roi", "measure.mask")
     ):
-        raise ConfigError(f"{key} is not changed like this")
+        raise ConfigError(f"{key} cannot be changed like this")
     session.draft.change_all({key: None if value == "" else value})
     if key.startswith("measure."):
         session.region_changed()
 
 
 def gauge(session: SetupSession, request: Request) -> None:
-    """A gauge made of a table or of places (``kind`` and ``points``), moved to others, or taken away.
+    """Make a gauge from a table or from points (``kind`` and ``points``), move it, rename it, or remove it.
 
-    ``was`` is its name so far; a new one without a name gets the usual one of its kind.
+    ``was`` is its former name; a new gauge without a name gets the usual one of its kind.
     """
     gauges, name = session.draft.config.gauges, request.get("name")
     was = request.get("was", name)
@@ -114,17 +114,17 @@ def gauge(session: SetupSession, request: Request) -> None:
     changes: dict[str, Any] = {}
     if before and was != name:
         if name in gauges:
-            raise ConfigError(f"there is a gauge {name} already")
+            raise ConfigError(f"there is already a gauge {name}")
         changes[f"gauges.{was}"] = None
     session.draft.change_all(changes | {f"gauges.{name}": table})
 
 
 def _parameters_at(kind: object, points: object) -> dict[str, Any]:
-    """The parameters of a gauge of ``kind`` at the places that a page has sent."""
+    """The parameters of a gauge of ``kind`` at the points that a page has sent."""
     if not isinstance(kind, str) or kind not in GAUGE_KINDS:
         raise ConfigError(f"there is no such kind of gauge; there are {', '.join(GAUGE_KINDS)}")
     if not are_points(points, 1, MAX_GAUGE_POINTS):
-        raise ConfigError(f"a gauge has 1 to {MAX_GAUGE_POINTS} places, x and y in px")
+        raise ConfigError(f"a gauge has 1 to {MAX_GAUGE_POINTS} points, x and y in px")
     return GAUGE_KINDS[kind].placed([(float(x), float(y)) for x, y in points])
 
 
@@ -135,12 +135,12 @@ def _free_name(usual: str, taken: Container[str]) -> str:
 
 
 def place(session: SetupSession, request: Request) -> None:
-    """Gauges that place themselves on the region; others stay."""
+    """Place the automatic gauges on the region; others stay."""
     session.place_gauges()
 
 
 def scale(session: SetupSession, request: Request) -> None:
-    """mm per px from two points and their distance."""
+    """Take the scale from two points and their distance."""
     points = request.get("points")
     if not are_points(points):
         raise ConfigError("a scale is two points in px and their distance in mm")
@@ -152,7 +152,7 @@ def scale(session: SetupSession, request: Request) -> None:
 
 
 def board(session: SetupSession, request: Request) -> None:
-    """mm per px from a board that is held where the specimen will be; without ``marker`` a checkerboard."""
+    """Take the scale from a board held at the place of the specimen; without ``marker`` a checkerboard."""
     columns, rows = request.get("columns"), request.get("rows")
     dictionary = request.get("dictionary", "4X4_50")
     if (
@@ -178,30 +178,18 @@ def _number(what: str, value: object, low: float = -math.inf, high: float = math
         raise ConfigError(f"{what} is {allowed}") from None
 
 
-def are_points(request: object, min_points: int = 2, max_points: int = 2) -> TypeGuard[list[list[Any]]]:
-    return (
-        isinstance(request, list)
-        and min_points <= len(request) <= max_points
-        and all(isinstance(p, list) and len(p) == 2 and all(map(_is_place, p)) for p in request)
-    )
-
-
-def _is_place(value: object) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6
-
-
 def check(session: SetupSession, request: Request) -> None:
-    """The whole check, with its table."""
+    """Run the whole check, with its table."""
     session.check()
 
 
 def reset_peak(session: SetupSession, request: Request) -> None:
-    """The peak of the sharpness."""
+    """Reset the peak of the sharpness."""
     session.reset_peak()
 
 
 def save(session: SetupSession, request: Request) -> None:
-    """Into the rig file."""
+    """Save the rig file."""
     session.save()
 
 

@@ -1,6 +1,7 @@
 """Set-up before a test: the live picture, the region drawn on it, and the check of the still specimen.
 
-The camera's thread (``preview``) draws a few pictures a second; another judges the newest (``live.setup.check``).
+The thread of the camera (``preview``) draws a few pictures a second; another thread checks the newest frames
+(``live.setup.check``).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquire.errors import DataError, PhasedicError
 from acquire.files.picture import write_picture
@@ -53,27 +55,27 @@ from live.ui.web.painting import as_jpeg, as_png, mark_saturated, shrunk
 log = logging.getLogger(__name__)
 
 PICTURE_S, EVALUATE_S = 0.2, 0.4
-MAX_BYTES = 400_000_000  # of frames held for a check
+MAX_BYTES = 400_000_000  # of the frames of a check
 OVERLAYS = ("saturated", "quality")
 SHADE = (60, 20, 0, 150)
-"""Over what is not measured: blue, green, red, opacity."""
+"""Colour over pixels that are not measured: blue, green, red, opacity."""
 
 
 class SetupSession:
-    """Looks at the camera from the moment it is entered until it is left.
+    """The set-up of a rig; reads the camera from ``with`` to its end.
 
     Parameters
     ----------
     draft : ConfigDraft
     broadcaster : Broadcaster
-        Told what there is to see.
+        Gets the state for the pages.
     drawn : DrawnRegion, optional
-        The region of the specimen before.
+        The region of the last specimen.
 
     Attributes
     ----------
     picture : bytes
-        The newest picture with its overlays, a JPEG.
+        The newest picture with its overlays, as JPEG.
     drawn : DrawnRegion or None
         None until there is a picture.
     """
@@ -93,7 +95,7 @@ class SetupSession:
         self._lock = threading.RLock()
         self._closing = threading.Event()
         self._folder = TemporaryDirectory(prefix="phasedic-")
-        self._evaluating = threading.Thread(target=self._work, name="page-judge", daemon=True)
+        self._evaluating = threading.Thread(target=self._work, name="page-check", daemon=True)
 
     def __enter__(self) -> SetupSession:
         self.preview.start()
@@ -106,33 +108,30 @@ class SetupSession:
         self._evaluating.join()
         self._folder.cleanup()
 
-    # -- what the page asks for ---------------------------------------------------------------
+    # -- requests of the page -----------------------------------------------------------------
 
     def refresh(self) -> None:
-        """Tell the pages anew, after a change."""
+        """Send the state to the pages."""
         self._broadcaster.publish("setup", self.state())
 
     def check(self) -> None:
-        """Take as many frames as ``phasedic check`` does, and judge them with the table."""
+        """Collect as many frames as ``phasedic check`` does, and run the whole check on them."""
         self.preview.collect(self._frames_needed())
         self._values |= {"checking": True, "go": None}
 
     def reset_peak(self) -> None:
-        """Begin the peak hold of the sharpness anew."""
+        """Reset the peak hold of the sharpness."""
         self._peak = 0.0
 
     def region_changed(self) -> None:
-        """Judge, and show, the region as it is drawn now."""
+        """Discard the results of the former region."""
         with self._lock:
             self._edition += 1
             self._values |= {"table": None, "go": None, "lines": []}
 
     def find(self) -> None:
-        """Look for the specimen in what is seen now; raises DataError where nothing is seen."""
-        frames, info = self.preview.recent(), self.preview.info
-        if not frames or info is None:
-            raise DataError("the camera has given no picture yet")
-        stack = np.stack([frame.image for frame in frames]).astype(np.float32)
+        """Find the specimen in the last frames; raises DataError where there is no picture or no specimen."""
+        info, stack = self._camera(), self._recent_stack()
         noise = float(np.diff(stack, axis=0).std()) / 2**0.5 / len(stack) ** 0.5 if len(stack) > 1 else None
         m = self.draft.config.measure
         automatic = replace(self.draft.config, measure=replace(m, roi=None, mask=None))
@@ -140,32 +139,27 @@ class SetupSession:
         self._set_region(DrawnRegion(region.inside(info.width, info.height, m.zoi), region.words))
 
     def scale_from(self, board: Board) -> Scale:
-        """The scale from a board in what is seen now; raises DataError where none is."""
-        frames = self.preview.recent()
-        if not frames:
-            raise DataError("the camera has given no picture yet")
-        picture = np.stack([frame.image for frame in frames]).mean(axis=0, dtype=np.float32)
+        """The scale from a board in the last frames; raises DataError where there is none."""
+        picture = self._recent_stack().mean(axis=0)
         scale = from_board(picture, board, stand_off_mm=self.draft.config.scale.stand_off_mm)
         self._values["remarks"] = [printable(remark) for remark in scale.remarks]
         return scale
 
     def clear_remarks(self) -> None:
-        """The scale has been taken another way: what was said of a board is old."""
+        """Remove the remarks on a calibration board: the scale was taken another way."""
         self._values["remarks"] = []
 
     def place_gauges(self) -> None:
-        """Gauges on the region as it is drawn; raises DataError or ConfigError where there is no room."""
-        drawn, config = self.drawn, self.draft.config
-        if drawn is None or drawn.box is None:
-            raise DataError("no region is drawn yet: draw one, or find the specimen")
+        """Place gauges on the drawn region; raises DataError or ConfigError where they do not fit."""
+        (drawn, roi), config = self._region(), self.draft.config
         height, width = drawn.mask.shape
-        box = replace(config, measure=replace(config.measure, roi=drawn.box, mask=None))
+        box = replace(config, measure=replace(config.measure, roi=roi, mask=None))
         placed = auto_gauges(grid_for(box, width, height, drawn.mask), config.specimen.first_axis)
         gauges = {f"gauges.{name}": table for name, table in placed.items()}
         self.draft.change_all(gauges | {"measure.gauges": GIVEN})
 
     def save(self) -> None:
-        """Write the rig file, with the region as it is drawn; raises ConfigError where that cannot be."""
+        """Write the rig file with the drawn region; raises ConfigError where a file cannot be written."""
         drawn = self.drawn
         if drawn is None or drawn.box is None:
             self.draft.save(None)
@@ -174,7 +168,7 @@ class SetupSession:
         self.draft.save(None if drawn.is_box else drawn.mask)
 
     def mask_picture(self) -> bytes:
-        """What is measured, as a picture to lay over: dark where it is not."""
+        """An overlay that darkens the pixels that are not measured, as PNG."""
         drawn = self.drawn
         mask = np.ones((1, 1), bool) if drawn is None else drawn.mask
         shade = np.zeros((*mask.shape, 4), np.uint8)
@@ -182,25 +176,23 @@ class SetupSession:
         return as_png(shade)
 
     def config(self, folder: Path) -> Config:
-        """The configuration with the region as it is drawn; a mask that is no box is written into ``folder``.
+        """The configuration with the drawn region; a mask that is not a rectangle is written into ``folder``.
 
         Raises
         ------
         DataError, ConfigError
-            Nothing is drawn, or no ZOI or gauge fits into it.
+            No region is drawn, or no ZOI or gauge fits into it.
         """
-        drawn, config = self.drawn, self.draft.config
-        if drawn is None or drawn.box is None:
-            raise DataError("no region is drawn yet: draw one, or find the specimen")
+        (drawn, roi), config = self._region(), self.draft.config
         path = None
         if not drawn.is_box:
             path = folder / f"mask-{time.monotonic_ns()}.png"
             write_picture(path, drawn.mask.astype(np.uint8) * 255)
-        region = replace(config.measure, roi=drawn.box, mask=None if path is None else str(path))
+        region = replace(config.measure, roi=roi, mask=None if path is None else str(path))
         return replace(config, measure=region)
 
     def ready(self, folder: Path) -> Config:
-        """As ``config``, for a test: raises ConfigError too where no ZOI or gauge lies in the region."""
+        """As ``config``, for a test: also raises where no ZOI, or not every gauge, lies in the region."""
         config = self.config(folder)
         assert self.drawn is not None
         height, width = self.drawn.mask.shape
@@ -211,18 +203,17 @@ class SetupSession:
         return config
 
     def state(self) -> dict[str, Any]:
-        """All that the page shows of it."""
+        """The state of the set-up, as the page shows it."""
         info, config, drawn = self.preview.info, self.draft.config, self.drawn
         m, specimen = config.measure, config.specimen
+        region = drawn and {"words": drawn.origin, "box": drawn.box, "edition": self._edition}
         return {
             **self._values,
             "trouble": self.preview.trouble,
             "camera": None if info is None else camera_values(info),
             "picture": self._shown,
             "overlays": self.overlays,
-            "region": None
-            if drawn is None
-            else {"words": drawn.origin, "box": drawn.box, "edition": self._edition},
+            "region": region,
             "gauges": gauge_shapes(config),
             "measure": {"zoi": m.zoi, "step": m.step, "burst": m.burst or DEFAULT_BURST},
             "specimen": {key: getattr(specimen, key) for key in ("width_mm", "thickness_mm", "axis")},
@@ -234,6 +225,26 @@ class SetupSession:
 
     # -- the camera ---------------------------------------------------------------------------
 
+    def _camera(self) -> CameraInfo:
+        info = self.preview.info
+        if info is None:
+            raise DataError("the camera has given no picture yet")
+        return info
+
+    def _recent_stack(self) -> NDArray[np.float32]:
+        """(N, H, W), the last frames."""
+        frames = self.preview.recent()
+        if not frames:
+            raise DataError("the camera has given no picture yet")
+        return np.stack([frame.image for frame in frames]).astype(np.float32)
+
+    def _region(self) -> tuple[DrawnRegion, tuple[int, int, int, int]]:
+        """The drawn region and its box."""
+        drawn = self.drawn
+        if drawn is None or drawn.box is None:
+            raise DataError("no region is drawn yet: draw one, or find the specimen")
+        return drawn, drawn.box
+
     def _opened(self, info: CameraInfo) -> None:
         self._values["checking"] = False
         with self._lock:
@@ -241,7 +252,7 @@ class SetupSession:
                 self.drawn = None
 
     def _show(self, frame: Frame) -> float:
-        """Draw, where somebody looks; when to draw again."""
+        """Draw the picture while a page is open; when to draw again."""
         began = time.monotonic()
         if self._broadcaster.open_pages:
             picture, scale = shrunk(frame.image, frame.bits)
@@ -255,7 +266,7 @@ class SetupSession:
         self.refresh()
         return max(began + PICTURE_S, time.monotonic() + 2 * (time.monotonic() - began))
 
-    # -- the judgement ------------------------------------------------------------------------
+    # -- the check ----------------------------------------------------------------------------
 
     def _work(self) -> None:
         yield_to_others(OUTPUT)
@@ -265,7 +276,7 @@ class SetupSession:
             except PhasedicError as error:
                 self._values |= {"doubt": printable(brief(error)), "checking": False}
             except Exception as error:
-                log.exception("judging the specimen failed")
+                log.exception("the check of the specimen failed")
                 self._values |= {"doubt": f"a defect: {error!r}", "checking": False}
             self.refresh()
             self._closing.wait(EVALUATE_S)
@@ -273,7 +284,7 @@ class SetupSession:
     def _evaluate(self) -> None:
         info, frames = self.preview.info, self.preview.recent()
         if info is None or len(frames) < RECENT or self.preview.collecting:
-            return  # frames that a check needs must not be lost for want of processor time
+            return  # a busy processor must not lose frames of a check
         self._compile(info)
         if self.drawn is None:
             self._begin(info)
@@ -286,14 +297,14 @@ class SetupSession:
             self._quick_check(frames, info)
 
     def _quick_check(self, frames: list[Frame], info: CameraInfo) -> None:
-        """What changes while lens and light are turned; what takes the kernel, in turns."""
+        """Update the figures that change while lens and light are adjusted."""
         edition, config = self._edition, self.config(Path(self._folder.name))
         if self._checked_for != (edition, config, info):
             self._checked_for, self._checker = (edition, config, info), QuickChecker(config)
         self._keep_figures(self._checker.glance(frame_stack(frames, info)).figures)
 
     def _compile(self, info: CameraInfo) -> None:
-        """By processes of their own: the test that follows must not measure with what this one has compiled."""
+        """Compile in separate processes: the test that follows must load the kernel from its cache."""
 
         def report(text: str) -> None:
             self._values["busy"] = text
@@ -304,7 +315,7 @@ class SetupSession:
         self._values["busy"] = ""
 
     def _begin(self, info: CameraInfo) -> None:
-        """The region as the rig has it, or the specimen that is found."""
+        """Begin with the region of the rig file, or with the specimen that is found."""
         m = self.draft.config.measure
         if not isinstance(m.roi, tuple) and m.mask is None:
             self.find()
@@ -323,9 +334,7 @@ class SetupSession:
         self.region_changed()
 
     def _frames_needed(self) -> int:
-        info = self.preview.info
-        if info is None:
-            raise DataError("the camera has given no picture yet")
+        info = self._camera()
         wanted = 2 * (self.draft.config.measure.reference_burst or DEFAULT_REFERENCE_BURST)
         return max(min(wanted, MAX_BYTES // (2 * info.width * info.height)), RECENT)
 
@@ -342,7 +351,7 @@ class SetupSession:
         lines = [*judge(figures, None, config.measure.reference_shift_px), self._gauge_line(folder)]
         self._keep_figures(figures)
         self._values["checking"] = False
-        if edition == self._edition:  # else the region has been changed meanwhile
+        if edition == self._edition:  # else the region has changed meanwhile
             go = all(line.good for line in lines)
             self._values |= {
                 "lines": [line_values(line) for line in lines],

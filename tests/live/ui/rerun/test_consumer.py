@@ -51,7 +51,7 @@ def test_everything_is_offered() -> None:
     out.add(make_measurement(0))
     out.frame(make_frame(0, START))
     out.load(LoadSample(START, 5.0))
-    event_log.notify(EventKind.NOTE, "operator", "hello")
+    event_log.tell(EventKind.NOTE, "operator", "hello")
     out.end()
     assert {name for name, _ in view.given} == {"show", "point", "picture", "load", "event"}
     assert [what for name, what in view.given if name == "point"] == [(0.001, 0.0)]

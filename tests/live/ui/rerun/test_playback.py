@@ -119,16 +119,16 @@ def test_it_serves_until_it_is_enough(run: RunFolder) -> None:
 
 
 @pytest.mark.parametrize(
-    ("asked", "rows"),
+    ("shown", "rows"),
     [
         (ShowRequest(), tuple(range(N))),
         (ShowRequest(every=50), (45, 95)),
         (ShowRequest(1.0, 1.25), (10, 11, 12)),
     ],
 )
-def test_what_is_chosen(run: RunFolder, request: ShowRequest, rows: tuple[int, ...]) -> None:
+def test_which_rows_are_shown(run: RunFolder, shown: ShowRequest, rows: tuple[int, ...]) -> None:
     run.strain.values["time_s"][:] = 0.1 * np.arange(N)
-    assert selected_rows(run, request) == rows
+    assert selected_rows(run, shown) == rows
 
 
 def test_a_long_run_is_thinned_to_what_the_viewer_keeps(

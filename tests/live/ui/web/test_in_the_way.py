@@ -17,7 +17,7 @@ import pytest
 from live.cli import main
 from live.config.loading import load_config
 from live.pipeline.consumer_thread import ConsumerThread
-from live.ui.web.broadcaster import MAX_STREAMS
+from live.ui.web.broadcaster import MAX_PAGES
 from live.ui.web.page_controller import PageController
 from tests.live.ui.web.driven import Program
 from tests.live.ui.web.test_page_consumer import costs_of, measurement
@@ -125,7 +125,7 @@ def program(tmp_path: Path) -> Iterator[Program]:
 
 
 def test_eight_pages_that_do_not_read_change_no_result(program: Program, tmp_path: Path) -> None:
-    pages = [Browser(program.address) for _ in range(MAX_STREAMS)]
+    pages = [Browser(program.address) for _ in range(MAX_PAGES)]
     ended_well(program)
     for page in pages:
         assert b"event: gone" not in page.rest(), "it did not stand in the way"
@@ -139,14 +139,14 @@ def test_eight_pages_that_do_not_read_cost_under_a_millisecond_a_measurement() -
         watching = controller.begin(config)
         worker = ConsumerThread(watching, lambda *told: pytest.fail(str(told)))
         worker.start()
-        pages = [Browser(controller.address) for _ in range(MAX_STREAMS)]
+        pages = [Browser(controller.address) for _ in range(MAX_PAGES)]
         streams = list(controller._broadcaster._subscribers)
         controller._broadcaster.publish("large", "x" * 200_000)
         until = time.monotonic() + 10
         while not all(stream._waiting for stream in streams) and time.monotonic() < until:
             time.sleep(0.05)
         costs = costs_of(worker, m)
-        assert len(streams) == MAX_STREAMS and all(stream._waiting for stream in streams), "they are blocked"
+        assert len(streams) == MAX_PAGES and all(stream._waiting for stream in streams), "they are blocked"
         worker.end()
         for page in pages:
             page.kill()

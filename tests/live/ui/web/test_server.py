@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from live.ui.web.broadcaster import MAX_STREAMS, Broadcaster
+from live.ui.web.broadcaster import MAX_PAGES, Broadcaster
 from live.ui.web.server import PageServer, json_response
 from tests.live.replay.batch.running import until
 
@@ -164,7 +164,7 @@ def stream(page: PageServer) -> http.client.HTTPResponse:
 
 
 def test_a_ninth_page_is_refused_until_one_goes(page: PageServer) -> None:
-    streams = [stream(page) for _ in range(MAX_STREAMS)]
+    streams = [stream(page) for _ in range(MAX_PAGES)]
     assert {one.status for one in streams} == {200}
     assert ask(page, "/events").status == 503
     streams[0].close()
@@ -173,7 +173,7 @@ def test_a_ninth_page_is_refused_until_one_goes(page: PageServer) -> None:
         page.broadcaster.publish(
             "state", "x" * 10
         )  # the server sees that a page has gone when it writes to it
-        return page.broadcaster.open_pages < MAX_STREAMS
+        return page.broadcaster.open_pages < MAX_PAGES
 
     until(gone)
     again = stream(page)
@@ -192,8 +192,8 @@ def test_a_page_is_told_the_newest_and_then_what_comes(page: PageServer) -> None
 
 def test_a_frozen_page_holds_up_nobody() -> None:
     broadcaster = Broadcaster()
-    frozen = [broadcaster.open() for _ in range(MAX_STREAMS)]
+    frozen = [broadcaster.open() for _ in range(MAX_PAGES)]
     for number in range(1000):
         broadcaster.publish("state", number)
     assert broadcaster.open() is None
-    assert [one.take(0) for one in frozen if one] == [{"state": b"999"}] * MAX_STREAMS
+    assert [one.take(0) for one in frozen if one] == [{"state": b"999"}] * MAX_PAGES
