@@ -203,4 +203,5 @@ def test_a_viewer_that_is_closed_is_no_trouble(
 
 
 def test_words_without_a_reason_name_the_packages_too() -> None:
-    assert "no reason given" in viewer.viewer_failure("") and viewer.VIEWER_PACKAGES in viewer.viewer_failure("panicked at x")
+    assert "no reason given" in viewer.viewer_failure("")
+    assert viewer.VIEWER_PACKAGES in viewer.viewer_failure("panicked at x")

@@ -104,7 +104,7 @@ class CurveDrawing:
         self._axes: tuple[Axis, Axis] | None = None
 
     def reset(self) -> None:
-        """Draw the axes anew with the next points."""
+        """Draw the axes again with the next points."""
         self._axes = None
 
     def draw(self, points: NDArray[np.float64]) -> None:

@@ -1,4 +1,4 @@
-"""A finished run in the view: all of it, as the files hold it, drawn by the view's own process."""
+"""A finished run in the view: all of its data, as in the files, drawn by the process of the view."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def drawn(path: Path) -> dict[str, list[Any]]:
     return found
 
 
-def test_the_story_is_what_the_files_hold(run: RunFolder) -> None:
+def test_the_messages_contain_the_data_of_the_files(run: RunFolder) -> None:
     messages = list(playback_messages(run, (0, 50, N - 1)))
     kinds = [message.kind for message in messages]
     assert kinds.count(Kind.FIELD) == kinds.count(Kind.PICTURE) == 3
@@ -84,7 +84,7 @@ def test_the_gauges_are_drawn_where_they_lie(run: RunFolder, tmp_path: Path) -> 
         assert not view_setup(plain).with_load
 
 
-def test_all_of_it_is_drawn_and_every_zoi_tells_its_values(
+def test_all_of_it_is_drawn_and_every_zoi_shows_its_values(
     folder: Path, tmp_path: Path, run: RunFolder
 ) -> None:
     path = tmp_path / "shown.rrd"
@@ -102,20 +102,20 @@ def test_all_of_it_is_drawn_and_every_zoi_tells_its_values(
     )
 
 
-def test_it_serves_until_it_is_enough(run: RunFolder) -> None:
-    stop, said = threading.Event(), list[str]()
+def test_it_serves_until_it_is_stopped(run: RunFolder) -> None:
+    stop, lines = threading.Event(), list[str]()
 
-    class Heard(Screen):
+    class RecordingScreen(Screen):
         def say(self, text: str = "") -> None:
-            said.append(text)
+            lines.append(text)
             if "--connect" in text:
                 stop.set()
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("live.ui.rerun.playback.spawn_viewer", lambda port, notify: None)
-        show(run, ShowRequest(every=40), Heard(), stop, port=19876)
-    assert any("this shows it, Ctrl-C ends it" in line for line in said)
-    assert said[0] == "3 of 96 instants are shown; --from, --to and --every choose others"
+        show(run, ShowRequest(every=40), RecordingScreen(), stop, port=19876)
+    assert any("this shows it, Ctrl-C ends it" in line for line in lines)
+    assert lines[0] == "3 of 96 instants are shown; --from, --to and --every choose others"
 
 
 @pytest.mark.parametrize(

@@ -53,8 +53,8 @@ def server() -> Iterator[socket.socket]:
         listening.shutdown(socket.SHUT_RDWR)
 
 
-def opened(server: socket.socket, told: list[str]) -> ViewerProxy:
-    proxy = ViewerProxy(0, told.append)
+def opened(server: socket.socket, messages: list[str]) -> ViewerProxy:
+    proxy = ViewerProxy(0, messages.append)
     proxy.open(*server.getsockname())
     return proxy
 
@@ -85,8 +85,8 @@ def ended(viewer: socket.socket, proxy: ViewerProxy) -> bool:
 
 def test_a_stopped_viewer_is_disconnected(server: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(viewer_proxy, "STOPPED_S", 0.2)
-    told: list[str] = []
-    proxy = opened(server, told)
+    messages: list[str] = []
+    proxy = opened(server, messages)
     with socket.create_connection(("127.0.0.1", proxy.port), 10) as viewer:
         viewer.sendall(PREFACE + b"x" * 20_000)
         received = 0
@@ -94,8 +94,8 @@ def test_a_stopped_viewer_is_disconnected(server: socket.socket, monkeypatch: py
             received += len(viewer.recv(2**16))
         viewer.settimeout(0.5)
         assert ended(viewer, proxy)
-    assert len(told) == 1
-    assert "disconnected" in told[0]
+    assert len(messages) == 1
+    assert "disconnected" in messages[0]
 
 
 def test_no_two_proxies_have_one_port() -> None:
