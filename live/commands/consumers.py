@@ -146,7 +146,7 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
         _announce(view, v.spawn, screen, lambda text: tell(text, "warning"))
 
     port = v.port if v.enabled else None
-    return View(setup, port=port, rrd=rrd, tell=tell, serving=serving)
+    return View(setup, port=port, rrd=rrd, notify=tell, on_serving=serving)
 
 
 def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], None]) -> None:
@@ -156,5 +156,5 @@ def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], 
         return
     why = "no display" if spawn else "view.spawn is off"
     screen.say(f"no viewer is opened here ({why}); it runs without, and this shows it:")
-    for line in view.address.splitlines():
+    for line in view.instructions.splitlines():
         screen.say(f"  {line}")

@@ -65,13 +65,13 @@ def run_beside_page(config: Config, screen: Screen) -> Outcome:
 
 def watched(controller: PageController, config: Config, screen: Screen) -> Outcome:
     """One test, with the page, told to its end."""
-    from live.ui.web.page_controller import ended
+    from live.ui.web.page_controller import run_result
 
     controller.viewer = _open_viewer
-    outcome = run_to_the_end(config, screen, [controller.begin(config)], controller.attend)
+    outcome = run_to_the_end(config, screen, [controller.begin(config)], controller.attach)
     conclude(outcome, screen)
     words = EXIT_WORDS.get(outcome.exit_code, "")
-    controller.end(ended(outcome.run_state, outcome.config.specimen, outcome.folder, words))
+    controller.end(run_result(outcome.run_state, outcome.config.specimen, outcome.folder, words))
     return outcome
 
 

@@ -46,7 +46,7 @@ class Run:
 
 def on_the_page(run_state: RunState) -> dict[str, Any]:
     page = PageConsumer(Broadcaster(), load_config(None, {"specimen.area_mm2": 40.0}), lambda: 5.0)
-    page.attend(Run(run_state))
+    page.attach(Run(run_state))
     return page.state()
 
 

@@ -1,4 +1,4 @@
-"""The process: Ctrl-C and a closed terminal are not meant for it."""
+"""Starts the process; Ctrl-C and a closed terminal do not end it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from acquire.held_back import let_through
 if __name__ == "__main__":
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    let_through(signal.SIGINT, signal.SIGHUP)  # held back by live.ui.rerun.supervisor
+    let_through(signal.SIGINT, signal.SIGHUP)  # blocked by live.ui.rerun.supervisor
 
     from live.ui.rerun.drawing.process import main
 
