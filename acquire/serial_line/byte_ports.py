@@ -1,17 +1,15 @@
-"""Ports as streams of bytes: what is there in one block, never more than asked for, never waiting for long.
+"""Ports as streams of bytes: one block of what came, with a limit, and no long wait.
 
-A socket is read by our own few lines: pyserial's reports one byte at a time, and its opening lasts as
-long as the other side keeps sending.
-
-A serial port behind a terminal server, by Telnet with the COM port option (RFC 854, RFC 2217).
-
-Our own client: pyserial's takes no write time-out, puts each byte into a queue without bound, and
-does not survive a server that ends a negotiation it has not begun.
+``TtyPort`` wraps pyserial, for ports of this machine. ``TcpPort`` is a socket: pyserial reads one byte at a
+time from it, and its opening lasts as long as the other side sends. ``Rfc2217Port`` is a serial port behind a
+terminal server (Telnet with the COM port option, RFC 854 and RFC 2217): pyserial has no write time-out
+there, an unbounded queue, and fails on a server that ends a negotiation which it did not begin.
 """
 
 from __future__ import annotations
 
 import contextlib
+import io
 import select
 import socket
 import time
@@ -52,8 +50,18 @@ class TtyPort:
     def receive(self, limit: int, /, *, wait: bool = True) -> bytes:
         """See ``Port``."""
         data = bytes(self._port.read(1)) if wait else b""
+        if not wait:
+            self._let_kernel_deliver()
         waiting = min(self._port.in_waiting, limit - len(data)) if data or not wait else 0
         return data + (self._port.read(waiting) if waiting else b"")
+
+    def _let_kernel_deliver(self) -> None:
+        """Have Linux count all that came: behind a full buffer of 4 kB it holds 64 kB, moved by a kernel worker.
+
+        ``in_waiting`` does not wait for that worker; ``select`` does before it finds nothing.
+        """
+        with contextlib.suppress(io.UnsupportedOperation):  # a port without a descriptor
+            select.select([self._port.fileno()], [], [], 0)
 
     def write(self, data: bytes, /) -> object:
         """See ``Port``."""

@@ -20,7 +20,7 @@ from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.protocols.base import Reading
 from acquire.serial_line.clock import ArrivalRate, ArrivalTimes, DeviceClock
-from acquire.serial_line.link import Flood, Link, LoadWatch, Means, Opener
+from acquire.serial_line.link import FloodGuard, Link, LinkContext, LoadWatch, Opener
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
 from acquire.serial_line.settings import SerialSettings, describe, read_settings
@@ -29,8 +29,9 @@ log = logging.getLogger(__name__)
 
 BLOCK = 2048  # bytes of one round
 REST_S = 0.05  # between two rounds at most
-AWAY_S, AWAY_BYTES, AWAY_BLOCK = 0.05, 1 << 22, 1 << 16  # what is thrown away at a time
-AWAY_PAUSE_S, FULL_BYTES = 0.002, 2048  # of a buffer of the system that was full, about
+# The bytes before a test are discarded within half a second, those of a flood in a moment.
+START_S, FLOOD_S, DISCARD_BYTES, DISCARD_BLOCK = 0.5, 0.05, 1 << 22, 1 << 16
+REFILL_S, FULL_BYTES = 0.002, 2048  # a USB adapter whose buffer was full sends the rest after a moment
 ANSWER_S = 1.0  # that an answer may take from its first byte to its last
 TARE_S = 0.3  # that a device may take to tare
 FORCED, UNDO = "force", "undo"
@@ -68,7 +69,7 @@ class SerialCell(Closing):
         self._sleep = sleep or self._stop.wait
         self._busy = threading.Lock()
         self._parser = settings.parser
-        self._scaling = Scaling(settings, self._tell)
+        self._scaling = Scaling(settings, self._report)
         self._times, self._device, self._pace = (
             ArrivalTimes(settings.byte_time_s),
             DeviceClock(),
@@ -77,15 +78,15 @@ class SerialCell(Closing):
         self._last_t = -math.inf  # of the last sample
         self._last_read = math.nan
         self._watch, self._flood = (
-            LoadWatch(settings.timeout_s, self._tell, clock()),
-            Flood(self._tell, clock()),
+            LoadWatch(settings.timeout_s, self._report, clock()),
+            FloodGuard(self._report, clock()),
         )
         self._next_poll, self._asked = clock(), math.nan  # when the answer that is awaited was asked for
         self._taring_until = -math.inf
         self._skipped = 0  # bytes, in floods
         self._waited = True  # for the bytes of the last round
-        means = Means(opener, clock, self._stop, self._sleep)
-        self._link = Link(settings.line, means, self._tell, lambda: self._watch.last_words(clock()))
+        context = LinkContext(opener, clock, self._stop, self._sleep)
+        self._link = Link(settings.line, context, self._report, lambda: self._watch.last_words(clock()))
         try:
             self._command("start")
             self._wait_for_first()
@@ -109,7 +110,7 @@ class SerialCell(Closing):
         if self._settings.wait_s > 0:
             what = f"{seen} lines came, none of them a reading of {self._settings.protocol.name}"
             text = f"no reading within {self._settings.wait_s:g} s: {what if seen else 'nothing came'}"
-            self._tell("warning", f"{text}; check protocol, baud and cable ('phasedic identify' listens)")
+            self._report("warning", f"{text}; check protocol, baud and cable ('phasedic identify' listens)")
 
     def _check(self, reading: Reading) -> None:
         try:
@@ -123,23 +124,23 @@ class SerialCell(Closing):
     def __enter__(self) -> Self:
         """What waited since the opening has no trustworthy time."""
         with self._busy:
-            self._throw_away()
+            self._discard_waiting(START_S)
             self._begin_anew()
             self._watch.restart(self._clock())
         return self
 
-    def _throw_away(self) -> int:
-        """Let go what waits, as far as it goes in a moment; the number of bytes."""
-        until, count, nothing = self._clock() + AWAY_S, 0, 0
-        while nothing < 2 and count < AWAY_BYTES and self._clock() < until and not self._stop.is_set():
-            data = self._link.receive(AWAY_BLOCK, wait=False)
-            count, nothing = count + len(data), 0 if data else nothing + 1
-            if nothing == 1 and count >= FULL_BYTES:  # it had 64 kB more behind, which take a moment to come
-                self._sleep(AWAY_PAUSE_S)
+    def _discard_waiting(self, seconds: float) -> int:
+        """Discard what waits, until the port was empty twice or time is up; the number of bytes."""
+        until, count, empty = self._clock() + seconds, 0, 0
+        while empty < 2 and count < DISCARD_BYTES and self._clock() < until and not self._stop.is_set():
+            data = self._link.receive(DISCARD_BLOCK, wait=False)
+            count, empty = count + len(data), 0 if data else empty + 1
+            if empty == 1 and count >= FULL_BYTES:
+                self._sleep(REFILL_S)
         if count:
             self._times.received(count, self._clock())
         self._parser.restart(count)
-        self._flood.skip(nothing > 0, self._clock())
+        self._flood.skip(empty > 0, self._clock())
         return count
 
     def _begin_anew(self) -> None:
@@ -152,18 +153,18 @@ class SerialCell(Closing):
             with self._busy:
                 samples = self._pass()
             yield from samples
-        self._tell_the_end()
+        self._report_end()
         self.close()
 
-    def _tell_the_end(self) -> None:
+    def _report_end(self) -> None:
         """How the device's own clock went, where it has one, and what was never looked at."""
         jitter = self._device.jitter_s
         if not math.isnan(jitter):
             drift = self._device.drift
             known = "" if math.isnan(drift) else f", drift {drift * 1e6:.0f} us/s against this machine"
-            self._tell("info", f"device clock: arrivals {jitter * 1e3:.1f} ms late on average (rms){known}")
+            self._report("info", f"device clock: arrivals {jitter * 1e3:.1f} ms late on average (rms){known}")
         if self._skipped:
-            self._tell(
+            self._report(
                 "warning", f"{self._skipped} bytes were skipped, since lines came faster than they are read"
             )
 
@@ -176,7 +177,7 @@ class SerialCell(Closing):
         readings = self._readings()
         samples += self._samples(readings)
         if self._flood.too_late(self._clock()):
-            self._skipped += self._throw_away()
+            self._skipped += self._discard_waiting(FLOOD_S)
             self._pace.restart()
             samples.append(self._hole())
         self._watch.look(samples, self._clock())
@@ -234,8 +235,10 @@ class SerialCell(Closing):
             return []
         times = [self._times.began(reading.start) for reading in readings]
         stamps = [(r.device_ms, t) for r, t in zip(readings, times, strict=True) if r.device_ms is not None]
-        self._device.begin(stamps)
-        if self._flood.late(self._last_read) or self._last_read < self._taring_until:
+        waited = self._flood.late
+        if not waited:  # messages of unknown age cannot tie the device's clock
+            self._device.begin(stamps)
+        if waited or self._last_read < self._taring_until:
             self._pace.restart()
             late = [True] * len(times)
         elif self._settings.mode == "poll":
@@ -245,11 +248,13 @@ class SerialCell(Closing):
         return [self._sample(*one) for one in zip(readings, times, late, strict=True)]
 
     def _sample(self, reading: Reading, t: float, late: bool) -> LoadSample:
-        if reading.device_ms is not None:
+        if reading.device_ms is not None and self._device.tied:
             stamp = self._device.stamp(reading.device_ms, t)
             t, late = stamp.t, stamp.doubtful
             if stamp.jumped:
-                self._tell("warning", "the device's own clock jumped (a restart?); its stamps are tied anew")
+                self._report(
+                    "warning", "the device's own clock jumped (a restart?); its stamps are tied anew"
+                )
         self._last_t = max(t, self._last_t)
         return self._scaling.sample(reading, self._last_t, LoadFlag.STALE if late else LoadFlag.NONE)
 
@@ -289,7 +294,7 @@ class SerialCell(Closing):
         zero = self._scaling.zero
         why_not = zero.why_not(self._clock())
         if why_not and not force:
-            self._tell("warning", f"not tared: {why_not}; hold the load still, or force the tare")
+            self._report("warning", f"not tared: {why_not}; hold the load still, or force the tare")
             return False
         load, data = zero.load(), {"forced": bool(why_not), "undo": False}
         wanted = self._settings.tare
@@ -301,7 +306,7 @@ class SerialCell(Closing):
             self._event(EventKind.TARE, "info", text, offset_N=None, step_N=_known(step), **data)
             return True
         if math.isnan(load):
-            self._tell("warning", "nothing to tare: there was no valid sample yet")
+            self._report("warning", "nothing to tare: there was no valid sample yet")
             return False
         step = zero.take()
         text = f"tared: {load:.6g} N is zero now"
@@ -312,14 +317,14 @@ class SerialCell(Closing):
         zero = self._scaling.zero
         step = zero.undo()
         if step is None:
-            self._tell("warning", "there is no tare to undo")
+            self._report("warning", "there is no tare to undo")
             return False
         text = f"the last tare is undone: forces rise by {-step:.6g} N"
         data = {"offset_N": zero.offset, "step_N": step, "forced": False, "undo": True}
         self._event(EventKind.TARE, "info", text, **data)
         return True
 
-    def _tell(self, level: str, text: str) -> None:
+    def _report(self, level: str, text: str) -> None:
         self._event(EventKind.DEVICE, level, text)
 
     def _event(self, kind: EventKind, level: Any, text: str, **data: Any) -> None:

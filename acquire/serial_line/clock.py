@@ -88,9 +88,14 @@ class DeviceClock:
         self._count, self._square = 0, 0.0
         self.jumps = 0
 
+    @property
+    def tied(self) -> bool:
+        """Whether its stamps can be converted to the host's clock."""
+        return not math.isnan(self._offset)
+
     def begin(self, messages: Sequence[tuple[float, float]]) -> None:
         """Tie to the least delayed of the first ``messages`` (ms, s): they may have waited together."""
-        if messages and math.isnan(self._offset):
+        if messages and not self.tied:
             offset, arrived = min((arrived - device_ms * 1e-3, arrived) for device_ms, arrived in messages)
             self._tie(offset, arrived)
 

@@ -30,7 +30,7 @@ PATIENCE_S = 0.1  # of one look
 CLOSE_S = 0.5
 
 Opener = Callable[[LineSettings], Port]
-Tell = Callable[[str, str], None]  # level, sentence
+Report = Callable[[str, str], None]  # level, sentence
 
 
 class Opening:
@@ -99,7 +99,7 @@ def close_port(port: Port | None) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Means:
+class LinkContext:
     """What time and ports are made of; tests bring their own.
 
     Attributes
@@ -123,8 +123,8 @@ class Link:
     Parameters
     ----------
     line : LineSettings
-    means : Means
-    tell : callable taking level and text
+    context : LinkContext
+    report : callable taking level and text
     last_words : callable
         What to say of the last sample when the port is lost.
 
@@ -140,12 +140,16 @@ class Link:
     """
 
     def __init__(
-        self, line: LineSettings, means: Means, tell: Tell, last_words: Callable[[], str] = lambda: ""
+        self,
+        line: LineSettings,
+        context: LinkContext,
+        report: Report,
+        last_words: Callable[[], str] = lambda: "",
     ) -> None:
-        self._line, self._tell, self._last_words = line, tell, last_words
-        self._opener, self._clock = means.opener, means.clock
-        self._sleep, self._stopped = means.sleep, means.stopped
-        first = Opening(means.opener, lambda: line)
+        self._line, self._report, self._last_words = line, report, last_words
+        self._opener, self._clock = context.opener, context.clock
+        self._sleep, self._stopped = context.sleep, context.stopped
+        first = Opening(context.opener, lambda: line)
         if not first.done(OPEN_S):
             first.abandon()
             raise DeviceError(
@@ -155,7 +159,7 @@ class Link:
         self._opening: Opening | None = None
         self.identity = "" if "://" in line.url else identity_of(line.url)
         self._url = line.url
-        self._since, self._next_try = means.clock(), 0.0
+        self._since, self._next_try = context.clock(), 0.0
         self._short = 0  # connections in a row that did not last
         self._missed = False  # told that it is lost, and not yet that it is back
 
@@ -180,7 +184,7 @@ class Link:
     def _heard_again(self) -> None:
         if self._short < 2 or self._clock() - self._since >= STEADY_S:
             self._missed = False
-            self._tell(
+            self._report(
                 "info", "connected again" + ("" if self._url == self._line.url else f" as {self._url}")
             )
 
@@ -206,12 +210,14 @@ class Link:
         delay = min(RETRY_S * 2 ** (self._short - 1), SELDOM_S)
         self._next_try = now + delay
         if self._short == 1:
-            self._tell("error", f"lost ({error}); {self._last_words()}; trying to reach it again")
+            self._report("error", f"lost ({error}); {self._last_words()}; trying to reach it again")
         elif self._short == 2:
             text = (
                 f"lost again at once ({error}): something on the other side hangs up; it is tried again ever"
             )
-            self._tell("error", f"{text} more seldom (up to every {SELDOM_S:g} s), and told of when it stays")
+            self._report(
+                "error", f"{text} more seldom (up to every {SELDOM_S:g} s), and told of when it stays"
+            )
         self._missed = True
 
     def again(self) -> bool:
@@ -268,13 +274,13 @@ class LoadWatch:
     ----------
     timeout_s : float, s
         Silence that is told.
-    tell : callable taking level and text
+    report : callable taking level and text
     now : float, s
         When the watch begins.
     """
 
-    def __init__(self, timeout_s: float, tell: Tell, now: float) -> None:
-        self._timeout_s, self._tell = timeout_s, tell
+    def __init__(self, timeout_s: float, report: Report, now: float) -> None:
+        self._timeout_s, self._report = timeout_s, report
         self._since = now
         self._last_good: LoadSample | None = None
         self._silent = self._bad_told = False
@@ -292,11 +298,11 @@ class LoadWatch:
         if good:
             self._last_good, self._since, self._bad_told = good[-1], now, False
             if self._silent:
-                self._tell("info", "readings come again")
+                self._report("info", "readings come again")
             self._silent = False
         elif not self._silent and now - self._since > self._timeout_s:
             self._silent = True
-            self._tell("warning", f"no reading for {self._timeout_s:g} s; {self.last_words(now)}")
+            self._report("warning", f"no reading for {self._timeout_s:g} s; {self.last_words(now)}")
 
     def _count_bad(self, samples: Sequence[LoadSample], any_good: bool) -> None:
         self._bad = 0 if any_good else self._bad + sum(LoadFlag.ERROR in s.flags for s in samples)
@@ -305,7 +311,7 @@ class LoadWatch:
         self._bad_told = True
         shown = samples[-1].raw[:60].decode("ascii", "backslashreplace")
         told = f"{self._bad} lines in a row give no reading, the last one {shown!r}"
-        self._tell("warning", f"{told}; check protocol, baud, column and decimal")
+        self._report("warning", f"{told}; check protocol, baud, column and decimal")
 
     def last_words(self, now: float) -> str:
         """Of the last good sample: its force and age."""
@@ -315,45 +321,49 @@ class LoadWatch:
         return f"last good sample {good.force:.6g} N, {now - good.t:.1f} s ago"
 
 
-class Flood:
-    """Knows when the port was last found empty.
+class FloodGuard:
+    """When the port was last empty, and whether what it gave may have waited.
 
     Parameters
     ----------
-    tell : callable taking level and text
+    report : callable taking level and text
     now : float, s
     """
 
-    def __init__(self, tell: Tell, now: float) -> None:
-        self._tell = tell
-        self._emptied, self._begun, self._told = now, math.inf, -math.inf  # begun: the first full read
+    def __init__(self, report: Report, now: float) -> None:
+        self._report = report
+        self._emptied, self._begun, self._reported = now, math.inf, -math.inf  # begun: the first full read
+        self._more = self._late = False
         self._lines = 0
 
     def read(self, full: bool, lines: int, now: float) -> None:
         """A read returned; ``full`` when more may wait behind what it brought."""
+        self._late = (full or self._more) and now - self._emptied > LATE_S
+        self._more = full
         if not full:
             self._emptied, self._begun = now, math.inf
         elif self._begun == math.inf:
             self._begun, self._lines = now, 0
         self._lines += lines
 
-    def late(self, now: float) -> bool:
-        """Whether what was just read may have waited for longer than anybody should."""
-        return now - self._emptied > LATE_S
+    @property
+    def late(self) -> bool:
+        """Whether what was just read may have waited for more than ``LATE_S``."""
+        return self._late
 
     def too_late(self, now: float) -> bool:
-        """Whether what still waits should be skipped; tells of it."""
+        """Whether what still waits should be skipped; reports it."""
         if now - self._begun <= SKIP_S:
             return False
-        if now - self._told > AGAIN_S:
+        if now - self._reported > AGAIN_S:
             rate = self._lines / (now - self._begun)
             text = f"lines come faster than they are read ({rate:.0f}/s); what waits is skipped and flagged STALE:"
-            self._tell("warning", f"{text} have the device send fewer")
-        self._told = now
+            self._report("warning", f"{text} have the device send fewer")
+        self._reported = now
         return True
 
     def skip(self, empty: bool, now: float) -> None:
-        """What waited was thrown away; ``empty`` when nothing was left."""
-        self._begun = math.inf
+        """What waited was discarded; ``empty`` when nothing was left."""
+        self._begun, self._more = math.inf, not empty
         if empty:
             self._emptied = now

@@ -111,7 +111,7 @@ class TareZero:
 
 BEYOND = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD
 
-Tell = Callable[[str, str], None]  # level, sentence
+Report = Callable[[str, str], None]  # level, sentence
 
 
 class Scaling:
@@ -120,7 +120,7 @@ class Scaling:
     Parameters
     ----------
     settings : SerialSettings
-    tell : callable taking level and text
+    report : callable taking level and text
 
     Attributes
     ----------
@@ -128,8 +128,8 @@ class Scaling:
         What is taken off every force.
     """
 
-    def __init__(self, settings: SerialSettings, tell: Tell) -> None:
-        self._settings, self._tell = settings, tell
+    def __init__(self, settings: SerialSettings, report: Report) -> None:
+        self._settings, self._report = settings, report
         self._units: dict[str, float | None] = {}
         self._last_unit: str | None = None
         self.zero = TareZero()
@@ -191,7 +191,9 @@ class Scaling:
         if unit not in self._units:
             self._units[unit] = self._learn(unit)
         if self._last_unit not in (None, unit):
-            self._tell("warning", f"the unit on the line changed from {self._last_unit} to {unit or 'none'}")
+            self._report(
+                "warning", f"the unit on the line changed from {self._last_unit} to {unit or 'none'}"
+            )
         self._last_unit = unit
         return self._units[unit]
 
@@ -199,7 +201,7 @@ class Scaling:
         try:
             return self.check_unit(unit)
         except ConfigError as error:
-            self._tell("error", f"no force from now on: {error}")
+            self._report("error", f"no force from now on: {error}")
             return None
 
     def check_unit(self, unit: str) -> float:
@@ -220,9 +222,9 @@ class Scaling:
         alarm = bool(flags & (BEYOND | LoadFlag.OUT_OF_RANGE))
         if alarm and not self._alarm:
             words = ", ".join(str(flag.name).lower().replace("_", " ") for flag in flags)
-            self._tell("error", f"load alarm: {words}; {_last(self._last_force)}")
+            self._report("error", f"load alarm: {words}; {_last(self._last_force)}")
         elif self._alarm and not alarm and not math.isnan(force):
-            self._tell("info", "the load is within its range again")
+            self._report("info", "the load is within its range again")
         if alarm or not math.isnan(force):
             self._alarm = alarm
 

@@ -174,6 +174,16 @@ def test_old_lines_with_old_stamps_are_doubted_and_the_clock_stays_tied() -> Non
     assert not any("clock jumped" in text for text in bench.told)
 
 
+def test_lines_of_unknown_age_at_the_start_do_not_tie_the_device_clock() -> None:
+    old = b"".join(f"{t},1 N\r\n".encode() for t in range(1000, 4000, 10))
+    new = [f"{t},2 N\r\n".encode() for t in range(60_000, 62_000, 100)]
+    bench = Bench([FIRST, STALL, old, *new], address="/dev/fake?millis=1&unit=N&wire=no", pace=0.06)
+    samples = bench.run()
+    assert [s.force for s in samples if LoadFlag.STALE not in s.flags] == [2.0] * 20
+    assert sum(LoadFlag.STALE in s.flags for s in samples) == 300
+    assert not any("clock jumped" in text for text in bench.told)
+
+
 def test_old_lines_without_stamps_are_too_many_for_their_time() -> None:
     script: list[bytes | Exception] = [FIRST, *[b"1 N\r\n"] * 100, b"2 N\r\n" * 50, *[b"1 N\r\n"] * 40]
     stale = [LoadFlag.STALE in s.flags for s in Bench(script).run()]

@@ -9,7 +9,7 @@ import pytest
 
 from acquire.errors import DeviceError
 from acquire.serial_line import link as link_module
-from acquire.serial_line.link import Link, Means, Opening, close_port
+from acquire.serial_line.link import Link, LinkContext, Opening, close_port
 from acquire.serial_line.ports import LineSettings
 from tests.acquire.serial_line.fake_port import FakePort, FakeTime
 
@@ -22,8 +22,8 @@ class Road:
     def __init__(self, *lives: int) -> None:
         self.time, self.told, self._lives = FakeTime(), list[str](), list(lives)
         self.opened: list[float] = []
-        means = Means(self._open, self.time, threading.Event(), self.time.sleep)
-        self.link = Link(LINE, means, lambda level, text: self.told.append(text), lambda: "no sample")
+        context = LinkContext(self._open, self.time, threading.Event(), self.time.sleep)
+        self.link = Link(LINE, context, lambda level, text: self.told.append(text), lambda: "no sample")
 
     def _open(self, line: LineSettings) -> FakePort:
         self.opened.append(self.time.now)
@@ -107,6 +107,6 @@ def test_a_port_that_never_opens_fails_the_start(monkeypatch: pytest.MonkeyPatch
         time.sleep(0.5)
         return FakePort(FakeTime(), [])
 
-    means = Means(never, time.monotonic, threading.Event(), time.sleep)
+    context = LinkContext(never, time.monotonic, threading.Event(), time.sleep)
     with pytest.raises(DeviceError, match="does not open within"):
-        Link(LINE, means, lambda level, text: None)
+        Link(LINE, context, lambda level, text: None)
