@@ -143,20 +143,20 @@ ANSWER = 100  # what the server adds to the number of a command
 PARITIES = {"N": 1, "O": 2, "E": 3}
 STOPS = {1.0: 1, 2.0: 2, 1.5: 3}
 NO_FLOW_CONTROL, DTR_ON, RTS_ON = 1, 8, 11
-LONGEST = 64  # bytes kept of a negotiation
+MAX_NEGOTIATION = 64  # bytes kept of a negotiation
 
 _OURS, _THEIRS = frozenset({BINARY, SGA, COM_PORT}), frozenset({BINARY, SGA, COM_PORT})
 
 
 class Telnet:
-    """Takes Telnet's own words out of what the server sends.
+    """Takes Telnet's commands out of what the server sends.
 
     Attributes
     ----------
     replies : bytearray
         What has to be sent back; the caller takes it out.
     willing : bool
-        The server speaks RFC 2217.
+        The server supports RFC 2217.
     answered : set of int
         Settings that the server has answered.
     """
@@ -166,7 +166,7 @@ class Telnet:
         self.willing = False
         self.answered: set[int] = set()
         self._begun = bytearray()  # of a command that is not whole yet
-        self._asked: set[tuple[int, int]] = set()
+        self._sent: set[tuple[int, int]] = set()
 
     def begin(self) -> bytes:
         """What is offered and asked for at the start."""
@@ -191,7 +191,7 @@ class Telnet:
                 out += data[at:]
                 break
             out += data[at:mark]
-            size = self._command(data[mark : mark + LONGEST])
+            size = self._command(data[mark : mark + MAX_NEGOTIATION])
             if size == 0:  # the rest of it is still to come
                 self._begun += data[mark:]
                 break
@@ -200,7 +200,7 @@ class Telnet:
         return bytes(out)
 
     def _command(self, data: bytes) -> int:
-        """Do what a command at the beginning of ``data`` says; its length, 0 when it is not whole."""
+        """Follow the command at the beginning of ``data``; its length, 0 when it is not whole."""
         if len(data) < 2:
             return 0
         if data[1] in (WILL, WONT, DO, DONT):
@@ -213,7 +213,7 @@ class Telnet:
     def _settings(self, data: bytes) -> int:
         end = data.find(bytes([IAC, SE]), 2)
         if end < 0:
-            return LONGEST if len(data) >= LONGEST else 0
+            return MAX_NEGOTIATION if len(data) >= MAX_NEGOTIATION else 0
         if data[2:3] == bytes([COM_PORT]) and end > 3:
             self.answered.add(data[3] - ANSWER)
         return end + 2
@@ -228,8 +228,8 @@ class Telnet:
 
     def _say(self, action: int, option: int) -> None:
         """Once, so that no two sides can answer each other for ever."""
-        if (action, option) not in self._asked:
-            self._asked.add((action, option))
+        if (action, option) not in self._sent:
+            self._sent.add((action, option))
             self.replies += bytes([IAC, action, option])
 
 
@@ -259,7 +259,7 @@ class Rfc2217Port(TcpPort):
     OSError
         Nobody answers.
     DeviceError
-        What answers does not speak RFC 2217.
+        The server does not support RFC 2217.
     """
 
     def __init__(self, host: str, port: int, line: bytes, read_timeout_s: float) -> None:

@@ -1,6 +1,6 @@
 """A load cell on a serial line: reads in blocks, stamps, scales, and never ends nor delays a test.
 
-The protocol's parser knows the lines, ``scaling`` the units, ``link`` the port and its return; here is the
+The protocol's parser reads the lines, ``scaling`` converts the units, ``link`` keeps the port open; here is the
 stream of samples, polling, and the commands. Every round is bounded in time and bytes, whatever comes.
 """
 
@@ -65,7 +65,7 @@ class SerialCell(Closing):
     ) -> None:
         self._settings, self._on_event, self._clock = settings, on_event, clock
         self._stop = threading.Event()
-        self._tare: str | None = None  # asked for: "", FORCED or UNDO
+        self._tare: str | None = None  # requested: "", FORCED or UNDO
         self._sleep = sleep or self._stop.wait
         self._busy = threading.Lock()
         self._parser = settings.parser
@@ -81,7 +81,7 @@ class SerialCell(Closing):
             LoadWatch(settings.timeout_s, self._report, clock()),
             FloodGuard(self._report, clock()),
         )
-        self._next_poll, self._asked = clock(), math.nan  # when the answer that is awaited was asked for
+        self._next_poll, self._polled = clock(), math.nan  # when the poll was sent whose answer is awaited
         self._taring_until = -math.inf
         self._skipped = 0  # bytes, in floods
         self._waited = True  # for the bytes of the last round
@@ -125,7 +125,7 @@ class SerialCell(Closing):
         """What waited since the opening has no trustworthy time."""
         with self._busy:
             self._discard_waiting(START_S)
-            self._begin_anew()
+            self._restart_stream()
             self._watch.restart(self._clock())
         return self
 
@@ -143,10 +143,10 @@ class SerialCell(Closing):
         self._flood.skip(empty > 0, self._clock())
         return count
 
-    def _begin_anew(self) -> None:
-        """Nothing is known of the stream that begins now."""
+    def _restart_stream(self) -> None:
+        """Forget the pace of the stream: another one begins."""
         self._pace.restart()
-        self._asked = self._last_read = math.nan
+        self._polled = self._last_read = math.nan
 
     def __iter__(self) -> Iterator[LoadSample]:
         while not self._stop.is_set():
@@ -173,7 +173,7 @@ class SerialCell(Closing):
         if not self._link.connected and not self._reconnect():
             self._watch.look((), self._clock())
             return []
-        samples = self._tare_asked()
+        samples = self._tare_requested()
         readings = self._readings()
         samples += self._samples(readings)
         if self._flood.too_late(self._clock()):
@@ -187,14 +187,14 @@ class SerialCell(Closing):
         if not self._link.again():
             return False
         self._parser.restart()
-        self._begin_anew()
+        self._restart_stream()
         self._flood.skip(True, self._clock())
         self._command("start")
         return self._link.connected
 
     def _readings(self) -> list[Reading]:
         """What one block completes; [] on silence or when the port is lost."""
-        if self._settings.mode == "poll" and math.isnan(self._asked):
+        if self._settings.mode == "poll" and math.isnan(self._polled):
             self._poll()
         self._rest()
         began = self._clock()
@@ -202,8 +202,8 @@ class SerialCell(Closing):
         self._last_read = self._clock()
         self._waited = self._last_read - began > 1e-3
         readings = self._feed(data)
-        if not data or self._last_read - self._asked > ANSWER_S:
-            self._asked = math.nan
+        if not data or self._last_read - self._polled > ANSWER_S:
+            self._polled = math.nan
             readings += self._parser.silence()
         return readings
 
@@ -212,7 +212,7 @@ class SerialCell(Closing):
             self._times.received(len(data), self._last_read)
         readings = self._parser.feed(data)
         self._flood.read(len(data) >= BLOCK, len(readings), self._last_read)
-        self._asked = math.nan if readings else self._asked
+        self._polled = math.nan if readings else self._polled
         return readings
 
     def _rest(self) -> None:
@@ -227,8 +227,8 @@ class SerialCell(Closing):
         if wait > 0:
             self._sleep(wait)
         self._command("poll")
-        period, self._asked = 1 / self._settings.rate, self._clock()
-        self._next_poll = max(self._next_poll, self._asked - period) + period
+        period, self._polled = 1 / self._settings.rate, self._clock()
+        self._next_poll = max(self._next_poll, self._polled - period) + period
 
     def _samples(self, readings: list[Reading]) -> list[LoadSample]:
         if not readings:
@@ -280,12 +280,12 @@ class SerialCell(Closing):
         """Let zero be where it was before the last tare; done by the reading thread."""
         self._tare = UNDO
 
-    def _tare_asked(self) -> list[LoadSample]:
-        """Move zero where somebody asked; no force may be interpolated across that."""
-        asked, self._tare = self._tare, None
-        if asked is None:
+    def _tare_requested(self) -> list[LoadSample]:
+        """Move zero on request; no force may be interpolated across that."""
+        request, self._tare = self._tare, None
+        if request is None:
             return []
-        moved = self._undo() if asked == UNDO else self._tare_now(asked == FORCED)
+        moved = self._undo() if request == UNDO else self._tare_now(request == FORCED)
         if moved:
             self._scaling.tared()
         return [self._hole()] if moved else []

@@ -1,10 +1,8 @@
-"""The way to the port: opened, lost and found again, without ever holding anybody up.
+"""The connection to a serial port: opened, lost and opened again, without ever delaying the reader.
 
-Opening and closing a port may take as long as a network or a driver likes; both are done by threads of
-their own, which are left alone when they take too long. A peer that hangs up at once is tried ever more
-seldom, and told of once.
-
-Watching a stream: silence, its end, lines that are no readings, and more than can be read, each told once.
+Opening and closing a port may take as long as a network or a driver likes. Threads of their own do both, and are
+abandoned when they take too long. A peer that hangs up at once is tried more and more seldom, and reported once.
+``LoadWatch`` reports silence, its end, and lines that are no readings; ``FloodGuard`` more lines than can be read.
 """
 
 from __future__ import annotations
@@ -26,7 +24,7 @@ log = logging.getLogger(__name__)
 OPEN_S = 10.0  # that the first opening may take
 RETRY_S, SELDOM_S = 0.5, 8.0
 STEADY_S = 5.0  # a connection that lasts so long is one
-PATIENCE_S = 0.1  # of one look
+STEP_S = 0.1  # of one look
 CLOSE_S = 0.5
 
 Opener = Callable[[LineSettings], Port]
@@ -126,7 +124,7 @@ class Link:
     context : LinkContext
     report : callable taking level and text
     last_words : callable
-        What to say of the last sample when the port is lost.
+        Words about the last sample when the port is lost.
 
     Attributes
     ----------
@@ -161,7 +159,7 @@ class Link:
         self._url = line.url
         self._since, self._next_try = context.clock(), 0.0
         self._short = 0  # connections in a row that did not last
-        self._missed = False  # told that it is lost, and not yet that it is back
+        self._missed = False  # reported as lost, and not yet as back
 
     @property
     def connected(self) -> bool:
@@ -225,10 +223,10 @@ class Link:
         if self._opening is None:
             left = self._next_try - self._clock()
             if left > 0:
-                self._sleep(min(left, PATIENCE_S))
+                self._sleep(min(left, STEP_S))
                 return False
             self._opening = Opening(self._opener, self._where)
-        if not self._opening.done(PATIENCE_S):
+        if not self._opening.done(STEP_S):
             return False
         opening, self._opening = self._opening, None
         try:
@@ -261,19 +259,19 @@ class Link:
         close_port(port)
 
 
-BAD_LINES_TOLD = 10  # in a row
+MAX_BAD_LINES = 10  # in a row
 LATE_S = 0.05
 SKIP_S = 0.25  # that a port may stay full before what waits in it is skipped
-AGAIN_S = 10.0  # without a flood until it is told anew
+AGAIN_S = 10.0  # without a flood until it is reported anew
 
 
 class LoadWatch:
-    """What a person is told of a stream.
+    """Silence and bad lines of a stream, each reported once.
 
     Parameters
     ----------
     timeout_s : float, s
-        Silence that is told.
+        Silence that is reported.
     report : callable taking level and text
     now : float, s
         When the watch begins.
@@ -283,7 +281,7 @@ class LoadWatch:
         self._timeout_s, self._report = timeout_s, report
         self._since = now
         self._last_good: LoadSample | None = None
-        self._silent = self._bad_told = False
+        self._silent = self._bad_reported = False
         self._bad = 0
 
     def restart(self, now: float) -> None:
@@ -296,7 +294,7 @@ class LoadWatch:
         if samples:
             self._count_bad(samples, bool(good))
         if good:
-            self._last_good, self._since, self._bad_told = good[-1], now, False
+            self._last_good, self._since, self._bad_reported = good[-1], now, False
             if self._silent:
                 self._report("info", "readings come again")
             self._silent = False
@@ -306,12 +304,12 @@ class LoadWatch:
 
     def _count_bad(self, samples: Sequence[LoadSample], any_good: bool) -> None:
         self._bad = 0 if any_good else self._bad + sum(LoadFlag.ERROR in s.flags for s in samples)
-        if self._bad < BAD_LINES_TOLD or self._bad_told:
+        if self._bad < MAX_BAD_LINES or self._bad_reported:
             return
-        self._bad_told = True
+        self._bad_reported = True
         shown = samples[-1].raw[:60].decode("ascii", "backslashreplace")
-        told = f"{self._bad} lines in a row give no reading, the last one {shown!r}"
-        self._report("warning", f"{told}; check protocol, baud, column and decimal")
+        text = f"{self._bad} lines in a row give no reading, the last one {shown!r}"
+        self._report("warning", f"{text}; check protocol, baud, column and decimal")
 
     def last_words(self, now: float) -> str:
         """Of the last good sample: its force and age."""

@@ -1,6 +1,6 @@
-"""What waits on a line that is open and that nobody reads: 64 kB and more, on a real pseudo-terminal.
+"""A load cell on a real pseudo-terminal: a backlog of 64 kB and more, and every fault of a line by name.
 
-Every fault of a real line by name, on a true pty: never a wrong force, and each told in its event.
+No force is wrong, and each fault is reported in its event.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ from tests.acquire.serial_line.fake_port import FakePort, FakeTime
 LINE = LineSettings("socket://fake:1")
 
 
-class Road:
+class FlakyLink:
     """A link to ports that each live for ``lives`` reads of a tenth of a second, the last one for ever."""
 
     def __init__(self, *lives: int) -> None:
@@ -37,23 +37,23 @@ class Road:
 
 
 def test_a_peer_that_hangs_up_is_tried_ever_more_seldom_and_told_of_once() -> None:
-    road = Road(*[0] * 1000)
-    road.until(160.0)
-    assert len(road.opened) < 15
-    assert road.opened[-1] - road.opened[-2] == pytest.approx(8.0, abs=0.3)
-    assert [text.partition(" (")[0] for text in road.told] == ["lost", "lost again at once"]
+    flaky = FlakyLink(*[0] * 1000)
+    flaky.until(160.0)
+    assert len(flaky.opened) < 15
+    assert flaky.opened[-1] - flaky.opened[-2] == pytest.approx(8.0, abs=0.3)
+    assert [text.partition(" (")[0] for text in flaky.told] == ["lost", "lost again at once"]
 
 
 def test_one_that_says_a_line_and_hangs_up_is_no_better() -> None:
-    road = Road(*[1] * 1000)
-    road.until(160.0)
-    assert len(road.opened) < 15 and len(road.told) == 3  # lost, connected again, lost again at once
+    flaky = FlakyLink(*[1] * 1000)
+    flaky.until(160.0)
+    assert len(flaky.opened) < 15 and len(flaky.told) == 3  # lost, connected again, lost again at once
 
 
 def test_when_it_stays_at_last_that_is_told_once() -> None:
-    road = Road(*[0] * 5)
-    road.until(160.0)
-    assert [text.partition(" (")[0] for text in road.told] == [
+    flaky = FlakyLink(*[0] * 5)
+    flaky.until(160.0)
+    assert [text.partition(" (")[0] for text in flaky.told] == [
         "lost",
         "lost again at once",
         "connected again",
@@ -61,10 +61,10 @@ def test_when_it_stays_at_last_that_is_told_once() -> None:
 
 
 def test_a_rare_loss_is_told_each_time_and_mended_soon() -> None:
-    road = Road(100, 100, 100)
-    road.until(140.0)
-    assert [text.partition(" (")[0] for text in road.told] == ["lost", "connected again"] * 3
-    assert len(road.opened) == 4
+    flaky = FlakyLink(100, 100, 100)
+    flaky.until(140.0)
+    assert [text.partition(" (")[0] for text in flaky.told] == ["lost", "connected again"] * 3
+    assert len(flaky.opened) == 4
 
 
 class SlowPort(FakePort):

@@ -1,9 +1,4 @@
-"""The list of ports, their identities, and why one cannot be opened.
-
-Finding out what talks: listening sends nothing, asking sends only what it said it would.
-
-Telnet and the COM port option: data out of it, whatever else is in it.
-"""
+"""Serial ports: their list and identity, opening and reading one, finding its protocol, and Telnet with RFC 2217."""
 
 from __future__ import annotations
 
@@ -27,7 +22,7 @@ from acquire.errors import ConfigError, DeviceError
 from acquire.protocols.base import find_protocol
 from acquire.serial_line import ports as serial_ports
 from acquire.serial_line.byte_ports import Telnet, escaped, line_settings
-from acquire.serial_line.identify import Question, ask, guess, hear, listen, questions
+from acquire.serial_line.identify import Question, ask, guess, listen, questions, record_bytes
 from acquire.serial_line.ports import LineSettings, find_again, identity_of, list_serial_ports, open_port
 from tests.acquire.serial_line.fake_port import FakePort, FakeTime
 from tests.adversary.peers import LINE, Rfc2217Peer, SocketPeer, paced, silence
@@ -268,7 +263,9 @@ def test_no_question_sets_or_moves_anything() -> None:
 def test_a_port_lost_while_listening() -> None:
     time = FakeTime()
     with pytest.raises(DeviceError, match="lost while listening"):
-        hear(LineSettings("/dev/x"), opener=lambda line: FakePort(time, [OSError(5, "gone")]), clock=time)
+        record_bytes(
+            LineSettings("/dev/x"), opener=lambda line: FakePort(time, [OSError(5, "gone")]), clock=time
+        )
 
 
 @given(data=st.binary(max_size=300), cuts=st.lists(st.integers(1, 40), min_size=1, max_size=20))
