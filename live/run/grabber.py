@@ -170,7 +170,7 @@ class Grabber:
     def _tell_loss(self, frame: Frame) -> None:
         """Each gap stands in the session; the screen hears of them at most every two seconds."""
         self._unsaid += frame.lost_before
-        if not self._muffler.told(frame.t):
+        if not self._muffler.due(frame.t):
             return
         text = f"{self._unsaid} frames were lost, the last before frame {frame.index}"
         data = {"count": self._unsaid, "before": frame.index}

@@ -20,7 +20,7 @@ from collections.abc import Callable, Iterator, Sequence
 from types import FrameType
 
 from acquire.errors import ConfigError, Interrupted
-from acquire.held_back import handled, held_back, let_through
+from acquire.signal_mask import blocked_signals, signal_handler, unblock_signals
 
 log = logging.getLogger(__name__)
 _POLL_S = 0.25
@@ -61,7 +61,7 @@ def compile_ahead(
     began = time.monotonic()
     words = [",".join(kinds), "phase" if phase else "-"]
     commands = [[sys.executable, "-m", "live.setup.compiling", part, *words] for part in COMPILE_PARTS]
-    with held_back(signal.SIGINT):
+    with blocked_signals(signal.SIGINT):
         processes = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]
     try:
         with _interruptions() as interrupted:
@@ -101,14 +101,14 @@ def _interruptions() -> Iterator[threading.Event]:
         if callable(handler):
             handler(number, frame)
 
-    with handled(hear, *before):
+    with signal_handler(hear, *before):
         yield heard
 
 
 def main(part: str, kinds: str, phase: str) -> int:
     """One of the processes."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # to end without a word
-    let_through(signal.SIGINT)
+    unblock_signals(signal.SIGINT)
     from acquire import burst, hdf5
     from analysis import COMPILE_PARTS, warm_up
 

@@ -24,7 +24,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
-from acquire.held_back import let_through
+from acquire.signal_mask import unblock_signals
 from analysis import PICTURE_KINDS, not_compiled
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.task import Task, TaskProgress, perform
@@ -33,7 +33,7 @@ from live.replay.batch.task import Task, TaskProgress, perform
 def main() -> int:
     """Do what comes, until nothing comes any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the caller hears it, and ends us
-    let_through(signal.SIGINT)
+    unblock_signals(signal.SIGINT)
     logging.basicConfig(level=logging.ERROR, format="%(levelname)s %(name)s: %(message)s")
     answers = _answers()
     tasks: queue.Queue[str] = queue.Queue()

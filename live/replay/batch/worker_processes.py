@@ -19,7 +19,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from acquire.held_back import held_back
+from acquire.signal_mask import blocked_signals
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress
 from live.replay.batch.worker import ONE_THREAD
@@ -76,7 +76,7 @@ class WorkerProcess:
     """One process; raises OSError where it cannot be started."""
 
     def __init__(self) -> None:
-        with held_back(signal.SIGINT):
+        with blocked_signals(signal.SIGINT):
             self._process = subprocess.Popen(
                 [sys.executable, "-m", "live.replay.batch.worker"],
                 stdin=subprocess.PIPE,

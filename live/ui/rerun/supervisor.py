@@ -23,7 +23,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquire.events import Level
-from acquire.held_back import held_back
+from acquire.signal_mask import blocked_signals
 from live.pipeline.latency import OUTPUT, yield_to_others
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
@@ -60,7 +60,7 @@ class RenderProcess:
 
     def __init__(self) -> None:
         ours, its = socket.socketpair()
-        with its, held_back(signal.SIGINT, signal.SIGHUP):
+        with its, blocked_signals(signal.SIGINT, signal.SIGHUP):
             # The process unblocks them once it ignores them.
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", _MODULE],
