@@ -19,10 +19,10 @@ from live.commands.signals import interrupts
 from live.config.loading import Config
 from live.setup.check.check_list import CheckFigures, examine, table_lines
 from live.setup.check.sample import take
-from live.setup.check.verdict import WITHOUT_TARGET, judge
+from live.setup.check.verdict import DEFAULT_TARGET, check_lines
 from live.setup.devices import open_load
 from live.setup.placement import with_auto_gauges
-from live.setup.region import troubles
+from live.setup.region import report_warnings
 from live.setup.specimen_drawing import Overlay, snapshot
 from live.ui.terminal.screen import TerminalScreen
 
@@ -61,11 +61,11 @@ def command(arguments: argparse.Namespace) -> int:
         with interrupts() as stop:
             figures = watch(config, target, screen, stop.is_set)
     else:
-        figures = examine(take(config, troubles(screen.say)), config, _load(config))
+        figures = examine(take(config, report_warnings(screen.say)), config, _load(config))
     if arguments.snapshot:
         write_picture(Path(arguments.snapshot), _drawn(figures, config, target))
         screen.say(f"written: {arguments.snapshot}")
-    lines = judge(figures, target, config.measure.reference_shift_px)
+    lines = check_lines(figures, target, config.measure.reference_shift_px)
     for line in [*(line.text() for line in lines), "", *table_lines(figures)]:
         screen.say(line)
     ready = all(line.good for line in lines)
@@ -76,9 +76,9 @@ def command(arguments: argparse.Namespace) -> int:
 def _verdict(figures: CheckFigures, ready: bool) -> str:
     if not ready:
         return "NO-GO: not ready, see what to look at above"
-    if figures.shots.few:
+    if figures.stack.few:
         told = "noise in time, flicker, drift and vibration are not judged"
-        return f"GO, as far as {figures.shots.said} can tell: {told}"
+        return f"GO, as far as {figures.stack.count_text} can tell: {told}"
     return "GO: ready"
 
 
@@ -86,9 +86,9 @@ def _drawn(figures: CheckFigures, config: Config, target: float | None) -> NDArr
     """The picture with what was judged over it."""
     zois = figures.zois
     gauges = with_auto_gauges(config, zois.grid).gauges
-    wanted = WITHOUT_TARGET if target is None else target
+    wanted = DEFAULT_TARGET if target is None else target
     overlay = Overlay(figures.region, zois.grid, gauges, zois.sigma, wanted, figures.px_per_mm)
-    return snapshot(figures.shots.mean().mean, overlay)
+    return snapshot(figures.stack.mean().mean, overlay)
 
 
 def _load(config: Config) -> LoadReport | None:

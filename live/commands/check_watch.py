@@ -15,10 +15,10 @@ from live.config.loading import Config
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.pipeline.screen import Screen
 from live.setup.check.check_list import CheckFigures
-from live.setup.check.quick_check import GLANCE, QuickCheck, QuickChecker, RollingFrames
-from live.setup.check.verdict import CheckLine, judge
+from live.setup.check.quick_check import GLANCE_FRAMES, QuickCheck, QuickChecker, RollingFrames
+from live.setup.check.verdict import CheckLine, check_lines
 from live.setup.devices import open_rig
-from live.setup.region import troubles
+from live.setup.region import report_warnings
 from live.ui.rerun.messages import ViewSetup
 from live.ui.rerun.view import View, spawn_viewer
 
@@ -41,7 +41,7 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
     """
     frames = 2 * (config.measure.reference_burst or DEFAULT_REFERENCE_BURST)
     watch, show, notes = QuickChecker(config), RenewedLines(screen), list[str]()
-    rig = open_rig(config.camera.address, "none:", troubles(notes.append), crop=config.camera.crop)
+    rig = open_rig(config.camera.address, "none:", report_warnings(notes.append), crop=config.camera.crop)
     try:
         with (
             RollingFrames(rig.camera, frames, config.camera.address) as rolling,
@@ -49,10 +49,10 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
         ):
             due = time.monotonic()
             while not (stopped() or rolling.over):
-                shots = rolling.newest(GLANCE)
-                if shots is not None:
-                    glance = watch.glance(shots)
-                    lines = judge(glance.figures, target, config.measure.reference_shift_px)
+                stack = rolling.newest(GLANCE_FRAMES)
+                if stack is not None:
+                    glance = watch.glance(stack)
+                    lines = check_lines(glance.figures, target, config.measure.reference_shift_px)
                     told = [*notes[-MOST_NOTES:], peak_line(glance), *(line.text() for line in lines)]
                     show.lines(told, short(glance, lines))
                     view(rolling, glance, lines)
@@ -138,8 +138,8 @@ def _viewed(config: Config, notes: list[str]) -> Iterator[Shown]:
 
 
 def _view(config: Config, figures: CheckFigures, grid: ZoiGrid, notes: list[str]) -> View:
-    camera = figures.shots.camera
-    start = float(figures.shots.times[-1])
+    camera = figures.stack.camera
+    start = float(figures.stack.times[-1])
     setup = ViewSetup("phasedic check", camera.width, camera.height, camera.bits, grid, start)
 
     def serving(view: View) -> None:

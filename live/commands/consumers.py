@@ -11,7 +11,7 @@ from contextlib import ExitStack
 from acquire.addresses import Options, parse_address
 from acquire.events import EventKind, Level
 from acquire.serial_line.ports import LineSettings
-from live.config.channels import STANDARD
+from live.config.channels import DEFAULT_CHANNELS
 from live.config.gauges import outlines
 from live.config.listen_address import ListenAddress, read_token
 from live.config.loading import Config
@@ -27,7 +27,7 @@ from live.ui.rerun.consumer import CardWriter, FiguresWriter, RerunConsumer
 from live.ui.rerun.messages import ViewSetup
 from live.ui.rerun.view import View, spawn_viewer
 
-WHAT = "strain out"
+OUTPUT_NAME = "strain out"
 
 
 def signals_of(about: RunInfo, run_state: RunState, screen: Screen) -> list[Consumer]:
@@ -40,21 +40,21 @@ def signals_of(about: RunInfo, run_state: RunState, screen: Screen) -> list[Cons
     """
     if about.end is None:
         return []
-    outs: list[StrainOut] = []
+    outputs: list[StrainOut] = []
     with ExitStack() as opened:
         for make in (_tcp, _udp, _serial):
             out = make(about.config, _lines(about, run_state))
             if out is not None:
                 opened.callback(out.end)
-                outs.append(out)
+                outputs.append(out)
                 screen.say(out.name)
         opened.pop_all()
-    means = ActionMeans(screen.bell, about.end, outs)
+    means = ActionMeans(screen.bell, about.end, outputs)
     alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
-    return [*_watch(alarms, about, run_state), *outs]
+    return [*_alarm_watch(alarms, about, run_state), *outputs]
 
 
-def _watch(alarms: Sequence[Alarm], about: RunInfo, run_state: RunState) -> list[Consumer]:
+def _alarm_watch(alarms: Sequence[Alarm], about: RunInfo, run_state: RunState) -> list[Consumer]:
     if not alarms:
         return []
     readings, health = ChannelValues(about.start.monotonic, run_state.snapshot), run_state.health
@@ -64,22 +64,24 @@ def _watch(alarms: Sequence[Alarm], about: RunInfo, run_state: RunState) -> list
 def _lines(about: RunInfo, run_state: RunState) -> Lines:
     config = about.config
     gauges = tuple(f"{prefix}gauge_{name}" for name in config.gauges for prefix in ("", "sigma_"))
-    channels = config.strain_out.channels or (*STANDARD, *gauges)
+    channels = config.strain_out.channels or (*DEFAULT_CHANNELS, *gauges)
     return Lines(ChannelValues(about.start.monotonic, run_state.snapshot), channels, config.strain_out.format)
 
 
 def _tcp(config: Config, lines: Lines) -> StrainOut | None:
     if config.strain_out.tcp is None:
         return None
-    place = ListenAddress.parse(config.strain_out.tcp)
-    return TcpOut(place.listen(WHAT), read_token(place, config.operate.token_file, WHAT), lines)
+    address = ListenAddress.parse(config.strain_out.tcp)
+    return TcpOut(
+        address.listen(OUTPUT_NAME), read_token(address, config.operate.token_file, OUTPUT_NAME), lines
+    )
 
 
 def _udp(config: Config, lines: Lines) -> StrainOut | None:
     if config.strain_out.udp is None:
         return None
-    place = ListenAddress.parse(config.strain_out.udp)
-    return UdpOut(place.host, place.port, lines)
+    address = ListenAddress.parse(config.strain_out.udp)
+    return UdpOut(address.host, address.port, lines)
 
 
 def _serial(config: Config, lines: Lines) -> StrainOut | None:
@@ -102,12 +104,12 @@ def standard_consumers(screen: Screen, more: Sequence[Consumer] = ()) -> Compose
 
     def compose(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
         signals = signals_of(about, run_state, screen)
-        return [*write_results(about, run_state), *_shown(about, run_state, screen), *more, *signals]
+        return [*write_results(about, run_state), *_view_consumers(about, run_state, screen), *more, *signals]
 
     return compose
 
 
-def _shown(about: RunInfo, run_state: RunState, screen: Screen) -> list[Consumer]:
+def _view_consumers(about: RunInfo, run_state: RunState, screen: Screen) -> list[Consumer]:
     """The view, and what keeps its words and figures new."""
     view = _view(about, run_state, screen)
     if view is None:
@@ -138,15 +140,15 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
     )
     rrd = about.folder / "view.rrd" if v.rrd else None
 
-    def tell(text: str, level: Level) -> None:
-        run_state.event_log.tell(EventKind.VIEW, "view", text, level)
+    def report(text: str, level: Level) -> None:
+        run_state.event_log.report(EventKind.VIEW, "view", text, level)
 
     def serving(view: View) -> None:
         run_state.health.view_port = view.port
-        _announce(view, v.spawn, screen, lambda text: tell(text, "warning"))
+        _announce(view, v.spawn, screen, lambda text: report(text, "warning"))
 
     port = v.port if v.enabled else None
-    return View(setup, port=port, rrd=rrd, tell=tell, serving=serving)
+    return View(setup, port=port, rrd=rrd, report=report, serving=serving)
 
 
 def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], None]) -> None:

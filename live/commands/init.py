@@ -17,7 +17,7 @@ from live.config.loading import load_config
 from live.config.rig_file import new_rig
 from live.pipeline.screen import Screen
 from live.setup.gauge_proposal import Proposal, propose, rig_text
-from live.setup.region import look, mask_picture
+from live.setup.region import first_look, mask_picture
 from live.setup.specimen_drawing import Overlay, snapshot
 from live.ui.terminal.screen import TerminalScreen
 
@@ -60,7 +60,7 @@ def command(arguments: argparse.Namespace) -> int:
     said = overrides(arguments)
     found = find_devices(said, screen)
     config = load_config(None, {**said, "camera.address": found.camera, "load.address": found.load})
-    seen = look(config, screen.say)
+    seen = first_look(config, screen.say)
     words = found.camera_words or printable(seen.camera.name), found.load_words
     proposal = propose(seen, config, said, words, found.others)
     if mask is not None and proposal.region.mask is not None:

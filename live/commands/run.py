@@ -23,7 +23,7 @@ from live.run.control import ControlPort
 from live.run.keyboard import listen
 from live.run.live_run import INTERRUPTED, LiveRun, run_live
 from live.run.outcome import Outcome, StopSignal
-from live.setup.region import searched
+from live.setup.region import located
 from live.ui.rerun.view import has_display, rerun_command, spawn_viewer
 from live.ui.terminal.screen import TerminalScreen
 
@@ -47,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
     screen = TerminalScreen()
-    with searched(configured(arguments), screen.say) as config:
+    with located(configured(arguments), screen.say) as config:
         outcome = run_beside_page(config, screen) if arguments.page else run_to_the_end(config, screen)
     if not arguments.page:
         conclude(outcome, screen)

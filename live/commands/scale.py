@@ -15,7 +15,7 @@ from live.config.loading import Config
 from live.config.rig_file import write_rig
 from live.config.values import AUTO
 from live.pipeline.screen import Screen
-from live.setup.region import look, region_of
+from live.setup.region import first_look, region_of
 from live.setup.scale import OUT_OF_PLANE_MM, Board, Scale, false_strain, from_board, from_points, from_width
 from live.ui.terminal.screen import TerminalScreen
 
@@ -98,7 +98,7 @@ def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | Non
         return from_points((x1, y1, x2, y2), _needed(arguments, "length"), arguments.sigma)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS or --config rig.toml")
-    seen = look(config, screen.say)
+    seen = first_look(config, screen.say)
     if arguments.width is None:
         return from_board(seen.picture, _board(arguments), arguments.sigma, stand_off)
     width = config.specimen.width_mm if arguments.width == OF_THE_RIG else arguments.width

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-MEASURED = {
+MEASURED_CHANNELS = {
     "time_s": "middle of the burst, s since the start of the test",
     "frame": "sequence number of its first frame",
     "axial": "strain along the load: the gauge axial, or else the mean",
@@ -20,16 +20,25 @@ MEASURED = {
     "latency_s": "from the stamp of the last frame to the result, s",
     "noise_GL": "of one frame",
 }
-MACHINE = {
+SYSTEM_CHANNELS = {
     "silent_s": "time since the last frame, s",
     "load_silent_s": "time since the last sample of the load cell, s",
     "disk_min": "until the disk is full, minutes",
 }
-STANDARD = ("time_s", "frame", "axial", "sigma_axial", "force_N", "stress_MPa", "lost_share", "latency_s")
+DEFAULT_CHANNELS = (
+    "time_s",
+    "frame",
+    "axial",
+    "sigma_axial",
+    "force_N",
+    "stress_MPa",
+    "lost_share",
+    "latency_s",
+)
 """What is told where nothing is chosen; the gauges beside."""
 
 
-def channel_names(gauges: Iterable[str], *, machine: bool = False) -> tuple[str, ...]:
+def channel_names(gauges: Iterable[str], *, system: bool = False) -> tuple[str, ...]:
     """All channels of a test with these gauges: ``gauge_NAME`` and ``sigma_gauge_NAME`` as in the files."""
     own = (f"{prefix}gauge_{name}" for name in gauges for prefix in ("", "sigma_"))
-    return (*MEASURED, *own, *(MACHINE if machine else ()))
+    return (*MEASURED_CHANNELS, *own, *(SYSTEM_CHANNELS if system else ()))

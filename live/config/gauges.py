@@ -21,11 +21,11 @@ Point = tuple[float, float]
 GaugeTable = Mapping[str, Any]
 """``kind`` and the parameters given of one gauge, fit for JSON."""
 
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
+NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
 """A gauge's name stands in the columns of files."""
-USUAL = "line"
+DEFAULT_KIND = "line"
 """The kind of a gauge that names none."""
-_PLACES = {"point": POINT, "box": RECTANGLE, "corners": CORNERS}
+_POSITIONS = {"point": POINT, "box": RECTANGLE, "corners": CORNERS}
 
 
 def gauge_checks(kind: object) -> dict[str, Check]:
@@ -40,13 +40,13 @@ def gauge_checks(kind: object) -> dict[str, Check]:
 def _check(one: Parameter) -> Check:
     if one.kind == "choice":
         return choice(*one.choices)
-    return length(number(one.low, one.high)) if one.kind == "length" else _PLACES[one.kind]
+    return length(number(one.low, one.high)) if one.kind == "length" else _POSITIONS[one.kind]
 
 
 def make_gauge(name: str, table: GaugeTable, axis: str) -> Gauge:
     """The gauge of a table with what follows from the ``axis`` of the load; raises ConfigError."""
     try:
-        return GAUGE_KINDS[table.get("kind", USUAL)].of(name, table, axis)
+        return GAUGE_KINDS[table.get("kind", DEFAULT_KIND)].of(name, table, axis)
     except ValueError as error:
         raise ConfigError(f"gauges.{name}: {error}") from None
 

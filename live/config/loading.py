@@ -21,7 +21,7 @@ from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
 from live.config.channels import channel_names
-from live.config.gauges import NAME, USUAL, GaugeTable, gauge_checks
+from live.config.gauges import NAME_PATTERN, DEFAULT_KIND, GaugeTable, gauge_checks
 from live.config.sections import (
     AlarmConfig,
     CameraConfig,
@@ -38,8 +38,8 @@ from live.config.sections import (
 from live.config.values import AUTO, Check, Option, in_px
 
 Section = TypeVar("Section")
-MOST_BYTES = 10**6  # of a configuration file
-_WITHDRAWN = {
+MAX_BYTES = 10**6  # of a configuration file
+_REMOVED_KEYS = {
     ("measure", "shorten_bursts"): "a burst keeps its length; leave it out, and take a smaller measure.burst"
     " where the picture moves",
 }
@@ -108,7 +108,7 @@ def from_dict(stored: Mapping[str, Any], overrides: Mapping[str, Any], where: st
     Keys of earlier versions that are withdrawn are left out.
     """
     tree = _without_none(stored)
-    for section, key in _WITHDRAWN:
+    for section, key in _REMOVED_KEYS:
         if isinstance(tree.get(section), dict):
             tree[section].pop(key, None)
     return _overlaid(tree, overrides, where)
@@ -153,7 +153,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
     if not path.exists():
         raise ConfigError(f"{path}: there is no such configuration file")
     try:
-        return tomllib.loads(read_bytes(path, MOST_BYTES).decode("utf-8-sig"))
+        return tomllib.loads(read_bytes(path, MAX_BYTES).decode("utf-8-sig"))
     except (DataError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read ({error}); give a text file in TOML") from None
     except RecursionError:
@@ -168,7 +168,7 @@ def _build(tree: Mapping[str, Any], where: str) -> Config:
     px_per_mm = _px_per_mm(tree, where)
     for name, content in tree.items():
         if name not in known:
-            raise ConfigError(f"{where}: unknown section [{name}]{_meant(name, known)}")
+            raise ConfigError(f"{where}: unknown section [{name}]{_suggestion(name, known)}")
         if name == "alarm":
             parts[name] = _alarms(content, where)
         elif not isinstance(content, Mapping):
@@ -208,28 +208,28 @@ def _accepted(
 ) -> dict[str, Any]:
     values = {}
     for key, value in content.items():
-        if (name, key) in _WITHDRAWN:
-            raise ConfigError(f"{where}: {name}.{key} is withdrawn: {_WITHDRAWN[name, key]}")
+        if (name, key) in _REMOVED_KEYS:
+            raise ConfigError(f"{where}: {name}.{key} is withdrawn: {_REMOVED_KEYS[name, key]}")
         if key not in checks:
-            raise ConfigError(f"{where}: unknown key {name}.{key}{_meant(key, list(checks))}")
+            raise ConfigError(f"{where}: unknown key {name}.{key}{_suggestion(key, list(checks))}")
         try:
             values[key] = checks[key].accept(in_px(value, checks[key], px_per_mm))
         except NotAllowed as allowed:
             raise ConfigError(
-                f"{where}: {name}.{key} = {_shown(value)} is not possible; allowed: {allowed}"
+                f"{where}: {name}.{key} = {_short_repr(value)} is not possible; allowed: {allowed}"
             ) from None
     return values
 
 
 def _gauge(name: str, table: Any, where: str, px_per_mm: float | None) -> GaugeTable:
-    if not NAME.fullmatch(name):
+    if not NAME_PATTERN.fullmatch(name):
         raise ConfigError(
             f"{where}: gauges.{name}: a name has up to 32 letters, digits and _, a letter first"
         )
     if not isinstance(table, Mapping):
         raise ConfigError(f"{where}: gauges.{name} must be a table, [gauges.{name}] with keys below it")
     values = _accepted(gauge_checks(table.get("kind")), f"gauges.{name}", table, where, px_per_mm)
-    return {"kind": USUAL, **values}
+    return {"kind": DEFAULT_KIND, **values}
 
 
 def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
@@ -249,12 +249,14 @@ def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
 def _check_channels(config: Config, where: str) -> None:
     placed = AUTO_GAUGES if config.measure.gauges == AUTO else ()
     gauges = dict.fromkeys((*config.gauges, *placed))
-    measured, known = channel_names(gauges), channel_names(gauges, machine=True)
+    measured, known = channel_names(gauges), channel_names(gauges, system=True)
     asked = [("strain_out", channel, measured) for channel in config.strain_out.channels or ()]
     asked += [(f"alarm {number}", alarm.channel, known) for number, alarm in enumerate(config.alarm, 1)]
     for whose, channel, names in asked:
         if channel not in names:
-            raise ConfigError(f"{where}: {whose}: unknown channel {channel!r}{_meant(channel, list(names))}")
+            raise ConfigError(
+                f"{where}: {whose}: unknown channel {channel!r}{_suggestion(channel, list(names))}"
+            )
 
 
 def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:
@@ -267,14 +269,14 @@ def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:
             raise ConfigError(f"{where}: metadata.{key} must be a text or a number, in one line")
 
 
-def _shown(value: Any) -> str:
+def _short_repr(value: Any) -> str:
     try:
         return reprlib.repr(value)
     except ValueError:  # thousands of digits
         return "this number"
 
 
-def _meant(word: str, known: list[str]) -> str:
+def _suggestion(word: str, known: list[str]) -> str:
     near = difflib.get_close_matches(word, known, 1)
     meant = f" (did you mean {near[0]}?)" if near else ""
     return f"{meant}; known: {', '.join(known)}"

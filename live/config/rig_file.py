@@ -15,7 +15,7 @@ from uuid import uuid4
 
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
-from live.config.loading import MOST_BYTES, Config, load_config
+from live.config.loading import MAX_BYTES, Config, load_config
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument
@@ -31,7 +31,7 @@ def new_rig(path: Path, text: str, changes: Mapping[str, Any] | None = None) -> 
     """
     if path.exists() or path.is_symlink():
         raise ConfigError(f"{path} exists; nothing is overwritten, choose another name")
-    return _put(path, _changed(_parsed(text, path), changes or {}, path))
+    return _write_checked(path, _changed(_parsed(text, path), changes or {}, path))
 
 
 def write_rig(path: Path, changes: Mapping[str, Any]) -> Config:
@@ -50,7 +50,7 @@ def write_rig(path: Path, changes: Mapping[str, Any]) -> Config:
         The file is no TOML, or would not be a configuration; then nothing is changed.
     """
     path = path.resolve()  # a link stays one
-    return _put(path, _changed(_read(path), changes, path))
+    return _write_checked(path, _changed(_read(path), changes, path))
 
 
 def _changed(document: TOMLDocument, changes: Mapping[str, Any], path: Path) -> str:
@@ -66,7 +66,7 @@ def _read(path: Path) -> TOMLDocument:
     if not path.exists():
         return _parsed("", path)
     try:
-        return _parsed(read_bytes(path, MOST_BYTES).decode("utf-8-sig"), path)
+        return _parsed(read_bytes(path, MAX_BYTES).decode("utf-8-sig"), path)
     except (DataError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read ({error}); give a text file in TOML") from None
 
@@ -96,17 +96,17 @@ def _change(document: TOMLDocument, section: str, key: str, value: Any, path: Pa
     if value is None:
         table.pop(key, None)  # type: ignore[attr-defined]
     else:
-        table[key] = _plain(value)  # type: ignore[index]
+        table[key] = _toml_value(value)  # type: ignore[index]
 
 
-def _plain(value: Any) -> Any:
+def _toml_value(value: Any) -> Any:
     """What TOML has: a tuple is a list, a key of None is none."""
     if isinstance(value, Mapping):
-        return {key: _plain(v) for key, v in value.items() if v is not None}
-    return [_plain(v) for v in value] if isinstance(value, list | tuple) else value
+        return {key: _toml_value(v) for key, v in value.items() if v is not None}
+    return [_toml_value(v) for v in value] if isinstance(value, list | tuple) else value
 
 
-def _put(path: Path, text: str) -> Config:
+def _write_checked(path: Path, text: str) -> Config:
     """Checked as a file of its own, then put in the place of what was there."""
     part = path.with_name(f".{path.name}.{uuid4().hex[:8]}.part")
     try:

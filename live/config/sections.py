@@ -12,7 +12,7 @@ from live.config.values import (
     FLAG,
     GIVEN,
     NAMES,
-    PLACE,
+    LISTEN_ADDRESS,
     RECORD_MODE,
     REGION,
     STRAINS,
@@ -127,7 +127,7 @@ class RecordConfig:
 class OperateConfig:
     """[operate]"""
 
-    orders: str | None = key(PLACE, None,
+    orders: str | None = key(LISTEN_ADDRESS, None,
         "take orders as lines over TCP at this port (of 127.0.0.1 unless an address is given)",
         Option("orders", "[HOST:]PORT"))
     token_file: str | None = key(TEXT, None,
@@ -138,10 +138,10 @@ class OperateConfig:
 class StrainOutConfig:
     """[strain_out]"""
 
-    tcp: str | None = key(PLACE, None,
+    tcp: str | None = key(LISTEN_ADDRESS, None,
         "tell every measurement as a line to TCP clients of this port (of 127.0.0.1 unless an address is given)",
         Option("strain-out", "[HOST:]PORT"))
-    udp: str | None = key(PLACE, None, "send it by UDP to this HOST:PORT")
+    udp: str | None = key(LISTEN_ADDRESS, None, "send it by UDP to this HOST:PORT")
     serial: str | None = key(TEXT, None, "write it to this port: /dev/ttyUSB1?baud=115200")
     format: str = key(choice("json", "csv"), "json", "of a line; csv begins with the names", Option("strain-format"))
     channels: tuple[str, ...] | None = key(NAMES, None,

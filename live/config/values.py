@@ -128,7 +128,7 @@ def _text(value: Any) -> str:
     return value
 
 
-def _place(value: Any) -> str:
+def _listen_address(value: Any) -> str:
     try:
         ListenAddress.parse(_text(value))
     except ValueError as allowed:
@@ -225,7 +225,7 @@ def _names(value: Any) -> tuple[str, ...]:
 TEXT = Check(_text)
 NAMES = Check(_names, lambda word: word.split(","))
 """Names, on the command line with commas between."""
-PLACE = Check(_place)
+LISTEN_ADDRESS = Check(_listen_address)
 """Where something listens: PORT or HOST:PORT."""
 FLAG = Check(_flag)
 BOX = length(Check(_box, _read_box), whole=True)

@@ -17,7 +17,7 @@ from live.config.gauges import GaugeTable
 from live.config.loading import Config
 from live.config.values import AUTO
 from live.setup.placement import with_auto_gauges
-from live.setup.region import FirstLook, Region, is_sought, region_of
+from live.setup.region import FirstLook, Region, is_auto_region, region_of
 
 SIZES = (64, 48, 32, 24, 16)
 ACROSS = 4  # ZOIs side by side on the specimen, at least
@@ -76,7 +76,7 @@ def propose(
         No ZOI fits, or the mask given does not.
     """
     given = set(said)
-    whole = is_sought(config)
+    whole = is_auto_region(config)
     region = region_of(
         _with(config, zoi=SIZES[-1]) if "measure.zoi" not in given else config, seen.picture, seen.noise
     )

@@ -1,6 +1,6 @@
 """Where is measured: as given, else on the specimen that is found in a picture, else all but a rim.
 
-``searched`` puts what was found into the configuration, as a box and a mask, so that all that comes after
+``located`` puts what was found into the configuration, as a box and a mask, so that all that comes after
 (the run, its folder, a replay) has it as if a person had drawn it.
 """
 
@@ -34,9 +34,9 @@ if TYPE_CHECKING:
 Box = tuple[int, int, int, int]
 Bools = NDArray[np.bool_]
 
-LOOK_FRAMES = 4
+FIRST_LOOK_FRAMES = 4
 """Taken of a live camera to find the specimen; of pictures, one."""
-ALL_SHARE = 0.98  # of the picture: the specimen fills it, but for holes that a ZOI would feel
+FILLS_PICTURE = 0.98  # of the picture: the specimen fills it, but for holes that a ZOI would feel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +75,7 @@ class Region:
         return inside if self.mask is None else inside & self.mask
 
 
-def is_sought(config: Config) -> bool:
+def is_auto_region(config: Config) -> bool:
     """Whether the specimen is to be found: nothing is given, or that it shall be."""
     return config.measure.mask is None and config.measure.roi in (None, AUTO)
 
@@ -90,7 +90,7 @@ def region_of(config: Config, picture: NDArray[Any], noise: float | None = None)
     """
     height, width = picture.shape
     box = config.measure.roi if isinstance(config.measure.roi, tuple) else None
-    if not is_sought(config):
+    if not is_auto_region(config):
         mask = read_mask(config.measure.mask, width, height)
         words = "as given" if box is not None or mask is not None else "all but a rim, as given"
         return Region(box, mask, words)
@@ -105,7 +105,7 @@ def _found(config: Config, picture: NDArray[Any], noise: float | None) -> Region
     specimen = find_specimen(picture, noise) if min(picture.shape) >= config.measure.zoi else None
     if specimen is None:
         return none
-    if specimen.share > ALL_SHARE and _deepest_gap(specimen.mask) < config.measure.zoi / 4:
+    if specimen.share > FILLS_PICTURE and _deepest_gap(specimen.mask) < config.measure.zoi / 4:
         return Region(None, None, "the specimen fills the picture: all but a rim", found=True)
     box = _within(specimen.box.x, specimen.box.y, specimen.box.width, specimen.box.height, config, picture)
     share = f"{specimen.share:.0%} of the picture"
@@ -159,7 +159,7 @@ class FirstLook:
         return width, height
 
 
-def look(config: Config, say: Callable[[str], None]) -> FirstLook:
+def first_look(config: Config, say: Callable[[str], None]) -> FirstLook:
     """Open the camera, take a few frames, and close it again; raises as ``open_rig``.
 
     What goes wrong meanwhile is said: a camera that gives nothing is waited for.
@@ -169,8 +169,8 @@ def look(config: Config, say: Callable[[str], None]) -> FirstLook:
     DataError
         The camera gave nothing.
     """
-    rig = open_rig(config.camera.address, "none:", troubles(say), crop=config.camera.crop)
-    n = LOOK_FRAMES if rig.camera.info.live else 1
+    rig = open_rig(config.camera.address, "none:", report_warnings(say), crop=config.camera.crop)
+    n = FIRST_LOOK_FRAMES if rig.camera.info.live else 1
     images: list[NDArray[Any]] = []
     try:
         with rig.camera:
@@ -185,7 +185,7 @@ def look(config: Config, say: Callable[[str], None]) -> FirstLook:
     return FirstLook(*_mean_and_noise(images), rig.camera.info)
 
 
-def troubles(say: Callable[[str], None]) -> EventSink:
+def report_warnings(say: Callable[[str], None]) -> EventSink:
     """Warnings and errors of a device, said."""
 
     def tell(event: Event) -> None:
@@ -204,21 +204,21 @@ def _mean_and_noise(images: list[NDArray[Any]]) -> tuple[NDArray[Any], float | N
 
 
 @contextmanager
-def searched(config: Config, say: Callable[[str], None]) -> Iterator[Config]:
+def located(config: Config, say: Callable[[str], None]) -> Iterator[Config]:
     """The configuration of a test, with the specimen found where nothing is given, and gauges placed where asked.
 
     The mask lies in a folder that is gone afterwards: a run has its own copy by then.
     """
-    if not config.camera.address or not (is_sought(config) or config.measure.gauges == AUTO):
+    if not config.camera.address or not (is_auto_region(config) or config.measure.gauges == AUTO):
         yield config
         return
-    sought = is_sought(config)
-    config, mask = placed_on(config, look(config, say), say)
+    auto_region = is_auto_region(config)
+    config, mask = located_on(config, first_look(config, say), say)
     with TemporaryDirectory(prefix="phasedic-") as folder:
-        yield with_mask_at(config, mask if sought else None, Path(folder) / "mask.png")
+        yield with_mask_at(config, mask if auto_region else None, Path(folder) / "mask.png")
 
 
-def placed_on(config: Config, seen: FirstLook, say: Callable[[str], None]) -> tuple[Config, Bools | None]:
+def located_on(config: Config, first: FirstLook, say: Callable[[str], None]) -> tuple[Config, Bools | None]:
     """The configuration with region and gauges in px, as far as they are sought, and the mask (H, W).
 
     Raises
@@ -226,10 +226,10 @@ def placed_on(config: Config, seen: FirstLook, say: Callable[[str], None]) -> tu
     ConfigError, DataError
         As ``region_of``; no ZOI fits, or too few for gauges.
     """
-    region = region_of(config, seen.picture, seen.noise)
-    if is_sought(config):
+    region = region_of(config, first.picture, first.noise)
+    if is_auto_region(config):
         say(f"{region.words} (--roi all or --roi X,Y,W,H say otherwise)")
-    return with_auto_gauges(region.config(config), region.grid(config, *seen.size)), region.mask
+    return with_auto_gauges(region.config(config), region.grid(config, *first.size)), region.mask
 
 
 def with_mask_at(config: Config, mask: Bools | None, path: Path) -> Config:

@@ -22,7 +22,7 @@ from live.setup.check.noise_floor import (
     ORDERS,
     SIZES,
     GaugeNoise,
-    Predicted,
+    PredictedNoise,
     StrainNoise,
     ZoiFloor,
     noise_floors,
@@ -77,7 +77,7 @@ class CheckFigures:
     Attributes
     ----------
     region : Region
-    shots : FrameStack
+    stack : FrameStack
     noise : float, GL
         Of one frame, at the ZOIs.
     exposure : Exposure
@@ -100,7 +100,7 @@ class CheckFigures:
     """
 
     region: Region
-    shots: FrameStack
+    stack: FrameStack
     noise: float
     exposure: Exposure
     depth: Depth
@@ -120,7 +120,7 @@ class CheckFigures:
     @property
     def automatic(self) -> tuple[str, ...]:
         """Controls that the camera changes by itself."""
-        return automatic_controls(self.shots.camera.controls)
+        return automatic_controls(self.stack.camera.controls)
 
     @property
     def floor(self) -> ZoiFloor | None:
@@ -135,21 +135,21 @@ class CheckFigures:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Measured:
+class KernelFigures:
     """What the kernel has to be asked for: the slower part of the figures."""
 
-    predicted: Predicted
+    predicted: PredictedNoise
     still: PictureStillness
 
     @classmethod
-    def of(cls, bench: CheckSample) -> Measured:
+    def of(cls, sample: CheckSample) -> KernelFigures:
         """Ask it for everything."""
-        noise = predicted(bench)
-        return cls(noise, stillness(bench, noise.able))
+        noise = predicted(sample)
+        return cls(noise, stillness(sample, noise.measurable))
 
 
 def examine(
-    shots: FrameStack,
+    stack: FrameStack,
     config: Config,
     load: LoadReport | None = None,
     table: bool = True,
@@ -158,7 +158,7 @@ def examine(
 
     Parameters
     ----------
-    shots : FrameStack
+    stack : FrameStack
     config : Config
     load : LoadReport, optional
     table : bool
@@ -169,43 +169,46 @@ def examine(
     ConfigError, DataError
         Region, mask, dark or flat do not fit.
     """
-    bench = CheckSample.of(shots, CheckRegion.of(sought(shots, config), config, shots.camera))
+    sample = CheckSample.of(stack, CheckRegion.of(find_region(stack, config), config, stack.camera))
     m = config.measure
     sizes, orders, bursts = (SIZES, ORDERS, BURSTS) if table else ((), (), ())
-    wanted = (*sizes, m.zoi), (*orders, m.order), (*bursts, bench.burst)
-    return figures_of(bench, Measured.of(bench), noise_floors(bench, *wanted), load)
+    wanted = (*sizes, m.zoi), (*orders, m.order), (*bursts, sample.burst)
+    return figures_of(sample, KernelFigures.of(sample), noise_floors(sample, *wanted), load)
 
 
-def sought(shots: FrameStack, config: Config) -> Region:
+def find_region(stack: FrameStack, config: Config) -> Region:
     """The region of a test, looked for in the mean of the frames, or in the first of too few."""
-    picture = correction(config, shots.camera)(shots.mean(0, 1 if shots.few else None))
-    return region_of(config, picture.mean, shots.noise())
+    picture = correction(config, stack.camera)(stack.mean(0, 1 if stack.few else None))
+    return region_of(config, picture.mean, stack.noise())
 
 
 def figures_of(
-    bench: CheckSample, measured: Measured, floors: tuple[ZoiFloor, ...] = (), load: LoadReport | None = None
+    sample: CheckSample,
+    measured: KernelFigures,
+    floors: tuple[ZoiFloor, ...] = (),
+    load: LoadReport | None = None,
 ) -> CheckFigures:
     """All figures: those that are read off the frames, beside what was measured with the kernel."""
-    ground, m, bits = bench.ground, bench.ground.config.measure, bench.shots.camera.bits
-    same = bench.picture.mean is bench.raw
+    check_region, m, bits = sample.check_region, sample.check_region.config.measure, sample.stack.camera.bits
+    same = sample.picture.mean is sample.raw
     return CheckFigures(
-        region=ground.region,
-        shots=bench.shots,
-        noise=bench.noise,
-        exposure=exposure(bench.pixels, bits),
-        depth=depth(bench.pixels, bits),
-        radius=_radius(bench),
-        zois=_zois(bench, measured.predicted.sigma),
-        still=replace(measured.still, light=light(bench)),
+        region=check_region.region,
+        stack=sample.stack,
+        noise=sample.noise,
+        exposure=exposure(sample.pixels, bits),
+        depth=depth(sample.pixels, bits),
+        radius=_radius(sample),
+        zois=_zois(sample, measured.predicted.sigma),
+        still=replace(measured.still, light=light(sample)),
         floors=floors,
         zoi=m.zoi,
         order=m.order,
-        burst=bench.burst,
+        burst=sample.burst,
         noise_stated=m.noise_GL is not None,
-        removed=None if same else float((bench.picture.mean - bench.raw)[ground.inside].std()),
+        removed=None if same else float((sample.picture.mean - sample.raw)[check_region.inside].std()),
         gauges=measured.predicted.gauges,
         load=load,
-        px_per_mm=ground.config.scale.px_per_mm,
+        px_per_mm=check_region.config.scale.px_per_mm,
     )
 
 
@@ -229,26 +232,26 @@ def median(values: Floats) -> float:
     return float(np.median(known)) if known.size else math.nan
 
 
-def _radius(bench: CheckSample) -> float:
-    at_zois = bench.ground.at_zois[bench.ground.cut]
+def _radius(sample: CheckSample) -> float:
+    at_zois = sample.check_region.at_zois[sample.check_region.cut]
     rows, columns = np.flatnonzero(at_zois.any(axis=1)), np.flatnonzero(at_zois.any(axis=0))
     if not rows.size:
         return math.nan
     cut = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-    noise = bench.noise / math.sqrt(bench.picture.n)
-    return speckle_radius(bench.picture.mean[cut], noise, at_zois[cut])
+    noise = sample.noise / math.sqrt(sample.picture.n)
+    return speckle_radius(sample.picture.mean[cut], noise, at_zois[cut])
 
 
-def _zois(bench: CheckSample, sigma: Floats) -> Zois:
+def _zois(sample: CheckSample, sigma: Floats) -> Zois:
     """Pattern of each ZOI, and what the kernel makes of it."""
-    grid = bench.ground.zois
-    found = zoi_pattern(bench.picture.mean, grid, bench.noise / math.sqrt(bench.picture.n))
+    grid = sample.check_region.zois
+    found = zoi_pattern(sample.picture.mean, grid, sample.noise / math.sqrt(sample.picture.n))
     with np.errstate(invalid="ignore", divide="ignore"):
         sharpness = np.sqrt((found.along_x + found.along_y) / (2 * grid.size**2) / found.variance)
     contrast, weaker = np.sqrt(found.variance), np.minimum(found.along_x, found.along_y)
     for values in (contrast, weaker, sharpness):
         values[~grid.active] = np.nan
-    return Zois(bench.ground.grid, sigma, contrast, weaker, sharpness)
+    return Zois(sample.check_region.grid, sigma, contrast, weaker, sharpness)
 
 
 def table_lines(figures: CheckFigures) -> list[str]:

@@ -11,18 +11,18 @@ from typing import Self
 from acquire.camera import Camera
 from acquire.frame import Frame
 from live.config.loading import Config
-from live.setup.check.check_list import CheckFigures, Measured, examine, figures_of, sought
+from live.setup.check.check_list import CheckFigures, KernelFigures, examine, figures_of, find_region
 from live.setup.check.noise_floor import predicted
-from live.setup.check.sample import FEWEST, CheckRegion, CheckSample, FrameStack, taken
+from live.setup.check.sample import MIN_FRAMES, CheckRegion, CheckSample, FrameStack, stack_of
 from live.setup.check.stillness import stillness
 from live.setup.region import Region
 
-GLANCE = 8  # frames
-TURNS = 8
+GLANCE_FRAMES = 8  # frames
+RENEW_EVERY = 8
 """Glances after which noise and motion are predicted and followed anew; searched, while nothing is found."""
 SEARCH_EVERY = 16
 """Glances after which the specimen that was found is looked for anew."""
-RIM = 0.02  # of a region: where it is found a little otherwise, the old one stays
+SAME_REGION = 0.02  # of a region: where it is found a little otherwise, the old one stays
 
 
 class RollingFrames:
@@ -30,7 +30,7 @@ class RollingFrames:
 
     def __init__(self, camera: Camera, length: int, address: str) -> None:
         self._camera, self._address = camera, address
-        self._frames: deque[Frame] = deque(maxlen=max(length, FEWEST))
+        self._frames: deque[Frame] = deque(maxlen=max(length, MIN_FRAMES))
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._drain, name="check", daemon=True)
         self._failed: Exception | None = None
@@ -59,11 +59,11 @@ class RollingFrames:
             Whatever ended the camera.
         """
         frames = self._newest(count)
-        return None if len(frames) < FEWEST else self._shots(frames)
+        return None if len(frames) < MIN_FRAMES else self._stack(frames)
 
     def last(self, count: int) -> FrameStack:
         """The same of a camera that has ended, however few of pictures; DataError where it gave too few."""
-        return self._shots(self._newest(count))
+        return self._stack(self._newest(count))
 
     def _newest(self, count: int) -> list[Frame]:
         if self._failed is not None:
@@ -71,9 +71,9 @@ class RollingFrames:
         with self._lock:
             return list(self._frames)[-count:]
 
-    def _shots(self, frames: list[Frame]) -> FrameStack:
+    def _stack(self, frames: list[Frame]) -> FrameStack:
         lost = sum(frame.lost_before for frame in frames[1:])
-        return taken(frames, self._camera.info, lost, self._address)
+        return stack_of(frames, self._camera.info, lost, self._address)
 
     def frame(self) -> Frame | None:
         """The newest one."""
@@ -113,49 +113,53 @@ class QuickChecker:
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        self._ground: CheckRegion | None = None
-        self._measured: Measured | None = None
+        self._check_region: CheckRegion | None = None
+        self._measured: KernelFigures | None = None
         self._peak = 0.0
-        self._glances = 0
+        self._checks = 0
 
-    def glance(self, shots: FrameStack) -> QuickCheck:
+    def check(self, stack: FrameStack) -> QuickCheck:
         """The figures without the noises that take long; raises as ``examine``."""
-        turn = self._glances
-        self._glances += 1
-        ground = self._ground_at(shots, turn)
-        bench = CheckSample.of(shots, ground)
-        self._measured = measured = self._renewed(bench, turn)
-        figures = figures_of(bench, measured)
+        turn = self._checks
+        self._checks += 1
+        check_region = self._region_at(stack, turn)
+        sample = CheckSample.of(stack, check_region)
+        self._measured = measured = self._renewed(sample, turn)
+        figures = figures_of(sample, measured)
         if math.isfinite(figures.sharpness):
             self._peak = max(self._peak, figures.sharpness)
         return QuickCheck(figures, self._peak)
 
-    def last(self, shots: FrameStack) -> CheckFigures:
+    def last(self, stack: FrameStack) -> CheckFigures:
         """All figures with the table."""
-        return examine(shots, self._config)
+        return examine(stack, self._config)
 
-    def _ground_at(self, shots: FrameStack, turn: int) -> CheckRegion:
+    def _region_at(self, stack: FrameStack, turn: int) -> CheckRegion:
         """Laid anew where the specimen is found elsewhere; its rim alone is never quite the same."""
-        now = self._ground
-        due = SEARCH_EVERY if now is not None and now.region.found else TURNS
+        now = self._check_region
+        due = SEARCH_EVERY if now is not None and now.region.found else RENEW_EVERY
         if now is None or turn % due == 0:
-            region = sought(shots, self._config)
-            if now is None or not _alike(region, now.region, now):
-                now = CheckRegion.of(region, self._config, shots.camera)
-                self._ground, self._measured = now, None
+            region = find_region(stack, self._config)
+            if now is None or not _same_region(region, now.region, now):
+                now = CheckRegion.of(region, self._config, stack.camera)
+                self._check_region, self._measured = now, None
         return now
 
-    def _renewed(self, bench: CheckSample, turn: int) -> Measured:
+    def _renewed(self, sample: CheckSample, turn: int) -> KernelFigures:
         before = self._measured
         if before is None:
-            return Measured.of(bench)
-        if turn % TURNS == 3:
-            return replace(before, predicted=predicted(bench))
-        return replace(before, still=stillness(bench, before.predicted.able)) if turn % TURNS == 6 else before
+            return KernelFigures.of(sample)
+        if turn % RENEW_EVERY == 3:
+            return replace(before, predicted=predicted(sample))
+        return (
+            replace(before, still=stillness(sample, before.predicted.measurable))
+            if turn % RENEW_EVERY == 6
+            else before
+        )
 
 
-def _alike(one: Region, other: Region, ground: CheckRegion) -> bool:
+def _same_region(one: Region, other: Region, check_region: CheckRegion) -> bool:
     """Whether both are the same place, but for a rim."""
-    size = ground.camera.width, ground.camera.height, ground.config.measure.zoi
+    size = check_region.camera.width, check_region.camera.height, check_region.config.measure.zoi
     first, second = (region.inside(*size) for region in (one, other))
-    return one.found == other.found and bool((first ^ second).sum() <= RIM * (first | second).sum())
+    return one.found == other.found and bool((first ^ second).sum() <= SAME_REGION * (first | second).sum())

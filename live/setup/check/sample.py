@@ -30,9 +30,9 @@ from live.setup.region import Region
 if TYPE_CHECKING:
     from analysis import KernelSettings, ZoiGrid
 
-FEWEST = 8  # frames
-MOST_BYTES = 1_500_000_000
-PIXELS_LOOKED_AT = 200_000  # of each frame, for light, bits and noise
+MIN_FRAMES = 8  # frames
+MAX_BYTES = 1_500_000_000
+MAX_PIXELS = 200_000  # of each frame, for light, bits and noise
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,10 +59,10 @@ class FrameStack:
     @property
     def few(self) -> bool:
         """Whether there are too few of them to tell what changes in time."""
-        return len(self) < FEWEST
+        return len(self) < MIN_FRAMES
 
     @property
-    def said(self) -> str:
+    def count_text(self) -> str:
         """How many, in words."""
         return f"{len(self)} picture{'s' if len(self) > 1 else ''}"
 
@@ -93,7 +93,7 @@ class FrameStack:
         """Some of the pixels ``inside`` (H, W) in every frame, (N, P): enough for light, bits and noise."""
         where = np.ones(self.frames.shape[1:], bool) if inside is None else inside
         index = np.flatnonzero(where)
-        index = index[:: max(1, len(index) // PIXELS_LOOKED_AT)]
+        index = index[:: max(1, len(index) // MAX_PIXELS)]
         return np.asarray(self.frames.reshape(len(self), -1)[:, index])
 
     def noise(self) -> float | None:
@@ -127,7 +127,7 @@ def take(config: Config, on_event: EventSink = ignore_event) -> FrameStack:
     lost = 0
     try:
         camera = rig.camera.info
-        n = max(min(2 * reference, MOST_BYTES // (camera.width * camera.height * 2)), FEWEST)
+        n = max(min(2 * reference, MAX_BYTES // (camera.width * camera.height * 2)), MIN_FRAMES)
         with rig.camera:
             for frame in rig.camera:
                 lost += (frame.lost_before if frames else 0) + frame.damaged
@@ -136,15 +136,15 @@ def take(config: Config, on_event: EventSink = ignore_event) -> FrameStack:
                     break
     finally:
         rig.close()
-    return taken(frames, camera, lost, config.camera.address)
+    return stack_of(frames, camera, lost, config.camera.address)
 
 
-def taken(frames: Sequence[Frame], camera: CameraInfo, lost: int, address: str) -> FrameStack:
-    """Whole frames as what is judged: of a camera ``FEWEST`` at least, of pictures one; else DataError."""
-    least = FEWEST if camera.live else 1
-    if len(frames) < least:
+def stack_of(frames: Sequence[Frame], camera: CameraInfo, lost: int, address: str) -> FrameStack:
+    """Whole frames as what is judged: of a camera ``MIN_FRAMES`` at least, of pictures one; else DataError."""
+    needed = MIN_FRAMES if camera.live else 1
+    if len(frames) < needed:
         raise DataError(
-            f"{printable(address)}: gave {len(frames)} whole frames, a check needs {least};"
+            f"{printable(address)}: gave {len(frames)} whole frames, a check needs {needed};"
             " look at the camera, or give more pictures"
         )
     return FrameStack(np.stack([f.image for f in frames]), np.array([f.t for f in frames]), lost, camera)
@@ -204,8 +204,8 @@ class CheckSample:
 
     Attributes
     ----------
-    shots : FrameStack
-    ground : CheckRegion
+    stack : FrameStack
+    check_region : CheckRegion
     settings : KernelSettings
     picture : Burst
         What the pattern is judged by, cut and corrected: all frames, or the first of too few.
@@ -219,8 +219,8 @@ class CheckSample:
         Frames in each of the test; one where nothing is given and the pictures are few.
     """
 
-    shots: FrameStack
-    ground: CheckRegion
+    stack: FrameStack
+    check_region: CheckRegion
     settings: KernelSettings
     picture: Burst
     raw: NDArray[np.float32]
@@ -230,32 +230,32 @@ class CheckSample:
     burst: int
 
     @classmethod
-    def of(cls, shots: FrameStack, ground: CheckRegion) -> CheckSample:
+    def of(cls, stack: FrameStack, check_region: CheckRegion) -> CheckSample:
         """Look at the frames once."""
-        m = ground.config.measure
-        raw = shots.cut(*ground.cut).mean(0, 1 if shots.few else None)
-        picture, pixels = ground.correct(raw), shots.pixels(ground.at_zois)
+        m = check_region.config.measure
+        raw = stack.cut(*check_region.cut).mean(0, 1 if stack.few else None)
+        picture, pixels = check_region.correct(raw), stack.pixels(check_region.at_zois)
         if m.noise_GL is not None:
             noise = m.noise_GL
         else:
-            noise = noise_of_picture(picture.mean) if shots.few else temporal_noise(pixels)
-        reference = m.reference_burst or (1 if shots.few else DEFAULT_REFERENCE_BURST)
-        burst, settings = m.burst or (1 if shots.few else DEFAULT_BURST), kernel_settings(ground.config)
-        return cls(shots, ground, settings, picture, raw.mean, pixels, noise, reference, burst)
+            noise = noise_of_picture(picture.mean) if stack.few else temporal_noise(pixels)
+        reference = m.reference_burst or (1 if stack.few else DEFAULT_REFERENCE_BURST)
+        burst, settings = m.burst or (1 if stack.few else DEFAULT_BURST), kernel_settings(check_region.config)
+        return cls(stack, check_region, settings, picture, raw.mean, pixels, noise, reference, burst)
 
     @property
     def half(self) -> int:
         """Frames of the reference here."""
-        return 1 if self.shots.few else len(self.shots) // 2
+        return 1 if self.stack.few else len(self.stack) // 2
 
     def mean(self, first: int, count: int) -> Burst:
         """A corrected burst, cut to the region."""
-        return self.ground.correct(self.shots.cut(*self.ground.cut).mean(first, count))
+        return self.check_region.correct(self.stack.cut(*self.check_region.cut).mean(first, count))
 
     def halves(self) -> tuple[Burst, Burst]:
         """The reference here and what is measured against it; of too few frames the first and itself."""
         first = self.mean(0, self.half)
-        return first, first if self.shots.few else self.mean(self.half, self.half)
+        return first, first if self.stack.few else self.mean(self.half, self.half)
 
 
 def around(inside: Bools) -> Cut:

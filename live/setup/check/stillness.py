@@ -19,8 +19,8 @@ from live.setup.pictures import correction
 if TYPE_CHECKING:
     from analysis import ZoiGrid
 
-FIRST = 4  # frames averaged as what motion is measured against
-MOST_ZOIS = 64
+FIRST_FRAMES = 4  # frames averaged as what motion is measured against
+MAX_ZOIS = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,19 +57,21 @@ class PictureStillness:
         return max((self.exx, self.eyy), key=lambda s: s.vibration)
 
 
-def stillness(bench: CheckSample, able: NDArray[np.bool_]) -> PictureStillness:
+def stillness(sample: CheckSample, measurable: NDArray[np.bool_]) -> PictureStillness:
     """Each frame against the mean of the first few, over some dozens of ZOIs about the middle of all that are able.
 
     Parameters
     ----------
-    bench : CheckSample
-    able : (R, C) bool
+    sample : CheckSample
+    measurable : (R, C) bool
         ZOIs with a pattern. Without any, and for too few frames, all motion is NaN.
     """
-    times = bench.shots.times
-    able = able & bench.ground.grid.active
+    times = sample.stack.times
+    measurable = measurable & sample.check_region.grid.active
     fields = (
-        _fields(bench, bench.ground.grid.subset(active=able)) if able.any() and not bench.shots.few else []
+        _fields(sample, sample.check_region.grid.subset(active=measurable))
+        if measurable.any() and not sample.stack.few
+        else []
     )
 
     def series(name: str) -> Steadiness:
@@ -77,45 +79,45 @@ def stillness(bench: CheckSample, able: NDArray[np.bool_]) -> PictureStillness:
         values, sigmas = (np.array(column) for column in zip(*pairs, strict=True))
         known = sigmas[np.isfinite(sigmas)]
         # The noise of the reference is common to all frames and moves none of them.
-        own = math.sqrt(1 / (1 + 1 / FIRST)) if known.size else math.nan
+        own = math.sqrt(1 / (1 + 1 / FIRST_FRAMES)) if known.size else math.nan
         return steadiness(times, values, own * float(np.sqrt(np.mean(known**2))) if known.size else 0.0)
 
-    return PictureStillness(series("u"), series("v"), series("exx"), series("eyy"), light(bench))
+    return PictureStillness(series("u"), series("v"), series("exx"), series("eyy"), light(sample))
 
 
-def light(bench: CheckSample) -> Steadiness:
+def light(sample: CheckSample) -> Steadiness:
     """The mean grey level at the ZOIs in each frame, relative."""
-    levels = bench.pixels.mean(axis=1, dtype=np.float64)
+    levels = sample.pixels.mean(axis=1, dtype=np.float64)
     mean = max(float(levels.mean()), 1e-9)
-    noise = bench.noise / math.sqrt(bench.pixels.shape[1]) / mean
-    return steadiness(bench.shots.times, levels / mean, noise)
+    noise = sample.noise / math.sqrt(sample.pixels.shape[1]) / mean
+    return steadiness(sample.stack.times, levels / mean, noise)
 
 
-def _fields(bench: CheckSample, grid: ZoiGrid) -> list[StrainField]:
+def _fields(sample: CheckSample, grid: ZoiGrid) -> list[StrainField]:
     """Of every frame, on no more of the picture than is needed."""
-    ground, middle = bench.ground, _middle(grid)
-    cut = around(_covered(middle, ground.at_zois.shape))
-    correct = correction(ground.config, ground.camera, cut)
-    shots, grid = bench.shots.cut(*cut), moved(middle, cut)
+    check_region, middle = sample.check_region, _middle(grid)
+    cut = around(_covered(middle, check_region.at_zois.shape))
+    correct = correction(check_region.config, check_region.camera, cut)
+    stack, grid = sample.stack.cut(*cut), moved(middle, cut)
     try:
-        kernel, _ = prepare(correct(shots.mean(0, FIRST)), grid, bench.settings, bench.noise)
+        kernel, _ = prepare(correct(stack.mean(0, FIRST_FRAMES)), grid, sample.settings, sample.noise)
     except DataError:
         return []
     fields = [StrainField.from_values(grid, {})]
-    for k in range(len(shots)):
-        frame = correct(shots.mean(k, 1))
-        fields.append(kernel.measure(frame.mean, start=fields[-1], noise=averaged(bench.noise, 1)))
+    for k in range(len(stack)):
+        frame = correct(stack.mean(k, 1))
+        fields.append(kernel.measure(frame.mean, start=fields[-1], noise=averaged(sample.noise, 1)))
     return fields[1:]
 
 
 def _middle(grid: ZoiGrid) -> ZoiGrid:
     """ZOIs side by side rather than one over the other, the nearest to the middle of all; a grid of these alone."""
-    spread = math.ceil(math.sqrt(grid.n_active / MOST_ZOIS))
+    spread = math.ceil(math.sqrt(grid.n_active / MAX_ZOIS))
     thin = grid.subset(every=max(1, min(spread, math.ceil(grid.size / grid.step))))
     thin = thin if thin.n_active else grid
     places = np.argwhere(thin.active)
     far = np.hypot(*(places - places.mean(axis=0)).T)
-    near = places[np.argsort(far, kind="stable")[:MOST_ZOIS]]
+    near = places[np.argsort(far, kind="stable")[:MAX_ZOIS]]
     active = np.zeros(grid.shape, bool)
     active[near[:, 0], near[:, 1]] = True
     (top, left), (bottom, right) = near.min(axis=0), near.max(axis=0)

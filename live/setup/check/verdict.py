@@ -14,10 +14,10 @@ import numpy as np
 from analysis.quality.exposure import Steadiness, aliased, mains_of
 from live.setup.check.check_list import CheckFigures, median
 from live.setup.check.noise_floor import ZoiFloor
-from live.setup.check.sample import FEWEST
+from live.setup.check.sample import MIN_FRAMES
 
-FULL = 0.95  # of the scale: more light than that saturates
-MOST_BURST = 1000
+FULL_LIGHT = 0.95  # of the scale: more light than that saturates
+MAX_BURST = 1000
 
 
 def reaching(floors: Sequence[ZoiFloor], target: float) -> list[tuple[ZoiFloor, int]]:
@@ -58,23 +58,23 @@ def _ways(figures: CheckFigures, target: float) -> Iterator[str]:
         return
     if not any(floor.zoi == figures.zoi for floor, _ in reaching(figures.floors, target)):
         yield from _longer(now, figures.burst, noise.known, target)
-    yield _light_advice(figures, (noise.known / target) ** 2)
+    yield _more_light(figures, (noise.known / target) ** 2)
 
 
 def _longer(floor: ZoiFloor, burst: int, noise: float, target: float) -> Iterator[str]:
     """A burst that is not in the table; the noise of the reference sets a limit to it."""
     one = noise**2 / (1 / floor.reference + 1 / burst)
     rest = target**2 / one - 1 / floor.reference
-    if rest > 1 / MOST_BURST:
+    if rest > 1 / MAX_BURST:
         yield f"burst {math.ceil(1 / rest)} with ZOI {floor.zoi}"
-    elif 2 * one / target**2 < MOST_BURST:
+    elif 2 * one / target**2 < MAX_BURST:
         both = math.ceil(2 * one / target**2)
         yield f"burst {both} and a reference of {both} with ZOI {floor.zoi}"
 
 
-def _light_advice(figures: CheckFigures, factor: float) -> str:
+def _more_light(figures: CheckFigures, factor: float) -> str:
     """Shot noise: twice the light, 1.4 times the signal-to-noise."""
-    room = FULL / max(figures.exposure.high, 1e-3)
+    room = FULL_LIGHT / max(figures.exposure.high, 1e-3)
     times = "twice" if 1.8 < factor < 2.2 else f"{factor:.1f} times"
     if factor <= room:
         return f"{times} the light or exposure"
@@ -82,17 +82,17 @@ def _light_advice(figures: CheckFigures, factor: float) -> str:
     return f"{need:.1f} times the contrast (light helps {room:.1f} times, then it saturates)"
 
 
-MOST_SATURATED, MOST_DARK, MOST_PILED = 1e-4, 0.01, 1e-3
-LEAST_LIGHT = 0.3  # of full scale, 99th percentile
-LEAST_CONTRAST = 0.05  # of full scale
+MAX_SATURATED, MAX_DARK, MAX_PILED = 1e-4, 0.01, 1e-3
+MIN_LIGHT = 0.3  # of full scale, 99th percentile
+MIN_CONTRAST = 0.05  # of full scale
 RADIUS_PX = (
     0.9,
     6.0,
 )  # 3 px of full width, the finest that the iDICs guide of good practice has: biased by 0.0003 px
-MOST_FLICKER, MOST_WITHOUT_PATTERN, LEAST_SHARP = 0.01, 0.02, 0.7
-MOST_NOISE_PX = 0.05  # of one ZOI in one frame
-HONEST = 1.5  # measured over predicted noise
-WITHOUT_TARGET = 1e-3
+MAX_FLICKER, MAX_WITHOUT_PATTERN, MIN_SHARPNESS_RATIO = 0.01, 0.02, 0.7
+MAX_NOISE_PX = 0.05  # of one ZOI in one frame
+MAX_OVER_PREDICTED = 1.5  # measured over predicted noise
+DEFAULT_TARGET = 1e-3
 """Strain noise above which a check is no GO where no target is given: a steel yields at twice that."""
 
 
@@ -117,7 +117,9 @@ class CheckLine:
         )
 
 
-def judge(figures: CheckFigures, target: float | None = None, most_shift_px: float = 0.05) -> list[CheckLine]:
+def check_lines(
+    figures: CheckFigures, target: float | None = None, max_shift_px: float = 0.05
+) -> list[CheckLine]:
     """All lines of the check.
 
     Parameters
@@ -125,7 +127,7 @@ def judge(figures: CheckFigures, target: float | None = None, most_shift_px: flo
     figures : CheckFigures
     target : float or None
         Strain noise of one ZOI that the test needs, dimensionless.
-    most_shift_px : float, px
+    max_shift_px : float, px
         Drift that is accepted.
     """
     return [
@@ -134,7 +136,7 @@ def judge(figures: CheckFigures, target: float | None = None, most_shift_px: flo
         *_camera(figures),
         *_light(figures),
         *_pattern(figures),
-        *_motion(figures, most_shift_px),
+        *_motion(figures, max_shift_px),
         *_load(figures),
         _floor(figures, target),
         *_gauges(figures),
@@ -142,18 +144,20 @@ def judge(figures: CheckFigures, target: float | None = None, most_shift_px: flo
 
 
 def _few(f: CheckFigures) -> Iterator[CheckLine]:
-    if f.shots.few:
-        told = f"{len(f.shots)}, too few for what changes in time; the pattern is that of the first"
+    if f.stack.few:
+        told = f"{len(f.stack)}, too few for what changes in time; the pattern is that of the first"
         yield CheckLine("pictures", told)
 
 
-def _untold(f: CheckFigures, what: str) -> CheckLine:
-    return CheckLine(what, f"not told by {f.shots.said}: it takes {FEWEST} of the still specimen", told=False)
+def _not_measured(f: CheckFigures, what: str) -> CheckLine:
+    return CheckLine(
+        what, f"not told by {f.stack.count_text}: it takes {MIN_FRAMES} of the still specimen", told=False
+    )
 
 
 def _camera(f: CheckFigures) -> Iterator[CheckLine]:
-    if f.shots.lost:
-        yield CheckLine("frames lost", f"{f.shots.lost} between {len(f.shots)}", False,
+    if f.stack.lost:
+        yield CheckLine("frames lost", f"{f.stack.lost} between {len(f.stack)}", False,
                    "a lower frame rate, a smaller picture (--crop), another port or a faster machine")  # fmt: skip
     automatic = ", ".join(f.automatic)
     yield CheckLine("automatic controls", automatic or "none", not automatic, f"put on manual: {automatic}")
@@ -180,21 +184,21 @@ def _bits(f: CheckFigures) -> CheckLine:
 def _light(f: CheckFigures) -> Iterator[CheckLine]:
     e = f.exposure
     yield CheckLine("light", f"1 % to 99 % of the pixels from {e.low:.0%} to {e.high:.0%} of full scale",
-               e.high >= LEAST_LIGHT, "under-exposed: more light, a longer exposure, or open the aperture")  # fmt: skip
-    yield CheckLine("saturated pixels", f"{e.saturated:.3%}", e.saturated <= MOST_SATURATED,
+               e.high >= MIN_LIGHT, "under-exposed: more light, a longer exposure, or open the aperture")  # fmt: skip
+    yield CheckLine("saturated pixels", f"{e.saturated:.3%}", e.saturated <= MAX_SATURATED,
                "less exposure or light, no glare")  # fmt: skip
-    if e.dark > MOST_DARK:
+    if e.dark > MAX_DARK:
         yield CheckLine("black pixels", f"{e.dark:.1%} at zero", False,
                    "raise the black level of the camera, or the light: what is cut off is lost")  # fmt: skip
-    if e.piled > MOST_PILED:
+    if e.piled > MAX_PILED:
         yield CheckLine("clipped below the top", f"{e.piled:.1%} at one highest level", False,
                    "saturated before the end of the scale: less light, or say the true depth (bits=...)")  # fmt: skip
-    yield _untold(f, "flicker") if f.shots.few else _flicker(f)
-    full = 2**f.shots.camera.bits - 1
+    yield _not_measured(f, "flicker") if f.stack.few else _flicker(f)
+    full = 2**f.stack.camera.bits - 1
     shown = f"{f.noise:.2f} GL of one frame, {f.noise / full:.2%} of full scale"
-    if f.shots.few:
+    if f.stack.few:
         yield CheckLine("noise", f"{shown}, {_noise_from(f)}")
-        yield _untold(f, "noise in time")
+        yield _not_measured(f, "noise in time")
     else:
         yield CheckLine("noise", shown, f.noise > 0, "every frame is the same: is this a live picture?")
 
@@ -216,13 +220,13 @@ def _flicker(f: CheckFigures) -> CheckLine:
     standing = [m for m in (50.0, 60.0) if s.rate and aliased(2 * m, s.rate) < 0.02 * s.rate]
     if standing:
         value += f" (at {s.rate:.3g} fps that of {standing[0]:.0f} Hz mains stands still and is not seen)"
-    return CheckLine("flicker", value, max(s.rms, abs(s.drift)) <= MOST_FLICKER or math.isnan(s.rms), words)
+    return CheckLine("flicker", value, max(s.rms, abs(s.drift)) <= MAX_FLICKER or math.isnan(s.rms), words)
 
 
 def _pattern(f: CheckFigures) -> Iterator[CheckLine]:
-    full, z = 2**f.shots.camera.bits - 1, f.zois
+    full, z = 2**f.stack.camera.bits - 1, f.zois
     contrast = median(z.contrast) / full
-    yield CheckLine("contrast (std)", f"{contrast:.1%} of full scale", contrast > LEAST_CONTRAST,
+    yield CheckLine("contrast (std)", f"{contrast:.1%} of full scale", contrast > MIN_CONTRAST,
                "more light, a longer exposure, or a pattern of blacker black and whiter white")  # fmt: skip
     low, high = RADIUS_PX
     words = "finer speckle or a wider field of view" if f.radius > high else "coarser speckle, or focus"
@@ -232,7 +236,7 @@ def _pattern(f: CheckFigures) -> Iterator[CheckLine]:
     yield _sssig(f)
     share, n = z.without_pattern, z.grid.n_active
     yield CheckLine("ZOIs without pattern", "all" if share == 1 else f"{share:.1%} of {n}",
-               share <= MOST_WITHOUT_PATTERN,
+               share <= MAX_WITHOUT_PATTERN,
                "spray a pattern, set focus and exposure" if share == 1 else
                "restrict them with --roi or --mask, or take larger ZOIs")  # fmt: skip
 
@@ -252,7 +256,7 @@ def _sharpness(f: CheckFigures) -> CheckLine:
     if not of:
         return CheckLine("sharpness", "no pattern is seen", False, "spray a pattern, set focus and exposure")
     softest, sharpest = min(of, key=lambda k: of[k]), max(of, key=lambda k: of[k])
-    even = of[softest] >= LEAST_SHARP * of[sharpest]
+    even = of[softest] >= MIN_SHARPNESS_RATIO * of[sharpest]
     text = f"{value}, {softest} {of[softest]:.3f}, {sharpest} {of[sharpest]:.3f}"
     return CheckLine(
         "sharpness", text, even, f"softer at the {softest}: set the camera square, close the aperture"
@@ -266,23 +270,23 @@ def _sssig(f: CheckFigures) -> CheckLine:
     weak = float(np.percentile(known, 5))
     px = math.sqrt(2) * f.noise / math.sqrt(max(weak, 1e-9))
     value = f"median {np.median(known):.3g}, weakest 5 % {weak:.3g} GL^2/px^2 ({px:.4f} px in one frame)"
-    return CheckLine("SSSIG of a ZOI", value, px < MOST_NOISE_PX, "more contrast, larger ZOIs")
+    return CheckLine("SSSIG of a ZOI", value, px < MAX_NOISE_PX, "more contrast, larger ZOIs")
 
 
-def _motion(f: CheckFigures, most_px: float) -> Iterator[CheckLine]:
+def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
     s = f.still
-    if f.shots.few:
-        yield from (_untold(f, what) for what in ("drift", "vibration"))
+    if f.stack.few:
+        yield from (_not_measured(f, what) for what in ("drift", "vibration"))
         return
     if not math.isfinite(s.drift_px):
         yield CheckLine("drift", "not measured", f.zois.without_pattern < 1, "nothing can be followed")
         return
     strain = max((s.exx, s.eyy), key=lambda one: abs(one.drift))
     yield CheckLine("drift", f"{s.drift_px:.4f} px and {strain.drift * 1e6:+.0f} um/m in {s.u.seconds:.3g} s",
-               s.drift_px <= most_px, "keep specimen and camera still")  # fmt: skip
+               s.drift_px <= max_px, "keep specimen and camera still")  # fmt: skip
     shake = s.worse
     yield CheckLine("vibration", f"{_seen(shake, 1, 'px', 4)}, {_seen(s.worse_strain, 1e6, 'um/m', 0)}",
-               shake.vibration <= most_px, "a stiffer tripod, a quiet floor, no fan on the bench")  # fmt: skip
+               shake.vibration <= max_px, "a stiffer tripod, a quiet floor, no fan on the bench")  # fmt: skip
 
 
 def _seen(s: Steadiness, unit: float, name: str, digits: int) -> str:
@@ -312,14 +316,14 @@ def _floor(f: CheckFigures, target: float | None) -> CheckLine:
         return CheckLine(what, f"not measured: too few ZOIs of {f.zoi} px", False, words)
     known = typical if noise is None else noise.known
     told = f"{known * 1e6:.0f} um/m predicted"
-    if f.shots.few:
+    if f.stack.few:
         told += f" from the noise {_noise_from(f)}"
     elif noise is not None:
         told = f"{noise.known * 1e6:.0f} um/m measured, {noise.predicted * 1e6:.0f} predicted"
     value = f"{told} (one ZOI of {f.zoi} px, burst of {f.burst})"
-    if noise is not None and noise.measured > HONEST * noise.predicted:
+    if noise is not None and noise.measured > MAX_OVER_PREDICTED * noise.predicted:
         return CheckLine(what, value, False, "something moves or flickers: vibration, air, lamp")
-    wanted = WITHOUT_TARGET if target is None else target
+    wanted = DEFAULT_TARGET if target is None else target
     asked = "asked for" if target is not None else "that are judged against where no --target is given"
     enough = known <= wanted
     words = f"more than the {wanted * 1e6:.1f} um/m {asked}: {'' if enough else advice(f, wanted)}"

@@ -28,7 +28,7 @@ from live.pipeline.warm_up import kinds_of
 from live.results.maps.painting import lay_cells
 from live.setup.check.check_list import CheckFigures, examine
 from live.setup.check.quick_check import QuickChecker
-from live.setup.check.verdict import CheckLine, judge
+from live.setup.check.verdict import CheckLine, check_lines
 from live.setup.compiling import compile_ahead
 from live.setup.grid import grid_for
 from live.setup.pictures import read_mask
@@ -332,7 +332,7 @@ class SetupSession:
         folder, edition = Path(self._folder.name), self._edition
         config = self.config(folder)
         figures = examine(shots_of(frames, info), config)
-        lines = [*judge(figures, None, config.measure.reference_shift_px), self._fitting(folder)]
+        lines = [*check_lines(figures, None, config.measure.reference_shift_px), self._fitting(folder)]
         self._note(figures)
         self._told["checking"] = False
         if edition == self._edition:  # else the region has been changed meanwhile

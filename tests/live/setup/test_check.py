@@ -22,7 +22,7 @@ from live.config.loading import Config, load_config
 from live.setup.check.check_list import CheckFigures, automatic_controls, examine, table_lines
 from live.setup.check.noise_floor import BURSTS, StrainNoise, ZoiFloor
 from live.setup.check.sample import FrameStack, take
-from live.setup.check.verdict import advice, judge, reaching
+from live.setup.check.verdict import advice, check_lines, reaching
 from live.setup.specimen_drawing import GOOD, POOR
 
 STILL = "sim:uniform?bits=8&fps=50&seconds=20&width=224&height=192&lockstep=yes"
@@ -220,9 +220,9 @@ def test_the_table_has_every_zoi_order_and_burst() -> None:
 def test_a_reference_of_another_length_than_was_tried() -> None:
     """16 and 16 frames taken, 8 wanted: the figures hold for 8."""
     config = load_config(None, {"camera.address": STILL_FLOOR + "&bits=12&noise=1", "measure.zoi": 32})
-    shots = take(config)
+    stack = take(config)
     short = replace(config, measure=replace(config.measure, reference_burst=8))
-    long, few = (examine(shots, c, table=False).floor for c in (config, short))
+    long, few = (examine(stack, c, table=False).floor for c in (config, short))
     assert long is not None
     assert few is not None
     ratio = few.noises[0].predicted / long.noises[0].predicted
@@ -277,9 +277,9 @@ def taken() -> FrameStack:
     return take(load_config(None, {"camera.address": STILL_FLOOR + "&bits=8&noise=1"}))
 
 
-def said(shots: FrameStack, what: str) -> str:
+def said(stack: FrameStack, what: str) -> str:
     config = Config()
-    lines = judge(examine(shots, replace(config, measure=replace(config.measure, zoi=48)), table=False))
+    lines = check_lines(examine(stack, replace(config, measure=replace(config.measure, zoi=48)), table=False))
     return next(line.text() for line in lines if line.what == what)
 
 
@@ -331,7 +331,7 @@ def test_what_surrounds_the_specimen_decides_nothing(taken: FrameStack) -> None:
     config = load_config(None, {"measure.zoi": 48})
     found = examine(shots_of(frames, 8), config, table=False)
     assert found.region.found
-    bad = [line.text() for line in judge(found) if not line.good]
+    bad = [line.text() for line in check_lines(found) if not line.good]
     assert bad == []
     assert found.noise == pytest.approx(examine(taken, config, table=False).noise, rel=0.05)
 

@@ -21,7 +21,7 @@ from live.commands import check_watch as watching
 from live.commands.check_watch import RenewedLines, card, peak_line
 from live.config.loading import load_config
 from live.setup.check.check_list import examine
-from live.setup.check.quick_check import SEARCH_EVERY, TURNS, QuickCheck, QuickChecker
+from live.setup.check.quick_check import SEARCH_EVERY, RENEW_EVERY, QuickCheck, QuickChecker
 from live.setup.check.sample import take
 from live.setup.check.verdict import CheckLine
 from live.setup.region import Region
@@ -114,7 +114,7 @@ def test_the_work_of_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
     }
     config = load_config(None, said)
     sixteen = take(config)
-    shots = replace(sixteen, frames=sixteen.frames[:8], times=sixteen.times[:8])
+    stack = replace(sixteen, frames=sixteen.frames[:8], times=sixteen.times[:8])
     done: list[str] = []
 
     def counted(module: str, name: str, what: str) -> None:
@@ -132,14 +132,14 @@ def test_the_work_of_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
     counted("live.setup.check.check_list", "noise_floors", "table")
     watch, work, glances = QuickChecker(config), list[list[str]](), list[QuickCheck]()
     for _ in range(2 * SEARCH_EVERY):
-        glances.append(watch.glance(shots))
+        glances.append(watch.glance(stack))
         work.append(list(done))
         done.clear()
     assert work[0] == ["search", "reference", "reference"]
     assert all(len(one) <= 1 for one in work[1:])
     later = [what for one in work[SEARCH_EVERY:] for what in one]
-    assert (later.count("reference"), later.count("search")) == (2 * SEARCH_EVERY // TURNS, 1)
-    once, last = examine(shots, config, table=False), glances[-1].figures
+    assert (later.count("reference"), later.count("search")) == (2 * SEARCH_EVERY // RENEW_EVERY, 1)
+    once, last = examine(stack, config, table=False), glances[-1].figures
     assert (last.noise, last.exposure, last.radius, last.still, last.gauges) == (
         once.noise, once.exposure, once.radius, once.still, once.gauges,
     )  # fmt: skip
@@ -149,14 +149,14 @@ def test_the_work_of_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_region_stays_where_only_its_rim_is_found_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
     config = load_config(None, {"camera.address": STILL + "&seconds=5&lockstep=yes", "measure.zoi": 48})
-    shots = take(config)
+    stack = take(config)
     boxes = iter([(8, 8, 200, 176), (9, 8, 199, 176), (60, 8, 148, 176)])
     monkeypatch.setattr(
         "live.setup.check.quick_check.sought", lambda *_: Region(next(boxes), None, "found", True)
     )
     monkeypatch.setattr("live.setup.check.quick_check.SEARCH_EVERY", 1)
     watch = QuickChecker(config)
-    assert [watch.glance(shots).figures.region.box for _ in range(3)] == [
+    assert [watch.glance(stack).figures.region.box for _ in range(3)] == [
         (8, 8, 200, 176),
         (8, 8, 200, 176),
         (60, 8, 148, 176),

@@ -22,7 +22,7 @@ from live.config.loading import load_config
 from live.results import Strain
 from live.setup.devices import open_rig
 from live.setup.placement import auto_gauges, with_auto_gauges
-from live.setup.region import FirstLook, look, placed_on, region_of
+from live.setup.region import FirstLook, first_look, located_on, region_of
 from tests.live.made_up import make_field
 
 SIM = "sim:hole?seconds=2&fps=20&width=320&height=320&hole=40&lockstep=yes"
@@ -107,7 +107,7 @@ def test_nothing_that_stands_out_is_told() -> None:
     picture = np.random.default_rng(0).normal(100, 2, (200, 200)).astype(np.float32)
     camera = CameraInfo("none", "none", 200, 200, 8, False, "nominal")
     said: list[str] = []
-    config, mask = placed_on(
+    config, mask = located_on(
         load_config(None, {"measure.zoi": 32}), FirstLook(picture, 2.0, camera), said.append
     )
     assert mask is None
@@ -126,7 +126,7 @@ def test_a_camera_that_gives_nothing_at_first_is_told(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr("live.setup.region.open_rig", troubled)
     said: list[str] = []
-    seen = look(load_config(None, {"camera.address": SIM}), said.append)
+    seen = first_look(load_config(None, {"camera.address": SIM}), said.append)
     assert said == ["no picture for 2.0 s; still waiting"]
     assert seen.size == (320, 320)
 
@@ -146,7 +146,7 @@ def test_simulated_specimens(address: str) -> None:
     rig.close()
     assert rig.specimen is not None
     truth = rig.specimen.mask()
-    seen = look(config, print)
+    seen = first_look(config, print)
     inside = region_of(config, seen.picture, seen.noise).inside(*seen.size, 32)
     distance = [cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (truth, ~truth)]
     assert not inside[distance[1] > 16].any()

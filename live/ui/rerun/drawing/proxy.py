@@ -22,7 +22,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from live.config.listen_address import listening
+from live.config.listen_address import listening_socket
 
 HOST, TRIES = "127.0.0.1", 50
 PATIENCE_S, PATIENCE_BYTES = 10.0, 500_000
@@ -152,7 +152,7 @@ def is_welcome(head: bytes) -> bool:
 
 def _listening(wanted: int) -> socket.socket:
     try:
-        return listening(HOST, wanted, TRIES)
+        return listening_socket(HOST, wanted, TRIES)
     except OSError:
         raise OSError(f"no free port from {wanted} on; set another view.port") from None
 
