@@ -51,7 +51,7 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
             while not (stopped() or rolling.over):
                 stack = rolling.newest(GLANCE_FRAMES)
                 if stack is not None:
-                    glance = watch.glance(stack)
+                    glance = watch.check(stack)
                     lines = check_lines(glance.figures, target, config.measure.reference_shift_px)
                     told = [*notes[-MOST_NOTES:], peak_line(glance), *(line.text() for line in lines)]
                     show.lines(told, short(glance, lines))

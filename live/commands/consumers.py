@@ -140,15 +140,15 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
     )
     rrd = about.folder / "view.rrd" if v.rrd else None
 
-    def report(text: str, level: Level) -> None:
-        run_state.event_log.report(EventKind.VIEW, "view", text, level)
+    def tell(text: str, level: Level) -> None:
+        run_state.event_log.tell(EventKind.VIEW, "view", text, level)
 
     def serving(view: View) -> None:
         run_state.health.view_port = view.port
-        _announce(view, v.spawn, screen, lambda text: report(text, "warning"))
+        _announce(view, v.spawn, screen, lambda text: tell(text, "warning"))
 
     port = v.port if v.enabled else None
-    return View(setup, port=port, rrd=rrd, report=report, serving=serving)
+    return View(setup, port=port, rrd=rrd, tell=tell, serving=serving)
 
 
 def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], None]) -> None:

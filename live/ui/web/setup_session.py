@@ -283,7 +283,7 @@ class SetupSession:
         edition, config = self._edition, self.config(Path(self._folder.name))
         if self._watched != (edition, config, info):
             self._watched, self._watch = (edition, config, info), QuickChecker(config)
-        self._note(self._watch.glance(shots_of(frames, info)).figures)
+        self._note(self._watch.check(shots_of(frames, info)).figures)
 
     def _compile(self, info: CameraInfo) -> None:
         """By processes of their own: the test that follows must not measure with what this one has compiled."""

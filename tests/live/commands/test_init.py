@@ -132,14 +132,14 @@ def test_devices_are_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("acquire.v4l2.listing.list_cameras", lambda: cameras)
     monkeypatch.setattr("acquire.serial_line.ports.list_serial_ports", lambda: [port])
     monkeypatch.setattr("acquire.serial_line.identify.listen", lambda device: [(9600, b"1 N", finding)])
-    look = init.look
+    take_look = init.first_look
     opened = []
 
     def first_look(config, say):
         opened.append(config.camera.address)
-        return look(load_config(None, {"camera.address": SIM}), say)
+        return take_look(load_config(None, {"camera.address": SIM}), say)
 
-    monkeypatch.setattr(init, "look", first_look)
+    monkeypatch.setattr(init, "first_look", first_look)
     rig = made(tmp_path)
     assert opened == ["/dev/v4l/by-id/usb-Cam?format=Y12"]
     config = load_config(rig, {})

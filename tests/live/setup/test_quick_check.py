@@ -21,7 +21,7 @@ from live.commands import check_watch as watching
 from live.commands.check_watch import RenewedLines, card, peak_line
 from live.config.loading import load_config
 from live.setup.check.check_list import examine
-from live.setup.check.quick_check import SEARCH_EVERY, RENEW_EVERY, QuickCheck, QuickChecker
+from live.setup.check.quick_check import RENEW_EVERY, SEARCH_EVERY, QuickCheck, QuickChecker
 from live.setup.check.sample import take
 from live.setup.check.verdict import CheckLine
 from live.setup.region import Region
@@ -41,7 +41,7 @@ def test_the_peak_is_held() -> None:
     sharp, watch, found = take(config), QuickChecker(config), []
     for blur in (2.0, 1.0, 0.0, 1.5):
         frames = np.stack([gaussian_filter(f.astype(np.float32), blur) for f in sharp.frames[:8]])
-        glance = watch.glance(replace(sharp, frames=np.round(frames).astype(np.uint8), times=sharp.times[:8]))
+        glance = watch.check(replace(sharp, frames=np.round(frames).astype(np.uint8), times=sharp.times[:8]))
         found.append(glance)
     values = [glance.figures.sharpness for glance in found]
     assert values[0] < values[1] < values[2] > values[3]
@@ -132,7 +132,7 @@ def test_the_work_of_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
     counted("live.setup.check.check_list", "noise_floors", "table")
     watch, work, glances = QuickChecker(config), list[list[str]](), list[QuickCheck]()
     for _ in range(2 * SEARCH_EVERY):
-        glances.append(watch.glance(stack))
+        glances.append(watch.check(stack))
         work.append(list(done))
         done.clear()
     assert work[0] == ["search", "reference", "reference"]
@@ -156,7 +156,7 @@ def test_the_region_stays_where_only_its_rim_is_found_otherwise(monkeypatch: pyt
     )
     monkeypatch.setattr("live.setup.check.quick_check.SEARCH_EVERY", 1)
     watch = QuickChecker(config)
-    assert [watch.glance(stack).figures.region.box for _ in range(3)] == [
+    assert [watch.check(stack).figures.region.box for _ in range(3)] == [
         (8, 8, 200, 176),
         (8, 8, 200, 176),
         (60, 8, 148, 176),
