@@ -1,4 +1,4 @@
-"""Where a server listens: a port of this machine alone, or of an address of it, and then only with a token."""
+"""The address at which a server listens: a local port, or an address of this machine, which needs a token."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Self
 from acquire.errors import ConfigError
 
 LOOPBACK = "127.0.0.1"
-MIN_TOKEN_LENGTH = 16  # letters of a token
+MIN_TOKEN_LENGTH = 16  # characters
 ALLOWED = "PORT, or HOST:PORT with the address of this machine, PORT from 1024 to 65535 (0: any free one)"
 
 
@@ -24,7 +24,7 @@ class ListenAddress:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """From ``PORT`` or ``HOST:PORT``; raises ValueError that says what is allowed."""
+        """From ``PORT`` or ``HOST:PORT``; raises ValueError with what is allowed."""
         host, _, port = text.rpartition(":")
         if not port.isascii() or not port.isdigit() or len(port) > 5 or not _port_allowed(int(port)):
             raise ValueError(ALLOWED)
@@ -38,11 +38,11 @@ class ListenAddress:
 
     @property
     def is_loopback(self) -> bool:
-        """Whether only programs of this machine can reach it."""
+        """Whether only programs of this machine can connect."""
         return ipaddress.IPv4Address(self.host).is_loopback
 
     def listen(self, what: str) -> socket.socket:
-        """A listening socket; ``what`` names it in messages.
+        """A listening, non-blocking socket; ``what`` is its name in messages.
 
         Raises
         ------
@@ -60,12 +60,12 @@ class ListenAddress:
 
 
 def listening_socket(host: str, port: int, tries: int = 1) -> socket.socket:
-    """A socket that listens at ``port``, or the next free one of as many as ``tries``.
+    """A socket that listens at the first free one of ``tries`` ports from ``port``.
 
     Raises
     ------
     OSError
-        None is free; the error of the last.
+        No port is free; the error of the last one.
     """
     failed = OSError(f"there is no port {port}")
     for candidate in range(port, min(port + tries, 65536)):
@@ -86,19 +86,19 @@ def _port_allowed(port: int) -> bool:
     return port == 0 or 1024 <= port <= 65535
 
 
-def read_token(place: ListenAddress, path: str | None, what: str) -> str:
-    """The token that a client must give first; empty where none is needed.
+def read_token(address: ListenAddress, path: str | None, what: str) -> str:
+    """The token that a client must send first; empty if none is needed.
 
     Raises
     ------
     ConfigError
-        There must be one and it is not there or too short.
+        A token is needed and there is none, or it is too short.
     """
     if path is None:
-        if place.is_loopback:
+        if address.is_loopback:
             return ""
         raise ConfigError(
-            f"{what}: {place.host} can be reached from other machines; give token_file, a file with a word of"
+            f"{what}: {address.host} can be reached from other machines; give token_file, a file with a word of"
             f" {MIN_TOKEN_LENGTH} letters or more, or listen at {LOOPBACK}"
         )
     try:

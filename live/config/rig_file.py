@@ -1,7 +1,7 @@
-"""The rig file written and changed: comments and order kept, and only what ``load_config`` accepts.
+"""Write and change a rig file: its comments and order stay, and ``load_config`` accepts the result.
 
-What is to be written is checked in a file beside it first; an impossible value leaves everything as it was.
-What stood there before a change is kept as ``NAME.bak``.
+The new text is checked in a temporary file first; an impossible value changes nothing. A change keeps the former
+file as ``NAME.bak``.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 def new_rig(path: Path, text: str, changes: Mapping[str, Any] | None = None) -> Config:
-    """Write ``text``, with ``changes`` as in ``write_rig``, as a new rig file; the configuration that it makes.
+    """Write ``text``, with ``changes`` as in ``write_rig``, as a new rig file; returns its configuration.
 
     Raises
     ------
     ConfigError
-        There is a file already (nothing is overwritten), it cannot be written, or the text is no configuration.
+        The file exists (nothing is overwritten) or cannot be written, or the text is not a configuration.
     """
     if path.exists() or path.is_symlink():
         raise ConfigError(f"{path} exists; nothing is overwritten, choose another name")
@@ -35,21 +35,21 @@ def new_rig(path: Path, text: str, changes: Mapping[str, Any] | None = None) -> 
 
 
 def write_rig(path: Path, changes: Mapping[str, Any]) -> Config:
-    """Change some keys of a rig file, or make a new one of them; the configuration that it makes.
+    """Change keys of a rig file, or make a new file of them; returns its configuration.
 
     Parameters
     ----------
     path : Path
-        What stood there is kept beside it, as ``NAME.bak``.
+        The former file is kept beside it as ``NAME.bak``.
     changes : mapping of "section.key" or "gauges.NAME" to a value
-        Numbers, texts, flags, lists; for a gauge a mapping of its keys. None takes the key or gauge out.
+        Numbers, texts, flags, lists; for a gauge a mapping of its keys. None removes the key or gauge.
 
     Raises
     ------
     ConfigError
-        The file is no TOML, or would not be a configuration; then nothing is changed.
+        The file is not TOML, or the result is not a configuration; then nothing is changed.
     """
-    path = path.resolve()  # a link stays one
+    path = path.resolve()  # a symbolic link stays a link
     return _write_checked(path, _changed(_read(path), changes, path))
 
 
@@ -100,14 +100,14 @@ def _change(document: TOMLDocument, section: str, key: str, value: Any, path: Pa
 
 
 def _toml_value(value: Any) -> Any:
-    """What TOML has: a tuple is a list, a key of None is none."""
+    """A value that TOML can hold: a tuple becomes a list, a key of None is left out."""
     if isinstance(value, Mapping):
         return {key: _toml_value(v) for key, v in value.items() if v is not None}
     return [_toml_value(v) for v in value] if isinstance(value, list | tuple) else value
 
 
 def _write_checked(path: Path, text: str) -> Config:
-    """Checked as a file of its own, then put in the place of what was there."""
+    """Check ``text`` in a temporary file, then replace ``path`` by it."""
     part = path.with_name(f".{path.name}.{uuid4().hex[:8]}.part")
     try:
         with part.open("x", encoding="utf-8") as file:
