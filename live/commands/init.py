@@ -17,7 +17,8 @@ from live.config.loading import load_config
 from live.config.rig_file import new_rig
 from live.pipeline.screen import Screen
 from live.setup.gauge_proposal import Proposal, propose, rig_text
-from live.setup.region import first_look, mask_picture
+from live.setup.pictures import mask_picture
+from live.setup.region import first_look
 from live.setup.specimen_drawing import Overlay, snapshot
 from live.ui.terminal.screen import TerminalScreen
 
