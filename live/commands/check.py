@@ -1,4 +1,4 @@
-"""``phasedic check``: judge the still specimen before the test; exit code 6 for NO-GO."""
+"""``phasedic check``: picture and load cell before the test; exit code 6 for NO-GO."""
 
 from __future__ import annotations
 
@@ -33,17 +33,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic check``."""
     add_options(parser, "devices", "camera", "crop", "dark", "flat", "load")
     parser.add_argument(
-        "--target", type=float, metavar="UM_M", help="strain noise of one ZOI that is needed, um/m"
+        "--target", type=float, metavar="UM_M", help="largest strain noise of one ZOI for the test, um/m"
     )
     parser.add_argument(
         "--snapshot",
         metavar="FILE",
-        help="a new PNG: picture with ruler, region, gauges, quality of the ZOIs",
+        help="write a new PNG: the picture with ruler, region, gauges and the noise of the ZOIs",
     )
     parser.add_argument(
         "--watch",
         action="store_true",
-        help="three times a second until Ctrl-C, with the peak of the sharpness",
+        help="repeat the check three times a second until Ctrl-C, with the peak of the sharpness",
     )
     add_measure(parser)
 
@@ -75,24 +75,23 @@ def command(arguments: argparse.Namespace) -> int:
 
 def _verdict(figures: CheckFigures, ready: bool) -> str:
     if not ready:
-        return "NO-GO: not ready, see what to look at above"
+        return "NO-GO: not ready, see the lines with LOOK above"
     if figures.stack.few:
-        told = "noise in time, flicker, drift and vibration are not judged"
-        return f"GO, as far as {figures.stack.count_text} can tell: {told}"
+        return f"GO, as far as {figures.stack.count_text} can show: noise in time, flicker, drift and vibration are open"
     return "GO: ready"
 
 
 def _drawn(figures: CheckFigures, config: Config, target: float | None) -> NDArray[np.uint8]:
-    """The picture with what was judged over it."""
+    """The picture with region, ZOIs and gauges drawn over it."""
     zois = figures.zois
     gauges = with_auto_gauges(config, zois.grid).gauges
-    wanted = DEFAULT_TARGET if target is None else target
-    overlay = Overlay(figures.region, zois.grid, gauges, zois.sigma, wanted, figures.px_per_mm)
+    limit = DEFAULT_TARGET if target is None else target
+    overlay = Overlay(figures.region, zois.grid, gauges, zois.sigma, limit, figures.px_per_mm)
     return snapshot(figures.stack.mean().mean, overlay)
 
 
 def _load(config: Config) -> LoadReport | None:
-    """A few seconds of the load cell, where there is one."""
+    """The check of a few seconds of the load cell, if there is one."""
     if config.load.address == "none:":
         return None
     cell = open_load(config.load.address, camera_address=config.camera.address)

@@ -1,10 +1,8 @@
-"""The strain noise of one ZOI, predicted and measured on the still specimen, for several ZOIs and bursts.
+"""The strain noise on the still specimen: a table over sizes, orders and bursts, and that of each ZOI and gauge.
 
-One half of the frames is the reference, as in the test; bursts from the other half are measured against
-it. What comes out is noise: the scatter over ZOIs is *measured*, the kernel's own uncertainty *predicted*.
-From too few frames it is predicted alone.
-
-The strain noise of every ZOI and gauge of the test, predicted from one half of the frames against the other.
+One half of the frames is the reference, as in the test; bursts of the other half are measured against it. The result
+is noise: the scatter over ZOIs is *measured*, the uncertainty of the kernel *predicted*. Too few frames give the
+prediction only.
 """
 
 from __future__ import annotations
@@ -27,7 +25,7 @@ from live.setup.check.sample import CheckSample
 from live.setup.placement import with_auto_gauges
 
 if TYPE_CHECKING:
-    from analysis import PhaseKernel, StrainField, ZoiGrid
+    from analysis import PhaseKernel, ZoiGrid
     from live.config.loading import Config
 
 SIZES, ORDERS, BURSTS = (32, 48, 64, 96), (1, 2), (1, 2, 4, 8, 16)
@@ -44,13 +42,13 @@ class StrainNoise:
 
     @property
     def known(self) -> float:
-        """As measured, else as predicted."""
+        """The measured noise, else the predicted one."""
         return self.measured if math.isfinite(self.measured) else self.predicted
 
 
 @dataclass(frozen=True, slots=True)
 class ZoiFloor:
-    """One size and order of ZOIs.
+    """The noise of one size and order of ZOIs.
 
     Attributes
     ----------
@@ -59,11 +57,11 @@ class ZoiFloor:
     l10, vsg : float, px
         l_10% of the strain; side of the virtual strain gauge.
     zois : int
-        ZOIs that were measured; 0: none fits, or none has pattern.
+        Number of measured ZOIs; 0: none fits, or none has pattern.
     noises : tuple of StrainNoise
-        By growing burst; empty where ``zois`` is 0.
+        Ordered by burst; empty if ``zois`` is 0.
     reference : int
-        Frames of the reference that the figures hold for.
+        Frames of the reference for which the figures hold.
     """
 
     zoi: int
@@ -75,7 +73,7 @@ class ZoiFloor:
     reference: int
 
     def of(self, burst: int) -> StrainNoise | None:
-        """The noise for a burst."""
+        """The noise for a burst; None if it is not in the table."""
         return next((noise for noise in self.noises if noise.burst == burst), None)
 
 
@@ -85,12 +83,12 @@ def noise_floors(
     orders: Sequence[int] = ORDERS,
     bursts: Sequence[int] = BURSTS,
 ) -> tuple[ZoiFloor, ...]:
-    """The table, by size and order."""
+    """The table, ordered by size and order."""
     lengths = sorted(set(bursts))
-    sample_bursts = {n: list(_bursts(sample, n)) for n in lengths}
+    taken = {n: list(_bursts(sample, n)) for n in lengths}
     reference = sample.mean(0, sample.half)
     return tuple(
-        _floor(sample, size, order, reference, sample_bursts)
+        _floor(sample, size, order, reference, taken)
         for size in sorted(set(sizes))
         for order in sorted(set(orders))
         if not (order > 1 and sample.settings.estimator == "phase")
@@ -98,7 +96,7 @@ def noise_floors(
 
 
 def _bursts(sample: CheckSample, n: int) -> Iterator[Burst]:
-    """Bursts of n frames from the second half, from its whole length; of too few frames the first alone."""
+    """Bursts of n frames, spread over the second half; of too few frames only the first."""
     if sample.stack.few:
         yield from [sample.mean(0, 1)] if n == 1 else []
         return
@@ -138,7 +136,7 @@ def _measured(kernel: PhaseKernel, burst: Burst, noise: float, start: StrainFiel
 
 
 def _grid(sample: CheckSample, size: int) -> ZoiGrid | None:
-    """ZOIs all over the region, half overlapping at most, not more than are needed."""
+    """ZOIs all over the region, at most half overlapping, at most some MAX_ZOIS."""
     from analysis import Roi, ZoiGrid
 
     inside = sample.check_region.inside
@@ -155,7 +153,7 @@ def _grid(sample: CheckSample, size: int) -> ZoiGrid | None:
 
 
 def _noise(fields: list[StrainField], n: int, sample: CheckSample) -> StrainNoise:
-    """Predicted and, from frames enough, measured; brought to the reference of the test."""
+    """Predicted and, from enough frames, measured noise, scaled to the reference of the test."""
     useful = [field for field in fields if field.n_valid >= MIN_ZOIS]
     if not useful:
         return StrainNoise(n, math.nan, math.nan)
@@ -172,7 +170,7 @@ def _share(reference: int, burst: int) -> float:
 
 
 def _scatter(field: StrainField, name: str) -> float:
-    """Variance over ZOIs about their mean, and the variance that the mean itself takes away."""
+    """Variance over the ZOIs: about their mean, plus the variance of that mean."""
     values = field.value(name)[field.ok]
     return float(values.var()) + field.mean(name)[1] ** 2
 
@@ -182,18 +180,15 @@ def _rms(parts: list[NDArray[Any]]) -> float:
 
 
 def _filled(noises: list[StrainNoise], sample: CheckSample) -> Iterator[StrainNoise]:
-    """Bursts longer than the half that is there are predicted from the longest that was measured."""
-    seen: StrainNoise | None = None
+    """Bursts longer than the available half, predicted from the longest measured one."""
+    longest: StrainNoise | None = None
     for noise in noises:
         if math.isfinite(noise.predicted):
-            seen = noise
+            longest = noise
             yield noise
-        elif seen is not None:
-            ratio = _share(sample.reference, noise.burst) / _share(sample.reference, seen.burst)
-            yield StrainNoise(noise.burst, seen.predicted * math.sqrt(ratio), math.nan)
-
-
-Floats = NDArray[np.float64]
+        elif longest is not None:
+            ratio = _share(sample.reference, noise.burst) / _share(sample.reference, longest.burst)
+            yield StrainNoise(noise.burst, longest.predicted * math.sqrt(ratio), math.nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,27 +202,27 @@ class GaugeNoise:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedNoise:
-    """For a burst of the test.
+    """The predicted strain noise for one burst of the test.
 
     Attributes
     ----------
     sigma : (R, C) float64
-        Of each ZOI, exx and eyy in the mean; NaN without pattern.
+        Of each ZOI, mean of exx and eyy; NaN without pattern.
     gauges : tuple of GaugeNoise
-        Those of the test, and the mean of all ZOIs along the load; empty without pattern.
+        The gauges of the test, and the mean of all ZOIs along the load; empty without pattern.
     """
 
-    sigma: Floats
+    sigma: NDArray[np.float64]
     gauges: tuple[GaugeNoise, ...]
 
     @property
     def measurable(self) -> NDArray[np.bool_]:
-        """(R, C): which ZOIs can be measured."""
+        """(R, C): the ZOIs that can be measured."""
         return np.isfinite(self.sigma)
 
 
-def predicted(sample: CheckSample) -> PredictedNoise:
-    """Predict it."""
+def predict_noise(sample: CheckSample) -> PredictedNoise:
+    """Predict the strain noise of each ZOI and gauge of the test."""
     grid = sample.check_region.grid
     field = _half_on_half(sample)
     if field is None:
@@ -241,19 +236,18 @@ def predicted(sample: CheckSample) -> PredictedNoise:
 
 
 def _half_on_half(sample: CheckSample) -> StrainField | None:
-    """The second half of the frames against the first; None where there is no pattern."""
+    """The second half of the frames against the first; None without pattern."""
     first, second = sample.halves()
     try:
         kernel, _ = prepare(first, sample.check_region.zois, sample.settings, sample.noise)
     except DataError:
         return None
-    # What stands still is where it was; only what is not found there is searched for.
+    # The specimen stands still: the fit begins at zero motion, and only failed ZOIs are searched.
     still = StrainField.from_values(kernel.grid, {})
     return kernel.measure(second.mean, start=still, noise=averaged(sample.noise, sample.half))
 
 
 def _gauges(config: Config, field: StrainField, factor: float) -> Iterator[GaugeNoise]:
-
     if not field.n_valid:
         return
     along = "exx" if config.specimen.first_axis == "x" else "eyy"

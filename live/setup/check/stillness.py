@@ -1,4 +1,4 @@
-"""Whether the specimen stands still and the light is steady, frame by frame."""
+"""Motion of the still specimen and steadiness of the light, frame by frame."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from live.setup.pictures import correction
 if TYPE_CHECKING:
     from analysis import ZoiGrid
 
-FIRST_FRAMES = 4  # frames averaged as what motion is measured against
+FIRST_FRAMES = 4  # frames averaged as the reference of the motion
 MAX_ZOIS = 64
 
 
 @dataclass(frozen=True, slots=True)
 class PictureStillness:
-    """Motion of the mean of the region, and its light.
+    """Mean motion of the region, and its light.
 
     Attributes
     ----------
     u, v : Steadiness, px
     exx, eyy : Steadiness, dimensionless
     light : Steadiness
-        Of the mean grey level, as a part of itself.
+        Of the mean grey level, relative.
     """
 
     u: Steadiness
@@ -43,42 +43,39 @@ class PictureStillness:
 
     @property
     def drift_px(self) -> float:
-        """How far the region drifted, px."""
+        """Drift of the region, px."""
         return math.hypot(self.u.drift, self.v.drift)
 
     @property
     def worse(self) -> Steadiness:
-        """Of u and v, the one that shakes more."""
+        """Of u and v, the one with more vibration."""
         return max((self.u, self.v), key=lambda s: s.vibration)
 
     @property
     def worse_strain(self) -> Steadiness:
-        """Of exx and eyy, the one that shakes more."""
+        """Of exx and eyy, the one with more vibration."""
         return max((self.exx, self.eyy), key=lambda s: s.vibration)
 
 
 def stillness(sample: CheckSample, measurable: NDArray[np.bool_]) -> PictureStillness:
-    """Each frame against the mean of the first few, over some dozens of ZOIs about the middle of all that are able.
+    """The motion of each frame against the mean of the first few, over some dozens of ZOIs about the middle.
 
     Parameters
     ----------
     sample : CheckSample
     measurable : (R, C) bool
-        ZOIs with a pattern. Without any, and for too few frames, all motion is NaN.
+        ZOIs with a pattern. Without any, and with too few frames, all motion is NaN.
     """
     times = sample.stack.times
     measurable = measurable & sample.check_region.grid.active
-    fields = (
-        _fields(sample, sample.check_region.grid.subset(active=measurable))
-        if measurable.any() and not sample.stack.few
-        else []
-    )
+    able = measurable.any() and not sample.stack.few
+    fields = _fields(sample, sample.check_region.grid.subset(active=measurable)) if able else []
 
     def series(name: str) -> Steadiness:
         pairs = [field.mean(name) for field in fields] or [(math.nan, math.nan)] * len(times)
         values, sigmas = (np.array(column) for column in zip(*pairs, strict=True))
         known = sigmas[np.isfinite(sigmas)]
-        # The noise of the reference is common to all frames and moves none of them.
+        # The noise of the reference is common to all frames and is no motion.
         own = math.sqrt(1 / (1 + 1 / FIRST_FRAMES)) if known.size else math.nan
         return steadiness(times, values, own * float(np.sqrt(np.mean(known**2))) if known.size else 0.0)
 
@@ -94,7 +91,7 @@ def light(sample: CheckSample) -> Steadiness:
 
 
 def _fields(sample: CheckSample, grid: ZoiGrid) -> list[StrainField]:
-    """Of every frame, on no more of the picture than is needed."""
+    """The strain field of every frame, on the necessary part of the picture."""
     check_region, middle = sample.check_region, _middle(grid)
     cut = around(_covered(middle, check_region.at_zois.shape))
     correct = correction(check_region.config, check_region.camera, cut)
@@ -111,7 +108,7 @@ def _fields(sample: CheckSample, grid: ZoiGrid) -> list[StrainField]:
 
 
 def _middle(grid: ZoiGrid) -> ZoiGrid:
-    """ZOIs side by side rather than one over the other, the nearest to the middle of all; a grid of these alone."""
+    """A grid of the ZOIs nearest to the middle, side by side rather than overlapping."""
     spread = math.ceil(math.sqrt(grid.n_active / MAX_ZOIS))
     thin = grid.subset(every=max(1, min(spread, math.ceil(grid.size / grid.step))))
     thin = thin if thin.n_active else grid
@@ -128,7 +125,7 @@ def _middle(grid: ZoiGrid) -> ZoiGrid:
 
 
 def _covered(grid: ZoiGrid, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """(H, W) bool: the pixels of its ZOIs."""
+    """(H, W) bool: the pixels of the active ZOIs."""
     found = np.zeros(shape, bool)
     for row, column in np.argwhere(grid.active):
         top, left = grid.first_y[row], grid.first_x[column]

@@ -91,8 +91,8 @@ def test_a_few_pictures_are_judged_by_what_they_tell(
     said = capsys.readouterr().out
     assert f"pictures               {count}, too few" in said
     for what in ("noise in time", "flicker", "drift", "vibration"):
-        assert re.search(rf"\? +{what} +not told by {count} picture.*: it takes 8", said), what
-    assert "predicted from the noise as stated" in said
+        assert re.search(rf"\? +{what} +not measured from {count} picture.*: it takes 8", said), what
+    assert "predicted, noise as given" in said
     assert said.rstrip().splitlines()[-1].startswith(f"GO, as far as {count} picture")
     assert "reference of 16" in said
     assert main(["check", *stated[:4]]) in (0, 6)
@@ -119,7 +119,7 @@ def test_a_black_picture(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> 
     said = capsys.readouterr().out
     assert "nan" not in said
     for what in (
-        "speckle radius         none is seen",
+        "speckle radius         none is visible",
         "sharpness              no pattern",
         "SSSIG of a ZOI         none",
     ):
@@ -319,7 +319,7 @@ def test_bits_that_never_change(taken: FrameStack) -> None:
     deep = taken.frames.astype(np.uint16)
     text = said(shots_of(deep, 16), "bits")
     assert "the highest 8 are never used" in text
-    assert "saturation is not seen" in text
+    assert "saturation is not found" in text
 
 
 def test_what_surrounds_the_specimen_decides_nothing(taken: FrameStack) -> None:
