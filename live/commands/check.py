@@ -77,7 +77,8 @@ def _verdict(figures: CheckFigures, ready: bool) -> str:
     if not ready:
         return "NO-GO: not ready, see the lines with LOOK above"
     if figures.stack.few:
-        return f"GO, as far as {figures.stack.count_text} can show: noise in time, flicker, drift and vibration are open"
+        open_points = "noise in time, flicker, drift and vibration are not measured"
+        return f"GO, as far as {figures.stack.count_text} can show: {open_points}"
     return "GO: ready"
 
 

@@ -16,9 +16,9 @@ from live.commands.options import PICTURES, add_options, add_verbose, overrides,
 from live.config.loading import load_config
 from live.config.rig_file import new_rig
 from live.pipeline.screen import Screen
-from live.setup.gauge_proposal import Proposal, propose, rig_text
 from live.setup.pictures import mask_picture
 from live.setup.region import first_look
+from live.setup.rig_proposal import Proposal, propose, rig_text
 from live.setup.specimen_drawing import Overlay, snapshot
 from live.ui.terminal.screen import TerminalScreen
 
@@ -157,13 +157,13 @@ def _heard(screen: Screen) -> Iterator[tuple[str, str]]:
 
 
 def _show(p: Proposal, png: Path) -> None:
-    grid = p.region.grid(p.config, *p.seen.size)
+    grid = p.region.grid(p.config, *p.first_look.size)
     overlay = Overlay(p.region, grid, p.config.gauges, px_per_mm=p.config.scale.px_per_mm)
-    write_picture(png, snapshot(p.seen.picture, overlay))
+    write_picture(png, snapshot(p.first_look.picture, overlay))
 
 
 def _tell(p: Proposal, rig: Path, png: Path, screen: Screen) -> None:
-    grid = p.region.grid(p.config, *p.seen.size)
+    grid = p.region.grid(p.config, *p.first_look.size)
     screen.say(p.region.words)
     screen.say(
         f"{grid.n_active} ZOIs of {grid.size} px, {grid.step} px apart; load along {p.config.specimen.axis}"

@@ -167,7 +167,7 @@ def test_pictures_that_are_few_leave_their_table(tmp_path: Path, capsys: pytest.
     config = load_config(None, {"camera.address": STILL + "&seconds=5&lockstep=yes"})
     cv2.imwrite(str(tmp_path / "one.png"), take(config).frames[0])
     assert main(["check", "--watch", "--camera", f"files:{tmp_path}", "--no-view", *SMALL]) == 0
-    assert "GO, as far as 1 picture can tell" in capsys.readouterr().out
+    assert "GO, as far as 1 picture can show" in capsys.readouterr().out
 
 
 class Terminal(io.StringIO):
