@@ -14,7 +14,7 @@ from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
 from live.commands.check_watch import watch
 from live.commands.exit_codes import NOT_READY
-from live.commands.options import PICTURES, add_measure, add_options, configured, to_be_new
+from live.commands.options import PICTURES, add_measure, add_options, configured, require_new
 from live.commands.signals import interrupts
 from live.config.loading import Config
 from live.setup.check.check_list import CheckFigures, examine, table_lines
@@ -55,7 +55,7 @@ def command(arguments: argparse.Namespace) -> int:
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")
     if arguments.snapshot:
-        to_be_new(Path(arguments.snapshot), *PICTURES)
+        require_new(Path(arguments.snapshot), *PICTURES)
     target = None if arguments.target is None else arguments.target * 1e-6
     if arguments.watch:
         with interrupts() as stop:

@@ -1,7 +1,4 @@
-"""The standard consumers of a test: results, view and status card; alarms and strain output of a live run.
-
-The signals that a configuration asks for, as consumers of a live run.
-"""
+"""The standard consumers of a test: results, view and status card; in a live run also alarms and strain output."""
 
 from __future__ import annotations
 
@@ -31,12 +28,12 @@ OUTPUT_NAME = "strain out"
 
 
 def signals_of(about: RunInfo, run_state: RunState, screen: Screen) -> list[Consumer]:
-    """Alarms and strain out of a live run; none of a replay.
+    """Alarms and strain outputs of a live run; none for a replay.
 
     Raises
     ------
     ConfigError, DeviceError
-        A port is taken, not there, or needs a token.
+        A port is taken or missing, or needs a token.
     """
     if about.end is None:
         return []
@@ -96,10 +93,10 @@ def _serial(config: Config, lines: Lines) -> StrainOut | None:
 
 
 def standard_consumers(screen: Screen, more: Sequence[Consumer] = ()) -> Compose:
-    """For ``run_live`` and ``replay``: what a configuration asks for, and ``more`` of one's own.
+    """The consumers of a configuration, and ``more``, for ``run_live`` and ``replay``.
 
-    Raises, when it is called, ConfigError or DeviceError where a port is taken, not there, or needs a token, and
-    DataError where a file of the results exists already, or cannot be made.
+    The result raises ConfigError or DeviceError if a port is taken or missing, or needs a token, and DataError if a
+    file of the results exists already or cannot be made.
     """
 
     def compose(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
@@ -110,7 +107,7 @@ def standard_consumers(screen: Screen, more: Sequence[Consumer] = ()) -> Compose
 
 
 def _view_consumers(about: RunInfo, run_state: RunState, screen: Screen) -> list[Consumer]:
-    """The view, and what keeps its words and figures new."""
+    """The view, and the consumers that update its card and figures."""
     view = _view(about, run_state, screen)
     if view is None:
         return []
@@ -152,11 +149,11 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
 
 
 def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], None]) -> None:
-    """Open the viewer where there is a display; else say how to look."""
+    """Open the viewer if there is a display; else print how to open it."""
     if spawn and view.port is not None and spawn_viewer(view.port, trouble) is not None:
-        screen.say("the viewer opens in a window of its own")
+        screen.say("the viewer opens in its own window")
         return
     why = "no display" if spawn else "view.spawn is off"
-    screen.say(f"no viewer is opened here ({why}); it runs without, and this shows it:")
+    screen.say(f"no viewer is opened ({why}); the test runs without it. To open one:")
     for line in view.address.splitlines():
         screen.say(f"  {line}")
