@@ -10,7 +10,17 @@ from pathlib import Path
 
 from acquire.errors import ConfigError
 from live.commands.exit_codes import EXIT_WORDS
-from live.commands.options import MEASURE, add_options, add_section, add_time_span, add_verbose, overrides
+from live.commands.options import (
+    MEASURE,
+    add_as_measured,
+    add_config_file,
+    add_metadata,
+    add_options,
+    add_section,
+    add_time_span,
+    add_verbose,
+    overrides,
+)
 from live.commands.signals import signals
 from live.ui.terminal.screen import TerminalScreen
 
@@ -34,25 +44,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scheduler", metavar="ADDRESS", help=words)
     words = "split longer sessions into chunks of S seconds for several workers (differs by less than 0.005 sigma)"
     parser.add_argument("--chunk", dest="chunk_s", type=float, metavar="S", help=words)
-    parser.add_argument(
-        "--as-measured",
-        action="store_true",
-        help="use the bursts of the live runs; results are bit-identical",
-    )
+    add_as_measured(parser)
     add_time_span(parser)
-    parser.add_argument(
-        "--config", metavar="FILE", help="TOML file of the configuration; options override it"
-    )
+    add_config_file(parser)
     add_options(parser, "measurement", *MEASURE)
     add_options(parser, "evaluation", *OUTPUT)
     add_section(parser)
-    parser.add_argument(
-        "--meta",
-        action="append",
-        default=[],
-        metavar="KEY=TEXT",
-        help="metadata, stored in every file; may be repeated",
-    )
+    add_metadata(parser)
     add_verbose(parser)
 
 

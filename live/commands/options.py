@@ -53,19 +53,11 @@ def _reader(read: Any) -> Any:
 
 def add_measure(parser: argparse.ArgumentParser) -> None:
     """Add the options of measurement and output."""
-    parser.add_argument(
-        "--config", metavar="FILE", help="TOML file of the configuration; options override it"
-    )
+    add_config_file(parser)
     add_options(parser, "measurement", *MEASURE)
     add_options(parser, "output", *OUTPUT)
     add_section(parser)
-    parser.add_argument(
-        "--meta",
-        action="append",
-        default=[],
-        metavar="KEY=TEXT",
-        help="metadata, stored in every file; may be repeated",
-    )
+    add_metadata(parser)
     add_verbose(parser)
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from live.commands.exit_codes import EXIT_WORDS
-from live.commands.options import add_measure, add_time_span, overrides
+from live.commands.options import add_as_measured, add_measure, add_time_span, overrides
 from live.commands.signals import signals
 from live.results.summary import file_lines, summary_lines
 from live.ui.terminal.screen import TerminalScreen
@@ -17,9 +17,7 @@ from live.ui.terminal.screen import TerminalScreen
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic replay``."""
     parser.add_argument("source", help="session.h5, a folder, 'files:shots/*.tif' or 'video:file.mp4'")
-    parser.add_argument(
-        "--as-measured", action="store_true", help="use the bursts of the live run; results are bit-identical"
-    )
+    add_as_measured(parser)
     add_time_span(parser)
     parser.add_argument("--reference", metavar="FILE", help="reference picture (default: the first)")
     words = "forces by file or time_s: a CSV with a header such as file,force_kN"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import ConfigError
-from live.commands.options import add_options, add_verbose, overrides
+from live.commands.options import add_config_file, add_options, add_verbose, overrides
 from live.config.values import AUTO
 from live.results.export.atomic_file import check_free, new_folder
 from live.results.report.saving import save_figures
@@ -59,9 +59,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out", dest="folder", default="study", metavar="DIR", help=f"{words} (default study)"
     )
-    parser.add_argument(
-        "--config", metavar="FILE", help="TOML file of the configuration; options override it"
-    )
+    add_config_file(parser)
     add_options(parser, "measurement", *MEASURE)
     add_verbose(parser)
 

@@ -29,7 +29,7 @@ def grid_for(config: Config, width: int, height: int, mask: NDArray[np.bool_] | 
     m = config.measure
     if m.roi == AUTO and m.mask is None:
         raise ConfigError(
-            "measure.roi = 'auto' is looked for by run, check and replay; here give x,y,width,height or 'all'"
+            "measure.roi = 'auto' is found by run, check and replay; here give x,y,width,height or 'all'"
         )
     x, y, w, h = m.roi if isinstance(m.roi, tuple) else whole_picture(width, height, m.zoi)
     if x + w > width or y + h > height:

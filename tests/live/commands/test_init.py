@@ -33,9 +33,9 @@ def gauges_of_run(rig: Path, out: Path, *arguments: str) -> dict[str, np.ndarray
 
 def test_a_simulated_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rig = made(tmp_path, "--camera", SIM, "--section", "10,2", "--zoi", "32", "--burst", "2")
-    said = capsys.readouterr().out
-    assert "load cell: sim:" in said
-    assert "the specimen was found" in said
+    output = capsys.readouterr().out
+    assert "load cell: sim:" in output
+    assert "the specimen was found" in output
     config = load_config(rig, {})
     assert (config.measure.roi, config.measure.gauges, config.measure.zoi) == ("auto", "auto", 32)
     assert config.specimen.area_m2 == pytest.approx(20e-6)

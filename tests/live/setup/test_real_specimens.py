@@ -34,8 +34,8 @@ HALF = ZOI / 2
 
 def region_in(path: Path) -> Region:
     config = load_config(None, {"camera.address": f"files:{path}", "measure.zoi": ZOI})
-    seen = first_look(config, print)
-    return region_of(config, seen.picture, seen.noise)
+    first = first_look(config, print)
+    return region_of(config, first.picture, first.noise)
 
 
 def test_the_polymer_bar(data_dir: Path) -> None:
