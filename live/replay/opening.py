@@ -21,7 +21,7 @@ from live.results.folder import other_digits
 from live.setup.devices import open_rig
 from live.setup.pictures import read_mask
 from live.setup.prepared import MeasurePlan, PreparedKernel
-from live.setup.region import FirstLook, placed_on
+from live.setup.region import FirstLook, located_on
 
 
 @contextmanager
@@ -91,7 +91,7 @@ def prepared(
     mask = read_mask(config.measure.mask, camera.width, camera.height)
     if AUTO in (config.measure.roi, config.measure.gauges):
         seen = FirstLook(source_of_bursts.reference.mean, _noise_of(source_of_bursts.reference), camera)
-        config, mask = placed_on(config, seen, screen.say)
+        config, mask = located_on(config, seen, screen.say)
     plan = MeasurePlan.of(config, camera, mask)
     plan.compile(camera, screen.status, stopped)
     return plan.on(source_of_bursts.reference, f"the reference of {source}")

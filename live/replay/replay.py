@@ -38,7 +38,7 @@ from live.results.folder import make_folder
 from live.results.writer import write_results
 from live.setup.devices import open_rig
 from live.setup.pictures import with_mask
-from live.setup.region import is_sought
+from live.setup.region import is_auto_region
 
 _MOST_TOLD = 5  # pictures that were left out, in the summary
 
@@ -95,7 +95,7 @@ def _replay_pictures(
     if request.as_measured:
         raise ConfigError(f"{request.source}: --as-measured needs a session; pictures have none")
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
-    region = AUTO if is_sought(config) else config.measure.roi
+    region = AUTO if is_auto_region(config) else config.measure.roi
     config = replace(
         config,
         load=replace(config.load, address="none:"),

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from acquire.events import Event, EventKind, EventSink
-from live.config.channels import MACHINE
+from live.config.channels import SYSTEM_CHANNELS
 from live.config.sections import AlarmConfig
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
@@ -184,7 +184,7 @@ class AlarmWatch(Consumer):
     def idle(self) -> float:
         """Look at the channels of the machine."""
         self._look(self._machine(self._clock()), math.nan)
-        return EVERY_S if any(alarm.config.channel in MACHINE for alarm in self._alarms) else math.inf
+        return EVERY_S if any(alarm.config.channel in SYSTEM_CHANNELS for alarm in self._alarms) else math.inf
 
     def end(self) -> str:
         """How often an alarm came."""
