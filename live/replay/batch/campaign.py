@@ -26,7 +26,7 @@ from live.replay.batch.row import COLUMNS, BatchRow, Value, failed
 from live.replay.batch.scheduler import BatchProgress, ChunkPlan, Scheduler, cut, sweep_chunks
 from live.replay.batch.task import Task, row_done
 from live.replay.batch.test_list import BatchJob
-from live.replay.batch.workdir import sweep, sweep_whole
+from live.replay.batch.workdir import sweep, sweep_done
 from live.replay.batch.worker_processes import Pool, WorkerProcesses
 from live.setup.compiling import compile_ahead
 
@@ -85,7 +85,7 @@ def _put(path: Path, content: bytes) -> None:
         raise DataError(f"{path}: cannot be written ({error.strerror}); make room and call again") from error
 
 
-_LOOK_S = 0.1
+_POLL_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,7 +190,7 @@ def _sweep(out: Path, rows: Mapping[str, BatchRow], tasks: Sequence[Task]) -> No
     """Remove what nobody works on and nobody needs."""
     done = {name for name, row in rows.items() if row.is_done}
     sweep(out)
-    sweep_whole(out, done)
+    sweep_done(out, done)
     sweep_chunks(out, done, {task.name: task for task in tasks})
 
 
@@ -254,21 +254,21 @@ def _work(
     stopping: threading.Event,
     processes: WorkerProcesses,
 ) -> None:
-    standing = BatchProgress(len(tasks), time.monotonic)
-    course = Scheduler(tasks, _cuts(tasks, screen), rows, standing, screen)
-    first = course.first()
+    progress = BatchProgress(len(tasks), time.monotonic)
+    scheduler = Scheduler(tasks, _cuts(tasks, screen), rows, progress, screen)
+    first = scheduler.first()
     workers: Pool | Cluster
     if wanted.scheduler is None:
         _compile(processes, screen, stopping)
-        workers = Pool(first, wanted.workers, course.told, course.done, processes)
+        workers = Pool(first, wanted.workers, scheduler.on_progress, scheduler.on_done, processes)
     else:
-        workers = Cluster(first, wanted.scheduler, course.told, course.done, screen)
+        workers = Cluster(first, wanted.scheduler, scheduler.on_progress, scheduler.on_done, screen)
     try:
-        while not workers.wait(_LOOK_S) and not stopping.is_set():
-            screen.status(standing.words())
+        while not workers.wait(_POLL_S) and not stopping.is_set():
+            screen.status(progress.words())
     finally:
         workers.close()
-    screen.say(standing.words())
+    screen.say(progress.words())
 
 
 def _compile(processes: WorkerProcesses, screen: Screen, stopping: threading.Event) -> None:

@@ -1,7 +1,7 @@
-"""The workers of a Dask cluster that is running already, at the same tasks as ``pool``.
+"""The tasks of a batch on the workers of a running Dask cluster.
 
-Whoever reaches a scheduler has it run any program, here as well as there: docs/scale.md. Dask is the extra
-``cluster``.
+Anyone with access to a scheduler can run any program on its machines and on this one: docs/scale.md. Dask is the
+extra ``cluster``.
 """
 
 from __future__ import annotations
@@ -18,16 +18,16 @@ from typing import Any
 from acquire.errors import ConfigError, DataError
 from acquire.printable import printable
 from live.pipeline.screen import Screen
-from live.replay.batch import worker as there
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress, row_done
-from live.replay.batch.worker_processes import Done, Told
+from live.replay.batch.worker import compile_on_worker, describe_worker, perform_on_worker
+from live.replay.batch.worker_processes import OnDone, OnProgress
 
 log = logging.getLogger(__name__)
 RETRIES = 2  # of a task that raised; one whose worker died is given to another three times by Dask itself
-_ANSWER_S, _STARTS = 10, 3
-_ROOM, _LEAST_ROOM = 4, 200
+_CONNECT_S, _STARTS = 10, 3
+_PER_WORKER, _MIN_QUEUED = 4, 200
 """Tasks a worker, and of all at least, that the scheduler is given; ten thousand at once silence it."""
 
 _GONE_S = 5.0  # without the scheduler
@@ -42,9 +42,9 @@ class Cluster:
     tasks : sequence of Task
     address : str
         tcp://HOST:PORT, or tls://HOST:PORT with Dask's own configuration.
-    told, done : callable
+    on_progress, done : callable
     screen : Screen
-        Told what is odd about the workers.
+        OnProgress what is odd about the workers.
 
     Raises
     ------
@@ -53,18 +53,20 @@ class Cluster:
         or their program is not ours.
     """
 
-    def __init__(self, tasks: Sequence[Task], address: str, told: Told, done: Done, screen: Screen) -> None:
-        self._told, self._done, self._address, self._screen = told, done, address, screen
+    def __init__(
+        self, tasks: Sequence[Task], address: str, on_progress: OnProgress, on_done: OnDone, screen: Screen
+    ) -> None:
+        self._on_progress, self._on_done, self._address, self._screen = on_progress, on_done, address, screen
         self._topic = f"phasedic-{uuid.uuid4().hex}"
         self._tasks: dict[str, Task] = {}
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._waiting, self._left = deque(tasks), dict[str, Any]()
         self._gone_s = self._quiet_s = 0.0
-        self._room = _LEAST_ROOM
+        self._max_queued = _MIN_QUEUED
         self._client = _connected(address)
         try:
             self._prepare(Path(tasks[0].out if not tasks[0].of else Path(tasks[0].out).parent))
-            self._client.subscribe_topic(self._topic, self._hear)
+            self._client.subscribe_topic(self._topic, self._on_event)
             self._feed()
         except BaseException:
             self._client.close()
@@ -79,9 +81,9 @@ class Cluster:
                 ended.append(self._ended.get_nowait())
         rows = self._fetched([future for _, future in ended if future.status == "finished"])
         for task, future in ended:
-            self._take(task, rows.get(future.key) or _given_up(task, future))
+            self._take(task, rows.get(future.key) or _row_without_result(task, future))
         self._feed()
-        self._look(0.0 if ended else seconds)
+        self._check_workers(0.0 if ended else seconds)
         self._gone_s = 0.0 if self._client.status == "running" else self._gone_s + seconds
         if self._gone_s > _GONE_S:
             raise DataError(
@@ -89,7 +91,7 @@ class Cluster:
             )
         return not self._left and not self._waiting
 
-    def _look(self, quiet_s: float) -> None:
+    def _check_workers(self, quiet_s: float) -> None:
         """Tell where nobody is left to work."""
         self._quiet_s = self._quiet_s + quiet_s if quiet_s else 0.0
         if self._quiet_s > _QUIET_S and self._client.status == "running":
@@ -111,13 +113,13 @@ class Cluster:
         token = out / f".{self._topic}"
         token.touch()
         try:
-            found = self._ask(there.about, str(token))
+            found = self._ask(describe_worker, str(token))
         finally:
             token.unlink(missing_ok=True)
         check(self._address, found)
         for words in advice(found):
             self._screen.say(words)
-        self._room = max(_LEAST_ROOM, _ROOM * len(found))
+        self._max_queued = max(_MIN_QUEUED, _PER_WORKER * len(found))
         self._compile(found)
 
     def _ask(self, function: Any, *arguments: Any) -> dict[str, Any]:
@@ -134,7 +136,7 @@ class Cluster:
         last = {answer["host"]: worker for worker, answer in found.items()}
         self._screen.status(f"compiling on {len(last)} machines, once")
         futures = [
-            self._client.submit(there.compile_there, workers=[worker], pure=False) for worker in last.values()
+            self._client.submit(compile_on_worker, workers=[worker], pure=False) for worker in last.values()
         ]
         self._client.gather(futures, errors="skip")
 
@@ -142,8 +144,8 @@ class Cluster:
 
     def _feed(self) -> None:
         """Keep the scheduler at work, with no more than it can look through at once."""
-        if self._client.status == "running" and len(self._left) <= self._room // 2:
-            count = min(len(self._waiting), self._room - len(self._left))
+        if self._client.status == "running" and len(self._left) <= self._max_queued // 2:
+            count = min(len(self._waiting), self._max_queued - len(self._left))
             self._submit([self._waiting.popleft() for _ in range(count)])
 
     def _submit(self, tasks: Sequence[Task]) -> None:
@@ -152,7 +154,7 @@ class Cluster:
         names = [f"{task.folder}-{task.key}" for task in tasks]
         self._tasks |= {task.title: task for task in tasks}
         futures = self._client.map(
-            there.perform_there,
+            perform_on_worker,
             [task.to_json() for task in tasks],
             folder=str(Path.cwd()),
             topic=self._topic,
@@ -164,10 +166,10 @@ class Cluster:
             self._left[task.title] = future
             future.add_done_callback(lambda ended, task=task: self._ended.put((task, ended)))
 
-    def _hear(self, event: tuple[float, Any]) -> None:
+    def _on_event(self, event: tuple[float, Any]) -> None:
         title, *values = event[1]
         if title in self._tasks:
-            self._told(self._tasks[title], TaskProgress(*values))
+            self._on_progress(self._tasks[title], TaskProgress(*values))
 
     def _fetched(self, futures: Sequence[Any]) -> dict[str, BatchRow]:
         """The rows of many in one go; none where the way to them is gone, for they lie on the disk as well."""
@@ -182,7 +184,7 @@ class Cluster:
         if self._client.status != "running" and not row.is_done:
             return  # the scheduler is going, as ``wait`` will tell
         if self._left.pop(task.title, None) is not None:
-            self._waiting.extendleft(self._done(task, row))
+            self._waiting.extendleft(self._on_done(task, row))
 
 
 def _connected(address: str) -> Any:
@@ -198,7 +200,7 @@ def _connected(address: str) -> Any:
         )
     for _ in range(_STARTS):
         try:
-            return Client(address, timeout=_ANSWER_S, set_as_default=False)
+            return Client(address, timeout=_CONNECT_S, set_as_default=False)
         except AssertionError:  # Dask waits ten seconds for a thread of its own, no longer
             log.debug("Dask's own thread did not start")
         except (OSError, ValueError, TypeError) as error:
@@ -249,7 +251,7 @@ def advice(found: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
         )
 
 
-def _given_up(task: Task, future: Any) -> BatchRow:
+def _row_without_result(task: Task, future: Any) -> BatchRow:
     """The row of a task that did not come to its end, or whose own row did not come back."""
     if (row := row_done(task)) is not None:
         return row

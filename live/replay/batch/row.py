@@ -76,16 +76,14 @@ def row_of_chunk(name: str, source: str, as_the_whole: bool, seconds: float) -> 
 def row_of(name: str, source: str, done: Replayed, seconds: float) -> BatchRow:
     """The row of a test that was replayed."""
     history, code = done.run_state.history, done.exit_code
-    said = (
-        "" if code == 0 else "; ".join(done.lines[:1]) if history.told_something else "nothing was measured"
-    )
+    error = "" if code == 0 else "; ".join(done.lines[:1]) if history.has_values else "nothing was measured"
     return BatchRow.of(
         {
             "test": name,
             "source": source,
             "outcome": "done" if code == 0 else "with loss",
             "exit_code": code,
-            "error": said,
+            "error": error,
             **_settings(done.config),
             "burst": done.config.measure.burst or _burst(done),
             **_counts(history),

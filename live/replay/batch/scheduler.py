@@ -26,11 +26,11 @@ from live.pipeline.screen import Screen
 from live.replay.batch.keys import is_session, key_of_chunk
 from live.replay.batch.row import RENEWED, BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress
-from live.replay.batch.workdir import parts, remove
-from live.replay.opening import open_material
+from live.replay.batch.workdir import remove, staging_dirs
+from live.replay.opening import open_source
 
 RUN_IN = 20  # instants; after them 0.0004 sigma is left of a first difference of 0.011
-LEAST = 100  # instants of a chunk, so that the run-in costs a fifth at most
+MIN_INSTANTS = 100  # instants of a chunk, so that the run-in costs a fifth at most
 _SUFFIX = ".chunks"
 
 
@@ -43,13 +43,13 @@ class ChunkPlan:
 
 
 def cut(task: Task) -> ChunkPlan:
-    """Chunks of about ``task.chunk_s`` of at least ``LEAST`` instants, each with its run-in."""
+    """Chunks of about ``task.chunk_s`` of at least ``MIN_INSTANTS`` instants, each with its run-in."""
     assert task.chunk_s is not None
     if not is_session(task.source):
         return ChunkPlan(why="pictures are not cut")
     try:
-        with open_material(task.request(task.folder)) as (source_of_bursts, _):
-            times = source_of_bursts.times
+        with open_source(task.request(task.folder)) as (source, _):
+            times = source.times
     except PhasedicError:
         return ChunkPlan()  # the replay will tell
     if times is None:  # --as-measured, which the command refuses beside --chunk
@@ -63,7 +63,7 @@ def _edges(times: NDArray[np.float64], seconds: float) -> Iterator[int]:
     """Numbers of the bursts that chunks begin with, but for the first."""
     begun = 0
     for number in (np.flatnonzero(np.diff((times - times[:1]) // seconds)) + 1).tolist():
-        if number - begun >= LEAST and len(times) - number >= LEAST:
+        if number - begun >= MIN_INSTANTS and len(times) - number >= MIN_INSTANTS:
             begun = number
             yield number
 
@@ -74,19 +74,19 @@ def _chunk(task: Task, number: int, first: int, stop: int) -> Task:
         task,
         name=f"{number:04d}",
         of=task.name,
-        out=str(_place(task)),
+        out=str(_chunk_folder(task)),
         numbers=(begin, stop),
         run_in=first - begin,
     )
     return dataclasses.replace(chunk, key=key_of_chunk(chunk))
 
 
-def joined(task: Task, found: ChunkPlan) -> Task:
+def join_task(task: Task, found: ChunkPlan) -> Task:
     """The task that makes one result of all chunks."""
     return dataclasses.replace(task, chunks=[str(chunk.folder) for chunk in found.chunks])
 
 
-def _place(task: Task) -> Path:
+def _chunk_folder(task: Task) -> Path:
     return Path(task.out) / f".{task.name}.{task.key[:12]}{_SUFFIX}"
 
 
@@ -94,8 +94,8 @@ def sweep_chunks(out: Path, done: set[str], missing: Mapping[str, Task]) -> None
     """Remove the chunks of tests that are ``done``, and those of other settings of the ``missing``; none at work."""
     for path in sorted(out.glob(f".*{_SUFFIX}")):
         name = path.name[1:].removesuffix(_SUFFIX).rpartition(".")[0]
-        outdated = name in done or (name in missing and path != _place(missing[name]))
-        if outdated and all(part.is_stale for part in parts(path)):
+        outdated = name in done or (name in missing and path != _chunk_folder(missing[name]))
+        if outdated and all(part.is_stale for part in staging_dirs(path)):
             remove(path)
 
 
@@ -122,7 +122,7 @@ class BatchProgress:
         with self._lock:
             self._shares[title] = share
 
-    def told(self, title: str, progress: TaskProgress) -> None:
+    def update(self, title: str, progress: TaskProgress) -> None:
         """How far that task is."""
         with self._lock:
             self._last[title] = progress
@@ -167,7 +167,7 @@ class Scheduler:
         The tests that are cut.
     rows : dict of name to BatchRow
         Filled as tests come to their end.
-    standing : BatchProgress
+    progress : BatchProgress
     screen : Screen
     """
 
@@ -176,13 +176,13 @@ class Scheduler:
         tasks: Sequence[Task],
         cuts: Mapping[str, ChunkPlan],
         rows: dict[str, BatchRow],
-        standing: BatchProgress,
+        progress: BatchProgress,
         screen: Screen,
     ) -> None:
         self._tests = {task.name: task for task in tasks}
         self._cuts = {name: found for name, found in cuts.items() if found.chunks}
         self._left = {name: {chunk.name for chunk in found.chunks} for name, found in self._cuts.items()}
-        self._rows, self._standing, self._screen = rows, standing, screen
+        self._rows, self._progress, self._screen = rows, progress, screen
         self._lock = threading.Lock()
 
     def first(self) -> list[Task]:
@@ -191,18 +191,18 @@ class Scheduler:
         for name, task in self._tests.items():
             pieces = self._cuts[name].chunks if name in self._cuts else (task,)
             for piece in pieces:
-                self._standing.expect(piece.title, 1 / len(pieces))
+                self._progress.expect(piece.title, 1 / len(pieces))
             found += pieces
         return found
 
-    def told(self, task: Task, progress: TaskProgress) -> None:
+    def on_progress(self, task: Task, progress: TaskProgress) -> None:
         """How far a task is."""
         if not task.chunks:  # its chunks have told all that
-            self._standing.told(task.title, progress)
+            self._progress.update(task.title, progress)
 
-    def done(self, task: Task, row: BatchRow) -> Sequence[Task]:
+    def on_done(self, task: Task, row: BatchRow) -> Sequence[Task]:
         """It has come to its end; what can be done now."""
-        self._standing.done(task.title)
+        self._progress.done(task.title)
         if task.of:
             with self._lock:
                 return self._chunk_done(task, row)
@@ -211,7 +211,7 @@ class Scheduler:
 
     def _end(self, name: str, row: BatchRow) -> None:
         self._rows[name] = row
-        self._standing.ended()
+        self._progress.ended()
         if not row.is_well:
             self._screen.say(row.words)
 
@@ -227,12 +227,12 @@ class Scheduler:
             self._end(name, failed(name, task.source, str(row.values["error"]), code))
             return ()
         self._left[name].discard(task.name)
-        return () if self._left[name] else [joined(self._tests[name], self._cuts[name])]
+        return () if self._left[name] else [join_task(self._tests[name], self._cuts[name])]
 
     def _whole(self, name: str) -> Sequence[Task]:
         del self._left[name]
         self._screen.say(f"{name}: a reference was renewed in it; it is not cut, but done whole")
         for chunk in self._cuts[name].chunks:
-            self._standing.expect(chunk.title, 0)
-        self._standing.expect(name)
+            self._progress.expect(chunk.title, 0)
+        self._progress.expect(name)
         return [self._tests[name]]

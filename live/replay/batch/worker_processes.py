@@ -30,7 +30,7 @@ _LEAN = {
 }  # fmt: skip
 _LAST_S = 5.0
 
-Told = Callable[[Task, TaskProgress], object]
+OnProgress = Callable[[Task, TaskProgress], object]
 
 
 class WorkerProcesses:
@@ -95,7 +95,7 @@ class WorkerProcess:
         except (OSError, ValueError):
             return False
 
-    def perform(self, task: Task, told: Told) -> BatchRow | None:
+    def perform(self, task: Task, on_progress: OnProgress) -> BatchRow | None:
         """The row of ``task``; None where the process died over it."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
@@ -107,7 +107,7 @@ class WorkerProcess:
                 if "row" in message:
                     return BatchRow.of(message["row"])
                 if "progress" in message:
-                    told(task, TaskProgress(**message["progress"]))
+                    on_progress(task, TaskProgress(**message["progress"]))
         except (OSError, ValueError):  # half a line is the last word of a process that was killed
             pass
         return None
@@ -130,9 +130,9 @@ class WorkerProcess:
 
 
 log = logging.getLogger(__name__)
-MOST_DEATHS = 3
+MAX_DEATHS = 3
 
-Done = Callable[[Task, BatchRow], Sequence[Task]]
+OnDone = Callable[[Task, BatchRow], Sequence[Task]]
 """Of a task that is done; gives those that can be done now."""
 
 
@@ -144,11 +144,16 @@ class Pool:
     """
 
     def __init__(
-        self, tasks: Sequence[Task], workers: int, told: Told, done: Done, processes: WorkerProcesses
+        self,
+        tasks: Sequence[Task],
+        workers: int,
+        on_progress: OnProgress,
+        on_done: OnDone,
+        processes: WorkerProcesses,
     ) -> None:
         self._processes = processes
         self._waiting, self._deaths = deque(tasks), dict.fromkeys((task.title for task in tasks), 0)
-        self._told, self._done = told, done
+        self._on_progress, self._on_done = on_progress, on_done
         self._stopped = threading.Event()
         self._workers: set[WorkerProcess] = set()
         self._lock = threading.Lock()
@@ -177,12 +182,12 @@ class Pool:
         try:
             while (task := self._next()) is not None:
                 worker = worker or self._new()
-                row = worker.perform(task, self._told) if worker is not None else None
+                row = worker.perform(task, self._on_progress) if worker is not None else None
                 if row is None:
                     self._end(worker)
                     worker, row = None, self._after_death(task)
                 if row is not None:
-                    self._add(self._done(task, row))
+                    self._add(self._on_done(task, row))
         finally:
             self._end(worker)
 
@@ -220,9 +225,9 @@ class Pool:
         if self._stopped.is_set():
             return None
         self._deaths[task.title] += 1
-        if self._deaths[task.title] < MOST_DEATHS:
+        if self._deaths[task.title] < MAX_DEATHS:
             with self._lock:
                 self._waiting.append(task)
             return None
-        words = f"its worker died {MOST_DEATHS} times; is there memory enough for --workers?"
+        words = f"its worker died {MAX_DEATHS} times; is there memory enough for --workers?"
         return failed(task.title, task.source, words, 1)

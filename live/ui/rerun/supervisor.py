@@ -25,7 +25,7 @@ from pathlib import Path
 
 from acquire.events import Level
 from acquire.held_back import held_back
-from live.pipeline.latency import OUTPUT, yield_to_others
+from live.pipeline.latency import OUTPUT, lower_priority
 from live.ui.rerun.messages import Where
 from live.ui.rerun.outbox import Outbox
 from live.ui.rerun.wire import Kind, Message, Reader, WireError, encoded
@@ -199,7 +199,7 @@ class Supervisor:
         self._thread.join(seconds + STUCK_S)
 
     def _run(self) -> None:
-        yield_to_others(OUTPUT)
+        lower_priority(OUTPUT)
         while not self._closing.is_set() and not self.failed:
             self._guarded(self._turn)
         if self._child is not None or not self.starts:

@@ -111,7 +111,7 @@ class PageConsumer(Consumer):
 
     name = "page"
     policy = Policy.NEWEST
-    patience_s = 5.0
+    timeout_s = 5.0
 
     def __init__(
         self, broadcaster: Broadcaster, config: Config, now: Callable[[], float] = time.monotonic
@@ -152,13 +152,15 @@ class PageConsumer(Consumer):
         """Keep the newest."""
         self._newest, self._fresh = measurement, True
 
-    def settled(self, measurement: Measurement) -> None:
+    def matched(self, measurement: Measurement) -> None:
         """A point of the curves."""
         i = measurement.time_step
         if math.isnan(self._t0):
             self._t0 = i.t
         axis = (
-            self._running.run_state.history.axis_by_now if self._running else self._config.specimen.first_axis
+            self._running.run_state.history.current_axis
+            if self._running
+            else self._config.specimen.first_axis
         )
         gauges = [
             i.gauges[name].value if name in i.gauges else getattr(i, name, math.nan) for name in self._names

@@ -19,7 +19,7 @@ from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from examples.second_consumer import main
 from live.pipeline.consumer import Consumer, Policy
-from live.pipeline.consumer_thread import MOST_EVENTS, Outputs
+from live.pipeline.consumer_thread import MAX_EVENTS, Outputs
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.measurement import Measurement
@@ -81,7 +81,7 @@ def test_every_measurement_is_passed_on_and_kept(blocks: bool) -> None:
     ids=["newest wins", "bounded"],
 )
 def test_one_that_falls_behind_is_served_as_its_policy_says(policy: Policy, kept: list[int]) -> None:
-    keeper = Keeper(policy=policy, room=2)
+    keeper = Keeper(policy=policy, queue_size=2)
     keeper.go.clear()
     out, _ = outputs(keeper)
     give(out, [0])
@@ -90,7 +90,7 @@ def test_one_that_falls_behind_is_served_as_its_policy_says(policy: Policy, kept
     keeper.go.set()
     out.end()
     assert keeper.rows == kept
-    assert out.reports[0].line() == "consumer: 3 measurements, 7 passed over; kept"
+    assert out.reports[0].line() == "consumer: 3 measurements, 7 dropped; kept"
 
 
 class Putting(Keeper):
@@ -119,7 +119,7 @@ def test_one_that_puts_things_off_is_asked_when_nothing_comes() -> None:
 
 
 def test_one_that_waits_holds_the_measurement_up_and_loses_nothing() -> None:
-    keeper = Keeper(policy=Policy.WAIT, room=2)
+    keeper = Keeper(policy=Policy.WAIT, queue_size=2)
     keeper.go.clear()
     out, _ = outputs(keeper)
     giver = threading.Thread(target=give, args=(out, range(10)))
@@ -139,7 +139,7 @@ def test_one_that_waits_holds_the_measurement_up_and_loses_nothing() -> None:
     [(DataError("strain.h5: the disk is full"), "the disk is full"), (TypeError("oops"), "by a defect")],
 )
 def test_a_failure_stops_one_consumer_alone(error: Exception, says: str, blocks: bool) -> None:
-    broken = Keeper(policy=Policy.WAIT, fails_at=3, error=error, vital=True, blocks=blocks)
+    broken = Keeper(policy=Policy.WAIT, fails_at=3, error=error, critical=True, blocks=blocks)
     sound = Keeper(policy=Policy.WAIT)
     out, event_log = outputs(broken, sound)
     give(out, range(200))
@@ -162,7 +162,7 @@ def test_a_failure_of_one_that_is_not_vital_is_a_warning() -> None:
 
 
 def test_one_that_waits_and_fails_lets_the_measurement_go_on() -> None:
-    keeper = Keeper(policy=Policy.WAIT, room=1, fails_at=0)
+    keeper = Keeper(policy=Policy.WAIT, queue_size=1, fails_at=0)
     keeper.go.clear()
     out, _ = outputs(keeper)
     giver = threading.Thread(target=give, args=(out, range(10)))
@@ -175,7 +175,7 @@ def test_one_that_waits_and_fails_lets_the_measurement_go_on() -> None:
 
 
 def test_one_that_is_stuck_is_left_behind() -> None:
-    keeper = Keeper(patience_s=0.05)
+    keeper = Keeper(timeout_s=0.05)
     keeper.go.clear()
     out, _ = outputs(keeper)
     give(out, [0])
@@ -191,7 +191,7 @@ class Listener(Consumer):
     name = "listener"
 
     def __init__(self) -> None:
-        self.seen: dict[str, list[Any]] = {"frame": [], "settled": [], "load": [], "event": []}
+        self.seen: dict[str, list[Any]] = {"frame": [], "matched": [], "load": [], "event": []}
         self.begun, self.go = threading.Event(), threading.Event()
 
     def begin(self) -> None:
@@ -201,8 +201,8 @@ class Listener(Consumer):
     def frame(self, frame: Any) -> None:
         self.seen["frame"].append(frame.index)
 
-    def settled(self, measurement: Measurement) -> None:
-        self.seen["settled"].append(measurement.force)
+    def matched(self, measurement: Measurement) -> None:
+        self.seen["matched"].append(measurement.force)
 
     def load(self, sample: LoadSample) -> None:
         self.seen["load"].append(sample)
@@ -223,15 +223,15 @@ def test_each_kind_reaches_those_who_define_it() -> None:
         out.frame(frame(index))
     sample = LoadSample(START, 5.0, unit="kg")
     out.load(sample)
-    for k in range(MOST_EVENTS + 5):
-        event_log.tell(EventKind.NOTE, "operator", str(k))
+    for k in range(MAX_EVENTS + 5):
+        event_log.emit(EventKind.NOTE, "operator", str(k))
     listener.go.set()
     out.end()
     assert listener.seen["frame"] == [2]  # a camera waits for nobody: the newest wins
-    assert listener.seen["settled"] == pytest.approx([0.0, 10.0], abs=1e-6)
+    assert listener.seen["matched"] == pytest.approx([0.0, 10.0], abs=1e-6)
     assert listener.seen["load"] == [sample]
     assert listener.seen["event"][0] == "5"
-    assert len(listener.seen["event"]) == MOST_EVENTS
+    assert len(listener.seen["event"]) == MAX_EVENTS
     line = out.reports[0].line()
     assert (
         line

@@ -135,7 +135,7 @@ def time_steps(count: int) -> list[TimeStep]:
 
 @pytest.mark.parametrize("most", [2000, 50])
 def test_y_until_the_strains_tell(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
-    monkeypatch.setattr(module, "MOST_INSTANTS", most)
+    monkeypatch.setattr(module, "MAX_INSTANTS", most)
     finder, course = AxisFinder("auto"), time_steps(300)
     told = [finder.add(i) for i in course]
     assert set(told[:100]) == {"y"} and set(told[130:]) == {"x"}
@@ -155,7 +155,7 @@ def test_smear_is_told_when_it_begins_and_ends() -> None:
     guard = SmearGuard(told.append)
     burst = burst_of([frame(0), frame(1)])
     for motion in (math.nan, 0.01, 0.2, 0.3, math.nan, 0.045, 0.06, 0.02, 0.01, 0.07):
-        guard.look(dataclasses.replace(burst, motion_px=motion))
+        guard.check(dataclasses.replace(burst, motion_px=motion))
     assert [event.level for event in told] == ["warning", "info", "warning"]
     assert "0.20 px during a burst of 2" in told[0].text
     assert told[0].data == {"motion_px": 0.2, "n": 2}
@@ -197,7 +197,7 @@ def test_a_silent_load_cell_holds_measurements_back_only_so_long() -> None:
         settled += settling.add(make_measurement(k))
         assert len(settling) <= HOLD_S / 0.1 + 1
     assert len(settled) == 40 - len(settling) > 10
-    settled += settling.rest()
+    settled += settling.flush()
     assert len(settled) == 40
     assert np.isnan([m.force for m in settled]).all()
 

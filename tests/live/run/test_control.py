@@ -1,4 +1,4 @@
-"""One grammar of orders, whoever gives them: a line, an answer in a line.
+"""One grammar of controls, whoever gives them: a line, an answer in a line.
 
 Orders over TCP: the same words, answered in a line.
 
@@ -27,7 +27,7 @@ from live.run.control import (
     UNDO,
     ControlPort,
     ControlRefused,
-    TareControls,
+    TareControl,
     answer,
 )
 from live.ui.terminal.screen import TerminalScreen
@@ -121,7 +121,7 @@ def test_orders_are_carried_out_and_answered() -> None:
     asked = [caller.ask(line) for line in ("pause", "note slipped", "nonsense", "quit")]
     assert asked[:2] == ["ok", "ok"] and asked[2].startswith("no: ") and asked[3] == "ok"
     assert live.calls == [(EventKind.PAUSE, ""), (EventKind.NOTE, "slipped"), ("stop", ENDED)]
-    assert "orders are taken at 127.0.0.1:" in said.getvalue()
+    assert "commands are taken at 127.0.0.1:" in said.getvalue()
     caller.close()
     port.close()
     port.close()
@@ -167,7 +167,7 @@ class Bench:
     ) -> None:
         self.now, self.cell, self.told = 10.0, FakeCell(capacity_N), list[tuple[EventKind, Level, str]]()
         sample = LoadSample(10.0, force)
-        self.orders = TareControls(self.cell, lambda: measured, lambda: sample, self._tell, lambda: self.now)
+        self.orders = TareControl(self.cell, lambda: measured, lambda: sample, self._tell, lambda: self.now)
 
     def _tell(self, kind: EventKind, source: str, text: str, level: Level) -> None:
         self.told.append((kind, level, text))
@@ -224,7 +224,7 @@ def test_a_load_that_is_not_known_is_not_none() -> None:
 def test_without_a_load_cell_there_is_nothing_to_tare() -> None:
     bench = Bench()
     bench.cell = FakeCell(None, "none")
-    bench.orders = TareControls(bench.cell, lambda: False, lambda: None, bench._tell, lambda: bench.now)
+    bench.orders = TareControl(bench.cell, lambda: False, lambda: None, bench._tell, lambda: bench.now)
     assert "no load cell" in bench.refused()
 
 

@@ -150,9 +150,9 @@ class Bench:
             self.recorder, self.frame_counts, EventLog(), PreTrigger(seconds, most, above_N), on=on
         )
 
-    def frames(self, *indices: int, needed: bool = False) -> None:
+    def frames(self, *indices: int, is_reference: bool = False) -> None:
         for index in indices:
-            self.pre_trigger.frame(frame(index), needed=needed)
+            self.pre_trigger.frame(frame(index), is_reference=is_reference)
 
     def measured(self, first: int, last: int) -> None:
         self.pre_trigger.event(
@@ -198,7 +198,7 @@ def test_what_is_kept_is_bounded_in_bytes() -> None:
 def test_a_reference_passes_a_shut_gate() -> None:
     bench = Bench()
     bench.frames(0, 1)
-    bench.frames(2, 3, needed=True)
+    bench.frames(2, 3, is_reference=True)
     bench.pre_trigger.event(Event(0.3, EventKind.REFERENCE, "m", "", "info", {"first": 2, "last": 3, "n": 2}))
     bench.frames(4)
     bench.pre_trigger.order(START)
@@ -207,7 +207,7 @@ def test_a_reference_passes_a_shut_gate() -> None:
 
 def test_measured_bursts_are_told_where_their_frames_are_recorded_whole() -> None:
     bench = Bench(0.25)
-    bench.frames(0, 1, needed=True)
+    bench.frames(0, 1, is_reference=True)
     bench.frames(*range(2, 9))
     for first in (2, 5, 6):
         bench.measured(first, first + 1)
@@ -223,7 +223,7 @@ def test_measured_bursts_are_told_where_their_frames_are_recorded_whole() -> Non
 
 def test_with_nothing_kept_no_burst_from_before_is_told() -> None:
     bench = Bench(most=10)
-    bench.frames(0, needed=True)
+    bench.frames(0, is_reference=True)
     bench.frames(1, 2, 3)
     bench.pre_trigger.order(START)
     bench.given.clear()
@@ -283,6 +283,6 @@ def test_a_recorder_that_tells_something_does_not_hold_itself_up() -> None:
     recorder.pre_trigger = PreTriggerBuffer(
         recorder, FrameCounts(), EventLog(), PreTrigger(0.5, 10**6), on=True
     )
-    recorder.pre_trigger.frame(frame(0), needed=False)
+    recorder.pre_trigger.frame(frame(0), is_reference=False)
     recorder.pre_trigger.close({})
     assert recorder.given == [("recorder", None), 0, ("recorder", None), "closed"]

@@ -38,7 +38,7 @@ from tests.live.replay.batch.running import (
 
 
 @pytest.fixture(scope="module")
-def standing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+def progress(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
     with running(tmp_path_factory.mktemp("dask")) as made:
         yield made
 
@@ -67,14 +67,14 @@ LOOPBACK = {"0100007F"}
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="listens to /proc")
-def test_twelve_tests_as_by_the_pool(runs: Path, done: Path, standing: Running, tmp_path: Path) -> None:
+def test_twelve_tests_as_by_the_pool(runs: Path, done: Path, progress: Running, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    words = (runs / "*" / "session.h5", *SETTINGS, "--scheduler", standing.address, "--out", out)
+    words = (runs / "*" / "session.h5", *SETTINGS, "--scheduler", progress.address, "--out", out)
     caller = started(*words)
     until(lambda: bool(parts(out)))
-    assert {pid_of(part) for part in parts(out)} <= set(standing.pids)
-    assert listening(standing.scheduler.pid) == LOOPBACK
-    assert all(listening(worker.pid) == LOOPBACK for worker in standing.workers)
+    assert {pid_of(part) for part in parts(out)} <= set(progress.pids)
+    assert listening(progress.scheduler.pid) == LOOPBACK
+    assert all(listening(worker.pid) == LOOPBACK for worker in progress.workers)
     assert listening(caller.pid) <= LOOPBACK
     assert caller.wait(120) == 0
     names = [row["test"] for row in rows(out)]
@@ -90,7 +90,7 @@ def test_twelve_tests_as_by_the_pool(runs: Path, done: Path, standing: Running, 
 
 def test_a_long_one_in_chunks(
     long: Path,
-    standing: Running,
+    progress: Running,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
@@ -99,7 +99,7 @@ def test_a_long_one_in_chunks(
     monkeypatch.setattr(cluster, "_LEAST_ROOM", 2)
     monkeypatch.setattr(cluster, "_ROOM", 1)
     words = ["batch", str(long), "--zoi", "48", "--step", "16", "--chunk", "10", "--out"]
-    assert main([*words, str(tmp_path / "there"), "--scheduler", standing.address]) == 0
+    assert main([*words, str(tmp_path / "there"), "--scheduler", progress.address]) == 0
     told = capsys.readouterr().out
     assert re.search(r"1 of 1 tests  [1-9]\d* instants  [\d,]+ ZOI/s", told)  # as the workers told
     assert main([*words, str(tmp_path / "here"), "--workers", "2"]) == 0
@@ -111,11 +111,11 @@ def test_a_long_one_in_chunks(
     assert "joined of 3 chunks" in (tmp_path / "there" / "long" / "replay.txt").read_text(encoding="utf-8")
 
 
-def test_one_that_fails_stops_no_other(runs: Path, standing: Running, tmp_path: Path) -> None:
+def test_one_that_fails_stops_no_other(runs: Path, progress: Running, tmp_path: Path) -> None:
     (tmp_path / "broken").mkdir()
     (tmp_path / "broken" / "session.h5").write_bytes(b"no session at all" * 100)
     tests = [str(tmp_path / "broken" / "session.h5"), str(runs / "hole-1" / "session.h5")]
-    words = [*SETTINGS, "--scheduler", standing.address, "--out", str(tmp_path / "out")]
+    words = [*SETTINGS, "--scheduler", progress.address, "--out", str(tmp_path / "out")]
     assert main(["batch", *tests, *words]) == 5
     assert [(row["test"], row["outcome"]) for row in rows(tmp_path / "out")] == [
         ("broken", "failed"),
@@ -124,10 +124,10 @@ def test_one_that_fails_stops_no_other(runs: Path, standing: Running, tmp_path: 
 
 
 def test_a_caller_that_is_killed(
-    runs: Path, standing: Running, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    runs: Path, progress: Running, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    words = (runs / "*" / "session.h5", *SETTINGS, "--scheduler", standing.address, "--out", out)
+    words = (runs / "*" / "session.h5", *SETTINGS, "--scheduler", progress.address, "--out", out)
     caller = started(*words)
     until(lambda: bool(parts(out)))
     caller.kill()
