@@ -185,8 +185,8 @@ def _run(
     finally:
         work.close()
         outputs.end()
-    pace = f"joined of {len(request.parts)} chunks" if request.parts else pace_line(run_state.history, took)
-    lines = [*_account(source, run_state), pace]
+    speed = f"joined of {len(request.parts)} chunks" if request.parts else speed_line(run_state.history, took)
+    lines = [*_account(source, run_state), speed]
     left_out = source.count.left_out if source.count else 0
     lossy = outputs.failed or not run_state.history.has_values or left_out > 0
     code = 130 if stopping.is_set() else 5 if lossy else 0
@@ -219,7 +219,7 @@ def _account(source: ReplaySource, run_state: RunState) -> list[str]:
     return [words, *(f"  {text}" for text in [*why[:_MOST_TOLD], *more])]
 
 
-def pace_line(history: History, seconds: float) -> str:
+def speed_line(history: History, seconds: float) -> str:
     """The speed, and the kernel's share of the time."""
     n, zois = len(history.time_steps), history.column("n_zoi").sum()
     share = history.column("measure_s").sum() / seconds

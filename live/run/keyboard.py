@@ -17,7 +17,7 @@ from live.run.control import ENDED, Controls, answer
 
 HELP = (
     "keys: r new reference, t tare (T whatever the load does, u undo it), p pause/go on, s start recording,"
-    " n note, a alarm off, : any order, qq quit, ? the orders"
+    " n note, a alarm off, : any command, qq quit, ? the commands"
 )
 LINES_HELP = (
     "keys (with Enter): r new reference, t tare (t! whatever the load does, u undo it), p pause/go on,"

@@ -46,12 +46,12 @@ def make(staging: Path) -> None:
 
 
 def publish(staging: Path, folder: Path) -> None:
-    """Let ``part`` take its name; raises DataError where somebody has it by now."""
+    """Rename ``staging`` to ``folder``; raises DataError where that exists by now."""
     try:
         staging.rename(folder)
     except OSError as error:
         raise DataError(
-            f"{folder}: the results cannot take their name ({error.strerror}); nothing is overwritten"
+            f"{folder}: the folder of the results cannot be renamed to this ({error.strerror}); nothing is overwritten"
         ) from error
 
 

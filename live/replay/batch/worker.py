@@ -77,7 +77,7 @@ def describe_worker(token: str, dask_worker: Any = None) -> dict[str, Any]:
         "host": platform.node(),
         "versions": deciding_versions(),
         "threads": {name: os.environ.get(name, "") for name in NEEDED},
-        "sees": Path(token).exists(),
+        "has_token": Path(token).exists(),
     }
 
 

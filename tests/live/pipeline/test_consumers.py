@@ -1,7 +1,4 @@
-"""The outputs: every consumer gets its share, as its policy says; a trouble in one stops that one alone.
-
-The example of a consumer of one's own does what it says.
-"""
+"""Consumers: each gets its data by its policy, and a failure of one stops only that one."""
 
 from __future__ import annotations
 

@@ -1,15 +1,4 @@
-"""The measuring path by itself: noise handed on, the reference renewed, by itself and on demand.
-
-The axis of the load as it is found while a test runs.
-
-The smear guard: warns once when it begins and says when it ends.
-
-The means of an instant: their bits belong to the values alone.
-
-A measurement waits for its force, but not for ever.
-
-Instants as columns: what goes in comes out, in little memory.
-"""
+"""The measuring path: noise, renewal of the reference, guards, means, force matching, and the history."""
 
 from __future__ import annotations
 
@@ -30,7 +19,6 @@ from analysis import KernelSettings, Roi, ZoiGrid
 from analysis.evaluate import GaugeValue
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
-from live.pipeline import history as module
 from live.pipeline.history import AxisFinder, History
 from live.pipeline.measure import NewReference, SmearGuard, measure
 from live.pipeline.measurement import HOLD_S, ForceMatching, TimeStep, ordered_mean
@@ -135,7 +123,7 @@ def time_steps(count: int) -> list[TimeStep]:
 
 @pytest.mark.parametrize("most", [2000, 50])
 def test_y_until_the_strains_tell(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
-    monkeypatch.setattr(module, "MAX_INSTANTS", most)
+    monkeypatch.setattr("live.pipeline.history.MAX_KEPT", most)
     finder, course = AxisFinder("auto"), time_steps(300)
     told = [finder.add(i) for i in course]
     assert set(told[:100]) == {"y"} and set(told[130:]) == {"x"}

@@ -1,9 +1,4 @@
-"""Mailbox and buffer: newest wins, bounded, everything counted.
-
-A lost pace is told once, with its cause.
-
-A thread is made nicer alone.
-"""
+"""Queues between threads, the latency monitor, and the priority of threads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The measure of strain is a setting; where small strains are false, a warning says so."""
+"""The measure of strain is a setting; where small strains are not valid, a warning names another."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A bounded history is even, and has the newest."""
+"""A thinned list is bounded and even, and has the newest item."""
 
 from __future__ import annotations
 

@@ -1,14 +1,8 @@
-"""Reading ahead: the same items in order, bounded, errors in their place, an end that leaves no thread.
-
-What a replay keeps in memory: no picture longer than it is needed.
-
-A session recorded by an earlier version replays to the strain that it replayed to then.
+"""Replay: prefetch, memory, the results of an older recording, and parts of a session.
 
 ``recorded/session.h5`` was recorded by ``phasedic run`` on the simulated rig (sim:woven, 144 x 112 px,
-8 bit, 10 fps, bursts of 2) before the code was laid out in rooms; ``strain.npz`` is what its replay
---as-measured gave then. The last bits belong to a processor, a version of numba and one of the loops.
-
-A part of a session: the same bursts as in the whole, and nothing of the rest is read.
+8 bit, 10 fps, bursts of 2) with an earlier version; ``strain.npz`` is the result of its replay --as-measured
+then. The last bits depend on the processor, the version of numba and that of the loops.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""``phasedic study``: noise as predicted, what is shown, and which setting it recommends."""
+"""``phasedic study``: the predicted noise, the strains, and the recommended setting."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Alarms: when they come and go, what they do, and how soon.
-
-Everything at once in real time: gauges, alarm, outputs, orders; values against the truth, and replayed.
-"""
+"""Alarms: when they come on and go off, their actions and delay; and a run with all outputs in real time."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""One grammar of controls, whoever gives them: a line, an answer in a line.
-
-Orders over TCP: the same words, answered in a line.
-
-Tare as an order: never by one key under load in mid-test.
-"""
+"""Commands and their answers: the grammar, the TCP port, and tare, which is never done by one key under load."""
 
 from __future__ import annotations
 

@@ -1,10 +1,6 @@
-"""The grab thread: reference first, then bursts; every frame has one fate.
+"""The grab thread: reference first, then bursts; every frame is counted once, also under disturbances.
 
-A reference that cannot be measured is not a still one.
-
-What disturbs a test is counted, and over within a second; what could be recorded is recorded.
-
-At small scale, with the camera from memory; docs/data/disturbances.csv has what the same did at full scale.
+The disturbances are at small scale with the camera from memory; docs/data/disturbances.csv has them at full scale.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""The recorder: takes everything, counts what it cannot write, and never ends a test.
-
-The gate before the recorder: what passes, what is kept, in which order, and that every frame is counted.
-"""
+"""The recorder and the pre-trigger buffer: what is recorded, in which order, and that every frame is counted."""
 
 from __future__ import annotations
 

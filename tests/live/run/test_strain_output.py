@@ -1,7 +1,4 @@
-"""Strain out to real clients: a socket, UDP, a second pseudo-terminal; what a client that stalls does not do.
-
-The example of a controller: a PID holds the strain rate of a soft machine through strain out.
-"""
+"""Strain output to real clients (TCP, UDP, serial), also when one stalls; and the controller of the examples."""
 
 from __future__ import annotations
 

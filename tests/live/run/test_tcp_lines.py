@@ -1,4 +1,4 @@
-"""The server of lines with real sockets: answers, tokens, and clients that stall or misbehave."""
+"""The TCP server of lines with real sockets: answers, tokens, and clients that stall or misbehave."""
 
 from __future__ import annotations
 
