@@ -168,26 +168,26 @@ def test_the_mean_of_nothing_is_not_a_number() -> None:
 
 def test_a_measurement_waits_for_its_force() -> None:
     loads = make_loads(0.15, lambda t: 100.0 * t)
-    settling = ForceMatching(loads)
-    settled = [m for k in range(3) for m in settling.add(make_measurement(k))]
-    assert (len(settled), len(settling)) == (2, 1)
+    matching = ForceMatching(loads)
+    matched = [m for k in range(3) for m in matching.add(make_measurement(k))]
+    assert (len(matched), len(matching)) == (2, 1)
     for k in range(16, 40):
         loads.append(LoadSample(START + k / 100, float(k)))
-    settled += settling.add(make_measurement(3))
-    assert len(settling) == 0
-    np.testing.assert_allclose([m.force for m in settled], [0.0, 10.0, 20.0, 30.0], atol=1e-6)
-    assert [m.number for m in settled] == [0, 1, 2, 3]
+    matched += matching.add(make_measurement(3))
+    assert len(matching) == 0
+    np.testing.assert_allclose([m.force for m in matched], [0.0, 10.0, 20.0, 30.0], atol=1e-6)
+    assert [m.number for m in matched] == [0, 1, 2, 3]
 
 
 def test_a_silent_load_cell_holds_measurements_back_only_so_long() -> None:
-    settling, settled = ForceMatching(LoadLog()), []
+    matching, matched = ForceMatching(LoadLog()), []
     for k in range(40):
-        settled += settling.add(make_measurement(k))
-        assert len(settling) <= HOLD_S / 0.1 + 1
-    assert len(settled) == 40 - len(settling) > 10
-    settled += settling.flush()
-    assert len(settled) == 40
-    assert np.isnan([m.force for m in settled]).all()
+        matched += matching.add(make_measurement(k))
+        assert len(matching) <= HOLD_S / 0.1 + 1
+    assert len(matched) == 40 - len(matching) > 10
+    matched += matching.flush()
+    assert len(matched) == 40
+    assert np.isnan([m.force for m in matched]).all()
 
 
 NUMBERS = [one.name for one in fields(TimeStep) if one.name not in ("refused", "gauges")]

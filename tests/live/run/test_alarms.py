@@ -55,8 +55,8 @@ class Kept:
         self.lines.append(line)
 
 
-class Bench:
-    """A watch with values and a machine that say what they are told."""
+class WatchSetup:
+    """An alarm watch with given channel values."""
 
     def __init__(self, *alarms: AlarmConfig) -> None:
         self.events: list[Event] = []
@@ -86,7 +86,7 @@ class Bench:
 
 
 def test_what_comes_is_told_stands_on_the_board_and_goes() -> None:
-    bench = Bench(AlarmConfig(channel="silent_s", above=2.0, name="camera", line="HALT", end=True))
+    bench = WatchSetup(AlarmConfig(channel="silent_s", above=2.0, name="camera", line="HALT", end=True))
     assert bench.check(silent_s=1.0) == []
     assert bench.check(silent_s=2.5) == [
         {"alarm": "camera", "on": True, "value": 2.5, "line": "HALT", "end": True}
@@ -102,7 +102,7 @@ def test_what_comes_is_told_stands_on_the_board_and_goes() -> None:
 
 
 def test_an_alarm_does_only_what_it_is_asked_for() -> None:
-    bench = Bench(AlarmConfig(channel="silent_s", above=2.0))
+    bench = WatchSetup(AlarmConfig(channel="silent_s", above=2.0))
     bench.check(silent_s=3.0)
     assert (bench.rung, bench.ended, bench.sent.lines) == (1, [], [])
 
@@ -113,7 +113,7 @@ def test_every_key_of_an_alarm_is_what_it_looks_at_or_an_action() -> None:
 
 
 def test_an_action_that_fails_keeps_nothing_else_from_being_done() -> None:
-    bench = Bench(AlarmConfig(channel="silent_s", above=2.0, line="HALT", end=True))
+    bench = WatchSetup(AlarmConfig(channel="silent_s", above=2.0, line="HALT", end=True))
     bench.sent.post = lambda line: 1 / 0  # type: ignore[method-assign, assignment, return-value]
     bench.check(silent_s=3.0)
     failed, came = bench.events
@@ -122,7 +122,7 @@ def test_an_action_that_fails_keeps_nothing_else_from_being_done() -> None:
 
 
 def test_a_silenced_alarm_comes_again_only_after_it_has_gone() -> None:
-    bench = Bench(AlarmConfig(channel="silent_s", above=2.0))
+    bench = WatchSetup(AlarmConfig(channel="silent_s", above=2.0))
     bench.check(silent_s=3.0)
     assert bench.active.silence() == ("silent_s above 2",)
     bench.check(silent_s=4.0)
@@ -175,7 +175,7 @@ REAL = "sim:uniform?seconds=4&fps=20&buffers=64&width=224&height=192&bits=12"
 
 
 def test_from_the_stamp_of_the_frame_to_the_action_within_two_measurement_periods(tmp_path: Path) -> None:
-    """In real time; the alarm ends the run, stands in the session, and is silenced by an order."""
+    """In real time; the alarm ends the run, is in the session, and is silenced by a command."""
     alarms = ({"channel": "axial", "above": 0.0005}, {"channel": "force_N", "above": 3000.0, "end": True})
     said: list[str] = []
 

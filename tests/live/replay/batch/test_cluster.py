@@ -206,7 +206,13 @@ def test_nobody_is_there(
 
 
 def answer(**other: object) -> dict[str, object]:
-    alike = {"slots": 1, "host": "a", "versions": deciding_versions(), "threads": ONE_THREAD, "has_token": True}
+    alike = {
+        "slots": 1,
+        "host": "a",
+        "versions": deciding_versions(),
+        "threads": ONE_THREAD,
+        "has_token": True,
+    }
     return alike | other
 
 
