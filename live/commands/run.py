@@ -115,7 +115,7 @@ def run_attended(
 
         if port is not None:
             stack.callback(port.close)
-        stack.enter_context(signals(lambda: stop.ask(INTERRUPTED), screen.say))
+        stack.enter_context(signals(lambda: stop.request(INTERRUPTED), screen.say))
         return run_live(
             config, screen, stop=stop, consumers=standard_consumers(screen, consumers), on_start=on_start
         )

@@ -20,7 +20,7 @@ from urllib.parse import parse_qs, urlsplit
 
 from acquire.errors import DeviceError
 from live.config.listen_address import listening_socket
-from live.pipeline.latency import OUTPUT, yield_to_others
+from live.pipeline.latency import OUTPUT, lower_priority
 from live.ui.web.authorization import HttpError, RequestGuard
 from live.ui.web.broadcaster import Broadcaster, json_bytes
 
@@ -189,7 +189,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = _TIMEOUT_S
 
     def setup(self) -> None:
-        yield_to_others(OUTPUT)
+        lower_priority(OUTPUT)
         super().setup()
 
     def log_message(self, format: str, *args: Any) -> None:

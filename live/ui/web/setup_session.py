@@ -25,8 +25,8 @@ from live.config.gauges import gauges_for
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
 from live.config.values import AUTO, GIVEN
-from live.pipeline.latency import OUTPUT, yield_to_others
-from live.pipeline.warm_up import kinds_of
+from live.pipeline.latency import OUTPUT, lower_priority
+from live.pipeline.warm_up import picture_kinds
 from live.results.maps.painting import lay_cells
 from live.setup.check.check_list import CheckFigures, examine
 from live.setup.check.quick_check import QuickChecker
@@ -269,7 +269,7 @@ class SetupSession:
     # -- the check ----------------------------------------------------------------------------
 
     def _work(self) -> None:
-        yield_to_others(OUTPUT)
+        lower_priority(OUTPUT)
         while not self._closing.is_set():
             try:
                 self._evaluate()
@@ -311,7 +311,7 @@ class SetupSession:
             self.refresh()
 
         phase = self.draft.config.measure.estimator == "phase"
-        compile_ahead(kinds_of(info), phase=phase, say=report, stopped=self._closing.is_set)
+        compile_ahead(picture_kinds(info), phase=phase, say=report, stopped=self._closing.is_set)
         self._values["busy"] = ""
 
     def _begin(self, info: CameraInfo) -> None:
