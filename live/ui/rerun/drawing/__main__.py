@@ -10,7 +10,7 @@ from acquire.signal_mask import unblock_signals
 if __name__ == "__main__":
     for number in (signal.SIGINT, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
-    unblock_signals(signal.SIGINT, signal.SIGHUP)  # held back by live.ui.rerun.supervisor
+    unblock_signals(signal.SIGINT, signal.SIGHUP)  # blocked by live.ui.rerun.supervisor
 
     from live.ui.rerun.drawing.process import main
 
