@@ -81,28 +81,44 @@ class InTurn:
 def _stamped(dispatcher: Any) -> Any:
     """The same, compiled anew when any of the compiled modules has changed.
 
-    numba itself looks only at the file of the function, and would run the old code of its helpers.
+    numba itself compares only the file of the function, and would run the old code of its helpers.
     """
     try:
-        _cache_file(dispatcher)._source_stamp = _own_stamp()
+        cache = _cache_file(dispatcher)
+        cache._source_stamp, cache._load_index = _own_stamp(), _empty_if_foreign(cache._load_index)
     except AttributeError:  # numba's own affair: an installed package changes all its files at once
         log.debug("the stamp of numba's cache could not be set")
     return dispatcher
 
 
-def stamp(package: Path) -> tuple[tuple[str, float, int], ...]:
-    """Name, time and size of every module of the rooms of a package in which loops are compiled.
+def _empty_if_foreign(load: Callable[[], Any]) -> Callable[[], Any]:
+    """numba's index as ``load`` reads it; empty where it names types that another version of phasedic had.
 
-    All modules of such a room: compiled code keeps the values of the constants that it was compiled with.
+    numba reads the types before it compares the stamp, and would fail after every upgrade that moves one.
     """
-    rooms = {m.parent for m in package.rglob("*.py") if _COMPILED.search(m.read_text("utf-8"))}
-    modules = sorted(m for room in rooms for m in room.glob("*.py"))
+
+    def index() -> Any:
+        try:
+            return load()
+        except (ImportError, AttributeError):
+            return {}
+
+    return index
+
+
+def stamp(package: Path) -> tuple[tuple[str, float, int], ...]:
+    """Name, time and size of every module of the folders of a package in which loops are compiled.
+
+    All modules of such a folder: compiled code keeps the values of the constants that it was compiled with.
+    """
+    folders = {m.parent for m in package.rglob("*.py") if _COMPILED.search(m.read_text("utf-8"))}
+    modules = sorted(m for folder in folders for m in folder.glob("*.py"))
     return tuple((m.relative_to(package).as_posix(), m.stat().st_mtime, m.stat().st_size) for m in modules)
 
 
 @lru_cache(maxsize=1)
 def digest() -> str:
-    """What tells these loops from those of another version, whatever time stands on their files."""
+    """A hash of the sources of these loops, whatever the times of their files."""
     modules = (_PACKAGE / name for name, _, _ in _own_stamp())
     return hashlib.sha256(b"".join(module.read_bytes() for module in modules)).hexdigest()[:12]
 

@@ -1,21 +1,16 @@
-"""The threads of a loop are not on the core of the one that called it.
-
-Compiled code is kept, found again by the next process, and thrown away when anything in it changes.
-
-Pieces of work that threads come for: each is done once, whoever does it.
-
-Explicit vectors in compiled loops, and the moments that are made with them, against numpy.
-"""
+"""Compiled loops: their threads and pieces of work, their cache, and explicit vectors against numpy."""
 
 from __future__ import annotations
 
 import ast
 import os
+import pickle
 import shutil
 import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numba
@@ -25,6 +20,7 @@ import pytest
 import analysis
 from analysis.compiled import threads as cores
 from analysis.compiled.layer import threading_layer
+from analysis.compiled import loops
 from analysis.compiled.loops import helper, stamp
 from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.compiled.vectors import LANES, load, spread, store, total, whole
@@ -56,8 +52,8 @@ def where(threads: Any, found: Any) -> Any:
     return calling
 
 
-@pytest.fixture(autouse=True)
-def _caller_works() -> None:
+@pytest.fixture
+def caller_works() -> None:
     if threading_layer() == "workqueue":
         pytest.skip("the caller of a loop only waits here (test_layer.py)")
 
@@ -67,6 +63,7 @@ def _run() -> tuple[Any, np.ndarray, np.ndarray]:
     return where(threads, found), threads, found
 
 
+@pytest.mark.usefixtures("caller_works")
 @pytest.mark.skipif(not cores.LINUX, reason="threads are told apart on Linux only")
 def test_the_threads_of_a_loop_leave_the_core_of_its_caller() -> None:
     allowed = os.sched_getaffinity(0)
@@ -84,6 +81,7 @@ def test_the_threads_of_a_loop_leave_the_core_of_its_caller() -> None:
     assert os.sched_getaffinity(0) == allowed, "the caller may go where it could"
 
 
+@pytest.mark.usefixtures("caller_works")
 @pytest.mark.skipif(not cores.LINUX, reason="threads are told apart on Linux only")
 def test_on_one_core_they_stay() -> None:
     allowed = os.sched_getaffinity(0)
@@ -97,8 +95,6 @@ def test_on_one_core_they_stay() -> None:
 
 
 PACKAGE = Path(analysis.__file__).parent
-
-
 COMPILING = ("analysis.compiled.loops", "analysis.compiled.vectors")
 
 
@@ -112,7 +108,7 @@ def imports_numba(module: Path) -> bool:
 
 COMPILED = sorted(m.relative_to(PACKAGE).as_posix() for m in PACKAGE.rglob("*.py") if imports_numba(m))
 # Their constants are part of the compiled code.
-CONSTANTS = ["fit/validity.py", "fit/bundles.py", "picture/splines.py"]
+CONSTANTS = ["fit/validity.py", "fit/kernel_args.py", "picture/splines.py"]
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +118,7 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_modules_with_compiled_code_were_found() -> None:
-    assert {"compiled/loops.py", "compiled/vectors.py", "picture/warp.py", "follow/climb.py"} <= set(COMPILED)
+    assert {"compiled/loops.py", "compiled/vectors.py", "picture/warp.py", "follow/hill_climb.py"} <= set(COMPILED)
 
 
 @pytest.mark.parametrize("module", [*COMPILED, *CONSTANTS])
@@ -160,6 +156,21 @@ def test_a_second_process_compiles_nothing() -> None:
         )
         assert done.returncode == 0, done.stderr
     assert done.stdout.split() == ["1", "0"] * 3
+
+
+def test_an_index_with_types_of_another_version_is_empty(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As after an upgrade that moves a class: the loop is compiled again."""
+    cache = loops._cache_file(every_operation)
+    index = tmp_path / "index.nbi"
+    monkeypatch.setattr(cache, "_index_path", str(index))
+    moved = type("Args", (), {"__module__": "moved", "__qualname__": "Args"})
+    monkeypatch.setitem(sys.modules, "moved", SimpleNamespace(Args=moved))
+    index.write_bytes(pickle.dumps(numba.__version__) + pickle.dumps((cache._source_stamp, {moved: "x.nbc"})))
+    assert list(cache._load_index().values()) == ["x.nbc"]
+    monkeypatch.delitem(sys.modules, "moved")
+    assert cache._load_index() == {}
 
 
 @numba.njit(parallel=True)
