@@ -53,10 +53,10 @@ def parallel(function: Callable[..., Any]) -> Any:
     time in place of 25 for the iteration).
     """
     options = {"error_model": "numpy", "fastmath": FAST, "cache": True, "nogil": True, "parallel": True}
-    return InTurn(_stamped(numba.njit(function, **options)))
+    return ExclusiveLoop(_stamped(numba.njit(function, **options)))
 
 
-class InTurn:
+class ExclusiveLoop:
     """A loop that all threads of the program take in turn.
 
     Each uses all cores, so that two at once gain nothing, and where numba finds neither OpenMP nor TBB they
@@ -71,10 +71,10 @@ class InTurn:
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the loop, once no other one runs."""
-        with InTurn._turn:
-            if not InTurn._started:
+        with ExclusiveLoop._turn:
+            if not ExclusiveLoop._started:
                 threading_layer()
-                InTurn._started = True
+                ExclusiveLoop._started = True
             return self.dispatcher(*arguments)
 
 

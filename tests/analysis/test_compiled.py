@@ -18,9 +18,9 @@ import numpy as np
 import pytest
 
 import analysis
+from analysis.compiled import loops
 from analysis.compiled import threads as cores
 from analysis.compiled.layer import threading_layer
-from analysis.compiled import loops
 from analysis.compiled.loops import helper, stamp
 from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
 from analysis.compiled.vectors import LANES, load, spread, store, total, whole
@@ -95,7 +95,7 @@ def test_on_one_core_they_stay() -> None:
 
 
 PACKAGE = Path(analysis.__file__).parent
-COMPILING = ("analysis.compiled.loops", "analysis.compiled.vectors")
+COMPILERS = ("analysis.compiled.loops", "analysis.compiled.vectors")
 
 
 def imports_numba(module: Path) -> bool:
@@ -103,7 +103,7 @@ def imports_numba(module: Path) -> bool:
     nodes = ast.parse(module.read_text(encoding="utf-8")).body
     names = [n.module or "" for n in nodes if isinstance(n, ast.ImportFrom)]
     names += [alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names]
-    return any(name.split(".")[0] == "numba" or name.startswith(COMPILING) for name in names)
+    return any(name.split(".")[0] == "numba" or name.startswith(COMPILERS) for name in names)
 
 
 COMPILED = sorted(m.relative_to(PACKAGE).as_posix() for m in PACKAGE.rglob("*.py") if imports_numba(m))
@@ -118,7 +118,9 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_modules_with_compiled_code_were_found() -> None:
-    assert {"compiled/loops.py", "compiled/vectors.py", "picture/warp.py", "follow/hill_climb.py"} <= set(COMPILED)
+    assert {"compiled/loops.py", "compiled/vectors.py", "picture/warp.py", "follow/hill_climb.py"} <= set(
+        COMPILED
+    )
 
 
 @pytest.mark.parametrize("module", [*COMPILED, *CONSTANTS])
@@ -226,7 +228,7 @@ def of_the_difference(images, samples, at, pitch, g, line, size, rows, columns, 
     return difference_moments(columns, rows, line, out)
 
 
-def test_a_vector_does_what_is_said() -> None:
+def test_operations_on_vectors() -> None:
     a, out = RNG.normal(size=LANES + 5).astype(np.float32), np.zeros(LANES + 3, np.float32)
     found = every_operation(a, 3, np.float32(1.5), out)
     expected = a[3 : 3 + LANES] * 1.5 - 1.5 + a[3 : 3 + LANES] + 1.5

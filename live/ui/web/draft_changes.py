@@ -108,7 +108,7 @@ def gauge(session: SetupSession, said: Said) -> None:
     if "points" in said:
         kind = said.get("kind", before.get("kind"))
         table = before | {"kind": kind, **_placed(kind, said["points"])}
-        name = name or _unused(GAUGE_KINDS[kind].usual, gauges)
+        name = name or _unused(GAUGE_KINDS[kind].default_name, gauges)
     if not isinstance(name, str) or not isinstance(table, dict | None):
         raise ConfigError("a gauge has a name and a table")
     changes: dict[str, Any] = {}
@@ -125,7 +125,7 @@ def _placed(kind: object, points: object) -> dict[str, Any]:
         raise ConfigError(f"there is no such kind of gauge; there are {', '.join(GAUGE_KINDS)}")
     if not _are_points(points, 1, MOST_POINTS):
         raise ConfigError(f"a gauge has 1 to {MOST_POINTS} places, x and y in px")
-    return GAUGE_KINDS[kind].placed([(float(x), float(y)) for x, y in points])
+    return GAUGE_KINDS[kind].from_handles([(float(x), float(y)) for x, y in points])
 
 
 def _unused(usual: str, taken: Container[str]) -> str:
