@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Burst
-from analysis.evaluate import FEWEST_STILL, evenly, noise_floor, still_phase
-from analysis.quality.exposure import gauge_length, l10_strain
+from analysis.evaluate import MIN_STILL_INSTANTS, evenly, noise_floor, still_phase
+from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.loading import Config
 from live.pipeline.reference import averaged
 from live.replay.source import ReplaySource
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 _LOADED_FORCE = 0.98  # of the highest
 MAX_STILL, MAX_LOADED = 8, 6
-MIN_STILL, MIN_LOADED = FEWEST_STILL, 2
+MIN_STILL, MIN_LOADED = MIN_STILL_INSTANTS, 2
 
 Seconds = tuple[float, float]
 Array = NDArray[np.float64]

@@ -163,12 +163,12 @@ def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
 
 def axis_words(load: LoadAxis) -> str:
     """The axis of the load with the angle to it; empty where the strains do not tell."""
-    if not load.off.known:
+    if not load.angle.known:
         return ""
-    words = f"largest strain {interval(load.off, math.pi / 180, 'degrees')} off {load.axis} (clockwise)"
+    words = f"largest strain {interval(load.angle, math.pi / 180, 'degrees')} off {load.axis} (clockwise)"
     if load.found:
         return f"{words}; {load.axis} was found to be the axis of the load"
-    wrong = abs(load.off.value) > math.pi / 4
+    wrong = abs(load.angle.value) > math.pi / 4
     return words + (f"; is specimen.axis = {load.axis!r} right?" if wrong else "")
 
 

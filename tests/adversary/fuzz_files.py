@@ -1,4 +1,4 @@
-"""Changes the structure of session and strain files in many ways and looks what reading them does.
+"""Changes the structure of session and strain files in many ways and checks what reading them does.
 
 ``python -m tests.adversary.fuzz_files session|strain [--seconds 600] [--seed 0]`` prints how often each end
 was reached, and every case that did not end in words with exit code 4 or in the right numbers.

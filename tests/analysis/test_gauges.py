@@ -1,4 +1,4 @@
-"""Virtual gauges: what they take, what they say of known fields, and that their sigma is their scatter."""
+"""Virtual gauges: the ZOIs they take, their values in known fields, and their sigma against their scatter."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def lost(*, share: float) -> np.ndarray:
 
 def test_lost_zois_give_a_reason() -> None:
     broken = field(lost(share=0.5), dv_dy=1e-3)
-    for gauge, says in (
+    for gauge, message in (
         (ZoiGauge("", (80, 20)), "1 of 1 ZOIs have no value (1 LOST)"),
         (AreaGauge("", (0, 0, 200, 60)), "ZOIs have no value"),
         (LINE, "end 1: "),
@@ -76,14 +76,14 @@ def test_lost_zois_give_a_reason() -> None:
     ):
         found = gauge.measure(broken)
         assert math.isnan(found.value) and math.isnan(found.sigma)
-        assert says in found.reason
+        assert message in found.reason
     some = lost(share=0.0)
     some[3, 4] = Status.UNEVEN
     whole = AreaGauge("", (0, 0, 200, 200)).measure(field(some, dv_dy=1e-3))
     assert whole.value == pytest.approx(1e-3)
 
 
-def test_a_gauge_beside_the_grid_says_where_the_grid_is() -> None:
+def test_a_gauge_beside_the_grid_names_where_the_grid_is() -> None:
     for gauge in (
         ZoiGauge("", (500, 80)),
         AreaGauge("", (500, 0, 9, 9)),
@@ -96,7 +96,7 @@ def test_a_gauge_beside_the_grid_says_where_the_grid_is() -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "message"),
     [
         (lambda: ZoiGauge("a", (0, 0), "ezz"), "gauge a: unknown value 'ezz'; known: u, v"),
         (lambda: AreaGauge("a", corners=((0, 0), (1, 1))), "at least 3 corners"),
@@ -107,8 +107,8 @@ def test_a_gauge_beside_the_grid_says_where_the_grid_is() -> None:
         (lambda: TransverseGauge("a", (0, 0, 5, 5), "z"), "along is x or y"),  # type: ignore[arg-type]
     ],
 )
-def test_impossible_gauges_are_refused(make, says: str) -> None:
-    with pytest.raises(ValueError, match=says):
+def test_impossible_gauges_are_refused(make, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         make()
 
 
