@@ -84,7 +84,10 @@ def _stamped(dispatcher: Any) -> Any:
     numba itself looks only at the file of the function, and would run the old code of its helpers.
     """
     try:
-        _cache_file(dispatcher)._source_stamp = _own_stamp()
+        file = _cache_file(dispatcher)
+        file._source_stamp = _own_stamp()
+        # An index of other modules is not even read: it may name types that have moved.
+        file._version = f"{numba.__version__}, loops {_own_stamp_digest()}"
     except AttributeError:  # numba's own affair: an installed package changes all its files at once
         log.debug("the stamp of numba's cache could not be set")
     return dispatcher
@@ -110,6 +113,11 @@ def digest() -> str:
 @lru_cache(maxsize=1)
 def _own_stamp() -> tuple[tuple[str, float, int], ...]:
     return stamp(_PACKAGE)
+
+
+@lru_cache(maxsize=1)
+def _own_stamp_digest() -> str:
+    return hashlib.sha256(repr(_own_stamp()).encode()).hexdigest()[:12]
 
 
 def is_cached(function: Any, kind: str = "") -> bool:

@@ -57,13 +57,17 @@ def numerics() -> dict[str, str]:
 
 
 def threads() -> str:
-    """How many threads the loops have, and by which library: "2 by OpenMP", "2 by TBB" or "2 by numba's workqueue"."""
+    """How many threads the loops have, and by which library: "2 by OpenMP" and the like."""
     import numba
 
+    return f"{numba.get_num_threads()} by {threading_library()}"
+
+
+def threading_library() -> str:
+    """The library that runs the threads of the loops: "OpenMP", "TBB" or "numba's workqueue"."""
     from analysis.compiled.layer import threading_layer
 
-    by = {"omp": "OpenMP", "tbb": "TBB", "workqueue": "numba's workqueue"}[threading_layer()]
-    return f"{numba.get_num_threads()} by {by}"
+    return {"omp": "OpenMP", "tbb": "TBB", "workqueue": "numba's workqueue"}[threading_layer()]
 
 
 def warm_up(part: str = ALL, kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) -> None:

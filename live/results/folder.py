@@ -24,9 +24,9 @@ _PACKAGES = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless", "h
 
 def versions() -> dict[str, str]:
     """Versions of ourselves, of Python and of what we stand on, what the last digits belong to, and the threads."""
-    from analysis import numerics, threads
+    from analysis import numerics, threading_library
 
-    return installed() | numerics() | {"threads": threads()}
+    return installed() | numerics() | {"threads": threading_library()}
 
 
 def installed() -> dict[str, str]:

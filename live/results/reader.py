@@ -22,6 +22,7 @@ from acquire.errors import ConfigError, DataError
 from acquire.hdf5 import (
     Declared,
     JsonField,
+    as_text,
     check_links,
     check_object,
     check_size,
@@ -34,7 +35,6 @@ from acquire.hdf5 import (
     read_scalar,
     read_superblock,
     stored_rows,
-    word,
 )
 from analysis.field import ZoiGrid
 from live.results import layout
@@ -156,9 +156,9 @@ class Strain(Closing):
         check_links(file)
         entry = open_group(file, "entry")
         strain, mean = open_group(entry, "strain"), open_group(entry, "mean")
-        self.start_utc = word(root["start_time"])
+        self.start_utc = as_text(root["start_time"])
         said = _attributes(strain, layout.STRAIN)
-        self.strain_measure = word(said["strain_measure"])
+        self.strain_measure = as_text(said["strain_measure"])
         self.grid = _grid(strain, said["grid"], path)
         self.config, self.metadata, self.versions = (
             read_object(item[()], f"{path}: {name}")
@@ -274,7 +274,7 @@ def _open(path: Path, probed: bool) -> tuple[Any, bool]:
 
 
 def _check(path: Path, file: Any) -> None:
-    found = word(read_attribute(file, "format", layout.ROOT["format"])) if "format" in file.attrs else None
+    found = as_text(read_attribute(file, "format", layout.ROOT["format"])) if "format" in file.attrs else None
     if found != FORMAT:
         shown = "something else" if found is None else repr(found[:40])
         raise DataError(f"{path}: holds {shown}, not {FORMAT}; give a strain.h5")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import DataError
-from acquire.hdf5 import FlushTimer, PictureStack, RowTable, let_go
+from acquire.hdf5 import FlushTimer, PictureStack, RowTable, abandon_file
 from analysis.evaluate import load_axis
 from live.results import layout
 from live.results.row import FORMAT, FORMAT_VERSION, STRAINS, StrainRow, gauge_columns
@@ -108,7 +108,7 @@ class StrainWriter:
     def close(self) -> None:
         """Close the file; after a failed write it is let go as it stands on the disk."""
         if self.failed:
-            let_go(self._file)
+            abandon_file(self._file)
         else:
             self._guard(self._flush)
             self._guard(self._show_last)

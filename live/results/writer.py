@@ -113,12 +113,12 @@ class Files(Consumer):
     name = "results"
     policy = Policy.WAIT
     room = 64
-    vital = True
+    critical = True
 
     def __init__(self, results: Results) -> None:
         self._results = results
 
-    def settled(self, measurement: Measurement) -> None:
+    def matched(self, measurement: Measurement) -> None:
         """Write one row."""
         self._results.add(measurement)
 
@@ -154,4 +154,4 @@ def write_results(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
         axis=config.specimen.axis,
         lagged=config.load.lag_s != 0,
     )
-    return [Files(Results(about.folder, about.grid, info, SELDOM_S if about.aside else FLUSH_S))]
+    return [Files(Results(about.folder, about.grid, info, SELDOM_S if about.deferred else FLUSH_S))]

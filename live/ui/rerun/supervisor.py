@@ -23,8 +23,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquire.events import Level
-from acquire.held_back import held_back
-from live.pipeline.latency import OUTPUT, yield_to_others
+from acquire.signal_mask import blocked_signals
+from live.pipeline.latency import OUTPUT, lower_priority
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
 from live.ui.rerun.wire import Kind, Message, Reader, WireError, encoded
@@ -60,7 +60,7 @@ class RenderProcess:
 
     def __init__(self) -> None:
         ours, its = socket.socketpair()
-        with its, held_back(signal.SIGINT, signal.SIGHUP):
+        with its, blocked_signals(signal.SIGINT, signal.SIGHUP):
             # The process unblocks them once it ignores them.
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", _MODULE],
@@ -200,7 +200,7 @@ class Supervisor:
         self._thread.join(seconds + STUCK_S)
 
     def _run(self) -> None:
-        yield_to_others(OUTPUT)
+        lower_priority(OUTPUT)
         while not self._closing.is_set() and not self.failed:
             self._guarded(self._step)
         if self._renderer is not None or not self.starts:

@@ -1,4 +1,4 @@
-"""Where a test stands is the same wherever it is shown."""
+"""The state of a test is the same in every display."""
 
 from __future__ import annotations
 

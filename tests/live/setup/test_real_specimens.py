@@ -15,7 +15,7 @@ import pytest
 
 from analysis.quality.specimen import find_specimen
 from live.config.loading import load_config
-from live.setup.region import Region, look, region_of
+from live.setup.region import Region, first_look, region_of
 
 pytestmark = pytest.mark.data
 
@@ -34,8 +34,8 @@ HALF = ZOI / 2
 
 def region_in(path: Path) -> Region:
     config = load_config(None, {"camera.address": f"files:{path}", "measure.zoi": ZOI})
-    seen = look(config, print)
-    return region_of(config, seen.picture, seen.noise)
+    first = first_look(config, print)
+    return region_of(config, first.picture, first.noise)
 
 
 def test_the_polymer_bar(data_dir: Path) -> None:

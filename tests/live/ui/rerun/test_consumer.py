@@ -50,12 +50,12 @@ def test_everything_is_offered() -> None:
     out.add(make_measurement(0))
     out.frame(make_frame(0, START))
     out.load(LoadSample(START, 5.0))
-    event_log.tell(EventKind.NOTE, "operator", "hello")
+    event_log.emit(EventKind.NOTE, "operator", "hello")
     out.end()
     assert {name for name, _ in view.calls} == {"show", "point", "picture", "load", "event"}
     assert [what for name, what in view.calls if name == "point"] == [(0.001, 0.0)]
     assert view.closed
-    assert out.reports[0].words == "all drawn"
+    assert out.reports[0].summary == "all drawn"
 
 
 def test_a_view_that_has_failed_is_reported_once_and_all_else_goes_on() -> None:
