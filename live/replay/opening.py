@@ -17,7 +17,7 @@ from live.pipeline.screen import Screen
 from live.replay.pictures import picture_source
 from live.replay.session import session_config, session_path, session_source
 from live.replay.source import ReplayRequest, ReplaySource, check_window
-from live.results.folder import other_digits
+from live.results.folder import differing_versions
 from live.setup.devices import open_rig
 from live.setup.pictures import read_mask
 from live.setup.prepared import MeasurePlan, PreparedKernel
@@ -49,7 +49,7 @@ def _notes(session: Session, request: ReplayRequest) -> Iterator[str]:
             "the run shortened its bursts while the picture moved; here they have one length, with --as-measured"
             " they are those of the run"
         )
-    if request.as_measured and (otherwise := other_digits(session.versions)):
+    if request.as_measured and (otherwise := differing_versions(session.versions)):
         yield f"recorded with {', '.join(otherwise)}; the last digits of the results may differ"
 
 

@@ -14,7 +14,7 @@ from acquire.addresses import parse_address
 from acquire.camera import with_scheme
 from acquire.errors import DataError
 from acquire.files.picture import check_regular
-from live.results.folder import installed
+from live.results.folder import installed_versions
 
 if TYPE_CHECKING:
     from live.replay.batch.task import Task
@@ -69,7 +69,7 @@ def _bytes(task: Task) -> int:
 @cache
 def deciding_versions() -> Mapping[str, str]:
     """Versions of all that the numbers depend on."""
-    found = installed()
+    found = installed_versions()
     return {name: found[name] for name in _DECIDING}
 
 

@@ -23,7 +23,7 @@ from analysis.evaluate import evaluate_test
 from live.config.gauges import outlines
 from live.config.loading import from_dict
 from live.pipeline.screen import Screen
-from live.results.figures import figure_lines, options_of
+from live.results.figures import figure_lines, tensile_options
 from live.results.run_folder import RunFolder
 from live.ui.rerun.messages import (
     STRAINS,
@@ -266,7 +266,7 @@ def _events(run: RunFolder) -> Iterator[Message]:
 
 def _status(run: RunFolder) -> str:
     """The figures of the test and the final values of the gauges, as Markdown."""
-    lines = figure_lines(evaluate_test(run.curve, options_of(run.specimen)), run.specimen)
+    lines = figure_lines(evaluate_test(run.curve, tensile_options(run.specimen)), run.specimen)
     lines += [
         f"gauge **{name}** {gauge.value[-1] * 1e6:+.0f} ± {gauge.sigma[-1] * 1e6:.0f} µm/m at the end"
         for name, gauge in run.gauges.items()

@@ -26,7 +26,7 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import Snapshot
 from live.results.maps.field_maps import FIELD_MAPS, FieldMaps, Painted
-from live.results.maps.painting import lay_cells
+from live.results.maps.painting import overlay_cells
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.painting import as_jpeg, shrunk
 
@@ -190,7 +190,7 @@ class PageConsumer(Consumer):
         if m is not None:
             picture, scale = shrunk(m.burst.mean, m.burst.bits)
             painted = self._maps.paint(m.field, (self._component,))[self._component]
-            lay_cells(picture, scale, m.field.grid, painted.rgba, (m.time_step.u, m.time_step.v))
+            overlay_cells(picture, scale, m.field.grid, painted.rgba, (m.time_step.u, m.time_step.v))
             self._scale = _scale_of(painted)
             size = m.burst.mean.shape
         elif frame is not None:

@@ -27,7 +27,7 @@ from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
 from live.config.values import AUTO, GIVEN
 from live.pipeline.latency import OUTPUT, lower_priority
 from live.pipeline.warm_up import picture_kinds
-from live.results.maps.painting import lay_cells
+from live.results.maps.painting import overlay_cells
 from live.setup.check.check_list import CheckFigures, examine
 from live.setup.check.quick_check import QuickChecker
 from live.setup.check.verdict import CheckLine, check_lines
@@ -258,7 +258,7 @@ class SetupSession:
             picture, scale = shrunk(frame.image, frame.bits)
             figures = self._figures
             if self.overlays["quality"] and figures is not None:
-                lay_cells(picture, scale, figures.zois.grid, quality_colours(figures))
+                overlay_cells(picture, scale, figures.zois.grid, quality_colours(figures))
             if self.overlays["saturated"]:
                 mark_saturated(picture, scale, frame.image, frame.bits)
             self.picture = as_jpeg(picture)

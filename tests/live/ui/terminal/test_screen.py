@@ -14,7 +14,7 @@ from live.pipeline.event_log import EventLog, sentence
 from live.pipeline.frame_counts import FrameCounts
 from live.pipeline.measurement import TimeStep
 from live.pipeline.snapshot import Snapshot
-from live.results.figures import quantity
+from live.results.figures import value_text
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.terminal.status_line import status_line
 
@@ -161,4 +161,4 @@ def test_late_listeners_get_every_event_once() -> None:
     ],
 )
 def test_quantities_have_digits_by_their_sigma(value: float, sigma: float, text: str) -> None:
-    assert quantity(value, sigma, "GPa") == text
+    assert value_text(value, sigma, "GPa") == text
