@@ -203,7 +203,7 @@ def test_a_stream_with_wrong_check_digits_gives_no_value(name: str) -> None:
     sent = [answer(1000 + k) for k in range(3000)]
     wrong = [WRONG[name](sound) for sound in sent if WRONG[name](sound) != sound]
     for damaged in wrong:
-        values += [reading.value for reading in modbus.burst_queue(damaged) + modbus.silence()]
+        values += [reading.value for reading in modbus.feed(damaged) + modbus.silence()]
     assert len(values) >= len(wrong) > 2900 and all(math.isnan(value) for value in values)
 
 
@@ -212,7 +212,7 @@ def test_sound_answers_between_wrong_ones_are_read(name: str) -> None:
     modbus, values = parser("modbus", PROFILE), []
     for k in range(300):
         wrong = k % 3 == 0
-        readings = modbus.burst_queue(WRONG[name](answer(k)) if wrong else answer(k)) + modbus.silence()
+        readings = modbus.feed(WRONG[name](answer(k)) if wrong else answer(k)) + modbus.silence()
         values += [math.nan if wrong and len(readings) > 1 else readings[0].value]
     good = [value for value in values if not math.isnan(value)]
     assert good == [k for k in range(300) if k % 3]
@@ -226,7 +226,7 @@ def test_every_flip_of_up_to_two_bits_is_found() -> None:
     for flip in flips:
         modbus = parser("modbus", PROFILE)
         damaged = (whole ^ flip).to_bytes(len(sound), "big") if flip.bit_count() else sound
-        readings = modbus.burst_queue(damaged) + modbus.silence()
+        readings = modbus.feed(damaged) + modbus.silence()
         assert all(math.isnan(reading.value) for reading in readings)
 
 
