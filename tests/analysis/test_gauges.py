@@ -139,29 +139,29 @@ class TestEveryKind:
     DRAWN = ((60.0, 40.0), (130.0, 110.0))
 
     def test_it_is_made_of_what_is_dragged_and_of_its_own_handles(self, kind: type[Gauge]) -> None:
-        gauge = kind.of("g", kind.placed(self.DRAWN), "y")
-        assert kind.of("g", kind.placed(gauge.handles()), "y") == gauge
-        assert kind.of("g", {**kind.placed(self.DRAWN), "of another": 1}, "y") == gauge
-        assert set(kind.placed(self.DRAWN)) <= set(kind.parameters())
+        gauge = kind.of("g", kind.from_handles(self.DRAWN), "y")
+        assert kind.of("g", kind.from_handles(gauge.handles()), "y") == gauge
+        assert kind.of("g", {**kind.from_handles(self.DRAWN), "of another": 1}, "y") == gauge
+        assert set(kind.from_handles(self.DRAWN)) <= set(kind.parameters())
 
     def test_it_takes_zois_and_reads_a_strain(self, kind: type[Gauge]) -> None:
-        gauge = kind.of("g", kind.placed(self.DRAWN), "y")
+        gauge = kind.of("g", kind.from_handles(self.DRAWN), "y")
         assert all(mask.any() and mask.dtype == bool for mask in gauge.zois(GRID))
         found = gauge.measure(field(du_dx=1e-3, dv_dy=1e-3))
         assert found.value == pytest.approx(1e-3, rel=1e-9) and found.sigma > 0
         assert math.isnan(gauge.measure(field(lost(share=1.0))).value)
 
     def test_its_outline_follows_its_handles(self, kind: type[Gauge]) -> None:
-        gauge = kind.of("g", kind.placed(self.DRAWN), "y")
-        moved = kind.of("g", kind.placed([(x + 7, y + 3) for x, y in gauge.handles()]), "y")
+        gauge = kind.of("g", kind.from_handles(self.DRAWN), "y")
+        moved = kind.of("g", kind.from_handles([(x + 7, y + 3) for x, y in gauge.handles()]), "y")
         for before, after in zip(gauge.outline(32), moved.outline(32), strict=True):
             assert len(before) > 1
             np.testing.assert_allclose(np.array(after) - before, [(7, 3)] * len(before), atol=0.2)
 
-    def test_it_says_what_it_needs(self, kind: type[Gauge]) -> None:
+    def test_it_names_what_it_needs(self, kind: type[Gauge]) -> None:
         with pytest.raises(ValueError, match=f"a gauge of kind '{kind.kind}' needs '"):
             kind.of("g", {}, "y")
-        assert kind.label and kind.hint and kind.usual.isidentifier()
+        assert kind.label and kind.hint and kind.default_name.isidentifier()
         assert kind.gesture in ("click", "line", "box")
 
 
@@ -175,8 +175,8 @@ def test_what_follows_from_the_axis_of_the_load() -> None:
 
 
 def test_a_box_is_drawn_in_whole_px_within_the_picture() -> None:
-    assert AreaGauge.placed([(30.4, 20.2), (-3.0, 10.6)]) == {"box": (0, 11, 30, 9)}
-    assert AreaGauge.placed([(5, 5), (5, 5)]) == {"box": (5, 5, 1, 1)}
+    assert AreaGauge.from_handles([(30.4, 20.2), (-3.0, 10.6)]) == {"box": (0, 11, 30, 9)}
+    assert AreaGauge.from_handles([(5, 5), (5, 5)]) == {"box": (5, 5, 1, 1)}
     corners = ((1.0, 2.0), (9.0, 2.0), (4.0, 8.0))
-    assert AreaGauge.placed(AreaGauge("g", corners=corners).handles()) == {"corners": corners}
-    assert LineGauge.placed([(1.234, 5), (9, 7.77)]) == {"start": (1.2, 5), "end": (9, 7.8)}
+    assert AreaGauge.from_handles(AreaGauge("g", corners=corners).handles()) == {"corners": corners}
+    assert LineGauge.from_handles([(1.234, 5), (9, 7.77)]) == {"start": (1.2, 5), "end": (9, 7.8)}
