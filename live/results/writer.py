@@ -108,7 +108,7 @@ class ResultsConsumer(Consumer):
 
     name = "results"
     policy = Policy.WAIT
-    room = 64
+    queue_size = 64
     critical = True
 
     def __init__(self, results: Results) -> None:
