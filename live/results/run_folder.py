@@ -1,11 +1,9 @@
-"""The folder of a finished run: results, recording and settings, tied together.
+"""The folder of a finished run: results, recording and settings together, with virtual gauges added afterwards.
 
-with open_run("runs/20261122T081747Z") as run:
-    run.strain.values["eyy"], run.stress, run.events
+    with open_run("runs/20261122T081747Z") as run:
+        run.strain.values["eyy"], run.stress, run.events
 
-Virtual gauges laid over a finished run: read from its maps as they would have been read in the test.
-
-The strain field of a measured instant, made of the maps that the file holds.
+``read_field`` makes the strain field of one instant from the stored maps; added gauges are measured on it.
 """
 
 from __future__ import annotations
