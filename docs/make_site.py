@@ -17,8 +17,8 @@ PAGES = ROOT / "build" / "pages"
 REFERENCE = {
     "Kernel, grid and field": "analysis",
     "Gauges and figures of a test": "analysis.evaluate",
-    "A finished run": "live.results",
     "Results": "live.results",
+    "A finished run": "live.results.run_folder",
     "Export": "live.results.export",
     "Report": "live.results.report",
     "Replay": "live.replay",
@@ -27,7 +27,7 @@ REFERENCE = {
     "Load cells": "acquire.load_cell",
     "Recorded sessions": "acquire.session",
 }
-"""Heading -> face whose public names are described."""
+"""Heading -> module whose public names are described."""
 
 HIDDEN = ("__pycache__", "*.pyc", "make_*.py", "layers.py", "__init__.py")
 
@@ -47,7 +47,7 @@ def lay_out() -> None:
 def reference() -> str:
     """The page that mkdocstrings fills from the docstrings."""
     parts = [f"## {words}\n\n::: {module}\n" for words, module in REFERENCE.items()]
-    head = "# Reference\n\nFrom the docstrings. What stands here is public; the rest may change without notice.\n"
+    head = "# Reference\n\nFrom the docstrings. These names are public; the rest may change without notice.\n"
     return "\n".join([head, *parts])
 
 
