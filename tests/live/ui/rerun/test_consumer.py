@@ -119,7 +119,7 @@ def test_the_large_figures_before_and_after_the_first_measurement(state: str) ->
     writer = FiguresWriter(view, run_state)  # type: ignore[arg-type]
     writer.idle()
     assert [(f.state, f.force_N, f.zois) for f in view.shown] == ([("ARMED", 800.0, 0)] if state else [])
-    run_state.alarms.put("limit", "limit: too much")
+    run_state.alarms.set("limit", "limit: too much")
     writer.measurement(make_measurement(1, 1e-3, force=500.0))
     last = view.shown[-1]
     assert (last.state, last.force_N) == (("ARMED", 800.0) if state else ("REPLAY", 500.0))
