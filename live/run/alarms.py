@@ -185,7 +185,7 @@ class AlarmWatch(Consumer):
 
     def end(self) -> str:
         """How often an alarm came on."""
-        return f"{self._count} alarms" if self._count else "no alarm"
+        return f"{self._count} came" if self._count else "none came"
 
     def _check(self, values: Mapping[str, float], stamp: float) -> None:
         for alarm in self._alarms:

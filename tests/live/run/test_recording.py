@@ -174,11 +174,11 @@ def test_what_came_a_little_before_goes_first_and_in_order() -> None:
     bench.pre_trigger.sample(LoadSample(0.9, 5.0))  # the load is recorded all the time
     bench.frames(10)
     assert bench.given == [("load", 5.0)]
-    assert bench.pre_trigger.order(START) == "with 6 before"
+    assert bench.pre_trigger.command(START) == "with 6 before"
     bench.frames(11)
     assert bench.given == [("load", 5.0), 5, 6, 7, 8, 9, 10, 11]
     assert bench.frame_counts.thinned == 5
-    bench.pre_trigger.order(STOP)
+    bench.pre_trigger.command(STOP)
     bench.frames(12, 13)
     bench.pre_trigger.close({})
     assert bench.given[-2:] == [11, "closed"]
@@ -188,7 +188,7 @@ def test_what_came_a_little_before_goes_first_and_in_order() -> None:
 def test_what_is_kept_is_bounded_in_bytes() -> None:
     bench = RecordingSetup(60, most=24 * 3 + 10)
     bench.frames(*range(8))
-    bench.pre_trigger.order(START)
+    bench.pre_trigger.command(START)
     assert bench.given == [5, 6, 7] and bench.frame_counts.thinned == 5
 
 
@@ -198,7 +198,7 @@ def test_a_reference_passes_a_shut_gate() -> None:
     bench.frames(2, 3, is_reference=True)
     bench.pre_trigger.event(Event(0.3, EventKind.REFERENCE, "m", "", "info", {"first": 2, "last": 3, "n": 2}))
     bench.frames(4)
-    bench.pre_trigger.order(START)
+    bench.pre_trigger.command(START)
     assert bench.given == [2, 3, ("reference", 2), 4] and bench.frame_counts.thinned == 2
 
 
@@ -208,10 +208,10 @@ def test_measured_bursts_are_told_where_their_frames_are_recorded_whole() -> Non
     bench.frames(*range(2, 9))
     for first in (2, 5, 6):
         bench.measured(first, first + 1)
-    bench.pre_trigger.order(START)
+    bench.pre_trigger.command(START)
     bench.frames(9)
     bench.measured(8, 9)
-    bench.pre_trigger.order(STOP)
+    bench.pre_trigger.command(STOP)
     bench.measured(7, 8)  # after the end, but its frames are there
     bench.frames(10)
     bench.measured(9, 10)
@@ -222,7 +222,7 @@ def test_with_nothing_kept_no_burst_from_before_is_told() -> None:
     bench = RecordingSetup(most=10)
     bench.frames(0, is_reference=True)
     bench.frames(1, 2, 3)
-    bench.pre_trigger.order(START)
+    bench.pre_trigger.command(START)
     bench.given.clear()
     bench.measured(1, 2)
     bench.frames(4, 5)
@@ -237,7 +237,7 @@ def test_a_force_opens_it_once() -> None:
         assert not bench.pre_trigger.on
         bench.pre_trigger.sample(LoadSample(0.1, force))
     assert bench.pre_trigger.on and bench.given[-1] == ("load", -11.0)
-    bench.pre_trigger.order(STOP)
+    bench.pre_trigger.command(STOP)
     bench.pre_trigger.sample(LoadSample(0.2, 99.0))
     assert not bench.pre_trigger.on
 
@@ -245,13 +245,13 @@ def test_a_force_opens_it_once() -> None:
 def test_an_order_that_changes_nothing_is_refused() -> None:
     bench = RecordingSetup(on=True)
     with pytest.raises(ControlRefused, match="already"):
-        bench.pre_trigger.order(START)
-    bench.pre_trigger.order(STOP)
+        bench.pre_trigger.command(START)
+    bench.pre_trigger.command(STOP)
     with pytest.raises(ControlRefused, match="not recording"):
-        bench.pre_trigger.order(STOP)
+        bench.pre_trigger.command(STOP)
     bench.recorder.failed = "the disk is full"
     with pytest.raises(ControlRefused, match="disk is full"):
-        bench.pre_trigger.order(START)
+        bench.pre_trigger.command(START)
 
 
 class TellingRecorder(FakeRecorder):
