@@ -86,7 +86,7 @@ def compile_loops(kinds: tuple[str, ...] = ("uint8", "uint16")) -> None:
     """Have the loops ready for frames of these types (once a process), so that none is lost to a compiler later."""
     from acquire.burst.accumulate_loops import GROUP, fold, scratch, tile_sums
 
-    if not (fold.stats.cache_path and any(Path(fold.stats.cache_path).glob("accumulate_loops.tile_sums-*.nbi"))):
+    if not (fold.stats.cache_path and any(Path(fold.stats.cache_path).glob("smear_loops.tile_sums-*.nbi"))):
         log.info("compiling the burst loops, once on this machine; this takes some seconds")
     mean, clipped, total = np.empty(9, np.float32), np.empty(9, np.bool_), np.empty(9, np.uint32)
     for kind in kinds:
