@@ -1,7 +1,7 @@
 """Addresses name devices and carry their settings: ``scheme:target?key=value&key=value``.
 
 ``parse_address`` splits them, ``Options`` hands out the settings with their types and bounds and
-refuses what nobody asked for, ``Registry`` finds who opens a scheme. Devices of other packages
+refuses unknown ones, ``Registry`` finds who opens a scheme. Devices of other packages
 register through the entry point groups ``phasedic.cameras`` and ``phasedic.load_cells``, whose
 entries are openers named after their scheme; what lists the devices of a scheme stands in a group of its own.
 """
@@ -74,7 +74,7 @@ def parse_address(text: str) -> Address:
 class Options:
     """The settings of an address, taken one by one with their types and bounds.
 
-    After the last one ``done()`` refuses what is left and lists what was asked for.
+    After the last one ``done()`` refuses what is left and lists what is known.
     """
 
     def __init__(self, address: Address) -> None:
@@ -200,7 +200,7 @@ class Registry(Generic[Device]):
     builtin : mapping of scheme to "module:function"
         Imported when first used, so that asking for help stays fast.
     fallback : str or None
-        "module:function" that takes every scheme nobody else knows (a pyserial URL).
+        "module:function" that takes every other scheme (a pyserial URL).
     lists_group : str
         Entry point group of what lists the devices that are there, by scheme; "": none.
     lists : mapping of scheme to "module:function"

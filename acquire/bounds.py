@@ -1,4 +1,4 @@
-"""Numbers within bounds, whoever gives them: an address, a configuration, the page, a profile."""
+"""Numbers within bounds, wherever they come from: an address, a configuration, the page, a profile."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 
 
 class NotAllowed(ValueError):
-    """A value is not possible; the text is what is allowed. Who asks adds the key and the value."""
+    """A value is not possible; the text is what is allowed. The caller adds the key and the value."""
 
 
 def as_number(value: object, low: float = -math.inf, high: float = math.inf) -> float:

@@ -1,6 +1,6 @@
 """The one clock of a test, and how it hangs together with the calendar.
 
-Everything is stamped in ``time.monotonic()`` seconds; a ``ClockPair`` says which instant of
+Everything is stamped in ``time.monotonic()`` seconds; a ``ClockPair`` names the instant of
 UTC one of them was, so that a file can be put beside those of other machines.
 """
 

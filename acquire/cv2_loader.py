@@ -13,13 +13,13 @@ from typing import Any
 # No damaged header may ask for gigabytes: 268 million pixels are more than any camera has.
 _LIMITS = {
     "OPENCV_IO_MAX_IMAGE_PIXELS": str(2**28),
-    "OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT": "1",  # s; unless told otherwise a stalled camera blocks for ten
+    "OPENCV_VIDEOIO_V4L_SELECT_TIMEOUT": "1",  # s; by default a stalled camera blocks for ten
 }
 
 
 @cache
 def load_cv2() -> Any:
-    """The module ``cv2``, quiet: what goes wrong is told by our own errors."""
+    """The module ``cv2``, quiet: our own errors report what goes wrong."""
     for key, value in _LIMITS.items():
         os.environ.setdefault(key, value)
     import cv2

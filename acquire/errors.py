@@ -27,7 +27,7 @@ class DeviceError(PhasedicError):
 
 
 class DataError(PhasedicError):
-    """A file or its content: missing, truncated, foreign, or not what it says."""
+    """A file or its content: missing, truncated, foreign, or not of the kind it claims to be."""
 
     exit_code = 4
 

@@ -46,7 +46,7 @@ class Event:
         ``time.monotonic()``.
     kind : EventKind
     source : str
-        Who says so: an address, "recorder", "operator", ...
+        Where it comes from: an address, "recorder", "operator", ...
     text : str
         One sentence for a person.
     level : "info" | "warning" | "error"
@@ -65,16 +65,16 @@ EventSink = Callable[[Event], None]
 
 
 def ignore_event(event: Event) -> None:
-    """The sink of those who do not listen."""
+    """A sink that drops every event."""
 
 
 def device_event(sink: EventSink, source: str, text: str, level: Level = "warning", **data: Any) -> None:
-    """Tell ``sink`` about a device, stamped now."""
+    """Send an event of a device to ``sink``, stamped now."""
     sink(Event(time.monotonic(), EventKind.DEVICE, source, text, level, data))
 
 
 class RateLimiter:
-    """Lets a fault that may come with every frame be told at once, then as a count once a while.
+    """Reports a fault that may come with every frame at once, then as a count per interval.
 
     Parameters
     ----------
@@ -83,13 +83,13 @@ class RateLimiter:
 
     def __init__(self, interval_s: float = 2.0) -> None:
         self._interval_s = interval_s
-        self._told_t = float("-inf")
-        self._kept = 0
+        self._last_t = float("-inf")
+        self._count = 0
 
-    def told(self, t: float) -> int:
-        """How many to tell of now, this one included; 0: keep quiet."""
-        self._kept += 1
-        if t - self._told_t < self._interval_s:
+    def due(self, t: float) -> int:
+        """How many to report at ``t``, this one included; 0: none yet."""
+        self._count += 1
+        if t - self._last_t < self._interval_s:
             return 0
-        count, self._kept, self._told_t = self._kept, 0, t
+        count, self._count, self._last_t = self._count, 0, t
         return count

@@ -39,7 +39,7 @@ class Frame:
     raw_t : float, s
         The stamp as it came.
     damaged : bool
-        The device said that the content is not whole (recorded, never measured).
+        The device marked the content as not whole (recorded, never measured).
     """
 
     image: NDArray[Any]
@@ -54,7 +54,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Burst:
-    """The mean of n consecutive frames and what their scatter tells.
+    """The mean of n consecutive frames and what follows from their scatter.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Burst:
 
 @dataclass(frozen=True, slots=True)
 class CameraSetting:
-    """A number in the address of a camera that can be changed while one looks at the picture.
+    """A number in the address of a camera that can be changed while the picture is live.
 
     Attributes
     ----------
@@ -144,7 +144,7 @@ class CameraInfo:
     warnings : tuple of str
         What a person should know before trusting the picture.
     settings : tuple of CameraSetting
-        What of the address can be changed while one looks, with its bounds; in no file.
+        What of the address can be changed in a live picture, with its bounds; in no file.
     """
 
     address: str

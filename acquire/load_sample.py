@@ -1,4 +1,4 @@
-"""What a load cell gives: samples in newtons, with what the line said about them."""
+"""What a load cell gives: samples in newtons, with what the line adds to them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from acquire.frame import Clock
 
 
 class LoadFlag(Flag):
-    """What a line says beside its value; overload and underload go with a force of NaN."""
+    """What a line adds to its value; overload and underload go with a force of NaN."""
 
     NONE = 0
     OVERLOAD = auto()
@@ -36,9 +36,9 @@ class LoadSample:
     force : float, N
         Tension positive; NaN where the line gives no valid value.
     unit : str
-        As it stood on the line, or as the user said.
+        As it stood on the line, or as the user gives it.
     stable : bool or None
-        None where the protocol does not say.
+        None where the protocol has no such mark.
     flags : LoadFlag
     raw : bytes
         The line as it came, without its end.

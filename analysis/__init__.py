@@ -5,8 +5,8 @@
 >>> field = kernel.measure(deformed)
 >>> field.mean("exx")
 
-Nothing here knows of files, threads, devices or the clock. Compiled code (numba) is loaded when
-the first ``PhaseKernel`` is made; ``warm_up`` does that ahead of a test. The first kernel of a process measures a
+This package uses no files, threads, devices or clock. Compiled code (numba) is loaded when the first
+``PhaseKernel`` is made; ``warm_up`` does that ahead of a test. The first kernel of a process measures a
 known pattern first, and a machine that measures it wrong is refused (``MachineError``).
 """
 
@@ -15,7 +15,15 @@ from analysis.kernel.images import NoiseModel
 from analysis.kernel.phase_kernel import PhaseKernel, check_machine
 from analysis.kernel.prepared import PatternError
 from analysis.kernel.settings import Estimator, KernelSettings
-from analysis.kernel.warm_up import COMPILE_PARTS, PICTURE_KINDS, not_compiled, numerics, threads, warm_up
+from analysis.kernel.warm_up import (
+    COMPILE_PARTS,
+    PICTURE_KINDS,
+    not_compiled,
+    numerics,
+    threading_library,
+    threads,
+    warm_up,
+)
 from analysis.self_test import MachineError
 
 __all__ = [
@@ -34,6 +42,7 @@ __all__ = [
     "check_machine",
     "not_compiled",
     "numerics",
+    "threading_library",
     "threads",
     "warm_up",
 ]

@@ -13,7 +13,7 @@ from typing import Any
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from tests.live.ui.web.driven import FLAGS, Page, Program, chromium
+from tests.live.ui.web.browser import FLAGS, Page, Program, chromium
 
 IMAGES = Path(__file__).parent / "images"
 CAMERA = "sim:woven?fps=15&seconds=44&hold=8&buffers=64&px_per_mm=20"

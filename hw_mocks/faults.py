@@ -1,9 +1,7 @@
 """Faults by name, at a time of the test: ``faults=drop@5,stall@8*1.5`` in a ``sim:`` address.
 
-Each may carry an amount after a star; what it means stands with the fault. What a fault does is
-up to the device; here they are only named, read and looked up.
-
-Which frames of a test the simulated camera gives, and what happens to them.
+Each may carry an amount after a star; its meaning stands with the fault. ``FaultPlan`` reads and finds them for any
+device; the simulated camera has its frames from here too: which come, and what happens to them.
 """
 
 from __future__ import annotations
@@ -81,7 +79,7 @@ class FaultPlan:
         return None
 
     def begun(self, name: str, t: float) -> Fault | None:
-        """The fault of this name whose time has come, told once each."""
+        """The fault of this name whose time has come, given once each."""
         for i, fault in enumerate(self._faults):
             if fault.name == name and fault.t <= t and i not in self._begun:
                 self._begun.add(i)

@@ -1,9 +1,8 @@
-"""What all simulated indicators share: a display, a tare memory, commands in and lines out.
+"""What all simulated indicators share: a display, a tare memory, commands in and lines out; and the simplest of them.
 
-A dialect says how a reading looks on the line and what it answers; ``hw_mocks.sim_indicators`` has
-those of real devices. Pure: bytes in, bytes out, no clock.
-
-The free text of microcontroller sketches: talks by itself, understands nothing.
+A dialect defines a reading on the line and the answers to commands; ``hw_mocks.sim_indicators`` has
+those of real devices. ``AsciiIndicator`` is the free text of microcontroller sketches: it sends unasked and takes
+no commands. Pure: bytes in, bytes out, no clock.
 """
 
 from __future__ import annotations
@@ -15,12 +14,12 @@ from typing import ClassVar, Literal
 
 Status = Literal["ok", "overload", "underload", "error"]
 NEWTONS = {"N": 1.0, "kN": 1e3, "lbF": 4.4482216153, "kgF": 9.80665, "kg": 9.80665, "g": 9.80665e-3}
-LONGEST_COMMAND = 256
+MAX_COMMAND = 256
 
 
 @dataclass(frozen=True, slots=True)
 class IndicatorReading:
-    """What the indicator has to say at one instant.
+    """The state of the indicator at one instant.
 
     Attributes
     ----------
@@ -96,7 +95,7 @@ class Indicator(ABC):
                 if command:
                     answers.append(self.answer(command, shown))
             else:
-                self._partial = (self._partial + bytes([byte]))[-LONGEST_COMMAND:]
+                self._partial = (self._partial + bytes([byte]))[-MAX_COMMAND:]
         return b"".join(answers)
 
     def net(self, shown: IndicatorReading) -> float:

@@ -1,9 +1,8 @@
-"""A simulated indicator on a pseudo-terminal: a thread that samples, talks and answers.
+"""A simulated indicator on a pseudo-terminal: a thread that samples, sends and answers.
 
-A serial port with nothing but a program at its other end: a pseudo-terminal under a steady name.
-
-The name is a symbolic link, so that the port can be pulled out and comes back where it was. One
-slave descriptor stays open, so that the reader may close and open as often as it likes.
+``PtyPort`` is a serial port with a program at its other end, under a steady name: a symbolic link, so that the port
+can be pulled out and comes back where it was. One slave descriptor stays open, so that the reader may close and
+open as often as it likes.
 """
 
 from __future__ import annotations
@@ -67,13 +66,13 @@ class PtyPort:
         os.close(self._slave)
         self._master = self._slave = -1
 
-    def write(self, data: bytes, patience_s: float = 0.0) -> None:
-        """Send; what finds no room in the line's buffer within ``patience_s`` of waiting is lost."""
+    def write(self, data: bytes, timeout_s: float = 0.0) -> None:
+        """Send; what does not fit into the line's buffer within ``timeout_s`` of waiting is lost."""
         while data and self.plugged:
             try:
                 data = data[os.write(self._master, data) :]
             except BlockingIOError:
-                if not select.select([], [self._master], [], patience_s)[1]:
+                if not select.select([], [self._master], [], timeout_s)[1]:
                     self.lost_bytes += len(data)
                     return
 
@@ -96,7 +95,7 @@ class PtyPort:
 log = logging.getLogger(__name__)
 POLL_S = 0.05
 SPLIT_S = 0.03
-PATIENCE_S = 0.2  # for a backlog that does not fit into the line's buffer at once
+BACKLOG_TIMEOUT_S = 0.2  # for a backlog that does not fit into the line's buffer at once
 
 
 class IndicatorServer(Closing):
@@ -176,4 +175,4 @@ class IndicatorServer(Closing):
         for i, chunk in enumerate(self._output.sample(t)):
             if i:
                 self._stopped.wait(SPLIT_S)
-            self._port.write(chunk, PATIENCE_S if len(chunk) > 1000 else 0.0)
+            self._port.write(chunk, BACKLOG_TIMEOUT_S if len(chunk) > 1000 else 0.0)

@@ -1,17 +1,14 @@
-"""A testing machine that another program drives: it listens for the speed of its crosshead over TCP.
+"""What the testing machine does to the virtual specimen over time, and the metal that it pulls.
 
-A line ``speed V`` (1/s: over the free length of the specimen) is answered with ``ok``. The machine is soft:
-while the specimen is elastic, part of the way goes into the machine, beyond yield all goes into the specimen. So
-the strain rate is not the speed, and jumps at yield; to hold it takes a controller. It only pulls.
-
-What the testing machine does over time: hold, pull to yield, pull on, hold.
-
-Two constant strain rates, as ISO 6892-1 has them: a slow one through the elastic part, where
-most is to be measured, and a faster one beyond yield. Times are seconds since the test began.
-
-The metal of the virtual specimen: elastic, then plastic with Voce and linear hardening.
-
-Uniaxial and rate independent. Nothing here unloads: the programme only ever pulls.
+- ``Programme``: hold, pull to yield, pull on, hold. Two constant strain rates, as ISO 6892-1 has them: a slow one
+  through the elastic part, where most is to be measured, and a faster one beyond yield. Times are seconds since
+  the test began (``TestClock``).
+- ``Machine``: driven by another program, which sends ``speed V`` (1/s: over the free length of the specimen) over
+  TCP and gets ``ok``. The machine is soft: while the specimen is elastic, part of the way goes into the machine,
+  beyond yield all goes into the specimen. So the strain rate is not the speed, and jumps at yield; to hold it takes
+  a controller.
+- ``FlowCurve``: elastic, then plastic with Voce and linear hardening; uniaxial and rate independent. Nothing here
+  unloads.
 """
 
 from __future__ import annotations
@@ -33,11 +30,11 @@ Array = NDArray[np.float64]
 
 ELASTIC_SHARE = 0.6
 """Of the crosshead's way that reaches an elastic specimen."""
-FASTEST = 0.1  # 1/s
+MAX_SPEED = 0.1  # 1/s
 
 
 class Machine:
-    """Strain over time, as the speeds say that were ordered.
+    """Strain over time, from the speeds that were commanded.
 
     Parameters
     ----------
@@ -66,7 +63,7 @@ class Machine:
         """Pull with ``speed`` (1/s) from now on."""
         with self._lock:
             t = max(self._elapsed(self._clock()), self._knots[-1][0])
-            self._knots.append((t, float(self._from(self._knots[-1], t)), min(max(speed, 0.0), FASTEST)))
+            self._knots.append((t, float(self._from(self._knots[-1], t)), min(max(speed, 0.0), MAX_SPEED)))
 
     def strain(self, t: ArrayLike) -> Array:
         """Strain of the specimen at ``t`` seconds since the start."""
@@ -88,7 +85,7 @@ class Machine:
         return np.asarray(strain + ELASTIC_SHARE * np.minimum(way, elastic) + np.maximum(way - elastic, 0.0))
 
     def listen(self) -> None:
-        """Take orders from now on; raises ConfigError where the port is taken."""
+        """Take commands from now on; raises ConfigError where the port is taken."""
         try:
             self._listening = socket.create_server(("127.0.0.1", self.port))
         except OSError as error:
@@ -99,7 +96,7 @@ class Machine:
         threading.Thread(target=self._serve, args=(self._listening,), name="machine", daemon=True).start()
 
     def close(self) -> None:
-        """Take no more orders."""
+        """Take no more commands."""
         if self._listening is not None:
             with contextlib.suppress(OSError):
                 self._listening.shutdown(socket.SHUT_RDWR)
@@ -146,7 +143,7 @@ class Programme:
     knee : float
         Part of the ramp's time spent up to ``knee_strain``.
     machine : Machine or None
-        Driven from outside; then it alone says the strain, and the times are those of the test.
+        Driven from outside; then it alone decides the strain, and the times are those of the test.
     """
 
     hold_s: float = 2.0
@@ -180,7 +177,7 @@ class Programme:
 
 
 class TestClock:
-    """When the test began, on the clock of whoever drives it; shared by both devices.
+    """When the test began, on the clock of its driver; shared by both devices.
 
     A simulated camera claims the start, so that the hold is not spent while a view opens; without
     one, the load cell begins the test.

@@ -1,8 +1,8 @@
 """A camera from memory: ``bench:?width=1280&height=1024&fps=30`` shows whether a machine keeps up.
 
-Pictures of a speckle pattern that is pulled and let go again are rendered beforehand; then they come
+Pictures of a speckle pattern that is pulled and released again are rendered beforehand; then they come
 at a fixed pace, whatever the reader does, from a ring of buffers like a driver's. A reader that is late by
-more than the ring loses frames, and the sequence numbers say so. Nothing is rendered while it runs,
+more than the ring loses frames, and the sequence numbers show it. Nothing is rendered while it runs,
 so that what is measured is the program and not the simulator.
 """
 

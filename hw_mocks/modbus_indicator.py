@@ -15,7 +15,7 @@ from hw_mocks.indicator import Indicator, IndicatorReading
 
 READ, WRITE_ONE, WRITE_MANY = 3, 6, 16
 ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE = 1, 2, 3
-MOST_REGISTERS = 32
+MAX_REGISTERS = 32
 ValueType = Literal["i32", "u32", "f32"]
 FORMS: Mapping[ValueType, str] = {"i32": ">i", "u32": ">I", "f32": ">f"}
 
@@ -36,7 +36,7 @@ class RegisterMap:
     zero, tare, reset_peak : int
         What to write to the command register.
     stable, unstable, tared, underload, overload : int
-        Masks in the status register; 0: not told.
+        Masks in the status register; 0: none.
     always : int
         Bits always set (data ok).
     """
@@ -163,7 +163,7 @@ class ModbusIndicator(Indicator):
         return word in (0, r.zero, r.tare, r.reset_peak)
 
     def _read(self, register: int, number: int, shown: IndicatorReading) -> bytes:
-        if not 1 <= number <= MOST_REGISTERS:
+        if not 1 <= number <= MAX_REGISTERS:
             return self._exception(READ, ILLEGAL_VALUE)
         if register + number > self.registers.size:
             return self._exception(READ, ILLEGAL_ADDRESS)

@@ -1,10 +1,8 @@
-"""What the simulated camera looks at: the pattern on the specimen, at any instant of the test.
-
-The image sensor: light to counts, with shot noise, read noise, fixed pattern, rounding, saturation.
+"""What the simulated camera takes: the pattern on the specimen at any instant, and the sensor that makes counts of it.
 
 Noise of a pixel at mean grey level mu: ``sigma^2 = K mu + K^2 sigma_d^2 + 1/12`` (EMVA 1288), shot
-noise taken as normal, which holds above some ten electrons. Motion during the exposure is left
-out: a frame shows its mid-exposure instant.
+noise taken as normal, which holds above some ten electrons; fixed pattern, rounding and saturation come on top.
+Motion during the exposure is left out: a frame shows its mid-exposure instant.
 """
 
 from __future__ import annotations

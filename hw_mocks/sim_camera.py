@@ -41,7 +41,7 @@ RENDER_SHARE = 0.4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimCameraSettings:
-    """How the camera looks and runs.
+    """The picture and the pace of the camera.
 
     Attributes
     ----------
@@ -191,7 +191,7 @@ class SimCamera(Closing):
 
     @property
     def scene(self) -> Scene:
-        """What it looks at, for the truth."""
+        """Its scene, for the truth."""
         return self._scene
 
     def __enter__(self) -> Self:
@@ -275,7 +275,7 @@ class SimCamera(Closing):
             self.dropped += 1
 
     def _delivers(self, planned: Planned) -> bool:
-        """Whether this frame comes; tells of trouble that begins or ends here."""
+        """Whether this frame comes; reports trouble that begins or ends here."""
         trouble = planned.fate if planned.fate in ("stalled", "disconnected") else ""
         source = self.info.address
         if planned.fate == "gone":

@@ -125,7 +125,7 @@ class AedStandardIndicator(Indicator):
 
 
 class Mark10Indicator(Indicator):
-    """Mark-10 gauges: ``-18.78 lbF``; tension is negative, and nothing tells an overload."""
+    """Mark-10 gauges: ``-18.78 lbF``; tension is negative, and nothing marks an overload."""
 
     name = "mark10"
     foreign: ClassVar[str] = "lbF"
@@ -199,7 +199,7 @@ class SauterIndicator(Indicator):
         return f"{'1' if force >= 0 else '0'}{abs(force):0{self.WIDTH}.{digits}f}".encode()
 
     def receive(self, data: bytes, shown: IndicatorReading) -> bytes:
-        """Each ``9`` asks once; other bytes are not understood."""
+        """Each ``9`` asks once; other bytes are ignored."""
         return b"".join(self.render(shown) for byte in data if byte == ord("9"))
 
 

@@ -1,6 +1,6 @@
 """The simulated load cell: ``sim:?rate=80&noise_N=1``.
 
-A simulated indicator feels the specimen and talks on a pseudo-terminal; what reads it is the
+A simulated indicator gets the force on the specimen and sends it on a pseudo-terminal; what reads it is the
 product's own serial load cell, opened on the other end. On nominal time (lock step) there is no
 line: samples are computed for the whole test.
 """
@@ -186,7 +186,7 @@ class NominalLoadCell(Closing):
 
 
 def _indicator(settings: SimLoadSettings) -> tuple[Indicator, dict[str, str]]:
-    """The indicator, and what the serial reader must know of it."""
+    """The indicator, and the settings that the serial reader needs."""
     name, step = settings.protocol, settings.resolution_N
     if name == "ascii":
         indicator: Indicator = AsciiIndicator(step, style=settings.style)
@@ -266,7 +266,7 @@ def _take_load(options: Options) -> SimLoadSettings:
 
 
 def _refuse_another_specimen(address: Address, specimen: VirtualSpecimen) -> None:
-    """The camera's specimen is the only one: what the load's address says of it must agree."""
+    """The camera's specimen is the only one: the load's address must agree."""
     if not specimen.clock.claimed:
         return
     given = [key for key, _ in address.settings if key in SPECIMEN_KEYS and key != "lockstep"]

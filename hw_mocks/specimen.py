@@ -1,4 +1,4 @@
-"""One virtual specimen behind both devices: what the camera sees and what the load cell feels.
+"""One virtual specimen behind both devices: what the camera takes and what the load cell measures.
 
 Every quantity is a pure function of the time since the start of the test (the programme holds,
 pulls to yield, pulls on, holds). It is the truth that measurements are compared with:

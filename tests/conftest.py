@@ -1,4 +1,4 @@
-"""What all tests share: the folder of real image sets, where there is one."""
+"""What all tests share: loops compiled ahead, and the folder of real image sets, where there is one."""
 
 from __future__ import annotations
 
@@ -6,6 +6,21 @@ import os
 from pathlib import Path
 
 import pytest
+
+MEASURING = {"accuracy", "adversary", "analysis", "bench", "contracts", "live"}
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Compile in processes of their own, as every command does.
+
+    The process that compiles a loop may get another last digit than those that load it, and some tests compare bits.
+    """
+    tests = Path(__file__).parent
+    if any(item.path.relative_to(tests).parts[0] in MEASURING for item in session.items):
+        from analysis import PICTURE_KINDS
+        from live.setup.compiling import compile_ahead
+
+        compile_ahead(PICTURE_KINDS, phase=True)
 
 
 @pytest.fixture(scope="session")

@@ -1,15 +1,11 @@
-"""From frames to bursts: the mean of n consecutive frames, its noise and its clipped pixels.
+"""From frames to bursts: the mean of n consecutive frames, its noise, its clipped pixels and its motion.
 
-The live grab thread and a replay use the same ``BurstAccumulator``; sums are whole numbers, so
-a burst of the same frames is the same to the last bit whenever and however often it is made.
-Nothing here reads a clock or a file.
+The live grab thread and a replay use the same ``BurstAccumulator``. Sums are whole numbers, so a burst of the same
+frames is the same to the last bit. Nothing here reads a clock or a file.
 
-How far the picture moved while a burst was taken.
-
-Averaging frames of a moving picture smears it: contrast at wave number k falls by
-|sinc(k v T / 2)|. The motion is estimated from the first and the last frame of the burst by the
-optical flow of a few large tiles (Lucas and Kanade, 1981): crude beside the measuring kernel, but
-cheap enough for every burst. Pure; reads no clock.
+Averaging frames of a moving picture smears it: contrast at wave number k falls by |sinc(k v T / 2)|. The motion
+is estimated from the first and the last frame of the burst by the optical flow of a few large tiles (Lucas and
+Kanade, 1981): crude beside the measuring kernel, but cheap enough for every burst.
 """
 
 from __future__ import annotations
@@ -29,7 +25,7 @@ from acquire.frame import Burst, Frame, frozen
 
 LIMIT_PX = 0.05  # above it a burst is smeared
 TILE_PIXELS = 4096  # looked at in each tile at least, so that noise gives less than about 0.01 px
-MOST_TILES = 4
+MAX_TILES = 4
 ROW_STEP = 4
 
 
@@ -58,7 +54,7 @@ def motion_between_frames(first: NDArray[Any], last: NDArray[Any], noise: float)
 
 def _tiles(height: int, width: int) -> tuple[int, int, int]:
     step = ROW_STEP if height * width >= 2**18 else 1
-    across = min(MOST_TILES, max(1, math.isqrt(height * width // (step * TILE_PIXELS))))
+    across = min(MAX_TILES, max(1, math.isqrt(height * width // (step * TILE_PIXELS))))
     return across, across, step
 
 
@@ -78,7 +74,7 @@ def _solve(xx: float, xy: float, yy: float, xd: float, yd: float, n: float, *, n
 
 log = logging.getLogger(__name__)
 
-MOST_FRAMES = 65536  # a sum of so many 16-bit samples still fits into 32 bits
+MAX_FRAMES = 65536  # a sum of so many 16-bit samples still fits into 32 bits
 
 
 @cache
@@ -86,7 +82,9 @@ def compile_loops(kinds: tuple[str, ...] = ("uint8", "uint16")) -> None:
     """Have the loops ready for frames of these types (once a process), so that none is lost to a compiler later."""
     from acquire.burst.accumulate_loops import GROUP, fold, scratch, tile_sums
 
-    if not (fold.stats.cache_path and any(Path(fold.stats.cache_path).glob("smear_loops.tile_sums-*.nbi"))):
+    if not (
+        fold.stats.cache_path and any(Path(fold.stats.cache_path).glob("accumulate_loops.tile_sums-*.nbi"))
+    ):
         log.info("compiling the burst loops, once on this machine; this takes some seconds")
     mean, clipped, total = np.empty(9, np.float32), np.empty(9, np.bool_), np.empty(9, np.uint32)
     for kind in kinds:
@@ -127,8 +125,8 @@ class BurstAccumulator:
     """
 
     def __init__(self, n: int, *, not_before: float = -math.inf) -> None:
-        if not 1 <= n <= MOST_FRAMES:
-            raise ConfigError(f"a burst of {n} frames is not possible; allowed: 1 to {MOST_FRAMES}")
+        if not 1 <= n <= MAX_FRAMES:
+            raise ConfigError(f"a burst of {n} frames is not possible; allowed: 1 to {MAX_FRAMES}")
         self._n, self._not_before = n, not_before
         self._times: list[float] = []
         self._sums: _Sums | None = None
@@ -151,7 +149,7 @@ class BurstAccumulator:
             self._lost += frame.damaged
             return None
         if self._n == 1:
-            return self._alone(frame)
+            return self._single(frame)
         if self._sums is None:
             self._sums, self._first = _Sums(frame), frame.index
         self._last = frame.index
@@ -166,7 +164,7 @@ class BurstAccumulator:
     def _start_anew(self) -> None:
         self._times, self._sums = [], None
 
-    def _alone(self, frame: Frame) -> Burst:
+    def _single(self, frame: Frame) -> Burst:
         """A burst of one is the frame itself: nothing is averaged, nothing copied."""
         burst = Burst(
             mean=frame.image, n=1, noise=math.nan, clipped=frozen(frame.image >= 2**frame.bits - 1),

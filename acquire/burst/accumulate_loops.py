@@ -1,8 +1,7 @@
-"""The compiled pass over the frames of a burst: sum, temporal differences and clipped pixels at once.
+"""The compiled loops behind ``acquire.burst.accumulate``; imported with the first burst: numba costs a second.
 
-Imported only when the first burst is taken, since numba costs a second.
-
-The compiled sums behind ``acquire.burst.accumulate``: gradients and differences of two frames, tile by tile.
+``fold`` passes once over the frames: sum, temporal differences and clipped pixels. ``tile_sums`` has gradients and
+differences of two frames, tile by tile.
 """
 
 from __future__ import annotations

@@ -1,10 +1,8 @@
-"""Fixed-pattern noise taken out of a burst, on request: dark and flat frames.
+"""Dark and flat frames: fixed-pattern noise taken out of a burst, on request.
 
 Dirt, dust and unequal pixels stand still while the specimen moves, which pulls displacements
-toward zero and does not average out. Pure: arrays in, arrays out; how dark and flat are taken
-(lens covered; an evenly lit white sheet, out of focus) tells docs/cameras.md.
-
-Means of many frames as 32-bit TIFF files: what dark and flat frames are kept in.
+toward zero and does not average out. docs/cameras.md describes how to take dark and flat frames (lens covered;
+an evenly lit white sheet, out of focus). They are kept as means of many frames, in 32-bit TIFF files.
 """
 
 from __future__ import annotations
@@ -20,7 +18,7 @@ from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_picture, write_picture
 from acquire.frame import Burst, frozen
 
-LEAST_SHARE = 0.05  # of the median of the flat: below it a pixel sees next to nothing
+MIN_SHARE = 0.05  # of the median of the flat: below it a pixel sees next to nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +62,7 @@ class FlatField:
             raise DataError(
                 "the flat picture is no brighter than the dark one; were they mistaken for each other?"
             )
-        useless = light < LEAST_SHARE * middle
+        useless = light < MIN_SHARE * middle
         return cls(offset, np.where(useless, np.float32(1), middle / np.where(useless, 1, light)), useless)
 
     def apply(self, burst: Burst) -> Burst:

@@ -1,10 +1,8 @@
-"""The contract of a camera.
+"""The contract of a camera, and the base class of our own cameras.
 
 A camera is a context manager and an iterable of frames. V4L2 devices, OpenCV cameras,
 video and image files, recorded sessions and the simulator differ in nothing else;
-``tests/contracts`` holds all of them to this text.
-
-What all our cameras share: entering, stopping and closing. No device is touched here.
+``tests/contracts`` holds all of them to this text. No device is touched here.
 """
 
 from __future__ import annotations

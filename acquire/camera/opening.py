@@ -1,12 +1,9 @@
-"""Opening the camera that an address names, and listing the cameras that are there.
+"""Opening the camera of an address, listing the cameras, and what their drivers share.
 
-Guards around drivers that hide their faults: repeated pictures, dead handles, lost frames.
-
-Pure: told of pictures and times, they answer; they touch no device and read no clock.
-
-A part of a camera's picture as a camera of its own: what is cut away is neither measured nor stored.
-
-All coordinates downstream (ROI, mask, results) count from the corner of that part.
+``RepeatGuard``, ``FailureGuard`` and ``missing_between`` find faults that drivers hide: repeated pictures, dead
+handles, lost frames. They get pictures and times, touch no device and read no clock. ``CroppedCamera`` is a part
+of a camera's picture as a camera of its own: nothing else is measured or stored, and all coordinates
+downstream (ROI, mask, results) count from the corner of that part.
 """
 
 from __future__ import annotations
@@ -76,7 +73,7 @@ class CameraListing:
 
 
 def list_cameras() -> list[CameraListing]:
-    """The cameras of every source that can list its own; those that cannot be used say why."""
+    """The cameras of every source that can list its own; with the trouble of those that cannot be used."""
     found: list[CameraListing] = []
     for scheme, listed in CAMERAS.listers():
         try:
@@ -115,7 +112,7 @@ def open_camera(address: str, on_event: EventSink = ignore_event) -> Camera:
         ``files:shots/*.tif?fps=5``, ``session:run.h5``, or a scheme registered by others. The name of
         a folder, a glob or a file needs none (``with_scheme``).
     on_event : callable taking an Event
-        Told of every fault and recovery; may be called from any thread.
+        Gets every fault and recovery; may be called from any thread.
 
     Raises
     ------
@@ -157,7 +154,7 @@ class RepeatGuard:
 
 
 class FailureGuard:
-    """Tells a read that failed at once (a dead handle) from one that waited in vain (a stall).
+    """Separates a read that failed at once (a dead handle) from one that waited in vain (a stall).
 
     Parameters
     ----------
@@ -182,7 +179,7 @@ def missing_between(earlier_t: float, later_t: float, fps: float | None) -> int:
     ----------
     earlier_t, later_t : float, s
     fps : float or None, 1/s
-        None or 0: nobody knows, 0 is the answer.
+        None or 0: unknown, and 0 is returned.
     """
     if not fps:
         return 0

@@ -1,14 +1,9 @@
-"""Picture files as arrays and back; nothing but regular files, and no name that is handed to a decoder.
+"""Picture files as arrays and back; only regular files, decoded from memory.
 
-OpenCV crashes on a name that is not UTF-8, so it sees bytes and no names.
-
-Bytes of a regular file. A pipe, device or socket would wait or run for ever and is refused unopened.
-
-Pictures out of bytes by OpenCV, with what its decoders complain of.
-
-OpenCV fills what it cannot decode of an 8-bit TIFF or a JPEG with black or grey, says so on standard error
-and returns the picture. That word is caught here: standard error leads into a file while a picture is
-decoded, and what others wrote meanwhile is passed on.
+A pipe, device or socket would wait or run for ever and is refused unopened. OpenCV crashes on a name that is not
+UTF-8, so it gets bytes and no names. It fills what it cannot decode of an 8-bit TIFF or a JPEG with black or grey,
+reports that on standard error and returns the picture. This report is caught: while a picture is decoded,
+standard error leads into a file, and what others wrote meanwhile is passed on.
 """
 
 from __future__ import annotations
@@ -33,7 +28,7 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
 
-MOST_BYTES = 2**31 - 1
+MAX_BYTES = 2**31 - 1
 _KINDS = {
     stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket", stat.S_IFDIR: "a folder",
     stat.S_IFCHR: "a device", stat.S_IFBLK: "a device",
@@ -58,7 +53,7 @@ def check_regular(path: Path) -> int:
     return status.st_size
 
 
-def read_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
+def read_bytes(path: Path, most: int = MAX_BYTES) -> bytes:
     """All of a regular file of at most ``most`` bytes.
 
     Raises
@@ -108,14 +103,14 @@ class Decoded:
 
 def decode(source: Source, page: int = 0) -> Decoded:
     """Decode a picture, or one page of a multi-page TIFF, as it is: from its bytes, or from a file by name."""
-    cv2, heard = load_cv2(), list[str]()
+    cv2, reports = load_cv2(), list[str]()
     picture: NDArray[Any] | None = None
-    with _lock, _heard(heard):
+    with _lock, _captured_reports(reports):
         try:
             picture = _decode(cv2, source, page)
         except cv2.error as error:
-            heard.append(str(error))
-    damage = next((line for line in heard if _DAMAGE.search(line)), "")
+            reports.append(str(error))
+    damage = next((line for line in reports if _DAMAGE.search(line)), "")
     return Decoded(picture, _BEFORE.sub("", damage).strip()[:200])
 
 
@@ -134,25 +129,25 @@ def _decode(cv2: Any, source: Source, page: int) -> NDArray[Any] | None:
 
 
 @contextmanager
-def _heard(lines: list[str]) -> Iterator[None]:
-    """Fill ``lines`` with what the decoders say meanwhile."""
-    if not _ours():
+def _captured_reports(lines: list[str]) -> Iterator[None]:
+    """Fill ``lines`` with what the decoders report meanwhile."""
+    if not _owns_stderr():
         yield
         return
     logging = load_cv2().utils.logging
-    level, ear, error = logging.getLogLevel(), _ear(), os.dup(2)
+    level, capture, error = logging.getLogLevel(), _capture_file(), os.dup(2)
     try:
-        os.dup2(ear.fileno(), 2)
+        os.dup2(capture.fileno(), 2)
         logging.setLogLevel(logging.LOG_LEVEL_WARNING)
         yield
     finally:
         logging.setLogLevel(level)
         os.dup2(error, 2)
         os.close(error)
-        lines += _taken(ear)
+        lines += _take_reports(capture)
 
 
-def _ours() -> bool:
+def _owns_stderr() -> bool:
     """Whether descriptor 2 is standard error: of a process begun without one it may be a file of data."""
     try:
         return sys.__stderr__ is not None and sys.__stderr__.fileno() == 2 and os.fstat(2) is not None
@@ -161,19 +156,19 @@ def _ours() -> bool:
 
 
 @cache
-def _ear() -> BinaryIO:
+def _capture_file() -> BinaryIO:
     return tempfile.TemporaryFile("w+b", buffering=0)
 
 
-def _taken(ear: BinaryIO) -> list[str]:
+def _take_reports(capture: BinaryIO) -> list[str]:
     """The decoders' lines; those of others go to standard error."""
-    size = os.fstat(ear.fileno()).st_size
+    size = os.fstat(capture.fileno()).st_size
     if not size:
         return []
-    ear.seek(0)
-    text = ear.read(size).decode("utf-8", "replace")
-    ear.seek(0)
-    ear.truncate()
+    capture.seek(0)
+    text = capture.read(size).decode("utf-8", "replace")
+    capture.seek(0)
+    capture.truncate()
     lines = text.splitlines()
     others = [line for line in lines if line.strip() and not _DECODERS.search(line)]
     if others:
@@ -204,7 +199,7 @@ def picture_source(path: Path) -> Source:
     DataError
         Missing, no regular file, unreadable, or too large and its name is not UTF-8.
     """
-    if check_regular(path) <= MOST_BYTES:
+    if check_regular(path) <= MAX_BYTES:
         return read_bytes(path)
     if not is_utf8(path):
         raise DataError(

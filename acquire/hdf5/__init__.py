@@ -4,7 +4,7 @@
 and forecasts the free space, ``declared`` checks what a file holds.
 """
 
-from acquire.hdf5.damage import check_size, let_go, probe, read_superblock
+from acquire.hdf5.damage import abandon_file, check_size, probe, read_superblock
 from acquire.hdf5.declared import (
     Declared,
     JsonField,
@@ -18,27 +18,37 @@ from acquire.hdf5.declared import (
     read_scalar,
     stored_rows,
 )
-from acquire.hdf5.disk import FlushTimer, ToDisk, forecast, free_bytes, network_share
+from acquire.hdf5.disk import DiskSync, FlushTimer, forecast, free_bytes, network_share
 from acquire.hdf5.pictures import PictureReader, PictureStack, compile_loops
-from acquire.hdf5.tables import NO_UNIT, GrowingDataset, RowTable, new_group, new_json, say, to_json, word
+from acquire.hdf5.tables import (
+    NO_UNIT,
+    GrowingDataset,
+    RowTable,
+    as_text,
+    new_group,
+    new_json,
+    set_attributes,
+    to_json,
+)
 
 __all__ = [
     "NO_UNIT",
     "Declared",
+    "DiskSync",
     "FlushTimer",
     "GrowingDataset",
     "JsonField",
     "PictureReader",
     "PictureStack",
     "RowTable",
-    "ToDisk",
+    "abandon_file",
+    "as_text",
     "check_links",
     "check_object",
     "check_size",
     "compile_loops",
     "forecast",
     "free_bytes",
-    "let_go",
     "network_share",
     "new_group",
     "new_json",
@@ -50,8 +60,7 @@ __all__ = [
     "read_object",
     "read_scalar",
     "read_superblock",
-    "say",
+    "set_attributes",
     "stored_rows",
     "to_json",
-    "word",
 ]

@@ -1,15 +1,11 @@
-"""A first reading of a file in a child process.
+"""HDF5 files that are damaged, unfinished or on a full disk, without a hang or a crash of the library.
 
-HDF5 waits and waits on a truncated file in SWMR mode, and may crash on damaged bytes; a child
-process with a time limit takes that in our place.
-
-Letting go of an HDF5 file whose disk takes no more.
-
-HDF5 tries to write once more while closing; when that fails too it crashes the process, at once or
-at its end. So the file is first swapped for one that takes everything: what stands on the disk
-stays as the last complete flush left it.
-
-Looking at an HDF5 file before the library does: its superblock.
+- ``read_superblock`` and ``check_size`` look at the first bytes before the library does.
+- ``probe`` reads a file in a child process with a time limit: HDF5 waits for ever on a truncated file in SWMR
+  mode, and may crash on damaged bytes.
+- ``abandon_file`` closes a file whose disk takes no more. While closing, HDF5 tries to write once more; when that
+  fails too, it crashes the process. So the file is first swapped for the null device, and what stands on the
+  disk stays as the last complete flush left it.
 """
 
 from __future__ import annotations
@@ -49,14 +45,14 @@ def probe(path: Path, package: str, timeout_s: float | None = None) -> None:
     except subprocess.TimeoutExpired as error:
         raise DataError(f"{path} is damaged: reading it does not come to an end") from error
     if done.returncode != 0:
-        said = done.stdout.strip() if done.returncode == DataError.exit_code else ""
-        raise DataError(said or f"{path} is damaged: the HDF5 library fails on it ({done.returncode})")
+        refusal = done.stdout.strip() if done.returncode == DataError.exit_code else ""
+        raise DataError(refusal or f"{path} is damaged: the HDF5 library fails on it ({done.returncode})")
 
 
 log = logging.getLogger(__name__)
 
 
-def let_go(file: h5py.File) -> None:
+def abandon_file(file: h5py.File) -> None:
     """Close a file that cannot be written any more, without touching it and without an error."""
     try:
         nowhere = os.open(os.devnull, os.O_RDWR)
@@ -66,7 +62,7 @@ def let_go(file: h5py.File) -> None:
             os.close(nowhere)
         file.close()
     except (OSError, RuntimeError) as error:
-        log.debug("letting go of a file: %s", error)
+        log.debug("abandoning a file: %s", error)
 
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -74,7 +70,7 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 @dataclass(frozen=True, slots=True)
 class Superblock:
-    """The first bytes of an HDF5 file, as far as they tell its state.
+    """The first bytes of an HDF5 file, as far as they show its state.
 
     Attributes
     ----------

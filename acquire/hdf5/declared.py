@@ -1,9 +1,8 @@
-"""What a file must hold, as data, and the one check of it: shape, type and range of everything that is read.
+"""What a file must hold, as data, and the check of it: shape, type and range of everything that is read.
 
-A file of somebody else may hold anything. Nothing outside of it is ever opened: links must be hard, and
-values must stand in the file itself. Nothing is read before its size is known to be that of what is stored.
-
-JSON that stands in a file, read as what it must be.
+A file from elsewhere may hold anything. Nothing outside of it is ever opened: links must be hard, and
+values must stand in the file itself. A dataset is read only once its size is that of what is stored.
+``JsonField`` and ``read_object`` check the JSON in a file in the same way.
 """
 
 from __future__ import annotations
@@ -20,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.hdf5.tables import word
+from acquire.hdf5.tables import as_text
 
 _FILTERS = {h5py.h5z.FILTER_DEFLATE, h5py.h5z.FILTER_SHUFFLE, h5py.h5z.FILTER_FLETCHER32}
-_MOST_BYTES = 1 << 31  # of a chunk, and of a column in memory
+_MAX_BYTES = 1 << 31  # of a chunk, and of a column in memory
 _TEXTS = {"S": "a text of fixed length", "text": "a text", "int": "a whole number", "number": "a number"}
 
 
@@ -34,7 +33,7 @@ class Declared:
     Attributes
     ----------
     dtype : str
-        As numpy says it; "S": text of any fixed length, "text": text of any kind, "int": any whole number,
+        As numpy names it; "S": text of any fixed length, "text": text of any kind, "int": any whole number,
         "number": any number.
     shape : tuple of int or None
         None: of any length.
@@ -130,7 +129,7 @@ def open_dataset(group: h5py.Group, name: str, declared: Declared) -> h5py.Datas
         raise _wrong(group, name, f"is of a type that is not known here ({error})") from error
     if not (declared.takes_type(dtype) and declared.takes_shape(dataset.shape)):
         raise _wrong(group, name, f"is {dtype} of shape {dataset.shape}; it must be {declared.words()}")
-    if declared.shape[1:] == () and dataset.nbytes > _MOST_BYTES:
+    if declared.shape[1:] == () and dataset.nbytes > _MAX_BYTES:
         raise _wrong(group, name, f"is {dataset.nbytes >> 20} MB large; no test is so long")
     return dataset
 
@@ -161,7 +160,7 @@ def _check_storage(dataset: h5py.Dataset) -> None:
             )
     if layout == h5py.h5d.CHUNKED:
         size = math.prod(plan.get_chunk()) * dataset.id.get_type().get_size()
-        if size > _MOST_BYTES:
+        if size > _MAX_BYTES:
             raise _wrong(
                 dataset.parent, dataset.name, f"has pieces of {size >> 20} MB, more than is read at once"
             )
@@ -218,8 +217,8 @@ def read_attribute(item: h5py.Group | h5py.Dataset, name: str, declared: Declare
 
 def _wrong(group: h5py.Group | h5py.Dataset, name: str, what: str) -> DataError:
     place = name if name.startswith("/") else f"{str(group.name).rstrip('/')}/{name}"
-    said = "".join(c if c.isprintable() else "?" for c in f"{place} {what}")
-    return DataError(f"{group.file.filename}: {said}; this is not a file as phasedic writes it")
+    words = "".join(c if c.isprintable() else "?" for c in f"{place} {what}")
+    return DataError(f"{group.file.filename}: {words}; this is not a file as phasedic writes it")
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,7 +268,7 @@ def read_object(text: Any, where: str) -> dict[str, Any]:
         It is none.
     """
     try:
-        value = json.loads(word(text))
+        value = json.loads(as_text(text))
     except (ValueError, RecursionError) as error:
         raise DataError(f"{where} is not JSON ({error}); the file is damaged, or not of phasedic") from error
     if not isinstance(value, dict):
@@ -284,7 +283,7 @@ def check_object(value: Mapping[str, Any], form: Mapping[str, JsonField], where:
     ------
     DataError
     """
-    for name, said in form.items():
-        if not said.takes(value.get(name)):
+    for name, declared in form.items():
+        if not declared.takes(value.get(name)):
             shown = repr(value.get(name))[:60]
             raise DataError(f"{where}: {name!r} is {shown}; this is not a file as phasedic writes it")

@@ -1,9 +1,7 @@
-"""Room on a disk, and how long it lasts.
+"""The disk below a file: its free space, and when what is written is flushed and brought to it.
 
-When a file that is written is flushed, and brought to its disk.
-
-Flushed often enough for a kill to lose little, seldom enough to cost little; on the disk soon enough for a power
-cut to lose little.
+A flush is often enough for a kill to lose little, and seldom enough to cost little; data are on the disk soon enough
+for a power cut to lose little.
 """
 
 from __future__ import annotations
@@ -45,7 +43,7 @@ NETWORK = frozenset({"nfs", "nfs4", "cifs", "smb3", "smbfs", "fuse.sshfs", "9p",
 def network_share(
     path: str | os.PathLike[str], mounts: str | os.PathLike[str] = "/proc/mounts"
 ) -> str | None:
-    """The kind of network file system that holds ``path``; None for a local disk or where nobody says."""
+    """The kind of network file system that holds ``path``; None for a local disk or an unknown one."""
     place = str(Path(path).resolve())
     try:
         lines = Path(mounts).read_text(encoding="utf-8", errors="replace").splitlines()
@@ -62,7 +60,7 @@ def network_share(
     return kind if kind in NETWORK else None
 
 
-SYNC_S, PATIENCE_S = 1.0, 10.0
+SYNC_S, CLOSE_TIMEOUT_S = 1.0, 10.0
 """Between two times that a file is brought to its disk, and the longest wait for the last one."""
 
 KEPT_BYTES = 8 << 20
@@ -72,7 +70,7 @@ _CANNOT = (errno.EINVAL, errno.ENOSYS, errno.EOPNOTSUPP)
 
 
 class FlushTimer:
-    """Says when the next flush is due.
+    """When the next flush is due.
 
     Parameters
     ----------
@@ -104,8 +102,8 @@ class FlushTimer:
         return max(0.0, self._last + self._every_s - self._now()) if self._waits else math.inf
 
 
-class ToDisk:
-    """Brings what stands in a file to its disk once a second, and lets go of the memory, on a thread of its own.
+class DiskSync:
+    """Brings what stands in a file to its disk once a second, and frees the memory, on a thread of its own.
 
     Left to itself the system keeps half a minute of pictures in memory: gone with the power, written all at once when
     they must, and a disk that fails is not noticed. Memory that is used again and again is cheaper too: on a virtual
@@ -120,7 +118,7 @@ class ToDisk:
     Attributes
     ----------
     failure : OSError or None
-        What the disk said.
+        Error of the disk.
     """
 
     def __init__(self, path: Path, every_s: float = SYNC_S) -> None:
@@ -133,7 +131,7 @@ class ToDisk:
     def close(self) -> None:
         """Once more, and no more; may be called again."""
         self._ended.set()
-        self._thread.join(PATIENCE_S)
+        self._thread.join(CLOSE_TIMEOUT_S)
 
     def _work(self) -> None:
         try:

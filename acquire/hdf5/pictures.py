@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-_WORTH_NUMBA = 400  # pictures read, after which loading numba pays where nobody has done so
+_WORTH_NUMBA = 400  # pictures read, after which loading numba pays where it is not loaded yet
 
 
 @cache
@@ -103,7 +103,7 @@ class PictureReader:
         """
         self._count += 1
         if self._sealed and ("numba" in sys.modules or self._count > _WORTH_NUMBA):
-            # What is wrong with it the library will say.
+            # The library reports what is wrong with it.
             with contextlib.suppress(OSError, RuntimeError, ValueError, OverflowError):
                 if (picture := self._at_once(number)) is not None:
                     return picture

@@ -1,9 +1,8 @@
-"""Growing HDF5 datasets row by row, without the cost of h5py's convenience layer.
+"""Growing HDF5 datasets row by row, and the texts of NeXus in HDF5.
 
 A session has some twenty columns; the low-level calls take a tenth of the time of ``dataset.resize``
-and ``dataset[n] = ...``, and rows that are written together share that.
-
-The words of NeXus in HDF5: groups with a class, attributes and JSON as texts of fixed length.
+and ``dataset[n] = ...``, and rows that are written together share that. Groups carry their NeXus class; attributes
+and JSON are texts of fixed length.
 """
 
 from __future__ import annotations
@@ -97,7 +96,7 @@ class RowTable:
 NO_UNIT = "none"
 
 
-def say(item: Any, **attributes: Any) -> None:
+def set_attributes(item: Any, **attributes: Any) -> None:
     """Set attributes, texts in fixed length.
 
     Texts of variable length would stand in HDF5's global heap, the one structure of this file
@@ -109,25 +108,25 @@ def say(item: Any, **attributes: Any) -> None:
         item.attrs[name] = np.bytes_(value.encode()) if isinstance(value, str) else value
 
 
-def word(value: Any) -> str:
-    """A text that ``say`` or a text dataset holds."""
+def as_text(value: Any) -> str:
+    """A text that ``set_attributes`` or a text dataset holds."""
     return bytes(value).decode("utf-8") if isinstance(value, bytes) else str(value)
 
 
 def new_group(parent: h5py.Group, name: str, nexus_class: str, **attributes: Any) -> h5py.Group:
     """A group with its NeXus class."""
     group = parent.create_group(name)
-    say(group, NX_class=nexus_class, **attributes)
+    set_attributes(group, NX_class=nexus_class, **attributes)
     return group
 
 
 def new_json(group: h5py.Group, name: str, value: Any) -> None:
     """A scalar text dataset holding JSON."""
-    say(group.create_dataset(name, data=np.bytes_(to_json(value))), units=NO_UNIT)
+    set_attributes(group.create_dataset(name, data=np.bytes_(to_json(value))), units=NO_UNIT)
 
 
 def to_json(value: Any) -> str:
-    """Strict JSON: not-a-number becomes null, what JSON does not know becomes its text."""
+    """Strict JSON: not-a-number becomes null, what JSON has no type for becomes its text."""
     return json.dumps(_plain(value), allow_nan=False)
 
 

@@ -78,7 +78,7 @@ def fit(points: Sequence[Point], now: datetime | None = None) -> Calibration:
     Parameters
     ----------
     points : sequence of Point
-        At least two different loads; reading no load before and after tells the drift.
+        At least two different loads; a reading without load before and after shows the drift.
     now : datetime or None
 
     Raises
@@ -144,13 +144,13 @@ def load(path: str) -> Calibration:
         Missing, or not such a file.
     """
     try:
-        said = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+        content = tomllib.loads(Path(path).read_text(encoding="utf-8"))
         points = tuple(
             Point(float(p["force_N"]), float(p["value"]), float(p["noise"]), int(p["n"]))
-            for p in said["points"]
+            for p in content["points"]
         )
-        numbers = [float(said[name]) for name in ("gain", "zero", "residual_N")]
-        date = str(said["date"])
+        numbers = [float(content[name]) for name in ("gain", "zero", "residual_N")]
+        date = str(content["date"])
     except OSError as error:
         raise ConfigError(f"calibration={path}: {error.strerror}; name the file of a calibration") from error
     except (UnicodeDecodeError, tomllib.TOMLDecodeError, KeyError, ValueError, TypeError) as error:

@@ -1,6 +1,7 @@
-"""Ten seconds of a load cell, judged before the test: rate, noise, range, flags, what the lines look like.
+"""The check of a load cell before a test: rate, noise, range, flags, and what its lines look like.
 
-Whether a load is still: its noise apart from its movement.
+``listen`` collects ten seconds, ``report`` judges them. ``stillness`` separates the noise of a load from its
+movement; a tare needs it too.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ from numpy.typing import ArrayLike, NDArray
 from acquire.load_cell.contract import LoadCell
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 
-LEAST = 3  # values from which something can be said
-ROBUST = 12  # values from which a few odd ones do not count
+MIN_VALUES = 3  # fewer give no noise
+ROBUST_VALUES = 12  # values from which a few odd ones do not count
 
 
 @dataclass(frozen=True, slots=True)
 class LoadStillness:
-    """What some values of a load say.
+    """Mean, noise and movement of some values of a load.
 
     Attributes
     ----------
@@ -34,7 +35,7 @@ class LoadStillness:
         Noise: standard deviation of one value, from second differences, so that neither a drift nor
         a ramp counts. NaN with fewer than three values.
     step_N : float, N
-        Resolution of the display: as said, or the least change that was seen in both directions.
+        Resolution of the display: as given, or the least change that was seen in both directions.
     moved_N : float, N
         By how much a straight line through the values rises, with its sign.
     range_N : float, N
@@ -50,7 +51,7 @@ class LoadStillness:
     @property
     def still(self) -> bool:
         """Whether nothing but noise and the last digit moved."""
-        if self.n < LEAST:
+        if self.n < MIN_VALUES:
             return False
         drift = self.noise_N * max(5 * math.sqrt(12 / self.n), 1) + 2 * self.step_N
         return abs(self.moved_N) <= drift and self.range_N <= 10 * self.noise_N + 3 * self.step_N
@@ -69,11 +70,13 @@ def stillness(times: ArrayLike, forces: ArrayLike, step_N: float = 0.0) -> LoadS
     """
     t, f = np.asarray(times, float), np.asarray(forces, float)
     mean, reach = (float(f.mean()), float(np.ptp(f))) if f.size else (math.nan, math.nan)
-    if f.size < LEAST:
+    if f.size < MIN_VALUES:
         return LoadStillness(f.size, mean, math.nan, step_N, reach, reach)
     second = np.abs(np.diff(f, 2))
     second[second < 1e-9 * np.abs(f).max()] = 0.0  # rounding
-    spread = 1.4826 * float(np.median(second)) if f.size >= ROBUST else math.sqrt(float((second**2).mean()))
+    spread = (
+        1.4826 * float(np.median(second)) if f.size >= ROBUST_VALUES else math.sqrt(float((second**2).mean()))
+    )
     step = max(step_N, _flicker(np.diff(f)), 1e-9 * float(np.abs(f).max()))
     return LoadStillness(f.size, mean, spread / math.sqrt(6), step, _rise(t - t[0], f - mean), reach)
 
@@ -158,7 +161,7 @@ class LoadReport:
 
 @dataclass(frozen=True, slots=True)
 class ListenResult:
-    """What came while somebody listened.
+    """The samples of some seconds.
 
     Attributes
     ----------
@@ -191,15 +194,15 @@ def _as_of_now(samples: tuple[LoadSample, ...], began: float, ended: float) -> L
     return ListenResult(samples, began, ended)
 
 
-def report(heard: ListenResult, info: LoadCellInfo) -> LoadReport:
-    """What these samples tell."""
-    samples = heard.samples
+def report(listened: ListenResult, info: LoadCellInfo) -> LoadReport:
+    """The figures of these samples, and remarks."""
+    samples = listened.samples
     times = np.array([sample.t for sample in samples])
     steps = np.diff(times)
     good = [sample for sample in samples if not math.isnan(sample.force)]
     forces = np.array([sample.force for sample in good])
-    gaps = np.diff([heard.began, *(sample.t for sample in good), heard.ended])
-    judged = stillness([sample.t for sample in good], forces)
+    gaps = np.diff([listened.began, *(sample.t for sample in good), listened.ended])
+    still = stillness([sample.t for sample in good], forces)
     values = np.unique(forces)
     flags = Counter(str(flag.name).lower() for sample in samples for flag in sample.flags)
     span = float(times[-1] - times[0]) if len(times) > 1 else 0.0
@@ -207,7 +210,7 @@ def report(heard: ListenResult, info: LoadCellInfo) -> LoadReport:
     found = LoadReport(
         samples=len(samples),
         good=len(forces),
-        seconds=heard.ended - heard.began,
+        seconds=listened.ended - listened.began,
         rate=len(steps) / span if span > 0 else math.nan,
         jitter_s=float(steps.std()) if steps.size else math.nan,
         longest_s=float(gaps.max()),
@@ -216,23 +219,23 @@ def report(heard: ListenResult, info: LoadCellInfo) -> LoadReport:
         step_N=float(np.diff(values).min()) if len(values) > 1 else math.nan,
         lowest_N=float(forces.min()) if forces.size else math.nan,
         highest_N=float(forces.max()) if forces.size else math.nan,
-        mean_N=judged.mean_N,
-        noise_N=judged.noise_N,
-        moved_N=_moved(good, heard),
+        mean_N=still.mean_N,
+        noise_N=still.noise_N,
+        moved_N=_moved(good, listened),
         of_capacity=greatest / info.capacity_N if info.capacity_N and forces.size else None,
         flags=tuple(sorted(flags.items())),
         lines=_last_lines(samples),
         remarks=(),
     )
-    return dataclasses.replace(found, remarks=tuple(_remarks(found, samples, judged.step_N)))
+    return dataclasses.replace(found, remarks=tuple(_remarks(found, samples, still.step_N)))
 
 
-def _moved(good: Sequence[LoadSample], heard: ListenResult) -> float:
+def _moved(good: Sequence[LoadSample], listened: ListenResult) -> float:
     """Between the lowest and the highest mean of a tenth of the time, N."""
-    tenth = max((heard.ended - heard.began) / 10, 1e-9)
+    tenth = max((listened.ended - listened.began) / 10, 1e-9)
     parts: dict[int, list[float]] = {}
     for sample in good:
-        parts.setdefault(int((sample.t - heard.began) / tenth), []).append(sample.force)
+        parts.setdefault(int((sample.t - listened.began) / tenth), []).append(sample.force)
     means = [math.fsum(part) / len(part) for part in parts.values()]
     return max(means) - min(means) if means else math.nan
 

@@ -1,11 +1,6 @@
-"""The contract of a load cell.
+"""The contract of a load cell, the opening of an address, and ``none:`` for a test without one.
 
-A load cell is a context manager and an iterable of load samples; ``tests/contracts``
-holds all of them to this text.
-
-Opening the load cell that an address names.
-
-``none:``, the load cell of a test without one.
+A load cell is a context manager and an iterable of load samples; ``tests/contracts`` holds all of them to this text.
 """
 
 from __future__ import annotations
@@ -35,8 +30,8 @@ class LoadCell(Protocol):
     - ``stop()`` may be called from any thread; the iteration then ends within half a second.
     - ``tare()`` makes the present load zero, in the device where its protocol can, else here; may be
       called from any thread while iterating. Unless forced it is refused, in an event, where the load
-      is not known to be still. Its event says by how much forces fall from then on (``step_N``).
-    - ``undo_tare()`` lets zero be where it was before; it tells the like.
+      is not known to be still. Its event has the amount by which forces fall from then on (``step_N``).
+    - ``undo_tare()`` restores the zero before that; its event has the same.
     """
 
     @property
@@ -80,7 +75,7 @@ def open_load_cell(address: str, on_event: EventSink = ignore_event) -> LoadCell
         ``/dev/ttyUSB0?protocol=ascii&baud=115200&unit=N&sign=-1``, any pyserial URL with the
         same keys, ``session:run.h5``, ``none:``, or a scheme registered by others.
     on_event : callable taking an Event
-        Told of every fault and recovery; may be called from any thread.
+        Gets every fault and recovery; may be called from any thread.
 
     Raises
     ------
@@ -117,7 +112,7 @@ def open_none(address: Address, on_event: EventSink) -> NoLoadCell:
     Raises
     ------
     ConfigError
-        The address says more than ``none:``.
+        The address has more than ``none:``.
     """
     Options(address).done()
     if address.target:

@@ -2,7 +2,7 @@
 
 Interpolates, and refuses to where it would invent: outside the log, across a gap, beside an
 overload. Lines that gave no reading at all (garbage, flag ERROR), and values that waited somewhere
-so that nobody knows of when they are (flag STALE), leave no mark of their own: they are neither a
+so that their time is unknown (flag STALE), leave no mark of their own: they are neither a
 force at a known time nor a hole, and the gap rule decides. An overload that waited, like lines that were
 never read, may have been at any time since the last value: the force is unknown from there on.
 """
@@ -30,7 +30,7 @@ class LoadLog:
     max_gap_s : float, s
         Between samples further apart than this the force is not known.
     lag_s : float, s
-        By which samples are stamped later than what they tell of; taken off by ``force_at``.
+        By which samples are stamped later than the load they show; taken off by ``force_at``.
     """
 
     def __init__(self, max_gap_s: float = 0.25, lag_s: float = 0.0) -> None:
@@ -60,7 +60,7 @@ class LoadLog:
         self._force.append(force)
 
     def take_event(self, event: Event) -> None:
-        """Note a tare that says by how much forces fall (``step_N``); other events are let pass."""
+        """Note a tare with the amount by which forces fall (``step_N``); other events are ignored."""
         step = event.data.get("step_N")
         if event.kind is EventKind.TARE and isinstance(step, int | float) and math.isfinite(step):
             with self._lock:
@@ -136,7 +136,7 @@ class LoadLog:
 
     @property
     def latest(self) -> LoadSample | None:
-        """The newest sample, whatever it says."""
+        """The newest sample, valid or not."""
         return self._latest
 
     def __len__(self) -> int:

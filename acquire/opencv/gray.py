@@ -34,9 +34,9 @@ def to_gray(picture: NDArray[Any], gray: str | None, source: str) -> NDArray[Any
     Raises
     ------
     ConfigError
-        The channels differ and ``gray`` is not said.
+        The channels differ and ``gray`` is not given.
     DataError
-        Neither 8- nor 16-bit, or a number of channels nobody knows.
+        Neither 8- nor 16-bit, or an unknown number of channels.
     """
     if picture.dtype not in (np.uint8, np.uint16):
         raise DataError(f"{source}: samples are {picture.dtype}; save it with 8 or 16 bits a sample")

@@ -1,6 +1,7 @@
-"""The times of image files from a CSV: one time a line, or a file name and its time.
+"""What belongs to image files beside their pixels: their times from a CSV, and the number of pages of a TIFF.
 
-How many pictures a TIFF file holds, from its directories alone (TIFF 6.0, section 2; BigTIFF).
+A CSV has one time a line, or a file name and its time. Pages are counted from the directories of the file
+(TIFF 6.0, section 2; BigTIFF); no pixel is read.
 """
 
 from __future__ import annotations
@@ -108,7 +109,7 @@ def _count(file: BinaryIO, path: Path) -> int:
     head = file.read(16)
     order = {b"II": "<", b"MM": ">"}.get(head[:2])
     if order is None or len(head) < 8:
-        return 1  # whatever it is, the decoder will say
+        return 1  # whatever it is, the decoder decides
     big = struct.unpack_from(order + "H", head, 2)[0] == 43
     offset = (
         struct.unpack_from(order + "Q", head, 8)[0] if big else struct.unpack_from(order + "I", head, 4)[0]

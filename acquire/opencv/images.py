@@ -28,7 +28,7 @@ from acquire.opencv.gray import GRAYS, to_gray
 from acquire.opencv.image_metadata import count_pages, read_stamps
 
 SUFFIXES = (".tif", ".tiff", ".png", ".bmp", ".jpg", ".jpeg", ".pgm")
-MOST_TOLD = 20  # pictures that are left out, one by one
+MAX_REPORTED = 20  # pictures that are left out, one by one
 _DIGITS = re.compile(r"(\d+)")
 
 
@@ -77,7 +77,7 @@ def read_image(path: str | Path, gray: str | None = None, page: int = 0) -> NDAr
     DataError
         Missing, no regular file, truncated, damaged, not an image, or not of 8 or 16 bits.
     ConfigError
-        A colour picture and ``gray`` not said.
+        A colour picture without ``gray``.
     """
     path = Path(path)
     return to_gray(read_picture_page(path, picture_source(path), page), gray, str(path))
@@ -85,7 +85,7 @@ def read_image(path: str | Path, gray: str | None = None, page: int = 0) -> NDAr
 
 @dataclass(frozen=True, slots=True)
 class FileSettings:
-    """What an address of image files says beside their names.
+    """The settings in an address of image files.
 
     Attributes
     ----------
@@ -106,8 +106,8 @@ class FileSettings:
 class ImageFiles(CameraBase):
     """Image files as a camera; see ``acquire.camera.Camera``.
 
-    Each picture that is left out is told as an event whose data names the ``file`` and the time ``t`` of the
-    picture, s; after ``MOST_TOLD`` only their number.
+    Each picture that is left out gives an event whose data names the ``file`` and the time ``t`` of the
+    picture, s; after ``MAX_REPORTED`` only their number.
 
     Raises
     ------
@@ -146,8 +146,8 @@ class ImageFiles(CameraBase):
             if self.stopped.is_set():
                 return
             yield self._frame(index, path, read)
-        if self._left_out > MOST_TOLD:
-            self._tell(f"{self._left_out} pictures were left out in all", self._time(index))
+        if self._left_out > MAX_REPORTED:
+            self._report(f"{self._left_out} pictures were left out in all", self._time(index))
 
     def _pages(self) -> Iterator[tuple[Path, Callable[[], NDArray[Any]]]]:
         for path in self._paths:
@@ -167,10 +167,10 @@ class ImageFiles(CameraBase):
 
     def _leave_out(self, path: Path, t: float, why: str) -> None:
         self._left_out += 1
-        if self._left_out <= MOST_TOLD:
-            self._tell(f"{why}; this picture is left out", t, file=path.name)
+        if self._left_out <= MAX_REPORTED:
+            self._report(f"{why}; this picture is left out", t, file=path.name)
 
-    def _tell(self, text: str, t: float, **data: Any) -> None:
+    def _report(self, text: str, t: float, **data: Any) -> None:
         device_event(self._on_event, self.info.address, text, t=t, **data)
 
     def _time(self, index: int) -> float:
@@ -213,7 +213,7 @@ class ImageFiles(CameraBase):
 
 
 def _count(path: Path) -> int:
-    """Pages; one where the file is broken: reading it says why."""
+    """Pages; one where the file is broken: reading it raises."""
     try:
         return count_pages(path)
     except PhasedicError:

@@ -66,7 +66,7 @@ class VideoFile(CameraBase):
         while not self.stopped.is_set():
             well, picture = self._capture.read()
             if not well:
-                self._tell_if_short(index)
+                self._report_if_short(index)
                 return
             stamp = self._capture.get(cv2.CAP_PROP_POS_MSEC) / 1000
             t = stamp if stamp > t or index == 0 else t + 1 / self._fps
@@ -79,7 +79,7 @@ class VideoFile(CameraBase):
             raise DataError(f"{self._path}: frame {index} is of another size than the first")
         return image
 
-    def _tell_if_short(self, count: int) -> None:
+    def _report_if_short(self, count: int) -> None:
         if count < self._promised:
             text = f"{self._path}: ends after {count} of {self._promised} frames; it may be cut off"
             device_event(self._on_event, self._address, text)

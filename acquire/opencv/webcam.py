@@ -1,8 +1,8 @@
 """Cameras through OpenCV: ``opencv:0?width=&height=&fps=&exposure=&gain=&gray=``.
 
-For cameras of other systems. On Linux the reader of
-``acquire.v4l2`` tells more. Pictures are 8-bit colour made grey; a live camera is drained by a
-thread of its own, since OpenCV's read may block for seconds; dead handles are opened anew.
+For cameras of other systems; on Linux ``acquire.v4l2`` has stamps and losses too. Pictures are 8-bit colour made
+grey. A thread of its own drains a live camera, since OpenCV's read may block for seconds; dead handles are opened
+anew.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class _Shot:
 
 
 class _Drain(threading.Thread):
-    """Reads one capture and nothing else, until it fails or is told to end."""
+    """Reads one capture and nothing else, until it fails or is stopped."""
 
     def __init__(self, capture: Capture, now: Callable[[], float]) -> None:
         super().__init__(name="opencv-drain", daemon=True)
@@ -253,7 +253,7 @@ class OpenCVCamera(CameraBase):
                 yield frame
 
     def _next_shot(self) -> _Shot | None:
-        """The next read; None when stopped, or when there was a stall or a dead handle to tell."""
+        """The next read; None when stopped, or when there was a stall or a dead handle to report."""
         self._start()
         began = self._now()
         while self._drain is not None and not self.stopped.is_set():
@@ -262,14 +262,14 @@ class OpenCVCamera(CameraBase):
             except queue.Empty:
                 waited = self._now() - began
             if waited > STALL_S:
-                self._tell(f"no picture for {waited:.1f} s; still waiting")
+                self._report(f"no picture for {waited:.1f} s; still waiting")
                 return None
         return None
 
     def _frame(self, shot: _Shot) -> Frame | None:
         image = self._gray(shot.picture)  # type: ignore[arg-type]  # asked by the caller
         if image.shape != self._shape:
-            self._tell(f"a picture of another size, {image.shape[1]}x{image.shape[0]}, was left out")
+            self._report(f"a picture of another size, {image.shape[1]}x{image.shape[0]}, was left out")
             return None
         raw_t = shot.stamp if self._clock == "device" else shot.returned
         t = max(raw_t, self._last_t)
@@ -281,11 +281,11 @@ class OpenCVCamera(CameraBase):
     def _repeated(self, image: NDArray[Any]) -> bool:
         repeated = self._repeats.repeated(image)
         if repeated and self._repeats.just_found:
-            self._tell("the driver hands out the same picture again and again; none of them is measured")
+            self._report("the driver hands out the same picture again and again; none of them is measured")
         return repeated
 
     def _recover(self, verdict: str) -> None:
-        self._tell(f"{verdict}; opening it again", "error")
+        self._report(f"{verdict}; opening it again", "error")
         self._end_drain()
         for attempt in range(10**9):
             if self.stopped.wait(BACKOFF_S[min(attempt, len(BACKOFF_S) - 1)]):
@@ -295,10 +295,10 @@ class OpenCVCamera(CameraBase):
             except (DeviceError, ConfigError) as error:
                 log.debug("%s", error)
             else:
-                self._tell("opened again; the recording goes on", "info")
+                self._report("opened again; the recording goes on", "info")
                 return
 
-    def _tell(self, text: str, level: Any = "warning") -> None:
+    def _report(self, text: str, level: Any = "warning") -> None:
         device_event(self._on_event, self._address, f"{self._address}: {text}", level, last_index=self._index)
 
 

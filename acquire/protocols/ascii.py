@@ -39,7 +39,7 @@ _COMMA_SPLIT = re.compile(r"( *[;\t] *| +)")
 
 @dataclass(frozen=True, slots=True)
 class AsciiSettings:
-    """What the address says of the lines; columns count from 1.
+    """How the address describes the lines; columns count from 1.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class AsciiSettings:
     millis : int or None
         Field of the device's own milliseconds.
     decimal_comma : bool or None
-        None: not said; then two numbers with a comma between them may be one.
+        None: not given; then two numbers with a comma between them may be one.
     """
 
     column: int | None = None
@@ -82,7 +82,7 @@ class AsciiParser(LineParser):
         chosen = self._choose(fields) if fields and self._usual(len(fields)) else None
         if fields is None or chosen is None:
             return bad(line)
-        unit = fields[chosen].unit or _unit_alone(fields[chosen + 1 : chosen + 2])
+        unit = fields[chosen].unit or _unit_only(fields[chosen + 1 : chosen + 2])
         saturated = _saturation(fields[chosen:])
         return Reading(
             value=math.nan if saturated else fields[chosen].value,
@@ -110,7 +110,7 @@ class AsciiParser(LineParser):
     def _usual(self, width: int) -> bool:
         """Whether a line has as many fields as the lines before: a decimal comma makes one more.
 
-        Only where columns are said; a new width that stays is taken over.
+        Only where columns are given; a new width that stays is taken over.
         """
         if self._settings.column is None or width == self._width or not self._width:
             self._width, self._others = width, 0
@@ -134,18 +134,20 @@ class AsciiParser(LineParser):
         return _Field(value, found[2] or None, digits, apart)
 
     def _choose(self, fields: list[_Field]) -> int | None:
-        """Where the value stands; None where the line does not tell."""
+        """Where the value stands; None where the line leaves that open."""
         millis, column = self._settings.millis, self._settings.column
         if millis is not None and not (_numeric_at(fields, millis) and self._is_time(fields[millis - 1])):
             return None
         if column is not None:
-            return column - 1 if _numeric_at(fields, column) and self._alone(fields, column - 1) else None
+            return (
+                column - 1 if _numeric_at(fields, column) and self._only_number(fields, column - 1) else None
+            )
         numeric = [i for i, field in enumerate(fields) if field.numeric and i + 1 != millis]
         if len(numeric) != 1:
-            numeric = [i for i in numeric if fields[i].unit or _unit_alone(fields[i + 1 : i + 2])]
-        return numeric[0] if len(numeric) == 1 and self._alone(fields, numeric[0]) else None
+            numeric = [i for i in numeric if fields[i].unit or _unit_only(fields[i + 1 : i + 2])]
+        return numeric[0] if len(numeric) == 1 and self._only_number(fields, numeric[0]) else None
 
-    def _alone(self, fields: list[_Field], i: int) -> bool:
+    def _only_number(self, fields: list[_Field], i: int) -> bool:
         """Whether the number in field ``i`` cannot be a part of one that its neighbours complete."""
         millis = self._settings.millis
         pairs = [(i - 1, i)] if i > 0 and i != millis else []
@@ -153,7 +155,7 @@ class AsciiParser(LineParser):
         return not any(self._may_be_one(fields[before], fields[after]) for before, after in pairs)
 
     def _is_time(self, field: _Field) -> bool:
-        """A comma within milliseconds separates two fields, whatever is said of decimals."""
+        """A comma within milliseconds separates two fields, whatever ``decimal`` is."""
         return not (self._settings.decimal_comma and "." in field.digits)
 
     def _may_be_one(self, before: _Field, after: _Field) -> bool:
@@ -176,7 +178,7 @@ def _numeric_at(fields: list[_Field], column: int) -> bool:
     return column <= len(fields) and fields[column - 1].numeric
 
 
-def _unit_alone(after: list[_Field]) -> str | None:
+def _unit_only(after: list[_Field]) -> str | None:
     return after[0].unit if after and not after[0].numeric else None
 
 

@@ -1,7 +1,4 @@
-"""What a protocol is: a description, a parser, and the bytes of its commands.
-
-Every protocol by its name; a module is imported when it is first used.
-"""
+"""What a protocol is: a description, a parser and the bytes of its commands; and the protocols by name."""
 
 from __future__ import annotations
 
@@ -31,7 +28,7 @@ class Reading:
     unit : str or None
         None where the line names none.
     stable : bool or None
-        None where the line does not say.
+        None where the line has no such mark.
     flags : LoadFlag
     raw : bytes
         Without the line end.
@@ -88,14 +85,14 @@ class Protocol:
     name, summary : str
     make_parser : callable taking Options
         Takes its own settings out of the address; may raise ConfigError.
-    baud, bytesize, parity : line settings where the address says none
+    baud, bytesize, parity : line settings where the address has none
     mode : "listen" | "stream" | "poll"
         Listen: the device sends by itself. Stream: it does after the command ``start``.
         Poll: each reading is asked for with ``poll``.
     sign : int
         With which tension is positive.
     unit_on_line : bool
-        False: the user must say the unit.
+        False: the address must name the unit.
     flags_overload : bool
         False: an overload shows only as a value beyond the capacity.
     commands : mapping of str to bytes
@@ -105,7 +102,7 @@ class Protocol:
     undetected : str
         What damage of a line this protocol cannot show, for the documentation and the log.
     max_rate : float, 1/s
-        Of polling, where the address says none.
+        Of polling, where the address has none.
     silence_s : float, s
         After which a message without an end is over.
     """
@@ -146,7 +143,7 @@ def find_protocol(name: str) -> Protocol:
     Raises
     ------
     ConfigError
-        Nobody knows it; lists those there are.
+        It is unknown; lists those there are.
     """
     if name not in PROTOCOLS:
         raise ConfigError(f"no protocol is called {name!r}; there are: {', '.join(PROTOCOLS)}")

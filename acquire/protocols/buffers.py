@@ -1,12 +1,9 @@
-"""Bytes of a message that only silence, or its length, ends: kept up to a bound, with their position.
+"""Bytes on their way to messages: kept up to a bound, cut into lines, read line by line.
 
-Cutting a stream of bytes into lines, in linear time and bounded memory.
-
-CR, LF and both are line ends alike; empty lines vanish. The first line after a (re)start may
-have lost its beginning and is dropped. A line that never ends is cut off at ``limit`` and
-comes out marked as overlong, once.
-
-What all protocols of lines share: a line buffer, and one function from line to reading.
+``HeldBytes`` keeps a message that only silence, or its length, ends. ``LineBuffer`` cuts a stream into lines, in
+linear time and bounded memory: CR, LF and both end a line; empty lines vanish. The first line after a (re)start may
+have lost its beginning and is dropped. A line that never ends is cut off at ``limit`` and comes out marked as
+overlong, once. ``LineParser`` is the base of all protocols of lines.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ KEYS = ("pattern", *STATES, "unstable", "net", "ends", "scale", "decimal", "unit
 
 @dataclass(frozen=True, slots=True)
 class LineRules:
-    """What the address or a preset says of the lines.
+    """How the address or a preset describes the lines.
 
     Attributes
     ----------
@@ -107,15 +107,15 @@ class RuledParser(LineParser):
 def make_parser(options: Options) -> Parser:
     """Takes ``preset`` and the keys of a preset out of the address."""
     preset = options.text("preset")
-    said: dict[str, Any] = load_preset(preset) if preset else {}
+    rules: dict[str, Any] = load_preset(preset) if preset else {}
     for key in KEYS:
         if key == "unit":  # also a setting of every serial address, taken there
             continue
         given = options.text(key)
         if given is not None:
-            said[key] = given
+            rules[key] = given
     try:
-        return parser_from(said)
+        return parser_from(rules)
     except ConfigError as error:
         raise ConfigError(f"{options.address.text}: {error}") from error
 
@@ -135,16 +135,16 @@ def load_preset(name: str) -> dict[str, Any]:
             f"no preset is called {name!r}; there are: {', '.join(known)}, or give a .toml file"
         )
     try:
-        said = tomllib.loads(Path(name).read_text(encoding="utf-8"))
+        rules = tomllib.loads(Path(name).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise ConfigError(f"preset {name}: {error}") from error
-    unknown = set(said) - set(KEYS)
+    unknown = set(rules) - set(KEYS)
     if unknown:
         raise ConfigError(f"preset {name}: unknown key {min(unknown)!r}; known: {', '.join(KEYS)}")
-    return said
+    return rules
 
 
-def parser_from(said: Mapping[str, Any]) -> RuledParser:
+def parser_from(preset: Mapping[str, Any]) -> RuledParser:
     """A parser from the keys of a preset.
 
     Raises
@@ -152,21 +152,21 @@ def parser_from(said: Mapping[str, Any]) -> RuledParser:
     ConfigError
         No pattern, an impossible one, or one without a value.
     """
-    if "pattern" not in said:
+    if "pattern" not in preset:
         raise ConfigError("protocol=lines needs pattern= or preset=")
-    ends = ENDS.get(str(said.get("ends", "line")))
+    ends = ENDS.get(str(preset.get("ends", "line")))
     if ends is None:
-        raise ConfigError(f"ends={said['ends']} is not possible; allowed: {', '.join(ENDS)}")
+        raise ConfigError(f"ends={preset['ends']} is not possible; allowed: {', '.join(ENDS)}")
     rules = LineRules(
-        pattern=_pattern(str(said["pattern"])),
-        states=tuple((word, flag) for key, flag in STATES.items() for word in _words(said, key)),
-        unstable=_words(said, "unstable"),
-        net=_words(said, "net"),
-        scale=_scale(said.get("scale", 1.0)),
-        decimal_comma=str(said.get("decimal", "point")) == "comma",
-        unit=said.get("unit"),
+        pattern=_pattern(str(preset["pattern"])),
+        states=tuple((word, flag) for key, flag in STATES.items() for word in _words(preset, key)),
+        unstable=_words(preset, "unstable"),
+        net=_words(preset, "net"),
+        scale=_scale(preset.get("scale", 1.0)),
+        decimal_comma=str(preset.get("decimal", "point")) == "comma",
+        unit=preset.get("unit"),
     )
-    commands = {key: _bytes(said[key]) for key in COMMANDS if key in said}
+    commands = {key: _bytes(preset[key]) for key in COMMANDS if key in preset}
     return RuledParser(rules, ends, commands)
 
 
@@ -180,8 +180,8 @@ def _pattern(text: str) -> re.Pattern[bytes]:
     return pattern
 
 
-def _words(said: Mapping[str, Any], key: str) -> tuple[bytes, ...]:
-    return tuple(word.encode() for word in str(said.get(key, "")).split("|") if word)
+def _words(rules: Mapping[str, Any], key: str) -> tuple[bytes, ...]:
+    return tuple(word.encode() for word in str(rules.get(key, "")).split("|") if word)
 
 
 def _scale(value: Any) -> float:

@@ -1,4 +1,4 @@
-"""``modbus``: weight transmitters that speak Modbus RTU, by a register map in TOML (``profile=``).
+"""``modbus``: weight transmitters on Modbus RTU, by a register map in TOML (``profile=``).
 
 Each reading is one query for a span of registers. Frames carry a CRC-16: a damaged one gives no value.
 
@@ -70,7 +70,7 @@ class ModbusParser(Parser):
         held = self._held.data
         if len(held) < EXCEPTION_BYTES or held[0] != self._profile.slave:
             return 0
-        if held.startswith(self._request):  # an RS-485 adapter that hears itself
+        if held.startswith(self._request):  # an RS-485 adapter that echoes
             return len(self._request)
         if held[1] == self._profile.function:
             size = 5 + 2 * self._profile.count if held[2] == 2 * self._profile.count else 0
@@ -91,8 +91,8 @@ class ModbusParser(Parser):
         value = math.nan if flags & VALUELESS else self._value(words) * self._scale
         if math.isnan(value) and not flags & VALUELESS:
             flags |= LoadFlag.ERROR
-        said = any(bit.flag is LoadFlag.UNSTABLE for bit in self._profile.flags)
-        stable = LoadFlag.UNSTABLE not in flags if said else None
+        has_mark = any(bit.flag is LoadFlag.UNSTABLE for bit in self._profile.flags)
+        stable = LoadFlag.UNSTABLE not in flags if has_mark else None
         return [Reading(value, None, answer, start, stable, flags)]
 
     def _raised(self, bit: FlagBit, words: tuple[int, ...]) -> bool:

@@ -22,7 +22,7 @@ FLAGS = {
     "error": LoadFlag.ERROR,
     "net": LoadFlag.NET,
 }
-LONGEST = 32  # registers of one query that every known transmitter answers
+MAX_REGISTERS = 32  # registers of one query that every known transmitter answers
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,13 +92,13 @@ def load_profile(name: str) -> Profile:
             f"no profile is called {name!r}; there are: {', '.join(known)}, or give a .toml file"
         )
     try:
-        said = tomllib.loads(Path(name).read_text(encoding="utf-8"))
+        table = tomllib.loads(Path(name).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
         raise ConfigError(f"profile {name}: {error}") from error
-    return profile_from(said, name)
+    return profile_from(table, name)
 
 
-def profile_from(said: Mapping[str, Any], name: str) -> Profile:
+def profile_from(table: Mapping[str, Any], name: str) -> Profile:
     """A profile from its keys.
 
     Raises
@@ -106,20 +106,20 @@ def profile_from(said: Mapping[str, Any], name: str) -> Profile:
     ConfigError
     """
     try:
-        _known_keys(said, ("slave", "function", "value", "sign", "flags", "commands"), "")
-        value = said["value"]
+        _known_keys(table, ("slave", "function", "value", "sign", "flags", "commands"), "")
+        value = table["value"]
         _known_keys(value, ("register", "type", "order"), "value.")
-        flags = said.get("flags", {})
+        flags = table.get("flags", {})
         _known_keys(flags, tuple(FLAGS), "flags.")
         profile = Profile(
-            slave=_whole(said.get("slave", 1), 1, 247, "slave"),
-            function=_whole(said.get("function", 3), 3, 4, "function"),
+            slave=_whole(table.get("slave", 1), 1, 247, "slave"),
+            function=_whole(table.get("function", 3), 3, 4, "function"),
             register=_whole(value["register"], 0, 65534, "value.register"),
             kind=_one_of(value.get("type", "i32"), tuple(TYPES), "value.type"),
             order=_one_of(value.get("order", "big"), ORDERS, "value.order"),
-            sign_bit=_bit(said["sign"], LoadFlag.NONE, "sign") if "sign" in said else None,
+            sign_bit=_bit(table["sign"], LoadFlag.NONE, "sign") if "sign" in table else None,
             flags=tuple(_bit(bit, FLAGS[flag], f"flags.{flag}") for flag, bit in flags.items()),
-            commands={key: _command(command, key) for key, command in said.get("commands", {}).items()},
+            commands={key: _command(command, key) for key, command in table.get("commands", {}).items()},
         )
     except KeyError as error:
         raise ConfigError(f"profile {name}: the key {error} is missing") from error
@@ -127,38 +127,38 @@ def profile_from(said: Mapping[str, Any], name: str) -> Profile:
         raise ConfigError(f"profile {name}: a table is expected where a plain value stands") from error
     except ConfigError as error:
         raise ConfigError(f"profile {name}: {error}") from error
-    if profile.count > LONGEST:
+    if profile.count > MAX_REGISTERS:
         raise ConfigError(
-            f"profile {name}: registers span {profile.count}; one query reads at most {LONGEST}"
+            f"profile {name}: registers span {profile.count}; one query reads at most {MAX_REGISTERS}"
         )
     return profile
 
 
-def _bit(said: Mapping[str, Any], flag: LoadFlag, where: str) -> FlagBit:
-    _known_keys(said, ("register", "mask", "set"), f"{where}.")
-    when_set = said.get("set", True)
+def _bit(table: Mapping[str, Any], flag: LoadFlag, where: str) -> FlagBit:
+    _known_keys(table, ("register", "mask", "set"), f"{where}.")
+    when_set = table.get("set", True)
     if not isinstance(when_set, bool):
         raise ConfigError(f"{where}.set must be true or false")
     return FlagBit(
         flag,
-        _whole(said["register"], 0, 65535, f"{where}.register"),
-        _whole(said["mask"], 1, 65535, f"{where}.mask"),
+        _whole(table["register"], 0, 65535, f"{where}.register"),
+        _whole(table["mask"], 1, 65535, f"{where}.mask"),
         when_set,
     )
 
 
-def _command(said: Mapping[str, Any], name: str) -> tuple[int, int]:
-    _known_keys(said, ("register", "value"), f"commands.{name}.")
+def _command(table: Mapping[str, Any], name: str) -> tuple[int, int]:
+    _known_keys(table, ("register", "value"), f"commands.{name}.")
     if name not in ("tare", "zero"):
         raise ConfigError(f"commands.{name}: there are tare and zero")
     return (
-        _whole(said["register"], 0, 65535, f"commands.{name}.register"),
-        _whole(said["value"], 0, 65535, f"commands.{name}.value"),
+        _whole(table["register"], 0, 65535, f"commands.{name}.register"),
+        _whole(table["value"], 0, 65535, f"commands.{name}.value"),
     )
 
 
-def _known_keys(said: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
-    unknown = set(said.keys()) - set(known)
+def _known_keys(table: Mapping[str, Any], known: tuple[str, ...], where: str) -> None:
+    unknown = set(table.keys()) - set(known)
     if unknown:
         raise ConfigError(f"unknown key {where}{min(unknown)}; known: {', '.join(known)}")
 

@@ -37,7 +37,7 @@ def is_unit(text: str) -> bool:
 
 
 def is_mass(text: str) -> bool:
-    """Whether ``text`` names a unit of mass, which is no force until somebody says so."""
+    """Whether ``text`` names a unit of mass, which is no force unless the address allows it."""
     return text.lower() in MASSES
 
 

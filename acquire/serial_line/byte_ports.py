@@ -1,17 +1,15 @@
-"""Ports as streams of bytes: what is there in one block, never more than asked for, never waiting for long.
+"""Ports as streams of bytes: one block of what came, with a limit, and no long wait.
 
-A socket is read by our own few lines: pyserial's reports one byte at a time, and its opening lasts as
-long as the other side keeps sending.
-
-A serial port behind a terminal server, by Telnet with the COM port option (RFC 854, RFC 2217).
-
-Our own client: pyserial's takes no write time-out, puts each byte into a queue without bound, and
-does not survive a server that ends a negotiation it has not begun.
+``TtyPort`` wraps pyserial, for ports of this machine. ``TcpPort`` is a socket: pyserial reads one byte at a
+time from it, and its opening lasts as long as the other side sends. ``Rfc2217Port`` is a serial port behind a
+terminal server (Telnet with the COM port option, RFC 854 and RFC 2217): pyserial has no write time-out
+there, an unbounded queue, and fails on a server that ends a negotiation which it did not begin.
 """
 
 from __future__ import annotations
 
 import contextlib
+import io
 import select
 import socket
 import time
@@ -52,8 +50,18 @@ class TtyPort:
     def receive(self, limit: int, /, *, wait: bool = True) -> bytes:
         """See ``Port``."""
         data = bytes(self._port.read(1)) if wait else b""
+        if not wait:
+            self._let_kernel_deliver()
         waiting = min(self._port.in_waiting, limit - len(data)) if data or not wait else 0
         return data + (self._port.read(waiting) if waiting else b"")
+
+    def _let_kernel_deliver(self) -> None:
+        """Have Linux count all that came: behind a full buffer of 4 kB it holds 64 kB, moved by a kernel worker.
+
+        ``in_waiting`` does not wait for that worker; ``select`` does before it finds nothing.
+        """
+        with contextlib.suppress(io.UnsupportedOperation):  # a port without a descriptor
+            select.select([self._port.fileno()], [], [], 0)
 
     def write(self, data: bytes, /) -> object:
         """See ``Port``."""
@@ -135,20 +143,20 @@ ANSWER = 100  # what the server adds to the number of a command
 PARITIES = {"N": 1, "O": 2, "E": 3}
 STOPS = {1.0: 1, 2.0: 2, 1.5: 3}
 NO_FLOW_CONTROL, DTR_ON, RTS_ON = 1, 8, 11
-LONGEST = 64  # bytes kept of a negotiation
+MAX_NEGOTIATION = 64  # bytes kept of a negotiation
 
 _OURS, _THEIRS = frozenset({BINARY, SGA, COM_PORT}), frozenset({BINARY, SGA, COM_PORT})
 
 
 class Telnet:
-    """Takes Telnet's own words out of what the server sends.
+    """Takes Telnet's commands out of what the server sends.
 
     Attributes
     ----------
     replies : bytearray
         What has to be sent back; the caller takes it out.
     willing : bool
-        The server speaks RFC 2217.
+        The server supports RFC 2217.
     answered : set of int
         Settings that the server has answered.
     """
@@ -158,7 +166,7 @@ class Telnet:
         self.willing = False
         self.answered: set[int] = set()
         self._begun = bytearray()  # of a command that is not whole yet
-        self._asked: set[tuple[int, int]] = set()
+        self._sent: set[tuple[int, int]] = set()
 
     def begin(self) -> bytes:
         """What is offered and asked for at the start."""
@@ -183,7 +191,7 @@ class Telnet:
                 out += data[at:]
                 break
             out += data[at:mark]
-            size = self._command(data[mark : mark + LONGEST])
+            size = self._command(data[mark : mark + MAX_NEGOTIATION])
             if size == 0:  # the rest of it is still to come
                 self._begun += data[mark:]
                 break
@@ -192,7 +200,7 @@ class Telnet:
         return bytes(out)
 
     def _command(self, data: bytes) -> int:
-        """Do what a command at the beginning of ``data`` says; its length, 0 when it is not whole."""
+        """Follow the command at the beginning of ``data``; its length, 0 when it is not whole."""
         if len(data) < 2:
             return 0
         if data[1] in (WILL, WONT, DO, DONT):
@@ -205,7 +213,7 @@ class Telnet:
     def _settings(self, data: bytes) -> int:
         end = data.find(bytes([IAC, SE]), 2)
         if end < 0:
-            return LONGEST if len(data) >= LONGEST else 0
+            return MAX_NEGOTIATION if len(data) >= MAX_NEGOTIATION else 0
         if data[2:3] == bytes([COM_PORT]) and end > 3:
             self.answered.add(data[3] - ANSWER)
         return end + 2
@@ -220,8 +228,8 @@ class Telnet:
 
     def _say(self, action: int, option: int) -> None:
         """Once, so that no two sides can answer each other for ever."""
-        if (action, option) not in self._asked:
-            self._asked.add((action, option))
+        if (action, option) not in self._sent:
+            self._sent.add((action, option))
             self.replies += bytes([IAC, action, option])
 
 
@@ -251,7 +259,7 @@ class Rfc2217Port(TcpPort):
     OSError
         Nobody answers.
     DeviceError
-        What answers does not speak RFC 2217.
+        The server does not support RFC 2217.
     """
 
     def __init__(self, host: str, port: int, line: bytes, read_timeout_s: float) -> None:

@@ -1,6 +1,6 @@
 """A load cell on a serial line: reads in blocks, stamps, scales, and never ends nor delays a test.
 
-The protocol's parser knows the lines, ``scaling`` the units, ``link`` the port and its return; here is the
+The protocol's parser reads the lines, ``scaling`` converts the units, ``link`` keeps the port open; here is the
 stream of samples, polling, and the commands. Every round is bounded in time and bytes, whatever comes.
 """
 
@@ -20,7 +20,7 @@ from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.protocols.base import Reading
 from acquire.serial_line.clock import ArrivalRate, ArrivalTimes, DeviceClock
-from acquire.serial_line.link import Flood, Link, LoadWatch, Means, Opener
+from acquire.serial_line.link import FloodGuard, Link, LinkContext, LoadWatch, Opener
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
 from acquire.serial_line.settings import SerialSettings, describe, read_settings
@@ -29,8 +29,9 @@ log = logging.getLogger(__name__)
 
 BLOCK = 2048  # bytes of one round
 REST_S = 0.05  # between two rounds at most
-AWAY_S, AWAY_BYTES, AWAY_BLOCK = 0.05, 1 << 22, 1 << 16  # what is thrown away at a time
-AWAY_PAUSE_S, FULL_BYTES = 0.002, 2048  # of a buffer of the system that was full, about
+# The bytes before a test are discarded within half a second, those of a flood in a moment.
+START_S, FLOOD_S, DISCARD_BYTES, DISCARD_BLOCK = 0.5, 0.05, 1 << 22, 1 << 16
+REFILL_S, FULL_BYTES = 0.002, 2048  # a USB adapter whose buffer was full sends the rest after a moment
 ANSWER_S = 1.0  # that an answer may take from its first byte to its last
 TARE_S = 0.3  # that a device may take to tare
 FORCED, UNDO = "force", "undo"
@@ -64,11 +65,11 @@ class SerialCell(Closing):
     ) -> None:
         self._settings, self._on_event, self._clock = settings, on_event, clock
         self._stop = threading.Event()
-        self._tare: str | None = None  # asked for: "", FORCED or UNDO
+        self._tare: str | None = None  # requested: "", FORCED or UNDO
         self._sleep = sleep or self._stop.wait
         self._busy = threading.Lock()
         self._parser = settings.parser
-        self._scaling = Scaling(settings, self._tell)
+        self._scaling = Scaling(settings, self._report)
         self._times, self._device, self._pace = (
             ArrivalTimes(settings.byte_time_s),
             DeviceClock(),
@@ -77,15 +78,15 @@ class SerialCell(Closing):
         self._last_t = -math.inf  # of the last sample
         self._last_read = math.nan
         self._watch, self._flood = (
-            LoadWatch(settings.timeout_s, self._tell, clock()),
-            Flood(self._tell, clock()),
+            LoadWatch(settings.timeout_s, self._report, clock()),
+            FloodGuard(self._report, clock()),
         )
-        self._next_poll, self._asked = clock(), math.nan  # when the answer that is awaited was asked for
+        self._next_poll, self._polled = clock(), math.nan  # when the poll was sent whose answer is awaited
         self._taring_until = -math.inf
         self._skipped = 0  # bytes, in floods
         self._waited = True  # for the bytes of the last round
-        means = Means(opener, clock, self._stop, self._sleep)
-        self._link = Link(settings.line, means, self._tell, lambda: self._watch.last_words(clock()))
+        context = LinkContext(opener, clock, self._stop, self._sleep)
+        self._link = Link(settings.line, context, self._report, lambda: self._watch.last_words(clock()))
         try:
             self._command("start")
             self._wait_for_first()
@@ -109,7 +110,7 @@ class SerialCell(Closing):
         if self._settings.wait_s > 0:
             what = f"{seen} lines came, none of them a reading of {self._settings.protocol.name}"
             text = f"no reading within {self._settings.wait_s:g} s: {what if seen else 'nothing came'}"
-            self._tell("warning", f"{text}; check protocol, baud and cable ('phasedic identify' listens)")
+            self._report("warning", f"{text}; check protocol, baud and cable ('phasedic identify' listens)")
 
     def _check(self, reading: Reading) -> None:
         try:
@@ -123,47 +124,47 @@ class SerialCell(Closing):
     def __enter__(self) -> Self:
         """What waited since the opening has no trustworthy time."""
         with self._busy:
-            self._throw_away()
-            self._begin_anew()
+            self._discard_waiting(START_S)
+            self._restart_stream()
             self._watch.restart(self._clock())
         return self
 
-    def _throw_away(self) -> int:
-        """Let go what waits, as far as it goes in a moment; the number of bytes."""
-        until, count, nothing = self._clock() + AWAY_S, 0, 0
-        while nothing < 2 and count < AWAY_BYTES and self._clock() < until and not self._stop.is_set():
-            data = self._link.receive(AWAY_BLOCK, wait=False)
-            count, nothing = count + len(data), 0 if data else nothing + 1
-            if nothing == 1 and count >= FULL_BYTES:  # it had 64 kB more behind, which take a moment to come
-                self._sleep(AWAY_PAUSE_S)
+    def _discard_waiting(self, seconds: float) -> int:
+        """Discard what waits, until the port was empty twice or time is up; the number of bytes."""
+        until, count, empty = self._clock() + seconds, 0, 0
+        while empty < 2 and count < DISCARD_BYTES and self._clock() < until and not self._stop.is_set():
+            data = self._link.receive(DISCARD_BLOCK, wait=False)
+            count, empty = count + len(data), 0 if data else empty + 1
+            if empty == 1 and count >= FULL_BYTES:
+                self._sleep(REFILL_S)
         if count:
             self._times.received(count, self._clock())
         self._parser.restart(count)
-        self._flood.skip(nothing > 0, self._clock())
+        self._flood.skip(empty > 0, self._clock())
         return count
 
-    def _begin_anew(self) -> None:
-        """Nothing is known of the stream that begins now."""
+    def _restart_stream(self) -> None:
+        """Forget the pace of the stream: another one begins."""
         self._pace.restart()
-        self._asked = self._last_read = math.nan
+        self._polled = self._last_read = math.nan
 
     def __iter__(self) -> Iterator[LoadSample]:
         while not self._stop.is_set():
             with self._busy:
                 samples = self._pass()
             yield from samples
-        self._tell_the_end()
+        self._report_end()
         self.close()
 
-    def _tell_the_end(self) -> None:
+    def _report_end(self) -> None:
         """How the device's own clock went, where it has one, and what was never looked at."""
         jitter = self._device.jitter_s
         if not math.isnan(jitter):
             drift = self._device.drift
             known = "" if math.isnan(drift) else f", drift {drift * 1e6:.0f} us/s against this machine"
-            self._tell("info", f"device clock: arrivals {jitter * 1e3:.1f} ms late on average (rms){known}")
+            self._report("info", f"device clock: arrivals {jitter * 1e3:.1f} ms late on average (rms){known}")
         if self._skipped:
-            self._tell(
+            self._report(
                 "warning", f"{self._skipped} bytes were skipped, since lines came faster than they are read"
             )
 
@@ -172,11 +173,11 @@ class SerialCell(Closing):
         if not self._link.connected and not self._reconnect():
             self._watch.look((), self._clock())
             return []
-        samples = self._tare_asked()
+        samples = self._tare_requested()
         readings = self._readings()
         samples += self._samples(readings)
         if self._flood.too_late(self._clock()):
-            self._skipped += self._throw_away()
+            self._skipped += self._discard_waiting(FLOOD_S)
             self._pace.restart()
             samples.append(self._hole())
         self._watch.look(samples, self._clock())
@@ -186,14 +187,14 @@ class SerialCell(Closing):
         if not self._link.again():
             return False
         self._parser.restart()
-        self._begin_anew()
+        self._restart_stream()
         self._flood.skip(True, self._clock())
         self._command("start")
         return self._link.connected
 
     def _readings(self) -> list[Reading]:
         """What one block completes; [] on silence or when the port is lost."""
-        if self._settings.mode == "poll" and math.isnan(self._asked):
+        if self._settings.mode == "poll" and math.isnan(self._polled):
             self._poll()
         self._rest()
         began = self._clock()
@@ -201,8 +202,8 @@ class SerialCell(Closing):
         self._last_read = self._clock()
         self._waited = self._last_read - began > 1e-3
         readings = self._feed(data)
-        if not data or self._last_read - self._asked > ANSWER_S:
-            self._asked = math.nan
+        if not data or self._last_read - self._polled > ANSWER_S:
+            self._polled = math.nan
             readings += self._parser.silence()
         return readings
 
@@ -211,7 +212,7 @@ class SerialCell(Closing):
             self._times.received(len(data), self._last_read)
         readings = self._parser.feed(data)
         self._flood.read(len(data) >= BLOCK, len(readings), self._last_read)
-        self._asked = math.nan if readings else self._asked
+        self._polled = math.nan if readings else self._polled
         return readings
 
     def _rest(self) -> None:
@@ -226,16 +227,18 @@ class SerialCell(Closing):
         if wait > 0:
             self._sleep(wait)
         self._command("poll")
-        period, self._asked = 1 / self._settings.rate, self._clock()
-        self._next_poll = max(self._next_poll, self._asked - period) + period
+        period, self._polled = 1 / self._settings.rate, self._clock()
+        self._next_poll = max(self._next_poll, self._polled - period) + period
 
     def _samples(self, readings: list[Reading]) -> list[LoadSample]:
         if not readings:
             return []
         times = [self._times.began(reading.start) for reading in readings]
         stamps = [(r.device_ms, t) for r, t in zip(readings, times, strict=True) if r.device_ms is not None]
-        self._device.begin(stamps)
-        if self._flood.late(self._last_read) or self._last_read < self._taring_until:
+        waited = self._flood.late
+        if not waited:  # messages of unknown age cannot tie the device's clock
+            self._device.begin(stamps)
+        if waited or self._last_read < self._taring_until:
             self._pace.restart()
             late = [True] * len(times)
         elif self._settings.mode == "poll":
@@ -245,11 +248,13 @@ class SerialCell(Closing):
         return [self._sample(*one) for one in zip(readings, times, late, strict=True)]
 
     def _sample(self, reading: Reading, t: float, late: bool) -> LoadSample:
-        if reading.device_ms is not None:
+        if reading.device_ms is not None and self._device.tied:
             stamp = self._device.stamp(reading.device_ms, t)
             t, late = stamp.t, stamp.doubtful
             if stamp.jumped:
-                self._tell("warning", "the device's own clock jumped (a restart?); its stamps are tied anew")
+                self._report(
+                    "warning", "the device's own clock jumped (a restart?); its stamps are tied anew"
+                )
         self._last_t = max(t, self._last_t)
         return self._scaling.sample(reading, self._last_t, LoadFlag.STALE if late else LoadFlag.NONE)
 
@@ -275,12 +280,12 @@ class SerialCell(Closing):
         """Let zero be where it was before the last tare; done by the reading thread."""
         self._tare = UNDO
 
-    def _tare_asked(self) -> list[LoadSample]:
-        """Move zero where somebody asked; no force may be interpolated across that."""
-        asked, self._tare = self._tare, None
-        if asked is None:
+    def _tare_requested(self) -> list[LoadSample]:
+        """Move zero on request; no force may be interpolated across that."""
+        request, self._tare = self._tare, None
+        if request is None:
             return []
-        moved = self._undo() if asked == UNDO else self._tare_now(asked == FORCED)
+        moved = self._undo() if request == UNDO else self._tare_now(request == FORCED)
         if moved:
             self._scaling.tared()
         return [self._hole()] if moved else []
@@ -289,7 +294,7 @@ class SerialCell(Closing):
         zero = self._scaling.zero
         why_not = zero.why_not(self._clock())
         if why_not and not force:
-            self._tell("warning", f"not tared: {why_not}; hold the load still, or force the tare")
+            self._report("warning", f"not tared: {why_not}; hold the load still, or force the tare")
             return False
         load, data = zero.load(), {"forced": bool(why_not), "undo": False}
         wanted = self._settings.tare
@@ -301,7 +306,7 @@ class SerialCell(Closing):
             self._event(EventKind.TARE, "info", text, offset_N=None, step_N=_known(step), **data)
             return True
         if math.isnan(load):
-            self._tell("warning", "nothing to tare: there was no valid sample yet")
+            self._report("warning", "nothing to tare: there was no valid sample yet")
             return False
         step = zero.take()
         text = f"tared: {load:.6g} N is zero now"
@@ -312,14 +317,14 @@ class SerialCell(Closing):
         zero = self._scaling.zero
         step = zero.undo()
         if step is None:
-            self._tell("warning", "there is no tare to undo")
+            self._report("warning", "there is no tare to undo")
             return False
         text = f"the last tare is undone: forces rise by {-step:.6g} N"
         data = {"offset_N": zero.offset, "step_N": step, "forced": False, "undo": True}
         self._event(EventKind.TARE, "info", text, **data)
         return True
 
-    def _tell(self, level: str, text: str) -> None:
+    def _report(self, level: str, text: str) -> None:
         self._event(EventKind.DEVICE, level, text)
 
     def _event(self, kind: EventKind, level: Any, text: str, **data: Any) -> None:

@@ -1,8 +1,9 @@
 """When a message began: from the time a read returned, the speed of the line, and the device's own clock.
 
 A read returns some time after the last of its bytes arrived; a byte before it came one byte time
-earlier. Where the device sends its own milliseconds they replace the arrival times, since they are
-free of the jitter of USB and of this machine; the least delayed arrivals tie them to the host's clock.
+earlier (``ArrivalTimes``). Where the device sends its own milliseconds they replace the arrival times, since they are
+free of the jitter of USB and of this machine; the least delayed arrivals tie them to the host's clock
+(``DeviceClock``). ``ArrivalRate`` finds messages that waited somewhere.
 """
 
 from __future__ import annotations
@@ -88,9 +89,14 @@ class DeviceClock:
         self._count, self._square = 0, 0.0
         self.jumps = 0
 
+    @property
+    def tied(self) -> bool:
+        """Whether its stamps can be converted to the host's clock."""
+        return not math.isnan(self._offset)
+
     def begin(self, messages: Sequence[tuple[float, float]]) -> None:
         """Tie to the least delayed of the first ``messages`` (ms, s): they may have waited together."""
-        if messages and math.isnan(self._offset):
+        if messages and not self.tied:
             offset, arrived = min((arrived - device_ms * 1e-3, arrived) for device_ms, arrived in messages)
             self._tie(offset, arrived)
 
@@ -111,7 +117,7 @@ class DeviceClock:
             self._offset, self._other_offset = min(risen, offset), math.nan
             if arrived - self._first_t < BEGIN_S:
                 self._first_offset = self._offset
-        elif not self._settled(offset, arrived):
+        elif not self._keeps_pace(offset, arrived):
             return DeviceTime(arrived, doubtful=True)
         else:
             self._tie(offset, arrived)
@@ -143,7 +149,7 @@ class DeviceClock:
             self._late_since = arrived
         return arrived - self._late_since < LATE_S
 
-    def _settled(self, offset: float, arrived: float) -> bool:
+    def _keeps_pace(self, offset: float, arrived: float) -> bool:
         """Whether the clock has kept a new pace for long enough."""
         if math.isnan(self._other_offset) or abs(offset - self._other_offset) > self._jump_s / 5:
             self._other_offset, self._other_since = offset, arrived
@@ -166,8 +172,8 @@ class ArrivalRate:
 
     A device sends at a pace of its own; the least delayed messages tie that pace to the host's clock, as
     ``DeviceClock`` does with milliseconds. What comes more than 50 ms, or one period, after its time has
-    waited somewhere. So have more messages than the device can have made. After a pause nobody
-    knows whether the device or the line has paused: messages are late until they have come at their pace for
+    waited somewhere. So have more messages than the device can have made. After a pause it is
+    unknown whether the device or the line has paused: messages are late until they have come at their pace for
     ``settle_s``. Where no pace is known (at first, or of a device that sends when it likes) all but the last
     message of a read are late.
 
@@ -217,7 +223,9 @@ class ArrivalRate:
             self._due, self._tie, self._last = times[0] - period, 0.0, times[-1]
         delays = self._delays(times, period)
         limit = max(self._late_s, period)
-        if self._doubtful(delays[-1], times[-1], limit) and not self._settled(delays[-1], times[-1], period):
+        if self._doubtful(delays[-1], times[-1], limit) and not self._keeps_pace(
+            delays[-1], times[-1], period
+        ):
             return [True] * len(times)
         self._other = math.nan
         return [delay - self._tie > limit for delay in delays]
@@ -251,7 +259,7 @@ class ArrivalRate:
         self._tie = min(self._tie + self.RISE * min(elapsed, limit), delay)
         return False
 
-    def _settled(self, delay: float, now: float, period: float) -> bool:
+    def _keeps_pace(self, delay: float, now: float, period: float) -> bool:
         """Whether messages have come at their pace, not faster, for long enough: it was the device that paused."""
         elapsed = now - self._other_since
         if math.isnan(self._other) or self._other - delay > self.FALL * elapsed + period:

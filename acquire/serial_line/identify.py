@@ -1,4 +1,4 @@
-"""Finding out what talks on a serial port: listening at the usual speeds, and asking only when told to.
+"""Finding out which protocol a serial port has: listening at the usual speeds, and asking only on request.
 
 Listening sends nothing. ``questions`` lists what asking would send, so that it can be shown first:
 an unknown machine may move.
@@ -22,9 +22,9 @@ from acquire.serial_line.ports import PORT_ERRORS, LineSettings, open_port
 
 SPEEDS = (9600, 115200, 57600, 19200, 2400, 4800, 38400, 1200)
 LISTEN_S = 1.5
-ENOUGH_LINES, ENOUGH_BYTES = 5, 1 << 16
+MIN_LINES, MAX_BYTES = 5, 1 << 16
 # What sends unasked, the strictest grammar first; ascii with columns where the plain one leaves a choice.
-HEARD = (
+UNASKED = (
     ("mt-sics", ""),
     ("aed-standard", ""),
     ("ascii", ""),
@@ -54,9 +54,9 @@ class Finding:
     score : float
         Part of the lines that are readings in this protocol.
     lines : tuple of bytes
-        Some of what was heard.
+        Some of what was received.
     remark : str
-        What still has to be said or checked.
+        What the address still lacks, or what to check.
     """
 
     address: str
@@ -75,7 +75,7 @@ class Question:
     data: bytes
 
 
-def hear(
+def record_bytes(
     line: LineSettings, seconds: float = LISTEN_S, opener: Opener = open_port, clock: Clock = time.monotonic
 ) -> bytes:
     """What comes on a port by itself within so many seconds.
@@ -95,10 +95,10 @@ def hear(
 
 
 def _collect(port: Port, seconds: float, clock: Clock) -> bytes:
-    until, heard = clock() + seconds, bytearray()
-    while clock() < until and len(heard) < ENOUGH_BYTES:
-        heard += port.receive(4096)
-    return bytes(heard)
+    until, received = clock() + seconds, bytearray()
+    while clock() < until and len(received) < MAX_BYTES:
+        received += port.receive(4096)
+    return bytes(received)
 
 
 def listen(
@@ -108,39 +108,39 @@ def listen(
 
     Yields
     ------
-    speed, what was heard, and the finding (None where it makes no sense)
+    speed, what was received, and the finding (None where it makes no sense)
     """
     for baud in SPEEDS:
-        heard = hear(LineSettings(device, baud), seconds, opener, clock)
-        finding = guess(device, baud, heard, seconds)
-        yield baud, heard, finding
+        received = record_bytes(LineSettings(device, baud), seconds, opener, clock)
+        finding = guess(device, baud, received, seconds)
+        yield baud, received, finding
         if finding is not None:
             return
 
 
-def guess(device: str, baud: int, heard: bytes, seconds: float = LISTEN_S) -> Finding | None:
-    """The protocol that understands most of what was heard in so many seconds; None where none does."""
-    parity = _parity(heard)
-    text = bytes(byte & 0x7F for byte in heard) if parity != "N" else heard
+def guess(device: str, baud: int, received: bytes, seconds: float = LISTEN_S) -> Finding | None:
+    """The protocol that understands most of what was received in so many seconds; None where none does."""
+    parity = _parity(received)
+    text = bytes(byte & 0x7F for byte in received) if parity != "N" else received
     line = LineSettings(device, baud, 7 if parity != "N" else 8, parity)
-    found = [_try(line, name, settings, text, seconds) for name, settings in HEARD]
+    found = [_try(line, name, settings, text, seconds) for name, settings in UNASKED]
     sure = [finding for finding in found if finding is not None and finding.score >= SURE]
     return max(sure, key=lambda finding: finding.score) if sure else None
 
 
-def _parity(heard: bytes) -> str:
+def _parity(received: bytes) -> str:
     """The parity of seven-bit characters that were received as eight bits."""
-    if not heard or max(heard) < 0x80:
+    if not received or max(received) < 0x80:
         return "N"
-    ones = {byte.bit_count() % 2 for byte in heard}
+    ones = {byte.bit_count() % 2 for byte in received}
     return {frozenset({0}): "E", frozenset({1}): "O"}.get(frozenset(ones), "N")
 
 
-def _try(line: LineSettings, name: str, settings: str, heard: bytes, seconds: float) -> Finding | None:
+def _try(line: LineSettings, name: str, settings: str, received: bytes, seconds: float) -> Finding | None:
     protocol = find_protocol(name)
     parser = _parser(protocol, line.url, settings)
-    readings = parser.feed(heard) + parser.silence()
-    if len(readings) < ENOUGH_LINES or ("millis" in settings and not _is_a_clock(readings, seconds)):
+    readings = parser.feed(received) + parser.silence()
+    if len(readings) < MIN_LINES or ("millis" in settings and not _is_a_clock(readings, seconds)):
         return None
     parts = [f"protocol={name}", f"baud={line.baud}", f"bytesize={line.bytesize}", f"parity={line.parity}"]
     more = [settings] if settings and name != "hbm-aed" else []
@@ -157,14 +157,14 @@ def _try(line: LineSettings, name: str, settings: str, heard: bytes, seconds: fl
 def _is_a_clock(readings: list[Reading], seconds: float) -> bool:
     """Whether what would be milliseconds never goes back, and runs about as long as was listened."""
     times = [reading.device_ms for reading in readings if reading.device_ms is not None]
-    if len(times) < ENOUGH_LINES or any(later < earlier for earlier, later in pairwise(times)):
+    if len(times) < MIN_LINES or any(later < earlier for earlier, later in pairwise(times)):
         return False
     span_s = (times[-1] - times[0]) * 1e-3
     return 0.2 * seconds < span_s < 2 * seconds
 
 
 def _reads(good: list[Reading]) -> str:
-    """What the last line says, for a person to compare with the display."""
+    """How the last line is read, for a person to compare with the display."""
     if not good:
         return ""
     shown = good[-1].raw.decode("ascii", "backslashreplace").strip()
@@ -211,21 +211,21 @@ def ask(question: Question, opener: Opener = open_port, clock: Clock = time.mono
     """
     port = opener(question.line)
     try:
-        _collect(port, 0.3, clock)  # what it says unasked is no answer
+        _collect(port, 0.3, clock)  # what it sends unasked is no answer
         port.write(question.data)
-        heard = _collect(port, 0.7, clock)
+        received = _collect(port, 0.7, clock)
     except PORT_ERRORS as error:
         raise DeviceError(f"{question.line.url}: lost while asking ({error}); check the cable") from error
     finally:
         port.close()
-    return _answer(question, heard)
+    return _answer(question, received)
 
 
-def _answer(question: Question, heard: bytes) -> Finding | None:
+def _answer(question: Question, received: bytes) -> Finding | None:
     protocol, line = find_protocol(question.protocol), question.line
     parser = _parser(protocol, line.url, ASKED_SETTINGS.get(question.protocol, ""))
     parser.feed(b"\r\n" if protocol.silence_s >= 0.1 else b"")
-    readings = [r for r in parser.feed(heard) + parser.silence() if _understood(r)]
+    readings = [r for r in parser.feed(received) + parser.silence() if _understood(r)]
     if not readings:
         return None
     settings = ASKED_SETTINGS.get(question.protocol, "")

@@ -1,10 +1,8 @@
-"""The way to the port: opened, lost and found again, without ever holding anybody up.
+"""The connection to a serial port: opened, lost and opened again, without ever delaying the reader.
 
-Opening and closing a port may take as long as a network or a driver likes; both are done by threads of
-their own, which are left alone when they take too long. A peer that hangs up at once is tried ever more
-seldom, and told of once.
-
-Watching a stream: silence, its end, lines that are no readings, and more than can be read, each told once.
+Opening and closing a port may take as long as a network or a driver likes. Threads of their own do both, and are
+abandoned when they take too long. A peer that hangs up at once is tried more and more seldom, and reported once.
+``LoadWatch`` reports silence, its end, and lines that are no readings; ``FloodGuard`` more lines than can be read.
 """
 
 from __future__ import annotations
@@ -26,11 +24,11 @@ log = logging.getLogger(__name__)
 OPEN_S = 10.0  # that the first opening may take
 RETRY_S, SELDOM_S = 0.5, 8.0
 STEADY_S = 5.0  # a connection that lasts so long is one
-PATIENCE_S = 0.1  # of one look
+STEP_S = 0.1  # of one look
 CLOSE_S = 0.5
 
 Opener = Callable[[LineSettings], Port]
-Tell = Callable[[str, str], None]  # level, sentence
+Report = Callable[[str, str], None]  # level, sentence
 
 
 class Opening:
@@ -99,7 +97,7 @@ def close_port(port: Port | None) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Means:
+class LinkContext:
     """What time and ports are made of; tests bring their own.
 
     Attributes
@@ -123,10 +121,10 @@ class Link:
     Parameters
     ----------
     line : LineSettings
-    means : Means
-    tell : callable taking level and text
+    context : LinkContext
+    report : callable taking level and text
     last_words : callable
-        What to say of the last sample when the port is lost.
+        Words about the last sample when the port is lost.
 
     Attributes
     ----------
@@ -140,12 +138,16 @@ class Link:
     """
 
     def __init__(
-        self, line: LineSettings, means: Means, tell: Tell, last_words: Callable[[], str] = lambda: ""
+        self,
+        line: LineSettings,
+        context: LinkContext,
+        report: Report,
+        last_words: Callable[[], str] = lambda: "",
     ) -> None:
-        self._line, self._tell, self._last_words = line, tell, last_words
-        self._opener, self._clock = means.opener, means.clock
-        self._sleep, self._stopped = means.sleep, means.stopped
-        first = Opening(means.opener, lambda: line)
+        self._line, self._report, self._last_words = line, report, last_words
+        self._opener, self._clock = context.opener, context.clock
+        self._sleep, self._stopped = context.sleep, context.stopped
+        first = Opening(context.opener, lambda: line)
         if not first.done(OPEN_S):
             first.abandon()
             raise DeviceError(
@@ -155,9 +157,9 @@ class Link:
         self._opening: Opening | None = None
         self.identity = "" if "://" in line.url else identity_of(line.url)
         self._url = line.url
-        self._since, self._next_try = means.clock(), 0.0
+        self._since, self._next_try = context.clock(), 0.0
         self._short = 0  # connections in a row that did not last
-        self._missed = False  # told that it is lost, and not yet that it is back
+        self._missed = False  # reported as lost, and not yet as back
 
     @property
     def connected(self) -> bool:
@@ -180,7 +182,7 @@ class Link:
     def _heard_again(self) -> None:
         if self._short < 2 or self._clock() - self._since >= STEADY_S:
             self._missed = False
-            self._tell(
+            self._report(
                 "info", "connected again" + ("" if self._url == self._line.url else f" as {self._url}")
             )
 
@@ -206,12 +208,14 @@ class Link:
         delay = min(RETRY_S * 2 ** (self._short - 1), SELDOM_S)
         self._next_try = now + delay
         if self._short == 1:
-            self._tell("error", f"lost ({error}); {self._last_words()}; trying to reach it again")
+            self._report("error", f"lost ({error}); {self._last_words()}; trying to reach it again")
         elif self._short == 2:
             text = (
                 f"lost again at once ({error}): something on the other side hangs up; it is tried again ever"
             )
-            self._tell("error", f"{text} more seldom (up to every {SELDOM_S:g} s), and told of when it stays")
+            self._report(
+                "error", f"{text} more seldom (up to every {SELDOM_S:g} s), and told of when it stays"
+            )
         self._missed = True
 
     def again(self) -> bool:
@@ -219,10 +223,10 @@ class Link:
         if self._opening is None:
             left = self._next_try - self._clock()
             if left > 0:
-                self._sleep(min(left, PATIENCE_S))
+                self._sleep(min(left, STEP_S))
                 return False
             self._opening = Opening(self._opener, self._where)
-        if not self._opening.done(PATIENCE_S):
+        if not self._opening.done(STEP_S):
             return False
         opening, self._opening = self._opening, None
         try:
@@ -255,29 +259,29 @@ class Link:
         close_port(port)
 
 
-BAD_LINES_TOLD = 10  # in a row
+MAX_BAD_LINES = 10  # in a row
 LATE_S = 0.05
 SKIP_S = 0.25  # that a port may stay full before what waits in it is skipped
-AGAIN_S = 10.0  # without a flood until it is told anew
+AGAIN_S = 10.0  # without a flood until it is reported anew
 
 
 class LoadWatch:
-    """What a person is told of a stream.
+    """Silence and bad lines of a stream, each reported once.
 
     Parameters
     ----------
     timeout_s : float, s
-        Silence that is told.
-    tell : callable taking level and text
+        Silence that is reported.
+    report : callable taking level and text
     now : float, s
         When the watch begins.
     """
 
-    def __init__(self, timeout_s: float, tell: Tell, now: float) -> None:
-        self._timeout_s, self._tell = timeout_s, tell
+    def __init__(self, timeout_s: float, report: Report, now: float) -> None:
+        self._timeout_s, self._report = timeout_s, report
         self._since = now
         self._last_good: LoadSample | None = None
-        self._silent = self._bad_told = False
+        self._silent = self._bad_reported = False
         self._bad = 0
 
     def restart(self, now: float) -> None:
@@ -290,22 +294,22 @@ class LoadWatch:
         if samples:
             self._count_bad(samples, bool(good))
         if good:
-            self._last_good, self._since, self._bad_told = good[-1], now, False
+            self._last_good, self._since, self._bad_reported = good[-1], now, False
             if self._silent:
-                self._tell("info", "readings come again")
+                self._report("info", "readings come again")
             self._silent = False
         elif not self._silent and now - self._since > self._timeout_s:
             self._silent = True
-            self._tell("warning", f"no reading for {self._timeout_s:g} s; {self.last_words(now)}")
+            self._report("warning", f"no reading for {self._timeout_s:g} s; {self.last_words(now)}")
 
     def _count_bad(self, samples: Sequence[LoadSample], any_good: bool) -> None:
         self._bad = 0 if any_good else self._bad + sum(LoadFlag.ERROR in s.flags for s in samples)
-        if self._bad < BAD_LINES_TOLD or self._bad_told:
+        if self._bad < MAX_BAD_LINES or self._bad_reported:
             return
-        self._bad_told = True
+        self._bad_reported = True
         shown = samples[-1].raw[:60].decode("ascii", "backslashreplace")
-        told = f"{self._bad} lines in a row give no reading, the last one {shown!r}"
-        self._tell("warning", f"{told}; check protocol, baud, column and decimal")
+        text = f"{self._bad} lines in a row give no reading, the last one {shown!r}"
+        self._report("warning", f"{text}; check protocol, baud, column and decimal")
 
     def last_words(self, now: float) -> str:
         """Of the last good sample: its force and age."""
@@ -315,45 +319,49 @@ class LoadWatch:
         return f"last good sample {good.force:.6g} N, {now - good.t:.1f} s ago"
 
 
-class Flood:
-    """Knows when the port was last found empty.
+class FloodGuard:
+    """When the port was last empty, and whether what it gave may have waited.
 
     Parameters
     ----------
-    tell : callable taking level and text
+    report : callable taking level and text
     now : float, s
     """
 
-    def __init__(self, tell: Tell, now: float) -> None:
-        self._tell = tell
-        self._emptied, self._begun, self._told = now, math.inf, -math.inf  # begun: the first full read
+    def __init__(self, report: Report, now: float) -> None:
+        self._report = report
+        self._emptied, self._begun, self._reported = now, math.inf, -math.inf  # begun: the first full read
+        self._more = self._late = False
         self._lines = 0
 
     def read(self, full: bool, lines: int, now: float) -> None:
         """A read returned; ``full`` when more may wait behind what it brought."""
+        self._late = (full or self._more) and now - self._emptied > LATE_S
+        self._more = full
         if not full:
             self._emptied, self._begun = now, math.inf
         elif self._begun == math.inf:
             self._begun, self._lines = now, 0
         self._lines += lines
 
-    def late(self, now: float) -> bool:
-        """Whether what was just read may have waited for longer than anybody should."""
-        return now - self._emptied > LATE_S
+    @property
+    def late(self) -> bool:
+        """Whether what was just read may have waited for more than ``LATE_S``."""
+        return self._late
 
     def too_late(self, now: float) -> bool:
-        """Whether what still waits should be skipped; tells of it."""
+        """Whether what still waits should be skipped; reports it."""
         if now - self._begun <= SKIP_S:
             return False
-        if now - self._told > AGAIN_S:
+        if now - self._reported > AGAIN_S:
             rate = self._lines / (now - self._begun)
             text = f"lines come faster than they are read ({rate:.0f}/s); what waits is skipped and flagged STALE:"
-            self._tell("warning", f"{text} have the device send fewer")
-        self._told = now
+            self._report("warning", f"{text} have the device send fewer")
+        self._reported = now
         return True
 
     def skip(self, empty: bool, now: float) -> None:
-        """What waited was thrown away; ``empty`` when nothing was left."""
-        self._begun = math.inf
+        """What waited was discarded; ``empty`` when nothing was left."""
+        self._begun, self._more = math.inf, not empty
         if empty:
             self._emptied = now

@@ -1,7 +1,4 @@
-"""From what stood on the line to newtons: units, sign, tare, capacity, plausibility.
-
-Where zero is: the tare, what it needs, and its undoing.
-"""
+"""From what stood on the line to newtons: units, sign, capacity, plausibility, and the tare (``TareZero``)."""
 
 from __future__ import annotations
 
@@ -18,7 +15,7 @@ from acquire.protocols.base import Reading
 from acquire.protocols.units import newtons_per
 from acquire.serial_line.settings import SerialSettings
 
-WINDOW_S, LONGEST_S = 0.5, 3.0  # of the samples that a tare looks at; of a slow device
+WINDOW_S, MAX_WINDOW_S = 0.5, 3.0  # of the samples that a tare looks at; of a slow device
 KEPT = 4096  # samples
 UNDONE = 16  # tares that can be undone
 
@@ -41,7 +38,7 @@ class TareZero:
         self._seen: deque[Seen] = deque(maxlen=KEPT)
 
     def saw(self, t: float, gross: float, unfit: str = "") -> None:
-        """A sample of ``t``; ``unfit`` says why a tare must not rest on it."""
+        """A sample of ``t``; ``unfit``: why a tare must not rest on it."""
         self._seen.append((t, gross, unfit))
 
     def why_not(self, now: float) -> str:
@@ -65,7 +62,7 @@ class TareZero:
         """Half a second; of a slow device as long as a few samples take."""
         last = [t for t, *_ in itertools.islice(reversed(self._seen), 8)]
         steps = [later - earlier for later, earlier in itertools.pairwise(last)]
-        return min(max(WINDOW_S, 3.5 * statistics.median(steps)), LONGEST_S) if steps else WINDOW_S
+        return min(max(WINDOW_S, 3.5 * statistics.median(steps)), MAX_WINDOW_S) if steps else WINDOW_S
 
     def _judge(self, seen: list[Seen]) -> LoadStillness:
         return stillness([t for t, *_ in seen], [gross for _, gross, _ in seen], self.step_N)
@@ -111,16 +108,16 @@ class TareZero:
 
 BEYOND = LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD
 
-Tell = Callable[[str, str], None]  # level, sentence
+Report = Callable[[str, str], None]  # level, sentence
 
 
 class Scaling:
-    """Makes samples of readings and tells what is wrong with them, once each time it begins.
+    """Makes samples of readings and reports what is wrong with them, once each time it begins.
 
     Parameters
     ----------
     settings : SerialSettings
-    tell : callable taking level and text
+    report : callable taking level and text
 
     Attributes
     ----------
@@ -128,8 +125,8 @@ class Scaling:
         What is taken off every force.
     """
 
-    def __init__(self, settings: SerialSettings, tell: Tell) -> None:
-        self._settings, self._tell = settings, tell
+    def __init__(self, settings: SerialSettings, report: Report) -> None:
+        self._settings, self._report = settings, report
         self._units: dict[str, float | None] = {}
         self._last_unit: str | None = None
         self.zero = TareZero()
@@ -185,13 +182,15 @@ class Scaling:
             self.zero.saw(t, force + self.zero.offset, unfit)
 
     def _newtons(self, unit: str) -> float | None:
-        """Newtons per unit of the line; None, and told once, where it cannot be known."""
+        """Newtons per unit of the line; None, and reported once, where it is unknown."""
         if self._settings.gain is not None:
             return self._settings.gain
         if unit not in self._units:
             self._units[unit] = self._learn(unit)
         if self._last_unit not in (None, unit):
-            self._tell("warning", f"the unit on the line changed from {self._last_unit} to {unit or 'none'}")
+            self._report(
+                "warning", f"the unit on the line changed from {self._last_unit} to {unit or 'none'}"
+            )
         self._last_unit = unit
         return self._units[unit]
 
@@ -199,7 +198,7 @@ class Scaling:
         try:
             return self.check_unit(unit)
         except ConfigError as error:
-            self._tell("error", f"no force from now on: {error}")
+            self._report("error", f"no force from now on: {error}")
             return None
 
     def check_unit(self, unit: str) -> float:
@@ -220,9 +219,9 @@ class Scaling:
         alarm = bool(flags & (BEYOND | LoadFlag.OUT_OF_RANGE))
         if alarm and not self._alarm:
             words = ", ".join(str(flag.name).lower().replace("_", " ") for flag in flags)
-            self._tell("error", f"load alarm: {words}; {_last(self._last_force)}")
+            self._report("error", f"load alarm: {words}; {_last(self._last_force)}")
         elif self._alarm and not alarm and not math.isnan(force):
-            self._tell("info", "the load is within its range again")
+            self._report("info", "the load is within its range again")
         if alarm or not math.isnan(force):
             self._alarm = alarm
 

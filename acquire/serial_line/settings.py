@@ -17,7 +17,7 @@ from acquire.serial_line.ports import LineSettings
 
 @dataclass(frozen=True, slots=True)
 class SerialSettings:
-    """Everything an address says.
+    """All settings of an address.
 
     Attributes
     ----------
@@ -35,11 +35,11 @@ class SerialSettings:
     zero : float
         Subtracted from the line's value before anything else.
     calibration : Calibration or None
-        Where gain and zero come from, unless the address says them.
+        Where gain and zero come from, unless the address has them.
     capacity_N, max_step_N : float or None, N
     mass_reads_force : bool
     timeout_s : float, s
-        Silence that is told.
+        Silence that is reported.
     wait_s : float, s
         How long opening waits for a first reading.
     rate : float, 1/s

@@ -2,9 +2,7 @@
 
 The file is HDF5 in NeXus conventions (docs/session-format.md describes it for other programs).
 All groups, datasets and attributes exist before the first frame, since a file in SWMR mode
-can only grow.
-
-What a session says once, at its start: devices, time zero, configuration, and what is recorded.
+can only grow. ``SessionInfo`` is what a session has once: devices, time zero, configuration, what is recorded.
 """
 
 from __future__ import annotations
@@ -23,11 +21,11 @@ from numpy.typing import NDArray
 from acquire.clock import ClockPair
 from acquire.events import Event
 from acquire.frame import CameraInfo, Clock
-from acquire.hdf5 import NO_UNIT, Declared, new_group, new_json, say, to_json
+from acquire.hdf5 import NO_UNIT, Declared, new_group, new_json, set_attributes, to_json
 from acquire.load_sample import LoadCellInfo, LoadFlag
 from acquire.record_mode import RecordMode
 
-MOST_BURST_FRAMES = 65536
+MAX_BURST_FRAMES = 65536
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +54,7 @@ class SessionInfo:
     metadata: Mapping[str, Any]
     versions: Mapping[str, Any]
     mode: RecordMode = dataclasses.field(default_factory=RecordMode)
-    burst_frames: int = MOST_BURST_FRAMES
+    burst_frames: int = MAX_BURST_FRAMES
     set_id: str = ""
     part: int = 0
 
@@ -89,9 +87,9 @@ ROWS = 512  # of a chunk of a one-dimensional dataset
 _FIRST = ["0", ".", "."]
 """``default_slice`` of pictures: viewers begin with the first."""
 
-FURTHEST_S = 1e12  # no clock has gone so far
-MOST_FORCE_N = 1e12
-MOST_PIXELS = 1 << 28
+MAX_TIME_S = 1e12  # no clock has gone so far
+MAX_FORCE_N = 1e12
+MAX_PIXELS = 1 << 28
 
 
 class Column(NamedTuple):
@@ -110,7 +108,7 @@ class Column(NamedTuple):
 
 
 def _time(meaning: str) -> Column:
-    return Column("f8", np.nan, "s", meaning, -FURTHEST_S, FURTHEST_S)
+    return Column("f8", np.nan, "s", meaning, -MAX_TIME_S, MAX_TIME_S)
 
 
 def _count(meaning: str, high: float = math.inf, low: int = 0) -> Column:
@@ -140,8 +138,8 @@ LOAD_COLUMNS: Columns = {
         np.nan,
         "N",
         "tension positive; NaN where the line gave no valid value",
-        -MOST_FORCE_N,
-        MOST_FORCE_N,
+        -MAX_FORCE_N,
+        MAX_FORCE_N,
     ),
     "flags": _count("bits: see flag_names", sum(flag.value for flag in LoadFlag)),
     "stable": Column("i1", -1, NO_UNIT, "1 yes, 0 no, -1 not said", -1, 1),
@@ -152,7 +150,7 @@ LOAD_COLUMNS: Columns = {
 BURST_COLUMNS: Columns = {
     "time_s": _time("mean time of the frames, since the start of the session"),
     "monotonic_s": _time("the same on the machine's monotonic clock"),
-    "n": _count("frames summed", MOST_BURST_FRAMES, 1),
+    "n": _count("frames summed", MAX_BURST_FRAMES, 1),
     "noise": Column("f8", np.nan, "GL", "temporal standard deviation of one frame", 0, 65535),
     "duration": _time("time from the first frame to the last"),
     "first_index": _sequence("sequence number of the first frame"),
@@ -177,7 +175,7 @@ def new_columns(group: h5py.Group, columns: Columns, checksum: bool) -> None:
         dataset = group.create_dataset(
             name, (0,), c.dtype, maxshape=(None,), chunks=(ROWS,), fillvalue=c.missing, fletcher32=checksum
         )
-        say(dataset, units=c.unit, long_name=c.meaning)
+        set_attributes(dataset, units=c.unit, long_name=c.meaning)
 
 
 def new_images(group: h5py.Group, name: str, shape: tuple[int, ...], dtype: Any, checksum: bool) -> None:
@@ -185,7 +183,7 @@ def new_images(group: h5py.Group, name: str, shape: tuple[int, ...], dtype: Any,
     dataset = group.create_dataset(
         name, (0, *shape), dtype, maxshape=(None, *shape), chunks=(1, *shape), fletcher32=checksum
     )
-    say(dataset, units="GL")
+    set_attributes(dataset, units="GL")
 
 
 def describe_camera(info: CameraInfo) -> dict[str, Any]:
@@ -204,13 +202,15 @@ def describe_load(info: LoadCellInfo | None) -> dict[str, Any] | None:
 
 def create(file: h5py.File, about: SessionInfo, checksum: bool) -> None:
     """Everything that will ever stand in the file, empty."""
-    say(file, NX_class="NXroot", default="entry", format=FORMAT, format_version=FORMAT_VERSION)
-    say(file, set_id=about.set_id or NO_SET, part=about.part)
+    set_attributes(file, NX_class="NXroot", default="entry", format=FORMAT, format_version=FORMAT_VERSION)
+    set_attributes(file, set_id=about.set_id or NO_SET, part=about.part)
     shown = "bursts" if about.mode.kind == "bursts" else "frames"
     entry = new_group(file, "entry", "NXentry", default=shown)
-    say(entry, record=about.mode.text(), crop=np.array(about.mode.crop or NO_CROP, np.int64))
-    say(entry.create_dataset("start_time", data=np.bytes_(about.start.iso())), units="ISO 8601 UTC")
-    say(entry.create_dataset("start_monotonic_s", data=about.start.monotonic), units="s")
+    set_attributes(entry, record=about.mode.text(), crop=np.array(about.mode.crop or NO_CROP, np.int64))
+    set_attributes(
+        entry.create_dataset("start_time", data=np.bytes_(about.start.iso())), units="ISO 8601 UTC"
+    )
+    set_attributes(entry.create_dataset("start_monotonic_s", data=about.start.monotonic), units="s")
     for name in ("config", "metadata", "versions"):
         new_json(entry, name, getattr(about, name))
     instrument = new_group(entry, "instrument", "NXinstrument")
@@ -224,59 +224,59 @@ def create(file: h5py.File, about: SessionInfo, checksum: bool) -> None:
         "events", (0,), f"S{EVENT_BYTES}", maxshape=(None,), chunks=(16,), fletcher32=checksum
     )
     entry.create_dataset("ledger", (1,), f"S{LEDGER_BYTES}")
-    say(entry["events"], units=NO_UNIT)
-    say(entry["ledger"], units=NO_UNIT)
+    set_attributes(entry["events"], units=NO_UNIT)
+    set_attributes(entry["ledger"], units=NO_UNIT)
 
 
 def _add_title(group: h5py.Group, words: str) -> None:
     """As a dataset of fixed length and UTF-8: viewers show what is marked as ASCII as bytes."""
     data = np.array(words.encode(), h5py.string_dtype("utf-8", len(words)))
-    say(group.create_dataset("title", data=data), units=NO_UNIT)
+    set_attributes(group.create_dataset("title", data=data), units=NO_UNIT)
 
 
 def _create_frames(entry: h5py.Group, camera: CameraInfo, checksum: bool) -> None:
     axes = ["time_s", ".", "."]
     frames = new_group(entry, "frames", "NXdata", signal="image", axes=axes, time_s_indices=0)
-    say(frames, default_slice=_FIRST)
+    set_attributes(frames, default_slice=_FIRST)
     _add_title(frames, "Frames as they were grabbed")
     new_columns(frames, FRAME_COLUMNS, checksum)
     new_images(frames, "image", (camera.height, camera.width), image_dtype(camera.bits), checksum)
-    say(frames["image"], bits=camera.bits)
+    set_attributes(frames["image"], bits=camera.bits)
 
 
 def _create_bursts(entry: h5py.Group, camera: CameraInfo, frames: int, checksum: bool) -> None:
     axes = ["time_s", ".", "."]
     bursts = new_group(entry, "bursts", "NXdata", signal="sum", axes=axes, time_s_indices=0)
-    say(bursts, default_slice=_FIRST)
+    set_attributes(bursts, default_slice=_FIRST)
     _add_title(bursts, "Sums of bursts")
     new_columns(bursts, BURST_COLUMNS, checksum)
     size = (camera.height, camera.width)
     dtype = np.uint16 if (2**camera.bits - 1) * frames < 2**16 else np.uint32
     new_images(bursts, "sum", size, dtype, checksum)
-    say(bursts["sum"], long_name="sum of the n frames; the mean is sum / n")
+    set_attributes(bursts["sum"], long_name="sum of the n frames; the mean is sum / n")
     packed = (camera.height * camera.width + 7) // 8
     clipped = bursts.create_dataset(
         "clipped", (0, packed), "u1", maxshape=(None, packed), chunks=(1, packed), compression="gzip",
         compression_opts=1, fletcher32=checksum,
     )  # fmt: skip
     meaning = "pixels at saturation in any frame: one bit each, rows end to end, high bit first"
-    say(clipped, units=NO_UNIT, long_name=meaning)
+    set_attributes(clipped, units=NO_UNIT, long_name=meaning)
 
 
 def _create_load(entry: h5py.Group, checksum: bool) -> None:
     load = new_group(entry, "load", "NXdata", signal="force", axes=["time_s"], time_s_indices=0)
     _add_title(load, "Force")
     new_columns(load, LOAD_COLUMNS, checksum)
-    say(load["flags"], flag_names=json.dumps({flag.name: flag.value for flag in LoadFlag}))
+    set_attributes(load["flags"], flag_names=json.dumps({flag.name: flag.value for flag in LoadFlag}))
     lines = load.create_dataset("lines", (0,), "u1", maxshape=(None,), chunks=(8192,), fletcher32=checksum)
     meaning = "the bytes of the lines, one after the other, each ended by a line feed"
-    say(lines, units=NO_UNIT, long_name=meaning)
+    set_attributes(lines, units=NO_UNIT, long_name=meaning)
 
 
 def event_rows(event: Event, start: float) -> NDArray[np.bytes_]:
     """An event as rows of the events dataset: (n,) of EVENT_BYTES each."""
-    said = {"kind": event.kind.value, "level": event.level, "source": event.source, "text": event.text}
-    stamped = {"time_s": event.t - start, "monotonic_s": event.t, **said, "data": event.data}
+    texts = {"kind": event.kind.value, "level": event.level, "source": event.source, "text": event.text}
+    stamped = {"time_s": event.t - start, "monotonic_s": event.t, **texts, "data": event.data}
     text = to_json(stamped).encode("ascii")
     rows = [text[:EVENT_BYTES]]
     step = EVENT_BYTES - len(CONTINUED)

@@ -1,7 +1,7 @@
 """Opening one session file for reading, whatever state it was left in.
 
 A file whose writer was killed, or is still writing, opens only in SWMR mode; that is tried
-by itself and said. Foreign, newer and truncated files are refused in words.
+automatically and reported. Foreign, newer and truncated files are refused in words.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.hdf5 import (
     Declared,
     PictureReader,
+    as_text,
     check_links,
     check_size,
     open_dataset,
@@ -33,7 +34,6 @@ from acquire.hdf5 import (
     read_scalar,
     read_superblock,
     stored_rows,
-    word,
 )
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.record_mode import RecordMode
@@ -110,12 +110,12 @@ class SessionPart(Closing):
         self.camera: CameraInfo = stored.camera_from(camera, f"{self.path}: the camera")
         self.load_cell: LoadCellInfo | None = stored.load_from(cell, f"{self.path}: the load cell")
         self.mode = _mode({name: read_attribute(entry, name, what) for name, what in stored.ENTRY.items()})
-        set_id = word(root["set_id"])
+        set_id = as_text(root["set_id"])
         self.set_id, self.part = "" if set_id == layout.NO_SET else set_id, int(root["part"])
         utc, monotonic = (
             read_scalar(item, stored.START[name]) for name, item in open_datasets(entry, stored.START).items()
         )
-        self.start = ClockPair.from_iso(float(monotonic), word(utc))
+        self.start = ClockPair.from_iso(float(monotonic), as_text(utc))
         self._groups = {name: open_group(entry, name) for name in ("frames", "bursts", "load", "clock")}
         self.refresh()
 
@@ -163,7 +163,7 @@ class SessionPart(Closing):
         try:
             return self._samples().troubles
         except (*DAMAGE, DataError):
-            return ()  # whoever asks for the samples is told
+            return ()  # load_samples() raises
 
     def _samples(self) -> Rows:
         return read_rows(self._groups["load"], layout.LOAD_COLUMNS, whole=self._whole)
@@ -312,7 +312,10 @@ def _open_file(path: Path, probed: bool) -> tuple[h5py.File, str | None]:
 
 
 def _check_format(path: Path, file: h5py.File) -> None:
-    if not h5py.h5a.exists(file.id, b"format") or word(read_attribute(file, "format", TEXT)) != layout.FORMAT:
+    if (
+        not h5py.h5a.exists(file.id, b"format")
+        or as_text(read_attribute(file, "format", TEXT)) != layout.FORMAT
+    ):
         raise DataError(f"{path} is an HDF5 file, but not a session of this program")
     version = int(read_attribute(file, "format_version", stored.ROOT["format_version"]))
     if version > layout.FORMAT_VERSION:
@@ -324,4 +327,4 @@ def _check_format(path: Path, file: h5py.File) -> None:
 
 def _mode(attributes: Mapping[str, Any]) -> RecordMode:
     x, y, width, height = (int(value) for value in attributes["crop"])
-    return RecordMode.parse(word(attributes["record"]), (x, y, width, height) if width else None)
+    return RecordMode.parse(as_text(attributes["record"]), (x, y, width, height) if width else None)

@@ -1,12 +1,9 @@
-"""Reading a recorded test: what was grabbed, what the load cell said, what happened, what was set.
+"""Reading a recorded test, and the set of files of a long one.
 
-The file is described for other programs in docs/session-format.md. Results of measurements are
-never stored here: they are another file that can be made again.
-
-Long recordings as a set of files: ``session.h5``, ``session.001.h5``, ``session.002.h5`` ...
-
-Each file is whole in itself (camera, configuration, start); ``Session.open`` on any of them
-opens the set as one.
+A long recording is a set: ``session.h5``, ``session.001.h5``, ``session.002.h5`` ... Each file is whole in itself
+(camera, configuration, start); ``Session.open`` on any of them opens the set as one, ``RotatingWriter`` writes it.
+docs/session-format.md describes the file for other programs. Results of measurements are never stored here: they
+are another file that can be made again.
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ ROOT = {
 ENTRY = {"record": Declared("S"), "crop": Declared("i8", (4,), 0, 65_535)}
 START = {
     "start_time": Declared("S"),
-    "start_monotonic_s": Declared("f8", (), -layout.FURTHEST_S, layout.FURTHEST_S),
+    "start_monotonic_s": Declared("f8", (), -layout.MAX_TIME_S, layout.MAX_TIME_S),
 }
 TEXTS = dict.fromkeys(("config", "metadata", "versions"), Declared("S"))
 EVENTS = Declared(f"S{layout.EVENT_BYTES}", (None,))
@@ -41,7 +41,7 @@ LEDGER = Declared(f"S{layout.LEDGER_BYTES}", (1,))
 LINES = Declared("u1", (None,))
 
 _CLOCK = JsonField(str, words=layout.CLOCKS)
-CAMERA_SAID = {
+CAMERA_FIELDS = {
     "address": JsonField(str),
     "name": JsonField(str),
     "width": JsonField(int, 1, 65_535),
@@ -55,18 +55,18 @@ CAMERA_SAID = {
     "controls": JsonField(dict),
     "warnings": JsonField(list),
 }
-LOAD_SAID = {
+LOAD_FIELDS = {
     "address": JsonField(str),
     "name": JsonField(str),
     "protocol": JsonField(str),
     "clock": _CLOCK,
     "sign": JsonField(int, -1, 1),
-    "capacity_N": JsonField(float, 0, layout.MOST_FORCE_N, missing=True),
+    "capacity_N": JsonField(float, 0, layout.MAX_FORCE_N, missing=True),
     "settings": JsonField(dict),
     "warnings": JsonField(list),
 }
-EVENT_SAID = {
-    "monotonic_s": JsonField(float, -layout.FURTHEST_S, layout.FURTHEST_S),
+EVENT_FIELDS = {
+    "monotonic_s": JsonField(float, -layout.MAX_TIME_S, layout.MAX_TIME_S),
     "kind": JsonField(str),
     "source": JsonField(str),
     "text": JsonField(str),
@@ -74,30 +74,30 @@ EVENT_SAID = {
     "data": JsonField(dict),
 }
 _FRAME = JsonField(int, 0, 2**63 - 1)
-BURST_SAID = {"first": _FRAME, "last": _FRAME, "n": JsonField(int, 1, 65_536)}
-_TELLS_OF_A_BURST = {EventKind.REFERENCE, EventKind.MEASURED}
+BURST_FIELDS = {"first": _FRAME, "last": _FRAME, "n": JsonField(int, 1, 65_536)}
+_NAMES_A_BURST = {EventKind.REFERENCE, EventKind.MEASURED}
 
 
 def camera_from(text: Any, where: str) -> CameraInfo:
     """The camera whose description stands in ``text``; raises DataError where it is none."""
-    said = _described(text, CAMERA_SAID, where)
-    if said["width"] * said["height"] > layout.MOST_PIXELS:
-        raise DataError(f"{where}: pictures of {said['width']} x {said['height']} px are beyond sense")
-    return CameraInfo(**said)
+    values = _described(text, CAMERA_FIELDS, where)
+    if values["width"] * values["height"] > layout.MAX_PIXELS:
+        raise DataError(f"{where}: pictures of {values['width']} x {values['height']} px are beyond sense")
+    return CameraInfo(**values)
 
 
 def load_from(text: Any, where: str) -> LoadCellInfo | None:
     """The load cell, or None for "null"; raises DataError where it is neither."""
     if bytes(text).strip() == b"null":
         return None
-    return LoadCellInfo(**_described(text, LOAD_SAID, where))
+    return LoadCellInfo(**_described(text, LOAD_FIELDS, where))
 
 
 def _described(text: Any, form: Mapping[str, JsonField], where: str) -> dict[str, Any]:
-    said = read_object(text, where)
-    check_object(said, form, where)
-    return {name: said[name] for name in form if name in said} | {
-        "warnings": tuple(map(str, said["warnings"]))
+    values = read_object(text, where)
+    check_object(values, form, where)
+    return {name: values[name] for name in form if name in values} | {
+        "warnings": tuple(map(str, values["warnings"]))
     }
 
 
@@ -146,7 +146,7 @@ def read_rows(
 ) -> Rows:
     """The rows of ``group`` that are complete in all columns and in the pictures.
 
-    A row without a time is left out, and told. Times that run backwards are told.
+    A row without a time is left out and reported. Times that run backwards are reported.
 
     Parameters
     ----------
@@ -245,14 +245,16 @@ def events_from(rows: NDArray[np.bytes_], where: str, *, whole: bool) -> list[Ev
 
 
 def _event_from(text: bytes, where: str) -> Event | None:
-    said = read_object(text, where)
-    check_object(said, EVENT_SAID, where)
-    if said["kind"] not in {*EventKind}:
+    values = read_object(text, where)
+    check_object(values, EVENT_FIELDS, where)
+    if values["kind"] not in {*EventKind}:
         return None
-    kind = EventKind(said["kind"])
-    if kind in _TELLS_OF_A_BURST:
-        check_object(said["data"], BURST_SAID, where)
-    return Event(said["monotonic_s"], kind, said["source"], said["text"], said["level"], said["data"])
+    kind = EventKind(values["kind"])
+    if kind in _NAMES_A_BURST:
+        check_object(values["data"], BURST_FIELDS, where)
+    return Event(
+        values["monotonic_s"], kind, values["source"], values["text"], values["level"], values["data"]
+    )
 
 
 def config_from(text: Any, where: str) -> dict[str, Any]:

@@ -25,13 +25,13 @@ from acquire.errors import DataError
 from acquire.events import Event
 from acquire.frame import Burst, Frame
 from acquire.hdf5 import (
+    DiskSync,
     FlushTimer,
     GrowingDataset,
     PictureStack,
     RowTable,
-    ToDisk,
+    abandon_file,
     free_bytes,
-    let_go,
     to_json,
 )
 from acquire.load_sample import LoadSample
@@ -93,7 +93,7 @@ class SessionWriter(Closing):
         self.unflushed_frames = 0
         self._written_bytes = 0
         self._file: h5py.File | None = _create(self.path)
-        self._to_disk = ToDisk(self.path)
+        self._to_disk = DiskSync(self.path)
         try:
             with self._guarded() as file:
                 layout.create(file, recorded, checksum)
@@ -265,7 +265,7 @@ class SessionWriter(Closing):
     def _abandon(self) -> None:
         file, self._file = self._file, None
         if file is not None:
-            let_go(file)
+            abandon_file(file)
         self._to_disk.close()
 
     def _open_file(self) -> h5py.File:

@@ -320,7 +320,7 @@ class Kernel:
 
 
 def try_ioctl(kernel: Kernel, fd: int, request: int, argument: Any) -> bool:
-    """Whether the driver knows the request and its argument (ENOTTY and EINVAL mean it does not)."""
+    """Whether the driver supports the request and its argument (ENOTTY and EINVAL mean it does not)."""
     try:
         kernel.ioctl(fd, request, argument)
     except OSError as error:

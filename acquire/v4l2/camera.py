@@ -1,7 +1,7 @@
 """Cameras of Linux through V4L2: ``/dev/video0?format=Y12&width=&height=&fps=30&exposure_us=8000``.
 
 Our own reader: raw grey levels, the driver's sequence numbers and stamps, losses and damaged
-frames told, what was asked read back. A fault never ends a test: a stalled, failed or unplugged
+frames reported, settings read back. A fault never ends a test: a stalled, failed or unplugged
 camera is closed, looked for by identity and opened again, while every step is an event.
 
 Settings: ``format``, ``width``, ``height``, ``fps``, ``input``, ``plane=raw|r|g|b`` (Bayer),
@@ -49,7 +49,7 @@ def mid_exposure(stamp: Stamp, raw_t: float, exposure_s: float | None) -> float:
     """The middle of the exposure, s, where exposure and the meaning of the stamp are known.
 
     A stamp of the end of the frame is half an exposure late, and later by the read-out of the
-    sensor, which no driver tells; without a known exposure the raw stamp stays.
+    sensor, which no driver gives; without a known exposure the raw stamp stays.
     """
     if exposure_s is None or not stamp.monotonic:
         return raw_t
@@ -213,15 +213,15 @@ class V4L2Camera(CameraBase):
     def _frame(self, stamp: Stamp, raw_t: float, image: NDArray[Any] | None) -> Frame | None:
         if image is None:
             # Nothing to hand out: its number is left open and counted as lost with the next one.
-            if count := self._short.told(raw_t):
-                self._tell(f"{count} frame(s) came without a whole picture and are counted as lost")
+            if count := self._short.due(raw_t):
+                self._report(f"{count} frame(s) came without a whole picture and are counted as lost")
             return None
         counted = self._counter.counts_itself
         lost = self._counter.count(stamp.sequence, raw_t, self._setup.mode.fps)
         if counted and not self._counter.counts_itself:
-            self._tell("the driver does not number its frames; losses are told from their stamps alone")
+            self._report("the driver does not number its frames; losses are told from their stamps alone")
         if stamp.damaged:
-            self._tell(
+            self._report(
                 f"frame {self._counter.index} is damaged: recorded, not measured", frame=self._counter.index
             )
         clock: Clock = "device" if stamp.monotonic else "host"
@@ -235,14 +235,14 @@ class V4L2Camera(CameraBase):
             self._stale += 1
             return True
         if self._stale:
-            self._tell(f"{self._stale} frames older than the start were left out", "info")
+            self._report(f"{self._stale} frames older than the start were left out", "info")
         self._stale, self._not_before = 0, float("-inf")
         return False
 
     def _look_for_delay(self, age: float) -> None:
         late = age > max(1.0, 2 * self._period())
         if late and not self._late:
-            self._tell(f"frames are {age:.1f} s old when they are fetched: this machine does not keep up")
+            self._report(f"frames are {age:.1f} s old when they are fetched: this machine does not keep up")
         self._late = late
 
     # Faults
@@ -260,7 +260,7 @@ class V4L2Camera(CameraBase):
         waited = self._kernel.now() - self._last_sign
         if waited > self.stall_s() and not self._stalled:
             self._stalled = True
-            self._tell(
+            self._report(
                 f"no picture for {waited:.1f} s; still waiting (trigger, cable, light control?)", "error"
             )
         if waited > 4 * self.stall_s():
@@ -269,7 +269,7 @@ class V4L2Camera(CameraBase):
     def _picture_came(self, now: float) -> None:
         if self._stalled:
             self._stalled = False
-            self._tell(f"pictures again after {now - self._last_picture:.1f} s", "info")
+            self._report(f"pictures again after {now - self._last_picture:.1f} s", "info")
         self._last_sign = self._last_picture = now
 
     def _woken_for_nothing(self) -> None:
@@ -282,8 +282,8 @@ class V4L2Camera(CameraBase):
         """Close, look for the camera by its identity, open it again; until it works or is stopped."""
         self._release()  # at once: an open handle makes a replugged camera come back under another name
         if not self._stalled:
-            self._tell(f"{fault_in_words(error)}; looking for it again", "error")
-        told = ""
+            self._report(f"{fault_in_words(error)}; looking for it again", "error")
+        reported = ""
         attempt = 0
         while not self._pause(BACKOFF_S[min(attempt, len(BACKOFF_S) - 1)]):
             attempt += 1
@@ -292,8 +292,8 @@ class V4L2Camera(CameraBase):
                     self._reopen()
             except (OSError, PhasedicError, NotACamera) as failure:
                 self._device.close()
-                if (text := str(failure)) != told:
-                    told = text
+                if (text := str(failure)) != reported:
+                    reported = text
                     log.info("%s: not back yet: %s", self._address, text)
             else:
                 return
@@ -313,10 +313,10 @@ class V4L2Camera(CameraBase):
         self._counter.restart()
         if not self._stalled:
             moved = f" as {path}" if path != self._path else ""
-            self._tell(f"opened again{moved}; the frames in between are counted as lost", "info", path=path)
+            self._report(f"opened again{moved}; the frames in between are counted as lost", "info", path=path)
         self._path = path
 
-    def _tell(self, text: str, level: Level = "warning", **data: Any) -> None:
+    def _report(self, text: str, level: Level = "warning", **data: Any) -> None:
         last = f" (last good frame {self._counter.index})" if level == "error" else ""
         device_event(self._on_event, self._address, f"{self._path}: {text}{last}", level, **data)
 
@@ -333,12 +333,12 @@ def open_v4l2(address: Address, on_event: EventSink) -> V4L2Camera:
 
 
 def v4l2_settings(address: Address) -> V4L2Settings:
-    """What the address asks for.
+    """The settings of the address.
 
     Raises
     ------
     ConfigError
-        An impossible value. Keys nobody knows are taken for controls, and refused with their
+        An impossible value. Unknown keys are taken for controls, and refused with their
         list once the camera is open.
     """
     options = Options(address)

@@ -1,7 +1,7 @@
 """One open V4L2 capture node: what it offers, how it is set up, its buffers.
 
-Every method is one or a few requests; an ``OSError`` goes to the caller, who knows what it
-means for the test. Nothing here waits for longer than it is told, reconnects or counts frames.
+Every method is one or a few requests; an ``OSError`` goes to the caller, who decides what it
+means for the test. Nothing here waits for longer than its argument, reconnects or counts frames.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class Mode:
 
 @dataclass(frozen=True, slots=True)
 class Stamp:
-    """What a buffer says about itself."""
+    """The time and state of a buffer."""
 
     sequence: int
     time: float
@@ -88,7 +88,7 @@ class Stamp:
 
 
 class NotACamera(Exception):
-    """The node captures no video, or only in a way that is not supported; says why."""
+    """The node captures no video, or only in a way that is not supported; the text has the reason."""
 
 
 class V4L2Device:
@@ -125,7 +125,7 @@ class V4L2Device:
         self._kernel.ioctl(self.fd, code, argument)
 
     def tried(self, code: int, argument: Any) -> bool:
-        """One ioctl that the driver may not know."""
+        """One ioctl that the driver may not support."""
         return try_ioctl(self._kernel, self.fd, code, argument)
 
     def _identify(self) -> Identity:
@@ -208,7 +208,7 @@ class V4L2Device:
         )
 
     def set_format(self, fourcc: str, width: int, height: int) -> None:
-        """Ask for a format; what became of it tells ``mode()``."""
+        """Ask for a format; ``mode()`` reads what is in force."""
         wanted = api.Format(type=api.CAPTURE)
         pix = wanted.fmt.pix
         pix.width, pix.height, pix.pixelformat = width, height, api.fourcc(fourcc)
@@ -216,14 +216,14 @@ class V4L2Device:
         self.request(api.S_FMT, wanted)
 
     def fps(self) -> float | None:
-        """Frames a second in force; None where the driver does not say."""
+        """Frames a second in force; None where the driver gives none."""
         parm = api.StreamParm(type=api.CAPTURE)
         if not self.tried(api.G_PARM, parm):
             return None
         return _rate(parm.parm.capture.timeperframe) or None
 
     def set_fps(self, fps: float) -> None:
-        """Ask for a frame rate; what became of it tells ``fps()``."""
+        """Ask for a frame rate; ``fps()`` reads what is in force."""
         parm = api.StreamParm(type=api.CAPTURE)
         if not self.tried(api.G_PARM, parm):
             return

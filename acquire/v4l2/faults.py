@@ -1,8 +1,7 @@
-"""Faults of V4L2 cameras: what they mean in words, who holds a camera, where an unplugged one came back.
+"""Faults of V4L2 cameras: in words, who holds a camera, where an unplugged one came back, and lost frames.
 
-From a driver's sequence numbers to the numbers of a test: never back, gaps counted.
-
-Pure: knows nothing of devices and reads no clock.
+``FrameCounter`` makes the numbers of a test from a driver's sequence numbers: never back, gaps counted. It
+touches no device and reads no clock.
 """
 
 from __future__ import annotations
@@ -145,7 +144,7 @@ class FrameCounter:
         t : float, s
             Its stamp.
         fps : float or None, 1/s
-            For frames lost while the device was away, told by the time that passed.
+            For frames lost while the device was away, found from the time that passed.
         """
         lost = self._lost(sequence, t, fps)
         if self.index < 0 and self._sequence is None:

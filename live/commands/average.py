@@ -21,7 +21,7 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic average``: average frames to a dark frame (lens covered) or a flat frame (evenly lit)."""
     from acquire.burst import average_bursts, compile_loops, save_mean
     from acquire.errors import DataError
-    from live.pipeline.warm_up import kinds_of
+    from live.pipeline.warm_up import picture_kinds
     from live.setup.devices import open_rig
 
     screen = TerminalScreen()
@@ -29,7 +29,7 @@ def command(arguments: argparse.Namespace) -> int:
     crop = tuple(given) if given else None
     rig = open_rig(arguments.camera, "none:", lambda event: screen.say(event.text), crop=crop)
     try:
-        compile_loops(kinds_of(rig.camera.info)[:1])
+        compile_loops(picture_kinds(rig.camera.info)[:1])
         with rig.camera:
             burst = next(average_bursts(rig.camera, arguments.frames), None)
     finally:

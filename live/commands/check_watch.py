@@ -148,12 +148,12 @@ def _view(config: Config, figures: CheckFigures, grid: ZoiGrid, notes: list[str]
     def serving(view: View) -> None:
         port = view.port if config.view.spawn else None
         if port is None or spawn_viewer(port, notes.append) is None:
-            notes.extend(view.address.splitlines())
+            notes.extend(view.instructions.splitlines())
 
     def tell(text: str, level: str) -> None:
         notes.append(text)
 
-    return View(setup, port=config.view.port, rrd=None, tell=tell, serving=serving)
+    return View(setup, port=config.view.port, rrd=None, notify=tell, on_serving=serving)
 
 
 def card(quick: QuickCheck, lines: list[CheckLine]) -> str:

@@ -19,7 +19,7 @@ from live.pipeline.screen import Screen
 from live.results.summary import StatusCard
 from live.results.writer import write_results
 from live.run.alarms import ActionMeans, Alarm, AlarmWatch, actions_of
-from live.run.strain_output import Lines, SerialOut, StrainOut, TcpOut, UdpOut
+from live.run.strain_output import LineFormat, SerialOut, StrainOut, TcpOut, UdpOut
 from live.ui.rerun.consumer import CardWriter, FiguresWriter, RerunConsumer
 from live.ui.rerun.messages import ViewSetup
 from live.ui.rerun.view import View, spawn_viewer
@@ -54,18 +54,20 @@ def signals_of(about: RunInfo, run_state: RunState, screen: Screen) -> list[Cons
 def _alarm_watch(alarms: Sequence[Alarm], about: RunInfo, run_state: RunState) -> list[Consumer]:
     if not alarms:
         return []
-    readings, health = ChannelValues(about.start.monotonic, run_state.snapshot), run_state.health
-    return [AlarmWatch(alarms, readings, health.channels, run_state.alarms, run_state.event_log)]
+    values, health = ChannelValues(about.start.monotonic, run_state.snapshot), run_state.health
+    return [AlarmWatch(alarms, values, health.channels, run_state.alarms, run_state.event_log)]
 
 
-def _lines(about: RunInfo, run_state: RunState) -> Lines:
+def _lines(about: RunInfo, run_state: RunState) -> LineFormat:
     config = about.config
     gauges = tuple(f"{prefix}gauge_{name}" for name in config.gauges for prefix in ("", "sigma_"))
     channels = config.strain_out.channels or (*DEFAULT_CHANNELS, *gauges)
-    return Lines(ChannelValues(about.start.monotonic, run_state.snapshot), channels, config.strain_out.format)
+    return LineFormat(
+        ChannelValues(about.start.monotonic, run_state.snapshot), channels, config.strain_out.format
+    )
 
 
-def _tcp(config: Config, lines: Lines) -> StrainOut | None:
+def _tcp(config: Config, lines: LineFormat) -> StrainOut | None:
     if config.strain_out.tcp is None:
         return None
     address = ListenAddress.parse(config.strain_out.tcp)
@@ -74,14 +76,14 @@ def _tcp(config: Config, lines: Lines) -> StrainOut | None:
     )
 
 
-def _udp(config: Config, lines: Lines) -> StrainOut | None:
+def _udp(config: Config, lines: LineFormat) -> StrainOut | None:
     if config.strain_out.udp is None:
         return None
     address = ListenAddress.parse(config.strain_out.udp)
     return UdpOut(address.host, address.port, lines)
 
 
-def _serial(config: Config, lines: Lines) -> StrainOut | None:
+def _serial(config: Config, lines: LineFormat) -> StrainOut | None:
     if config.strain_out.serial is None:
         return None
     address = parse_address(config.strain_out.serial)
@@ -138,14 +140,14 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
     rrd = about.folder / "view.rrd" if v.rrd else None
 
     def tell(text: str, level: Level) -> None:
-        run_state.event_log.tell(EventKind.VIEW, "view", text, level)
+        run_state.event_log.emit(EventKind.VIEW, "view", text, level)
 
     def serving(view: View) -> None:
         run_state.health.view_port = view.port
         _announce(view, v.spawn, screen, lambda text: tell(text, "warning"))
 
     port = v.port if v.enabled else None
-    return View(setup, port=port, rrd=rrd, tell=tell, serving=serving)
+    return View(setup, port=port, rrd=rrd, notify=tell, on_serving=serving)
 
 
 def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], None]) -> None:
@@ -155,5 +157,5 @@ def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], 
         return
     why = "no display" if spawn else "view.spawn is off"
     screen.say(f"no viewer is opened ({why}); the test runs without it. To open one:")
-    for line in view.address.splitlines():
+    for line in view.instructions.splitlines():
         screen.say(f"  {line}")

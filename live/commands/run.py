@@ -67,13 +67,13 @@ def run_and_show_page(config: Config, screen: Screen) -> Outcome:
 
 def run_with_page(controller: PageController, config: Config, screen: Screen) -> Outcome:
     """One test, shown on the page until its end."""
-    from live.ui.web.page_controller import ended
+    from live.ui.web.page_controller import run_result
 
     controller.viewer = _open_viewer
-    outcome = run_attended(config, screen, [controller.begin(config)], controller.attend)
+    outcome = run_attended(config, screen, [controller.begin(config)], controller.attach)
     print_outcome(outcome, screen)
     words = EXIT_WORDS.get(outcome.exit_code, "")
-    controller.end(ended(outcome.run_state, outcome.config.specimen, outcome.folder, words))
+    controller.end(run_result(outcome.run_state, outcome.config.specimen, outcome.folder, words))
     return outcome
 
 
@@ -115,7 +115,7 @@ def run_attended(
 
         if port is not None:
             stack.callback(port.close)
-        stack.enter_context(signals(lambda: stop.ask(INTERRUPTED), screen.say))
+        stack.enter_context(signals(lambda: stop.request(INTERRUPTED), screen.say))
         return run_live(
             config, screen, stop=stop, consumers=standard_consumers(screen, consumers), on_start=on_start
         )

@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
 
-from acquire.held_back import handled
+from acquire.signal_mask import signal_handler
 
 
 @contextlib.contextmanager
@@ -25,7 +25,7 @@ def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[No
         say("closing the files ..." if times == 1 else "still closing; a third signal ends it at once")
         stop()
 
-    with handled(handle, signal.SIGINT, signal.SIGTERM), handled(signal.SIG_IGN, signal.SIGHUP):
+    with signal_handler(handle, signal.SIGINT, signal.SIGTERM), signal_handler(signal.SIG_IGN, signal.SIGHUP):
         yield
 
 
@@ -39,5 +39,5 @@ def interrupts() -> Iterator[threading.Event]:
             raise KeyboardInterrupt
         stop.set()
 
-    with handled(handle, signal.SIGINT, signal.SIGTERM):
+    with signal_handler(handle, signal.SIGINT, signal.SIGTERM):
         yield stop

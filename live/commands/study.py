@@ -66,8 +66,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic study``."""
-    from live.pipeline.warm_up import kinds_of
-    from live.replay.opening import open_material
+    from live.pipeline.warm_up import picture_kinds
+    from live.replay.opening import open_source
     from live.replay.source import ReplayRequest
     from live.replay.study import recommended, study, take_windows
 
@@ -76,13 +76,15 @@ def command(arguments: argparse.Namespace) -> int:
     settings, found = _settings(arguments), []
     config_file = Path(arguments.config) if arguments.config else None
     request = ReplayRequest(arguments.source, False, None, None, None, config_file, overrides(arguments))
-    with open_material(request) as (material, config):
+    with open_source(request) as (material, config):
         if AUTO in (config.measure.roi, config.measure.gauges):
             raise ConfigError(
                 "a study does not look for the specimen; give --roi x,y,width,height or all, or the --mask that"
                 " 'phasedic replay' leaves beside its results"
             )
-        compile_ahead(kinds_of(material.camera), phase=config.measure.estimator == "phase", say=screen.status)
+        compile_ahead(
+            picture_kinds(material.camera), phase=config.measure.estimator == "phase", say=screen.status
+        )
         windows = take_windows(material, arguments.static, arguments.loaded)
         n = f"{len(windows.still)} still and {len(windows.loaded)} loaded bursts"
         screen.say(f"{len(settings)} settings on {n} of {arguments.source}")
@@ -122,7 +124,7 @@ _HEAD = (
 
 def _line(one: StudyResult) -> str:
     s = one.setting
-    mark = "" if one.is_told else "  noise"
+    mark = "" if one.is_significant else "  noise"
     over = f"{one.noise / one.predicted:.2f}" if one.measured else "-"
     return (
         f"{s.zoi:5d} {s.step:4d} {s.order:5d} {s.window:12s} {one.l10:7.1f} {one.vsg:7.1f} {one.noise * 1e6:11.1f}"
@@ -194,9 +196,9 @@ def _windows(word: str) -> list[str]:
 
 
 def _still(word: str) -> tuple[float, float]:
-    from live.replay.study import NEVER
+    from live.replay.study import NO_WINDOW
 
-    return NEVER if word == "none" else _seconds(word)
+    return NO_WINDOW if word == "none" else _seconds(word)
 
 
 def _seconds(word: str) -> tuple[float, float]:

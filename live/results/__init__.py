@@ -1,14 +1,14 @@
 """The files of a run: ``strain.h5`` and ``strain.csv`` written row by row, and read back.
 
-``writer`` writes a ``row`` to ``strain_h5`` and ``strain_csv`` in the ``layout``; ``quantities`` describes each
-number, ``reader`` opens the file (``Strain``), ``run_folder`` a whole run. ``figures`` is the table of tensile
-figures, ``summary`` the words at the end, ``noise_floor`` the still phase. Packages: ``maps``, ``report``,
-``export``. ``python -m live.results`` reads a file first in a child process.
+``writer`` writes a ``row`` to ``strain_h5`` and ``strain_csv`` in the ``layout``; ``quantities`` defines each
+number, ``reader`` opens the file (``Strain``), ``run_folder`` a whole run, ``pictures`` its images. ``figures`` is the
+table of tensile figures, ``summary`` the text at the end, ``noise_floor`` the still phase. Packages: ``maps``,
+``report``, ``export``. ``python -m live.results`` reads an unfinished file in a child process.
 """
 
 from live.results.noise_floor import StillPhase, still_phase_of
-from live.results.quantities import MEANS, UNITLESS, Quantity, quantity_of
-from live.results.reader import Strain, dataset, mean_name
+from live.results.quantities import MEANS, UNITLESS, Display, Quantity, mean_name, quantity_of
+from live.results.reader import Strain
 from live.results.row import ResultsInfo, gauge_columns
 from live.results.strain_h5 import FLUSH_S
 from live.results.writer import Results
@@ -17,12 +17,12 @@ __all__ = [
     "FLUSH_S",
     "MEANS",
     "UNITLESS",
+    "Display",
     "Quantity",
     "Results",
     "ResultsInfo",
     "StillPhase",
     "Strain",
-    "dataset",
     "gauge_columns",
     "mean_name",
     "quantity_of",

@@ -1,6 +1,6 @@
-"""The figures of a tensile test in words: modulus, strengths, extensions, each with its interval.
+"""The figures of a tensile test: one table for summary, page, report, comparison and batch, and its text lines.
 
-The table of tensile figures: summary, page, report, comparison and batch take name, unit and interval from it.
+Modulus, strengths and extensions, each with name, unit and interval.
 """
 
 from __future__ import annotations
@@ -29,14 +29,16 @@ from live.pipeline.history import History
 
 HEADLINE = ("E", "nu", "Rp02", "Rm")
 """The figures that are shown first, and compared between tests."""
+_STRENGTHS = ("Rp01", "Rp02", "Rp1", "ReH", "ReL", "Rm")
+_EXTENSIONS = ("Ag", "Agt", "A", "At")
 
 _PLAIN, _PERCENT, _MPA, _GPA, _KN = ("", 1.0), ("%", 0.01), ("MPa", 1e6), ("GPa", 1e9), ("kN", 1e3)
-_STRENGTHS_TENSILE_TABLE = {"Rp01": "p0.1", "Rp02": "p0.2", "Rp1": "p1", "ReH": "eH", "ReL": "eL", "Rm": "m"}
+_STRENGTH_SUFFIXES = dict(zip(_STRENGTHS, ("p0.1", "p0.2", "p1", "eH", "eL", "m"), strict=True))
 _SMALL_KN = 2.0  # below it forces are shown in N
 
 
-def quantity(value: float, sigma: float, unit: str) -> str:
-    """``value +- sigma unit`` with as many digits as the uncertainty deserves."""
+def value_text(value: float, sigma: float, unit: str) -> str:
+    """``value +- sigma unit``, rounded to two digits of the uncertainty."""
     if not math.isfinite(value):
         return "not known"
     if not math.isfinite(sigma) or sigma <= 0:
@@ -45,10 +47,10 @@ def quantity(value: float, sigma: float, unit: str) -> str:
     return f"{value:.{digits}f} +- {sigma:.{digits}f} {unit}".rstrip()
 
 
-def interval(figure: Figure, unit_is: float = 1.0, unit: str = "") -> str:
-    """A figure with the larger half of its interval, in a unit that is ``unit_is`` of ours."""
+def figure_text(figure: Figure, unit_is: float = 1.0, unit: str = "") -> str:
+    """A figure with the larger half of its interval, in ``unit``, which is ``unit_is`` in SI units."""
     half = max(figure.high - figure.value, figure.value - figure.low)
-    return quantity(figure.value / unit_is, half / unit_is, unit)
+    return value_text(figure.value / unit_is, half / unit_is, unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +60,7 @@ class TensileRow:
     Attributes
     ----------
     name : str
-        As the standards have it: Rp0.2, or Fp0.2 of a force.
+        As in the standards: Rp0.2, or Fp0.2 of a force.
     unit : str
     figure : Figure
         In that unit, or why it is not known.
@@ -82,8 +84,8 @@ class TensileRow:
     def text(self) -> str:
         """Value, interval and unit for a person; forces below 2 kN in N."""
         if self.unit == "kN" and abs(self.figure.value) < _SMALL_KN:
-            return interval(self.figure, 1e-3, "N")
-        return interval(self.figure, 1.0, self.unit)
+            return figure_text(self.figure, 1e-3, "N")
+        return figure_text(self.figure, 1.0, self.unit)
 
 
 def tensile_table(figures: TensileFigures, *, stresses: bool) -> dict[str, TensileRow]:
@@ -98,8 +100,8 @@ def tensile_table(figures: TensileFigures, *, stresses: bool) -> dict[str, Tensi
     modulus, letter = ("E", "R") if stresses else ("EA", "F")
     stiffness, strength = (_GPA, _MPA) if stresses else (_KN, _KN)
     names = {"E": (modulus, stiffness), "E_chord": (f"{modulus} by chord", stiffness), "nu": ("nu", _PLAIN)}
-    names |= {key: (letter + end, strength) for key, end in _STRENGTHS_TENSILE_TABLE.items()}
-    names |= {key: (key, _PERCENT) for key in ("Ag", "Agt", "A", "At")}
+    names |= {key: (letter + end, strength) for key, end in _STRENGTH_SUFFIXES.items()}
+    names |= {key: (key, _PERCENT) for key in _EXTENSIONS}
     return {
         key: TensileRow(name, unit, getattr(figures, key).over(one))
         for key, (name, (unit, one)) in names.items()
@@ -112,19 +114,15 @@ def headline(figures: TensileFigures, *, stresses: bool) -> list[TensileRow]:
     return [rows[key] for key in HEADLINE]
 
 
-_STRENGTHS = ("Rp01", "Rp02", "Rp1", "ReH", "ReL", "Rm")
-_EXTENSIONS = ("Ag", "Agt", "A", "At")
-
-
 def evaluate(history: History, loads: LoadLog, specimen: SpecimenConfig) -> TensileFigures:
     """The tensile figures of the run; stresses are forces (N) where the section is not known."""
     axial, transverse = history.along(specimen.axis)
     stress = history.forces(loads) / (specimen.area_m2 or 1.0)
-    return evaluate_test(Curve(history.column("t"), axial, stress, transverse), options_of(specimen))
+    return evaluate_test(Curve(history.column("t"), axial, stress, transverse), tensile_options(specimen))
 
 
-def options_of(specimen: SpecimenConfig) -> TensileOptions:
-    """How the configuration asks for the evaluation; a preload (MPa) needs a section, and is let go without."""
+def tensile_options(specimen: SpecimenConfig) -> TensileOptions:
+    """The options of the evaluation from the configuration; a preload (MPa) is ignored without a section."""
     standard = STANDARDS.get(specimen.standard) or free(Interval("strain", *specimen.modulus_between))
     if specimen.zero == "preload" and specimen.area_m2 is not None:
         return TensileOptions(standard, "preload", specimen.preload_MPa * 1e6)
@@ -132,72 +130,72 @@ def options_of(specimen: SpecimenConfig) -> TensileOptions:
 
 
 def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
-    """How late the load comes, as the test itself tells it; nothing without a load."""
+    """The lag of the load behind the frames, found from the test itself; nothing without a load."""
     t, force = loads.arrays()
     if not len(t):
         return []
     lag = find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
     if not lag.known:
-        return [f"lag of the load beside the frames: not known ({lag.why})"]
-    how = f"{loads.lag_s * 1e3:g} ms taken off" if loads.lag_s else f"not applied; --lag {lag.value:.3f} does"
-    return [f"lag of the load beside the frames: {interval(lag, 1e-3, 'ms')} ({CONFIDENCE:.0%}; {how})"]
+        return [f"lag of the load behind the frames: not known ({lag.why})"]
+    how = f"{loads.lag_s * 1e3:g} ms corrected" if loads.lag_s else f"not applied; --lag {lag.value:.3f} does"
+    return [f"lag of the load behind the frames: {figure_text(lag, 1e-3, 'ms')} ({CONFIDENCE:.0%}; {how})"]
 
 
 def tare_line(history: History, loads: LoadLog) -> list[str]:
-    """That the zero was moved in mid-test; nothing where it was not."""
+    """A note where the load cell was tared in mid-test; else nothing."""
     tared = history.tared_in_mid_test(loads)
     if not tared:
         return []
     return [
-        f"tared in mid-test by {tared:+.4g} N: these figures go by the zero before; strain.csv has it as zero_N"
+        f"tared in mid-test by {tared:+.4g} N: these figures use the zero before; strain.csv has the tare as zero_N"
     ]
 
 
 def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
-    """How far the largest strain lies off the axis of the load; nothing where the strains do not tell."""
+    """The angle from the axis of the load to the largest strain; nothing where it is not known."""
     load = history.axis(specimen.axis)
-    words = axis_words(load)
+    words = axis_text(load)
     stays = load.found and load.axis != specimen.first_axis and history.gauge("axial") is not None
-    return [words + ("; the gauge axial stays where it was placed" if stays else "")] if words else []
+    return [words + ("; the gauge axial keeps its place" if stays else "")] if words else []
 
 
-def axis_words(load: LoadAxis) -> str:
-    """The axis of the load with the angle to it; empty where the strains do not tell."""
-    if not load.off.known:
+def axis_text(load: LoadAxis) -> str:
+    """The axis of the load and the angle to the largest strain; empty where it is not known."""
+    if not load.angle.known:
         return ""
-    words = f"largest strain {interval(load.off, math.pi / 180, 'degrees')} off {load.axis} (clockwise)"
+    words = f"largest strain {figure_text(load.angle, math.pi / 180, 'degrees')} off {load.axis} (clockwise)"
     if load.found:
         return f"{words}; {load.axis} was found to be the axis of the load"
-    wrong = abs(load.off.value) > math.pi / 4
+    wrong = abs(load.angle.value) > math.pi / 4
     return words + (f"; is specimen.axis = {load.axis!r} right?" if wrong else "")
 
 
 def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]:
-    """E, nu and the strengths in words; nothing where the curve told nothing."""
+    """E, nu and the strengths as text; nothing where E is not known."""
     if not figures.E.known or figures.span is None:
         return []
     rows = _rows(figures, specimen)
     hint = "" if specimen.area_m2 else " (give [specimen] width_mm and thickness_mm for E)"
-    words = f"  {_said(rows, 'nu')}  ({figures.span.n} points, +-: {CONFIDENCE:.0%} interval)"
-    return [_said(rows, "E") + hint + words, _known(rows, _STRENGTHS)]
+    words = f"  {_text(rows, 'nu')}  ({figures.span.n} points, +-: {CONFIDENCE:.0%} interval)"
+    return [_text(rows, "E") + hint + words, _known_texts(rows, _STRENGTHS)]
 
 
 def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> dict[str, TensileRow]:
     return tensile_table(figures, stresses=specimen.area_m2 is not None)
 
 
-def _said(rows: Mapping[str, TensileRow], key: str) -> str:
+def _text(rows: Mapping[str, TensileRow], key: str) -> str:
     return f"{rows[key].name} = {rows[key].text}"
 
 
-def _known(rows: Mapping[str, TensileRow], keys: Sequence[str]) -> str:
-    return "  ".join(_said(rows, key) for key in keys if rows[key].figure.known)
+def _known_texts(rows: Mapping[str, TensileRow], keys: Sequence[str]) -> str:
+    return "  ".join(_text(rows, key) for key in keys if rows[key].figure.known)
 
 
 def figure_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]:
-    """All of a test: what ``elastic_lines`` says, how it was had, extensions, rates, and what cannot be had."""
+    """All figures as text: ``elastic_lines``, the elastic part, extensions, strain rate, and what is not known."""
     rows, span = _rows(figures, specimen), figures.span
-    lines = elastic_lines(figures, specimen) or [line for line in [_known(rows, _STRENGTHS)] if line]
+    lines = elastic_lines(figures, specimen) or [line for line in [_known_texts(rows, _STRENGTHS)] if line]
     if not lines:
         return []
     if span is not None:
@@ -206,17 +204,17 @@ def figure_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]
             f"  {figures.standard}: strains {100 * low:.3f} to {100 * high:.3f} %, R2 = {figures.r2:.5f}, by chord"
             f" {rows['E_chord'].text}; strain counts {figures.zero.how}"
         )
-    if extensions := _known(rows, _EXTENSIONS):
+    if extensions := _known_texts(rows, _EXTENSIONS):
         length = f"  (gauge length {specimen.gauge_length_mm:g} mm)" if specimen.gauge_length_mm else ""
         lines.append(extensions + length)
     if figures.rate_elastic.known:
         words = f" ({figures.rate_elastic.why})" if figures.rate_elastic.why else ""
         lines.append(f"strain rate {figures.rate_elastic.value:.3g} 1/s in the elastic part{words}")
-    return lines + _unknown(rows)
+    return lines + _unknown_lines(rows)
 
 
-def _unknown(rows: Mapping[str, TensileRow]) -> list[str]:
-    """Which figures of the standard are not known, and why, a line for each reason."""
+def _unknown_lines(rows: Mapping[str, TensileRow]) -> list[str]:
+    """The figures of the standard that are not known: one line for each reason."""
     reasons: dict[str, list[str]] = {}
     for key in ("E", *_STRENGTHS, *_EXTENSIONS, "nu"):
         figure = rows[key].figure

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import datetime
-import logging
 import platform
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
@@ -13,24 +12,19 @@ from typing import Any
 from acquire.errors import ConfigError
 from acquire.printable import printable
 
-log = logging.getLogger(__name__)
-
-
 FILES = ("session.h5", "mask.png", "strain.h5", "strain.csv", "view.rrd", "config.json")
-
-
 _PACKAGES = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless", "h5py", "rerun-sdk", "pyserial")
 
 
 def versions() -> dict[str, str]:
-    """Versions of ourselves, of Python and of what we stand on, what the last digits belong to, and the threads."""
-    from analysis import numerics, threads
+    """Versions of phasedic, Python and the libraries, what the last digits depend on, and the threading library."""
+    from analysis import numerics, threading_library
 
-    return installed() | numerics() | {"threads": threads()}
+    return installed_versions() | numerics() | {"threads": threading_library()}
 
 
-def installed() -> dict[str, str]:
-    """Versions of ourselves, of Python and of what we stand on; loads nothing."""
+def installed_versions() -> dict[str, str]:
+    """Versions of phasedic, of Python and of the libraries; imports nothing heavy."""
     found = {
         "python": platform.python_version(),
         "machine": platform.machine(),
@@ -47,8 +41,8 @@ def installed() -> dict[str, str]:
 _DIGITS = ("numba", "numpy", "machine", "processor", "vectors", "loops")
 
 
-def other_digits(then: Mapping[str, Any]) -> list[str]:
-    """What was otherwise when something with the versions ``then`` was measured, where its last digits hang on it."""
+def differing_versions(then: Mapping[str, Any]) -> list[str]:
+    """What differs from the versions ``then`` of an earlier measurement and changes the last digits, in words."""
     now = versions()
     differ = [name for name in _DIGITS if name in then and str(then[name]) != now[name]]
     return [f"{name} {printable(str(then[name]))[:40]} (here {now[name]})" for name in differ]
@@ -60,16 +54,18 @@ def make_folder(wanted: str | None, now: datetime.datetime) -> Path:
     Raises
     ------
     ConfigError
-        It holds a run already (nothing is ever overwritten), or cannot be made.
+        It holds a run already (files are never overwritten), or cannot be made.
     """
     folder = Path(wanted) if wanted else _unused(Path("runs") / now.strftime("%Y%m%dT%H%M%SZ"))
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(f"{folder}: cannot be made ({error.strerror}); choose another --out") from None
-    taken = [name for name in FILES if (folder / name).exists()]
-    if taken:
-        raise ConfigError(f"{folder} already holds {taken[0]}; nothing is overwritten, choose another --out")
+    existing = [name for name in FILES if (folder / name).exists()]
+    if existing:
+        raise ConfigError(
+            f"{folder} already holds {existing[0]}; nothing is overwritten, choose another --out"
+        )
     return folder
 
 

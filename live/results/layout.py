@@ -1,4 +1,4 @@
-"""Where everything stands in ``strain.h5``: the writer makes it so, the reader takes nothing else."""
+"""The layout of ``strain.h5``: the writer makes it, the reader refuses any other."""
 
 from __future__ import annotations
 
@@ -9,36 +9,17 @@ from acquire.hdf5 import Declared
 from live.results.row import GRADIENTS, STRAINS, gauge_columns
 from live.results.strain_csv import COLUMNS
 
+FORMAT, FORMAT_VERSION = "phasedic-strain", 1
 PLAIN_MAPS = ("u", "v", *GRADIENTS, *STRAINS)
 MAPS = (*PLAIN_MAPS, *(f"sigma_{name}" for name in PLAIN_MAPS), "residual", "status", "iterations")
 BYTES = {"status", "iterations"}  # maps of whole numbers; the others are float32
 WHOLE = {"frame", "last_frame", "n_frames", "lost", "n_valid", "n_zoi"}  # columns; the others are float64
-ANY_COLUMN = Declared("number", (None,))  # one of a gauge, or that another version has added
-NEEDED = {
-    *(
-        "frame",
-        "time_s",
-        "force_N",
-        "exx",
-        "eyy",
-        "exy",
-        "sigma_exx",
-        "sigma_eyy",
-        "sigma_exy",
-        "n_valid",
-        "n_zoi",
-    ),
-    *("noise_GL", "n_frames", "last_frame", "lost", "duration_s", "u_px", "v_px"),
-}  # columns that every file of this version has
-KNOWN = {
-    *COLUMNS,
-    "stress_Pa",
-    "true_strain",
-    "true_stress_Pa",
-    "force_raw_N",
-}  # columns whose type is declared where they are there
-ERRORS = "_errors"  # NeXus' second name of the uncertainty of what stands before it
-MOST_PIXELS = 65_535
+ANY_COLUMN = Declared("number", (None,))  # of a gauge, or added by another version
+# The columns that every file of this version has, and those that it may have.
+REQUIRED = {*COLUMNS} - {"latency_s", "kernel_s", "zero_N"}
+KNOWN = {*COLUMNS, "stress_Pa", "true_strain", "true_stress_Pa", "force_raw_N"}
+ERRORS = "_errors"  # NeXus: the uncertainty of NAME is also called NAME_errors
+MAX_SIDE_PX = 65_535
 
 ROOT = {"format": Declared("text"), "format_version": Declared("int", (), 1), "start_time": Declared("text")}
 STRAIN = {"strain_measure": Declared("text"), "grid": Declared("text")}
@@ -57,6 +38,6 @@ def column_declared(name: str) -> Declared:
 
 
 def column_names(gauges: Iterable[str] = (), extras: Iterable[str] = ()) -> tuple[str, ...]:
-    """The columns in the order in which they are written: a reader that sees the time sees the whole row."""
+    """The columns in the order in which they are written: time_s is last, so a row with a time is complete."""
     names = tuple(name for name in COLUMNS if name != "time_s")
     return (*names, *extras, *chain.from_iterable(map(gauge_columns, gauges)), "time_s")

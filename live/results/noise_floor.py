@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate import FEWEST_STILL, NoiseFloor, evenly, noise_floor, still_phase
+from analysis.evaluate import MIN_STILL_INSTANTS, NoiseFloor, evenly, noise_floor, still_phase
 from live.results.reader import Strain
 
-MOST_INSTANTS = 64
-"""Still instants that are read; more would not make the noise floor better known."""
+MAX_INSTANTS = 64
+"""Still instants that are read; more do not improve the noise floor."""
 
 _MEANS = ("exx", "eyy", "exy")
 _DISPLACEMENTS = ("u", "v")
@@ -20,13 +20,13 @@ _DISPLACEMENTS = ("u", "v")
 
 @dataclass(frozen=True, slots=True)
 class StillPhase:
-    """The beginning of a test, in which nothing moves.
+    """The beginning of a test, before anything moves.
 
     Attributes
     ----------
     time_steps : int
     floors : mapping of str to NoiseFloor
-        Of u, v (px), exx, eyy and exy; empty where the instants are too few, without those that too few ZOIs have.
+        Of u, v (px), exx, eyy and exy; empty with too few instants; a map with too few ZOIs is left out.
     """
 
     time_steps: int
@@ -37,9 +37,9 @@ def still_phase_of(strain: Strain, names: Sequence[str] = (*_DISPLACEMENTS, *_ME
     """The still phase of ``strain``, with the noise floors of the maps ``names``; raises DataError as ``maps``."""
     means = {name: (_column(strain, name), _column(strain, f"sigma_{name}")) for name in _MEANS}
     count = still_phase(strain.force_one_zero, means)
-    if count < FEWEST_STILL:
+    if count < MIN_STILL_INSTANTS:
         return StillPhase(count, {})
-    rows = evenly(count, MOST_INSTANTS).tolist()
+    rows = evenly(count, MAX_INSTANTS).tolist()
     floors = {name: noise_floor(_maps(strain, name, rows), planes=name in _DISPLACEMENTS) for name in names}
     return StillPhase(count, {name: floor for name, floor in floors.items() if floor is not None})
 

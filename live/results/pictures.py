@@ -37,25 +37,25 @@ class Pictures:
 
 
 def of_session(session: Session, strain: Strain) -> Pictures | None:
-    """Those of a recording: the frame (or burst) nearest to the middle of each measured one."""
+    """Pictures of a recording: the frame (or burst) nearest to the middle of each measured burst."""
     bursts = session.mode.kind == "bursts"
     n = session.burst_count if bursts else len(session)
     if not n:
         return None
-    moments = _BurstTimes(session) if bursts else [float(t) for t in session.times]
+    times = _BurstTimes(session) if bursts else [float(t) for t in session.times]
 
     def each(rows: Sequence[int]) -> Iterator[Image]:
         for row in rows:
-            number = _nearest(moments, n, float(strain.time_s[row]) + session.start_monotonic)
+            number = _nearest(times, n, float(strain.time_s[row]) + session.start_monotonic)
             yield session.burst(number).mean if bursts else session.frame(number).image
 
     return Pictures(session.camera, each)
 
 
 def of_images(address: str, strain: Strain, crop: Crop | None = None) -> Pictures:
-    """Those that a replay measured, ``crop`` (x, y, width, height) of them.
+    """Pictures that a replay measured, cropped to ``crop`` (x, y, width, height).
 
-    Raises what ``open_camera`` raises where they are gone.
+    Raises as ``open_camera`` where they cannot be found any more.
     """
     with _opened(address, crop) as camera:
         info = camera.info
@@ -90,7 +90,7 @@ def _numbered(camera: Camera, numbers: Sequence[int]) -> Iterator[Image]:
 
 
 class _BurstTimes(Sequence[float]):
-    """Times of recorded bursts, read when they are looked at."""
+    """Times of recorded bursts, read on access."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -102,8 +102,8 @@ class _BurstTimes(Sequence[float]):
         return self._session.burst(number).t
 
 
-def _nearest(moments: Sequence[float], n: int, t: float) -> int:
-    after = bisect_left(moments, t, 0, n)
+def _nearest(times: Sequence[float], n: int, t: float) -> int:
+    after = bisect_left(times, t, 0, n)
     if after == n:
         return n - 1
-    return after - 1 if after and t - moments[after - 1] < moments[after] - t else after
+    return after - 1 if after and t - times[after - 1] < times[after] - t else after

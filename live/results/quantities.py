@@ -1,6 +1,6 @@
-"""What every number of the results means, and in which unit it is kept.
+"""The numbers of the results: name, unit and definition of each, and the units and axes to show them in.
 
-The units and axes that numbers are shown or exported in; files always hold px and plain numbers.
+Files always hold px and dimensionless strains; ``Display`` converts.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ class Quantity:
 
     @property
     def is_strain(self) -> bool:
-        """A strain, a gradient or the uncertainty of one: what percent are made of."""
+        """A strain, a gradient or the uncertainty of one; ``Display`` can give it in percent."""
         plain = self.name.removeprefix("sigma_")
         return plain in _STRAINS or plain.startswith(_GAUGE)
 
@@ -80,17 +80,17 @@ _INSTANTS = (
     Quantity(
         "true_stress", "Pa", "stress times one plus the axial engineering strain; volume taken as constant"
     ),
-    Quantity("force_raw", "N", "force before the lag was taken off"),
-    Quantity("zero", "N", "what tares had taken off the force by then"),
+    Quantity("force_raw", "N", "force as stamped, not corrected for the lag of the load"),
+    Quantity("zero", "N", "sum of the tares before, subtracted from the force"),
     Quantity("n_valid", UNITLESS, "ZOIs with a value"),
-    Quantity("n_zoi", UNITLESS, "ZOIs asked for"),
+    Quantity("n_zoi", UNITLESS, "ZOIs to measure"),
     Quantity("noise", "GL", "temporal standard deviation of one frame; nan for a burst of one"),
     Quantity("frame", UNITLESS, "sequence number of the first frame of the burst"),
     Quantity("last_frame", UNITLESS, "sequence number of the last frame of the burst"),
     Quantity("n_frames", UNITLESS, "frames averaged"),
     Quantity("lost", UNITLESS, "frames lost or damaged since the burst before"),
     Quantity("duration", "s", "time of the last frame of the burst minus that of the first"),
-    Quantity("kernel", "s", "time that the kernel took; nan where nobody measured it"),
+    Quantity("kernel", "s", "time that the kernel took; nan where it was not measured"),
     Quantity("latency", "s", "from the stamp of the last frame of the burst to the result; nan in a replay"),
 )
 _GAUGE = "gauge_"
@@ -101,11 +101,11 @@ MEANS = {
     "force_raw_N": "force_raw", "zero_N": "zero", "noise_GL": "noise",
     "duration_s": "duration", "kernel_s": "kernel", "latency_s": "latency", "u_px": "u", "v_px": "v",
 }  # fmt: skip
-"""Columns of ``Strain.values`` whose name carries the unit, and the quantity each is; others have its name."""
+"""Column of ``Strain.values`` with the unit in its name -> quantity; other columns have the name of their quantity."""
 
 
 def quantity_of(name: str) -> Quantity:
-    """The quantity behind the name of a map or a column; one that is not known has no words."""
+    """The quantity of a map or column; one that is not known refers to the description of the format."""
     plain = MEANS.get(name, name)
     if plain in _KNOWN:
         return _KNOWN[plain]
@@ -121,14 +121,23 @@ def quantity_of(name: str) -> Quantity:
     return Quantity(plain, of.unit, f"standard uncertainty (1 sigma) of {of.name}")
 
 
+def mean_name(name: str) -> str:
+    """The name of a column where it stands beside maps, which may have the same."""
+    plain = MEANS.get(name, name)
+    if plain.removeprefix("sigma_").startswith(_GAUGE):
+        return plain
+    averaged = quantity_of(plain.removeprefix("sigma_")).is_strain or plain in ("u", "v")
+    return f"mean_{plain}" if averaged else plain
+
+
 @dataclass(frozen=True, slots=True)
 class Display:
-    """How numbers come out.
+    """Units and axes that numbers are shown and exported in; by default as the files hold them.
 
     Attributes
     ----------
     mm_per_px : float or None, mm/px
-        Lengths come in mm; None: in px.
+        Lengths are in mm; None: in px.
     y_up : bool
         y points up, from the centre of the first pixel: y, v, exy, du_dy and dv_dx change their sign,
         exx, eyy, du_dx and dv_dy do not.
@@ -153,14 +162,14 @@ class Display:
             )
 
     def unit(self, name: str) -> str:
-        """The unit that a map or column comes in; "" where it has none."""
+        """The unit of a map or column; "" where it has none."""
         quantity = quantity_of(name)
         if quantity.is_strain and self.percent:
             return "%"
         return "mm" if quantity.unit == "px" and self.mm_per_px is not None else quantity.unit
 
     def column(self, name: str) -> str:
-        """The name with its unit, as heads of columns and names of arrays carry it: ``u_mm``, ``eyy_percent``."""
+        """Name and unit, for heads of columns and names of arrays: ``u_mm``, ``eyy_percent``."""
         unit = self.unit(name).replace("%", "percent")
         plain = quantity_of(name).name
         return f"{plain}_{unit}" if unit else plain
@@ -171,7 +180,7 @@ class Display:
         return f"{self.column(name)} [{unit}]: {quantity_of(name).words}"
 
     def shown(self, name: str, values: NDArray[Any]) -> NDArray[Any]:
-        """Values of a map or column as they come out; whole numbers stay as they are."""
+        """Values of a map or column in these units and axes; whole numbers stay as they are."""
         factor = self.factor(name)
         return values if factor == 1 else values * values.dtype.type(factor)
 
@@ -194,7 +203,7 @@ class Display:
         return f"x right, y {y}, from the centre of the first pixel; all values lie on the reference picture{scale}"
 
     def factor(self, name: str) -> float:
-        """From the values of a map or column as they are kept to those that come out."""
+        """From the stored values of a map or column to those shown."""
         quantity = quantity_of(name)
         sign = -1.0 if self.y_up and quantity.turns else 1.0
         if quantity.unit == "px" and self.mm_per_px is not None:

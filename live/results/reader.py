@@ -1,10 +1,8 @@
 """Reads ``strain.h5`` back, also the one a killed process left behind.
 
-Maps are fetched from the file when asked for; per-row values are in memory. HDF5 may wait for ever
-on an unfinished file that was damaged too, so such a file is first read by a child process,
-``python -m live.results FILE``. A file that does not hold what ``layout`` declares is refused.
-
-Results as an ``xarray.Dataset``, where xarray is installed (``phasedic[xarray]``).
+Maps are read from the file on request; the columns are in memory. HDF5 may wait for ever on an unfinished
+file that is damaged too, so a child process, ``python -m live.results FILE``, reads such a file first. A file
+that does not hold what ``layout`` declares is refused.
 """
 
 from __future__ import annotations
@@ -12,7 +10,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +20,7 @@ from acquire.errors import ConfigError, DataError
 from acquire.hdf5 import (
     Declared,
     JsonField,
+    as_text,
     check_links,
     check_object,
     check_size,
@@ -34,97 +33,13 @@ from acquire.hdf5 import (
     read_scalar,
     read_superblock,
     stored_rows,
-    word,
 )
 from analysis.field import ZoiGrid
 from live.results import layout
-from live.results.quantities import MEANS, quantity_of
-from live.results.row import FORMAT, FORMAT_VERSION
-
-
-class ShownAs(Protocol):
-    """In which units and axes numbers come out."""
-
-    def shown(self, name: str, values: NDArray[Any]) -> NDArray[Any]: ...
-    def unit(self, name: str) -> str: ...
-    def x(self, grid: ZoiGrid) -> NDArray[np.float64]: ...
-    def y(self, grid: ZoiGrid) -> NDArray[np.float64]: ...
-    def axes(self) -> str: ...
-
-
-class Stored:
-    """As the file holds them: px, y down, strains dimensionless."""
-
-    def shown(self, name: str, values: NDArray[Any]) -> NDArray[Any]:
-        """The same."""
-        return values
-
-    def unit(self, name: str) -> str:
-        """As it is kept."""
-        return quantity_of(name).unit
-
-    def x(self, grid: ZoiGrid) -> NDArray[np.float64]:
-        """(C,), px."""
-        return grid.x
-
-    def y(self, grid: ZoiGrid) -> NDArray[np.float64]:
-        """(R,), px."""
-        return grid.y
-
-    def axes(self) -> str:
-        """In words."""
-        return (
-            "x right, y down, px, from the centre of the first pixel; all values lie on the reference picture"
-        )
-
-
-def dataset(strain: Strain, shown: ShownAs, fields: tuple[str, ...] | None = None) -> Any:
-    """Maps and means with coordinates ``time``, ``y``, ``x`` and units; ``fields`` are maps, all without.
-
-    Raises
-    ------
-    ConfigError
-        xarray is not installed.
-    DataError
-        There is no such map, or it cannot be read.
-    """
-    try:
-        import xarray
-    except ImportError:
-        raise ConfigError("this needs xarray: pip install 'phasedic[xarray]'") from None
-    maps = {
-        name: (("time", "y", "x"), shown.shown(name, strain.maps(name)), _attributes_dataset(shown, name))
-        for name in fields or strain.names
-    }
-    means = {
-        mean_name(name): ("time", shown.shown(name, values), _attributes_dataset(shown, name))
-        for name, values in strain.values.items()
-        if name != "time_s"
-    }
-    places = {
-        "time": ("time", strain.time_s, {"units": "s"}),
-        "y": ("y", shown.y(strain.grid), _attributes_dataset(shown, "y")),
-        "x": ("x", shown.x(strain.grid), _attributes_dataset(shown, "x")),
-    }
-    about = {"strain_measure": strain.strain_measure, "start_time": strain.start_utc, "axes": shown.axes()}
-    return xarray.Dataset({**maps, **means}, places, about)
-
-
-def mean_name(name: str) -> str:
-    """The name of a column where it stands beside maps, which may have the same."""
-    plain = MEANS.get(name, name)
-    if plain.removeprefix("sigma_").startswith("gauge_"):
-        return plain
-    averaged = quantity_of(plain.removeprefix("sigma_")).is_strain or plain in ("u", "v")
-    return f"mean_{plain}" if averaged else plain
-
-
-def _attributes_dataset(shown: ShownAs, name: str) -> dict[str, str]:
-    return {"units": shown.unit(name), "long_name": quantity_of(name).words}
-
+from live.results.quantities import Display, mean_name, quantity_of
 
 _log = logging.getLogger(__name__)
-_LENGTH, _PLACE = JsonField(int, 1, layout.MOST_PIXELS), JsonField(int, 0, layout.MOST_PIXELS)
+_LENGTH, _POSITION = JsonField(int, 1, layout.MAX_SIDE_PX), JsonField(int, 0, layout.MAX_SIDE_PX)
 
 
 class Strain(Closing):
@@ -156,10 +71,10 @@ class Strain(Closing):
         check_links(file)
         entry = open_group(file, "entry")
         strain, mean = open_group(entry, "strain"), open_group(entry, "mean")
-        self.start_utc = word(root["start_time"])
-        said = _attributes(strain, layout.STRAIN)
-        self.strain_measure = word(said["strain_measure"])
-        self.grid = _grid(strain, said["grid"], path)
+        self.start_utc = as_text(root["start_time"])
+        described = _attributes(strain, layout.STRAIN)
+        self.strain_measure = as_text(described["strain_measure"])
+        self.grid = _grid(strain, described["grid"], path)
         self.config, self.metadata, self.versions = (
             read_object(item[()], f"{path}: {name}")
             for name, item in open_datasets(entry, layout.TEXTS).items()
@@ -170,16 +85,16 @@ class Strain(Closing):
         self.n = _rows(path, [*self._maps.values(), *columns.values()], whole=not unfinished)
         self.values: dict[str, NDArray[Any]] = {name: item[: self.n] for name, item in columns.items()}
         self.time_s: NDArray[np.float64] = self.values["time_s"]
-        _tell_of_times(path, self.time_s)
+        _warn_of_times(path, self.time_s)
 
     @classmethod
     def open(cls, path: Path, *, probed: bool = False) -> Strain:
-        """Open the results at ``path``; ``probed``: a child process need not look first.
+        """Open the results at ``path``; ``probed``: no child process reads it first.
 
         Raises
         ------
         DataError
-            Missing, not HDF5, not ours, newer than this program, or damaged.
+            Missing, not HDF5, not of phasedic, newer than this program, or damaged.
         """
         file, unfinished = _open(path, probed)
         try:
@@ -227,13 +142,15 @@ class Strain(Closing):
         force, zero = np.asarray(self.values["force_N"], np.float64), self.values.get("zero_N")
         return force if zero is None else force + np.asarray(zero - zero[:1], np.float64)
 
-    def to_xarray(self, *fields: str) -> Any:
-        """Maps and means as an ``xarray.Dataset`` with coordinates ``time`` (s), ``y`` and ``x`` (px) and units.
+    def to_xarray(self, *fields: str, display: Display | None = None) -> Any:
+        """Maps and means as an ``xarray.Dataset`` with coordinates ``time`` (s), ``y`` and ``x`` and units.
 
         Parameters
         ----------
         *fields : str
-            Maps; all without.
+            Maps; all where none is named.
+        display : Display, optional
+            Units and axes; else as the file holds them (px, y down).
 
         Raises
         ------
@@ -242,7 +159,29 @@ class Strain(Closing):
         DataError
             There is no such map, or it cannot be read.
         """
-        return dataset(self, Stored(), fields or None)
+        try:
+            import xarray
+        except ImportError:
+            raise ConfigError("this needs xarray: pip install 'phasedic[xarray]'") from None
+        display = display or Display()
+
+        def variable(axes: Any, name: str, values: NDArray[Any]) -> tuple[Any, NDArray[Any], dict[str, str]]:
+            return axes, values, {"units": display.unit(name), "long_name": quantity_of(name).words}
+
+        names = [name for name in self.values if name != "time_s"]
+        data = {
+            n: variable(("time", "y", "x"), n, display.shown(n, self.maps(n))) for n in fields or self.names
+        }
+        data |= {mean_name(n): variable("time", n, display.shown(n, self.values[n])) for n in names}
+        coordinates = {
+            "time": ("time", self.time_s, {"units": "s"}),
+            "y": variable("y", "y", display.y(self.grid)),
+            "x": variable("x", "x", display.x(self.grid)),
+        }
+        about = {
+            "strain_measure": self.strain_measure, "start_time": self.start_utc, "axes": display.axes(),
+        }  # fmt: skip
+        return xarray.Dataset(data, coordinates, about)
 
     def __repr__(self) -> str:
         rows, columns = self.grid.shape
@@ -274,14 +213,14 @@ def _open(path: Path, probed: bool) -> tuple[Any, bool]:
 
 
 def _check(path: Path, file: Any) -> None:
-    found = word(read_attribute(file, "format", layout.ROOT["format"])) if "format" in file.attrs else None
-    if found != FORMAT:
+    found = as_text(read_attribute(file, "format", layout.ROOT["format"])) if "format" in file.attrs else None
+    if found != layout.FORMAT:
         shown = "something else" if found is None else repr(found[:40])
-        raise DataError(f"{path}: holds {shown}, not {FORMAT}; give a strain.h5")
+        raise DataError(f"{path}: holds {shown}, not {layout.FORMAT}; give a strain.h5")
     version = read_attribute(file, "format_version", layout.ROOT["format_version"])
-    if int(version) > FORMAT_VERSION:
+    if int(version) > layout.FORMAT_VERSION:
         raise DataError(
-            f"{path}: format version {version}, this program reads up to {FORMAT_VERSION}; update phasedic"
+            f"{path}: format version {version}, this program reads up to {layout.FORMAT_VERSION}; update phasedic"
         )
 
 
@@ -290,28 +229,32 @@ def _attributes(item: Any, declared: Mapping[str, Declared]) -> dict[str, Any]:
 
 
 def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
-    """The grid, once its description and what stands in the file agree."""
+    """The grid; its description and the arrays in the file must agree."""
     where = f"{path}: the grid"
-    said = read_object(text, where)
-    check_object(said, {"roi": JsonField(dict), "size": _LENGTH, "step": _LENGTH}, where)
-    check_object(said["roi"], {"x": _PLACE, "y": _PLACE, "width": _LENGTH, "height": _LENGTH}, where)
+    described = read_object(text, where)
+    check_object(described, {"roi": JsonField(dict), "size": _LENGTH, "step": _LENGTH}, where)
+    check_object(
+        described["roi"], {"x": _POSITION, "y": _POSITION, "width": _LENGTH, "height": _LENGTH}, where
+    )
     active = open_dataset(strain, "active", Declared("u1", (None, None), 0, 1))
-    shape = tuple((said["roi"][name] - said["size"]) // said["step"] + 1 for name in ("height", "width"))
+    shape = tuple(
+        (described["roi"][name] - described["size"]) // described["step"] + 1 for name in ("height", "width")
+    )
     if active.shape != shape:
         raise DataError(f"{where} is described as {shape} ZOIs, but {active.shape} are there; make it again")
-    grid = ZoiGrid.from_dict(said, read_scalar(active, Declared("u1", shape, 0, 1)).astype(bool))
+    grid = ZoiGrid.from_dict(described, read_scalar(active, Declared("u1", shape, 0, 1)).astype(bool))
     for name, places in (("x", grid.x), ("y", grid.y)):
         if not np.array_equal(open_dataset(strain, name, Declared("f8", places.shape))[()], places):
-            raise DataError(f"{where} has other centres {name} than its description says; make it again")
+            raise DataError(f"{where} has other centres {name} than its description; make it again")
     return grid
 
 
 def _columns(mean: Any) -> dict[str, Any]:
-    """All columns: those that every file has, and whatever another version has added."""
-    ours = {*layout.NEEDED, *(name for name in mean if name in layout.KNOWN)}
-    known = {name: layout.column_declared(name) for name in ours}
-    there = (name for name in mean if not name.endswith(layout.ERRORS))
-    return open_datasets(mean, dict.fromkeys(there, layout.ANY_COLUMN) | known)
+    """All columns: those that every file has, and those that another version added."""
+    declared = {*layout.REQUIRED, *(name for name in mean if name in layout.KNOWN)}
+    known = {name: layout.column_declared(name) for name in declared}
+    present = (name for name in mean if not name.endswith(layout.ERRORS))
+    return open_datasets(mean, dict.fromkeys(present, layout.ANY_COLUMN) | known)
 
 
 def _rows(path: Path, datasets: Sequence[Any], *, whole: bool) -> int:
@@ -324,10 +267,10 @@ def _rows(path: Path, datasets: Sequence[Any], *, whole: bool) -> int:
     return min(lengths)
 
 
-def _tell_of_times(path: Path, times: NDArray[np.float64]) -> None:
+def _warn_of_times(path: Path, times: NDArray[np.float64]) -> None:
     for count, what in (
         (np.count_nonzero(np.isnan(times)), "rows have no time"),
         (np.count_nonzero(np.diff(times) < 0), "times run backwards"),
     ):
         if count:
-            _log.warning("%s: %d %s; they are taken as they stand", path, count, what)
+            _log.warning("%s: %d %s; they are used as they are", path, count, what)

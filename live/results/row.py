@@ -1,14 +1,11 @@
-"""One row of the results: the strain maps of one instant, their means, and what belongs to them.
-
-What stands beside the numbers of a test in its files.
-"""
+"""One row of the results (maps and means of one measurement), and what the files hold besides the rows."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,20 +22,47 @@ STRAINS = ("exx", "eyy", "exy")
 GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
 
 
-class RowInfo(Protocol):
-    """What a row needs to know of the test."""
+@dataclass(frozen=True, slots=True, eq=False)
+class ResultsInfo:
+    """What the files of a test hold besides the rows.
+
+    Attributes
+    ----------
+    start_monotonic : float, s
+        Zero of ``time_s``.
+    start_utc : str
+        The same instant, ISO 8601.
+    config, metadata, versions : mapping to JSON values
+        The configuration in force, free text of the user, versions of the programs.
+    camera : CameraInfo or None
+    strain_measure : "small" | "engineering" | "green" | "hencky"
+    area_m2 : float or None, m^2
+        Cross-section of the specimen; with it the rows have a stress.
+    gauges : mapping of name to JSON values
+        The virtual gauges, each as it was described.
+    axis : "x", "y" or "auto"
+        Of the load; auto: found from the means, y until then.
+    lagged : bool
+        The force is corrected for a lag of the load; rows have the force as stamped too.
+    """
+
+    start_monotonic: float
+    start_utc: str
+    config: Mapping[str, Any]
+    metadata: Mapping[str, Any]
+    versions: Mapping[str, Any]
+    camera: CameraInfo | None
+    strain_measure: StrainMeasure = "small"
+    area_m2: float | None = None
+    gauges: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    axis: str = "y"
+    lagged: bool = False
 
     @property
-    def start_monotonic(self) -> float: ...
-
-    @property
-    def strain_measure(self) -> StrainMeasure: ...
-
-    @property
-    def area_m2(self) -> float | None: ...
-
-    @property
-    def lagged(self) -> bool: ...
+    def extras(self) -> tuple[str, ...]:
+        """The columns that only some tests have, without those of gauges."""
+        stress = ("stress_Pa", "true_strain", "true_stress_Pa") if self.area_m2 is not None else ()
+        return (*stress, *(("force_raw_N",) if self.lagged else ()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,8 +82,8 @@ class StrainRow:
     values: dict[str, float | int]
 
     @classmethod
-    def of(cls, measurement: Measurement, info: RowInfo, axis: str = "y") -> StrainRow:
-        """The row of ``measurement`` in the measure of strain of ``info``; ``axis`` is that of the load."""
+    def of(cls, measurement: Measurement, info: ResultsInfo, axis: str = "y") -> StrainRow:
+        """The row of ``measurement``, strains in the measure of ``info``; ``axis`` is that of the load."""
         maps = maps_of(measurement.field, info.strain_measure)
         return cls(maps, _values(measurement, maps, info, axis))
 
@@ -80,7 +104,7 @@ def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any
 
 
 def _values(
-    measurement: Measurement, maps: dict[str, NDArray[Any]], info: RowInfo, axis: str
+    measurement: Measurement, maps: dict[str, NDArray[Any]], info: ResultsInfo, axis: str
 ) -> dict[str, float | int]:
     burst, time_step = measurement.burst, measurement.time_step
     values: dict[str, float | int] = {
@@ -133,49 +157,3 @@ def _stretched(strain: float, measure: StrainMeasure) -> float:
 
 def _mean(name: str, small: float, maps: dict[str, NDArray[Any]], measure: StrainMeasure) -> float:
     return small if measure == "small" else ordered_mean(maps[name][np.isfinite(maps[name])])
-
-
-FORMAT, FORMAT_VERSION = "phasedic-strain", 1
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ResultsInfo:
-    """What stands beside the numbers.
-
-    Attributes
-    ----------
-    start_monotonic : float, s
-        Zero of ``time_s``.
-    start_utc : str
-        The same instant, ISO 8601.
-    config, metadata, versions : mapping to JSON values
-        In force, free words of the user, and of the programs.
-    camera : CameraInfo or None
-    strain_measure : "small" | "engineering" | "green" | "hencky"
-    area_m2 : float or None, m^2
-        Cross-section of the specimen; with it the rows have a stress.
-    gauges : mapping of name to JSON values
-        The virtual gauges, each as it was described.
-    axis : "x", "y" or "auto"
-        Of the load; auto: as the means tell it, y until then.
-    lagged : bool
-        A lag of the load was taken off, so that rows have the force without it too.
-    """
-
-    start_monotonic: float
-    start_utc: str
-    config: Mapping[str, Any]
-    metadata: Mapping[str, Any]
-    versions: Mapping[str, Any]
-    camera: CameraInfo | None
-    strain_measure: StrainMeasure = "small"
-    area_m2: float | None = None
-    gauges: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
-    axis: str = "y"
-    lagged: bool = False
-
-    @property
-    def extras(self) -> tuple[str, ...]:
-        """The columns that not every test has, but for those of gauges."""
-        stress = ("stress_Pa", "true_strain", "true_stress_Pa") if self.area_m2 is not None else ()
-        return (*stress, *(("force_raw_N",) if self.lagged else ()))

@@ -1,11 +1,9 @@
-"""The folder of a finished run: results, recording and settings, tied together.
+"""The folder of a finished run: results, recording and settings together.
 
 with open_run("runs/20261122T081747Z") as run:
     run.strain.values["eyy"], run.stress, run.events
 
-Virtual gauges laid over a finished run: read from its maps as they would have been read in the test.
-
-The strain field of a measured instant, made of the maps that the file holds.
+``add_gauges`` adds virtual gauges afterwards; it reads them from the stored maps.
 """
 
 from __future__ import annotations
@@ -36,39 +34,10 @@ from live.results.pictures import Pictures, of_images, of_session
 from live.results.reader import Strain
 from live.results.row import gauge_columns
 
-_GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
-_DU_DY, _DV_DX = 2, 4  # of u, du_dx, du_dy, v, dv_dx, dv_dy
-
-
-def read_field(strain: Strain, row: int) -> StrainField:
-    """The field of ``row``; of the covariances those that the stored sigmas tell, the others 0.
-
-    Raises
-    ------
-    DataError
-        There is no such row, or it cannot be read.
-    """
-    maps = {name: np.asarray(strain.maps(name, row), np.float64) for name in ("u", "v", *_GRADIENTS)}
-    sigmas = {name: np.asarray(strain.maps(f"sigma_{name}", row), np.float64) for name in maps}
-    status, residual = strain.maps("status", row), strain.maps("residual", row)
-    field = StrainField.from_values(strain.grid, maps, sigmas, status=status, residual=residual)
-    covariance = np.array(field.covariance)
-    shear = np.asarray(strain.maps("sigma_exy", row), np.float64)
-    both = sigmas["du_dy"] ** 2 + sigmas["dv_dx"] ** 2
-    covariance[PAIR_INDEX[_DU_DY, _DV_DX]] = (4 * shear**2 - both) / 2
-    measure = cast(Measure, strain.strain_measure)
-    return replace(field, covariance=covariance, measure=measure, window=_window(strain))
-
-
-def _window(strain: Strain) -> Window:
-    """The weight of the ZOIs, which says how far neighbours are correlated; gaussian where it is not recorded."""
-    said = strain.config.get("measure")
-    name = said.get("window") if isinstance(said, dict) else None
-    return cast(Window, name) if name in WINDOWS else "gaussian"
-
-
 SESSION, STRAIN = "session.h5", "strain.h5"
 _AS_FILES = ("files:", "video:")
+_GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
+_DU_DY, _DV_DX = 2, 4  # of u, du_dx, du_dy, v, dv_dx, dv_dy
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,7 +49,7 @@ class GaugeTrack:
     value, sigma : (T,) float64
         Strain and its standard uncertainty; NaN where it was lost.
     described : mapping of str to JSON value
-        Kind and place as they were configured; empty where the file does not say.
+        Kind and position as configured; empty where the file has none.
     """
 
     value: NDArray[np.float64]
@@ -110,7 +79,7 @@ class RunFolder(Closing):
         Raises
         ------
         DataError
-            It is there and cannot be read.
+            It exists and cannot be read.
         """
         path = self.session_path
         if path is None:
@@ -120,7 +89,7 @@ class RunFolder(Closing):
 
     @property
     def session_path(self) -> Path | None:
-        """Where the recording lies; None where there is none."""
+        """The file of the recording; None where there is none."""
         address = self.camera_address
         replayed = address.removeprefix("session:") if address.startswith("session:") else ""
         tried = [self.path / SESSION, *([Path(replayed), self.path / replayed] if replayed else [])]
@@ -128,7 +97,7 @@ class RunFolder(Closing):
 
     @property
     def camera_address(self) -> str:
-        """What was measured, as it was given."""
+        """The address of the camera, as given."""
         return str(self.section("camera").get("address") or "")
 
     def section(self, name: str) -> dict[str, Any]:
@@ -138,12 +107,12 @@ class RunFolder(Closing):
 
     @cached_property
     def pictures(self) -> Pictures | None:
-        """Pictures of the measured instants; None where they are not here any more.
+        """Pictures of the measured instants; None where they cannot be found any more.
 
         Raises
         ------
         DataError
-            The recording is there and cannot be read.
+            The recording exists and cannot be read.
         """
         if self.session is not None:
             return of_session(self.session, self.strain)
@@ -155,7 +124,7 @@ class RunFolder(Closing):
 
     @property
     def _crop(self) -> Crop | None:
-        """The part of the pictures that was measured; None for all of it, or where the file says what cannot be."""
+        """The part of the pictures that was measured; None for all of it, or where the file has no valid one."""
         crop = self.section("camera").get("crop")
         if not isinstance(crop, list) or [type(value) for value in crop] != [int] * 4:
             return None
@@ -164,12 +133,12 @@ class RunFolder(Closing):
 
     @property
     def specimen(self) -> SpecimenConfig:
-        """Section and axis of the load, as stored; what is not stored is not known.
+        """Section and axis of the load, as stored; keys that are not stored have their defaults.
 
         Raises
         ------
         DataError
-            The file says what cannot be.
+            The file holds an impossible value.
         """
         known = {field.name for field in fields(SpecimenConfig)}
         stored = {key: value for key, value in self.section("specimen").items() if key in known}
@@ -193,7 +162,7 @@ class RunFolder(Closing):
 
     @cached_property
     def load_axis(self) -> LoadAxis:
-        """The axis of the load, as it was given or as the means tell it."""
+        """The axis of the load, as given or as found from the means."""
         exx, eyy, exy = (np.asarray(self.strain.values[name], np.float64) for name in ("exx", "eyy", "exy"))
         return load_axis(exx, eyy, exy, self.specimen.axis)
 
@@ -216,13 +185,9 @@ class RunFolder(Closing):
         tracks = {}
         for name in names:
             value, sigma = (np.asarray(values[column], np.float64) for column in gauge_columns(name))
-            said = described.get(name)
-            known = (
-                {key: item for key, item in said.items() if item is not None}
-                if isinstance(said, dict)
-                else {}
-            )
-            tracks[name] = GaugeTrack(value, sigma, known)
+            stored = described.get(name)
+            keys = stored.items() if isinstance(stored, dict) else ()
+            tracks[name] = GaugeTrack(value, sigma, {key: item for key, item in keys if item is not None})
         return tracks
 
     @property
@@ -268,14 +233,14 @@ class RunFolder(Closing):
 
     @property
     def curve(self) -> Curve:
-        """Stress over axial strain, to be evaluated; force (N) where the section is not known."""
+        """Stress over axial strain, for evaluation; force (N) where the section is not known."""
         load = self.force_one_zero if self.stress is None else self.stress
         times = np.asarray(self.strain.time_s, np.float64)
         return Curve(times, self.axial_strain, load, self.transverse_strain)
 
     @cached_property
     def events(self) -> list[Event]:
-        """What was recorded of events, without the one a burst; empty without a recording."""
+        """The recorded events without MEASURED, which comes with every burst; empty without a recording."""
         if self.session is None:
             return []
         return [event for event in self.session.events() if event.kind is not EventKind.MEASURED]
@@ -303,24 +268,51 @@ def open_run(path: str | os.PathLike[str]) -> RunFolder:
     DataError
         There is no ``strain.h5``, or it cannot be read.
     """
-    place = Path(path)
-    file = place / STRAIN if place.is_dir() else place
+    path = Path(path)
+    file = path / STRAIN if path.is_dir() else path
     if not file.exists():
-        raise DataError(f"{place}: no {STRAIN} there; give the folder that phasedic run or replay wrote")
+        raise DataError(f"{path}: no {STRAIN} there; give the folder that phasedic run or replay wrote")
     return RunFolder(file.parent, Strain.open(file))
 
 
+def read_field(strain: Strain, row: int) -> StrainField:
+    """The field of ``row``; covariances that the stored sigmas do not give are 0.
+
+    Raises
+    ------
+    DataError
+        There is no such row, or it cannot be read.
+    """
+    maps = {name: np.asarray(strain.maps(name, row), np.float64) for name in ("u", "v", *_GRADIENTS)}
+    sigmas = {name: np.asarray(strain.maps(f"sigma_{name}", row), np.float64) for name in maps}
+    status, residual = strain.maps("status", row), strain.maps("residual", row)
+    field = StrainField.from_values(strain.grid, maps, sigmas, status=status, residual=residual)
+    covariance = np.array(field.covariance)
+    shear = np.asarray(strain.maps("sigma_exy", row), np.float64)
+    both = sigmas["du_dy"] ** 2 + sigmas["dv_dx"] ** 2
+    covariance[PAIR_INDEX[_DU_DY, _DV_DX]] = (4 * shear**2 - both) / 2
+    measure = cast(Measure, strain.strain_measure)
+    return replace(field, covariance=covariance, measure=measure, window=_window(strain))
+
+
+def _window(strain: Strain) -> Window:
+    """The window of the ZOIs, on which the correlation of neighbours depends; gaussian where it is not recorded."""
+    measure = strain.config.get("measure")
+    name = measure.get("window") if isinstance(measure, dict) else None
+    return cast(Window, name) if name in WINDOWS else "gaussian"
+
+
 def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
-    """Add the ``[gauges.NAME]`` of a TOML file to ``run``, as long as it is open; its files stay as they are.
+    """Add the ``[gauges.NAME]`` of a TOML file to ``run`` while it is open; its files stay as they are.
 
     Values are those that a replay with this file would give, and so are the uncertainties of extensometers and single
-    ZOIs. That of a mean over an area is of the overlap of the windows alone, which is low on dense grids (by 6 % at a
-    step of a quarter of a ZOI, by a third at most). One of a name that is there already takes its place.
+    ZOIs. That of a mean over an area includes only the overlap of the windows, which is low on dense grids (by 6 % at a
+    step of a quarter of a ZOI, by a third at most). A gauge replaces an existing one of the same name.
 
     Raises
     ------
     ConfigError
-        The file cannot be read, says nothing of gauges, or no ZOI lies where one is.
+        The file cannot be read, holds no gauge, or no ZOI lies at a gauge.
     DataError
         The maps cannot be read.
     """
@@ -333,7 +325,7 @@ def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
     strain.config["gauges"] = {**stored, **config.gauges}
     for k, gauge in enumerate(gauges):
         strain.values |= dict(zip(gauge_columns(gauge.name), (values[:, k], sigmas[:, k]), strict=True))
-    run.__dict__.pop("gauges", None)  # worked out anew when it is asked for
+    run.__dict__.pop("gauges", None)  # the cached value is out of date
     return tuple(gauge.name for gauge in gauges)
 
 

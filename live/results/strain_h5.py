@@ -1,7 +1,7 @@
 """``strain.h5``: the strain maps of a test, crash-safe and readable by NeXus viewers.
 
-Every dataset and attribute is made before SWMR mode is switched on, and rows are flushed soon: after a kill those are
-there (open with ``swmr=True``, as ``Strain.open`` does).
+Every dataset and attribute is made before SWMR mode is switched on, and rows are flushed soon: after a kill they are
+in the file (open it with ``swmr=True``, as ``Strain.open`` does).
 """
 
 from __future__ import annotations
@@ -16,25 +16,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import DataError
-from acquire.hdf5 import FlushTimer, PictureStack, RowTable, let_go
+from acquire.hdf5 import FlushTimer, PictureStack, RowTable, abandon_file
 from analysis.evaluate import load_axis
 from live.results import layout
-from live.results.row import FORMAT, FORMAT_VERSION, STRAINS, StrainRow, gauge_columns
+from live.results.quantities import quantity_of
+from live.results.row import STRAINS, StrainRow, gauge_columns
 
 if TYPE_CHECKING:
     from analysis.field import ZoiGrid
     from live.results.row import ResultsInfo
 
 FLUSH_S = 0.25  # a row of a live test waits for its flush no longer than this
-_UNITS = {"time_s": "s", "force_N": "N", "noise_GL": "GL", "duration_s": "s", "u_px": "px", "v_px": "px"}
-_UNITS |= {
-    "stress_Pa": "Pa",
-    "true_stress_Pa": "Pa",
-    "force_raw_N": "N",
-    "zero_N": "N",
-    "latency_s": "s",
-    "kernel_s": "s",
-}
 _WORDS = {
     "u": "displacement along x (right)",
     "v": "displacement along y (down)",
@@ -62,7 +54,7 @@ class StrainWriter:
     flush_s : float, s
         A row waits for its flush no longer than this.
     now : callable
-        Gives seconds; paces the flushes.
+        Gives seconds; times the flushes.
 
     Raises
     ------
@@ -81,7 +73,7 @@ class StrainWriter:
     ) -> None:
         self._path, self.failed, self._axis = path, False, info.axis
         self._flushed = 0  # rows
-        self._pace = FlushTimer(flush_s, now)
+        self._timer = FlushTimer(flush_s, now)
         self._file = self._guard(lambda: _create(path, grid, info))
         entry = self._file["entry"]
         self._maps = {n: PictureStack(entry["strain"][n]) for n in layout.MAPS}
@@ -90,7 +82,7 @@ class StrainWriter:
     def write(self, row: StrainRow) -> None:
         """Append one row."""
         self._guard(lambda: self._append(row))
-        self._pace.wrote()
+        self._timer.wrote()
         self.flush_when_due()
 
     def flush_when_due(self) -> float:
@@ -101,18 +93,18 @@ class StrainWriter:
         float, s
             Time after which this must be called again if no row comes; infinite where none waits.
         """
-        if self._pace.left_s() == 0:
+        if self._timer.left_s() == 0:
             self._guard(self._flush)
-        return self._pace.left_s()
+        return self._timer.left_s()
 
     def close(self) -> None:
-        """Close the file; after a failed write it is let go as it stands on the disk."""
+        """Close the file; after a failed write, leave it as it is on the disk."""
         if self.failed:
-            let_go(self._file)
+            abandon_file(self._file)
         else:
             self._guard(self._flush)
-            self._guard(self._show_last)
-            self._guard(self._tell_axis)
+            self._guard(self._write_default_slice)
+            self._guard(self._write_axis)
             self._guard(self._file.close)
 
     def _append(self, row: StrainRow) -> None:
@@ -122,29 +114,29 @@ class StrainWriter:
         self._values.hold(values)
 
     def _flush(self) -> None:
-        self._pace.began()
+        self._timer.began()
         self._values.write()
         self._file.flush()
-        self._pace.done()
+        self._timer.done()
         self._flushed = self._values.length
 
-    def _show_last(self) -> None:
-        """Viewers begin with the last instant; a file that was never closed says the first."""
+    def _write_default_slice(self) -> None:
+        """Viewers begin with the last instant; with the first, where the file was never closed."""
         shown = _slice_of(max(self._values.length - 1, 0))
         self._file["entry/strain"].attrs.modify("default_slice", shown)
 
-    def _tell_axis(self) -> None:
-        """The axis of the load, and the angle from it to the largest strain, as all means tell them."""
+    def _write_axis(self) -> None:
+        """The axis of the load, and the angle from it to the largest strain, found from all means."""
         mean = self._file["entry/mean"]
         exx, eyy, exy = (np.asarray(mean[name], np.float64) for name in STRAINS)
         load = load_axis(exx, eyy, exy, self._axis)
         mean.attrs.modify("load_axis", np.array(load.axis, "S1"))
-        mean.attrs.modify("load_angle_deg", np.float64(math.degrees(load.off.value)))
+        mean.attrs.modify("load_angle_deg", np.float64(math.degrees(load.angle.value)))
 
     def _guard(self, action: Callable[[], Any]) -> Any:
         try:
             return action()
-        except (OSError, RuntimeError) as error:  # HDF5 tells of a full disk by a RuntimeError
+        except (OSError, RuntimeError) as error:  # HDF5 reports a full disk as a RuntimeError
             self.failed = True
             raise self._trouble(error) from error
 
@@ -167,8 +159,8 @@ def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
     file.attrs.update(
         NX_class="NXroot",
         default="entry",
-        format=FORMAT,
-        format_version=FORMAT_VERSION,
+        format=layout.FORMAT,
+        format_version=layout.FORMAT_VERSION,
         creator="phasedic",
         start_time=info.start_utc,
     )
@@ -187,7 +179,7 @@ def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
 
 
 def _slice_of(row: int) -> Any:
-    """Which of the maps is shown first, as NeXus says it: of fixed length, so that it can be changed in place."""
+    """The map that viewers show first (NeXus default_slice), of fixed length: it is changed in place."""
     return np.array([str(row), ".", "."], "S12")
 
 
@@ -205,7 +197,7 @@ def _add_mean(entry: Any, info: ResultsInfo) -> None:
     for name in _value_names(info):
         kind = layout.column_declared(name).dtype
         dataset = mean.create_dataset(name, (0,), kind, maxshape=(None,), chunks=(256,), fletcher32=True)
-        dataset.attrs["units"] = _UNITS.get(name, "")
+        dataset.attrs["units"] = quantity_of(name).unit
         if name in STRAINS:
             dataset.attrs["uncertainties"] = f"sigma_{name}"
     for name in STRAINS:
@@ -216,7 +208,7 @@ def _add_mean(entry: Any, info: ResultsInfo) -> None:
 
 
 def _add_gauges(entry: Any, info: ResultsInfo) -> None:
-    """The columns of the virtual gauges by their names, and what each of them is."""
+    """The columns of the virtual gauges by their names, with the description of each."""
     if not info.gauges:
         return
     first = next(iter(info.gauges))

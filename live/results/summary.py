@@ -1,7 +1,4 @@
-"""The short summary at the end of a run: what was measured, how well, and where it lies.
-
-The status card of the view: where the test stands, in a few lines of Markdown.
-"""
+"""The figures of a run as text: the summary at its end, and the status card of the view while it runs."""
 
 from __future__ import annotations
 
@@ -18,6 +15,8 @@ from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import Snapshot
 from live.results.figures import alignment_line, elastic_lines, evaluate, figure_lines, lag_line, tare_line
 
+_CARD_EVERY_S = 1.0  # of the test
+
 
 def noise_line(history: History) -> str:
     """The noise of the picture and of the strain, typical of the run."""
@@ -32,7 +31,7 @@ def noise_line(history: History) -> str:
 
 
 def latency_lines(history: History) -> list[str]:
-    """How late the results were; nothing in a replay."""
+    """The latency of the results; nothing in a replay."""
     late = history.column("latency_s") * 1e3
     if not np.isfinite(late).any():
         return []
@@ -43,14 +42,14 @@ def latency_lines(history: History) -> list[str]:
 
 
 def why_nothing(run_state: RunState) -> str:
-    """Why no ZOI has a value, in a sentence."""
+    """Why no ZOI has a value, in one sentence."""
     time_steps, troubles = run_state.history.time_steps, run_state.event_log.events("warning", "error")
     if time_steps:
-        return f"nothing was measured: no ZOI has a value ({time_steps[-1].refused or 'none was asked for'})"
+        return f"nothing was measured: no ZOI has a value ({time_steps[-1].refused or 'no ZOI is active'})"
     if troubles:
         return f"nothing was measured: {brief(troubles[-1].text)}"
     grabbed = run_state.frame_counts.grabbed
-    return f"nothing was measured: {grabbed} frames gave no burst after the reference; take shorter ones"
+    return f"nothing was measured: {grabbed} frames gave no burst after the reference; take shorter bursts"
 
 
 def summary_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
@@ -84,25 +83,22 @@ def file_lines(folder: Path) -> list[str]:
     ]
 
 
-EVERY_S = 1.0  # of the test
-
-
 class StatusCard:
-    """Writes the card anew once a second of the test."""
+    """The card in Markdown, renewed once a second of the test."""
 
     def __init__(self, specimen: SpecimenConfig, loads: LoadLog) -> None:
         self._specimen, self._loads = specimen, loads
         self._last = -math.inf
 
     def is_due(self, now: float) -> bool:
-        """Whether the last card is old at ``now`` (s, monotonic); then the next is not, for a while."""
-        if now - self._last < EVERY_S:
+        """Whether a second has passed at ``now`` (s, monotonic) since this last returned True."""
+        if now - self._last < _CARD_EVERY_S:
             return False
         self._last = now
         return True
 
     def written(self, snapshot: Snapshot, history: History) -> str:
-        """The card, from the last instant and the figures of all of ``history``."""
+        """The card: the last measurement, and the figures of all of ``history``."""
         return "\n\n".join(self._lines(snapshot, history))
 
     def _lines(self, snapshot: Snapshot, history: History) -> list[str]:

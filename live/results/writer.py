@@ -1,10 +1,7 @@
-"""What a test gives: one row a measurement in ``strain.h5`` and ``strain.csv``.
+"""Writes the results: one row a measurement in ``strain.h5`` and ``strain.csv``, as a consumer of the run.
 
-The force of a measurement must be final when it comes here (``live.pipeline.measurement.ForceMatching``). Recording,
-drawing and reporting are not done here; ``Strain`` (``reader``) reads the file back. The format is
-described in docs/strain-format.md.
-
-The results as a consumer: every measurement, in order, once its force is final.
+A measurement is written once its force is final (``live.pipeline.measurement.ForceMatching``), in order.
+``Strain`` (``reader``) reads the file back. docs/strain-format.md describes the format.
 """
 
 from __future__ import annotations
@@ -26,7 +23,6 @@ from live.results.strain_h5 import FLUSH_S, StrainWriter
 
 if TYPE_CHECKING:
     from analysis.field import ZoiGrid
-    from live.pipeline.measurement import Measurement
 
 
 class Results(Closing):
@@ -35,11 +31,11 @@ class Results(Closing):
     Parameters
     ----------
     folder : Path
-        Made where it does not exist; files in it are never overwritten.
+        Created where it does not exist; files in it are never overwritten.
     grid : ZoiGrid
     info : ResultsInfo
     flush_s : float, s
-        A row waits no longer than this to be readable by others, and safe from a kill.
+        After this time at most, others can read a row, and a kill does not lose it.
 
     Raises
     ------
@@ -81,7 +77,7 @@ class Results(Closing):
         self.written += 1
 
     def flush_when_due(self) -> float:
-        """Bring rows that have waited long enough to the file, as ``add`` does too; raises as that.
+        """Flush rows that have waited ``flush_s``, as ``add`` does too; raises as ``add``.
 
         Returns
         -------
@@ -101,29 +97,29 @@ class Results(Closing):
             self._h5.close()
 
 
-SELDOM_S = 10.0  # a row may wait for its flush where nobody would have it from a broken run
+DEFERRED_FLUSH_S = 10.0  # in a replay, which can be run again
 
 
-class Files(Consumer):
-    """Writes ``results``; a disk with bad moments holds the measurement up only when ``room`` of them wait.
+class ResultsConsumer(Consumer):
+    """Writes ``results``; a slow disk delays the measurement only when the queue is full.
 
-    Then nothing is lost: bursts are skipped, and counted, as with any slow measurement.
+    Then no result is lost: bursts are skipped, and counted, as with any slow measurement.
     """
 
     name = "results"
     policy = Policy.WAIT
-    room = 64
-    vital = True
+    queue_size = 64
+    critical = True
 
     def __init__(self, results: Results) -> None:
         self._results = results
 
-    def settled(self, measurement: Measurement) -> None:
+    def matched(self, measurement: Measurement) -> None:
         """Write one row."""
         self._results.add(measurement)
 
     def idle(self) -> float:
-        """A row that is not flushed must not wait for one that does not come."""
+        """Flush the last rows, also where no further one comes."""
         return self._results.flush_when_due()
 
     def end(self) -> str:
@@ -133,7 +129,7 @@ class Files(Consumer):
 
 
 def write_results(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
-    """The results alone.
+    """The consumers of a run that writes its results and shows nothing.
 
     Raises
     ------
@@ -154,4 +150,8 @@ def write_results(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
         axis=config.specimen.axis,
         lagged=config.load.lag_s != 0,
     )
-    return [Files(Results(about.folder, about.grid, info, SELDOM_S if about.aside else FLUSH_S))]
+    return [
+        ResultsConsumer(
+            Results(about.folder, about.grid, info, DEFERRED_FLUSH_S if about.deferred else FLUSH_S)
+        )
+    ]

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from types import FrameType
 
 from acquire.errors import ConfigError, Interrupted
-from acquire.held_back import handled, held_back, let_through
+from acquire.signal_mask import blocked_signals, signal_handler, unblock_signals
 
 log = logging.getLogger(__name__)
 _POLL_S = 0.25
@@ -58,7 +58,7 @@ def compile_ahead(
     began = time.monotonic()
     words = [",".join(kinds), "phase" if phase else "-"]
     commands = [[sys.executable, "-m", __name__, part, *words] for part in COMPILE_PARTS]
-    with held_back(signal.SIGINT):
+    with blocked_signals(signal.SIGINT):
         processes = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]
     try:
         with _interruptions() as interrupted:
@@ -98,14 +98,14 @@ def _interruptions() -> Iterator[threading.Event]:
         if callable(handler):
             handler(number, frame)
 
-    with handled(handle, *before):
+    with signal_handler(handle, *before):
         yield interrupted
 
 
 def main(part: str, kinds: str, phase: str) -> int:
     """One of the compiling processes; returns the exit code."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # end without a message
-    let_through(signal.SIGINT)
+    unblock_signals(signal.SIGINT)
     from acquire import burst, hdf5
     from analysis import COMPILE_PARTS, warm_up
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from acquire.errors import ConfigError
 from live.config.loading import Config
 from live.config.values import AUTO
-from live.pipeline.reference import usable
+from live.pipeline.reference import numerics_error
 
 if TYPE_CHECKING:
     from analysis import KernelSettings, ZoiGrid
@@ -67,4 +67,4 @@ def kernel_settings(config: Config) -> KernelSettings:
             bending_px=m.bending_px,
         )
     except ValueError as error:
-        raise usable(error, "measure") from None
+        raise numerics_error(error, "measure") from None

@@ -18,7 +18,7 @@ from live.config.loading import Config
 from live.pipeline.measure import NewReference, measure
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, prepare
-from live.pipeline.warm_up import kinds_of
+from live.pipeline.warm_up import picture_kinds
 from live.setup.compiling import compile_ahead
 from live.setup.grid import grid_for, kernel_settings
 from live.setup.pictures import correction
@@ -66,7 +66,7 @@ class MeasurePlan:
     def compile(self, camera: CameraInfo, say: Callable[[str], object], stopped: Callable[[], bool]) -> float:
         """Compile what is not compiled yet (``compile_ahead``); returns the seconds that took."""
         phase = self.settings.estimator == "phase"
-        return compile_ahead(kinds_of(camera), phase=phase, say=say, stopped=stopped)
+        return compile_ahead(picture_kinds(camera), phase=phase, say=say, stopped=stopped)
 
     def on(self, reference: Burst, what: str = "the reference") -> PreparedKernel:
         """The kernel on ``reference``, named ``what`` in errors; raises as ``live.pipeline.reference.prepare``."""

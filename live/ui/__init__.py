@@ -1,1 +1,1 @@
-"""What a person sees: ``terminal``, ``rerun`` (maps and curves) and ``web`` (the operator's page)."""
+"""The outputs for a person: ``terminal``, ``rerun`` (maps and curves) and ``web`` (the operator's page)."""

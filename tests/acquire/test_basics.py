@@ -1,11 +1,4 @@
-"""The two clocks, and the text between them.
-
-One closing for all devices and files.
-
-OpenCV's limits hold only where ``load_cv2`` is the first to import it.
-
-What ``import acquire`` gives, and what it does not load.
-"""
+"""What all of ``acquire`` uses: clocks, texts, closing, OpenCV's limits, and imports that stay light."""
 
 from __future__ import annotations
 
@@ -73,7 +66,7 @@ def test_what_cannot_be_closed_cannot_be_made() -> None:
 
 ROOT = Path(__file__).parents[2]
 READERS = {
-    "images": "from acquire.opencv import read_image as read",
+    "images": "from acquire.opencv.images import read_image as read",
     "dark and flat frames": "from acquire.burst import load_mean as read",
 }
 # Something else comes first: the renderer of the simulated specimen, which needs OpenCV too.

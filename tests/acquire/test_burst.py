@@ -159,10 +159,6 @@ def waves(
     return np.rint(image).astype(np.uint16)
 
 
-def frame_smear(image: NDArray[Any], index: int) -> Frame:
-    return Frame(frozen(image), index, index / 10, "device", 0, 12, index / 10)
-
-
 @pytest.mark.parametrize(("u", "v"), [(0.05, 0.0), (0.0, -0.05), (0.03, 0.04), (0.2, 0.1), (-0.5, 0.0)])
 def test_a_known_motion_is_told_well_enough(u: float, v: float) -> None:
     motion = motion_between_frames(waves(), waves(u, v), 0.3)
@@ -199,9 +195,9 @@ def test_tiny_pictures_tell_nothing(shape: tuple[int, int]) -> None:
 
 
 def test_a_burst_tells_its_motion_over_the_whole_of_its_frames() -> None:
-    burst = burst_of([frame_smear(waves(u=0.02 * k), k) for k in range(4)])
+    burst = burst_of([frame(waves(u=0.02 * k), k, bits=12) for k in range(4)])
     assert burst.motion_px == pytest.approx(0.08, rel=0.15)
-    assert math.isnan(burst_of([frame_smear(waves(), 0)]).motion_px)
+    assert math.isnan(burst_of([frame(waves(), 0, bits=12)]).motion_px)
 
 
 def burst(mean: np.ndarray) -> Burst:

@@ -1,9 +1,4 @@
-"""Room on a disk, how long it lasts, and whether it is a disk at all.
-
-Pictures handed to HDF5 as finished chunks: the same bytes that the library would have written.
-
-What is written is brought to its disk once a second; a disk that fails is told.
-"""
+"""Files on their disk: free space, network shares, pictures as finished chunks, and bringing them to the disk."""
 
 from __future__ import annotations
 
@@ -21,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.hdf5 import PictureReader, PictureStack, ToDisk, compile_loops
+from acquire.hdf5 import DiskSync, PictureReader, PictureStack, compile_loops
 from acquire.hdf5 import disk as pace_module
 from acquire.hdf5.disk import forecast, free_bytes, network_share
 from tests.acquire.session.fixtures import frame, writer
@@ -200,7 +195,7 @@ def test_it_is_brought_again_and_again_and_at_the_end(
 
     monkeypatch.setattr(os, "fdatasync", bring)
     path.write_bytes(b"1")
-    to_disk = ToDisk(path, every_s=0.02)
+    to_disk = DiskSync(path, every_s=0.02)
     until(lambda: len(brought) > 2)
     path.write_bytes(b"1234")
     to_disk.close()
@@ -217,7 +212,7 @@ def test_the_memory_of_what_was_brought_is_let_go_but_for_the_end(
     path.write_bytes(bytes(3_000_000))
     monkeypatch.setattr(pace_module, "KEPT_BYTES", 1_000_000)
     monkeypatch.setattr(os, "posix_fadvise", lambda file, start, size, advice: given.append((start, size)))
-    ToDisk(path).close()
+    DiskSync(path).close()
     assert given == [(0, 2_000_000)]
 
 
@@ -228,7 +223,7 @@ def test_a_disk_that_fails_ends_the_recording_and_one_that_cannot_is_let_be(
     def refuse(file: int) -> None:
         raise OSError(code, os.strerror(code))
 
-    monkeypatch.setattr(ToDisk.__init__, "__defaults__", (0.01,))
+    monkeypatch.setattr(DiskSync.__init__, "__defaults__", (0.01,))
     session = writer(tmp_path / "session.h5")
     monkeypatch.setattr(os, "fdatasync", refuse)
 

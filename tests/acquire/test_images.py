@@ -15,7 +15,7 @@ from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event
 from acquire.opencv import images
 from acquire.opencv.image_metadata import count_pages
-from acquire.opencv.images import MOST_TOLD, natural_key, read_image
+from acquire.opencv.images import MAX_REPORTED, natural_key, read_image
 
 
 def picture(value: int = 0, shape: tuple[int, ...] = (12, 16), dtype: type = np.uint8) -> NDArray[Any]:
@@ -120,7 +120,7 @@ def test_a_folder_of_rubbish_is_not_told_picture_by_picture(tmp_path: Path) -> N
     told: list[Event] = []
     with open_camera(f"files:{tmp_path}/*.png", told.append) as camera:
         assert sum(frame.damaged for frame in camera) == 50
-    assert len(told) == MOST_TOLD + 1
+    assert len(told) == MAX_REPORTED + 1
     assert told[-1].text == "50 pictures were left out in all"
 
 

@@ -1,9 +1,4 @@
-"""The ten-second check of a load cell: what it sees, and what it warns of.
-
-Calibrating with known loads: the line, its residual, its file, and its use in an address.
-
-Noise apart from movement: what is still and what is not.
-"""
+"""The check of a load cell, its calibration with known loads, and noise apart from movement."""
 
 from __future__ import annotations
 
@@ -26,7 +21,7 @@ from acquire.load_cell.check import report as report_heard
 from acquire.load_cell.contract import NoLoadCell
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.serial_line.settings import read_settings
-from tests.acquire.serial_line.fake_port import Bench
+from tests.acquire.serial_line.fake_port import FakeLine
 
 INFO = LoadCellInfo("/dev/ttyUSB0", "a cell", "ascii", capacity_N=500.0)
 
@@ -173,17 +168,17 @@ def test_the_file_comes_back_and_is_never_overwritten(tmp_path: Path) -> None:
 def test_an_address_uses_it(tmp_path: Path) -> None:
     path = tmp_path / "cal.toml"
     save(fit(POINTS, NOW), path, "")
-    bench = Bench([b"x\r\n", b"1100\r\n"], address=f"/dev/fake?calibration={path}")
-    assert [s.force for s in bench.run()] == pytest.approx([50.0, 50.0][:1], abs=0.11)
-    stored = bench.cell.info.settings["calibration"]
+    line = FakeLine([b"x\r\n", b"1100\r\n"], address=f"/dev/fake?calibration={path}")
+    assert [s.force for s in line.run()] == pytest.approx([50.0, 50.0][:1], abs=0.11)
+    stored = line.cell.info.settings["calibration"]
     assert stored["date"].startswith("2026-05-09") and len(stored["points"]) == 3
 
 
 def test_a_calibration_carries_the_sign(tmp_path: Path) -> None:
     path = tmp_path / "cal.toml"
     save(fit([Point(0, 0.0, 0, 1), Point(10, -20.0, 0, 1)], NOW), path, "")
-    bench = Bench([b"x\r\n", b"-20 N\r\n"], address=f"/dev/fake?protocol=mark10&calibration={path}")
-    assert [s.force for s in bench.run()] == pytest.approx([10.0])
+    line = FakeLine([b"x\r\n", b"-20 N\r\n"], address=f"/dev/fake?protocol=mark10&calibration={path}")
+    assert [s.force for s in line.run()] == pytest.approx([10.0])
     with pytest.raises(ConfigError, match="leave out sign"):
         read_settings(parse_address(f"/dev/fake?sign=-1&calibration={path}"))
 

@@ -18,7 +18,7 @@ from live.config.gauges import gauges_for
 from live.config.loading import load_config
 from live.pipeline.history import History
 from live.run.outcome import Outcome
-from live.ui.terminal.status_line import gauge_words
+from live.ui.terminal.status_line import gauge_texts
 from tests.live.made_up import make_grid, make_measurement
 from tests.live.test_end_to_end import live_run
 
@@ -89,7 +89,7 @@ def test_a_replay_is_bit_equal_and_takes_other_gauges(recorded: tuple[Path, Outc
 def test_the_status_line_shows_gauges() -> None:
     found = make_measurement(0).time_step
     gauges = {"axial": GaugeValue(1.234e-3, 3e-6), "hole": GaugeValue(float("nan"), float("nan"), "lost")}
-    words = gauge_words(replace(found, gauges=gauges))
+    words = gauge_texts(replace(found, gauges=gauges))
     assert words == ["axial +1234 +- 3", "hole lost"]
 
 

@@ -22,8 +22,7 @@ from acquire.errors import DataError
 from acquire.load_sample import LoadSample
 from live.results.export.atomic_file import new_file, new_folder
 from live.results.export.job import Job
-from live.results.quantities import Display, quantity_of
-from live.results.reader import Strain, dataset, mean_name
+from live.results.quantities import mean_name, quantity_of
 from live.results.run_folder import RunFolder
 
 FIRST = ("time_s", "force_N", "stress_Pa", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy")
@@ -178,25 +177,6 @@ def write_mat(job: Job, path: Path) -> None:
             raise DataError(
                 f"{path}: too large for this format ({error}); give --from and --until, or --to npz"
             ) from error
-
-
-def to_xarray(strain: Strain, display: Display | None = None, fields: tuple[str, ...] | None = None) -> Any:
-    """The maps and means as an ``xarray.Dataset`` with coordinates ``time``, ``y``, ``x`` and units.
-
-    Parameters
-    ----------
-    strain : Strain
-    display : Display, optional
-        Units and axes; without, as they are stored (px, y down).
-    fields : tuple of str, optional
-        Maps; all without.
-
-    Raises
-    ------
-    ConfigError
-        xarray is not installed.
-    """
-    return dataset(strain, display or Display(), fields)
 
 
 def _small(job: Job) -> dict[str, NDArray[Any]]:

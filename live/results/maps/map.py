@@ -25,7 +25,7 @@ from live.results.maps.scale import AutoRange, ColourScale, kind_of
 from live.results.reader import Strain
 
 DISPLACEMENTS = ("u", "v")
-MOST_MEDIAN, MOST_STEPS = 51, 100
+MAX_MEDIAN, MAX_STEPS = 51, 100
 FORMATS = (".png", ".jpg")
 
 
@@ -61,12 +61,12 @@ class MapRequest:
     def check(self, grid: ZoiGrid) -> None:
         """Raises ConfigError where a number is impossible, or beyond what makes sense on ``grid``."""
         extent = max(grid.shape) * grid.step
-        limit, low_pass, odd = self.limit, self.low_pass_px, self.median in range(1, MOST_MEDIAN + 1, 2)
+        limit, low_pass, odd = self.limit, self.low_pass_px, self.median in range(1, MAX_MEDIAN + 1, 2)
         for what, value, well, allowed in (
             ("limit", limit, limit is None or 0 < limit < math.inf, "a number above 0"),
-            ("median", self.median, odd, f"an odd number from 1 to {MOST_MEDIAN}"),
+            ("median", self.median, odd, f"an odd number from 1 to {MAX_MEDIAN}"),
             ("low-pass", low_pass, 0 <= low_pass <= extent, f"0 to {extent} px, the extent of the grid"),
-            ("deconvolution", self.deconvolution, 0 <= self.deconvolution <= MOST_STEPS, f"0 to {MOST_STEPS} steps"),
+            ("deconvolution", self.deconvolution, 0 <= self.deconvolution <= MAX_STEPS, f"0 to {MAX_STEPS} steps"),
         ):  # fmt: skip
             if not well:
                 raise ConfigError(f"a {what} of {value} is not possible; allowed: {allowed}")

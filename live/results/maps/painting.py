@@ -54,12 +54,12 @@ class Levels:
         return np.asarray(np.clip(np.rint(scaled), 0, 255), np.uint8)
 
 
-def lay_cells(
+def overlay_cells(
     picture: Image, zoom: float, grid: ZoiGrid, cells: Image, moved: tuple[float, float] = (0.0, 0.0)
 ) -> None:
     """Lay RGBA ``cells`` (R, C, 4) of ``grid`` over a BGR ``picture``, in place, all moved by (x, y) px alike.
 
-    For pictures that are shown while a test runs: a hundred times quicker than ``lay_quads``.
+    For pictures that are shown while a test runs: a hundred times quicker than ``overlay_quads``.
     """
     half = grid.step / 2
     across, down = (m if math.isfinite(m) else 0.0 for m in moved)
@@ -73,7 +73,7 @@ def lay_cells(
     picture[rows, columns] = _mixed(picture[rows, columns], part[..., 2::-1], part[..., 3:])
 
 
-def lay_quads(picture: Image, cells: Image, corners: NDArray[np.float64]) -> Image:
+def overlay_quads(picture: Image, cells: Image, corners: NDArray[np.float64]) -> Image:
     """RGBA ``cells`` (R, C, 4) over a BGR ``picture``, a new image; ``corners`` (R, C, 4, 2) of each, px of it."""
     cv2 = load_cv2()
     painted, alpha = picture.copy(), np.zeros(picture.shape[:2], np.uint8)
@@ -144,7 +144,7 @@ class Painter:
         """
         values = self._strain.maps(self._name, row) if values is None else values
         cells = status_colours(values) if self._scale is None else self._scale.colours(values)
-        return lay_quads(base, cells, self._corners(row if moved else None))
+        return overlay_quads(base, cells, self._corners(row if moved else None))
 
     def framed(self, image: Image, title: Sequence[str], row: int, *, axes: bool = False) -> Image:
         """With lines of words above, the colour bar or the legend on the right, and px along the edges."""

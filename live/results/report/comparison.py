@@ -1,4 +1,4 @@
-"""Several tests in one report: their curves, and mean and scatter of what they tell."""
+"""Several tests in one report: their curves, and mean and scatter of their figures."""
 
 from __future__ import annotations
 
@@ -11,17 +11,16 @@ import numpy as np
 
 from acquire.errors import ConfigError, DataError
 from analysis.evaluate import CONFIDENCE
-from live.results.figures import TensileRow, headline, quantity
+from live.results.figures import TensileRow, headline, value_text
 from live.results.report.curves import load_unit, strain_unit
 from live.results.report.evaluation import EvaluatedCurve
 from live.results.report.page import Html, element, joined, page, paragraph, safe, section, table
 from live.results.report.report import Report, plots
-from live.results.report.svg import Plot
-from live.results.report.svg import PlotLine as Line
+from live.results.report.svg import Plot, PlotLine
 from live.results.run_folder import RunFolder
 
-_FEWEST = 2
-_ROOM = 50  # letters above the curves; numbers stand for longer names
+_MIN_RUNS = 2
+_MAX_LABELS = 50  # letters above the curves; longer names are replaced by numbers
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +42,7 @@ def tests_of(runs: Sequence[RunFolder]) -> list[ComparedTest]:
     DataError
         One holds no measurement.
     """
-    if len(runs) < _FEWEST:
+    if len(runs) < _MIN_RUNS:
         raise ConfigError("--compare needs at least two runs")
     for run in runs:
         if not run.strain.n:
@@ -58,24 +57,24 @@ def tests_of(runs: Sequence[RunFolder]) -> list[ComparedTest]:
 
 
 def _rows(tests: Sequence[ComparedTest]) -> list[tuple[TensileRow, ...]]:
-    """Of each figure the rows of all tests."""
+    """For each figure, the rows of all tests."""
     found = (headline(test.curve.figures, stresses=test.curve.is_stress) for test in tests)
     return list(zip(*found, strict=True))
 
 
 def summary(values: Sequence[float]) -> tuple[float, float, int]:
-    """Mean, standard deviation (n - 1) and number of those that are known."""
+    """Mean, standard deviation (n - 1) and number of the values that are known."""
     known = [value for value in values if math.isfinite(value)]
     mean = float(np.mean(known)) if known else math.nan
     return mean, float(np.std(known, ddof=1)) if len(known) > 1 else math.nan, len(known)
 
 
 def compare(tests: Sequence[ComparedTest]) -> Report:
-    """The page; the curves over one pair of axes, and the table."""
+    """The report: the curves in one plot, and the table."""
     figures = (_together(tests),)
     words = (
-        "E, nu and the strengths of each test as its own report has them, with half of the interval"
-        f" ({CONFIDENCE:.0%}); mean and scatter are those between tests."
+        "E, nu and the strengths of each test, as in its own report, with half of the interval"
+        f" ({CONFIDENCE:.0%}); mean and standard deviation are over the tests."
     )
     parts = [
         element("h1", f"Comparison of {len(tests)} tests"),
@@ -99,7 +98,7 @@ def write_table(tests: Sequence[ComparedTest], file: TextIO) -> None:
 
 
 def _quoted(words: str) -> str:
-    """A field of a CSV; no program takes it for a formula."""
+    """A field of a CSV that no spreadsheet reads as a formula."""
     plain = words.lstrip("=+-@\t ") or "-"
     return '"' + plain.replace('"', '""') + '"'
 
@@ -108,10 +107,10 @@ def _together(tests: Sequence[ComparedTest]) -> Plot:
     e = strain_unit(*(test.curve.axial for test in tests))
     load = load_unit(max((test.curve for test in tests), key=lambda c: np.nanmax(c.load, initial=0.0)))
     names = [test.title for test in tests]
-    if sum(len(name) for name in names) > _ROOM:
+    if sum(len(name) for name in names) > _MAX_LABELS:
         names = [str(k + 1) for k in range(len(tests))]
     lines = tuple(
-        Line(names[k], test.curve.axial * e.factor, test.curve.load * load.factor, colour=k)
+        PlotLine(names[k], test.curve.axial * e.factor, test.curve.load * load.factor, colour=k)
         for k, test in enumerate(tests)
     )
     what = "stress" if tests[0].curve.is_stress else "force"
@@ -134,10 +133,10 @@ def _table(tests: Sequence[ComparedTest]) -> Html:
 
 
 def _cell(row: TensileRow) -> Html:
-    """Value and half of the interval in the unit of the column; where it is not known, the reason when pointed at."""
+    """Value and half of the interval in the unit of the column; where it is not known, the reason as a tooltip."""
     if not row.figure.known:
         return element("span", "not known", title=row.figure.why)
-    return safe(quantity(row.figure.value, row.half, "").replace("+-", "±"))
+    return safe(value_text(row.figure.value, row.half, "").replace("+-", "±"))
 
 
 def _number(value: float) -> str:

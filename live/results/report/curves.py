@@ -1,4 +1,4 @@
-"""The curves of a report as figures."""
+"""The plots of a report."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ import math
 import numpy as np
 
 from live.results.maps.colours import Unit, unit_for
-from live.results.report.evaluation import EvaluatedCurve as TestCurve
+from live.results.report.evaluation import EvaluatedCurve
 from live.results.report.svg import COLOURS, Array, Mark, Plot, PlotLine
 from live.results.run_folder import RunFolder
 
 _NAMES = ("exx", "eyy", "exy")
 
 
-def load_unit(curve: TestCurve) -> Unit:
-    """In which stresses (MPa) or forces (N or kN) are shown."""
+def load_unit(curve: EvaluatedCurve) -> Unit:
+    """The unit of the load axis: MPa of stresses, N or kN of forces."""
     if curve.is_stress:
         return Unit("MPa", 1e-6)
     return force_unit(curve.load)
@@ -28,12 +28,12 @@ def force_unit(force: Array) -> Unit:
 
 
 def strain_unit(*strains: Array) -> Unit:
-    """% or µm/m."""
+    """% or µm/m, from the largest of ``strains``."""
     values = [np.abs(e[np.isfinite(e)]) for e in strains]
     return unit_for(max((float(v.max()) for v in values if v.size), default=0.0))
 
 
-def stress_strain(curve: TestCurve) -> Plot:
+def stress_strain(curve: EvaluatedCurve) -> Plot:
     """Stress (or force) over axial strain with the line of E and the construction of Rp0.2."""
     e, load, figures = strain_unit(curve.axial), load_unit(curve), curve.figures
     curves = [PlotLine("measured", curve.axial * e.factor, curve.load * load.factor)]
@@ -54,14 +54,14 @@ def stress_strain(curve: TestCurve) -> Plot:
     )
 
 
-def _straight(curve: TestCurve, label: str, offset: float, e: Unit, load: Unit) -> PlotLine:
+def _straight(curve: EvaluatedCurve, label: str, offset: float, e: Unit, load: Unit) -> PlotLine:
     top = 1.05 * curve.figures.Rm.value
     y = np.array([0.0, top])
     x = offset + (y - curve.intercept) / curve.figures.E.value
     return PlotLine(label, x * e.factor, y * load.factor, colour=1 if not offset else 3, dashed=True)
 
 
-def means(run: RunFolder) -> Plot:
+def mean_strains(run: RunFolder) -> Plot:
     """Mean strains against time, each in a band of one standard uncertainty."""
     values, t = run.strain.values, run.strain.time_s
     found = [np.asarray(values[name], np.float64) for name in _NAMES]
@@ -75,7 +75,7 @@ def means(run: RunFolder) -> Plot:
     )
 
 
-def gauges(run: RunFolder) -> Plot | None:
+def gauge_strains(run: RunFolder) -> Plot | None:
     """Virtual gauges against time, each in a band of one standard uncertainty; None without any."""
     found = run.gauges
     if not found:
@@ -105,7 +105,7 @@ def force(run: RunFolder) -> Plot | None:
     return Plot("force-time", "Force", "time, s", f"force, {unit.name}", (curve,), x_range=time_range(run))
 
 
-def valid(run: RunFolder) -> Plot:
+def valid_share(run: RunFolder) -> Plot:
     """Share of ZOIs with a value against time."""
     values = run.strain.values
     share = 100.0 * np.asarray(values["n_valid"], np.float64) / np.maximum(values["n_zoi"], 1)
@@ -116,7 +116,7 @@ def valid(run: RunFolder) -> Plot:
 
 
 def time_range(run: RunFolder) -> tuple[float, float]:
-    """The same for all figures against time."""
+    """The time axis of all plots against time."""
     t = run.strain.time_s
     first, last = float(min(0.0, t[0])), float(t[-1])
     return (first, last) if last > first else (first, first + 1.0)

@@ -1,4 +1,4 @@
-"""What a finished run tells: tensile figures with their line, and the instants worth showing."""
+"""The evaluation of a finished run: its curve with the tensile figures, the lag of the load, the instants to show."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.evaluate import Figure, TensileFigures, Track, evaluate_test, find_lag
-from live.results.figures import options_of
+from live.results.figures import tensile_options
 from live.results.run_folder import RunFolder
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ class EvaluatedCurve:
     def of(cls, run: RunFolder) -> EvaluatedCurve:
         """The curve of ``run``."""
         measured, is_stress = run.curve, run.specimen.area_m2 is not None
-        figures = evaluate_test(measured, options_of(run.specimen))
+        figures = evaluate_test(measured, tensile_options(run.specimen))
         axial, load = measured.strain, measured.stress
         return cls(axial, run.transverse_strain, load, is_stress, figures, _intercept(axial, load, figures))
 
@@ -74,7 +74,7 @@ def _intercept(axial: Array, load: Array, figures: TensileFigures) -> float:
 
 
 def lag_of(run: RunFolder) -> Figure:
-    """How late the recorded load comes beside the frames, s, as the test itself tells it."""
+    """The lag of the recorded load behind the frames, s, found from the test itself."""
     samples = run.session.load_samples() if run.session is not None else []
     if not samples:
         return Figure.none("no readings of a load cell were recorded")
@@ -85,7 +85,7 @@ def lag_of(run: RunFolder) -> Figure:
 
 
 def time_steps(run: RunFolder, curve: EvaluatedCurve) -> dict[int, str]:
-    """Row -> what it is: first, elastic, yield, maximum, last; each row once, in order of time."""
+    """Row -> name: first, elastic, yield, highest force, last; each row once, in order of time."""
     found = {0: ["first"]}
 
     def add(row: int, words: str) -> None:

@@ -1,4 +1,4 @@
-"""Maps of a report: beside the picture of their instant, all of a name with one colour bar."""
+"""Maps of a report, each beside the picture of its instant; all maps of a name share one colour scale."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _STEPS = 16  # colours of the bar
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MapPictures:
-    """Pictures of the instants that are shown.
+    """Pictures of the instants in the report.
 
     Attributes
     ----------
@@ -34,7 +34,7 @@ class MapPictures:
         The same for all.
     size : (width, height), px
     camera : CameraInfo or None
-        What took them.
+        The camera that recorded them.
     """
 
     images: Mapping[int, NDArray[Any] | None]
@@ -43,13 +43,13 @@ class MapPictures:
     camera: CameraInfo | None = None
 
 
-def shots(run: RunFolder, rows: list[int]) -> MapPictures:
-    """Read the pictures; without them, plain grey as large as the ZOIs reach.
+def map_pictures(run: RunFolder, rows: list[int]) -> MapPictures:
+    """Read the pictures of ``rows``; where there are none, the painter uses plain grey of the extent of the ZOIs.
 
     Raises
     ------
     DataError
-        The recording is there and cannot be read.
+        The recording exists and cannot be read.
     """
     pictures = run.pictures
     if pictures is None:
@@ -62,15 +62,17 @@ def shots(run: RunFolder, rows: list[int]) -> MapPictures:
     return MapPictures(images, levels, (pictures.info.width, pictures.info.height), pictures.info)
 
 
-def maps(run: RunFolder, name: str, time_steps: Mapping[int, str], taken: MapPictures, longest: int) -> Html:
-    """One map at all instants beside its picture."""
+def maps(
+    run: RunFolder, name: str, time_steps: Mapping[int, str], pictures: MapPictures, longest: int
+) -> Html:
+    """One map at all instants, each beside its picture."""
     scale = ColourScale.of_run(run.strain, name, list(time_steps))
-    painter = Painter(run.strain, name, scale, taken.size, longest)
+    painter = Painter(run.strain, name, scale, pictures.size, longest)
     pairs = []
     for row, words in time_steps.items():
-        base = painter.picture(taken.images[row], taken.levels)
+        base = painter.picture(pictures.images[row], pictures.levels)
         beside = [_picture(painter.over(base, row), f"{name}, {words}")]
-        if taken.images[row] is not None:
+        if pictures.images[row] is not None:
             beside.insert(0, _picture(base, f"picture, {words}"))
         pairs.append(
             captioned(element("div", joined(beside, "")), f"{words}: {caption(run.strain, row)}", "pair")
@@ -78,7 +80,7 @@ def maps(run: RunFolder, name: str, time_steps: Mapping[int, str], taken: MapPic
     words = quantity_of(name).words
     bar = captioned(
         _bar(name, scale),
-        f"{words}; beyond the ends the colours stay; without colour there is no value",
+        f"{words}; values beyond the ends have the colour of the end; no colour: no value",
         "bar",
     )
     return joined(
@@ -86,10 +88,10 @@ def maps(run: RunFolder, name: str, time_steps: Mapping[int, str], taken: MapPic
     )
 
 
-def statuses(run: RunFolder, row: int, taken: MapPictures, longest: int) -> Html:
-    """Why ZOIs have no value at an instant: the map and the counts."""
-    painter = Painter(run.strain, "status", None, taken.size, longest)
-    base = painter.picture(taken.images.get(row), taken.levels)
+def statuses(run: RunFolder, row: int, pictures: MapPictures, longest: int) -> Html:
+    """The statuses of the ZOIs at an instant: the map, and how many have each."""
+    painter = Painter(run.strain, "status", None, pictures.size, longest)
+    base = painter.picture(pictures.images.get(row), pictures.levels)
     picture = _picture(painter.over(base, row), "status of each ZOI")
     lines = []
     for one in status_legend(run.strain.maps("status", row)[run.strain.grid.active]):

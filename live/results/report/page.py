@@ -1,6 +1,6 @@
-"""The page itself: one HTML file that asks nothing of anybody. All words are escaped here.
+"""The HTML of a report: one file that loads nothing else. All text is escaped here.
 
-A ``Html`` is markup that is already safe; strings are not, and every function escapes them.
+``Html`` is markup that is already safe; every function escapes plain strings.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from live.results.report.svg import STYLE
 
-# What a browser may do with the page: show its own styles and the pictures inside it, and nothing else.
+# A browser may only apply the page's own styles and show the pictures inside it.
 _POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'"
 
 _CSS = """
@@ -45,18 +45,18 @@ gap:.6rem 1.6rem}
 
 
 class Html(str):
-    """Markup that is safe to stand in the page."""
+    """Markup that needs no escaping."""
 
     __slots__ = ()
 
 
 def safe(words: object) -> Html:
-    """Words as markup; what is markup already stays."""
+    """Text as markup; markup stays as it is."""
     return words if isinstance(words, Html) else Html(html.escape(str(words)))
 
 
 def joined(parts: Iterable[Html], between: str = "\n") -> Html:
-    """Several parts in a row."""
+    """Parts one after the other."""
     return Html(html.escape(between).join(parts))
 
 
@@ -67,7 +67,7 @@ def element(name: str, inside: object, **attributes: str) -> Html:
 
 
 def section(title: str, *parts: Html) -> Html:
-    """A heading and what belongs to it; nothing where there is nothing."""
+    """A heading and its parts; empty where all parts are empty."""
     inside = joined(part for part in parts if part)
     return Html(f"<section>\n{element('h2', title)}\n{inside}\n</section>") if inside else Html("")
 
@@ -78,7 +78,7 @@ def paragraph(words: object, kind: str = "") -> Html:
 
 
 def facts(pairs: Mapping[str, object]) -> Html:
-    """Names and what they are, a line each."""
+    """A table of names and values."""
     rows = (f"<tr><th>{safe(name)}</th><td>{safe(value)}</td></tr>" for name, value in pairs.items())
     return Html(f'<div class="wide"><table>{"".join(rows)}</table></div>')
 
@@ -96,13 +96,13 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]], numbers: Seque
 
 
 def tiles(pairs: Mapping[str, str]) -> Html:
-    """The figures that are looked for first."""
+    """The main figures, a tile each."""
     found = (f'<div class="tile">{safe(name)}<b>{safe(value)}</b></div>' for name, value in pairs.items())
     return Html(f'<div class="tiles">{"".join(found)}</div>')
 
 
 def captioned(inside: Html, caption: str, kind: str = "") -> Html:
-    """A figure with words below it."""
+    """A figure with a caption."""
     return element(
         "figure", Html(f"{inside}{element('figcaption', caption)}"), **({"class_": kind} if kind else {})
     )

@@ -1,8 +1,8 @@
 """The reporting table of the Good Practices Guide for DIC, filled in from what was recorded.
 
 International Digital Image Correlation Society, A Good Practices Guide for Digital Image Correlation (2018),
-section on reporting requirements, doi:10.32720/idics/gpg.ed1. What nobody recorded is left open and marked;
-``--meta KEY=TEXT`` at the run fills it.
+section on reporting requirements, doi:10.32720/idics/gpg.ed1. What was not recorded is marked as open;
+``--meta KEY=TEXT`` at the run fills it in.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _MICRO = 1e6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PracticeValues:
-    """What the table is filled in from.
+    """The data for the table.
 
     Attributes
     ----------
@@ -59,28 +59,28 @@ def _open(item: str, key: str) -> Html:
 
 
 def _hardware(known: PracticeValues) -> list[tuple[str, str, str]]:
-    said, camera, scale = _said(known.run), known.camera, known.mm_per_px
+    meta, camera, scale = _metadata(known.run), known.camera, known.mm_per_px
     size = f"{camera.width} x {camera.height} px, {camera.bits} bits" if camera else ""
     view = f"{camera.width * scale:.4g} x {camera.height * scale:.4g} mm" if camera and scale else ""
     return [
-        ("Camera", "camera", camera.name if camera else said("camera")),
+        ("Camera", "camera", camera.name if camera else meta("camera")),
         ("Image resolution", "", size),
-        ("Lens", "lens", said("lens")),
-        ("Aperture", "aperture", said("aperture")),
-        ("Field of view", "field_of_view", view or said("field_of_view")),
-        ("Image scale", "scale", f"{scale:g} mm/px" if scale else said("scale")),
-        ("Stand-off distance", "standoff", said("standoff")),
+        ("Lens", "lens", meta("lens")),
+        ("Aperture", "aperture", meta("aperture")),
+        ("Field of view", "field_of_view", view or meta("field_of_view")),
+        ("Image scale", "scale", f"{scale:g} mm/px" if scale else meta("scale")),
+        ("Stand-off distance", "standoff", meta("standoff")),
         ("Stereo angle", "", "one camera, in-plane measurement"),
         ("Image acquisition rate", "", f"{camera.fps:g} frames/s" if camera and camera.fps else ""),
-        ("Exposure time", "exposure", _exposure(camera) or said("exposure")),
-        ("Lighting", "lighting", said("lighting")),
-        ("Patterning technique", "pattern", said("pattern")),
+        ("Exposure time", "exposure", _exposure(camera) or meta("exposure")),
+        ("Lighting", "lighting", meta("lighting")),
+        ("Patterning technique", "pattern", meta("pattern")),
         ("Pattern feature size", "", _feature(known)),
     ]
 
 
-def _said(run: RunFolder) -> Callable[[str], str]:
-    """What the operator gave as metadata, "" where nothing."""
+def _metadata(run: RunFolder) -> Callable[[str], str]:
+    """The metadata of the operator by key; "" where there is none."""
     lower = {str(k).lower().replace("-", "_"): str(v) for k, v in run.strain.metadata.items()}
     return lambda key: lower.get(key, "")
 
@@ -140,12 +140,12 @@ def _gaussian(window: str, size: int) -> str:
 
 def _bursts(run: RunFolder) -> str:
     frames = np.asarray(run.strain.values["n_frames"])
-    told = [e for e in _events(run) if e.get("n")]
-    reference = f"; reference {told[0]['n']}" if told else ""
+    references = [event for event in _reference_events(run) if event.get("n")]
+    reference = f"; reference {references[0]['n']}" if references else ""
     return f"{int(np.median(frames))}{reference}" if len(frames) else ""
 
 
-def _events(run: RunFolder) -> list[dict[str, object]]:
+def _reference_events(run: RunFolder) -> list[dict[str, object]]:
     return [dict(event.data) for event in run.events if event.kind is EventKind.REFERENCE]
 
 

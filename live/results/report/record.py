@@ -1,4 +1,4 @@
-"""What was kept of a run: gauges, times, ledger, events, definitions, versions, hashes."""
+"""Sections of the report from the record of a run: gauges, times, frame counts, events, versions, files."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
-from live.results.figures import interval, quantity
+from live.results.figures import figure_text, value_text
 from live.results.folder import versions
 from live.results.maps.colours import unit_for
 from live.results.quantities import MEANS, quantity_of
@@ -18,17 +18,17 @@ from live.results.report.evaluation import lag_of
 from live.results.report.page import Html, element, facts, joined, paragraph, table
 from live.results.run_folder import RunFolder
 
-_MOST_EVENTS = 3000
+_MAX_EVENTS = 3000
 _KINDS = (".h5", ".csv", ".json", ".png", ".tif")
 _FIGURES = (
     (
         "E",
         "Pa",
-        "slope of stress over axial strain by least squares, over the strains named under Figures of the test",
+        "slope of stress over axial strain by least squares, over the strains under Figures of the test",
     ),
-    ("EA", "N", "the same of force where the section is not known"),
+    ("EA", "N", "the same slope of force, where the section is not known"),
     ("nu", "1", "minus the slope of transverse over axial strain in the same part"),
-    ("Rp0.1, Rp0.2, Rp1", "Pa", "stress where the curve crosses the elastic line moved by so much strain"),
+    ("Rp0.1, Rp0.2, Rp1", "Pa", "stress where the curve crosses the elastic line, moved by this strain"),
     ("ReH, ReL", "Pa", "upper and lower yield strength, where there is a yield point"),
     ("Rm", "Pa", "highest stress: force over the undeformed section"),
     ("Agt, Ag", "1", "extension at Rm, total and plastic"),
@@ -37,16 +37,16 @@ _FIGURES = (
 
 
 def gauges(run: RunFolder) -> Html:
-    """The virtual gauges: what each is, how far it went, where it ended, and how often it was lost."""
+    """The virtual gauges: definition, largest and last strain, and how often each was lost."""
     rows = []
     for name, gauge in run.gauges.items():
         e = unit_for(_largest(gauge.value))
         known = np.isfinite(gauge.value)
-        last = quantity(gauge.value[-1] * e.factor, gauge.sigma[-1] * e.factor, e.name).replace("+-", "±")
+        last = value_text(gauge.value[-1] * e.factor, gauge.sigma[-1] * e.factor, e.name).replace("+-", "±")
         words = "; ".join(f"{key} {_plain(value)}" for key, value in gauge.described.items())
         largest = f"{_largest(gauge.value) * e.factor:.4g} {e.name}" if known.any() else "not known"
         rows.append((name, words or "not recorded", largest, last, int(np.count_nonzero(~known))))
-    heads = ("gauge", "what it is, px", "largest", "last ± sigma", "instants lost")
+    heads = ("gauge", "definition, px", "largest", "last ± sigma", "instants lost")
     return table(heads, rows, (2, 3, 4)) if rows else Html("")
 
 
@@ -62,16 +62,18 @@ def _plain(value: object) -> str:
 
 
 def times(run: RunFolder) -> Html:
-    """How late the load came beside the frames, and the results after them."""
+    """The lag of the load behind the frames, and the latency of the results."""
     lag = lag_of(run)
-    words = interval(lag, 1e-3, "ms").replace("+-", "±") if lag.known else f"not known: {lag.why}"
-    sign = f" ({CONFIDENCE:.0%} interval; positive: the load comes late)" if lag.known else ""
+    words = figure_text(lag, 1e-3, "ms").replace("+-", "±") if lag.known else f"not known: {lag.why}"
+    sign = f" ({CONFIDENCE:.0%} interval; positive: the load is late)" if lag.known else ""
     late = np.asarray(run.strain.values.get("latency_s", ()), np.float64) * 1e3
     late = late[np.isfinite(late)]
-    taken = run.section("load").get("lag_s")
+    corrected = run.section("load").get("lag_s")
     found = {
-        "lag of the load beside the frames": words + sign,
-        "lag taken off the force": f"{taken:g} s" if isinstance(taken, int | float) and taken else "none",
+        "lag of the load behind the frames": words + sign,
+        "lag corrected in the force": f"{corrected:g} s"
+        if isinstance(corrected, int | float) and corrected
+        else "none",
     }
     if late.size:
         p50, p95 = np.percentile(late, (50, 95))
@@ -80,13 +82,13 @@ def times(run: RunFolder) -> Html:
 
 
 def frame_counts(run: RunFolder) -> Html:
-    """The counts of frames."""
+    """The frame counts of the recording."""
     found = run.session.frame_counts if run.session is not None else None
-    return facts(found) if found else paragraph("No ledger was recorded.", "dim")
+    return facts(found) if found else paragraph("No frame counts were recorded.", "dim")
 
 
 def events(run: RunFolder) -> Html:
-    """All events; of more than 3000 the first."""
+    """The events, at most the first 3000."""
     found = run.events
     rows = [
         (
@@ -96,17 +98,17 @@ def events(run: RunFolder) -> Html:
             event.source,
             event.text,
         )
-        for event in found[:_MOST_EVENTS]
+        for event in found[:_MAX_EVENTS]
     ]
     if not rows:
         return paragraph("No events were recorded.", "dim")
     left = len(found) - len(rows)
     more = paragraph(f"{left} more events are in session.h5.", "warning") if left else Html("")
-    return joined([table(("time, s", "level", "kind", "who", "what"), rows, (0,)), more])
+    return joined([table(("time, s", "level", "kind", "source", "message"), rows, (0,)), more])
 
 
 def definitions(run: RunFolder) -> Html:
-    """What every number is."""
+    """The definition of every number."""
     names = ["x", "y", *run.strain.names, *(MEANS.get(name, name) for name in run.strain.values)]
     known = {q.name: q for q in map(quantity_of, names)}
     rows = [(q.name, q.unit or "1", q.words) for q in known.values()]
@@ -114,11 +116,11 @@ def definitions(run: RunFolder) -> Html:
         "x right, y down, from the centre of the first pixel; all maps lie on the reference picture. Strain"
         f" measure: {run.strain.strain_measure}. Strains are dimensionless in the files."
     )
-    return joined([paragraph(words), table(("", "unit", "what it is"), [*rows, *_FIGURES])])
+    return joined([paragraph(words), table(("", "unit", "definition"), [*rows, *_FIGURES])])
 
 
 def version_table(run: RunFolder) -> Html:
-    """Of the programs that measured, and of those that made the report."""
+    """Versions that measured, and versions that made the report."""
     then = {str(key): str(value) for key, value in run.strain.versions.items()}
     now = versions()
     rows = [(name, then.get(name, ""), now.get(name, "")) for name in {**then, **now}]
@@ -126,7 +128,7 @@ def version_table(run: RunFolder) -> Html:
 
 
 def hashes(run: RunFolder, screen: Screen) -> Html:
-    """The files of the run as they are on the disk, and the recording that was replayed."""
+    """The files of the run and the replayed recording, with their size and hash."""
     files = {path for path in run.path.iterdir() if path.suffix in _KINDS}
     session = run.session_path
     beside = [session] if session is not None and session.parent.resolve() != run.path.resolve() else []

@@ -1,4 +1,4 @@
-"""The report of one run: what was tested, how, what came out, how well, and from which files."""
+"""The report of one run: specimen, rig, figures, curves, maps, noise, and the files it comes from."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import numpy as np
 from acquire.errors import DataError
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
-from live.results.figures import axis_words, figure_lines, headline
+from live.results.figures import axis_text, figure_lines, headline
 from live.results.noise_floor import StillPhase, still_phase_of
 from live.results.report import curves
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
-from live.results.report.maps import MapPictures, maps, shots, statuses
+from live.results.report.maps import MapPictures, map_pictures, maps, statuses
 from live.results.report.page import (
     Html,
     captioned,
@@ -32,7 +32,7 @@ from live.results.report.record import definitions, events, frame_counts, gauges
 from live.results.report.svg import Plot, draw
 from live.results.run_folder import RunFolder
 
-MOST_BYTES = 5_000_000
+MAX_BYTES = 5_000_000
 _SIDES = (720, 480, 320, 200)  # px, of the pictures: smaller ones where the page would be too large
 
 
@@ -64,13 +64,13 @@ class Report:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Content:
-    """What is worked out once, whatever the size of the pictures."""
+    """What does not depend on the size of the pictures."""
 
     run: RunFolder
     curve: EvaluatedCurve
     figures: tuple[Plot, ...]
     time_steps: dict[int, str]
-    shots: MapPictures
+    pictures: MapPictures
     still: StillPhase
     files: Html
 
@@ -88,7 +88,7 @@ def make_report(run: RunFolder, wanted: ReportRequest, screen: Screen) -> Report
     content = _content(run, wanted, screen)
     for side in _SIDES:
         text = page(f"{run.title}: phasedic report", _parts(content, wanted, side))
-        if len(text.encode()) < MOST_BYTES:
+        if len(text.encode()) < MAX_BYTES:
             break
     return Report(text, content.figures)
 
@@ -98,32 +98,38 @@ def _content(run: RunFolder, wanted: ReportRequest, screen: Screen) -> _Content:
     chosen = nearest_rows(run, wanted.times) if wanted.times else time_steps(run, curve)
     still = still_phase_of(run.strain)
     return _Content(
-        run, curve, _figures(run, curve), chosen, shots(run, list(chosen)), still, hashes(run, screen)
+        run, curve, _figures(run, curve), chosen, map_pictures(run, list(chosen)), still, hashes(run, screen)
     )
 
 
 def _figures(run: RunFolder, curve: EvaluatedCurve) -> tuple[Plot, ...]:
     first = [curves.stress_strain(curve)] if curve.has_load else []
-    found = [*first, curves.force(run), curves.gauges(run), curves.means(run), curves.valid(run)]
+    found = [
+        *first,
+        curves.force(run),
+        curves.gauge_strains(run),
+        curves.mean_strains(run),
+        curves.valid_share(run),
+    ]
     return tuple(figure for figure in found if figure is not None)
 
 
 def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
-    run, taken, chosen = content.run, content.shots, content.time_steps
+    run, pictures, chosen = content.run, content.pictures, content.time_steps
     fields = wanted.fields or (run.axial,)
-    reference = next((image for image in taken.images.values() if image is not None), None)
-    known = PracticeValues(run, taken.camera, reference, content.still.floors, wanted.mm_per_px)
+    reference = next((image for image in pictures.images.values() if image is not None), None)
+    known = PracticeValues(run, pictures.camera, reference, content.still.floors, wanted.mm_per_px)
     return [
         _head(run, content.curve),
-        section("Specimen and rig", facts(_rig(run, taken))),
+        section("Specimen and rig", facts(_rig(run, pictures))),
         section("Curves", plots(content.figures), _about_curves(content.curve)),
         section("Figures of the test", *figure_table(run, content.curve)),
         section("Virtual gauges", gauges(run)),
         section("Lag and latency", times(run)),
-        section("Maps", *(maps(run, name, chosen, taken, side) for name in fields)),
+        section("Maps", *(maps(run, name, chosen, pictures, side) for name in fields)),
         section("Noise floor", *_noise_section(content)),
-        section("Status of the ZOIs", statuses(run, max(chosen), taken, min(side, 480))),
-        section("Ledger and events", frame_counts(run), events(run)),
+        section("Status of the ZOIs", statuses(run, max(chosen), pictures, min(side, 480))),
+        section("Frame counts and events", frame_counts(run), events(run)),
         section("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
         section("Definitions", definitions(run)),
         section("Versions and files", version_table(run), content.files),
@@ -133,7 +139,7 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
 def _head(run: RunFolder, curve: EvaluatedCurve) -> Html:
     now = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d %H:%M UTC")
     words = f"Test of {run.strain.start_utc}: {run.strain.n} measurements in {run.strain.time_s[-1]:.4g} s."
-    unfinished = "The results were not closed by their writer; all complete rows are here."
+    unfinished = "The results were not closed by their writer; the report has all complete rows."
     return joined(
         [
             element("h1", run.title),
@@ -145,7 +151,7 @@ def _head(run: RunFolder, curve: EvaluatedCurve) -> Html:
 
 
 def tensile(curve: EvaluatedCurve) -> dict[str, str]:
-    """E, nu and the strengths by name, each with its uncertainty; what the curve does not tell is left out."""
+    """E, nu and the strengths by name, each with its uncertainty; without those that are not known."""
     rows = headline(curve.figures, stresses=curve.is_stress)
     return {row.name: row.text.replace("+-", "±") for row in rows if row.figure.known}
 
@@ -160,16 +166,16 @@ def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
     return found
 
 
-def _rig(run: RunFolder, taken: MapPictures) -> dict[str, object]:
-    s, camera, grid = run.specimen, taken.camera, run.strain.grid
+def _rig(run: RunFolder, pictures: MapPictures) -> dict[str, object]:
+    s, camera, grid = run.specimen, pictures.camera, run.strain.grid
     found: dict[str, object] = {str(key): value for key, value in run.strain.metadata.items()}
     known = s.width_mm is not None and s.thickness_mm is not None
     found["section"] = (
         f"{s.width_mm:g} mm x {s.thickness_mm:g} mm" if known else "not known: forces, no stresses"
     )
     found["load along"] = f"{run.load_axis.axis} of the picture"
-    if known_angle := axis_words(run.load_axis):
-        found["direction of the load"] = known_angle
+    if direction := axis_text(run.load_axis):
+        found["direction of the load"] = direction
     if camera is not None:
         fps = f", {camera.fps:g} frames/s" if camera.fps else ""
         size = f"{camera.width} x {camera.height} px, {camera.bits} bits{fps}, clock: {camera.clock}"
@@ -188,7 +194,7 @@ def _rig(run: RunFolder, taken: MapPictures) -> dict[str, object]:
 
 
 def plots(figures: tuple[Plot, ...]) -> Html:
-    """Figures side by side as there is room."""
+    """Plots side by side, as many as the width allows."""
     found = [
         captioned(Html(draw(figure).replace("<svg ", '<svg class="plot" ', 1)), figure.title)
         for figure in figures
@@ -199,7 +205,7 @@ def plots(figures: tuple[Plot, ...]) -> Html:
 def _about_curves(curve: EvaluatedCurve) -> Html:
     if not curve.has_load:
         return paragraph("No force is known at any instant, so there is no stress-strain curve.", "dim")
-    words = "Bands are one standard uncertainty of the mean on either side."
+    words = "Bands: one standard uncertainty of the mean on either side."
     figures = curve.figures
     if not figures.E.known:
         words += f" E is not known: {figures.E.why}."
@@ -213,7 +219,7 @@ def _about_curves(curve: EvaluatedCurve) -> Html:
 
 
 def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
-    """All figures in words, how they were had, and which are not known and why."""
+    """The figures as text, how they were found, and why others are not known."""
     lines = figure_lines(curve.figures, run.specimen) if curve.has_load else []
     return [paragraph(line.strip().replace("+-", "±").replace("  ", ", ")) for line in lines]
 
@@ -222,8 +228,8 @@ def _noise_section(content: _Content) -> list[Html]:
     n = content.still.time_steps
     if not content.still.floors:
         words = (
-            "No still phase was found: fewer than two instants before anything moves. With the specimen at rest"
-            " for a few seconds at the start of a test the noise floor is measured there."
+            "No still phase was found: fewer than two instants before anything moves. Keep the specimen at rest"
+            " for a few seconds at the start of a test to measure the noise floor."
         )
         return [paragraph(words, "open")]
     rows = []
@@ -233,7 +239,7 @@ def _noise_section(content: _Content) -> list[Html]:
         rows.append((name, f"{noise.measured * factor:.3g}", f"{noise.predicted * factor:.3g}", unit, ratio))
     words = (
         f"Standard deviation of single ZOIs in the first {n} instants (to {content.run.strain.time_s[n - 1]:.4g} s),"
-        " in which nothing moves yet: displacements about a plane, strains about their mean. Predicted: from the"
-        " noise of the pictures, as every value's sigma."
+        " before anything moves: displacements about a plane, strains about their mean. Predicted: sigma of each"
+        " value, from the noise of the pictures."
     )
     return [paragraph(words), table(("", "measured", "predicted", "", "ratio"), rows, (1, 2, 4))]

@@ -1,6 +1,6 @@
-"""The files of a report: the page, its PDF, and each figure as SVG, PNG and the CSV behind it.
+"""The files of a report: the page, its PDF, and each figure as SVG, PNG and CSV.
 
-A browser without a window, where there is one: pages to PDF, figures to PNG.
+A headless browser makes PDF and PNG, where one is installed.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ _INSTALL = "`apt install chromium` on Debian"
 NO_BROWSER = (
     f"no browser was found (chromium, Chrome or Edge); print the page from yours, or install one: {_INSTALL}"
 )
-NO_PNG = f"no browser was found to make PNG of the figures; SVG and CSV are there ({_INSTALL} brings one)"
-_TIME_S = 120
+NO_PNG = f"no browser was found, so the figures are SVG and CSV without PNG ({_INSTALL} installs one)"
+_TIMEOUT_S = 120
 
 
 def find_browser() -> str | None:
-    """Its program, or None."""
+    """The path of a browser, or None."""
     return next((path for path in map(shutil.which, _NAMES) if path), None)
 
 
@@ -43,7 +43,7 @@ def to_pdf(page: Path, pdf: Path) -> None:
 
 
 def to_png(picture: Path, png: Path, width: int, height: int) -> None:
-    """A page or SVG as it looks in a window of this size, px; raises as ``_run``."""
+    """Render a page or SVG in a window of this size, px; raises as ``_run``."""
     _run(
         picture,
         png,
@@ -51,15 +51,15 @@ def to_png(picture: Path, png: Path, width: int, height: int) -> None:
     )
 
 
-def _run(page: Path, wanted: Path, arguments: list[str]) -> None:
-    """Let the browser make ``wanted`` of ``page``.
+def _run(page: Path, target: Path, arguments: list[str]) -> None:
+    """Make ``target`` from ``page`` with the browser.
 
     Raises
     ------
     ConfigError
         There is no browser.
     DataError
-        It made nothing.
+        It failed, or took too long.
     """
     browser = find_browser()
     if browser is None:
@@ -72,18 +72,16 @@ def _run(page: Path, wanted: Path, arguments: list[str]) -> None:
             done = subprocess.run(
                 [*plain, *arguments, page.resolve().as_uri()],
                 capture_output=True,
-                timeout=_TIME_S,
+                timeout=_TIMEOUT_S,
                 check=False,
             )
         except subprocess.TimeoutExpired:
             raise DataError(
-                f"{wanted}: {browser} did not finish within {_TIME_S} s; print the page from it"
+                f"{target}: {browser} did not finish within {_TIMEOUT_S} s; print the page from it"
             ) from None
-    if not wanted.exists():
+    if not target.exists():
         words = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
-        raise DataError(
-            f"{wanted}: {browser} made nothing of {page} ({' '.join(words)}); print the page from it"
-        )
+        raise DataError(f"{target}: {browser} failed on {page} ({' '.join(words)}); print the page from it")
 
 
 def save_page(report: Report, path: Path) -> None:
@@ -93,18 +91,18 @@ def save_page(report: Report, path: Path) -> None:
 
 
 def save_pdf(page: Path, path: Path) -> None:
-    """The page printed by a browser without a window; raises ConfigError where there is none."""
+    """The page printed by a headless browser; raises ConfigError where there is none."""
     with new_file(path) as part:
         to_pdf(page, part)
 
 
 def save_figures(figures: Sequence[Plot], folder: Path, screen: Screen) -> None:
-    """Each as SVG and CSV, and as PNG where there is a browser to make it; raises as ``new_folder``."""
+    """Each as SVG and CSV, and as PNG where a browser is installed; raises as ``new_folder``."""
     browser = find_browser()
     with new_folder(folder) as part:
         for figure in figures:
             svg = part / f"{figure.name}.svg"
-            svg.write_text(draw(figure, alone=True), encoding="utf-8")
+            svg.write_text(draw(figure, standalone=True), encoding="utf-8")
             (part / f"{figure.name}.csv").write_text(as_csv(figure), encoding="utf-8")
             if browser is not None:
                 to_png(svg, svg.with_suffix(".png"), WIDTH, HEIGHT)
@@ -113,7 +111,7 @@ def save_figures(figures: Sequence[Plot], folder: Path, screen: Screen) -> None:
 
 
 def as_csv(figure: Plot) -> str:
-    """The points of all curves, a line each: curve, x, y, and half the width of the band."""
+    """The points of all curves, one a line: curve, x, y, and half the width of the band."""
     lines = [f"# {figure.title}; x: {figure.x_label}; y: {figure.y_label}", "curve,x,y,sigma"]
     for curve in figure.curves:
         sigma = curve.sigma if curve.sigma is not None else np.full(len(curve.x), np.nan)

@@ -1,7 +1,7 @@
-"""Curves as SVG, written by ourselves: small, sharp in print, and in the colours of the page around them.
+"""Curves as SVG: small, sharp in print, and in the colours of the page around them.
 
-A ``Plot`` is plain data, so that the same curves can be saved as CSV. Colours are classes of the page's style
-sheet (light and dark); a figure on its own carries ``STYLE``.
+A ``Plot`` is plain data, so that its curves can be saved as CSV too. Colours are classes of the page's style
+sheet (light and dark); a file of its own holds ``STYLE``.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from live.results.maps.colours import number, ticks
 Array = NDArray[np.float64]
 WIDTH, HEIGHT = 580, 310
 _LEFT, _RIGHT, _TOP, _BOTTOM = 74, 14, 26, 46
-MOST_POINTS = 1600  # of a curve; more are thinned to the extremes of each stretch
+MAX_POINTS = 1600  # of a curve; a longer one is thinned to the extremes of each interval
 
 STYLE = """
 .axis{stroke:var(--line,#8a8f98);stroke-width:1;fill:none}
@@ -84,7 +84,7 @@ class Plot:
     curves : tuple of PlotLine
     marks : tuple of Mark
     x_range, y_range : (low, high) or None
-        Fixed, so that figures one above the other agree; else as far as the curves reach.
+        Fixed, so that several figures agree; else the extent of the curves.
     """
 
     name: str
@@ -109,10 +109,12 @@ class _Axes:
         return HEIGHT - _BOTTOM - (value - self.y[0]) / (self.y[1] - self.y[0]) * (HEIGHT - _TOP - _BOTTOM)
 
 
-def draw(figure: Plot, *, alone: bool = False) -> str:
-    """The figure as an ``svg`` element; ``alone``: as a file of its own."""
+def draw(figure: Plot, *, standalone: bool = False) -> str:
+    """The figure as an ``svg`` element, or as a file of its own (``standalone``)."""
     axes = _Axes(figure.x_range or _span(figure.curves, "x"), figure.y_range or _span(figure.curves, "y"))
-    style = f'<style>{STYLE}</style><rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>' if alone else ""
+    style = (
+        f'<style>{STYLE}</style><rect width="{WIDTH}" height="{HEIGHT}" fill="#fff"/>' if standalone else ""
+    )
     words = html.escape(f"{figure.title}: {figure.y_label} over {figure.x_label}")
     parts = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" aria-label="{words}">',
@@ -137,8 +139,8 @@ def _span(curves: Sequence[PlotLine], axis: str) -> tuple[float, float]:
     ]
     finite = np.concatenate([v[np.isfinite(v)] for v in values]) if values else np.zeros(0)
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 1.0)
-    room = 0.03 * (high - low) or 0.5 * abs(high) or 1.0
-    return low - room, high + room
+    margin = 0.03 * (high - low) or 0.5 * abs(high) or 1.0
+    return low - margin, high + margin
 
 
 def _frame(figure: Plot, axes: _Axes) -> Iterator[str]:
@@ -182,26 +184,26 @@ def _line(curve: PlotLine, axes: _Axes) -> Iterator[str]:
 
 
 def _follows(x: Array, y: Array) -> list[bool]:
-    """Whether the point before has a place too."""
+    """Whether the point before each is known too."""
     known = np.isfinite(x) & np.isfinite(y)
     return [False, *(bool(k) for k in known[:-1])]
 
 
 def _band(x: Array, low: Array, high: Array, colour: int) -> str:
     known = np.isfinite(x) & np.isfinite(low) & np.isfinite(high)
-    there = [f"{a:.1f},{b:.1f}" for a, b in zip(x[known], low[known], strict=True)]
+    forth = [f"{a:.1f},{b:.1f}" for a, b in zip(x[known], low[known], strict=True)]
     back = [f"{a:.1f},{b:.1f}" for a, b in zip(x[known][::-1], high[known][::-1], strict=True)]
-    return f'<polygon class="band f{colour}" points="{" ".join(there + back)}"/>' if there else ""
+    return f'<polygon class="band f{colour}" points="{" ".join(forth + back)}"/>' if forth else ""
 
 
 def _thinned(y: Array) -> NDArray[np.intp]:
-    """Indices that keep the extremes of each stretch, so that no spike is lost."""
+    """Indices that keep the extremes of each interval, so that no spike is lost."""
     n = len(y)
-    if n <= MOST_POINTS:
+    if n <= MAX_POINTS:
         return np.arange(n)
-    edges = np.linspace(0, n, MOST_POINTS // 2 + 1).astype(int)
+    edges = np.linspace(0, n, MAX_POINTS // 2 + 1).astype(int)
     filled = np.nan_to_num(y, nan=0.0)
-    found = {0, n - 1, *np.flatnonzero(~np.isfinite(y))[:MOST_POINTS].tolist()}
+    found = {0, n - 1, *np.flatnonzero(~np.isfinite(y))[:MAX_POINTS].tolist()}
     for a, b in pairwise(edges):
         found |= {a + int(np.argmin(filled[a:b])), a + int(np.argmax(filled[a:b]))}
     return np.array(sorted(found), np.intp)

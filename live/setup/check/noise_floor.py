@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from acquire.errors import DataError
 from acquire.frame import Burst
 from analysis.field import StrainField
-from analysis.quality.exposure import gauge_length, l10_strain
+from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.gauges import gauges_for
 from live.pipeline.reference import averaged, prepare
 from live.setup.check.sample import CheckSample

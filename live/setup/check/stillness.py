@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from analysis.field import Roi, StrainField
-from analysis.quality.exposure import Steadiness, steadiness
+from analysis.quality.steadiness import Steadiness, steadiness
 from live.pipeline.reference import averaged, prepare
 from live.setup.check.sample import CheckSample, around, moved
 from live.setup.pictures import correction

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.quality.exposure import Steadiness, aliased, mains_of
+from analysis.quality.steadiness import Steadiness, aliased, mains_of
 from live.setup.check.check_list import CheckFigures, median
 from live.setup.check.noise_floor import ZoiFloor
 from live.setup.check.sample import MIN_FRAMES

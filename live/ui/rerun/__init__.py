@@ -1,5 +1,6 @@
-"""The view in rerun, drawn by a process of its own.
+"""The view in rerun, drawn by a separate process.
 
-``consumer`` takes what a test gives, ``view`` and ``outbox`` make ``messages`` of it, ``supervisor`` keeps the
-process of ``live.ui.rerun.drawing`` alive. rerun is imported only there. ``playback`` shows a finished run.
+``consumer`` receives the data of a test, ``view`` and ``outbox`` turn them into ``messages``, ``supervisor`` starts
+the process ``live.ui.rerun.drawing`` and restarts it. Only that process imports rerun. ``playback`` shows a
+finished run.
 """

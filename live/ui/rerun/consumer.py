@@ -1,4 +1,4 @@
-"""The view and its status card as consumers."""
+"""The consumers that feed the view: maps and curves, the status card, the large figures."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from live.results.summary import StatusCard
 from live.ui.rerun.view import View
 
 CLOSE_S = 10.0
-"""For drawing what waits and closing the file at the end of a test."""
+"""At the end of a test: to draw what waits and to close the file."""
 
 IDLE_S = 0.5
-CARD_INSTANTS = 2000
-"""The figures of the card are of so many instants at most, evenly thinned; those of the summary of all."""
+CARD_TIME_STEPS = 2000
+"""The figures of the card use at most so many time steps, evenly thinned; those of the summary use all."""
 
 
 class RerunConsumer(Consumer):
-    """Shows everything. An offer is one append; the view's own thread and process do the rest."""
+    """Passes everything to the view. Each call is one append; the thread and process of the view do the rest."""
 
     name = "view"
     blocks = False
@@ -34,7 +34,7 @@ class RerunConsumer(Consumer):
         self._view, self._run_state = view, run_state
 
     def frame(self, frame: Frame) -> None:
-        """Offer a frame; a few a second are taken."""
+        """Offer a frame; the view accepts a few a second."""
         self._view.picture(frame)
 
     def measurement(self, measurement: Measurement) -> None:
@@ -43,9 +43,9 @@ class RerunConsumer(Consumer):
             raise DataError(self._view.failed)
         self._view.show(measurement)
 
-    def settled(self, measurement: Measurement) -> None:
+    def matched(self, measurement: Measurement) -> None:
         """Offer a point of the curve."""
-        axial, _ = measurement.time_step.axial(self._run_state.history.axis_by_now)
+        axial, _ = measurement.time_step.axial(self._run_state.history.current_axis)
         self._view.point(axial, measurement.force)
 
     def load(self, sample: LoadSample) -> None:
@@ -53,13 +53,13 @@ class RerunConsumer(Consumer):
         self._view.load(sample.t, sample.force)
 
     def event(self, event: Event) -> None:
-        """Offer an event, a device by its name."""
+        """Offer an event, with the name of its device."""
         self._view.event(
             replace(event, source=self._run_state.event_log.names.get(event.source, event.source))
         )
 
     def end(self) -> str:
-        """Let it draw what waits, and close it."""
+        """Draw what waits, and close the view."""
         self._view.close(CLOSE_S)
         if self._view.failed:
             raise DataError(self._view.failed)
@@ -67,16 +67,16 @@ class RerunConsumer(Consumer):
 
 
 class CardWriter(Consumer):
-    """Writes the status card of the view anew, once a second of the test, on a thread of its own."""
+    """Writes the status card of the view once a second of the test, in its own thread."""
 
     name = "status card"
 
     def __init__(self, view: View, card: StatusCard, run_state: RunState) -> None:
         self._view, self._card, self._run_state = view, card, run_state
-        self._time_steps: Thinned[TimeStep] = Thinned(CARD_INSTANTS)
+        self._time_steps: Thinned[TimeStep] = Thinned(CARD_TIME_STEPS)
 
     def measurement(self, measurement: Measurement) -> None:
-        """Keep its means, and write the card where the last one is old."""
+        """Keep the means; write the card when it is due."""
         self._time_steps.append(measurement.time_step)
         if self._card.is_due(measurement.t):
             history = History()
@@ -87,7 +87,7 @@ class CardWriter(Consumer):
 
 
 class FiguresWriter(Consumer):
-    """Shows the large figures of the view, with the newest load, alarms and state."""
+    """Shows the large figures with the newest load, alarms and state."""
 
     name = "figures"
 
@@ -96,15 +96,15 @@ class FiguresWriter(Consumer):
         self._last: TimeStep | None = None
 
     def measurement(self, measurement: Measurement) -> None:
-        """Show the newest."""
+        """Show the newest measurement."""
         self._last = measurement.time_step
         self._view.figures(self._run_state.snapshot(measurement.t, self._last))
 
     def event(self, event: Event) -> None:
-        """Wake up: the first one comes before the first frame."""
+        """Wake the thread: the first event comes before the first frame."""
 
     def idle(self) -> float:
-        """Show what has changed meanwhile, also before anything is measured."""
+        """Show the newest load and state, also before the first measurement."""
         health = self._run_state.health
         if health.state and not math.isnan(health.frame_t):
             self._view.figures(self._run_state.snapshot(health.frame_t, self._last))

@@ -1,14 +1,14 @@
-"""What a test gives, as messages to the process of its view, and back.
+"""The data of a test as messages to the process of its view, and back.
 
-What the view needs to know before the first picture.
+The first message has the settings of the view (``ViewSetup``) and where it is shown (``ViewTarget``).
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,26 +20,23 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.snapshot import Snapshot
 from live.ui.rerun.wire import Kind, Message, WireError
 
-if TYPE_CHECKING:
-    from analysis.field import ZoiGrid
-
 STRAINS = ("exx", "eyy", "exy")
 MAPS = (*STRAINS, "e1", "e2", "sigma", "residual", "status")
-"""What is shown as maps: strains, principal strains, sigma of the strain along the load, chi squared, status."""
+"""The maps: strains, principal strains, sigma of the axial strain, chi squared, status."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ViewSetup:
-    """What is shown, and how.
+    """Settings of the view.
 
     Attributes
     ----------
     title : str
         Name of the test, shown by the viewer.
     width, height : int, px
-        Of the camera's picture.
+        Of the picture of the camera.
     bits : int
-        Significant bits of a sample of it.
+        Significant bits of its samples.
     grid : ZoiGrid
     start_monotonic : float, s
         Zero of the timeline "time".
@@ -52,17 +49,17 @@ class ViewSetup:
     picture_hz : float, 1/s
         Pictures shown per second of the test, at most.
     finished : bool
-        A test of the past: all that is told is shown, kept for the slider of time, and every ZOI tells its values.
+        A finished test: everything is shown and kept for the time slider, and every ZOI has a label with its values.
     with_load : bool
         Whether there is a load to show.
     outlines : mapping of name to (((x, y), ...), ...), px
-        Lines drawn on the picture: gauges.
+        Lines of the gauges, drawn on the picture.
     gauges : sequence of str
-        Those whose strain is drawn over time.
+        Names of those whose strain is plotted over time.
     light : bool
-        For slow links: pictures and maps smaller and seldom.
+        For slow connections: smaller pictures, fewer maps.
     scale : "symmetric" | "automatic"
-        Colours of the maps about zero, or over the values there are.
+        Colour range of the maps: symmetric about zero, or that of the values.
     """
 
     title: str
@@ -85,30 +82,30 @@ class ViewSetup:
 
 Row = tuple[float, ...]
 
-MOST_PICTURE_BYTES = 8_000_000
-"""A larger picture is sent as every second (third ...) pixel of every second row.
+MAX_PICTURE_BYTES = 8_000_000
+"""Of a larger picture every second (third ...) pixel of every second row is sent.
 
-To slice 20 megapixels costs the test 0.7 ms, to send them whole 4 ms, to reduce them well 14 ms.
+For 20 megapixels, slicing takes 0.7 ms of the test, sending them whole 4 ms, and averaging 14 ms.
 """
 
 COLUMNS = {Kind.MEANS: 1 + 2 * len(STRAINS), Kind.LOADS: 2, Kind.POINTS: 2, Kind.GAUGE: 3}
-"""Numbers in a row: t and mean, sigma of each strain; t and N; strain and N; t and strain, sigma of a gauge."""
+"""Columns: t and mean, sigma of each strain; t and N; strain and N; t and strain, sigma of a gauge."""
 
 _NUMBERS = ("t", "axial", "sigma_axial", "force_N", "stress_Pa")
 
 
 @dataclass(frozen=True, slots=True)
-class Where:
-    """Where the view is to be shown.
+class ViewTarget:
+    """Where the view is shown.
 
     Attributes
     ----------
     port : int or None
-        Where viewers connect; the next free one is taken. None: no server.
+        Where viewers connect, or the next free one. None: no server.
     rrd : str or None
-        A file that is not there yet.
+        A new file. None: no file.
     recording : str
-        Identity of the test for the viewer.
+        Identifier of the test for the viewer.
     """
 
     port: int | None
@@ -118,7 +115,7 @@ class Where:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PictureMessage:
-    """A camera's picture as it was sent: (H, W) uint8 or uint16 with every ``step``-th pixel of the frame."""
+    """A received picture: (H, W) uint8 or uint16, every ``step``-th pixel of the frame."""
 
     image: NDArray[Any]
     bits: int
@@ -126,23 +123,21 @@ class PictureMessage:
     step: int
 
 
-def setup_message(setup: ViewSetup, where: Where) -> Message:
-    """The first message: what is shown, and where."""
-    names = ("title", "width", "height", "bits", "start_monotonic", "area_m2", "axis", "strain_range")
-    more = ("picture_hz", "finished", "with_load", "outlines", "gauges", "light", "scale")
-    meta = {name: getattr(setup, name) for name in (*names, *more)}
-    sinks = {"port": where.port, "rrd": where.rrd, "recording": where.recording}
-    return Message(Kind.SETUP, {**meta, **sinks, "grid": setup.grid.to_dict()}, {"active": setup.grid.active})
+def setup_message(setup: ViewSetup, target: ViewTarget) -> Message:
+    """The first message."""
+    meta = {one.name: getattr(setup, one.name) for one in fields(setup) if one.name != "grid"}
+    meta |= {"port": target.port, "rrd": target.rrd, "recording": target.recording}
+    return Message(Kind.SETUP, {**meta, "grid": setup.grid.to_dict()}, {"active": setup.grid.active})
 
 
-def setup_of(message: Message) -> tuple[ViewSetup, Where]:
-    """What ``setup_message`` was made of."""
+def setup_of(message: Message) -> tuple[ViewSetup, ViewTarget]:
+    """The content of ``setup_message``."""
     meta = dict(message.meta)
     try:
-        where = Where(*(meta.pop(name) for name in ("port", "rrd", "recording")))
-        return ViewSetup(grid=_grid(meta.pop("grid"), message), **meta), where
+        target = ViewTarget(*(meta.pop(name) for name in ("port", "rrd", "recording")))
+        return ViewSetup(grid=_grid(meta.pop("grid"), message), **meta), target
     except (KeyError, TypeError) as error:
-        raise WireError(f"the first message to the view lacks or has too much: {error}") from error
+        raise WireError(f"the first message to the view has missing or unknown entries: {error}") from error
 
 
 def row_of(measurement: Measurement) -> Row:
@@ -152,7 +147,7 @@ def row_of(measurement: Measurement) -> Row:
 
 
 def rows_message(kind: Kind, rows: Iterable[Row], name: str = "") -> Message:
-    """Means, loads, points of the curve, or the gauge called ``name``; ``COLUMNS`` says what is in a row."""
+    """Means, loads, points of the curve, or the gauge ``name``; columns as in ``COLUMNS``."""
     return Message(
         kind,
         {"name": name} if name else {},
@@ -161,7 +156,7 @@ def rows_message(kind: Kind, rows: Iterable[Row], name: str = "") -> Message:
 
 
 def rows_of(message: Message) -> list[Row]:
-    """What ``rows_message`` was made of."""
+    """The content of ``rows_message``."""
     rows = _array(message, "rows")
     if rows.ndim != 2 or rows.shape[1] != COLUMNS[message.kind]:
         raise WireError(f"a message {message.kind.name} to the view has rows {rows.shape}")
@@ -169,7 +164,7 @@ def rows_of(message: Message) -> list[Row]:
 
 
 def field_message(t: float, field: StrainField) -> Message:
-    """A strain field at ``t`` (s, monotonic): what the view draws of it, as it lies in memory."""
+    """What the view draws of a strain field at ``t`` (s, monotonic); the arrays are not copied."""
     arrays: dict[str, NDArray[Any]] = {
         "parameters": field.parameters, "covariance": field.covariance, "status": field.status,
         "active": field.grid.active, "residual": field.residual,
@@ -178,7 +173,7 @@ def field_message(t: float, field: StrainField) -> Message:
 
 
 def field_of(message: Message) -> tuple[float, StrainField]:
-    """Time and field; what the view does not draw of it is 0."""
+    """Time and field of ``field_message``; what the view does not draw is 0."""
     grid = _grid(message.meta.get("grid"), message)
     parameters, covariance, status = (_array(message, n) for n in ("parameters", "covariance", "status"))
     residual = _array(message, "residual")
@@ -201,14 +196,14 @@ def field_of(message: Message) -> tuple[float, StrainField]:
 
 
 def picture_message(frame: Frame) -> Message:
-    """A frame, thinned where it is very large."""
-    step = max(1, math.ceil(math.sqrt(frame.image.nbytes / MOST_PICTURE_BYTES)))
+    """A frame, thinned where it exceeds ``MAX_PICTURE_BYTES``."""
+    step = max(1, math.ceil(math.sqrt(frame.image.nbytes / MAX_PICTURE_BYTES)))
     image = frame.image if step == 1 else frame.image[::step, ::step]
     return Message(Kind.PICTURE, {"t": frame.t, "bits": frame.bits, "step": step}, {"image": image})
 
 
 def picture_of(message: Message) -> PictureMessage:
-    """What ``picture_message`` was made of."""
+    """The content of ``picture_message``."""
     image = _array(message, "image")
     if image.ndim != 2 or not image.size or image.dtype.kind != "u":
         raise WireError(f"a picture to the view is {image.shape} of {image.dtype}")
@@ -222,7 +217,7 @@ def events_message(events: Sequence[Event]) -> Message:
 
 
 def events_of(message: Message) -> list[Event]:
-    """What ``events_message`` was made of."""
+    """The content of ``events_message``."""
     try:
         return [
             Event(float(t), EventKind(kind), str(source), str(text), level)
@@ -233,13 +228,13 @@ def events_of(message: Message) -> list[Event]:
 
 
 def figures_message(snapshot: Snapshot) -> Message:
-    """What is shown large of ``snapshot``."""
+    """The large figures of ``snapshot``."""
     shown = {name: getattr(snapshot, name) for name in (*_NUMBERS, "valid", "zois", "state", "alarms")}
     return Message(Kind.FIGURES, {k: v for k, v in shown.items() if v == v})  # NaN is no JSON
 
 
 def figures_of(message: Message) -> Snapshot:
-    """What ``figures_message`` was made of, as far as it is shown large."""
+    """The large figures, as a snapshot without the rest."""
     meta = message.meta
     try:
         shown: dict[str, Any] = {name: float(meta.get(name, math.nan)) for name in _NUMBERS}
@@ -251,12 +246,12 @@ def figures_of(message: Message) -> Snapshot:
 
 
 def _measure(message: Message) -> Measure:
-    said = message.meta.get("measure")
-    known: tuple[Measure, ...] = get_args(Measure)
-    for measure in known:
-        if said == measure:
+    name = message.meta.get("measure")
+    measures: tuple[Measure, ...] = get_args(Measure)
+    for measure in measures:
+        if name == measure:
             return measure
-    raise WireError(f"a field to the view is of a measure of strain {said!r} that is not known")
+    raise WireError(f"a field to the view has an unknown measure of strain {name!r}")
 
 
 def _grid(description: Any, message: Message) -> ZoiGrid:

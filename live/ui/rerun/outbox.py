@@ -1,9 +1,7 @@
-"""What is sent next: the small things all and at once, of fields and pictures the newest, a few a second.
+"""What is sent to the process of the view: rows and events all and at once, the newest field and picture at a rate.
 
-What has come for the view and was not yet sent; everything bounded, what goes is counted.
-
-Filled by the threads of the test with one append each, emptied by the view's own. Rows are kept
-all, of fields and pictures the newest.
+The threads of the test append to ``Pending``; the thread of the view empties it through ``Outbox``. Everything is
+bounded; what is dropped is counted.
 """
 
 from __future__ import annotations
@@ -18,7 +16,7 @@ from live.pipeline.snapshot import Snapshot
 from live.ui.rerun.messages import (
     Row,
     ViewSetup,
-    Where,
+    ViewTarget,
     events_message,
     field_message,
     figures_message,
@@ -33,9 +31,15 @@ if TYPE_CHECKING:
     from acquire.frame import Frame
     from analysis.field import StrainField
 
-MOST_ROWS, MOST_EVENTS = 20_000, 1000
-PAST_ROWS = {Kind.MEANS: 5000, Kind.LOADS: 10_000, Kind.POINTS: 800}
-"""What is kept of each to be told again."""
+MAX_ROWS, MAX_EVENTS = 20_000, 1000
+HISTORY_ROWS = {Kind.MEANS: 5000, Kind.LOADS: 10_000, Kind.POINTS: 800}
+"""Rows kept of each kind for a restarted process."""
+
+FIELD_HZ = 10.0
+MAX_BYTES_S = 60e6
+"""Of fields, and of pictures, each; very large ones are sent less often."""
+
+MessageSource = Callable[[], Iterable[Message]]
 
 
 class Pending:
@@ -51,11 +55,11 @@ class Pending:
         Markdown.
     figures : Snapshot or None
     dropped : int
-        Rows and events that were too many.
+        Rows and events dropped because too many waited.
     """
 
     def __init__(self) -> None:
-        self.rows: dict[Kind, deque[Row]] = {kind: deque() for kind in PAST_ROWS}
+        self.rows: dict[Kind, deque[Row]] = {kind: deque() for kind in HISTORY_ROWS}
         self.events: deque[Event] = deque()
         self.field: tuple[float, StrainField] | None = None
         self.picture: Frame | None = None
@@ -64,27 +68,27 @@ class Pending:
         self.dropped = 0
 
     def row(self, kind: Kind, row: Row) -> None:
-        """Keep a row; of too many the oldest goes."""
-        self._keep(self.rows[kind], row, MOST_ROWS)
+        """Keep a row; the oldest is dropped where too many wait."""
+        self._keep(self.rows[kind], row, MAX_ROWS)
 
     def event(self, event: Event) -> None:
-        """Keep an event; of too many the oldest goes."""
-        self._keep(self.events, event, MOST_EVENTS)
+        """Keep an event; the oldest is dropped where too many wait."""
+        self._keep(self.events, event, MAX_EVENTS)
 
-    def _keep(self, kept: deque[Any], item: Any, most: int) -> None:
-        if len(kept) >= most:
-            kept.popleft()
+    def _keep(self, waiting: deque[Any], item: Any, limit: int) -> None:
+        if len(waiting) >= limit:
+            waiting.popleft()
             self.dropped += 1
-        kept.append(item)
+        waiting.append(item)
 
 
-def taken(kept: deque[Any]) -> list[Any]:
-    """All of it, which is then gone from there; another thread may append meanwhile."""
-    return [kept.popleft() for _ in range(len(kept))]
+def drained(waiting: deque[Any]) -> list[Any]:
+    """Remove and return all items; another thread may append meanwhile."""
+    return [waiting.popleft() for _ in range(len(waiting))]
 
 
 class PastMessages:
-    """What a process that is started anew must be told: rows thinned, the last events and the status.
+    """What a restarted process gets: thinned rows, the last events and the status.
 
     Attributes
     ----------
@@ -94,72 +98,66 @@ class PastMessages:
     """
 
     def __init__(self) -> None:
-        self.rows: dict[Kind, Thinned[Row]] = {kind: Thinned(most) for kind, most in PAST_ROWS.items()}
-        self.events: deque[Event] = deque(maxlen=MOST_EVENTS)
+        self.rows: dict[Kind, Thinned[Row]] = {kind: Thinned(limit) for kind, limit in HISTORY_ROWS.items()}
+        self.events: deque[Event] = deque(maxlen=MAX_EVENTS)
         self.status: str | None = None
 
 
-Story = Callable[[], Iterable[Message]]
-FIELD_HZ = 10.0
-MOST_BYTES_S = 60e6
-"""Of fields, and of pictures; very large ones are sent less often."""
-
-
 class Outbox:
-    """Makes messages of what waits, and keeps what a process that is started anew must be told.
+    """Makes messages of what waits, and keeps what a restarted process gets.
 
     Parameters
     ----------
     setup : ViewSetup
     pending : Pending
-    story : callable
-        Gives what else there is to tell, message by message and from the beginning, as fast as it is taken.
+    playback : callable
+        Gives further messages for each new process, from the beginning, one at a time.
 
     Attributes
     ----------
     sent : dict of Kind to int
-        Fields and pictures.
+        Numbers of fields and pictures sent.
     """
 
-    def __init__(self, setup: ViewSetup, pending: Pending, story: Story = lambda: ()) -> None:
+    def __init__(self, setup: ViewSetup, pending: Pending, playback: MessageSource = lambda: ()) -> None:
         self._setup, self._pending, self._past = setup, pending, PastMessages()
-        self._story = story
+        self._playback = playback
         self._first: Iterator[Message] = iter(())
         self._due_t = {Kind.FIELD: -math.inf, Kind.PICTURE: -math.inf}
         self._ending = False
         self.sent = dict.fromkeys(self._due_t, 0)
 
-    def begin(self, where: Where) -> None:
-        """A process was started: it must be told everything."""
-        self._first = self._all(where)
+    def begin(self, target: ViewTarget) -> None:
+        """A process was started: send everything."""
+        self._first = self._all(target)
 
     def end(self) -> None:
-        """Nothing comes any more: when all is sent, say so."""
+        """Send END after what waits."""
         self._ending = True
 
-    def _all(self, where: Where) -> Iterator[Message]:
-        yield setup_message(self._setup, where)
+    def _all(self, target: ViewTarget) -> Iterator[Message]:
+        yield setup_message(self._setup, target)
         for kind, rows in self._past.rows.items():
             yield rows_message(kind, rows.items())
         yield events_message(list(self._past.events))
         if self._past.status is not None:
             yield Message(Kind.STATUS, {"markdown": self._past.status})
-        yield from self._story()
+        yield from self._playback()
 
     def next(self, now: float) -> Message | None:
-        """What is to be sent at ``now`` (s, monotonic); None: nothing for the moment."""
+        """The message due at ``now`` (s, monotonic); None: nothing yet."""
         return next(self._first, None) or self._small() or self._large(now) or self._last()
 
     def _small(self) -> Message | None:
         pending, past = self._pending, self._past
-        for kind, kept in pending.rows.items():
-            if kept:
-                rows = taken(kept)
+        for kind, waiting in pending.rows.items():
+            if waiting:
+                rows = drained(waiting)
                 for row in rows:
                     past.rows[kind].append(row)
                 return rows_message(kind, rows)
         if pending.events:
-            events = taken(pending.events)
+            events = drained(pending.events)
             past.events.extend(events)
             return events_message(events)
         if pending.status is not None:
@@ -185,7 +183,7 @@ class Outbox:
 
     def _paced(self, message: Message, now: float, rate: float) -> Message:
         size = sum(array.nbytes for array in message.arrays.values())
-        period = max(1 / rate, size / MOST_BYTES_S)
+        period = max(1 / rate, size / MAX_BYTES_S)
         self._due_t[message.kind] = max(self._due_t[message.kind] + period, now + period / 2)
         self.sent[message.kind] += 1
         return message
@@ -193,6 +191,6 @@ class Outbox:
     def _last(self) -> Message | None:
         if not self._ending:
             return None
-        # Said once to each process.
+        # Once for each process.
         self._ending = False
         return Message(Kind.END)

@@ -1,6 +1,6 @@
-"""The view of a finished run: opened, told everything, and kept until a person has seen enough.
+"""Shows a finished run in the view, until a person ends it.
 
-What the view is told of a finished run: setup, curves, events, then picture and maps instant by instant.
+The view gets the curves and events first, then picture and maps time step by time step.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from analysis.evaluate import evaluate_test
 from live.config.gauges import outlines
 from live.config.loading import from_dict
 from live.pipeline.screen import Screen
-from live.results.figures import figure_lines, options_of
+from live.results.figures import figure_lines, tensile_options
 from live.results.run_folder import RunFolder
 from live.ui.rerun.messages import (
     STRAINS,
@@ -36,23 +36,24 @@ from live.ui.rerun.messages import (
 from live.ui.rerun.view import View, spawn_viewer
 from live.ui.rerun.wire import Kind, Message
 
-MOST_BYTES = 500e6
-"""Of pictures and maps, as they are drawn: the viewer keeps them all in memory."""
+MAX_BYTES = 500e6
+"""Of pictures and maps as drawn: the viewer keeps them all in memory."""
 
-_BYTES_PX, _BYTES_ZOI = 0.35, 250.0  # of a JPEG of speckle; of three maps and the values of a ZOI
-_LONGEST_PX = 1280  # larger pictures are drawn reduced
+_BYTES_PX, _BYTES_ZOI = 0.35, 250.0  # of a JPEG of speckle; of a ZOI in three maps, with its values
+_MAX_PX = 1280  # larger pictures are drawn reduced
+_POLL_S, _CLOSE_S = 0.1, 600.0
 
 
 @dataclass(frozen=True, slots=True)
 class ShowRequest:
-    """Which part of the run.
+    """The part of a run that is shown.
 
     Attributes
     ----------
     start_s, end_s : float or None, s
         Since the start of the test.
     every : int or None
-        One instant in so many; None: as many as the viewer can keep.
+        One time step in so many; None: as many as the viewer can keep.
     """
 
     start_s: float | None = None
@@ -60,47 +61,134 @@ class ShowRequest:
     every: int | None = None
 
 
-def chosen(run: RunFolder, asked: ShowRequest) -> tuple[int, ...]:
-    """Rows of the instants that are shown, the last of them always.
+def show(
+    run: RunFolder,
+    request: ShowRequest,
+    screen: Screen,
+    stop: threading.Event,
+    *,
+    port: int,
+    rrd: Path | None = None,
+) -> None:
+    """Show ``run`` until ``stop`` is set; with ``rrd`` into that file alone, until all is written.
+
+    Raises
+    ------
+    ConfigError, DataError
+        Nothing can be shown, a file cannot be read, or the view's process fails.
+    """
+    rows = selected_rows(run, request)
+    _report_selection(len(rows), run, screen)
+    played = _PlayedMessages(run, rows, screen)
+    view = View(
+        view_setup(run),
+        port=None if rrd else port,
+        rrd=rrd,
+        notify=lambda text, level: None if stop.is_set() else _notify(screen, text, level),
+        on_serving=lambda view: _announce(view, screen),
+        playback=played.messages,
+    )
+    try:
+        while not view.failed and not played.trouble and not (played.all if rrd else stop).wait(_POLL_S):
+            if stop.is_set():
+                break
+    finally:
+        view.close(_CLOSE_S if rrd and not stop.is_set() else 0.0)
+    if played.trouble or view.failed:
+        raise DataError(played.trouble or view.failed)
+
+
+class _PlayedMessages:
+    """The messages of a run, from the beginning for each process that is started.
+
+    Attributes
+    ----------
+    all : Event
+        Set once all were sent.
+    trouble : str
+        Why they ended early.
+    """
+
+    def __init__(self, run: RunFolder, rows: tuple[int, ...], screen: Screen) -> None:
+        self._run, self._rows, self._screen = run, rows, screen
+        self.all, self.trouble = threading.Event(), ""
+
+    def messages(self) -> Iterator[Message]:
+        try:
+            done = 0
+            for message in playback_messages(self._run, self._rows):
+                yield message
+                done += message.kind is Kind.FIELD
+                self._screen.status(f"instant {done} of {len(self._rows)}")
+        except PhasedicError as error:
+            self.trouble = str(error)
+        self.all.set()
+
+
+def _report_selection(shown: int, run: RunFolder, screen: Screen) -> None:
+    if shown < run.strain.n:
+        screen.say(f"{shown} of {run.strain.n} instants are shown; --from, --to and --every choose others")
+    if run.pictures is None:
+        screen.say("note: the pictures that were measured are not here any more; maps alone")
+
+
+def _notify(screen: Screen, text: str, level: Level) -> None:
+    screen.say(text if level == "info" else f"{level}: {text}")
+
+
+def _announce(view: View, screen: Screen) -> None:
+    """Open the viewer where there is a display; else print how to watch."""
+    if view.port is None:
+        return
+    if spawn_viewer(view.port, screen.say) is not None:
+        screen.say("the viewer opens in a window of its own; Ctrl-C here ends it")
+        return
+    screen.say("no viewer is opened here (no display); this shows it, Ctrl-C ends it:")
+    for line in view.instructions.splitlines():
+        screen.say(f"  {line}")
+
+
+def selected_rows(run: RunFolder, request: ShowRequest) -> tuple[int, ...]:
+    """Rows of the time steps that are shown, always with the last.
 
     Raises
     ------
     ConfigError
-        None is left.
+        No time step is in the range.
     DataError
-        The run holds none.
+        The run has no time step.
     """
     t = run.strain.time_s
     if not len(t):
         raise DataError(f"{run.strain.path}: holds no measurement, there is nothing to show")
-    low = -math.inf if asked.start_s is None else asked.start_s
-    high = math.inf if asked.end_s is None else asked.end_s
+    low = -math.inf if request.start_s is None else request.start_s
+    high = math.inf if request.end_s is None else request.end_s
     rows = np.flatnonzero((t >= low) & (t <= high))
     if not len(rows):
         raise ConfigError(
             f"--from, --to: no measurement between {low:g} and {high:g} s; they reach from {t[0]:.6g} to {t[-1]:.6g} s"
         )
-    every = asked.every or math.ceil(len(rows) * _bytes_each(run) / MOST_BYTES)
+    every = request.every or math.ceil(len(rows) * _bytes_each(run) / MAX_BYTES)
     return tuple(int(row) for row in rows[::-1][::every][::-1])
 
 
 def _bytes_each(run: RunFolder) -> float:
-    width, height = size_of(run)
-    reduced = max(1, math.ceil(max(width, height) / _LONGEST_PX))
+    width, height = picture_size(run)
+    reduced = max(1, math.ceil(max(width, height) / _MAX_PX))
     return _BYTES_PX * width * height / reduced**2 + _BYTES_ZOI * run.strain.grid.n_active
 
 
-def size_of(run: RunFolder) -> tuple[int, int]:
-    """Width and height of the pictures, px; without any, as far as the ZOIs reach."""
+def picture_size(run: RunFolder) -> tuple[int, int]:
+    """Width and height of the pictures, px; without pictures, those that the ZOIs need."""
     if run.pictures is not None:
         return run.pictures.info.width, run.pictures.info.height
     roi = run.strain.grid.roi
     return 2 * roi.x + roi.width, 2 * roi.y + roi.height
 
 
-def setup_of(run: RunFolder) -> ViewSetup:
-    """What is shown, and how."""
-    width, height = size_of(run)
+def view_setup(run: RunFolder) -> ViewSetup:
+    """Settings of the view for ``run``."""
+    width, height = picture_size(run)
     return ViewSetup(
         title=run.title,
         width=width,
@@ -118,7 +206,7 @@ def setup_of(run: RunFolder) -> ViewSetup:
 
 
 def _outlines(run: RunFolder) -> dict[str, tuple[tuple[tuple[float, float], ...], ...]]:
-    """Where the gauges lie; of one whose place the file does not tell, nothing."""
+    """Outlines of the gauges; none where the file does not have their positions."""
     described = {name: gauge.described for name, gauge in run.gauges.items()}
     try:
         gauges = from_dict({"gauges": described}, {}, str(run.path)).gauges
@@ -127,8 +215,8 @@ def _outlines(run: RunFolder) -> dict[str, tuple[tuple[tuple[float, float], ...]
         return {}
 
 
-def story(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Message]:
-    """Everything, times in seconds since the start of the test.
+def playback_messages(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Message]:
+    """All messages, with times in seconds since the start of the test.
 
     Raises
     ------
@@ -151,8 +239,8 @@ def story(run: RunFolder, rows: tuple[int, ...]) -> Iterator[Message]:
 
 def _frame(image: NDArray[Any], t: float, bits: int) -> Frame:
     kind = np.uint8 if bits <= 8 else np.uint16
-    whole = image if image.dtype == kind else np.rint(image).astype(kind)
-    return Frame(frozen(whole), 0, t, "nominal", 0, bits, t)
+    levels = image if image.dtype == kind else np.rint(image).astype(kind)
+    return Frame(frozen(levels), 0, t, "nominal", 0, bits, t)
 
 
 def _curves(run: RunFolder) -> Iterator[Message]:
@@ -168,9 +256,8 @@ def _curves(run: RunFolder) -> Iterator[Message]:
 
 
 def _points(run: RunFolder, start: int, stop: int) -> list[tuple[float, float]]:
-    """Strain and N of some instants, for the curve that grows with the slider."""
-    found = zip(run.axial_strain[start:stop].tolist(), run.force[start:stop].tolist(), strict=True)
-    return list(found)
+    """Strain and N of some time steps, for the curve up to the time of the slider."""
+    return list(zip(run.axial_strain[start:stop].tolist(), run.force[start:stop].tolist(), strict=True))
 
 
 def _events(run: RunFolder) -> Iterator[Message]:
@@ -178,8 +265,8 @@ def _events(run: RunFolder) -> Iterator[Message]:
 
 
 def _status(run: RunFolder) -> str:
-    """The figures of the test and the gauges at its end, as Markdown."""
-    lines = figure_lines(evaluate_test(run.curve, options_of(run.specimen)), run.specimen)
+    """The figures of the test and the final values of the gauges, as Markdown."""
+    lines = figure_lines(evaluate_test(run.curve, tensile_options(run.specimen)), run.specimen)
     lines += [
         f"gauge **{name}** {gauge.value[-1] * 1e6:+.0f} ± {gauge.sigma[-1] * 1e6:.0f} µm/m at the end"
         for name, gauge in run.gauges.items()
@@ -187,93 +274,3 @@ def _status(run: RunFolder) -> str:
     values = run.strain.values
     head = f"**{run.title}**, {run.strain.n} instants, {values['n_valid'][-1]} of {values['n_zoi'][-1]} ZOIs at the end"
     return "\n\n".join([head, *(line.strip().replace("+-", "±") for line in lines)])
-
-
-_LOOK_S, _CLOSE_S = 0.1, 600.0
-
-
-def show(
-    run: RunFolder,
-    asked: ShowRequest,
-    screen: Screen,
-    enough: threading.Event,
-    *,
-    port: int,
-    rrd: Path | None = None,
-) -> None:
-    """Show ``run`` until ``enough`` is set; with ``rrd`` into that file alone, until all is written.
-
-    Raises
-    ------
-    ConfigError, DataError
-        Nothing can be shown, a file cannot be read, or the view's process fails.
-    """
-    rows = chosen(run, asked)
-    _tell_of_choice(len(rows), run, screen)
-    told = _Told(run, rows, screen)
-    view = View(
-        setup_of(run),
-        port=None if rrd else port,
-        rrd=rrd,
-        tell=lambda text, level: None if enough.is_set() else _say(screen, text, level),
-        serving=lambda view: _announce(view, screen),
-        story=told.messages,
-    )
-    try:
-        while not view.failed and not told.trouble and not (told.all if rrd else enough).wait(_LOOK_S):
-            if enough.is_set():
-                break
-    finally:
-        view.close(_CLOSE_S if rrd and not enough.is_set() else 0.0)
-    if told.trouble or view.failed:
-        raise DataError(told.trouble or view.failed)
-
-
-class _Told:
-    """The story as it is taken, from the beginning each time a process is started.
-
-    Attributes
-    ----------
-    all : Event
-        Once everything was taken.
-    trouble : str
-        Why the story ended early.
-    """
-
-    def __init__(self, run: RunFolder, rows: tuple[int, ...], screen: Screen) -> None:
-        self._run, self._rows, self._screen = run, rows, screen
-        self.all, self.trouble = threading.Event(), ""
-
-    def messages(self) -> Iterator[Message]:
-        try:
-            done = 0
-            for message in story(self._run, self._rows):
-                yield message
-                done += message.kind is Kind.FIELD
-                self._screen.status(f"instant {done} of {len(self._rows)}")
-        except PhasedicError as error:
-            self.trouble = str(error)
-        self.all.set()
-
-
-def _tell_of_choice(shown: int, run: RunFolder, screen: Screen) -> None:
-    if shown < run.strain.n:
-        screen.say(f"{shown} of {run.strain.n} instants are shown; --from, --to and --every choose others")
-    if run.pictures is None:
-        screen.say("note: the pictures that were measured are not here any more; maps alone")
-
-
-def _say(screen: Screen, text: str, level: Level) -> None:
-    screen.say(text if level == "info" else f"{level}: {text}")
-
-
-def _announce(view: View, screen: Screen) -> None:
-    """Open the viewer where there is a display; else say how to look."""
-    if view.port is None:
-        return
-    if spawn_viewer(view.port, screen.say) is not None:
-        screen.say("the viewer opens in a window of its own; Ctrl-C here ends it")
-        return
-    screen.say("no viewer is opened here (no display); this shows it, Ctrl-C ends it:")
-    for line in view.address.splitlines():
-        screen.say(f"  {line}")

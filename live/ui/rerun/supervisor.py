@@ -1,10 +1,9 @@
-"""Keeps a process that draws alive and supplied: one thread, which alone may wait for it.
+"""Supervises the process that draws: starts it, sends it messages, restarts it where it ends.
 
-One process that draws, and the socket to it; nothing here waits for it but ``end``.
-
-The process is a plain child in our own session, so that its nice value counts against our threads. It
-ignores Ctrl-C, since a terminal sends that to all, and ends by itself when our end of the socket closes,
-also when we are killed.
+All of it runs in one thread of the view; only that thread may wait for the process. The process is a plain
+child in the session of the test, so that its nice value counts against the threads of the test. It ignores
+Ctrl-C, since a terminal sends that to all processes, and ends when the other end of its socket is closed, also
+where the test is killed.
 """
 
 from __future__ import annotations
@@ -24,11 +23,24 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquire.events import Level
-from acquire.held_back import held_back
-from live.pipeline.latency import OUTPUT, yield_to_others
-from live.ui.rerun.messages import Where
+from acquire.signal_mask import blocked_signals
+from live.pipeline.latency import OUTPUT, lower_priority
+from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
 from live.ui.rerun.wire import Kind, Message, Reader, WireError, encoded
+
+TICK_S = 0.05
+STUCK_S, START_S = 15.0, 90.0
+"""A process that takes nothing for so long is replaced (a busy machine starts one slowly)."""
+
+MAX_STARTS, MAX_REPORTED = 5, 3
+"""Failures in a row: until the view is given up; that are reported."""
+
+_STABLE_S, _MAX_DELAY_S = 60.0, 60.0
+"""A process that ran so long starts the count of failures again; the longest delay of a restart."""
+
+Notify = Callable[[str, Level], None]
+"""Takes a message for a person and its level."""
 
 _SEND_BYTES = 1 << 20
 _ROOT = str(Path(__file__).parents[3])
@@ -37,19 +49,19 @@ _KILLED_S = 5.0
 
 
 class RenderProcess:
-    """A process that draws, from its start to its end.
+    """A process that draws, and the socket to it; only ``wait`` and ``end`` wait for it.
 
     Attributes
     ----------
     pid : int
     progress_t : float, s
-        When it last took or gave something (``time.monotonic``).
+        When it last received or sent something (``time.monotonic``).
     """
 
     def __init__(self) -> None:
         ours, its = socket.socketpair()
-        with its, held_back(signal.SIGINT, signal.SIGHUP):
-            # It lets them through once it ignores them.
+        with its, blocked_signals(signal.SIGINT, signal.SIGHUP):
+            # The process unblocks them once it ignores them.
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", _MODULE],
                 stdin=its.fileno(),
@@ -64,18 +76,18 @@ class RenderProcess:
         self.pid, self.progress_t = self._process.pid, time.monotonic()
 
     def send(self, message: Message) -> None:
-        """Put ``message`` behind what waits."""
+        """Queue ``message``."""
         if not self._pending:
             self.progress_t = time.monotonic()
         self._pending.extend(encoded(message))
 
-    def pushed(self) -> bool:
-        """Hand over what the process takes at once; whether all is gone.
+    def flush(self) -> bool:
+        """Send as much as the socket takes now; whether nothing is left.
 
         Raises
         ------
         OSError
-            The process is gone.
+            The process has ended.
         """
         while self._pending:
             try:
@@ -83,10 +95,10 @@ class RenderProcess:
             except BlockingIOError:
                 return False
             self.progress_t = time.monotonic()
-            self._let_go(sent)
+            self._discard(sent)
         return True
 
-    def _let_go(self, sent: int) -> None:
+    def _discard(self, sent: int) -> None:
         while sent:
             piece = self._pending.popleft()
             if sent < piece.nbytes:
@@ -95,12 +107,12 @@ class RenderProcess:
             sent -= piece.nbytes
 
     def replies(self) -> Iterator[Message]:
-        """What it has said since.
+        """The messages received since the last call.
 
         Raises
         ------
         EOFError, OSError
-            The process is gone.
+            The process has ended.
         """
         with contextlib.suppress(BlockingIOError):
             while True:
@@ -109,11 +121,11 @@ class RenderProcess:
                 yield message
 
     def wait(self, seconds: float, *, to_send: bool) -> None:
-        """Until it says something (or takes something), at most ``seconds``."""
+        """Wait for a message (or for room to send), at most ``seconds``."""
         select.select([self._socket], [self._socket] if to_send else [], [], seconds)
 
     def end(self, seconds: float = 0.0) -> int:
-        """Close the socket and see the process off, killed after ``seconds``; what it ended with."""
+        """Close the socket, wait ``seconds`` and kill the process after that; its exit code."""
         self._socket.close()
         try:
             return self._process.wait(seconds)
@@ -125,191 +137,182 @@ class RenderProcess:
 
 
 def _environment() -> dict[str, str]:
-    """Ours, with this very code in front; -P keeps the folder we were started in out of it.
+    """The environment of the process, with this code first in its path; -P keeps the current folder out of it.
 
-    Rerun's allocator is to give back at once what its server lets go: a tenth less memory in a long test.
+    The allocator of rerun returns freed memory at once: a tenth less memory in a long test.
     """
     paths = [_ROOT, *filter(None, [os.environ.get("PYTHONPATH")])]
     return {"MIMALLOC_PURGE_DELAY": "0", **os.environ, "PYTHONPATH": os.pathsep.join(paths)}
 
 
-TICK_S = 0.05
-STUCK_S, START_S = 15.0, 90.0
-"""A process that takes nothing for so long is replaced (a busy machine starts one slowly)."""
-
-MOST_STARTS, MOST_TOLD = 5, 3
-"""Without success, in a row: starts until it is given up, ends of the process that are told."""
-
-_LIVED_S, _LONGEST_S = 60.0, 60.0
-"""A process that lived so long begins a new row; the longest wait before a start."""
-
-Tell = Callable[[str, Level], None]
-
-
 class Stuck(OSError):
-    """The process takes nothing any more."""
+    """The process receives nothing any more."""
 
 
 class Supervisor:
-    """Starts the process, talks to it, starts it anew where it ends; gives up where that is of no use.
+    """Starts the process, exchanges messages, restarts it where it ends; gives up after ``MAX_STARTS`` failures.
 
     Parameters
     ----------
     outbox : Outbox
-    where : Where
-        As it is wanted.
-    tell : callable
-        Told what a person should know: words and level.
-    serving : callable
-        Called once viewers can connect, and again where they must anew.
+    target : ViewTarget
+        As configured.
+    notify : callable
+        Called with a message for a person and its level.
+    on_serving : callable
+        Called once viewers can connect, and again after a restart.
 
     Attributes
     ----------
-    served : Where
-        What there really is: port and file, None until they are.
+    served : ViewTarget
+        The port that is served and the file that is written; None until they are.
     failed : str
-        Why there is no view any more; empty while all is well.
+        Why there is no view any more; empty while it runs.
     pid : int or None
-        Of the process.
+        Process id, while there is one.
     starts : int
     """
 
-    def __init__(self, outbox: Outbox, where: Where, tell: Tell, serving: Callable[[], None]) -> None:
-        self._outbox, self._where, self._tell, self._serving = outbox, where, tell, serving
-        self.served = replace(where, port=None, rrd=None)
+    def __init__(
+        self, outbox: Outbox, target: ViewTarget, notify: Notify, on_serving: Callable[[], None]
+    ) -> None:
+        self._outbox, self._target, self._notify, self._on_serving = outbox, target, notify, on_serving
+        self.served = replace(target, port=None, rrd=None)
         self.failed = ""
         self.pid: int | None = None
-        self.starts = self._row = 0
-        self._child: RenderProcess | None = None
-        self._again_t = self._begun_t = 0.0
+        self.starts = self._failures = 0
+        self._renderer: RenderProcess | None = None
+        self._restart_t = self._started_t = 0.0
         self._is_up = self._is_done = False
-        self._why = ""
-        self._closing, self._patience_s = threading.Event(), 0.0
+        self._cause = ""
+        self._closing, self._close_s = threading.Event(), 0.0
         self._thread = threading.Thread(target=self._run, name="view", daemon=True)
 
     def start(self) -> None:
-        """Begin; the process inherits the nice value of the caller, which the thread's would make slow to start."""
-        self._guarded(self._started)
+        """Start the process, which inherits the nice value of the caller, then the thread, which has its own."""
+        self._guarded(self._start_process)
         self._thread.start()
 
     def close(self, seconds: float) -> None:
-        """Have all drawn and the file closed within ``seconds``; else the process is killed, and it is told."""
-        self._patience_s = seconds
+        """Draw all and close the file within ``seconds``; else kill the process and warn."""
+        self._close_s = seconds
         self._closing.set()
         self._thread.join(seconds + STUCK_S)
 
     def _run(self) -> None:
-        yield_to_others(OUTPUT)
+        lower_priority(OUTPUT)
         while not self._closing.is_set() and not self.failed:
-            self._guarded(self._turn)
-        if self._child is not None or not self.starts:
+            self._guarded(self._step)
+        if self._renderer is not None or not self.starts:
             self._outbox.end()
-            self._finish(time.monotonic() + self._patience_s)
+            self._finish(time.monotonic() + self._close_s)
 
-    # -- talking ------------------------------------------------------------------------------
+    # -- messages -----------------------------------------------------------------------------
 
-    def _turn(self) -> None:
-        child = self._child or self._started()
-        if child is None or self._is_told(child):
+    def _step(self) -> None:
+        renderer = self._renderer or self._start_process()
+        if renderer is None or self._exchange(renderer):
             self._closing.wait(TICK_S)
         else:
-            child.wait(TICK_S, to_send=True)
+            renderer.wait(TICK_S, to_send=True)
 
-    def _is_told(self, child: RenderProcess) -> bool:
-        """Talk with it; whether it has taken all there is."""
-        for message in child.replies():
-            self._hear(message)
-        while child.pushed():
+    def _exchange(self, renderer: RenderProcess) -> bool:
+        """Receive and send; whether everything was sent."""
+        for message in renderer.replies():
+            self._handle(message)
+        while renderer.flush():
             more = self._outbox.next(time.monotonic())
             if more is None:
                 return True
-            child.send(more)
-        silent = time.monotonic() - child.progress_t
+            renderer.send(more)
+        silent = time.monotonic() - renderer.progress_t
         if silent > (STUCK_S if self._is_up else START_S):
             raise Stuck(f"took nothing for {silent:.0f} s (stopped?)")
         return False
 
-    def _hear(self, message: Message) -> None:
+    def _handle(self, message: Message) -> None:
         meta = message.meta
         if message.kind is Kind.SERVING:
             self._is_up = True
-            before, self.served = self.served.port, replace(self._where, port=meta["port"], rrd=meta["rrd"])
+            before, self.served = self.served.port, replace(self._target, port=meta["port"], rrd=meta["rrd"])
             if before not in (None, meta["port"]):
-                self._tell(f"the view is now on port {meta['port']}", "warning")
-            self._serving()
+                self._notify(f"the view is now on port {meta['port']}", "warning")
+            self._on_serving()
         elif message.kind is Kind.TROUBLE:
-            self._tell(meta["text"], "warning")
+            self._notify(meta["text"], "warning")
             self.failed = meta["text"] if meta["lasting"] else self.failed
         elif message.kind is Kind.FULL:
-            self._why = f"had grown to {meta['memory_MiB']} MiB"
+            self._cause = f"had grown to {meta['memory_MiB']} MiB"
         elif message.kind is Kind.ENDED:
             self._is_done = True
 
-    # -- its life -----------------------------------------------------------------------------
+    # -- start and end ------------------------------------------------------------------------
 
-    def _started(self) -> RenderProcess | None:
+    def _start_process(self) -> RenderProcess | None:
         now = time.monotonic()
-        if now < self._again_t:
+        if now < self._restart_t:
             return None
         self.starts += 1
         self._is_up = False
-        self._why, self._begun_t = "", now
-        self._child = RenderProcess()
-        self.pid = self._child.pid
-        self._outbox.begin(self._next_where())
-        return self._child
+        self._cause, self._started_t = "", now
+        self._renderer = RenderProcess()
+        self.pid = self._renderer.pid
+        self._outbox.begin(self._next_target())
+        return self._renderer
 
-    def _next_where(self) -> Where:
-        """The port that viewers know, and a file that is not there yet: view.rrd, view-2.rrd ..."""
-        where = self._where
+    def _next_target(self) -> ViewTarget:
+        """The same port as before, and a new file: view.rrd, view-2.rrd ..."""
+        target = self._target
         if self.served.port is not None:
-            where = replace(where, port=self.served.port)
-        if where.rrd is not None and self.starts > 1:
-            path = Path(where.rrd)
-            where = replace(where, rrd=str(path.with_stem(f"{path.stem}-{self.starts}")))
-        return where
+            target = replace(target, port=self.served.port)
+        if target.rrd is not None and self.starts > 1:
+            path = Path(target.rrd)
+            target = replace(target, rrd=str(path.with_stem(f"{path.stem}-{self.starts}")))
+        return target
 
     def _guarded(self, step: Callable[[], object]) -> None:
         try:
             step()
         except (OSError, EOFError, WireError) as error:
-            self._lost(error)
+            self._handle_loss(error)
 
-    def _lost(self, error: Exception) -> None:
-        """The process is gone, or as good as gone."""
-        child, self._child, self.pid = self._child, None, None
-        code = child.end() if child is not None else 0
+    def _handle_loss(self, error: Exception) -> None:
+        """The process has ended or hangs: end it, and schedule a restart."""
+        renderer, self._renderer, self.pid = self._renderer, None, None
+        code = renderer.end() if renderer is not None else 0
         if self.failed:
             return
-        lived = time.monotonic() - self._begun_t
-        self._row = 1 if self._is_up and lived > _LIVED_S else self._row + 1
-        if not self._is_up and self._row >= MOST_STARTS:
-            self.failed = f"its process does not start ({_ended(code, error)})"
+        lived = time.monotonic() - self._started_t
+        self._failures = 1 if self._is_up and lived > _STABLE_S else self._failures + 1
+        if not self._is_up and self._failures >= MAX_STARTS:
+            self.failed = f"its process does not start ({_reason(code, error)})"
             return
-        self._again_t = time.monotonic() + (0.0 if self._why else min(2.0 ** (self._row - 1), _LONGEST_S))
-        if self._why:
-            self._tell(f"the view's process {self._why} and is started anew", "info")
-        elif self._row <= MOST_TOLD:
-            last = "; that is not told again" * (self._row == MOST_TOLD)
-            self._tell(f"the view's process {_ended(code, error)} and is started anew{last}", "warning")
+        self._restart_t = time.monotonic() + (
+            0.0 if self._cause else min(2.0 ** (self._failures - 1), _MAX_DELAY_S)
+        )
+        if self._cause:
+            self._notify(f"the view's process {self._cause} and is restarted", "info")
+        elif self._failures <= MAX_REPORTED:
+            last = "; further restarts are not reported" * (self._failures == MAX_REPORTED)
+            self._notify(f"the view's process {_reason(code, error)} and is restarted{last}", "warning")
 
     def _finish(self, until: float) -> None:
         try:
             while not self._is_done and time.monotonic() < until:
-                child = self._child or self._started()
-                if child is None:
+                renderer = self._renderer or self._start_process()
+                if renderer is None:
                     return
-                child.wait(TICK_S, to_send=not self._is_told(child))
+                renderer.wait(TICK_S, to_send=not self._exchange(renderer))
         except (OSError, EOFError, WireError) as error:
-            self._why = str(error) or "ended early"
-        code = self._child.end(max(0.0, until - time.monotonic())) if self._child is not None else 0
+            self._cause = str(error) or "ended early"
+        code = self._renderer.end(max(0.0, until - time.monotonic())) if self._renderer is not None else 0
         self.pid = None
         if not self._is_done and not self.failed:
-            why = self._why or "did not finish in time and was ended"
-            self._tell(f"the view's process {why} ({code}); its file may lack the last seconds", "warning")
+            why = self._cause or "did not finish in time and was ended"
+            self._notify(f"the view's process {why} ({code}); its file may lack the last seconds", "warning")
 
 
-def _ended(code: int, error: Exception) -> str:
+def _reason(code: int, error: Exception) -> str:
     if isinstance(error, (Stuck, WireError)):
         return str(error)
     if code < 0:

@@ -1,7 +1,7 @@
-"""What goes between a test and the process of its view: framed messages, checked as they come.
+"""Framed messages between a test and the process of its view, checked when they are read.
 
 A message is a header (magic, version, kind, two lengths; little endian), a JSON object, and the bytes
-of its arrays, each padded to 8. The object's "arrays" lists name, type and shape of each array. Nothing
+of its arrays, each padded to 8. "arrays" in the object lists name, type and shape of each array. Nothing
 that is read is executed.
 """
 
@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from acquire.errors import DataError
 
 MAGIC, VERSION = b"pdvw", 1
-MOST_META, MOST_BYTES = 2**23, 2**28
-"""Of one message: beyond these it is not one of ours."""
+MAX_META_BYTES, MAX_BYTES = 2**23, 2**28
+"""Limits of one message; a larger one is refused."""
 
 _HEADER = struct.Struct("<4sHHIQ")
 _TYPES = ("|b1", "|u1", "<u2", "<f4", "<f8")
@@ -31,7 +31,7 @@ _ALIGN = 8
 
 
 class Kind(IntEnum):
-    """What a message says; the last four come from the view's process."""
+    """Kind of a message; those from 20 on come from the process of the view."""
 
     SETUP = 1
     MEANS = 2
@@ -45,13 +45,13 @@ class Kind(IntEnum):
     FIGURES = 10
     GAUGE = 11
     SERVING = 20  # port (None: no server), rrd (None: no file)
-    TROUBLE = 21  # text, lasting: whether to start anew is of no use
+    TROUBLE = 21  # text, lasting: whether a restart is useless
     FULL = 22  # memory_MiB: the process ends because it grew to this
     ENDED = 23
 
 
 class WireError(DataError):
-    """What came is not a message of this version, or not what it says it is."""
+    """The data are not a message of this version, or contradict its header."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -71,12 +71,12 @@ class Message:
 
 
 def encoded(message: Message) -> list[memoryview]:
-    """The bytes of ``message``, in pieces; the arrays are not copied and must not change until they are sent.
+    """The bytes of ``message`` in pieces. The arrays are not copied; they must not change until they are sent.
 
     Raises
     ------
     WireError
-        An array of another type.
+        An array has another type.
     """
     arrays = {name: np.ascontiguousarray(array) for name, array in message.arrays.items()}
     listed = [[name, array.dtype.str, array.shape] for name, array in arrays.items()]
@@ -97,7 +97,7 @@ def _padding(length: int) -> int:
 
 
 class Reader:
-    """Takes messages from a stream socket, blocking or not.
+    """Reads messages from a stream socket, blocking or not.
 
     Parameters
     ----------
@@ -115,10 +115,11 @@ class Reader:
         Raises
         ------
         BlockingIOError
-            Not all of it has come yet; what came is kept.
+            The message is not complete yet; what was received is kept.
         EOFError
-            The other side has gone.
+            The other side closed the socket.
         WireError
+            The data are not a message.
         """
         if self._head is None:
             self._fill()
@@ -136,22 +137,22 @@ class Reader:
 
     def _fill(self) -> None:
         while self._got < len(self._buffer):
-            came = self._source.recv_into(memoryview(self._buffer)[self._got :])
-            if not came:
+            received = self._source.recv_into(memoryview(self._buffer)[self._got :])
+            if not received:
                 raise EOFError
-            self._got += came
+            self._got += received
 
 
 def _checked_header(header: bytes) -> tuple[Kind, int, int]:
     magic, version, number, meta, total = _HEADER.unpack(header)
     if (magic, version) != (MAGIC, VERSION):
         raise WireError(f"not a message of version {VERSION} to or from the view: {header[:6]!r}")
-    if meta > MOST_META or total > MOST_BYTES:
+    if meta > MAX_META_BYTES or total > MAX_BYTES:
         raise WireError(f"a message of {meta} + {total} bytes is too long for the view")
     try:
         return Kind(number), meta, total
     except ValueError as error:
-        raise WireError(f"the view knows no message {number}") from error
+        raise WireError(f"the view has no message {number}") from error
 
 
 def _message(kind: Kind, body: bytearray, length: int) -> Message:

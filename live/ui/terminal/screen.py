@@ -1,7 +1,7 @@
-"""The screen: plain sentences, and one status line that is renewed in place on a terminal.
+"""Prints messages, and one status line that is renewed in place on a terminal.
 
-A terminal that has gone away must not end a recording: what cannot be printed is let go. What was read
-from a file or a device may hold anything, and is made harmless.
+A terminal that was closed must not end a recording: what cannot be printed is dropped. Text from a file or a
+device may contain control characters; they are escaped.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, TextIO
 
 from acquire.printable import duration, printable
 from live.pipeline.screen import Screen
-from live.ui.terminal.status_line import GAP, force, gauge_words, status_line
+from live.ui.terminal.status_line import GAP, force_text, gauge_texts, status_line
 
 if TYPE_CHECKING:
     from live.pipeline.measurement import TimeStep
@@ -26,7 +26,7 @@ _UNKNOWN_WIDTH, _FILE_WIDTH = 119, 1000
 
 
 def say(text: str = "") -> None:
-    """A line on standard output, made harmless; for commands that need no status line."""
+    """Print a line on standard output, control characters escaped; for commands without a status line."""
     TerminalScreen().say(text)
 
 
@@ -45,7 +45,7 @@ class TerminalScreen(Screen):
         self._prompt: str | None = None
 
     def say(self, text: str = "") -> None:
-        """A line that stays."""
+        """Print a line that stays."""
         if not self._quiet:
             self._write(" " * self._width + "\r" * (self._width > 0) + printable(text) + "\n")
             self._width = 0
@@ -53,7 +53,7 @@ class TerminalScreen(Screen):
                 self._renew(self._prompt)
 
     def bell(self) -> None:
-        """Ring, where it is a terminal."""
+        """Ring the bell of a terminal."""
         if self._terminal and not self._quiet:
             self._write("\a")
 
@@ -63,7 +63,7 @@ class TerminalScreen(Screen):
         return not self._quiet and self._prompt is None and self._now() - self._last >= self._every
 
     def status(self, text: str) -> None:
-        """The status line, renewed in place on a terminal."""
+        """Renew the status line, in place on a terminal."""
         if not self.is_due:
             return
         self._last = self._now()
@@ -73,47 +73,47 @@ class TerminalScreen(Screen):
             self._write(printable(text) + "\n")
 
     def _renew(self, text: str) -> None:
-        """The last line of a terminal; never wider than that, since a line that wraps cannot be renewed."""
+        """Renew the last line, cut to the width of the terminal: a line that wraps cannot be renewed."""
         text = printable(text)[: self._columns()]
         self._write(text.ljust(self._width) + "\r")
         self._width = len(text)
 
     def _columns(self) -> int:
-        """One less than the terminal has: the last may wrap."""
+        """Usable columns: a character in the last column may wrap."""
         try:
             return os.get_terminal_size(self._stream.fileno()).columns - 1
         except (OSError, ValueError):
             return _UNKNOWN_WIDTH
 
     def snapshot(self, snapshot: Snapshot, words: str = "") -> None:
-        """Where a live run stands; ``words`` say what it waits for."""
+        """Renew the status line of a live run; ``words`` name what it waits for."""
         self.status(status_line(snapshot, self._columns() if self._terminal else _FILE_WIDTH, words))
 
     def prompt(self, text: str | None) -> None:
-        """What the operator types, in the place of the status line; None: no more."""
+        """Show what the operator types in place of the status line; None ends that."""
         self._prompt = text
         if self._terminal and not self._quiet:
             self._renew(text or "")
 
     def progress(self, i: TimeStep, done: int, expected: int | None, elapsed_s: float) -> None:
-        """Where a replay stands: ``done`` bursts of the ``expected``, ZOIs a second, the time that is left."""
+        """Renew the status line of a replay: ``done`` of ``expected`` bursts, ZOI/s, remaining time."""
         of = left = rate = ""
         if expected is not None and done <= expected:
             of, left = f" of {expected}", f"  {duration(elapsed_s / done * (expected - done))} left"
         if elapsed_s > 0:
             rate = f"  {done * i.n_zoi / elapsed_s:.0f} ZOI/s"
         self.status(
-            f"{done}{of} bursts{_load(i)}  {GAP.join(gauge_words(i))} um/m  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}"
+            f"{done}{of} bursts{_force(i)}  {GAP.join(gauge_texts(i))} um/m  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}"
         )
 
     def _write(self, text: str) -> None:
-        coding = getattr(self._stream, "encoding", None) or "utf-8"
+        encoding = getattr(self._stream, "encoding", None) or "utf-8"
         try:
-            self._stream.write(text.encode(coding, "backslashreplace").decode(coding))
+            self._stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
             self._stream.flush()
         except (OSError, ValueError):
             self._quiet = True
 
 
-def _load(i: TimeStep) -> str:
-    return "" if math.isnan(i.force) else f"  {force(i.force)}"
+def _force(i: TimeStep) -> str:
+    return "" if math.isnan(i.force) else f"  {force_text(i.force)}"

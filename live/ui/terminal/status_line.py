@@ -1,4 +1,4 @@
-"""The status line of a live run: what matters most, as much of it as the terminal is wide."""
+"""The status line of a live run: the most important items that fit the width of the terminal."""
 
 from __future__ import annotations
 
@@ -13,41 +13,41 @@ if TYPE_CHECKING:
     from live.pipeline.snapshot import Snapshot
 
 GAP = "  "
-MOST_GAUGES = 4
-Part = tuple[int, str]
-"""How soon it has to go where the line is too long (the highest first), and its words."""
+MAX_GAUGES = 4
+Item = tuple[int, str]
+"""Rank and text; a line that is too long loses the items with the highest rank first."""
 
 
 def status_line(s: Snapshot, width: int, words: str = "") -> str:
-    """The line, at most ``width`` letters; ``words`` say what is waited for."""
+    """The line, at most ``width`` characters; ``words`` name what the run waits for."""
     return fitted([*_test(s), (3, words), *_strain(s.time_step), *_machine(s)], width)
 
 
-def fitted(parts: Sequence[Part], width: int) -> str:
-    """The parts in their order, without as many as do not fit; the last one left is cut."""
-    left = [part for part in parts if part[1]]
+def fitted(items: Sequence[Item], width: int) -> str:
+    """The items that fit, in their order; the last one left is cut."""
+    left = [item for item in items if item[1]]
     while len(left) > 1 and len(GAP.join(text for _, text in left)) > width:
-        left.remove(max(left, key=lambda part: part[0]))
+        left.remove(max(left, key=lambda item: item[0]))
     return GAP.join(text for _, text in left)[: max(width, 0)]
 
 
-def _test(s: Snapshot) -> list[Part]:
+def _test(s: Snapshot) -> list[Item]:
     alarm = " ".join(f"ALARM {text}" for text in s.alarms)
     stress = "" if math.isnan(s.stress_Pa) else f"{s.stress_Pa * 1e-6:.1f} MPa"
-    peak = "" if math.isnan(s.peak_N) else f"peak {force(s.peak_N)}"
-    load = [(0, force(s.force_N)), (4, stress), (12, peak)]
+    peak = "" if math.isnan(s.peak_N) else f"peak {force_text(s.peak_N)}"
+    load = [(0, force_text(s.force_N)), (4, stress), (12, peak)]
     return [(1, alarm), (2, s.state), (7, duration(s.elapsed_s)), *load]
 
 
-def _strain(i: TimeStep | None) -> list[Part]:
+def _strain(i: TimeStep | None) -> list[Item]:
     if i is None:
         return []
-    parts = [(5 if number == 0 else 10, text) for number, text in enumerate(gauge_words(i))]
-    parts[-1] = parts[-1][0], f"{parts[-1][1]} um/m"
-    return [*parts, (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
+    items = [(5 if number == 0 else 10, text) for number, text in enumerate(gauge_texts(i))]
+    items[-1] = items[-1][0], f"{items[-1][1]} um/m"
+    return [*items, (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
 
 
-def _machine(s: Snapshot) -> list[Part]:
+def _machine(s: Snapshot) -> list[Item]:
     frames = s.frames
     late = "" if math.isnan(s.latency_p95_s) else f"p95 {s.latency_p95_s * 1e3:.0f} ms"
     measured = f"measured {frames['measured']}" if s.time_step is not None else f"{frames['grabbed']} frames"
@@ -61,12 +61,12 @@ def _machine(s: Snapshot) -> list[Part]:
     ]
 
 
-def force(value: float) -> str:
-    """A force in words; nothing where it is not known."""
+def force_text(value: float) -> str:
+    """A force with its unit; empty where it is not known."""
     return "" if math.isnan(value) else f"{value:.1f} N"
 
 
-def gauge_words(i: TimeStep) -> list[str]:
+def gauge_texts(i: TimeStep) -> list[str]:
     """The virtual gauges with their sigmas in um/m, or the means where there are none."""
     if not i.gauges:
         return [
@@ -75,5 +75,5 @@ def gauge_words(i: TimeStep) -> list[str]:
         ]
     return [
         f"{name} lost" if gauge.reason else f"{name} {gauge.value * 1e6:+.0f} +- {gauge.sigma * 1e6:.0f}"
-        for name, gauge in list(i.gauges.items())[:MOST_GAUGES]
+        for name, gauge in list(i.gauges.items())[:MAX_GAUGES]
     ]

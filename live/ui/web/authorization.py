@@ -1,8 +1,8 @@
-"""Who may come in: every request is judged by its headers before anything is done.
+"""Authorization: the headers of every request are checked before anything is done.
 
 A page of another site can make a browser send requests to 127.0.0.1, and can rebind its own name to that
-address; so a request needs the token as a cookie that no other site's request carries, our own address as
-its ``Host``, and where it changes something our own ``Origin``.
+address. So a request needs the token, in a cookie that requests of other sites do not carry, this address as
+its ``Host``, and this page as its ``Origin`` where it changes something.
 """
 
 from __future__ import annotations
@@ -12,35 +12,35 @@ from dataclasses import dataclass
 from email.message import Message
 from http.cookies import CookieError, SimpleCookie
 
-MOST_BYTES = 1_000_000
-"""Of what is posted."""
+MAX_POST_BYTES = 1_000_000
+"""Limit of a POST body."""
 
 
 class HttpError(Exception):
-    """A request that is not answered.
+    """A request that is refused.
 
     Parameters
     ----------
     status : int
-        Of HTTP.
-    why : str
+        HTTP status.
+    reason : str
         For a person.
     """
 
-    def __init__(self, status: int, why: str) -> None:
-        super().__init__(why)
-        self.status, self.why = status, why
+    def __init__(self, status: int, reason: str) -> None:
+        super().__init__(reason)
+        self.status, self.reason = status, reason
 
 
 @dataclass(frozen=True, slots=True)
 class RequestGuard:
-    """Judges requests to ``http://127.0.0.1:port``.
+    """Checks requests to ``http://127.0.0.1:port``.
 
     Attributes
     ----------
     port : int
     token : str
-        The secret of this page; stands in the address that is printed, then in a cookie.
+        The secret of this page: in the printed address, then in a cookie.
     """
 
     port: int
@@ -48,57 +48,57 @@ class RequestGuard:
 
     @property
     def host(self) -> str:
-        """The one ``Host`` that is answered."""
+        """The only ``Host`` that is answered."""
         return f"127.0.0.1:{self.port}"
 
     @property
     def origin(self) -> str:
-        """The one ``Origin`` that may change something."""
+        """The only ``Origin`` that may change something."""
         return f"http://{self.host}"
 
     @property
     def address(self) -> str:
-        """What a person opens."""
+        """The address that a person opens."""
         return f"{self.origin}/?token={self.token}"
 
     @property
     def cookie(self) -> str:
-        """The header that keeps the token in the browser; other ports of this machine have names of their own."""
-        return f"{self._name}={self.token}; HttpOnly; SameSite=Strict; Path=/"
+        """The cookie with the token; its name contains the port, since cookies are shared by all ports of a host."""
+        return f"{self._cookie_name}={self.token}; HttpOnly; SameSite=Strict; Path=/"
 
     @property
-    def _name(self) -> str:
+    def _cookie_name(self) -> str:
         return f"phasedic_{self.port}"
 
-    def is_key(self, word: str) -> bool:
-        """Whether ``word`` is the token."""
-        return hmac.compare_digest(word.encode(), self.token.encode())
+    def is_token(self, text: str) -> bool:
+        """Whether ``text`` is the token."""
+        return hmac.compare_digest(text.encode(), self.token.encode())
 
-    def check_place(self, headers: Message) -> None:
-        """Raise ``HttpError`` unless the request is for this address, and not sent by another site's page."""
+    def check_host(self, headers: Message) -> None:
+        """Raise ``HttpError`` unless the request is for this address and not sent by a page of another site."""
         if headers.get("Host", "") != self.host:
             raise HttpError(403, "this is not the address of the page")
         if headers.get("Sec-Fetch-Site", "same-origin") not in ("same-origin", "none"):
-            raise HttpError(403, "asked by a page of another site")
+            raise HttpError(403, "requested by a page of another site")
 
     def check_cookie(self, headers: Message) -> None:
-        """Raise ``HttpError`` unless the cookie has the token."""
+        """Raise ``HttpError`` unless the cookie contains the token."""
         try:
-            morsel = SimpleCookie(headers.get("Cookie", "")).get(self._name)
+            morsel = SimpleCookie(headers.get("Cookie", "")).get(self._cookie_name)
         except CookieError:
             morsel = None
-        if morsel is None or not self.is_key(morsel.value):
+        if morsel is None or not self.is_token(morsel.value):
             raise HttpError(403, "open the address that phasedic has printed, with its token")
 
     def check_post(self, headers: Message) -> int:
-        """The length of what is posted; raise ``HttpError`` unless it is our page's own JSON of a sensible length."""
+        """The length of the body; raise ``HttpError`` unless it is JSON from this page and not too long."""
         if headers.get("Origin", "") != self.origin:
-            raise HttpError(403, "posted by another page than ours")
+            raise HttpError(403, "posted by another page")
         if headers.get("Content-Type", "").partition(";")[0].strip().lower() != "application/json":
-            raise HttpError(403, "nothing but JSON is taken")
+            raise HttpError(403, "only JSON is accepted")
         length = headers.get("Content-Length", "")
         if not (length.isascii() and length.isdigit()) or "Transfer-Encoding" in headers:
-            raise HttpError(411, "say how long it is")
-        if len(length) > 12 or int(length) > MOST_BYTES:
-            raise HttpError(413, f"more than {MOST_BYTES} bytes")
+            raise HttpError(411, "the length is missing")
+        if len(length) > 12 or int(length) > MAX_POST_BYTES:
+            raise HttpError(413, f"more than {MAX_POST_BYTES} bytes")
         return int(length)

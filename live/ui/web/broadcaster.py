@@ -1,4 +1,4 @@
-"""What is told to all open pages: of each kind the newest, so that a page that does not read holds up nobody."""
+"""Sends messages to all open pages: of each kind the newest, so that a page that does not read delays nothing."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import math
 import threading
 from typing import Any
 
-MOST_STREAMS = 8
-"""Pages that are told at one time."""
+MAX_PAGES = 8
+"""Pages that may be open at one time."""
 
 
 def plain(value: Any) -> Any:
-    """Fit for JSON: what is not finite becomes None."""
+    """A value as JSON can hold it; NaN and infinity become None."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     if isinstance(value, dict):
@@ -22,13 +22,13 @@ def plain(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value
 
 
-def encoded(value: Any) -> bytes:
+def json_bytes(value: Any) -> bytes:
     """JSON in one line."""
     return json.dumps(plain(value), allow_nan=False, separators=(",", ":")).encode()
 
 
 class Subscriber:
-    """What waits for one page: one message of each kind."""
+    """The messages that wait for one page: one of each kind."""
 
     def __init__(self) -> None:
         self._waiting: dict[str, bytes] = {}
@@ -36,19 +36,19 @@ class Subscriber:
         self._closed = False
 
     def put(self, kind: str, message: bytes) -> None:
-        """Replace what waits of this kind; never waits for the page."""
+        """Replace the waiting message of this kind; never waits for the page."""
         with self._changed:
             self._waiting[kind] = message
             self._changed.notify()
 
     def close(self) -> None:
-        """Nothing comes any more; what waits can still be taken."""
+        """Accept no more messages; those that wait can still be taken."""
         with self._changed:
             self._closed = True
             self._changed.notify()
 
     def take(self, timeout_s: float) -> dict[str, bytes] | None:
-        """All that waits, empty after ``timeout_s``; None once it is closed and empty."""
+        """All waiting messages, none after ``timeout_s``; None once it is closed and empty."""
         with self._changed:
             if not self._waiting and not self._closed:
                 self._changed.wait(timeout_s)
@@ -57,46 +57,46 @@ class Subscriber:
 
 
 class Broadcaster:
-    """Passes messages on to all streams; a stream that is opened begins with the newest of each kind."""
+    """Passes messages to all subscribers; a new one first gets the newest of each kind."""
 
     def __init__(self) -> None:
-        self._streams: set[Subscriber] = set()
+        self._subscribers: set[Subscriber] = set()
         self._newest: dict[str, bytes] = {}
         self._lock = threading.Lock()
         self._closed = False
 
     @property
-    def watched(self) -> int:
-        """Pages that are open."""
-        return len(self._streams)
+    def open_pages(self) -> int:
+        """Number of open pages."""
+        return len(self._subscribers)
 
-    def tell(self, kind: str, value: Any) -> None:
-        """Tell every page."""
-        message = encoded(value)
+    def publish(self, kind: str, value: Any) -> None:
+        """Send a message to every page."""
+        message = json_bytes(value)
         with self._lock:
             self._newest[kind] = message
-            for stream in self._streams:
-                stream.put(kind, message)
+            for subscriber in self._subscribers:
+                subscriber.put(kind, message)
 
     def open(self) -> Subscriber | None:
-        """A new stream; None where ``MOST_STREAMS`` are open, or all is over."""
+        """A new subscriber; None where ``MAX_PAGES`` are open, or after ``close``."""
         with self._lock:
-            if self._closed or len(self._streams) >= MOST_STREAMS:
+            if self._closed or len(self._subscribers) >= MAX_PAGES:
                 return None
-            stream = Subscriber()
+            subscriber = Subscriber()
             for kind, message in self._newest.items():
-                stream.put(kind, message)
-            self._streams.add(stream)
-            return stream
+                subscriber.put(kind, message)
+            self._subscribers.add(subscriber)
+            return subscriber
 
-    def leave(self, stream: Subscriber) -> None:
-        """The page has gone."""
+    def remove(self, subscriber: Subscriber) -> None:
+        """Remove a page that was closed."""
         with self._lock:
-            self._streams.discard(stream)
+            self._subscribers.discard(subscriber)
 
     def close(self) -> None:
-        """End all streams."""
+        """Close all subscribers."""
         with self._lock:
             self._closed = True
-            for stream in self._streams:
-                stream.close()
+            for subscriber in self._subscribers:
+                subscriber.close()

@@ -1,4 +1,4 @@
-"""Looking through the camera while the rig is set up: drained by a thread, the last frames kept."""
+"""The live picture during set-up: a thread reads the camera and keeps the last frames."""
 
 from __future__ import annotations
 
@@ -15,34 +15,35 @@ from acquire.errors import DataError, PhasedicError
 from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
 from acquire.printable import brief, printable
-from live.pipeline.latency import OUTPUT, yield_to_others
+from live.pipeline.latency import OUTPUT, lower_priority
 from live.setup.devices import open_rig
-from live.ui.web.config_draft import ConfigDraft, still
+from live.ui.web.config_draft import ConfigDraft, at_rest
 
 log = logging.getLogger(__name__)
 
 RECENT = 8
-"""Frames that are kept."""
+"""Frames kept."""
+
 RETRY_S, OPEN_S = 1.0, 20.0
-"""Between tries to open the camera; and how long a camera may take to open."""
+"""Delay before the camera is opened again; time limit for opening it."""
 
 
 class CameraPreview:
-    """The camera of ``draft``, opened again and again where it fails.
+    """Reads the camera of ``draft``, and opens it again where it fails.
 
     Parameters
     ----------
     draft : ConfigDraft
     on_open : callable taking a CameraInfo
-        Before the first frame of a camera.
-    on_frame : callable taking a Frame, giving seconds
-        Called with the newest frame; when to be called again.
+        Called before the first frame of a camera.
+    on_frame : callable taking a Frame, giving monotonic s
+        Called with the newest frame; returns when to be called again.
 
     Attributes
     ----------
     info : CameraInfo or None
     trouble : str
-        What is wrong with the camera; empty while it gives frames.
+        The fault of the camera; empty while it delivers frames.
     """
 
     def __init__(
@@ -56,25 +57,25 @@ class CameraPreview:
         self._collected: deque[Frame] | None = None
         self._opened: queue.SimpleQueue[PhasedicError | None] = queue.SimpleQueue()
         self._lock = threading.Lock()
-        self._leave, self._again = threading.Event(), threading.Event()
+        self._closing, self._reopen = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._work, name="page-camera", daemon=True)
 
     def start(self) -> None:
-        """Begin to look."""
+        """Start the thread."""
         self._thread.start()
 
     def close(self) -> None:
-        """Give the camera back."""
-        self._leave.set()
+        """Close the camera and end the thread."""
+        self._closing.set()
         self._stop()
         self._thread.join()
 
     def reopen(self, address: str) -> None:
-        """Open the camera with another address; raises, and the old one is kept, where that cannot be."""
+        """Open the camera with another address; where that fails, raise and keep the old address."""
         before = self._draft.config.camera.address
         self._draft.change_all({"camera.address": address})
         self._opened = queue.SimpleQueue()
-        self._again.set()
+        self._reopen.set()
         self._stop()
         with contextlib.suppress(queue.Empty):
             if (error := self._opened.get(timeout=OPEN_S)) is not None:
@@ -93,13 +94,13 @@ class CameraPreview:
 
     @property
     def collecting(self) -> bool:
-        """Whether frames are still to come."""
+        """Whether ``collect`` still waits for frames."""
         with self._lock:
             found = self._collected
             return found is not None and len(found) != found.maxlen
 
     def collected(self) -> list[Frame] | None:
-        """Those, once they are there; then they are forgotten."""
+        """The frames of ``collect`` once they are complete; they are returned once."""
         with self._lock:
             found = self._collected
             if found is None or len(found) != found.maxlen:
@@ -113,39 +114,39 @@ class CameraPreview:
             camera.stop()
 
     def _work(self) -> None:
-        yield_to_others(OUTPUT)
-        while not self._leave.is_set():
+        lower_priority(OUTPUT)
+        while not self._closing.is_set():
             try:
-                self._look()
+                self._preview()
             except PhasedicError as error:
                 self.trouble = printable(brief(error))
             except Exception as error:
-                log.exception("looking through the camera failed")
+                log.exception("the preview of the camera failed")
                 self.trouble = f"a defect: {error!r}"
-            if self.trouble and not self._again.is_set():
-                self._leave.wait(RETRY_S)
+            if self.trouble and not self._reopen.is_set():
+                self._closing.wait(RETRY_S)
 
-    def _look(self) -> None:
-        self._again.clear()
+    def _preview(self) -> None:
+        self._reopen.clear()
         config = self._draft.config.camera
         if not config.address:
             raise DataError(
-                "no camera is given: start with --camera ADDRESS (phasedic devices lists what is there)"
+                "no camera is given: start with --camera ADDRESS (phasedic devices lists the cameras)"
             )
         try:
-            rig = open_rig(still(config.address), "none:", self._heard, crop=config.crop)
+            rig = open_rig(at_rest(config.address), "none:", self._on_event, crop=config.crop)
         except PhasedicError as error:
             self._opened.put(error)
             raise
         try:
-            self._is_open(rig.camera)
+            self._camera_opened(rig.camera)
             with rig.camera:
                 self._drain(rig.camera)
         finally:
             self._camera = None
             rig.close()
 
-    def _is_open(self, camera: Camera) -> None:
+    def _camera_opened(self, camera: Camera) -> None:
         with self._lock:
             self._camera, self.info = camera, camera.info
             self._recent.clear()
@@ -156,20 +157,20 @@ class CameraPreview:
     def _drain(self, camera: Camera) -> None:
         due = 0.0
         for frame in camera:
-            if self._leave.is_set() or self._again.is_set():
+            if self._closing.is_set() or self._reopen.is_set():
                 return
             if not frame.damaged:
-                self._take(frame)
+                self._keep(frame)
             if time.monotonic() >= due:
                 due = self._on_frame(frame)
 
-    def _take(self, frame: Frame) -> None:
+    def _keep(self, frame: Frame) -> None:
         self.trouble = ""
         with self._lock:
             self._recent.append(frame)
             if self._collected is not None and len(self._collected) != self._collected.maxlen:
                 self._collected.append(frame)
 
-    def _heard(self, event: Event) -> None:
+    def _on_event(self, event: Event) -> None:
         if event.level != "info":
             self.trouble = printable(brief(event.text))

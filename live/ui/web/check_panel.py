@@ -1,4 +1,4 @@
-"""What a judgement of the still specimen is on the page: plain values, and colours."""
+"""The check of the still specimen as the page shows it: plain values and colours."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from live.setup.check.verdict import CheckLine
 from live.ui.web.painting import traffic_light
 
 GOOD, BAD = 50e-6, 1000e-6
-"""Strain noise of a ZOI that is shown green, and red."""
+"""Strain noise of a ZOI that is shown green, and that is shown red."""
 
 
-def shots_of(frames: Sequence[Frame], info: CameraInfo) -> FrameStack:
-    """Frames in a row as what is judged."""
+def frame_stack(frames: Sequence[Frame], info: CameraInfo) -> FrameStack:
+    """Consecutive frames as the input of the check."""
     lost = sum(frame.lost_before for frame in frames[1:])
     return FrameStack(np.stack([f.image for f in frames]), np.array([f.t for f in frames]), lost, info)
 
 
-def quality(figures: CheckFigures) -> NDArray[np.uint8]:
-    """Colours of the ZOIs by their predicted strain noise; none where nothing is asked for."""
+def quality_colours(figures: CheckFigures) -> NDArray[np.uint8]:
+    """Colours of the ZOIs by their predicted strain noise; transparent outside the region."""
     cells = traffic_light(figures.zois.sigma, GOOD, BAD)
     cells[~figures.zois.grid.active] = 0
     return cells
 
 
 def camera_values(info: CameraInfo) -> dict[str, Any]:
-    """What is known of the camera, and what can be turned at it."""
+    """The camera, and its settings that can be changed."""
     return {
         "name": printable(info.name),
         "width": info.width,
@@ -52,7 +52,7 @@ def line_values(line: CheckLine) -> dict[str, Any]:
 
 
 def table_values(figures: CheckFigures) -> dict[str, Any]:
-    """The strain noise of one ZOI, by its size and by bursts, at the order of the test."""
+    """The strain noise of one ZOI by its size and the burst, at the order of the test."""
     bursts = sorted({noise.burst for floor in figures.floors for noise in floor.noises})
     rows = [
         {
@@ -69,13 +69,13 @@ def table_values(figures: CheckFigures) -> dict[str, Any]:
 
 
 def figure_values(figures: CheckFigures) -> dict[str, Any]:
-    """The figures that change while lens and light are turned."""
-    known = figures.zois.sigma[np.isfinite(figures.zois.sigma)]
+    """The figures that change while lens and light are adjusted."""
+    sigma = figures.zois.sigma[np.isfinite(figures.zois.sigma)]
     return {
         "sharpness": figures.sharpness,
         "saturated": figures.exposure.saturated,
         "light": figures.exposure.high,
         "noise_GL": figures.noise,
-        "sigma": float(np.median(known)) if known.size else None,
+        "sigma": float(np.median(sigma)) if sigma.size else None,
         "zois": figures.zois.grid.n_active,
     }

@@ -1,4 +1,4 @@
-"""The rig as it is being set up: what was given, and what has been changed on the page and not saved yet."""
+"""The configuration during set-up: as it was loaded, with the changes that are not saved yet."""
 
 from __future__ import annotations
 
@@ -29,7 +29,11 @@ CHANGEABLE = frozenset(
 )  # fmt: skip
 """Keys that a page may change, beside gauges."""
 
-OF_TODAY = ("output.", "view.")
+TRANSIENT = ("output.", "view.")
+"""Keys of the command line with these beginnings are not saved."""
+
+_SAFE = "/:,@+-_.*~"
+_NUMBERED = re.compile(r"^(.*?)-?(\d{1,6})$")
 
 
 class ConfigDraft:
@@ -38,38 +42,38 @@ class ConfigDraft:
     Parameters
     ----------
     given : Config
-        As the file and the command line have it.
+        Of the file and the command line.
     path : Path
-        Of the rig file; need not be there yet.
-    said : mapping of "section.key" to value
-        What the command line says: saved with the rest, but for what is of this time alone (``OF_TODAY``).
+        Of the rig file; it need not exist yet.
+    overrides : mapping of "section.key" to value
+        Of the command line: saved with the changes, except for ``TRANSIENT``.
 
     Attributes
     ----------
     changes : dict of "section.key" to value
-        Not saved yet; None takes a key out.
+        Not saved yet; None removes a key.
     """
 
-    def __init__(self, given: Config, path: Path, said: Mapping[str, Any]) -> None:
+    def __init__(self, given: Config, path: Path, overrides: Mapping[str, Any]) -> None:
         self.path = path
-        self._of_today = {key: value for key, value in said.items() if key.startswith(OF_TODAY)}
+        self._transient = {key: value for key, value in overrides.items() if key.startswith(TRANSIENT)}
         in_file = settings_in(path) if path.exists() else {}
-        lasting = {key: value for key, value in said.items() if key not in self._of_today}
-        self.changes: dict[str, Any] = {key: v for key, v in lasting.items() if in_file.get(key) != v}
+        permanent = {key: value for key, value in overrides.items() if key not in self._transient}
+        self.changes: dict[str, Any] = {key: v for key, v in permanent.items() if in_file.get(key) != v}
         self._config = given
 
     @property
     def config(self) -> Config:
-        """With all changes."""
+        """The configuration with all changes."""
         return self._config
 
     def change_all(self, changes: Mapping[str, Any]) -> None:
-        """Change keys, all or none; raises ConfigError where a value is impossible, and nothing is changed then."""
+        """Change keys, all or none; raises ConfigError for an invalid value, and changes nothing then."""
         tree: dict[str, Any] = json.loads(json.dumps(self._config.as_dict()))
         for dotted, value in changes.items():
             section, _, key = dotted.partition(".")
             if section != "gauges" and dotted not in CHANGEABLE:
-                raise ConfigError(f"{dotted} is not changed here; change it in {self.path}")
+                raise ConfigError(f"{dotted} cannot be changed here; change it in {self.path}")
             if value is None:
                 tree[section].pop(key, None)
             else:
@@ -78,21 +82,21 @@ class ConfigDraft:
         self.changes |= changes
 
     def save(self, mask: NDArray[np.bool_] | None) -> None:
-        """Write the changes into the rig file, the old one kept beside it; ``mask`` as a picture beside it.
+        """Write the changes into the rig file and ``mask`` into a picture beside it; the old rig file is kept.
 
         Raises
         ------
         ConfigError
-            It cannot be written; then nothing is changed.
+            A file cannot be written; then nothing is changed.
         """
         if mask is not None:
-            self.change_all({"measure.mask": str(self._mask_beside(mask))})
+            self.change_all({"measure.mask": str(self._write_mask(mask))})
         write_rig(self.path, self.changes)
-        self._config = load_config(self.path, self._of_today)
+        self._config = load_config(self.path, self._transient)
         self.changes = {}
 
-    def _mask_beside(self, mask: NDArray[np.bool_]) -> Path:
-        """A new file each time: a rig file kept as .bak still means its own."""
+    def _write_mask(self, mask: NDArray[np.bool_]) -> Path:
+        """Write a new file each time: a rig file kept as .bak refers to the old one."""
         stem = self.path.resolve().with_suffix("")
         tries = (stem.with_name(f"{stem.name}-mask-{n}.png") for n in range(1, 10_000))
         path = next(one for one in tries if not one.exists())
@@ -104,17 +108,14 @@ class ConfigDraft:
 
 
 def with_setting(address: str, key: str, value: float) -> str:
-    """The address with one of its settings changed."""
-    known = dict(parse_address(address).settings) | {key: f"{value:g}"}
+    """The address with one setting changed."""
+    settings = dict(parse_address(address).settings) | {key: f"{value:g}"}
     body = address.partition("?")[0] if parse_address(address).settings else address
-    return f"{body}?{'&'.join(f'{k}={quote(v, safe=_SAFE)}' for k, v in known.items())}"
+    return f"{body}?{'&'.join(f'{k}={quote(v, safe=_SAFE)}' for k, v in settings.items())}"
 
 
-_SAFE = "/:,@+-_.*~"
-
-
-def still(address: str) -> str:
-    """The address of a rig that is looked at and not pulled: a simulated one would begin by itself."""
+def at_rest(address: str) -> str:
+    """The address of a rig without load: a simulated test would start by itself."""
     if parse_address(address).scheme != "sim":
         return address
     for key, value in (("max_strain", 0.0), ("seconds", 3600.0), ("hold", 1.0), ("end", 1.0)):
@@ -122,12 +123,9 @@ def still(address: str) -> str:
     return address
 
 
-NUMBERED = re.compile(r"^(.*?)-?(\d{1,6})$")
-
-
-def counted_up(name: str) -> str:
+def next_name(name: str) -> str:
     """The name of the next specimen: bar-7 after bar-6."""
-    found = NUMBERED.match(name)
+    found = _NUMBERED.match(name)
     if found is None:
         return f"{name}-2"
     stem, number = found[1], found[2]

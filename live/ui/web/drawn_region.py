@@ -1,6 +1,6 @@
-"""The region as it is drawn: strokes of the mouse, in px of the picture, made into a mask.
+"""The drawn region: strokes of the mouse, in px of the picture, made into a mask.
 
-The centre of the pixel in column i and row j is at (i, j). A pixel belongs to a shape where its centre does.
+The centre of the pixel in column i and row j is at (i, j). A pixel belongs to a shape where its centre lies in it.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +18,8 @@ from acquire.errors import ConfigError
 from analysis.evaluate import inside_polygon
 
 TOOLS = ("rectangle", "polygon", "brush", "eraser")
-MOST_POINTS = 5000
-_KEPT = 12  # masks that can be gone back to
+MAX_POINTS = 5000
+_MAX_UNDO = 12  # masks kept for undo
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -34,11 +34,11 @@ class Stroke:
     tool : str
         One of ``TOOLS``.
     points : (N, 2) float64, px
-        x, y: two opposite corners, the corners of a polygon, or the way of a brush.
+        x, y: two opposite corners, the corners of a polygon, or the path of a brush.
     radius : float, px
         Of a brush or eraser.
     add : bool
-        Whether a rectangle or polygon adds to what is there; else the region is that shape alone.
+        Whether a rectangle or polygon is added to the region; else it replaces the region.
     """
 
     tool: str
@@ -47,19 +47,19 @@ class Stroke:
     add: bool
 
     @classmethod
-    def read(cls, said: Mapping[str, Any]) -> Stroke:
-        """From what a page has sent; raises ConfigError where it is no stroke."""
-        tool, points, radius = said.get("tool"), said.get("points"), said.get("radius", 8)
-        fewest = {"rectangle": 2, "polygon": 3}.get(str(tool), 1)
+    def parse(cls, request: Mapping[str, Any]) -> Stroke:
+        """A stroke as a page sends it; raises ConfigError where it is invalid."""
+        tool, points, radius = request.get("tool"), request.get("points"), request.get("radius", 8)
+        min_points = {"rectangle": 2, "polygon": 3}.get(str(tool), 1)
         if tool not in TOOLS:
             raise ConfigError(f"no such tool; there are {', '.join(TOOLS)}")
-        if not isinstance(points, list) or not fewest <= len(points) <= MOST_POINTS:
-            raise ConfigError(f"a {tool} has {fewest} to {MOST_POINTS} points")
-        if not all(isinstance(p, list) and len(p) == 2 and all(map(_is_place, p)) for p in points):
-            raise ConfigError("a point is two numbers, x and y in px")
-        if not _is_place(radius) or not 0.5 <= radius <= 1000:
+        if not are_points(points, min_points, MAX_POINTS):
+            raise ConfigError(
+                f"a {tool} has {min_points} to {MAX_POINTS} points, each two numbers, x and y in px"
+            )
+        if not _is_coordinate(radius) or not 0.5 <= radius <= 1000:
             raise ConfigError("a brush has a radius from 0.5 to 1000 px")
-        return cls(str(tool), np.array(points, np.float64), float(radius), said.get("add") is True)
+        return cls(str(tool), np.array(points, np.float64), float(radius), request.get("add") is True)
 
     def drawn_on(self, mask: Bools) -> Bools:
         """The mask after this stroke."""
@@ -82,18 +82,27 @@ class Stroke:
         elif self.tool == "polygon":
             found[rows, columns] = inside_polygon(x, y, self.points)
         else:
-            found[rows, columns] = near_way(x, y, self.points, self.radius)
+            found[rows, columns] = near_path(x, y, self.points, self.radius)
         return found
 
 
-def _is_place(value: object) -> bool:
+def are_points(value: object, min_points: int = 2, max_points: int = 2) -> TypeGuard[list[list[Any]]]:
+    """Whether a value from a page is a list of so many points ``[x, y]`` in px."""
+    return (
+        isinstance(value, list)
+        and min_points <= len(value) <= max_points
+        and all(isinstance(p, list) and len(p) == 2 and all(map(_is_coordinate, p)) for p in value)
+    )
+
+
+def _is_coordinate(value: object) -> TypeGuard[float]:
     return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e6
 
 
-def near_way(x: Floats, y: Floats, way: Floats, radius: float) -> Bools:
-    """Whether the points lie within ``radius`` of the line through the points of ``way``."""
-    near = np.hypot(x - way[0, 0], y - way[0, 1]) <= radius
-    for (x0, y0), (x1, y1) in itertools.pairwise(way):
+def near_path(x: Floats, y: Floats, path: Floats, radius: float) -> Bools:
+    """Whether the points lie within ``radius`` of the line through the points of ``path``."""
+    near = np.hypot(x - path[0, 0], y - path[0, 1]) <= radius
+    for (x0, y0), (x1, y1) in itertools.pairwise(path):
         length = (x1 - x0) ** 2 + (y1 - y0) ** 2
         along = ((x - x0) * (x1 - x0) + (y - y0) * (y1 - y0)) / length if length else np.zeros(x.shape)
         along = np.clip(along, 0.0, 1.0)
@@ -102,32 +111,32 @@ def near_way(x: Floats, y: Floats, way: Floats, radius: float) -> Bools:
 
 
 class DrawnRegion:
-    """A region that is drawn on, stroke by stroke; the last ones can be undone.
+    """A region that changes stroke by stroke; the last strokes can be undone.
 
     Parameters
     ----------
     mask : (H, W) bool
-        To begin with.
-    words : str
-        Where that comes from.
+        At the beginning.
+    origin : str
+        What the mask was made from, for a person.
     """
 
-    def __init__(self, mask: Bools, words: str) -> None:
-        self._masks: list[tuple[Bools, str]] = [(mask, words)]
+    def __init__(self, mask: Bools, origin: str) -> None:
+        self._masks: list[tuple[Bools, str]] = [(mask, origin)]
 
     @property
     def mask(self) -> Bools:
-        """(H, W) bool: what is measured."""
+        """(H, W) bool: the measured pixels."""
         return self._masks[-1][0]
 
     @property
-    def words(self) -> str:
-        """Where it comes from, for a person."""
+    def origin(self) -> str:
+        """What the mask was made from, for a person."""
         return self._masks[-1][1]
 
     @property
     def box(self) -> tuple[int, int, int, int] | None:
-        """x, y, width, height of what is drawn, px; None where nothing is."""
+        """x, y, width, height of the region, px; None where it is empty."""
         rows, columns = np.flatnonzero(self.mask.any(axis=1)), np.flatnonzero(self.mask.any(axis=0))
         if not rows.size:
             return None
@@ -136,23 +145,23 @@ class DrawnRegion:
 
     @property
     def is_box(self) -> bool:
-        """Whether it is all of its box."""
+        """Whether the region is a rectangle."""
         box = self.box
         return box is not None and int(self.mask.sum()) == box[2] * box[3]
 
-    def draw(self, said: Sequence[Mapping[str, Any]]) -> None:
-        """Draw strokes; raises ConfigError, and nothing is drawn, where one of them is none."""
+    def draw(self, strokes: Sequence[Mapping[str, Any]]) -> None:
+        """Draw strokes; raises ConfigError where one is invalid, and draws none then."""
         mask = self.mask
-        for stroke in [Stroke.read(one) for one in said]:
+        for stroke in [Stroke.parse(one) for one in strokes]:
             mask = stroke.drawn_on(mask)
-        self.take(mask, "as drawn")
+        self.replace(mask, "as drawn")
 
-    def take(self, mask: Bools, words: str) -> None:
-        """Another mask, of the same size."""
-        kept = self._masks[-_KEPT:]
-        self._masks = [*kept, (mask, words)]
+    def replace(self, mask: Bools, origin: str) -> None:
+        """Replace the mask by another of the same size."""
+        kept = self._masks[-_MAX_UNDO:]
+        self._masks = [*kept, (mask, origin)]
 
     def undo(self) -> None:
-        """Take the last change back."""
+        """Undo the last change."""
         if len(self._masks) > 1:
             self._masks.pop()

@@ -1,9 +1,7 @@
-"""The page as a consumer of a run: numbers ten times a second, a map four times a second, points as they settle.
+"""The page as a consumer of a run: state ten times a second, a map four times a second, points of the curves.
 
-The measuring thread only leaves the measurement in a place; everything else is done by the consumer's own
-thread, and the map is made only while a page is open.
-
-The points of the curves, bounded: a long test is thinned evenly, and a page then asks for all of it anew.
+The measuring thread only stores the measurement; the thread of the consumer does everything else, and draws the
+map only while a page is open.
 """
 
 from __future__ import annotations
@@ -28,57 +26,17 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import Snapshot
 from live.results.maps.field_maps import FIELD_MAPS, FieldMaps, Painted
-from live.results.maps.painting import lay_cells
+from live.results.maps.painting import overlay_cells
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.painting import as_jpeg, shrunk
 
-MOST_POINTS = 4000
-
-
-class CurveHistory:
-    """Rows of numbers by growing time.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Of the columns.
-    """
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self._names = list(names)
-        self._rows: Thinned[Sequence[float]] = Thinned(MOST_POINTS)
-        self._lock = threading.Lock()
-
-    def add(self, row: Sequence[float]) -> None:
-        """Take a row, or let it go where the curve has become long."""
-        with self._lock:
-            self._rows.append(row)
-
-    @property
-    def place(self) -> tuple[int, int]:
-        """Edition (what a page has of another is of no use) and number of rows."""
-        with self._lock:
-            return self._rows.halvings, len(self._rows.kept)
-
-    def since(self, edition: int, count: int) -> dict[str, Any]:
-        """What a page lacks that has ``count`` rows of ``edition``."""
-        with self._lock:
-            first = count if edition == self._rows.halvings else 0
-            return {
-                "names": self._names,
-                "edition": self._rows.halvings,
-                "first": first,
-                "rows": self._rows.kept[first:],
-            }
-
-
+MAX_POINTS, MAX_EVENTS = 4000, 30
 STATE_S, PICTURE_S = 0.1, 0.25
 """Between states and between pictures."""
-MOST_EVENTS = 30
 
 
 class Running(Protocol):
-    """What is asked of a run."""
+    """What the page reads of a run."""
 
     @property
     def paused(self) -> bool: ...
@@ -94,7 +52,7 @@ class Running(Protocol):
 
 
 class PageConsumer(Consumer):
-    """Tells the pages how a run stands.
+    """Sends the state of a run to the pages.
 
     Parameters
     ----------
@@ -105,13 +63,13 @@ class PageConsumer(Consumer):
     Attributes
     ----------
     picture : bytes
-        The newest picture with its map, a JPEG.
+        The newest picture with its map, as JPEG.
     curve : CurveHistory
     """
 
     name = "page"
     policy = Policy.NEWEST
-    patience_s = 5.0
+    timeout_s = 5.0
 
     def __init__(
         self, broadcaster: Broadcaster, config: Config, now: Callable[[], float] = time.monotonic
@@ -130,88 +88,85 @@ class PageConsumer(Consumer):
         self._newest: Measurement | None = None
         self._frame: Frame | None = None
         self._fresh = False
-        self._events: deque[tuple[float, dict[str, Any]]] = deque(maxlen=MOST_EVENTS)
-        self._began = now()
+        self._events: deque[tuple[float, dict[str, Any]]] = deque(maxlen=MAX_EVENTS)
+        self._start_t = now()
         self._t0 = math.nan
         self._due = {"state": 0.0, "picture": 0.0}
 
-    def attend(self, running: Running) -> None:
-        """The run has begun, and can be asked."""
-        self._running, self._began = running, running.run_state.health.began_t
+    def attach(self, running: Running) -> None:
+        """Use ``running``, which has begun."""
+        self._running, self._start_t = running, running.run_state.health.began_t
 
-    def choose(self, component: str) -> str:
-        """Show another map; a refusal in words, or empty."""
+    def select_map(self, component: str) -> str:
+        """Show another map; the reason of a refusal, or empty."""
         if component not in FIELD_MAPS:
             return f"there is no map {component!r}; there are {', '.join(FIELD_MAPS)}"
         self._component, self._fresh = component, True
         return ""
 
-    # -- what a run gives ---------------------------------------------------------------------
+    # -- data of a run ------------------------------------------------------------------------
 
     def measurement(self, measurement: Measurement) -> None:
-        """Keep the newest."""
+        """Keep the newest measurement."""
         self._newest, self._fresh = measurement, True
 
-    def settled(self, measurement: Measurement) -> None:
-        """A point of the curves."""
+    def matched(self, measurement: Measurement) -> None:
+        """Add a point of the curves."""
         i = measurement.time_step
         if math.isnan(self._t0):
             self._t0 = i.t
-        axis = (
-            self._running.run_state.history.axis_by_now if self._running else self._config.specimen.first_axis
-        )
-        gauges = [
-            i.gauges[name].value if name in i.gauges else getattr(i, name, math.nan) for name in self._names
-        ]
+        running, first_axis = self._running, self._config.specimen.first_axis
+        axis = first_axis if running is None else running.run_state.history.current_axis
+        strains = [i.gauges[n].value if n in i.gauges else getattr(i, n, math.nan) for n in self._names]
         stress = i.force / (self._config.specimen.area_m2 or 1.0)
-        self.curve.add([i.t - self._t0, stress, i.axial(axis)[0], *gauges])
+        self.curve.add([i.t - self._t0, stress, i.axial(axis)[0], *strains])
 
     def frame(self, frame: Frame) -> None:
-        """Keep the newest, to be shown until something is measured."""
+        """Keep the newest frame, shown until something is measured."""
         if self._newest is None and not frame.damaged:
             self._frame, self._fresh = frame, True
 
     def event(self, event: Event) -> None:
-        """Keep the last ones."""
+        """Keep the last events."""
         if event.kind is EventKind.MEASURED:
             return
         names = {} if self._running is None else self._running.run_state.event_log.names
         text = printable(sentence(event, names))
-        told = {"level": event.level, "kind": str(event.kind), "text": text}
-        self._events.append((self._now(), told))
+        self._events.append((self._now(), {"level": event.level, "kind": str(event.kind), "text": text}))
 
     def idle(self) -> float:
-        """Tell and draw what is due."""
+        """Send and draw what is due."""
         now = self._now()
         if now >= self._due["state"]:
             self._due["state"] = now + STATE_S
-            self._broadcaster.tell("run", self.state())
-        if now >= self._due["picture"] and self._fresh and self._broadcaster.watched:
+            self._broadcaster.publish("run", self.state())
+        if now >= self._due["picture"] and self._fresh and self._broadcaster.open_pages:
             self._draw()
-            # No more than a fifth of the time is spent on drawing, however large the pictures are.
+            # Drawing takes at most a fifth of the time, also with large pictures.
             self._due["picture"] = max(now + PICTURE_S, self._now() + 4 * (self._now() - now))
         return STATE_S
 
     def end(self) -> str:
-        """A last word to the pages."""
-        self._broadcaster.tell("run", self.state() | {"state": "ended"})
+        """Send the last state."""
+        self._broadcaster.publish("run", self.state() | {"state": "ended"})
         return f"{self._shown} pictures shown"
 
-    # -- what is told -------------------------------------------------------------------------
+    # -- messages to the page -----------------------------------------------------------------
 
     def state(self) -> dict[str, Any]:
-        """Where the run stands."""
+        """The state of the run, as the page shows it."""
         running, now = self._running, self._now()
-        s = Snapshot(now, elapsed_s=now - self._began) if running is None else running.run_state.snapshot(now)
-        told: dict[str, Any] = {
-            "state": self._word(s),
+        elapsed_s = now - self._start_t
+        s = Snapshot(now, elapsed_s=elapsed_s) if running is None else running.run_state.snapshot(now)
+        values: dict[str, Any] = {
+            "state": self._state_name(s),
             "elapsed_s": s.elapsed_s,
             "force_N": s.force_N,
             "peak_N": s.peak_N,
             "stress_Pa": s.stress_Pa,
-            "points": self.curve.place,
+            "points": self.curve.position,
             "picture": {"n": self._shown, "of": self._component, **self._scale},
-            "events": [{"s": max(at - self._began, 0.0), **event} for at, event in self._events],
+            "events": [{"s": max(at - self._start_t, 0.0), **event} for at, event in self._events],
             "late_s": s.latency_p95_s,
             "fps": s.fps,
             "ledger": s.frames,
@@ -219,10 +174,10 @@ class PageConsumer(Consumer):
             "disk_min": s.disk_s / 60,
         }
         if running is not None:
-            told |= {"recording": running.recording, "folder": str(running.folder)}
-        return told | _measured(s)
+            values |= {"recording": running.recording, "folder": str(running.folder)}
+        return values | _measured(s)
 
-    def _word(self, s: Snapshot) -> str:
+    def _state_name(self, s: Snapshot) -> str:
         if self._running is None:
             return "opening"
         if s.time_step is None:
@@ -235,7 +190,7 @@ class PageConsumer(Consumer):
         if m is not None:
             picture, scale = shrunk(m.burst.mean, m.burst.bits)
             painted = self._maps.paint(m.field, (self._component,))[self._component]
-            lay_cells(picture, scale, m.field.grid, painted.rgba, (m.time_step.u, m.time_step.v))
+            overlay_cells(picture, scale, m.field.grid, painted.rgba, (m.time_step.u, m.time_step.v))
             self._scale = _scale_of(painted)
             size = m.burst.mean.shape
         elif frame is not None:
@@ -243,13 +198,50 @@ class PageConsumer(Consumer):
             size = frame.image.shape
         else:
             return
-        self._scale |= {"width": size[1], "height": size[0], "gauges": gauges_of(self._config)}
+        self._scale |= {"width": size[1], "height": size[0], "gauges": gauge_shapes(self._config)}
         self.picture = as_jpeg(picture)
         self._shown += 1
 
 
+class CurveHistory:
+    """Rows of numbers by time, bounded: a long test is thinned evenly, and a page then requests all rows again.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the columns.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = list(names)
+        self._rows: Thinned[Sequence[float]] = Thinned(MAX_POINTS)
+        self._lock = threading.Lock()
+
+    def add(self, row: Sequence[float]) -> None:
+        """Add a row; a long curve is thinned."""
+        with self._lock:
+            self._rows.append(row)
+
+    @property
+    def position(self) -> tuple[int, int]:
+        """Edition (rows of another edition are useless) and number of rows."""
+        with self._lock:
+            return self._rows.halvings, len(self._rows.kept)
+
+    def since(self, edition: int, count: int) -> dict[str, Any]:
+        """The rows that a page with ``count`` rows of ``edition`` lacks."""
+        with self._lock:
+            first = count if edition == self._rows.halvings else 0
+            return {
+                "names": self._names,
+                "edition": self._rows.halvings,
+                "first": first,
+                "rows": self._rows.kept[first:],
+            }
+
+
 def _scale_of(painted: Painted) -> dict[str, Any]:
-    """What the colours of a map stand for, as the page shows it."""
+    """The colour scale of a map, as the page shows it."""
     scale = painted.scale
     if scale is not None:
         return {"low": scale.low, "high": scale.high, "unit": scale.unit}
@@ -257,7 +249,7 @@ def _scale_of(painted: Painted) -> dict[str, Any]:
     return {"legend": legend}
 
 
-def gauges_of(config: Config) -> dict[str, Any]:
+def gauge_shapes(config: Config) -> dict[str, Any]:
     """The gauges of a configuration as the page draws them: kind, handles and lines, px."""
     found = complete_gauges(config.gauges, config.specimen.first_axis)
     zoi = config.measure.zoi

@@ -1,9 +1,7 @@
-"""The operator's desk: set up, run, after, and again; what each stage shows, and which orders it takes.
+"""The stages of the page: set-up, run, after, and again; what each shows, and which commands it accepts.
 
-An order is the same line from the page as from the keyboard (``live.run``). Before and after a test there
+A command is the same line from the page as from the keyboard (``live.run.control``). Before and after a test there
 are ``start``, ``next`` and ``quit``.
-
-What the page shows of a test that has ended.
 """
 
 from __future__ import annotations
@@ -32,12 +30,12 @@ from live.results.summary import summary_lines
 from live.run.control import Controls, answer
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.config_draft import ConfigDraft, counted_up
+from live.ui.web.config_draft import ConfigDraft, next_name
 from live.ui.web.draft_changes import CHANGES
 from live.ui.web.drawn_region import DrawnRegion
 from live.ui.web.page_consumer import PageConsumer, Running
 from live.ui.web.painting import RAMP, as_png
-from live.ui.web.server import ALONE, DEFAULT_PORT, PageServer, Response, jpeg, of_json
+from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response, json_response
 from live.ui.web.setup_session import SetupSession
 
 SET_UP, RUN, AFTER = "setup", "run", "after"
@@ -47,26 +45,26 @@ GOODBYE_S = 0.5
 
 
 class ControlledRun(Controls, Running, Protocol):
-    """A run that takes orders."""
+    """A run that accepts commands."""
 
 
 class PageController:
-    """The page and its server, until it is left.
+    """The page and its server.
 
     Parameters
     ----------
     draft : ConfigDraft or None
-        None: there is nothing to set up, a run is watched.
+        None: there is no set-up, the page only shows a run.
     port : int
 
     Attributes
     ----------
     stage : str
     session : SetupSession or None
-        While it is set up.
+        During set-up.
     server : PageServer
     viewer : callable
-        Opens a viewer of the view at a port; its answer.
+        Opens a viewer at the port of the view; returns the answer for the page.
     """
 
     def __init__(self, draft: ConfigDraft | None, port: int = DEFAULT_PORT) -> None:
@@ -75,13 +73,13 @@ class PageController:
         self.session: SetupSession | None = None
         self._drawn: DrawnRegion | None = None
         self._broadcaster = Broadcaster()
-        self._watching: PageConsumer | None = None
+        self._consumer: PageConsumer | None = None
         self._live: ControlledRun | None = None
         self._report: Path | None = None
-        self._after: dict[str, Any] = {}
-        self._wishes: queue.SimpleQueue[str] = queue.SimpleQueue()
+        self._result: dict[str, Any] = {}
+        self._requests: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._folder = TemporaryDirectory(prefix="phasedic-")
-        self._said = ""
+        self._message = ""
         self.viewer: Callable[[int], str] = lambda port: "no: there is no viewer here"
         gets = {
             "/points": self._points,
@@ -89,45 +87,45 @@ class PageController:
             "/mask": self._mask,
             "/report": self._show_report,
         }
-        posts = {"/order": self._order, "/setup": self._change, "/map": self._map, "/viewer": self._viewer}
+        posts = {"/order": self._command, "/setup": self._change, "/map": self._map, "/viewer": self._viewer}
         self.server = PageServer(self._broadcaster, gets, posts, port)
-        self._tell_stage()
+        self._publish_stage()
 
     def __enter__(self) -> PageController:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._broadcaster.tell("gone", True)  # of its own kind: a page must still hear of the stage before
+        self._broadcaster.publish("gone", True)  # a separate kind: it must not replace the last stage
         threading.Event().wait(GOODBYE_S)
         self.server.close()
         self._folder.cleanup()
 
     @property
     def address(self) -> str:
-        """What a person opens in a browser."""
+        """The address that a person opens in a browser."""
         return self.server.address
 
     def quit(self) -> None:
-        """Leave the set-up, or what comes after a test."""
-        self._wishes.put(QUIT)
+        """End the set-up, or the stage after a test."""
+        self._requests.put(QUIT)
 
     # -- the stages ---------------------------------------------------------------------------
 
-    def set_up(self, words: str = "") -> Config | None:
-        """Let the rig be set up until a test is started; its configuration, or None to quit.
+    def set_up(self, message: str = "") -> Config | None:
+        """Set up the rig until a test is started; its configuration, or None to quit.
 
         Parameters
         ----------
-        words : str
-            Said to the operator, such as why the last test did not begin.
+        message : str
+            A message to the operator, such as why the last test did not begin.
         """
         assert self.draft is not None
         if not self.draft.config.metadata.get("specimen"):
-            self.draft.change_all({"metadata.specimen": self._unused(FIRST)})
+            self.draft.change_all({"metadata.specimen": self._free_name(FIRST)})
         with SetupSession(self.draft, self._broadcaster, self._drawn) as session:
             self.session = session
-            self._enter(SET_UP, words)
-            started = self._wishes.get() == START
+            self._enter(SET_UP, message)
+            started = self._requests.get() == START
         self.session, self._drawn = None, session.drawn
         return self._to_run(session) if started else None
 
@@ -139,80 +137,81 @@ class PageController:
         return replace(config, output=replace(config.output, dir=str(folder)))
 
     def _folder_of(self, name: str) -> Path:
-        """Of the files of a specimen of that name."""
+        """The folder for the files of a specimen."""
         assert self.draft is not None
-        plain = re.sub(r"[^\w.-]+", "_", name).strip("._-")[:80]
-        return Path(self.draft.config.output.dir or "runs") / (plain or FIRST)
+        folder = re.sub(r"[^\w.-]+", "_", name).strip("._-")[:80]
+        return Path(self.draft.config.output.dir or "runs") / (folder or FIRST)
 
-    def _unused(self, name: str) -> str:
-        """The first name from here on whose folder is not there."""
+    def _free_name(self, name: str) -> str:
+        """The first name from ``name`` on whose folder does not exist."""
         while self._folder_of(name).exists():
-            name = counted_up(name)
+            name = next_name(name)
         return name
 
     def begin(self, config: Config) -> PageConsumer:
-        """A run begins; what is to watch it."""
-        self._watching, self._live = PageConsumer(self._broadcaster, config), None
+        """Begin the stage of the run; the consumer of its data."""
+        self._consumer, self._live = PageConsumer(self._broadcaster, config), None
         self._enter(RUN, "")
-        return self._watching
+        return self._consumer
 
-    def attend(self, live: ControlledRun) -> None:
-        """The run takes orders from now on."""
+    def attach(self, live: ControlledRun) -> None:
+        """Pass commands to ``live`` from now on."""
         self._live = live
-        if self._watching is not None:
-            self._watching.attend(live)
+        if self._consumer is not None:
+            self._consumer.attach(live)
 
-    def end(self, told: Mapping[str, Any]) -> None:
-        """The run has ended."""
+    def end(self, result: Mapping[str, Any]) -> None:
+        """Begin the stage after the run and show its ``result``."""
         self._live, self._report = None, None
         name = None
         if self.draft is not None:
-            name = self._unused(counted_up(str(self.draft.config.metadata.get("specimen", FIRST))))
-        self._after = {**told, "report": False, "next": name}
-        self._broadcaster.tell("after", self._after)
+            name = self._free_name(next_name(str(self.draft.config.metadata.get("specimen", FIRST))))
+        self._result = {**result, "report": False, "next": name}
+        self._broadcaster.publish("after", self._result)
         self._enter(AFTER, "")
 
     def reported(self, report: Path | None) -> None:
-        """The report of the last run is there, or could not be made."""
+        """Show that the report of the last run exists, or (None) that it could not be made."""
         self._report = report
-        self._after |= {"report": report is not None}
-        self._broadcaster.tell("after", self._after)
+        self._result |= {"report": report is not None}
+        self._broadcaster.publish("after", self._result)
 
     def after(self) -> bool:
-        """Wait for the operator; whether a next specimen is to be set up."""
+        """Wait for the operator; whether a next specimen follows."""
         assert self.draft is not None
-        if self._wishes.get() != NEXT:
+        if self._requests.get() != NEXT:
             return False
-        self.draft.change_all({"metadata.specimen": self._after["next"]})
+        self.draft.change_all({"metadata.specimen": self._result["next"]})
         return True
 
-    def _enter(self, stage: str, words: str) -> None:
-        self.stage, self._said = stage, printable(words)
-        self._wishes = queue.SimpleQueue()
-        self._tell_stage()
+    def _enter(self, stage: str, message: str) -> None:
+        self.stage, self._message = stage, printable(message)
+        self._requests = queue.SimpleQueue()
+        self._publish_stage()
 
-    def _tell_stage(self) -> None:
-        said = {"stage": self.stage, "words": self._said, "alone": self.draft is None}
+    def _publish_stage(self) -> None:
+        stage = {"stage": self.stage, "words": self._message, "alone": self.draft is None}
         kinds = [
             {"kind": name, "label": one.label, "hint": one.hint, "gesture": one.gesture}
             for name, one in GAUGE_KINDS.items()
         ]
-        self._broadcaster.tell("stage", said | {"components": FIELD_MAPS, "ramp": RAMP, "kinds": kinds})
+        self._broadcaster.publish("stage", stage | {"components": FIELD_MAPS, "ramp": RAMP, "kinds": kinds})
 
-    # -- what a page asks ---------------------------------------------------------------------
+    # -- requests of the page -----------------------------------------------------------------
 
     def _points(self, query: Mapping[str, str]) -> Response:
-        if self._watching is None:
+        if self._consumer is None:
             raise HttpError(404, "nothing has been measured")
         edition, count = (query.get(key, "") for key in ("edition", "count"))
         if not all(word.isascii() and word.isdigit() and len(word) < 10 for word in (edition, count)):
             raise HttpError(400, "edition and count are whole numbers")
-        return of_json(self._watching.curve.since(int(edition), int(count)))
+        return json_response(self._consumer.curve.since(int(edition), int(count)))
 
     def _picture(self, query: Mapping[str, str]) -> Response:
-        session, watching = self.session, self._watching
-        content = session.picture if session is not None else b"" if watching is None else watching.picture
-        return jpeg(content) if content else Response(as_png(np.zeros((1, 1), np.uint8)), "image/png")
+        source = self.session or self._consumer
+        if source is not None and source.picture:
+            return jpeg_response(source.picture)
+        return Response(as_png(np.zeros((1, 1), np.uint8)), "image/png")
 
     def _mask(self, query: Mapping[str, str]) -> Response:
         if self.session is None:
@@ -222,61 +221,61 @@ class PageController:
     def _show_report(self, query: Mapping[str, str]) -> Response:
         if self._report is None:
             raise HttpError(404, "there is no report yet")
-        return Response(self._report.read_bytes(), "text/html; charset=utf-8", ALONE)
+        return Response(self._report.read_bytes(), "text/html; charset=utf-8", REPORT_POLICY)
 
-    def _map(self, said: Mapping[str, Any]) -> dict[str, str]:
-        refusal = (
-            "nothing is measured" if self._watching is None else self._watching.choose(str(said.get("of")))
-        )
+    def _map(self, request: Mapping[str, Any]) -> dict[str, str]:
+        if self._consumer is None:
+            return {"answer": "no: nothing is measured"}
+        refusal = self._consumer.select_map(str(request.get("of")))
         return {"answer": f"no: {refusal}" if refusal else "ok"}
 
-    def _viewer(self, said: Mapping[str, Any]) -> dict[str, str]:
-        """Open it at the port that the view has told: another than was wanted where that was taken."""
+    def _viewer(self, request: Mapping[str, Any]) -> dict[str, str]:
+        """Open the viewer at the actual port of the view, which may differ from the configured one."""
         port = None if self._live is None else self._live.run_state.health.view_port
         if port is None:
-            return {"answer": "no: the view is switched off, or not there yet; after a test see its view.rrd"}
+            return {"answer": "no: the view is switched off or not ready yet; after a test open its view.rrd"}
         return {"answer": self.viewer(port)}
 
-    def _order(self, said: Mapping[str, Any]) -> dict[str, str]:
-        """One line, one answer."""
-        line = said.get("line")
-        return {"answer": self._answered(line) if isinstance(line, str) else "no: an order is a line"}
+    def _command(self, request: Mapping[str, Any]) -> dict[str, str]:
+        """Run a command line."""
+        line = request.get("line")
+        return {"answer": self._answer_to(line) if isinstance(line, str) else "no: a command is a line"}
 
-    def _answered(self, line: str) -> str:
-        live, word = self._live, line.strip()
+    def _answer_to(self, line: str) -> str:
+        live, command = self._live, line.strip()
         if live is not None:
             return answer(line, live)
         if self.stage == RUN or (self.stage == SET_UP and self.session is None):
             return "no: the test is being opened"
         allowed = (START, QUIT) if self.stage == SET_UP else (NEXT, QUIT)
-        if word not in allowed or self.draft is None:
-            return f"no: now there are {', '.join(allowed)}"
+        if command not in allowed or self.draft is None:
+            return f"no: the commands of this stage are {', '.join(allowed)}"
         try:
-            if word == START and self.session is not None:
+            if command == START and self.session is not None:
                 self.session.ready(Path(self._folder.name))
         except PhasedicError as error:
             return f"no: {printable(brief(error))}"
-        self._wishes.put(word)
+        self._requests.put(command)
         return "ok"
 
-    def _change(self, said: Mapping[str, Any]) -> dict[str, str]:
-        """A change of the rig."""
+    def _change(self, request: Mapping[str, Any]) -> dict[str, str]:
+        """Run a change of the set-up."""
         session = self.session
         if session is None:
             return {"answer": "no: nothing is set up now"}
-        change = CHANGES.get(str(said.get("do")))
+        change = CHANGES.get(str(request.get("do")))
         if change is None:
-            return {"answer": f"no: there are {', '.join(CHANGES)}"}
+            return {"answer": f"no: the changes are {', '.join(CHANGES)}"}
         try:
-            change(session, said)
+            change(session, request)
         except (ConfigError, DataError) as error:
             return {"answer": f"no: {printable(brief(error))}"}
         session.refresh()
         return {"answer": "ok"}
 
 
-def ended(run_state: RunState, specimen: SpecimenConfig, folder: Path, words: str) -> dict[str, Any]:
-    """Figures, summary, ledger and losses; ``words`` say how the run ended, empty where it ended well."""
+def run_result(run_state: RunState, specimen: SpecimenConfig, folder: Path, words: str) -> dict[str, Any]:
+    """Figures, summary, frame counts and losses; ``words`` describe how the run ended, empty where it ended well."""
     figures = evaluate(run_state.history, run_state.loads, specimen) if run_state.history.time_steps else None
     troubles = run_state.event_log.events("warning", "error")
     return {

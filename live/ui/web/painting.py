@@ -1,4 +1,4 @@
-"""Small pictures for the page: grey levels, what is saturated of them, and the noise of ZOIs in colours."""
+"""Small pictures for the page: grey levels, saturated pixels, and the noise of ZOIs in colours."""
 
 from __future__ import annotations
 
@@ -11,20 +11,21 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from live.results.maps.colours import ramp
 
-MOST_SIDE = 960
-"""Of a picture, px; larger ones are shown smaller."""
+MAX_SIDE_PX = 960
+"""Of a picture; larger ones are reduced."""
+
 QUALITY = 80
-RED = (40, 40, 255)  # of OpenCV: blue, green, red
+RED = (40, 40, 255)  # blue, green, red
 
 Bytes = NDArray[np.uint8]
 RAMP = [f"#{bytes(row).hex()}" for row in ramp(11, 1)[:, 0]]
 """The colours of a map from its highest value down."""
 
 
-def shrunk(image: NDArray[Any], bits: int, most: int = MOST_SIDE) -> tuple[Bytes, float]:
-    """Grey levels as (h, w, 3) uint8, and how many px of it are one of ``image``."""
+def shrunk(image: NDArray[Any], bits: int, max_side_px: int = MAX_SIDE_PX) -> tuple[Bytes, float]:
+    """Grey levels as (h, w, 3) uint8, and the scale: its px for one of ``image``."""
     height, width = image.shape
-    scale = min(1.0, most / max(height, width))
+    scale = min(1.0, max_side_px / max(height, width))
     size = max(1, round(width * scale)), max(1, round(height * scale))
     cv2 = load_cv2()
     levels = np.asarray(image, np.float32)
@@ -35,7 +36,7 @@ def shrunk(image: NDArray[Any], bits: int, most: int = MOST_SIDE) -> tuple[Bytes
 
 
 def mark_saturated(picture: Bytes, scale: float, image: NDArray[Any], bits: int) -> None:
-    """Paint red what is at the end of the scale; one such pixel is seen in a shrunk picture too."""
+    """Paint saturated pixels red; a single one is visible in a reduced picture too."""
     rows, columns = np.nonzero(image >= 2**bits - 1)
     if rows.size:
         height, width = picture.shape[:2]
@@ -45,14 +46,14 @@ def mark_saturated(picture: Bytes, scale: float, image: NDArray[Any], bits: int)
 
 
 def as_jpeg(picture: Bytes) -> bytes:
-    """(h, w, 3) of OpenCV's order as a file."""
+    """(h, w, 3), blue, green, red, as the bytes of a file."""
     cv2 = load_cv2()
     _, content = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     return bytes(content)
 
 
 def as_png(picture: NDArray[Any]) -> bytes:
-    """A picture without loss as a file."""
+    """A picture as the bytes of a file, without loss."""
     _, content = load_cv2().imencode(".png", picture)
     return bytes(content)
 
@@ -60,10 +61,10 @@ def as_png(picture: NDArray[Any]) -> bytes:
 def traffic_light(values: NDArray[Any], good: float, bad: float) -> Bytes:
     """RGBA of ZOIs by their noise: green up to ``good``, yellow, red from ``bad`` and without a value."""
     with np.errstate(invalid="ignore", divide="ignore"):
-        place = np.clip(np.log(values / good) / math.log(bad / good), 0, 1)
-    place = np.where(np.isfinite(place), place, 1.0)[..., None]
+        share = np.clip(np.log(values / good) / math.log(bad / good), 0, 1)
+    share = np.where(np.isfinite(share), share, 1.0)[..., None]
     green, yellow, red = (np.array(c, float) for c in ((40, 170, 80), (240, 200, 30), (220, 50, 40)))
     rgb = np.where(
-        place < 0.5, green + 2 * place * (yellow - green), yellow + (2 * place - 1) * (red - yellow)
+        share < 0.5, green + 2 * share * (yellow - green), yellow + (2 * share - 1) * (red - yellow)
     )
     return np.concatenate([rgb, np.full((*values.shape, 1), 110.0)], axis=-1).astype(np.uint8)

@@ -1,9 +1,7 @@
-"""The page's server: the standard library's, on 127.0.0.1 alone, a thread for each request.
+"""The HTTP server of the page: the one of the standard library, on 127.0.0.1 alone, a thread for each request.
 
-Requests of a page are few; what is told to it goes as server-sent events (``broadcaster``). ``guard`` judges every
-request before anything is done.
-
-What a request is answered with: pages and pictures of ours, each with what a browser may do with it.
+A page sends few requests; the messages to it are server-sent events (``broadcaster``). ``guard`` checks every
+request before anything is done. Every response has a policy that limits what the browser may do with it.
 """
 
 from __future__ import annotations
@@ -22,20 +20,34 @@ from urllib.parse import parse_qs, urlsplit
 
 from acquire.errors import DeviceError
 from live.config.listen_address import listening_socket
-from live.pipeline.latency import OUTPUT, yield_to_others
+from live.pipeline.latency import OUTPUT, lower_priority
 from live.ui.web.authorization import HttpError, RequestGuard
-from live.ui.web.broadcaster import Broadcaster, encoded
+from live.ui.web.broadcaster import Broadcaster, json_bytes
 
-OURS = (
+log = logging.getLogger(__name__)
+
+HOST = "127.0.0.1"
+DEFAULT_PORT, TRIES = 8765, 10
+HEARTBEAT_S = 0.5
+"""Between heartbeats; the page shows NO LINK after 2 s without one."""
+
+_SEND_BYTES = 2**14  # buffer for a page that does not read; more data would be old when it reads again
+_TIMEOUT_S = 10.0  # a page that reads nothing for so long is disconnected
+
+PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self';"
     " base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
-"""What our page may load: nothing but from here."""
-ALONE = (
+"""What the page may load: only from this server."""
+REPORT_POLICY = (
     "sandbox; default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none';"
     " form-action 'none'; frame-ancestors 'none'"
 )
-"""What a report may: show itself."""
+"""A report may only show itself."""
+
+Query = Mapping[str, str]
+Get = Callable[[Query], "Response"]
+Post = Callable[[Mapping[str, Any]], Any]
 
 _TYPES = {
     "html": "text/html; charset=utf-8",
@@ -47,7 +59,7 @@ _TYPES = {
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """What is sent back.
+    """Content and headers of a response.
 
     Attributes
     ----------
@@ -60,17 +72,17 @@ class Response:
 
     content: bytes
     kind: str = "application/json"
-    policy: str = OURS
+    policy: str = PAGE_POLICY
 
 
-def jpeg(content: bytes) -> Response:
-    """A picture."""
+def jpeg_response(content: bytes) -> Response:
+    """A JPEG picture."""
     return Response(content, "image/jpeg")
 
 
-def of_json(value: Any) -> Response:
-    """Plain values."""
-    return Response(encoded(value))
+def json_response(value: Any) -> Response:
+    """Values as JSON."""
+    return Response(json_bytes(value))
 
 
 def static_names() -> frozenset[str]:
@@ -81,25 +93,11 @@ def static_names() -> frozenset[str]:
 
 
 def static(name: str) -> Response:
-    """A file of the page; a name that is not in the list (so no path either) is ``HttpError``."""
+    """A file of the page; raises ``HttpError`` for a name that is not in the folder (so also for a path)."""
     kind = _TYPES.get(name.rpartition(".")[2])
     if kind is None or name not in static_names():
-        raise HttpError(404, "there is no such thing")
+        raise HttpError(404, "not found")
     return Response(files("live.ui.web").joinpath("static", name).read_bytes(), kind)
-
-
-log = logging.getLogger(__name__)
-
-HOST = "127.0.0.1"
-DEFAULT_PORT, TRIES = 8765, 10
-BEAT_S = 0.5
-"""Between heartbeats; the page says NO LINK after 2 s without."""
-_UNREAD_BYTES = 2**14  # held for a page that does not read; more would be old when it reads again
-_SLOW_S = 10.0  # a page that does not take what is sent to it for so long has gone
-
-Query = Mapping[str, str]
-Get = Callable[[Query], Response]
-Post = Callable[[Mapping[str, Any]], Any]
 
 
 class PageServer:
@@ -109,9 +107,9 @@ class PageServer:
     ----------
     broadcaster : Broadcaster
     gets, posts : mapping of path to callable
-        What is answered beside the files of the page and the events.
+        Handlers beside the files of the page and the events.
     port : int
-        The next ones are tried where it is taken; 0: any.
+        Where it is taken, the next ones are tried; 0: any free port.
 
     Attributes
     ----------
@@ -137,28 +135,28 @@ class PageServer:
         self._server.page = self
         self._threads = [
             threading.Thread(target=self._server.serve_forever, args=(0.2,), name="page", daemon=True),
-            threading.Thread(target=self._beat, name="page-beat", daemon=True),
+            threading.Thread(target=self._send_heartbeats, name="page-beat", daemon=True),
         ]
         for thread in self._threads:
             thread.start()
 
     @property
     def address(self) -> str:
-        """What a person opens in a browser."""
+        """The address that a person opens in a browser."""
         return self.guard.address
 
     def close(self) -> None:
-        """End all streams and give the port back."""
+        """Disconnect all pages and release the port."""
         self._closed.set()
         self.broadcaster.close()
         self._server.shutdown()
         self._server.server_close()
 
-    def _beat(self) -> None:
+    def _send_heartbeats(self) -> None:
         beats = 0
-        while not self._closed.wait(BEAT_S):
+        while not self._closed.wait(HEARTBEAT_S):
             beats += 1
-            self.broadcaster.tell("beat", beats)
+            self.broadcaster.publish("beat", beats)
 
 
 class _Server(ThreadingHTTPServer):
@@ -166,7 +164,7 @@ class _Server(ThreadingHTTPServer):
     page: PageServer
 
     def server_bind(self) -> None:
-        """At the port that is wanted or one of the next."""
+        """Bind the configured port or one of the next."""
         self.socket.close()
         self.socket = listening_socket(HOST, int(self.server_address[1]), TRIES)
         self.server_address = self.socket.getsockname()
@@ -177,7 +175,8 @@ def _open_server(port: int) -> _Server:
         return _Server((HOST, port), _Handler)
     except OSError as error:
         raise DeviceError(
-            f"the page: no port from {port} to {port + TRIES - 1} is free on {HOST} ({error}); end what holds them"
+            f"the page: no port from {port} to {port + TRIES - 1} is free on {HOST} ({error});"
+            " end the programs that use them"
         ) from None
 
 
@@ -187,31 +186,31 @@ class _Handler(BaseHTTPRequestHandler):
     server: _Server
     protocol_version = "HTTP/1.1"
     server_version, sys_version = "phasedic", ""
-    timeout = _SLOW_S
+    timeout = _TIMEOUT_S
 
     def setup(self) -> None:
-        yield_to_others(OUTPUT)
+        lower_priority(OUTPUT)
         super().setup()
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Requests are nobody's business; an address with the token must not be logged."""
+        """Log nothing: an address with the token must not be in a log."""
 
     def do_GET(self) -> None:
-        """A file of the page, the events, or what ``gets`` has."""
-        self._guarded(self._get)
+        """Answer with a file of the page, the events, or a handler of ``gets``."""
+        self._checked(self._get)
 
     def do_POST(self) -> None:
-        """An order or a change."""
-        self._guarded(self._post)
+        """Answer with a handler of ``posts``."""
+        self._checked(self._post)
 
-    def _guarded(self, step: Callable[[], None]) -> None:
+    def _checked(self, step: Callable[[], None]) -> None:
         try:
-            self.server.page.guard.check_place(self.headers)
+            self.server.page.guard.check_host(self.headers)
             step()
         except HttpError as refused:
             self.close_connection = True
-            self._send(Response(refused.why.encode(), "text/plain; charset=utf-8"), refused.status)
-        except (OSError, ValueError):  # the browser has gone, or sends no HTTP
+            self._send(Response(refused.reason.encode(), "text/plain; charset=utf-8"), refused.status)
+        except (OSError, ValueError):  # the browser closed the connection, or does not send HTTP
             self.close_connection = True
         except Exception:
             log.exception("a request to the page failed")
@@ -222,7 +221,7 @@ class _Handler(BaseHTTPRequestHandler):
         page, parts = self.server.page, urlsplit(self.path)
         query = {key: values[-1] for key, values in parse_qs(parts.query).items()}
         if parts.path == "/" and "token" in query:
-            self._let_in(query["token"])
+            self._log_in(query["token"])
             return
         page.guard.check_cookie(self.headers)
         if parts.path == "/events":
@@ -233,10 +232,10 @@ class _Handler(BaseHTTPRequestHandler):
             name = "index.html" if parts.path == "/" else parts.path.removeprefix("/static/")
             self._send(static(name))
 
-    def _let_in(self, word: str) -> None:
-        """Put the token into a cookie and take it out of the address, where it could be read or handed on."""
+    def _log_in(self, token: str) -> None:
+        """Put the token into a cookie, and remove it from the address, where others could read it."""
         guard = self.server.page.guard
-        if not guard.is_key(word):
+        if not guard.is_token(token):
             raise HttpError(403, "a wrong token; open the address that phasedic has printed")
         self.send_response(303)
         self.send_header("Location", "/")
@@ -250,34 +249,34 @@ class _Handler(BaseHTTPRequestHandler):
         page.guard.check_cookie(self.headers)
         handler = page.posts.get(urlsplit(self.path).path)
         if handler is None:
-            raise HttpError(404, "there is no such thing")
+            raise HttpError(404, "not found")
         try:
             value = json.loads(self.rfile.read(length))
         except (ValueError, RecursionError):
             raise HttpError(400, "not JSON") from None
         if not isinstance(value, dict):
             raise HttpError(400, "an object is expected")
-        self._send(of_json(handler(value)))
+        self._send(json_response(handler(value)))
 
     def _events(self, broadcaster: Broadcaster) -> None:
-        """Server-sent events until the page goes or all is over."""
-        stream = broadcaster.open()
-        if stream is None:
+        """Send events until the page is closed or the server ends."""
+        subscriber = broadcaster.open()
+        if subscriber is None:
             raise HttpError(503, "too many pages are open; close one")
         try:
             self.close_connection = True
-            self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _UNREAD_BYTES)
-            self._head(200, "text/event-stream", OURS, None)
-            while (messages := stream.take(BEAT_S)) is not None:
+            self.connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BYTES)
+            self._head(200, "text/event-stream", PAGE_POLICY, None)
+            while (messages := subscriber.take(HEARTBEAT_S)) is not None:
                 for kind, message in messages.items():
                     self.wfile.write(b"event: %s\ndata: %s\n\n" % (kind.encode(), message))
                 self.wfile.flush()
         finally:
-            broadcaster.leave(stream)
+            broadcaster.remove(subscriber)
 
-    def _send(self, answer: Response, status: int = 200) -> None:
-        self._head(status, answer.kind, answer.policy, len(answer.content))
-        self.wfile.write(answer.content)
+    def _send(self, response: Response, status: int = 200) -> None:
+        self._head(status, response.kind, response.policy, len(response.content))
+        self.wfile.write(response.content)
 
     def _head(self, status: int, kind: str, policy: str, length: int | None) -> None:
         self.send_response(status)

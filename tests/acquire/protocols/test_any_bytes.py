@@ -1,11 +1,4 @@
-"""What holds for every parser, whatever the bytes and however they are cut.
-
-Lines out of bytes.
-
-The same number in all notations of the world: read rightly or not at all.
-
-Units to newtons.
-"""
+"""Any bytes, cut anywhere: every parser, the line buffer under them, the notations of numbers, and the units."""
 
 from __future__ import annotations
 

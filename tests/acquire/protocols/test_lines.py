@@ -1,7 +1,4 @@
-"""The configurable line parser: rules of one's own, and what is wrong with them.
-
-Modbus RTU: frames, damage, register maps.
-"""
+"""The parsers that a file configures: rules for lines, register maps for Modbus, and what is wrong with either."""
 
 from __future__ import annotations
 

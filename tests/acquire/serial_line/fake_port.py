@@ -85,7 +85,7 @@ class FakePort:
         self.closed += 1
 
 
-class Bench:
+class FakeLine:
     """A serial cell on fake ports, its events, and a way to run it to the end of the script.
 
     Each port of ``ports`` is handed out once; an exception among them is what opening raises.

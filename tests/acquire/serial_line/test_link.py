@@ -9,21 +9,21 @@ import pytest
 
 from acquire.errors import DeviceError
 from acquire.serial_line import link as link_module
-from acquire.serial_line.link import Link, Means, Opening, close_port
+from acquire.serial_line.link import Link, LinkContext, Opening, close_port
 from acquire.serial_line.ports import LineSettings
 from tests.acquire.serial_line.fake_port import FakePort, FakeTime
 
 LINE = LineSettings("socket://fake:1")
 
 
-class Road:
+class FlakyLink:
     """A link to ports that each live for ``lives`` reads of a tenth of a second, the last one for ever."""
 
     def __init__(self, *lives: int) -> None:
         self.time, self.told, self._lives = FakeTime(), list[str](), list(lives)
         self.opened: list[float] = []
-        means = Means(self._open, self.time, threading.Event(), self.time.sleep)
-        self.link = Link(LINE, means, lambda level, text: self.told.append(text), lambda: "no sample")
+        context = LinkContext(self._open, self.time, threading.Event(), self.time.sleep)
+        self.link = Link(LINE, context, lambda level, text: self.told.append(text), lambda: "no sample")
 
     def _open(self, line: LineSettings) -> FakePort:
         self.opened.append(self.time.now)
@@ -37,23 +37,23 @@ class Road:
 
 
 def test_a_peer_that_hangs_up_is_tried_ever_more_seldom_and_told_of_once() -> None:
-    road = Road(*[0] * 1000)
-    road.until(160.0)
-    assert len(road.opened) < 15
-    assert road.opened[-1] - road.opened[-2] == pytest.approx(8.0, abs=0.3)
-    assert [text.partition(" (")[0] for text in road.told] == ["lost", "lost again at once"]
+    flaky = FlakyLink(*[0] * 1000)
+    flaky.until(160.0)
+    assert len(flaky.opened) < 15
+    assert flaky.opened[-1] - flaky.opened[-2] == pytest.approx(8.0, abs=0.3)
+    assert [text.partition(" (")[0] for text in flaky.told] == ["lost", "lost again at once"]
 
 
 def test_one_that_says_a_line_and_hangs_up_is_no_better() -> None:
-    road = Road(*[1] * 1000)
-    road.until(160.0)
-    assert len(road.opened) < 15 and len(road.told) == 3  # lost, connected again, lost again at once
+    flaky = FlakyLink(*[1] * 1000)
+    flaky.until(160.0)
+    assert len(flaky.opened) < 15 and len(flaky.told) == 3  # lost, connected again, lost again at once
 
 
 def test_when_it_stays_at_last_that_is_told_once() -> None:
-    road = Road(*[0] * 5)
-    road.until(160.0)
-    assert [text.partition(" (")[0] for text in road.told] == [
+    flaky = FlakyLink(*[0] * 5)
+    flaky.until(160.0)
+    assert [text.partition(" (")[0] for text in flaky.told] == [
         "lost",
         "lost again at once",
         "connected again",
@@ -61,10 +61,10 @@ def test_when_it_stays_at_last_that_is_told_once() -> None:
 
 
 def test_a_rare_loss_is_told_each_time_and_mended_soon() -> None:
-    road = Road(100, 100, 100)
-    road.until(140.0)
-    assert [text.partition(" (")[0] for text in road.told] == ["lost", "connected again"] * 3
-    assert len(road.opened) == 4
+    flaky = FlakyLink(100, 100, 100)
+    flaky.until(140.0)
+    assert [text.partition(" (")[0] for text in flaky.told] == ["lost", "connected again"] * 3
+    assert len(flaky.opened) == 4
 
 
 class SlowPort(FakePort):
@@ -107,6 +107,6 @@ def test_a_port_that_never_opens_fails_the_start(monkeypatch: pytest.MonkeyPatch
         time.sleep(0.5)
         return FakePort(FakeTime(), [])
 
-    means = Means(never, time.monotonic, threading.Event(), time.sleep)
+    context = LinkContext(never, time.monotonic, threading.Event(), time.sleep)
     with pytest.raises(DeviceError, match="does not open within"):
-        Link(LINE, means, lambda level, text: None)
+        Link(LINE, context, lambda level, text: None)

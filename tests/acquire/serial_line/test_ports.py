@@ -1,15 +1,13 @@
-"""The list of ports, their identities, and why one cannot be opened.
-
-Finding out what talks: listening sends nothing, asking sends only what it said it would.
-
-Telnet and the COM port option: data out of it, whatever else is in it.
-"""
+"""Serial ports: their list and identity, opening and reading one, finding its protocol, and Telnet with RFC 2217."""
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import math
+import os
 import pty
+import tty
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +22,7 @@ from acquire.errors import ConfigError, DeviceError
 from acquire.protocols.base import find_protocol
 from acquire.serial_line import ports as serial_ports
 from acquire.serial_line.byte_ports import Telnet, escaped, line_settings
-from acquire.serial_line.identify import Question, ask, guess, hear, listen, questions
+from acquire.serial_line.identify import Question, ask, guess, listen, questions, record_bytes
 from acquire.serial_line.ports import LineSettings, find_again, identity_of, list_serial_ports, open_port
 from tests.acquire.serial_line.fake_port import FakePort, FakeTime
 from tests.adversary.peers import LINE, Rfc2217Peer, SocketPeer, paced, silence
@@ -100,6 +98,25 @@ def test_a_port_that_is_open_already_is_busy() -> None:
     with pytest.raises(DeviceError, match="another program"):
         open_port(LineSettings(name))
     first.close()
+    os.close(master)
+    os.close(slave)
+
+
+def test_all_that_waits_comes_without_a_pause() -> None:
+    """Behind a full buffer of 4 kB Linux holds 64 kB, which a worker of the kernel moves when it likes."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    os.set_blocking(master, False)
+    port = open_port(LineSettings(os.ttyname(slave)))
+    for _ in range(100):
+        sent, received = 0, 0
+        with contextlib.suppress(BlockingIOError):
+            while sent < 60_000:
+                sent += os.write(master, b"x" * 1000)
+        while data := port.receive(1 << 16, wait=False):
+            received += len(data)
+        assert received == sent > 4096
+    port.close()
     os.close(master)
     os.close(slave)
 
@@ -246,7 +263,9 @@ def test_no_question_sets_or_moves_anything() -> None:
 def test_a_port_lost_while_listening() -> None:
     time = FakeTime()
     with pytest.raises(DeviceError, match="lost while listening"):
-        hear(LineSettings("/dev/x"), opener=lambda line: FakePort(time, [OSError(5, "gone")]), clock=time)
+        record_bytes(
+            LineSettings("/dev/x"), opener=lambda line: FakePort(time, [OSError(5, "gone")]), clock=time
+        )
 
 
 @given(data=st.binary(max_size=300), cuts=st.lists(st.integers(1, 40), min_size=1, max_size=20))

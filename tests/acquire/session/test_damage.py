@@ -1,16 +1,7 @@
-"""A damaged session is refused or read right: never a hang, a crash or a wrong number.
+"""Sessions that were killed, cut, damaged or left on a full disk: refused or read right, never wrong or for ever.
 
-Many more cases: ``python -m tests.acquire.session.fuzz --cases 20000``.
-
-What ``recover`` saves of a session that was killed, damaged or cut.
-
-A disk that takes no more: the recording ends in words, and what was complete is readable.
-
-The limit on the size of files stands in for the full disk: writing fails in the same place.
-
-A killed recorder loses at most what is younger than 50 ms.
-
-Many more kills: ``python -m tests.acquire.session.kill_recorder``.
+The limit on the size of files stands in for the full disk: writing fails in the same place. Many more cases:
+``python -m tests.acquire.session.fuzz --cases 20000`` and ``python -m tests.acquire.session.kill_recorder``.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from acquire.v4l2.camera import V4L2Camera, v4l2_settings
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel
 
 
-class Bench:
+class CameraRig:
     """A fake kernel, a camera opened on it, and the events it told."""
 
     def __init__(self, *cameras: FakeCamera, address: str = "/dev/video0") -> None:
@@ -56,8 +56,8 @@ def test_request_codes_are_those_of_videodev2_h() -> None:
 
 
 def test_the_best_grey_format_is_taken_and_told() -> None:
-    bench = Bench()
-    camera = bench.open()
+    rig = CameraRig()
+    camera = rig.open()
     assert camera.info.pixel_format == "Y12"
     assert (camera.info.bits, camera.info.width, camera.info.height, camera.info.fps) == (12, 8, 4, 10)
     assert (camera.info.live, camera.info.clock, camera.info.name) == (
@@ -72,11 +72,11 @@ def test_the_best_grey_format_is_taken_and_told() -> None:
 @pytest.mark.parametrize("fourcc", ["GREY", "Y10", "Y12", "Y16", "YUYV", "UYVY", "RGGB", "RG12"])
 @pytest.mark.parametrize("padding", [0, 6])
 def test_pictures_come_as_the_sensor_counted_them(fourcc: str, padding: int) -> None:
-    bench = Bench(
+    rig = CameraRig(
         FakeCamera(formats=("YUYV", fourcc), padding=padding),
         address=f"/dev/video0?format={fourcc}&width=16&height=8",
     )
-    frames = bench.take(3)
+    frames = rig.take(3)
     for k, frame in enumerate(frames):
         expected = (np.arange(128).reshape(8, 16) + k) % 251
         assert np.array_equal(frame.image, expected)
@@ -86,8 +86,8 @@ def test_pictures_come_as_the_sensor_counted_them(fourcc: str, padding: int) -> 
 
 
 def test_a_plane_of_a_mosaic_is_half_as_large() -> None:
-    bench = Bench(FakeCamera(formats=("RGGB",), fourcc="RGGB"), address="/dev/video0?plane=b")
-    camera = bench.open()
+    rig = CameraRig(FakeCamera(formats=("RGGB",), fourcc="RGGB"), address="/dev/video0?plane=b")
+    camera = rig.open()
     assert (camera.info.width, camera.info.height) == (4, 2)
     with camera:
         frame = next(iter(camera))
@@ -95,11 +95,11 @@ def test_a_plane_of_a_mosaic_is_half_as_large() -> None:
 
 
 def test_motion_jpeg_only_on_request_and_with_a_warning() -> None:
-    bench = Bench(FakeCamera(formats=("MJPG",), fourcc="MJPG", size=(16, 8)))
+    rig = CameraRig(FakeCamera(formats=("MJPG",), fourcc="MJPG", size=(16, 8)))
     with pytest.raises(DeviceError, match="format=MJPG takes the compressed"):
-        bench.open()
-    bench.address = "/dev/video0?format=MJPG"
-    camera = bench.open()
+        rig.open()
+    rig.address = "/dev/video0?format=MJPG"
+    camera = rig.open()
     assert "no averaging removes" in camera.info.warnings[0]
     with camera:
         frame = next(iter(camera))
@@ -107,8 +107,8 @@ def test_motion_jpeg_only_on_request_and_with_a_warning() -> None:
 
 
 def test_numbers_and_stamps_are_those_of_the_driver() -> None:
-    bench = Bench()
-    frames = bench.take(3)
+    rig = CameraRig()
+    frames = rig.take(3)
     assert [frame.index for frame in frames] == [0, 1, 2]
     assert [frame.raw_t for frame in frames] == pytest.approx([1000.1, 1000.2, 1000.3])
     assert [frame.t for frame in frames] == [frame.raw_t for frame in frames]
@@ -118,170 +118,170 @@ def test_numbers_and_stamps_are_those_of_the_driver() -> None:
 @pytest.mark.parametrize(("source", "shift"), [(api.SOURCE_START_OF_EXPOSURE, 0.004), (0, -0.004)])
 def test_time_is_mid_exposure_where_it_can_be_known(source: int, shift: float) -> None:
     fake = FakeCamera(flags=api.STAMP_MONOTONIC | source, controls=exposure_controls())
-    frame = Bench(fake, address="/dev/video0?exposure_us=8000").take(1)[0]
+    frame = CameraRig(fake, address="/dev/video0?exposure_us=8000").take(1)[0]
     assert frame.t - frame.raw_t == pytest.approx(shift)
 
 
 def test_stamps_on_another_clock_are_replaced_by_the_hosts() -> None:
-    frame = Bench(FakeCamera(flags=0)).take(1)[0]
+    frame = CameraRig(FakeCamera(flags=0)).take(1)[0]
     assert frame.clock == "host"
     assert frame.raw_t == pytest.approx(1000.1)
 
 
 def test_gaps_in_the_sequence_are_counted() -> None:
-    bench = Bench()
-    bench.fake.script.extend([_nothing, _set(skip_next=3), _nothing])
-    frames = bench.take(3)
+    rig = CameraRig()
+    rig.fake.script.extend([_nothing, _set(skip_next=3), _nothing])
+    frames = rig.take(3)
     assert [frame.index for frame in frames] == [0, 4, 5]
     assert [frame.lost_before for frame in frames] == [0, 3, 0]
 
 
 def test_damaged_frames_are_marked() -> None:
-    bench = Bench()
-    bench.fake.script.extend([_nothing, _set(damaged_next=True)])
-    assert [frame.damaged for frame in bench.take(3)] == [False, True, False]
-    assert "frame 1 is damaged" in bench.texts()
+    rig = CameraRig()
+    rig.fake.script.extend([_nothing, _set(damaged_next=True)])
+    assert [frame.damaged for frame in rig.take(3)] == [False, True, False]
+    assert "frame 1 is damaged" in rig.texts()
 
 
 def test_a_short_frame_counts_as_lost() -> None:
-    bench = Bench()
-    bench.fake.script.extend([_nothing, _set(short_next=True)])
-    frames = bench.take(2)
+    rig = CameraRig()
+    rig.fake.script.extend([_nothing, _set(short_next=True)])
+    frames = rig.take(2)
     assert [(frame.index, frame.lost_before) for frame in frames] == [(0, 0), (2, 1)]
-    assert "without a whole picture" in bench.texts()
+    assert "without a whole picture" in rig.texts()
 
 
 def test_a_driver_that_does_not_count_is_told_and_stamps_tell_the_losses() -> None:
-    bench = Bench(FakeCamera(counts=False))
-    bench.fake.script.extend([_nothing, _nothing, _set(skip_next=2)])
-    frames = bench.take(4)
+    rig = CameraRig(FakeCamera(counts=False))
+    rig.fake.script.extend([_nothing, _nothing, _set(skip_next=2)])
+    frames = rig.take(4)
     assert [frame.index for frame in frames] == [0, 1, 4, 5]
     assert [frame.lost_before for frame in frames] == [0, 0, 2, 0]
-    assert bench.texts().count("does not number") == 1
+    assert rig.texts().count("does not number") == 1
 
 
 def test_frames_from_before_the_start_are_left_out() -> None:
-    bench = Bench()
-    with bench.open() as camera:
-        bench.kernel.t += 5.0  # nobody fetched; the buffers filled up
+    rig = CameraRig()
+    with rig.open() as camera:
+        rig.kernel.t += 5.0  # nobody fetched; the buffers filled up
         frame = next(iter(camera))
-    assert frame.raw_t >= bench.kernel.t - 0.3
-    assert "older than the start" in bench.texts()
+    assert frame.raw_t >= rig.kernel.t - 0.3
+    assert "older than the start" in rig.texts()
 
 
 @pytest.mark.parametrize("error", [errno.EIO, errno.EPROTO])
 def test_a_fatal_error_reopens_the_camera_and_counts_the_gap(error: int) -> None:
-    bench = Bench()
-    bench.fake.script.extend([_nothing, _nothing, _set(dead=error)])
+    rig = CameraRig()
+    rig.fake.script.extend([_nothing, _nothing, _set(dead=error)])
 
     def heal() -> None:
-        bench.fake.dead = 0
+        rig.fake.dead = 0
 
-    bench.kernel.on_wait = iter([heal])
-    frames = bench.take(4)
+    rig.kernel.on_wait = iter([heal])
+    frames = rig.take(4)
     assert [frame.index for frame in frames[:2]] == [0, 1]
     gap = frames[2].lost_before
     assert gap == round((frames[2].raw_t - frames[1].raw_t) * 10) - 1
     assert [frame.index for frame in frames[2:]] == [2 + gap, 3 + gap]
-    assert "last good frame 1" in bench.events[0].text
-    assert "opened again" in bench.events[1].text
-    assert bench.fake.opened >= 2
+    assert "last good frame 1" in rig.events[0].text
+    assert "opened again" in rig.events[1].text
+    assert rig.fake.opened >= 2
 
 
 def test_an_unplugged_camera_is_found_again_under_another_name() -> None:
     other = FakeCamera(path="/dev/video5", card="another camera")
-    bench = Bench(FakeCamera(bus="usb-2"), other)
-    bench.fake.script.extend([_nothing, _set(present=False)])
+    rig = CameraRig(FakeCamera(bus="usb-2"), other)
+    rig.fake.script.extend([_nothing, _set(present=False)])
 
     def replug() -> None:
-        bench.fake.path, bench.fake.present = "/dev/video1", True
+        rig.fake.path, rig.fake.present = "/dev/video1", True
 
-    bench.kernel.on_wait = iter([_idle, _idle, replug])
-    frames = bench.take(3)
+    rig.kernel.on_wait = iter([_idle, _idle, replug])
+    frames = rig.take(3)
     assert [frame.index for frame in frames] == sorted({frame.index for frame in frames})
     assert frames[1].lost_before > 0
-    assert "unplugged" in bench.events[0].text
-    assert "opened again as /dev/video1" in bench.texts()
+    assert "unplugged" in rig.events[0].text
+    assert "opened again as /dev/video1" in rig.texts()
     assert not other.streaming
 
 
 def test_plugged_into_another_port_it_is_known_by_its_name() -> None:
-    bench = Bench()
-    bench.fake.script.extend([_nothing, _set(present=False)])
+    rig = CameraRig()
+    rig.fake.script.extend([_nothing, _set(present=False)])
 
     def replug() -> None:
-        bench.fake.path, bench.fake.bus, bench.fake.present = "/dev/video3", "usb-7", True
+        rig.fake.path, rig.fake.bus, rig.fake.present = "/dev/video3", "usb-7", True
 
-    bench.kernel.on_wait = iter([replug])
-    assert len(bench.take(2)) == 2
-    assert "/dev/video3" in bench.texts()
+    rig.kernel.on_wait = iter([replug])
+    assert len(rig.take(2)) == 2
+    assert "/dev/video3" in rig.texts()
 
 
 def test_two_cameras_of_one_name_are_not_mistaken_for_each_other() -> None:
     twin = FakeCamera(path="/dev/video2", bus="usb-9")
-    bench = Bench(FakeCamera(), twin)
-    bench.fake.script.extend([_nothing, _set(present=False)])
+    rig = CameraRig(FakeCamera(), twin)
+    rig.fake.script.extend([_nothing, _set(present=False)])
 
     def replug() -> None:
-        bench.fake.present = True
+        rig.fake.present = True
 
-    bench.kernel.on_wait = iter([_idle, _idle, replug])
+    rig.kernel.on_wait = iter([_idle, _idle, replug])
     # While it is away the twin is the only one of its name.
-    with bench.open() as camera:
+    with rig.open() as camera:
         frames = list(islice(camera, 2))
         assert not twin.streaming
     assert len(frames) == 2
 
 
 def test_a_stall_is_told_once_and_its_end_too() -> None:
-    bench = Bench()
-    bench.fake.script.extend([_nothing, _set(stalled=True)])
+    rig = CameraRig()
+    rig.fake.script.extend([_nothing, _set(stalled=True)])
 
     def go_on() -> None:
-        bench.fake.stalled = False
-        bench.fake.next_t = bench.kernel.t
+        rig.fake.stalled = False
+        rig.fake.next_t = rig.kernel.t
 
-    bench.kernel.on_wait = iter([_idle] * 7 + [go_on])
-    frames = bench.take(3)
+    rig.kernel.on_wait = iter([_idle] * 7 + [go_on])
+    frames = rig.take(3)
     assert len(frames) == 3
-    assert bench.texts().count("no picture for") == 1
-    assert "pictures again after" in bench.texts()
+    assert rig.texts().count("no picture for") == 1
+    assert "pictures again after" in rig.texts()
 
 
 def test_a_long_stall_opens_the_camera_anew() -> None:
-    bench = Bench()
-    bench.fake.script.extend([_nothing, _set(stalled=True)])
+    rig = CameraRig()
+    rig.fake.script.extend([_nothing, _set(stalled=True)])
 
     def go_on() -> None:
-        bench.fake.stalled = False
+        rig.fake.stalled = False
 
-    bench.kernel.on_wait = iter([_idle] * 60 + [go_on])
-    frames = bench.take(2)
-    assert bench.fake.opened >= 3
+    rig.kernel.on_wait = iter([_idle] * 60 + [go_on])
+    frames = rig.take(2)
+    assert rig.fake.opened >= 3
     assert frames[1].index > frames[0].index + 10
-    assert len([event for event in bench.events if event.level == "error"]) == 1
+    assert len([event for event in rig.events if event.level == "error"]) == 1
 
 
 def test_waking_for_nothing_counts_as_a_dead_device() -> None:
-    bench = Bench()
-    with bench.open() as camera:
+    rig = CameraRig()
+    with rig.open() as camera:
         stream = iter(camera)
         next(stream)
-        bench.fake.queued.clear()  # as a driver does that reports an error without a buffer
+        rig.fake.queued.clear()  # as a driver does that reports an error without a buffer
 
         def heal() -> None:
-            assert "fatal error" in bench.texts()
+            assert "fatal error" in rig.texts()
 
-        bench.kernel.on_wait = iter([heal])
+        rig.kernel.on_wait = iter([heal])
         assert next(stream).index > 0
 
 
 def test_stop_ends_the_iteration_also_while_the_camera_is_away() -> None:
-    bench = Bench()
-    camera = bench.open()
-    bench.fake.script.extend([_nothing, _set(present=False)])
+    rig = CameraRig()
+    camera = rig.open()
+    rig.fake.script.extend([_nothing, _set(present=False)])
     camera._pause = lambda seconds: camera.stopped.is_set()
-    bench.kernel.on_wait = iter(())
+    rig.kernel.on_wait = iter(())
     with camera:
         frames = []
         for frame in camera:
@@ -291,8 +291,8 @@ def test_stop_ends_the_iteration_also_while_the_camera_is_away() -> None:
 
 
 def test_closing_from_another_thread_while_it_streams() -> None:
-    bench = Bench()
-    camera = bench.open()
+    rig = CameraRig()
+    camera = rig.open()
     seen = []
 
     def read() -> None:
@@ -302,16 +302,16 @@ def test_closing_from_another_thread_while_it_streams() -> None:
         reader = threading.Thread(target=read)
         reader.start()
     reader.join()  # as the stream has ended, and no buffer was taken from under it
-    assert not bench.kernel._handles
-    assert bench.fake.maps_open == 0
-    assert not bench.events
+    assert not rig.kernel._handles
+    assert rig.fake.maps_open == 0
+    assert not rig.events
 
 
 def test_a_missing_device_names_what_there_is() -> None:
     with pytest.raises(
         DeviceError, match=r"/dev/video9: there is no such device.*/dev/video0 \(fake camera\)"
     ):
-        Bench(address="/dev/video9").open()
+        CameraRig(address="/dev/video9").open()
 
 
 @pytest.mark.parametrize(
@@ -320,12 +320,12 @@ def test_a_missing_device_names_what_there_is() -> None:
 )
 def test_why_it_does_not_open(error: int, words: str) -> None:
     with pytest.raises(DeviceError, match=words):
-        Bench(FakeCamera(open_error=error)).open()
+        CameraRig(FakeCamera(open_error=error)).open()
 
 
 def test_a_camera_held_by_another_program_is_told_at_the_start_of_the_stream() -> None:
-    bench = Bench(FakeCamera(request_errors={api.REQBUFS: errno.EBUSY}))
-    camera = bench.open()
+    rig = CameraRig(FakeCamera(request_errors={api.REQBUFS: errno.EBUSY}))
+    camera = rig.open()
     with pytest.raises(DeviceError, match="another program"):
         camera.__enter__()
     camera.close()
@@ -337,7 +337,7 @@ def test_a_camera_held_by_another_program_is_told_at_the_start_of_the_stream() -
 )
 def test_what_is_no_camera(caps: int, words: str) -> None:
     with pytest.raises(DeviceError, match=words):
-        Bench(FakeCamera(caps=caps)).open()
+        CameraRig(FakeCamera(caps=caps)).open()
 
 
 @pytest.mark.parametrize(
@@ -355,10 +355,10 @@ def test_what_is_no_camera(caps: int, words: str) -> None:
     ],
 )
 def test_what_is_not_honoured_is_refused_with_what_there_is(query: str, words: str) -> None:
-    bench = Bench(address=f"/dev/video0?{query}")
+    rig = CameraRig(address=f"/dev/video0?{query}")
     with pytest.raises(ConfigError, match=words):
-        bench.open()
-    assert not bench.kernel._handles
+        rig.open()
+    assert not rig.kernel._handles
 
 
 def exposure_controls(**more: Any) -> dict[int, FakeControl]:
@@ -378,10 +378,10 @@ def exposure_controls(**more: Any) -> dict[int, FakeControl]:
 
 
 def test_automatic_controls_are_put_on_manual_first() -> None:
-    bench = Bench(
+    rig = CameraRig(
         FakeCamera(controls=exposure_controls()), address="/dev/video0?exposure_us=8000&gain=40&brightness=10"
     )
-    camera = bench.open()
+    camera = rig.open()
     assert camera.info.exposure_s == pytest.approx(0.008)
     assert camera.info.controls == {
         "auto_exposure": "Manual",
@@ -396,28 +396,30 @@ def test_automatic_controls_are_put_on_manual_first() -> None:
 
 def test_what_can_be_changed_has_the_bounds_of_the_driver() -> None:
     controls = exposure_controls()
-    camera = Bench(FakeCamera(controls=controls), address="/dev/video0?exposure_us=8000&fps=20").open()
+    camera = CameraRig(FakeCamera(controls=controls), address="/dev/video0?exposure_us=8000&fps=20").open()
     exposure, gain = camera.info.settings
     assert exposure == CameraSetting("exposure_us", pytest.approx(8000), 100, 50_000, 100, log=True)
     assert gain == CameraSetting("gain", 16, 0, 100, 4)
 
 
 def test_what_an_automatic_control_holds_cannot_be_changed() -> None:
-    bench = Bench(FakeCamera(controls=exposure_controls()), address="/dev/video0?manual=no")
-    assert bench.open().info.settings == ()
+    rig = CameraRig(FakeCamera(controls=exposure_controls()), address="/dev/video0?manual=no")
+    assert rig.open().info.settings == ()
 
 
 def test_controls_left_automatic_are_named() -> None:
-    bench = Bench(FakeCamera(controls=exposure_controls()), address="/dev/video0?manual=no")
-    camera = bench.open()
+    rig = CameraRig(FakeCamera(controls=exposure_controls()), address="/dev/video0?manual=no")
+    camera = rig.open()
     assert camera.info.exposure_s is None
     assert "auto_exposure, gain_automatic, power_line_frequency" in camera.info.warnings[0]
 
 
 def test_a_held_control_is_refused_not_ignored() -> None:
-    bench = Bench(FakeCamera(controls=exposure_controls()), address="/dev/video0?manual=no&exposure_us=8000")
+    rig = CameraRig(
+        FakeCamera(controls=exposure_controls()), address="/dev/video0?manual=no&exposure_us=8000"
+    )
     with pytest.raises(ConfigError, match="held by an automatic control"):
-        bench.open()
+        rig.open()
 
 
 @pytest.mark.parametrize(
@@ -429,14 +431,14 @@ def test_a_held_control_is_refused_not_ignored() -> None:
     ],
 )
 def test_clamped_values_are_refused(query: str, words: str) -> None:
-    bench = Bench(FakeCamera(controls=exposure_controls()), address=f"/dev/video0?{query}")
+    rig = CameraRig(FakeCamera(controls=exposure_controls()), address=f"/dev/video0?{query}")
     with pytest.raises(ConfigError, match=words):
-        bench.open()
+        rig.open()
 
 
 def test_the_rate_asked_for_is_in_force() -> None:
-    bench = Bench(address="/dev/video0?fps=20&format=GREY&width=16&height=8")
-    assert bench.open().info.fps == 20
+    rig = CameraRig(address="/dev/video0?fps=20&format=GREY&width=16&height=8")
+    assert rig.open().info.fps == 20
 
 
 def _nothing(camera: FakeCamera) -> None: ...

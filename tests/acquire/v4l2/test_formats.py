@@ -126,8 +126,8 @@ def test_a_dead_handle_is_told_from_a_stall() -> None:
 
 
 def test_a_fault_with_every_frame_is_told_once_a_while_and_none_is_forgotten() -> None:
-    muffler = RateLimiter(2.0)
-    assert [muffler.told(t) for t in (0.0, 0.5, 1.0, 2.5, 2.6, 9.0)] == [1, 0, 0, 3, 0, 2]
+    limiter = RateLimiter(2.0)
+    assert [limiter.due(t) for t in (0.0, 0.5, 1.0, 2.5, 2.6, 9.0)] == [1, 0, 0, 3, 0, 2]
 
 
 def test_a_camera_is_listed_with_the_address_to_use() -> None:

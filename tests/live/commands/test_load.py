@@ -182,7 +182,7 @@ def test_a_viewer_without_its_libraries_names_their_packages(
     answer = run._open_viewer(9881)
     assert answer == (
         "no: the viewer did not open (winit: Failed to load one of xlib's shared libraries); "
-        f"on a Debian without desktop it needs: {viewer.NEEDS}"
+        f"on a Debian without desktop it needs: {viewer.VIEWER_PACKAGES}"
     )
 
 
@@ -200,4 +200,5 @@ def test_a_viewer_that_is_closed_is_no_trouble(
 
 
 def test_words_without_a_reason_name_the_packages_too() -> None:
-    assert "no reason given" in viewer.no_window("") and viewer.NEEDS in viewer.no_window("panicked at x")
+    assert "no reason given" in viewer.viewer_failure("")
+    assert viewer.VIEWER_PACKAGES in viewer.viewer_failure("panicked at x")

@@ -22,7 +22,7 @@ from live.results.report.evaluation import EvaluatedCurve as RunCurve
 from live.results.report.report import tensile
 from live.results.run_folder import open_run
 from live.results.summary import summary_lines
-from live.ui.web.page_controller import ended
+from live.ui.web.page_controller import run_result
 from tests.analysis.curves import noisy, ramberg_osgood
 from tests.live.made_run import CONFIG, PULLED, make_run
 from tests.live.results.test_figures import AREA_M2, FLAT, kept
@@ -60,7 +60,7 @@ def test_summary_and_page_agree(specimen: SpecimenConfig) -> None:
     history, loads = kept(ramberg_osgood())
     run_state = RunState(EventLog(), FrameCounts(), loads, history)
     summary = "\n".join(summary_lines(run_state, specimen)).replace("+-", "±")
-    for one in ended(run_state, specimen, Path("runs"), "")["figures"]:
+    for one in run_result(run_state, specimen, Path("runs"), "")["figures"]:
         assert one["text"] is not None and f"{one['name']} = {one['text']}" in summary
 
 

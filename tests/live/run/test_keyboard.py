@@ -1,4 +1,4 @@
-"""The operator's keys: a line is an order, what is refused is told."""
+"""The keys of the operator: each is a command, and a refusal is shown."""
 
 from __future__ import annotations
 

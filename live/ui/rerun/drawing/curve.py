@@ -1,9 +1,4 @@
-"""Draws the stress-strain (or load-strain) curve with axes of its own; rerun has no x-y plot.
-
-The axes to draw the stress-strain (or load-strain) curve on. Plain numbers; nothing is drawn here.
-
-What the scene is made of: words, lines, rounded numbers and encoded pictures.
-"""
+"""Draws the stress-strain (or load-strain) curve with its own axes: rerun has no x-y plot."""
 
 from __future__ import annotations
 
@@ -15,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.cv2_loader import load_cv2
 from live.results.maps.colours import nice_above, number, ticks, unit_for
 from live.ui.rerun.drawing.layout import CURVE_WIDTH
+from live.ui.rerun.drawing.shapes import DIM, GREY, ORANGE, polylines, text_labels
 from live.ui.rerun.messages import ViewSetup
 
 MAX_POINTS = 800
-"""Of the curve, thinned; the newest always there."""
+"""Of the curve, thinned; the newest point is always drawn."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,10 +40,10 @@ class Axis:
     unit: str
     ticks: tuple[float, ...]
 
-    def sink(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """0..1 along the axis."""
-        placed: NDArray[np.float64] = (values - self.low) / (self.high - self.low)
-        return placed
+    def position(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Positions along the axis, 0..1."""
+        share: NDArray[np.float64] = (values - self.low) / (self.high - self.low)
+        return share
 
 
 def strain_axis(values: NDArray[np.float64]) -> Axis:
@@ -75,59 +70,19 @@ def _axis(low: float, high: float, factor: float, unit: str) -> Axis:
     return Axis(low, high, factor, unit, marks)
 
 
-def _range(values: NDArray[np.float64], least: float) -> tuple[float, float]:
-    # Zero is always in the picture; a side that is only noise gets no room of its own.
+def _range(values: NDArray[np.float64], min_size: float) -> tuple[float, float]:
+    # Zero is always shown; a side with nothing but noise takes no space.
     top, bottom = max(float(np.max(values, initial=0.0)), 0.0), min(float(np.min(values, initial=0.0)), 0.0)
-    size = max(top, -bottom, least)
+    size = max(top, -bottom, min_size)
     high = nice_above(top * 1.04) if top > 0.02 * size else 0.0
     low = -nice_above(-bottom * 1.04) if -bottom > 0.02 * size else 0.0
-    return (0.0, nice_above(least)) if high == low else (low, high)
-
-
-GREY, DIM = (170, 175, 185), (62, 66, 74)
-ORANGE, CYAN, YELLOW = (255, 169, 64), (64, 224, 255), (255, 212, 59)
-
-
-def words(sinks: Any, labels: list[str], colour: Any = GREY) -> Any:
-    """Text hung below its places."""
-    import rerun as rr
-
-    return rr.Points2D(sinks, labels=labels, colors=colour, radii=0.0, show_labels=True, draw_order=40)
-
-
-def lines(strips: Any, colour: tuple[int, int, int], radius: float) -> Any:
-    """Polylines; the thicker lie above."""
-    import rerun as rr
-
-    return rr.LineStrips2D(strips, colors=colour, radii=rr.Radius.ui_points(radius), draw_order=radius)
+    return (0.0, nice_above(min_size)) if high == low else (low, high)
 
 
 def rounded(value: float, axis: Axis) -> str:
-    """A value with its unit, in three or four digits of the axis."""
+    """A value with its unit, with three or four digits of the range of the axis."""
     digits = max(0, 2 - math.floor(math.log10(max(abs(axis.low), abs(axis.high)) * axis.factor)))
     return f"{number(round(value * axis.factor, digits))} {axis.unit}"
-
-
-def reduced(image: NDArray[Any], bits: int, longest_px: int) -> tuple[NDArray[np.uint8], int]:
-    """An 8-bit picture of at most ``longest_px``, and the whole factor it was reduced by."""
-    cv2 = load_cv2()
-
-    factor = max(1, math.ceil(max(image.shape) / longest_px))
-    if factor > 1:
-        size = image.shape[1] // factor, image.shape[0] // factor
-        image = cv2.resize(image[: size[1] * factor, : size[0] * factor], size, interpolation=cv2.INTER_AREA)
-    if bits != 8:
-        image = cv2.convertScaleAbs(image, alpha=255.0 / (2**bits - 1))
-    return image, factor
-
-
-def encode(kind: str, image: NDArray[np.uint8], quality: int) -> bytes:
-    """The file ``kind`` (".jpg", ".png") of an image in OpenCV's order of colours."""
-    cv2 = load_cv2()
-
-    flag = cv2.IMWRITE_JPEG_QUALITY if kind == ".jpg" else cv2.IMWRITE_PNG_COMPRESSION
-    _, data = cv2.imencode(kind, image, [flag, quality])
-    return bytes(data)
 
 
 class CurveDrawing:
@@ -136,7 +91,7 @@ class CurveDrawing:
     Parameters
     ----------
     log : callable
-        Takes an entity path and what to show there.
+        Takes an entity path and the archetype to show there.
     log_change : callable
         The same for what is drawn only where it changes.
     setup : ViewSetup
@@ -148,12 +103,12 @@ class CurveDrawing:
         self._log, self._log_change, self._setup = log, log_change, setup
         self._axes: tuple[Axis, Axis] | None = None
 
-    def forget(self) -> None:
-        """Draw the axes anew with the next points."""
+    def reset(self) -> None:
+        """Draw the axes again with the next points."""
         self._axes = None
 
     def draw(self, points: NDArray[np.float64]) -> None:
-        """Draw (N, 2) pairs of strain and force (N); those that have both."""
+        """Draw (N, 2) pairs of strain and force (N); pairs with NaN are left out."""
         import rerun as rr
 
         points = points[np.isfinite(points).all(axis=1)]
@@ -166,31 +121,31 @@ class CurveDrawing:
             self._axes = axes
             self._draw_axes(*axes)
         across, up = axes
-        placed = np.stack([across.sink(points[:, 0]) * CURVE_WIDTH, 1.0 - up.sink(vertical)], axis=1)
+        line = np.stack([across.position(points[:, 0]) * CURVE_WIDTH, 1.0 - up.position(vertical)], axis=1)
         self._log(
             "curve/line",
-            rr.LineStrips2D([placed], colors=ORANGE, radii=rr.Radius.ui_points(1.25), draw_order=10),
+            rr.LineStrips2D([line], colors=ORANGE, radii=rr.Radius.ui_points(1.25), draw_order=10),
         )
-        tip = rr.Points2D([placed[-1]], colors=ORANGE, radii=rr.Radius.ui_points(4.0), draw_order=20)
+        tip = rr.Points2D([line[-1]], colors=ORANGE, radii=rr.Radius.ui_points(4.0), draw_order=20)
         self._log("curve/tip", tip)
-        right = placed[-1, 0] > 0.7 * CURVE_WIDTH
-        beside = placed[-1] + [-0.3 if right else 0.3, 0.17 if placed[-1, 1] < 0.7 else -0.25]
+        right = line[-1, 0] > 0.7 * CURVE_WIDTH
+        beside = line[-1] + [-0.3 if right else 0.3, 0.17 if line[-1, 1] < 0.7 else -0.25]
         label = f"{rounded(points[-1, 0], across)}, {rounded(vertical[-1], up)}"
-        self._log("curve/value", words([beside], [label], ORANGE))
+        self._log("curve/value", text_labels([beside], [label], ORANGE))
 
     def _draw_axes(self, across: Axis, up: Axis) -> None:
-        x = across.sink(np.array(across.ticks)) * CURVE_WIDTH
-        y = 1.0 - up.sink(np.array(up.ticks))
+        x = across.position(np.array(across.ticks)) * CURVE_WIDTH
+        y = 1.0 - up.position(np.array(up.ticks))
         rules = [[[xk, 0.0], [xk, 1.0]] for xk in x] + [[[0.0, yk], [CURVE_WIDTH, yk]] for yk in y]
-        self._log_change("curve/grid", lines(rules, DIM, 0.5))
-        x0, y0 = float(across.sink(np.array(0.0))) * CURVE_WIDTH, 1.0 - float(up.sink(np.array(0.0)))
+        self._log_change("curve/grid", polylines(rules, DIM, 0.5))
+        x0, y0 = float(across.position(np.array(0.0))) * CURVE_WIDTH, 1.0 - float(up.position(np.array(0.0)))
         self._log_change(
-            "curve/axes", lines([[[0.0, y0], [CURVE_WIDTH, y0]], [[x0, 0.0], [x0, 1.0]]], GREY, 0.75)
+            "curve/axes", polylines([[[0.0, y0], [CURVE_WIDTH, y0]], [[x0, 0.0], [x0, 1.0]]], GREY, 0.75)
         )
-        # rerun hangs a label below its place: a little higher puts it on the line.
-        sinks = [*([xk, 1.03] for xk in x), *([-0.13, yk - 0.05] for yk in y)]
+        # rerun draws a label below its position: a little higher puts it on the line.
+        positions = [*([xk, 1.03] for xk in x), *([-0.13, yk - 0.05] for yk in y)]
         labels = [number(v * across.factor) for v in across.ticks] + [number(v * up.factor) for v in up.ticks]
-        what = "stress" if self._setup.area_m2 else "load"
-        names = [f"axial strain ({across.unit})", f"{what} ({up.unit})"]
+        quantity = "stress" if self._setup.area_m2 else "load"
+        names = [f"axial strain ({across.unit})", f"{quantity} ({up.unit})"]
         titles = [[CURVE_WIDTH / 2, 1.15], [0.0, -0.2]]
-        self._log_change("curve/ticks", words([*sinks, *titles], [*labels, *names]))
+        self._log_change("curve/ticks", text_labels([*positions, *titles], [*labels, *names]))

@@ -1,24 +1,25 @@
-"""How the viewer opens: which view shows what, and where it stands (rerun blueprint)."""
+"""The initial layout of the viewer: the views, what each shows, and their sizes (rerun blueprint)."""
 
 from __future__ import annotations
 
 import math
 from typing import Any
 
-from live.ui.rerun.drawing.board import HEIGHT, WIDTH
+from live.ui.rerun.drawing.large_figures import HEIGHT, WIDTH
+from live.ui.rerun.drawing.shapes import BACKGROUND
 from live.ui.rerun.messages import MAPS, ViewSetup
 
-BAR_GAP, BAR_WIDTH, BAR_LABEL, BAR_ROOM = 0.03, 0.035, 0.16, 0.275
+BAR_GAP, BAR_WIDTH, BAR_LABEL, BAR_END = 0.03, 0.035, 0.16, 0.275
 """Colour bar, right of the picture: its left edge, width, middle and right end of its labels.
 
-In ``bar_unit``s, like all that goes with the size of letters.
+In ``bar_unit``s, like everything that depends on the size of letters.
 """
 
 BAR_TOP, BAR_HEIGHT = 0.12, 0.84
 """Its top edge (the unit stands above) and height, in heights of the picture."""
 
 LETTER = 0.028
-"""About half the height of a line of words, in ``bar_unit``s."""
+"""About half the height of a line of text, in ``bar_unit``s."""
 
 CURVE_WIDTH = 1.6
 """Width of the curve's rectangle; its height is 1."""
@@ -26,19 +27,17 @@ CURVE_WIDTH = 1.6
 _TITLES = {"e1": "e1 (largest)", "e2": "e2 (smallest)"}
 
 _WIDE = 2.2
-"""Pictures wider than that many heights stand one above the other."""
+"""Pictures wider than so many heights are placed one above the other."""
 
 ROWS = [2.4, 5.6, 3.8]
-"""Shares of the height: the large figures, the pictures, plots and words."""
-
-BACKGROUND = (18, 20, 24)
+"""Shares of the height: the large figures, the pictures, plots and texts."""
 
 VALUES = "/specimen/values"
-"""Where every ZOI tells its values when it is pointed at or clicked."""
+"""Entity with the values of every ZOI, shown where one is pointed at or clicked."""
 
 
 def gauge_path(name: str) -> str:
-    """Where the strain of a gauge is drawn over time."""
+    """Entity with the strain of a gauge over time."""
     return f"gauges/{name}"
 
 
@@ -53,7 +52,10 @@ def blueprint(setup: ViewSetup) -> Any:
 
     return rrb.Blueprint(
         rrb.Vertical(
-            *([] if setup.finished else [_board()]), _middle(setup), _below(setup), row_shares=_rows(setup)
+            *([] if setup.finished else [_large_figures()]),
+            _middle(setup),
+            _below(setup),
+            row_shares=_rows(setup),
         ),
         rrb.TimePanel(
             state="collapsed",
@@ -71,7 +73,7 @@ def _rows(setup: ViewSetup) -> list[float]:
     return ROWS[1:] if setup.finished else ROWS
 
 
-def _board() -> Any:
+def _large_figures() -> Any:
     """The large figures."""
     import rerun.blueprint as rrb
 
@@ -127,10 +129,10 @@ def _picture_view(setup: ViewSetup, name: str, contents: list[str]) -> Any:
     w, h = setup.width, setup.height
     margin, unit = 0.02 * max(w, h), bar_unit(setup)
     if name == "Camera":
-        # Room for a line of words above.
+        # Space for a line of text above.
         x_range, y_range = [-margin, w + margin], [-0.1 * unit, h + margin]
     else:
-        x_range, y_range = [-margin, w + BAR_ROOM * unit], [-margin, h + margin]
+        x_range, y_range = [-margin, w + BAR_END * unit], [-margin, h + margin]
     bounds = rrb.VisualBounds2D(x_range=x_range, y_range=y_range)
     return rrb.Spatial2DView(
         origin="/", contents=contents, name=name, visual_bounds=bounds, background=[*BACKGROUND, 255]
@@ -142,7 +144,7 @@ def _strain() -> Any:
 
 
 def _strains(setup: ViewSetup) -> Any:
-    """The mean strain, behind that of the gauges where there are any."""
+    """The mean strain; where there are gauges, theirs in a tab in front of it."""
     import rerun.blueprint as rrb
 
     if not setup.gauges:
@@ -172,7 +174,7 @@ def _plot(origin: str, name: str, *, legend: bool) -> Any:
 def _events() -> Any:
     import rerun.blueprint as rrb
 
-    # Rerun's own column of times is too narrow to be read; the text begins with the time instead.
+    # The time column of rerun is too narrow to be read; the text begins with the time instead.
     hidden = rrb.encodings.TimelineColumn("time", visible=False)
     columns = rrb.TextLogColumns(timeline_columns=[hidden], text_log_columns=["LogLevel", "Body"])
     return rrb.TextLogView(origin="/events", name="Events", columns=columns)
@@ -181,8 +183,8 @@ def _events() -> Any:
 def _curve(setup: ViewSetup) -> Any:
     import rerun.blueprint as rrb
 
-    what = "Stress" if setup.area_m2 else "Load"
+    quantity = "Stress" if setup.area_m2 else "Load"
     bounds = rrb.VisualBounds2D(x_range=[-0.3, CURVE_WIDTH + 0.17], y_range=[-0.25, 1.3])
     return rrb.Spatial2DView(
-        origin="/curve", name=f"{what} – strain", visual_bounds=bounds, background=[*BACKGROUND, 255]
+        origin="/curve", name=f"{quantity} – strain", visual_bounds=bounds, background=[*BACKGROUND, 255]
     )

@@ -1,6 +1,6 @@
-"""Reads what the test says, and draws it.
+"""The main loop of the process: reads messages and draws them.
 
-What ends the process that draws when nobody else does: a parent that has gone, a memory that has grown.
+It ends with the test, also with one that is killed, and where its memory has grown too large.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from live.ui.rerun.drawing.scene import ViewScene
 from live.ui.rerun.drawing.sinks import FINISHED_MIB, RerunSink, serve, write
 from live.ui.rerun.messages import (
     ViewSetup,
-    Where,
+    ViewTarget,
     events_of,
     field_of,
     figures_of,
@@ -32,119 +32,95 @@ from live.ui.rerun.messages import (
 )
 from live.ui.rerun.wire import Kind, Message, Reader, encoded
 
-GRACE_S = 5.0
-"""For drawing what waits and closing the file once the parent has gone."""
-
-
-def follow(parent: socket.socket) -> None:
-    """End this process ``GRACE_S`` after ``parent`` is closed at the other end, wherever it hangs then."""
-    threading.Thread(target=_follow, args=(parent.fileno(),), name="guard", daemon=True).start()
-
-
-def _follow(number: int) -> None:
-    poll = select.poll()
-    poll.register(number, 0)  # a closed end is told unasked
-    poll.poll()
-    threading.Event().wait(GRACE_S)
-    os.kill(os.getpid(), signal.SIGKILL)  # it may hang anywhere
-
-
-def memory_MiB() -> float:
-    """Resident memory of this process (its largest so far where the system does not tell)."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
-        return pages * resource.getpagesize() / 2**20
-    except (OSError, ValueError, IndexError):
-        most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        return most / 2**20 if sys.platform == "darwin" else most / 2**10
-
-
 log = logging.getLogger(__name__)
 
-MOST_MIB = 640
-"""Of the whole process; beyond, it closes its file and ends, and the test starts it anew."""
+MAX_MIB = 640
+"""Of the whole process; beyond it the process closes its file and ends, and the test restarts it."""
 
-_LOOK_S, _NICE = 2.0, 19
+GRACE_S = 5.0
+"""To draw what waits and to close the file after the test has ended."""
+
+_POLL_S, _NICE = 2.0, 19
 
 
-class ReplyLine:
-    """The way back to the test, for several threads."""
+class ReplyChannel:
+    """Sends messages to the test, from several threads."""
 
-    def __init__(self, there: socket.socket) -> None:
-        self._there, self._lock = there, threading.Lock()
+    def __init__(self, parent: socket.socket) -> None:
+        self._parent, self._lock = parent, threading.Lock()
 
-    def say(self, kind: Kind, **meta: Any) -> None:
-        """Tell the test; nothing where it has gone."""
+    def send(self, kind: Kind, **meta: Any) -> None:
+        """Send a message; ignored where the test has ended."""
         with self._lock, contextlib.suppress(OSError):
             for piece in encoded(Message(kind, meta)):
-                self._there.sendall(piece)
+                self._parent.sendall(piece)
 
-    def tell(self, text: str) -> None:
-        """Something for a person."""
-        self.say(Kind.TROUBLE, text=text, lasting=False)
+    def notify(self, text: str) -> None:
+        """Send a message for a person."""
+        self.send(Kind.TROUBLE, text=text, lasting=False)
 
 
 def main() -> int:
-    """Draw until the test ends or goes; what the process ends with."""
-    there = socket.socket(fileno=os.dup(0))
-    there.setblocking(True)
-    line, reader = ReplyLine(there), Reader(there)
-    follow(there)
+    """Draw until the test ends; the exit code."""
+    parent = socket.socket(fileno=os.dup(0))
+    parent.setblocking(True)
+    channel, reader = ReplyChannel(parent), Reader(parent)
+    end_with(parent)
     try:
-        setup, where = setup_of(reader.next())
-        sinks = _open(setup, where, line)
+        setup, target = setup_of(reader.next())
+        sinks = _open(setup, target, channel)
         if not sinks:
             return 3
-        # Only now: a machine without a free core would be long in loading rerun.
+        # Only now: with a low priority a busy machine takes long to load rerun.
         os.nice(_NICE - os.nice(0))
-        _draw(reader, ViewScene(sinks, setup), line, MOST_MIB + FINISHED_MIB * setup.finished)
+        _draw(reader, ViewScene(sinks, setup), channel, MAX_MIB + FINISHED_MIB * setup.finished)
     except EOFError:
         return 1
     except Exception as error:
         log.exception("the view's process stopped")
-        line.tell(f"the view's process stopped by a defect: {error!r}")
+        channel.notify(f"the view's process stopped by a defect: {error!r}")
         return 1
     return 0
 
 
-def _open(setup: ViewSetup, where: Where, line: ReplyLine) -> list[RerunSink]:
+def _open(setup: ViewSetup, target: ViewTarget, channel: ReplyChannel) -> list[RerunSink]:
     sinks, port, rrd, troubles = [], None, None, []
     try:
-        if where.port is not None:
-            sink, port = serve(setup, where, line.tell)
+        if target.port is not None:
+            sink, port = serve(setup, target, channel.notify)
             sinks.append(sink)
     except Exception as error:
         troubles.append(f"the view's server did not start: {error}")
     try:
-        if where.rrd is not None:
-            sinks.append(write(setup, where))
-            rrd = where.rrd
+        if target.rrd is not None:
+            sinks.append(write(setup, target))
+            rrd = target.rrd
     except FileExistsError:
-        troubles.append(f"the view's file did not start: {where.rrd} exists already and is not overwritten")
+        troubles.append(f"the view's file did not start: {target.rrd} exists already and is not overwritten")
     except Exception as error:
         troubles.append(f"the view's file did not start: {error}")
     if not sinks and not troubles:
         troubles.append("the view has nowhere to draw to")
     for text in troubles:
-        line.say(Kind.TROUBLE, text=f"{text}; all else goes on", lasting=not sinks)
+        channel.send(Kind.TROUBLE, text=f"{text}; all else goes on", lasting=not sinks)
     if sinks:
-        line.say(Kind.SERVING, port=port, rrd=rrd)
+        channel.send(Kind.SERVING, port=port, rrd=rrd)
     return sinks
 
 
-def _draw(reader: Reader, scene: ViewScene, line: ReplyLine, most_MiB: float) -> None:
+def _draw(reader: Reader, scene: ViewScene, channel: ReplyChannel, max_MiB: float) -> None:
     scene.begin()
-    look_t = time.monotonic()
+    checked_t = time.monotonic()
     try:
         while (message := reader.next()).kind is not Kind.END:
             _show(scene, message)
-            if time.monotonic() - look_t > _LOOK_S:
-                look_t = time.monotonic()
-                if (grown := memory_MiB()) > most_MiB:
-                    line.say(Kind.FULL, memory_MiB=round(grown))
+            if time.monotonic() - checked_t > _POLL_S:
+                checked_t = time.monotonic()
+                if (grown := memory_MiB()) > max_MiB:
+                    channel.send(Kind.FULL, memory_MiB=round(grown))
                     return
         scene.end()
-        line.say(Kind.ENDED)
+        channel.send(Kind.ENDED)
     finally:
         scene.end()
 
@@ -170,3 +146,26 @@ def _show(scene: ViewScene, message: Message) -> None:
         scene.status(str(message.meta.get("markdown", "")))
     elif kind is Kind.FIGURES:
         scene.figures(figures_of(message))
+
+
+def end_with(parent: socket.socket) -> None:
+    """End this process ``GRACE_S`` after the other end of ``parent`` is closed, even where it hangs."""
+    threading.Thread(target=_end_with, args=(parent.fileno(),), name="guard", daemon=True).start()
+
+
+def _end_with(number: int) -> None:
+    poll = select.poll()
+    poll.register(number, 0)  # a closed end is reported in any case
+    poll.poll()
+    threading.Event().wait(GRACE_S)
+    os.kill(os.getpid(), signal.SIGKILL)  # a hanging thread does not stop this
+
+
+def memory_MiB() -> float:
+    """Resident memory of this process (its peak where the system does not report the current value)."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        return pages * resource.getpagesize() / 2**20
+    except (OSError, ValueError, IndexError):
+        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        return peak / 2**20 if sys.platform == "darwin" else peak / 2**10

@@ -1,7 +1,6 @@
-"""Draws a test: pictures, maps, curves, events, status; once, for all places.
+"""Draws a test with rerun: pictures, maps, curves, events and status, once for all sinks.
 
-Knows rerun and the arrays; nothing of threads, processes or servers. Rates are per second of the
-test (``sinks``).
+Threads, processes and servers are elsewhere. Rates are per second of the test (``sinks``).
 """
 
 from __future__ import annotations
@@ -18,8 +17,8 @@ from live.pipeline.history import Thinned
 from live.pipeline.snapshot import Snapshot
 from live.results.maps.colours import MICROSTRAIN, number, ramp
 from live.results.maps.field_maps import FieldMaps, Painted
-from live.ui.rerun.drawing.board import paint
-from live.ui.rerun.drawing.curve import CYAN, DIM, MAX_POINTS, YELLOW, CurveDrawing, encode, reduced, words
+from live.ui.rerun.drawing.curve import MAX_POINTS, CurveDrawing
+from live.ui.rerun.drawing.large_figures import paint
 from live.ui.rerun.drawing.layout import (
     BAR_GAP,
     BAR_HEIGHT,
@@ -32,10 +31,16 @@ from live.ui.rerun.drawing.layout import (
     gauge_path,
 )
 from live.ui.rerun.drawing.shapes import (
+    CYAN,
+    DIM,
+    YELLOW,
     ArrowScale,
+    encode,
     mean_motion,
+    reduced,
     region_edges,
     sample_boxes,
+    text_labels,
     thinned,
     value_dots,
     with_heads,
@@ -51,13 +56,13 @@ GAUGES = ((255, 0, 255), (64, 224, 255), (255, 212, 59), (81, 207, 102), (255, 1
 RED, GAUGE, GAUGE_NAME = (255, 90, 60), (255, 0, 255), (255, 200, 255)
 _LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 _RAMP = (8, 256)
-_STRAINS_KEPT, _FORCES_KEPT = 5000, 10_000
-QUALITY, LONGEST_PX = 80, 1280
+_MAX_STRAINS, _MAX_FORCES = 5000, 10_000
+QUALITY, MAX_PX = 80, 1280
+LIGHT_QUALITY, LIGHT_MAX_PX = 50, 640
+"""Of a JPEG, 1..100; larger pictures are reduced by a whole factor. With ``ViewSetup.light`` the second pair."""
 FIGURES_QUALITY = 70
-LIGHT_QUALITY, LIGHT_LONGEST_PX = 50, 640
-"""Of the JPEG, 1..100; larger pictures are reduced by a whole factor."""
 _ALPHA = 225  # of the maps, 0..255
-_MORE = tuple(name for name in MAPS if name not in STRAINS)
+_OTHER_MAPS = tuple(name for name in MAPS if name not in STRAINS)
 
 
 class ViewScene:
@@ -78,11 +83,11 @@ class ViewScene:
         self._curve: Thinned[Row] = Thinned(MAX_POINTS)
         self._drawn_curve = CurveDrawing(self._log_due, self._log, setup)
         self._arrows = ArrowScale()
-        self._strains: Thinned[Row] = Thinned(_STRAINS_KEPT)
-        self._forces: Thinned[Row] = Thinned(_FORCES_KEPT)
+        self._strains: Thinned[Row] = Thinned(_MAX_STRAINS)
+        self._forces: Thinned[Row] = Thinned(_MAX_FORCES)
 
     def begin(self) -> None:
-        """All that does not change."""
+        """Draw everything that does not change."""
         import rerun as rr
 
         self._at(self._setup.start_monotonic)
@@ -100,7 +105,7 @@ class ViewScene:
         self._region(self._setup.grid)
 
     def end(self) -> None:
-        """All is drawn: let it reach its places, and close those."""
+        """Send what waits, and close the sinks."""
         for sink in self._sinks:
             sink.send_rows(_columns)
             sink.close()
@@ -109,14 +114,14 @@ class ViewScene:
     # -- pictures and maps ------------------------------------------------------------------
 
     def picture(self, picture: PictureMessage) -> None:
-        """A picture, as JPEG, no more often than the rates say."""
+        """Draw a picture as JPEG where a sink is due."""
         import rerun as rr
 
         self._due = [sink for sink in self._sinks if sink.takes("picture", picture.t)]
         if not self._due:
             return
         light = self._setup.light
-        image, factor = reduced(picture.image, picture.bits, LIGHT_LONGEST_PX if light else LONGEST_PX)
+        image, factor = reduced(picture.image, picture.bits, LIGHT_MAX_PX if light else MAX_PX)
         data = encode(".jpg", image, LIGHT_QUALITY if light else QUALITY)
         self._at(picture.t)
         self._log_due(
@@ -127,7 +132,7 @@ class ViewScene:
         self._count(data)
 
     def field(self, t: float, field: StrainField) -> None:
-        """A strain field at ``t`` (s, monotonic) as maps, no more often than the rates say; and the curve."""
+        """Draw a strain field at ``t`` (s, monotonic) as maps, and the curve, where a sink is due."""
         self._due = [sink for sink in self._sinks if sink.takes("map", t)]
         if not self._due:
             return
@@ -140,28 +145,24 @@ class ViewScene:
         self._drawn_curve.draw(points)
         self._due = [sink for sink in self._due if sink.takes("more", t)]
         if self._due:
-            self._draw_maps(field, _MORE)
+            self._draw_maps(field, _OTHER_MAPS)
 
     def _outlines(self, grid: ZoiGrid) -> None:
-        """The outlines of the ZOIs, and where the maps lie."""
+        """Draw the outlines of gauges and ZOIs, and place the maps."""
         import rerun as rr
 
         step = float(grid.step)
         corner = (float(grid.x[0]) + 0.5 - step / 2, float(grid.y[0]) + 0.5 - step / 2, 0.0)
         for name in MAPS:
-            sink = rr.Transform3D(translation=corner, scale=(step, step, 1.0))
-            self._log(f"specimen/map/{name}", sink, static=True)
+            placement = rr.Transform3D(translation=corner, scale=(step, step, 1.0))
+            self._log(f"specimen/map/{name}", placement, static=True)
         lines = [[np.array(line) + 0.5 for line in lines] for lines in self._setup.outlines.values()]
         strips = [strip for gauge in lines for strip in gauge]
         if strips:
-            gauges = rr.LineStrips2D(
-                strips,
-                colors=GAUGE,
-                radii=rr.Radius.ui_points(2.0),
-                draw_order=50,
-            )
+            width = rr.Radius.ui_points(2.0)
+            gauges = rr.LineStrips2D(strips, colors=GAUGE, radii=width, draw_order=50)
             self._log("specimen/gauges", gauges, static=True)
-            names = words([gauge[0][0] for gauge in lines], list(self._setup.outlines), GAUGE_NAME)
+            names = text_labels([gauge[0][0] for gauge in lines], list(self._setup.outlines), GAUGE_NAME)
             self._log("specimen/gauges/names", names, static=True)
         boxes = sample_boxes(grid)
         self._log(
@@ -177,7 +178,7 @@ class ViewScene:
         )
 
     def _region(self, grid: ZoiGrid) -> None:
-        """The edge of what is measured."""
+        """Draw the edge of the measured region."""
         import rerun as rr
 
         edge = rr.LineStrips2D(
@@ -196,14 +197,17 @@ class ViewScene:
         )
         self._log_due("zoi/displacement", arrows)
         total, outlined = field.grid.n_active, len(sample_boxes(field.grid))
-        some = f"{outlined} of {number(total)}" if outlined < total else f"all {total}"
-        text = f"displacement ×{number(factor)} · {some} ZOIs outlined"
+        count = f"{outlined} of {number(total)}" if outlined < total else f"all {total}"
+        text = f"displacement ×{number(factor)} · {count} ZOIs outlined"
         if self._changed("words", text):
-            sink = [[0.5 * self._setup.width, -0.08 * bar_unit(self._setup)]]
-            self._log("zoi/words", words(sink, [text], CYAN))
-        plain = field.status == Status.NO_PATTERN  # background, where nothing is to be lost
-        for name, wanted, colour in (("plain", plain, DIM), ("rejected", ~plain & np.isnan(field.exx), RED)):
-            dots = thinned(field.grid, wanted & field.grid.active)
+            above = [[0.5 * self._setup.width, -0.08 * bar_unit(self._setup)]]
+            self._log("zoi/words", text_labels(above, [text], CYAN))
+        plain = field.status == Status.NO_PATTERN  # background: not rejected
+        for name, selected, colour in (
+            ("plain", plain, DIM),
+            ("rejected", ~plain & np.isnan(field.exx), RED),
+        ):
+            dots = thinned(field.grid, selected & field.grid.active)
             if self._changed(name, dots.tobytes()):
                 points = rr.Points2D(dots, colors=colour, radii=rr.Radius.ui_points(1.5), draw_order=25)
                 self._log(f"specimen/zoi/{name}", points)
@@ -219,17 +223,17 @@ class ViewScene:
             if self._changed(f"bar/{name}", painted.scale or painted.legend):
                 self._log(f"bar/{name}/ticks", self._ticks(painted))
 
-    def _changed(self, what: str, says: object) -> bool:
-        """Whether it is to be drawn anew: a server's memory grows with each thing drawn."""
-        if self._drawn.get(what) == says:
+    def _changed(self, name: str, state: object) -> bool:
+        """Whether ``state`` differs from what was drawn: the memory of a server grows with everything drawn."""
+        if self._drawn.get(name) == state:
             return False
-        self._drawn[what] = says
+        self._drawn[name] = state
         return True
 
     def _values(self, field: StrainField) -> None:
-        """A dot in each ZOI that tells its values where a person clicks."""
-        for part in value_dots(field):
-            self._log_due(VALUES, part)
+        """Draw a dot in each ZOI, which shows its values where a person clicks."""
+        for archetype in value_dots(field):
+            self._log_due(VALUES, archetype)
 
     def _bar(self, name: str) -> None:
         import rerun as rr
@@ -239,49 +243,49 @@ class ViewScene:
         self._log(f"bar/{name}/ramp", rr.EncodedImage(contents=data, media_type="image/png"), static=True)
         unit = bar_unit(self._setup)
         scale = (BAR_WIDTH * unit / _RAMP[0], BAR_HEIGHT * h / _RAMP[1], 1.0)
-        sink = rr.Transform3D(translation=(w + BAR_GAP * unit, BAR_TOP * h, 0.0), scale=scale)
-        self._log(f"bar/{name}/ramp", sink, static=True)
+        placement = rr.Transform3D(translation=(w + BAR_GAP * unit, BAR_TOP * h, 0.0), scale=scale)
+        self._log(f"bar/{name}/ramp", placement, static=True)
 
     def _ticks(self, painted: Painted) -> Any:
         length, height = bar_unit(self._setup), self._setup.height
         x, top = self._setup.width + BAR_LABEL * length, BAR_TOP * height
         if painted.scale is None:
-            sinks = [[x, top + 0.1 * k * length] for k in range(len(painted.legend))]
+            positions = [[x, top + 0.1 * k * length] for k in range(len(painted.legend))]
             texts = [f"{one.name} {one.count}" for one in painted.legend]
-            return words(sinks, texts, [one.rgb for one in painted.legend])
+            return text_labels(positions, texts, [one.rgb for one in painted.legend])
         scale, share = painted.scale, np.array([1.0, 0.75, 0.5, 0.25, 0.0])
         y = (BAR_TOP + BAR_HEIGHT * (1 - share)) * height - LETTER * length
         points = [*([x, yk] for yk in y), [x - 0.04 * length, top - 0.09 * length]]
         values = scale.low + share * (scale.high - scale.low)
-        return words(points, [*(number(float(f"{v:.6g}")) for v in values), scale.unit])
+        return text_labels(points, [*(number(float(f"{v:.6g}")) for v in values), scale.unit])
 
     # -- curves -------------------------------------------------------------------------------
 
     def points(self, points: Iterable[Row]) -> None:
-        """Points (strain, N) of the curve, drawn with the next maps."""
+        """Add points (strain, N) of the curve, drawn with the next maps."""
         for point in points:
             self._curve.append(point)
 
     def loads(self, samples: Iterable[Row]) -> None:
-        """Load samples (s, N)."""
+        """Add load samples (s, N)."""
         for t, force in samples:
             row = (self._since_start(t), force)
             self._forces.append(row)
             self._add(t, "load/force", row)
 
     def gauge(self, name: str, rows: Iterable[Row]) -> None:
-        """Time (s), strain and sigma of a gauge."""
+        """Add rows of a gauge: time (s), strain and sigma."""
         for t, *values in rows:
             self._add(t, gauge_path(name), (self._since_start(t), *values))
 
     def means(self, rows: Iterable[Row]) -> None:
-        """Time (s), and mean and sigma of each strain."""
+        """Add rows of means: time (s), then mean and sigma of each strain."""
         for t, *values in rows:
             if any(math.isfinite(value) for value in values[::2]):
                 row = (self._since_start(t), *values)
                 self._strains.append(row)
                 self._add_strains(t, row)
-        self._repeat()
+        self._send_again()
 
     def _add_strains(self, t: float, row: Row) -> None:
         for k, name in enumerate(STRAINS):
@@ -293,21 +297,21 @@ class ViewScene:
             if sink.takes("rows", t):
                 sink.send_rows(_columns)
 
-    def _repeat(self) -> None:
-        forgetting = [sink for sink in self._sinks if sink.forgets()]
-        for sink in forgetting:
+    def _send_again(self) -> None:
+        due = [sink for sink in self._sinks if sink.needs_curves_again()]
+        for sink in due:
             sink.send("load/force", self._forces.items(), _columns)
             for k, name in enumerate(STRAINS):
                 rows = [(row[0], *row[2 * k + 1 : 2 * k + 3]) for row in self._strains.items()]
                 sink.send(f"strain/{name}", rows, _columns)
-        if forgetting:
+        if due:
             self._drawn = {}
-            self._drawn_curve.forget()
+            self._drawn_curve.reset()
 
-    # -- words --------------------------------------------------------------------------------
+    # -- texts --------------------------------------------------------------------------------
 
     def event(self, event: Event) -> None:
-        """One line in the list of events; not one for each measurement."""
+        """Add a line to the list of events, except for measurements."""
         import rerun as rr
 
         if event.kind is EventKind.MEASURED:
@@ -318,7 +322,7 @@ class ViewScene:
         self._log("events", rr.TextLog(text, level=_LEVELS[event.level]))
 
     def figures(self, snapshot: Snapshot) -> None:
-        """The large figures, no more often than the rates say."""
+        """Draw the large figures where a sink is due."""
         import rerun as rr
 
         self._due = [sink for sink in self._sinks if sink.takes("figures", snapshot.t)]
@@ -328,10 +332,10 @@ class ViewScene:
             self._log_due("figures", rr.EncodedImage(contents=data, media_type="image/jpeg"))
 
     def status(self, markdown: str) -> None:
-        """The status card."""
+        """Draw the status card."""
         import rerun as rr
 
-        # What is static a server keeps for ever, each of them.
+        # A server keeps everything that is static, also after it was replaced.
         card = rr.TextDocument(markdown, media_type=rr.MediaType.MARKDOWN)
         self._log("status", card, static=self._setup.finished)
 
@@ -344,14 +348,14 @@ class ViewScene:
         for sink in self._sinks:
             sink.stream.set_time("time", duration=self._since_start(t))
 
-    def _log(self, path: str, what: Any, *, static: bool = False) -> None:
-        """To all places: what is drawn only where it changes."""
+    def _log(self, path: str, archetype: Any, *, static: bool = False) -> None:
+        """Draw in all sinks, for what is drawn only where it changes."""
         for sink in self._sinks:
-            sink.stream.log(path, what, static=static)
+            sink.stream.log(path, archetype, static=static)
 
-    def _log_due(self, path: str, what: Any) -> None:
+    def _log_due(self, path: str, archetype: Any) -> None:
         for sink in self._due:
-            sink.stream.log(path, what)
+            sink.stream.log(path, archetype)
 
     def _count(self, data: bytes) -> None:
         for sink in self._due:
@@ -359,7 +363,7 @@ class ViewScene:
 
 
 def _columns(path: str, values: Sequence[Any]) -> Any:
-    """Rerun's columns of what is drawn over time."""
+    """The columns of rerun for the rows of an entity."""
     import rerun as rr
 
     if path == "load/force":

@@ -1,4 +1,4 @@
-"""Where is drawn to: a server that viewers look at, and a file; each a rerun stream with rates of its own."""
+"""The sinks of the drawing: a server for viewers, and a file; each a rerun stream with its own rates."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from live.ui.rerun.drawing.layout import blueprint
-from live.ui.rerun.drawing.proxy import ViewerProxy, hidden, wait_for
-from live.ui.rerun.messages import ViewSetup, Where
+from live.ui.rerun.drawing.proxy import ViewerProxy, hidden_address, wait_for
+from live.ui.rerun.messages import ViewSetup, ViewTarget
 
 APPLICATION = "phasedic"
 SERVER_MIB = 64
-"""What a viewer that comes late can still be shown; beyond, the oldest pictures and maps go."""
+"""What a viewer that connects late can still get; beyond it the oldest pictures and maps are dropped."""
 
 FINISHED_MIB = 768
-"""Of a finished test everything is to be kept: whoever tells it chooses no more than that."""
+"""For a finished test, where everything is kept: ``live.ui.rerun.playback`` selects no more than that."""
 
 RRD_LIMIT_BYTES = 1e9
 _FLUSH_S = 10.0
@@ -27,23 +27,23 @@ _FLUSH_S = 10.0
 
 @dataclass(frozen=True, slots=True)
 class Rates:
-    """How much goes to one place, per second of the test; and how much in all.
+    """How much goes to one sink per second of the test, and in total.
 
     Attributes
     ----------
     picture_hz, map_hz, row_hz : float, 1/s
-        Pictures, maps; and how often what came of means and loads (all of it) is drawn, a parcel each time.
+        Pictures, maps, and parcels of rows (means and loads, all of them).
     gather_s : float, s
-        What is drawn of one thing in so long goes out together; rerun's memory grows with each parcel
-        (of a file: for good).
+        What is drawn of one entity in this time is sent together; the memory of rerun grows with each parcel
+        (for a file: permanently).
     parcel_bytes : int
-        What is drawn of one thing goes out when it comes to this much; large parcels leave holes in the memory,
-        which grew by as much as was written.
+        A parcel is sent when it reaches this size; large ones fragment the memory, which then grows by as much as
+        is written.
     limit_bytes : float
-        When the pictures and maps drawn come to this much they stop; the curves go on.
+        Pictures and maps stop when their total reaches this; the curves continue.
     repeat_bytes : float
-        Each time that much was drawn, the curves are sent again from their beginning: a server
-        forgets the oldest, and a viewer that comes later is to see the whole test.
+        The curves are sent again from their beginning each time so much was drawn: a server drops the oldest
+        data, and a viewer that connects later must show the whole test.
     """
 
     picture_hz: float
@@ -56,18 +56,18 @@ class Rates:
 
 
 ALL = Rates(math.inf, math.inf)
-"""Whatever comes."""
+"""Everything is drawn."""
 
 
 class RerunSink:
-    """One stream, and how much it was given so far.
+    """One stream, and how much was drawn into it.
 
     Parameters
     ----------
     stream : rerun.RecordingStream
     rates : Rates
     drawn : callable
-        Told how many bytes of pictures and maps were drawn so far.
+        Called with the total of bytes of pictures and maps.
 
     Attributes
     ----------
@@ -89,23 +89,20 @@ class RerunSink:
         self.drawn_bytes = self._repeated_at = 0
 
     def count(self, data: bytes) -> None:
-        """A picture or map of so many bytes was drawn."""
+        """Count the bytes of a picture or map."""
         self.drawn_bytes += len(data)
         self._drawn(self.drawn_bytes)
 
-    def takes(self, what: str, t: float) -> bool:
-        """Whether a "picture", "map", "more" (maps), "figures" or "rows" at ``t`` (s) is due.
-
-        Then the next is not, for a while.
-        """
-        full = self.drawn_bytes >= self._rates.limit_bytes and what not in ("rows", "figures")
-        if full or t - self._last_t[what] < 0.999 / self._hz[what]:
+    def takes(self, kind: str, t: float) -> bool:
+        """Whether a "picture", "map", "more" (maps), "figures" or "rows" at ``t`` (s) is due; if so, it is drawn."""
+        full = self.drawn_bytes >= self._rates.limit_bytes and kind not in ("rows", "figures")
+        if full or t - self._last_t[kind] < 0.999 / self._hz[kind]:
             return False
-        self._last_t[what] = t
+        self._last_t[kind] = t
         return True
 
-    def forgets(self) -> bool:
-        """Whether so much was drawn since the last time that the curves are to be sent again."""
+    def needs_curves_again(self) -> bool:
+        """Whether ``repeat_bytes`` were drawn since the curves were sent."""
         if self.drawn_bytes - self._repeated_at < self._rates.repeat_bytes:
             return False
         self._repeated_at = self.drawn_bytes
@@ -116,7 +113,7 @@ class RerunSink:
         self._rows.setdefault(path, []).append(row)
 
     def send_rows(self, columns: Callable[[str, Any], Any]) -> None:
-        """Draw all rows kept; ``columns`` makes rerun's columns of a path and (values, N)."""
+        """Draw all waiting rows; ``columns`` makes the columns of rerun from a path and (values, N)."""
         kept, self._rows = self._rows, {}
         for path, rows in kept.items():
             self.send(path, rows, columns)
@@ -130,13 +127,13 @@ class RerunSink:
             self.stream.send_columns(path, [rr.TimeColumn("time", duration=times)], columns(path, values))
 
     def close(self) -> None:
-        """Let all reach its place, and close that."""
+        """Send everything, and close the stream."""
         self.stream.flush(timeout_sec=_FLUSH_S)
         self.stream.disconnect()
 
 
-def serve(setup: ViewSetup, where: Where, tell: Callable[[str], None]) -> tuple[RerunSink, int]:
-    """A server, and the port where viewers connect.
+def serve(setup: ViewSetup, target: ViewTarget, notify: Callable[[str], None]) -> tuple[RerunSink, int]:
+    """A sink that serves viewers, and its port.
 
     Raises
     ------
@@ -145,32 +142,32 @@ def serve(setup: ViewSetup, where: Where, tell: Callable[[str], None]) -> tuple[
     """
     import rerun as rr
 
-    wanted = where.port or 0
-    proxy = ViewerProxy(wanted, tell)
+    wanted = target.port or 0
+    proxy = ViewerProxy(wanted, notify)
     if wanted and proxy.port != wanted:
-        tell(f"port {wanted} is taken; the view is on {proxy.port}")
-    host, port = hidden()
+        notify(f"port {wanted} is taken; the view is on {proxy.port}")
+    host, port = hidden_address()
     memory = FINISHED_MIB if setup.finished else SERVER_MIB
     live = Rates(setup.picture_hz, 1.0 if setup.light else 10.0, repeat_bytes=SERVER_MIB * 2**20 / 4)
     rates = ALL if setup.finished else live
-    sink = rr.GrpcServerSink(host, port, server_memory_limit=f"{memory}MiB")
-    place = _sink(sink, setup, where.recording, rates, proxy.drawn)
+    server = rr.GrpcServerSink(host, port, server_memory_limit=f"{memory}MiB")
+    sink = _sink(server, setup, target.recording, rates, proxy.drawn)
     wait_for(host, port)
     proxy.open(host, port)
-    return place, proxy.port
+    return sink, proxy.port
 
 
-def write(setup: ViewSetup, where: Where) -> RerunSink:
-    """A file.
+def write(setup: ViewSetup, target: ViewTarget) -> RerunSink:
+    """A sink that writes a file.
 
     Raises
     ------
     OSError
-        It is there already, or cannot be made.
+        It exists already, or cannot be created.
     """
     import rerun as rr
 
-    path = Path(where.rrd or "")
+    path = Path(target.rrd or "")
     with path.open("xb"):  # rerun overwrites
         pass
     rates = (
@@ -178,12 +175,12 @@ def write(setup: ViewSetup, where: Where) -> RerunSink:
         if setup.finished
         else Rates(1.0, 2.0, 0.2, gather_s=5.0, parcel_bytes=2**16, limit_bytes=RRD_LIMIT_BYTES)
     )
-    # Two streams of one name in a process would be one stream.
-    return _sink(rr.FileSink(str(path)), setup, f"{where.recording}-file", rates)
+    # Two streams with one name in a process would be one stream.
+    return _sink(rr.FileSink(str(path)), setup, f"{target.recording}-file", rates)
 
 
 def _sink(
-    sink: Any,
+    rerun_sink: Any,
     setup: ViewSetup,
     recording: str,
     rates: Rates,
@@ -193,7 +190,7 @@ def _sink(
 
     parcels = rr.ChunkBatcherConfig(flush_tick=rates.gather_s, flush_num_bytes=rates.parcel_bytes)
     stream = rr.RecordingStream(APPLICATION, recording_id=recording, batcher_config=parcels)
-    stream.set_sinks(sink)
+    stream.set_sinks(rerun_sink)
     stream.send_recording_name(setup.title)
     stream.send_blueprint(blueprint(setup))
     return RerunSink(stream, rates, drawn)

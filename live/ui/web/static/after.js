@@ -1,9 +1,9 @@
-// What came out.
+// After a test: figures, summary, report.
 import { $, put } from "./base.js";
 import { t } from "./words.js";
 
-export function showAfter(told) {
-  $("results").replaceChildren(...told.figures.map((one) => {
+export function showAfter(result) {
+  $("results").replaceChildren(...result.figures.map((one) => {
     const box = document.createElement("div"), name = document.createElement("span"), value = document.createElement("output");
     name.textContent = one.name;
     value.textContent = one.text ?? "–";
@@ -12,14 +12,14 @@ export function showAfter(told) {
     box.append(name, value, why);
     return box;
   }));
-  put($("folder"), told.folder);
-  put($("ended"), told.words);
-  $("summary").replaceChildren(...[...told.lines, told.ledger, ...told.troubles].map((text) => {
+  put($("folder"), result.folder);
+  put($("ended"), result.words);
+  $("summary").replaceChildren(...[...result.lines, result.ledger, ...result.troubles].map((text) => {
     const item = document.createElement("li");
     item.textContent = text;
     return item;
   }));
-  $("report").setAttribute("aria-disabled", String(!told.report));
-  put($("next"), told.next ?? "");
-  if (told.report) $("report").textContent = t("Open the report");
+  $("report").setAttribute("aria-disabled", String(!result.report));
+  put($("next"), result.next ?? "");
+  if (result.report) $("report").textContent = t("Open the report");
 }

@@ -1,27 +1,27 @@
-// What all parts of the page use: elements by name, and what is sent to phasedic.
+// Shared by all parts of the page: elements by name, and requests to phasedic.
 import { t } from "./words.js";
 
 export const $ = (id) => document.getElementById(id);
 
-// Writes only what has changed, so that nothing is laid out anew.
+// Writes only a changed text, so that the layout is not computed again.
 export function put(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
 export async function post(path, value) {
-  let said;
+  let answer;
   try {
     const response = await fetch(path, {
       method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify(value),
     });
-    said = response.ok ? (await response.json()).answer : `no: ${await response.text()}`;
+    answer = response.ok ? (await response.json()).answer : `no: ${await response.text()}`;
   } catch {
-    said = `no: ${t("NO LINK")}`;
+    answer = `no: ${t("NO LINK")}`;
   }
-  put($("answer"), said === "ok" ? `${value.line ?? value.do ?? value.of ?? ""} ✓` : said);
-  $("answer").classList.toggle("no", said.startsWith("no"));
-  return said;
+  put($("answer"), answer === "ok" ? `${value.line ?? value.do ?? value.of ?? ""} ✓` : answer);
+  $("answer").classList.toggle("no", answer.startsWith("no"));
+  return answer;
 }
 
-export const order = (line) => post("/order", { line });
+export const command = (line) => post("/order", { line });
 export const change = (value) => post("/setup", value);

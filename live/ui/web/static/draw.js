@@ -30,8 +30,8 @@ export function drawGauges(svg, gauges, width, height, handles) {
   if (focused) svg.querySelector(`[data-handle="${CSS.escape(focused)}"]`)?.focus();
 }
 
-// Where the mouse is, in px of the picture.
-export function place(svg, event) {
+// Position of the mouse, in px of the picture.
+export function position(svg, event) {
   const p = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
   return [p.x, p.y];
 }

@@ -1,23 +1,23 @@
-// Setting up: light and focus, region and gauges with the mouse, scale, the check, the rig file.
+// Set-up: light and focus, region and gauges with the mouse, scale, the check, the rig file.
 import { $, change, put } from "./base.js";
-import { drawGauges, make, place } from "./draw.js";
+import { drawGauges, make, position } from "./draw.js";
 import { t } from "./words.js";
 
 const svg = $("drawing");
-let told = {}, tool = "rectangle", points = [], busy = false, shownPicture = -1, edition = -1, drag = null, pending = null;
+let state = {}, tool = "rectangle", points = [], busy = false, shownPicture = -1, edition = -1, drag = null, pending = null;
 
 const HINTS = {
   rectangle: "Drag a rectangle over the specimen; with Shift it is added.",
-  polygon: "Click the corners; Enter or a double click closes it, Escape forgets it.",
+  polygon: "Click the corners; Enter or a double click closes it, Escape discards it.",
   brush: "Paint what is measured.",
   eraser: "Paint what is not measured.",
   move: "Drag the handles; with the keyboard Tab and the arrows.",
-  scale: "Click two points whose distance you know.",
+  scale: "Click two points whose distance is known.",
   board: "Hold the board where the specimen will be. Of a checkerboard count the inner corners, of a ChArUco board the squares.",
 };
-let kinds = {};  // of gauges, as the server lists them
-const dragged = () => tool === "rectangle" || ["line", "box"].includes(kinds[tool]?.gesture);
-const clicked = () => kinds[tool]?.gesture === "click";
+let kinds = {};  // of gauges, from the server
+const isDragged = () => tool === "rectangle" || ["line", "box"].includes(kinds[tool]?.gesture);
+const isClicked = () => kinds[tool]?.gesture === "click";
 
 function choose(name) {
   tool = name;
@@ -53,15 +53,15 @@ showSetup.begin = (stage) => {
 // -- the mouse ---------------------------------------------------------------------------------
 
 svg.addEventListener("pointerdown", (event) => {
-  if (event.button !== 0 || !told.camera) return;
-  const at = place(svg, event), handle = event.target.dataset?.handle;
+  if (event.button !== 0 || !state.camera) return;
+  const at = position(svg, event), handle = event.target.dataset?.handle;
   if (handle && (tool === "move" || tool in kinds)) {
     const [name, index] = handle.split(" ");
     drag = { name, index: Number(index) };
-    pending = told.gauges[name];
-  } else if (tool === "polygon" || clicked() || tool === "scale") {
+    pending = state.gauges[name];
+  } else if (tool === "polygon" || isClicked() || tool === "scale") {
     points.push(at);
-    if (clicked() || (tool === "scale" && points.length === 2)) finish(false);
+    if (isClicked() || (tool === "scale" && points.length === 2)) finish(false);
   } else if (tool !== "move") {
     points = [at];
     drag = { tool };
@@ -73,14 +73,14 @@ svg.addEventListener("pointerdown", (event) => {
 svg.addEventListener("pointermove", (event) => {
   if (!drag) return;
   const moves = event.getCoalescedEvents?.() ?? [];
-  for (const one of moves.length ? moves : [event]) moved(place(svg, one));
+  for (const one of moves.length ? moves : [event]) dragTo(position(svg, one));
   sketch();
 });
 
-function moved(at) {
+function dragTo(at) {
   if (drag.name) {
     pending = { ...pending, handles: pending.handles.map((p, i) => (i === drag.index ? at : p)) };
-  } else if (dragged()) {
+  } else if (isDragged()) {
     points = [points[0], at];
   } else {
     points.push(at);
@@ -89,12 +89,12 @@ function moved(at) {
 
 svg.addEventListener("pointerup", (event) => {
   if (!drag) return;
-  moved(place(svg, event));
+  dragTo(position(svg, event));
   const was = drag;
   drag = null;
   if (was.name) {
     change({ do: "gauge", name: was.name, points: pending.handles });
-    told.gauges[was.name] = pending;
+    state.gauges[was.name] = pending;
     pending = null;
   } else {
     finish(event.shiftKey);
@@ -112,7 +112,7 @@ function finish(add) {
   sketch();
 }
 
-// A long way is sent in pieces that hang together.
+// A long path is sent in connected pieces.
 function strokes(drawn, add) {
   const radius = Number($("radius").value), found = [];
   for (let i = 0; i < drawn.length; i += 4000) found.push({ tool, points: drawn.slice(Math.max(i - 1, 0), i + 4000), radius, add });
@@ -120,7 +120,7 @@ function strokes(drawn, add) {
 }
 
 function newGauge(drawn) {
-  if (!clicked() && (drawn.length < 2 || Math.hypot(drawn[1][0] - drawn[0][0], drawn[1][1] - drawn[0][1]) < 3)) return;
+  if (!isClicked() && (drawn.length < 2 || Math.hypot(drawn[1][0] - drawn[0][0], drawn[1][1] - drawn[0][1]) < 3)) return;
   change({ do: "gauge", kind: tool, points: drawn });
 }
 
@@ -132,7 +132,7 @@ function askLength(drawn) {
   const form = document.createElement("form"), input = document.createElement("input"), button = document.createElement("button");
   Object.assign(input, { type: "number", min: "0", step: "any", required: true, placeholder: "mm" });
   input.setAttribute("aria-label", t("Length in mm"));
-  button.textContent = t("Take");
+  button.textContent = t("Apply");
   form.append(input, button);
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
@@ -145,7 +145,7 @@ function askLength(drawn) {
   input.focus();
 }
 
-// A board is seen in the picture as it is: no click, only what it is.
+// A calibration board is found in the picture: only its dimensions are needed.
 const BOARD = { columns: "Columns", rows: "Rows", square: "Square, mm", marker: "Marker, mm (none: checkerboard)" };
 let asking = false;
 $("board").addEventListener("click", () => {
@@ -160,13 +160,13 @@ $("board").addEventListener("click", () => {
     return labelled(input, t(words));
   });
   Object.assign(last, { name: "dictionary", type: "text", value: "4X4_50", maxLength: 39 });
-  button.textContent = t("Take");
+  button.textContent = t("Apply");
   form.append(...inputs, labelled(last, t("Dictionary of the markers")), button);
   form.addEventListener("submit", async (event) => {
     event.preventDefault();
-    const said = { do: "board", dictionary: last.value };
-    for (const key of Object.keys(BOARD)) said[key] = form.elements[key].value === "" ? 0 : Number(form.elements[key].value);
-    if (await change(said) !== "ok") return;
+    const request = { do: "board", dictionary: last.value };
+    for (const key of Object.keys(BOARD)) request[key] = form.elements[key].value === "" ? 0 : Number(form.elements[key].value);
+    if (await change(request) !== "ok") return;
     asking = false;
     showScale();
   });
@@ -199,23 +199,23 @@ function sketch() {
   if (group.children.length) svg.append(group);
 }
 
-// What is dragged, until the server gives its outline.
+// The dragged shape, until the server sends its outline.
 function preview(gesture, at) {
   if (gesture !== "box" || at.length !== 2) return make(at.length > 2 ? "polygon" : "polyline", { class: "drawn", points: at.join(" ") });
   const [[x0, y0], [x1, y1]] = at;
   return make("rect", { class: "drawn", x: Math.min(x0, x1), y: Math.min(y0, y1), width: Math.abs(x1 - x0), height: Math.abs(y1 - y0) });
 }
 
-// Keys of the set-up; true where one was used.
+// Handles the keys of the set-up; true where one was used.
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 export function setupKeys(event) {
   const handle = document.activeElement?.dataset?.handle, arrow = ARROWS[event.key];
   if (handle && arrow) {
-    const [name, index] = handle.split(" "), step = event.shiftKey ? 10 : 1, gauge = told.gauges[name];
-    const now = gauge.handles.map((p, i) => (i === Number(index) ? p.map((v, k) => v + step * arrow[k]) : p));
-    told.gauges[name] = { ...gauge, handles: now };
-    change({ do: "gauge", name, points: now });
-    gaugesOver();
+    const [name, index] = handle.split(" "), step = event.shiftKey ? 10 : 1, gauge = state.gauges[name];
+    const handles = gauge.handles.map((p, i) => (i === Number(index) ? p.map((v, k) => v + step * arrow[k]) : p));
+    state.gauges[name] = { ...gauge, handles };
+    change({ do: "gauge", name, points: handles });
+    showGauges();
     event.preventDefault();
     return true;
   }
@@ -224,14 +224,14 @@ export function setupKeys(event) {
   return false;
 }
 
-// -- what is shown -----------------------------------------------------------------------------
+// -- display -----------------------------------------------------------------------------------
 
 const percent = (value) => (value == null ? "–" : value > 0 && value < 1e-4 ? "<0.01 %" : `${(value * 100).toFixed(2)} %`);
 
 export function showSetup(value) {
-  const held = drag?.name ? told.gauges[drag.name] : null;
-  told = value;
-  if (held) told.gauges[drag.name] = held;
+  const dragged = drag?.name ? state.gauges[drag.name] : null;
+  state = value;
+  if (dragged) state.gauges[drag.name] = dragged;
   put($("trouble"), value.trouble || value.doubt);
   put($("busy"), value.busy);
   put($("sharpness"), value.sharpness == null ? "–" : value.sharpness.toFixed(3));
@@ -242,17 +242,17 @@ export function showSetup(value) {
   put($("camera"), c ? `${c.name}, ${c.width} × ${c.height} px, ${c.bits} bit${c.fps ? `, ${c.fps} fps` : ""}` : "");
   put($("region"), value.region ? `${value.region.words}${value.zois == null ? "" : ` · ${value.zois} ZOIs`}` : "");
   put($("file"), `${value.file}${value.unsaved.length ? ` · ${t("not saved")}` : ` · ${t("saved")}`}`);
-  picture(value);
-  gaugesOver();
-  gaugeList(value.gauges);
-  sliders(c?.sliders ?? []);
-  fields(value);
+  showPicture(value);
+  showGauges();
+  listGauges(value.gauges);
+  showSliders(c?.sliders ?? []);
+  showFields(value);
   for (const box of document.querySelectorAll("[data-overlay]")) if (box !== document.activeElement) box.checked = value.overlays[box.dataset.overlay];
-  check(value);
+  showCheck(value);
   showScale();
 }
 
-function picture(value) {
+function showPicture(value) {
   if (value.picture && value.picture !== shownPicture && !busy) {
     busy = true;
     shownPicture = value.picture;
@@ -266,56 +266,56 @@ function picture(value) {
   }
 }
 
-function gaugesOver() {
-  if (told.camera && !pending) {
+function showGauges() {
+  if (state.camera && !pending) {
     const before = svg.dataset.mark;
-    drawGauges(svg, told.gauges, told.camera.width, told.camera.height, true);
+    drawGauges(svg, state.gauges, state.camera.width, state.camera.height, true);
     if (svg.dataset.mark !== before) sketch();
   }
 }
 
-function gaugeList(gauges) {
+function listGauges(gauges) {
   const list = $("gauges"), names = Object.keys(gauges);
   if (list.contains(document.activeElement) || list.dataset.names === names.join()) return;
   list.dataset.names = names.join();
   list.replaceChildren(...names.map((name) => {
-    const item = document.createElement("li"), input = document.createElement("input"), away = document.createElement("button");
+    const item = document.createElement("li"), input = document.createElement("input"), remove = document.createElement("button");
     input.value = name;
     input.maxLength = 32;
     input.setAttribute("aria-label", t("Name"));
     input.addEventListener("change", async () => {
-      const said = await change({ do: "gauge", name: input.value, was: name });
-      if (!said.startsWith("ok")) input.value = name;
+      const answer = await change({ do: "gauge", name: input.value, was: name });
+      if (!answer.startsWith("ok")) input.value = name;
       input.blur();
       list.dataset.names = "";
     });
-    away.type = "button";
-    away.textContent = "×";
-    away.setAttribute("aria-label", `${t("Take away")} ${name}`);
-    away.addEventListener("click", () => { away.blur(); change({ do: "gauge", name, gauge: null }); });
-    item.append(input, away);
+    remove.type = "button";
+    remove.textContent = "×";
+    remove.setAttribute("aria-label", `${t("Remove")} ${name}`);
+    remove.addEventListener("click", () => { remove.blur(); change({ do: "gauge", name, gauge: null }); });
+    item.append(input, remove);
     return item;
   }));
 }
 
 const LABELS = { exposure_us: "Exposure, µs", gain: "Gain", brightness: "Brightness" };
-function sliders(wanted) {
+function showSliders(settings) {
   const box = $("sliders");
-  if (box.dataset.keys !== wanted.map((one) => one.key).join()) {
-    box.dataset.keys = wanted.map((one) => one.key).join();
-    box.replaceChildren(...wanted.map((one) => {
+  if (box.dataset.keys !== settings.map((one) => one.key).join()) {
+    box.dataset.keys = settings.map((one) => one.key).join();
+    box.replaceChildren(...settings.map((one) => {
       const label = document.createElement("label"), name = document.createElement("span"), input = document.createElement("input"), value = document.createElement("output");
       name.dataset.t = LABELS[one.key] ?? one.key;
       name.textContent = t(name.dataset.t);
       Object.assign(input, { type: "range", min: 0, max: 1000, step: 1 });
       input.dataset.key = one.key;
-      input.addEventListener("change", () => change({ do: "camera", key: one.key, value: at(input, input.value) }));
-      input.addEventListener("input", () => put(value, number(at(input, input.value))));
+      input.addEventListener("change", () => change({ do: "camera", key: one.key, value: sliderValue(input, input.value) }));
+      input.addEventListener("input", () => put(value, number(sliderValue(input, input.value))));
       label.append(name, input, value);
       return label;
     }));
   }
-  wanted.forEach((one, i) => {
+  settings.forEach((one, i) => {
     const [, input, value] = box.children[i].children;
     Object.assign(input.dataset, { low: one.low, high: one.high, log: one.log, step: one.step });
     if (input === document.activeElement && input.matches(":active")) return;
@@ -325,8 +325,8 @@ function sliders(wanted) {
   });
 }
 
-function at(input, place) {
-  const low = Number(input.dataset.low), high = Number(input.dataset.high), share = place / 1000;
+function sliderValue(input, ticks) {
+  const low = Number(input.dataset.low), high = Number(input.dataset.high), share = ticks / 1000;
   const value = input.dataset.log === "true" ? low * (high / low) ** share : low + share * (high - low), step = Number(input.dataset.step);
   return step ? low + Math.min(Math.round((value - low) / step), Math.floor((high - low) / step)) * step : Number(value.toPrecision(3));
 }
@@ -338,7 +338,7 @@ for (const input of document.querySelectorAll("[data-set]")) {
   input.addEventListener("change", () => change({ do: "set", key: input.dataset.set, value: numeric && input.value !== "" ? Number(input.value) : input.value }));
 }
 
-function fields(value) {
+function showFields(value) {
   for (const input of document.querySelectorAll("[data-set]")) {
     if (input === document.activeElement) continue;
     const [section, key] = input.dataset.set.split("."), now = value[section][key] ?? "";
@@ -352,7 +352,7 @@ for (const box of document.querySelectorAll("[data-overlay]")) {
 }
 
 let shownCheck = "";
-function check(value) {
+function showCheck(value) {
   const verdict = $("verdict");
   put(verdict, value.checking ? t("checking …") : value.go == null ? "" : value.go ? "GO" : "NO-GO");
   verdict.className = value.go == null ? "" : value.go ? "go" : "nogo";
@@ -369,10 +369,10 @@ function check(value) {
     item.append(what, words, advice);
     return item;
   }));
-  table(value);
+  showTable(value);
 }
 
-function table({ table: known, measure, scale }) {
+function showTable({ table: known, measure, scale }) {
   const mm = scale?.px_per_mm;
   const rows = [];
   const row = (tag, cells) => { const line = document.createElement("tr"); for (const [text, here] of cells) { const cell = document.createElement(tag); cell.textContent = text; cell.className = here ? "here" : ""; line.append(cell); } rows.push(line); };
@@ -388,8 +388,8 @@ function table({ table: known, measure, scale }) {
 
 function showScale() {
   if (scaled || asking) return;
-  const s = told.scale;
-  put($("scale"), s?.px_per_mm ? `${s.px_per_mm.toFixed(2)} px/mm${s.sigma ? ` ± ${(100 * s.sigma * s.px_per_mm).toFixed(2)} %` : ""}${told.remarks.map((one) => ` · ${one}`).join("")}` : "");
+  const s = state.scale;
+  put($("scale"), s?.px_per_mm ? `${s.px_per_mm.toFixed(2)} px/mm${s.sigma ? ` ± ${(100 * s.sigma * s.px_per_mm).toFixed(2)} %` : ""}${state.remarks.map((one) => ` · ${one}`).join("")}` : "");
 }
 
 choose("rectangle");

@@ -1,13 +1,13 @@
-// The words of the page; English ones are the keys, another language is one file.
+// The texts of the page; the English ones are the keys, each other language is one file.
 const FILES = { de: "./words-de.js", fr: "./words-fr.js" };
-let known = {};
+let translations = {};
 
-export const t = (words) => known[words] ?? words;
+export const t = (text) => translations[text] ?? text;
 
 export function translate(root = document) {
   for (const element of root.querySelectorAll("[data-t]")) {
-    const words = t(element.dataset.t);
-    if (element.textContent !== words) element.textContent = words;
+    const text = t(element.dataset.t);
+    if (element.textContent !== text) element.textContent = text;
   }
 }
 
@@ -17,7 +17,7 @@ export function language() {
 }
 
 export async function setLanguage(name) {
-  known = name in FILES ? (await import(FILES[name])).default : {};
+  translations = name in FILES ? (await import(FILES[name])).default : {};
   localStorage.setItem("language", name);
   document.documentElement.lang = name;
   document.getElementById("language").value = name;

@@ -13,7 +13,6 @@ import pytest
 from scipy.io import loadmat
 
 from live.cli import main
-from live.results.export.tables import to_xarray
 from live.results.quantities import Display
 from live.results.run_folder import open_run
 from tests.live.results.export import vti
@@ -199,7 +198,7 @@ def test_r3xa_by_its_own_schema(run_dir: Path, tmp_path: Path) -> None:
 def test_xarray(run_dir: Path) -> None:
     pytest.importorskip("xarray")
     with open_run(run_dir) as run:
-        data = to_xarray(run.strain, Display(y_up=True, percent=True))
+        data = run.strain.to_xarray(display=Display(y_up=True, percent=True))
         np.testing.assert_allclose(
             data["eyy"].sel(time=0.5, method="nearest"), 100 * run.strain.maps("eyy", 5)
         )

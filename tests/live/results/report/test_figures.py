@@ -89,7 +89,7 @@ def test_the_curve_is_that_of_the_gauge_axial(gauged: Path, run_dir: Path) -> No
 
 def test_the_lag_is_told_or_why_not(gauged: Path, tmp_path: Path) -> None:
     with open_run(gauged) as run:
-        assert "lag of the load beside the frames" in times(run)
+        assert "lag of the load behind the frames" in times(run)
         assert "not known: " in times(run) or " ms (95% interval" in times(run)
     with open_run(make_run(tmp_path, [0.0, 1e-3], session=False)) as bare:
         assert "no readings of a load cell were recorded" in times(bare)

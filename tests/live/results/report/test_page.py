@@ -17,7 +17,7 @@ from live.commands import report as command
 from live.results.report.page import Html, safe
 from live.results.report.report import ReportRequest, make_report
 from live.results.report.saving import find_browser
-from live.results.report.svg import MOST_POINTS, Plot, PlotLine, draw
+from live.results.report.svg import MAX_POINTS, Plot, PlotLine, draw
 from live.results.run_folder import open_run
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.made_run import CONFIG, PULLED, make_run
@@ -90,7 +90,7 @@ def test_it_holds_what_a_report_must(text: str, run_dir: Path) -> None:
     for words in (
         "Rp0.2 = 210.2 MPa",  # drawn on the curve
         "first: t =", "elastic: t =", "yield (0.2 %)", "highest force", "last: t =",
-        "Figures of the test", "iso6892: strains", "no break was seen", "lag taken off the force",
+        "Figures of the test", "iso6892: strains", "no break was seen", "lag corrected in the force",
         "Noise floor", "POOR_MATCH", "grabbed", str(8 * len(PULLED)), "reference: 8 frames",
         "not recorded (phasedic run --meta aperture=...)", "50 mm", "6.4 x 4.8 mm", "0.05 mm/px",
         "half of the engineering shear", "numpy",
@@ -111,14 +111,14 @@ def test_a_run_without_force_recording_and_section(tmp_path: Path) -> None:
         said = " ".join(Reader(make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html).words)
     assert "there is no stress-strain curve" in said
     assert "No still phase was found" in said
-    assert "No ledger was recorded" in said
+    assert "No frame counts were recorded" in said
     assert "not known: forces, no stresses" in said
 
 
 def test_a_large_page_takes_smaller_pictures(run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with open_run(run_dir) as run:
         full = make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html
-        monkeypatch.setattr("live.results.report.report.MOST_BYTES", len(full) - 10)
+        monkeypatch.setattr("live.results.report.report.MAX_BYTES", len(full) - 10)
         assert len(make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html) < len(full) - 10
 
 
@@ -245,7 +245,7 @@ def test_thinning_keeps_the_spikes_and_the_gaps() -> None:
     heights = [float(v) for v in re.findall(r"[ML][\d.]+ ([\d.]+)", path[1])]
     assert min(heights) == pytest.approx(26.0)  # the top of the axes
     assert path[1].count("M") == 2
-    assert len(heights) < 2 * MOST_POINTS
+    assert len(heights) < 2 * MAX_POINTS
 
 
 def test_words_are_escaped_once() -> None:

@@ -1,9 +1,4 @@
-"""The axes read well.
-
-What is drawn stands where it was drawn to, as often as it should.
-
-What is drawn on the picture lies where it belongs.
-"""
+"""The drawing of the view: axes, what reaches each sink and how often, and positions on the picture."""
 
 from __future__ import annotations
 
@@ -21,13 +16,14 @@ from acquire.events import Event, EventKind
 from analysis.field import StrainField
 from analysis.field.grid import Roi, ZoiGrid
 from live.pipeline.snapshot import Snapshot
-from live.ui.rerun.drawing.curve import force_axis, reduced, strain_axis, stress_axis
+from live.ui.rerun.drawing.curve import force_axis, strain_axis, stress_axis
 from live.ui.rerun.drawing.layout import blueprint
 from live.ui.rerun.drawing.scene import ViewScene
 from live.ui.rerun.drawing.shapes import (
     ArrowScale,
     centres,
     mean_motion,
+    reduced,
     region_edges,
     sample_boxes,
     thinned,
@@ -42,7 +38,7 @@ def test_axes_start_at_zero_and_leave_room() -> None:
     axis = strain_axis(np.array([0.0, 1e-3, 3.3e-3]))
     assert (axis.low, axis.unit) == (0.0, "µm/m")
     assert 3.3e-3 < axis.high <= 5e-3
-    assert axis.sink(np.array([0.0, axis.high])).tolist() == [0.0, 1.0]
+    assert axis.position(np.array([0.0, axis.high])).tolist() == [0.0, 1.0]
 
 
 def test_axes_of_compression_end_at_zero() -> None:
@@ -253,9 +249,9 @@ def test_the_maps_follow_the_specimen() -> None:
     values = {"u": 3.0 + 0.01 * x - 0.02 * y, "v": -1.0 + 0.03 * x + 0.05 * y}
     values |= {"du_dx": 0.01, "du_dy": -0.02, "dv_dx": 0.03, "dv_dy": 0.05}
     matrix, shift = mean_motion(StrainField.from_values(grid, values))
-    sink = np.array([40.0, 60.0, 0.0])
+    point = np.array([40.0, 60.0, 0.0])
     half = np.array([0.5, 0.5, 0.0])
-    moved = matrix @ (sink + half) + shift - half
+    moved = matrix @ (point + half) + shift - half
     expected = [40 + 3.0 + 0.4 - 1.2, 60 - 1.0 + 1.2 + 3.0, 0.0]
     np.testing.assert_allclose(moved, expected, atol=1e-9)
 

@@ -1,4 +1,4 @@
-"""A finished run in the view: all of it, as the files hold it, drawn by the view's own process."""
+"""A finished run in the view: all of its data, as in the files, drawn by the process of the view."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from live.cli import main
 from live.pipeline.screen import Screen
 from live.results.run_folder import RunFolder, open_run
 from live.ui.rerun.messages import events_of, field_of, picture_of, rows_of
-from live.ui.rerun.playback import ShowRequest, chosen, setup_of, show, story
+from live.ui.rerun.playback import ShowRequest, playback_messages, selected_rows, show, view_setup
 from live.ui.rerun.wire import Kind
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
 
@@ -42,8 +42,8 @@ def drawn(path: Path) -> dict[str, list[Any]]:
     return found
 
 
-def test_the_story_is_what_the_files_hold(run: RunFolder) -> None:
-    messages = list(story(run, (0, 50, N - 1)))
+def test_the_messages_contain_the_data_of_the_files(run: RunFolder) -> None:
+    messages = list(playback_messages(run, (0, 50, N - 1)))
     kinds = [message.kind for message in messages]
     assert kinds.count(Kind.FIELD) == kinds.count(Kind.PICTURE) == 3
     t, field = field_of(messages[-1])
@@ -61,7 +61,7 @@ def test_the_story_is_what_the_files_hold(run: RunFolder) -> None:
     points = [row for message in messages if message.kind is Kind.POINTS for row in rows_of(message)]
     np.testing.assert_array_equal([row[0] for row in points], run.strain.values["gauge_axial"])
     gauges = {message.meta["name"]: rows_of(message) for message in messages if message.kind is Kind.GAUGE}
-    assert list(gauges) == list(setup_of(run).gauges) == ["axial", "shear"]
+    assert list(gauges) == list(view_setup(run).gauges) == ["axial", "shear"]
     axial = np.stack([run.strain.time_s, run.gauges["axial"].value, run.gauges["axial"].sigma], axis=1)
     np.testing.assert_array_equal(gauges["axial"], axial)
     status = next(message for message in messages if message.kind is Kind.STATUS)
@@ -70,21 +70,21 @@ def test_the_story_is_what_the_files_hold(run: RunFolder) -> None:
 
 
 def test_the_gauges_are_drawn_where_they_lie(run: RunFolder, tmp_path: Path) -> None:
-    drawn = setup_of(run).outlines
+    drawn = view_setup(run).outlines
     assert set(drawn) == {"axial", "shear"}
     assert drawn["axial"][0] == ((64.0, 20.0), (64.0, 76.0))
     np.testing.assert_allclose(np.mean(drawn["axial"][2][1:], axis=0), (64, 76), atol=1e-9)
     assert drawn["shear"] == (((40, 30), (90, 30), (90, 70), (40, 70), (40, 30)),)
-    assert setup_of(run).with_load
+    assert view_setup(run).with_load
     run.strain.config["gauges"] = {"axial": {"kind": "spiral"}}
     del run.gauges
-    assert setup_of(run).outlines == {}
+    assert view_setup(run).outlines == {}
     with open_run(make_run(tmp_path, PULLED[:3], session=False)) as plain:
         plain.strain.values["force_N"][:] = np.nan
-        assert not setup_of(plain).with_load
+        assert not view_setup(plain).with_load
 
 
-def test_all_of_it_is_drawn_and_every_zoi_tells_its_values(
+def test_all_of_it_is_drawn_and_every_zoi_shows_its_values(
     folder: Path, tmp_path: Path, run: RunFolder
 ) -> None:
     path = tmp_path / "shown.rrd"
@@ -102,40 +102,40 @@ def test_all_of_it_is_drawn_and_every_zoi_tells_its_values(
     )
 
 
-def test_it_serves_until_it_is_enough(run: RunFolder) -> None:
-    enough, said = threading.Event(), list[str]()
+def test_it_serves_until_it_is_stopped(run: RunFolder) -> None:
+    stop, lines = threading.Event(), list[str]()
 
-    class Heard(Screen):
+    class RecordingScreen(Screen):
         def say(self, text: str = "") -> None:
-            said.append(text)
+            lines.append(text)
             if "--connect" in text:
-                enough.set()
+                stop.set()
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("live.ui.rerun.playback.spawn_viewer", lambda port, tell: None)
-        show(run, ShowRequest(every=40), Heard(), enough, port=19876)
-    assert any("this shows it, Ctrl-C ends it" in line for line in said)
-    assert said[0] == "3 of 96 instants are shown; --from, --to and --every choose others"
+        patch.setattr("live.ui.rerun.playback.spawn_viewer", lambda port, notify: None)
+        show(run, ShowRequest(every=40), RecordingScreen(), stop, port=19876)
+    assert any("this shows it, Ctrl-C ends it" in line for line in lines)
+    assert lines[0] == "3 of 96 instants are shown; --from, --to and --every choose others"
 
 
 @pytest.mark.parametrize(
-    ("asked", "rows"),
+    ("shown", "rows"),
     [
         (ShowRequest(), tuple(range(N))),
         (ShowRequest(every=50), (45, 95)),
         (ShowRequest(1.0, 1.25), (10, 11, 12)),
     ],
 )
-def test_what_is_chosen(run: RunFolder, asked: ShowRequest, rows: tuple[int, ...]) -> None:
+def test_which_rows_are_shown(run: RunFolder, shown: ShowRequest, rows: tuple[int, ...]) -> None:
     run.strain.values["time_s"][:] = 0.1 * np.arange(N)
-    assert chosen(run, asked) == rows
+    assert selected_rows(run, shown) == rows
 
 
 def test_a_long_run_is_thinned_to_what_the_viewer_keeps(
     run: RunFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("live.ui.rerun.playback.MOST_BYTES", 1e5)
-    rows = chosen(run, ShowRequest())
+    monkeypatch.setattr("live.ui.rerun.playback.MAX_BYTES", 1e5)
+    rows = selected_rows(run, ShowRequest())
     assert 1 < len(rows) < 20
     assert rows[-1] == N - 1
 

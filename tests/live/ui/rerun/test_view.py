@@ -1,4 +1,4 @@
-"""The view's process: it draws all it is told, comes back when it dies, and never holds up the test."""
+"""The process of the view: it draws everything, is restarted when it ends, and never delays the test."""
 
 from __future__ import annotations
 
@@ -16,29 +16,27 @@ from typing import Any
 import pytest
 
 from acquire.events import Event, EventKind
-from live.ui.rerun import supervisor as supervisor
-from live.ui.rerun.outbox import MOST_ROWS, Pending
+from live.ui.rerun import supervisor
+from live.ui.rerun.outbox import MAX_ROWS, Pending
 from live.ui.rerun.view import View, has_display, spawn_viewer, url, viewer_binary
 from live.ui.rerun.wire import Kind
 from tests.live.made_up import START, make_frame, make_measurement
 from tests.live.ui.rerun.test_drawing import make_setup, rows_in
-
-LONG_S = 60.0
-"""For whatever takes a moment; the machine may be busy."""
+from tests.live.ui.waiting import LONG_S, until
 
 
-class Watched:
-    """A view, what it told, and how often it was served."""
+class ViewRecord:
+    """A view with its messages, and how often it was served."""
 
     def __init__(self, port: int | None, rrd: Path | None, **more: Any) -> None:
-        self.told: list[str] = []
+        self.messages: list[str] = []
         self.served: list[int | None] = []
         self.view = View(
             make_setup(**more),
             port=port,
             rrd=rrd,
-            tell=lambda text, level: self.told.append(f"{level}: {text}"),
-            serving=lambda view: self.served.append(view.port),
+            notify=lambda text, level: self.messages.append(f"{level}: {text}"),
+            on_serving=lambda view: self.served.append(view.port),
         )
 
     def close(self) -> None:
@@ -46,23 +44,16 @@ class Watched:
 
 
 @pytest.fixture
-def make() -> Iterator[Callable[..., Watched]]:
-    made: list[Watched] = []
+def make() -> Iterator[Callable[..., ViewRecord]]:
+    made: list[ViewRecord] = []
 
-    def make(port: int | None, rrd: Path | None, **more: Any) -> Watched:
-        made.append(Watched(port, rrd, **more))
+    def make(port: int | None, rrd: Path | None, **more: Any) -> ViewRecord:
+        made.append(ViewRecord(port, rrd, **more))
         return made[-1]
 
     yield make
     for watched in made:
         watched.close()
-
-
-def until(ready: Callable[[], object]) -> None:
-    end = time.monotonic() + LONG_S
-    while not ready():
-        assert time.monotonic() < end, "in vain"
-        time.sleep(0.02)
 
 
 def show(view: View, first: int = 0, count: int = 30) -> None:
@@ -85,12 +76,12 @@ def is_gone(pid: int) -> bool:
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "Z"
 
 
-def test_what_was_shown_stands_in_the_file(make: Callable[..., Watched], tmp_path: Path) -> None:
+def test_the_file_contains_what_was_shown(make: Callable[..., ViewRecord], tmp_path: Path) -> None:
     watched = make(None, tmp_path / "view.rrd", area_m2=4e-5)
     show(watched.view)
     watched.close()
-    assert (watched.view.failed, watched.told) == ("", [])
-    assert watched.view.address.startswith("later: ")
+    assert (watched.view.failed, watched.messages) == ("", [])
+    assert watched.view.instructions.startswith("later: ")
     rows = rows_in(tmp_path / "view.rrd")
     static = 1
     assert rows["/strain/eyy"] == 30 + static  # every mean, however many fields were passed over
@@ -102,7 +93,7 @@ def test_what_was_shown_stands_in_the_file(make: Callable[..., Watched], tmp_pat
     assert watched.view.pid is None
 
 
-def test_it_serves_on_the_next_port_when_the_wanted_one_is_taken(make: Callable[..., Watched]) -> None:
+def test_it_serves_on_the_next_port_when_the_wanted_one_is_taken(make: Callable[..., ViewRecord]) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -113,12 +104,12 @@ def test_it_serves_on_the_next_port_when_the_wanted_one_is_taken(make: Callable[
     assert len(ports) == 2
     assert wanted not in ports
     for watched in both:
-        assert f"port {wanted} is taken" in watched.told[0]
-        assert url(watched.view.port or 0) in watched.view.address
+        assert f"port {wanted} is taken" in watched.messages[0]
+        assert url(watched.view.port or 0) in watched.view.instructions
 
 
-def test_killed_it_comes_back_on_its_port_and_knows_the_past(
-    make: Callable[..., Watched], tmp_path: Path
+def test_killed_it_is_restarted_on_its_port_with_the_past_data(
+    make: Callable[..., ViewRecord], tmp_path: Path
 ) -> None:
     watched = make(0, tmp_path / "view.rrd")
     view = watched.view
@@ -130,14 +121,14 @@ def test_killed_it_comes_back_on_its_port_and_knows_the_past(
     show(view, first=30)
     watched.close()
     assert watched.served[0] == watched.served[1]
-    assert watched.told == ["warning: the view's process was ended by SIGKILL and is started anew"]
+    assert watched.messages == ["warning: the view's process was ended by SIGKILL and is restarted"]
     assert view.rrd == tmp_path / "view-2.rrd"
     assert rows_in(tmp_path / "view-2.rrd")["/strain/eyy"] == 60 + 1
     assert "started 2 times" in view.report
 
 
-def test_stopped_it_is_replaced_and_holds_nothing_up(
-    make: Callable[..., Watched], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_stopped_it_is_replaced_and_delays_nothing(
+    make: Callable[..., ViewRecord], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
         supervisor, "STUCK_S", 2.0
@@ -147,7 +138,7 @@ def test_stopped_it_is_replaced_and_holds_nothing_up(
     stopped = watched.view.pid or 0
     os.kill(stopped, signal.SIGSTOP)
     longest, k = 0.0, 0
-    while not watched.told:
+    while not watched.messages:
         begin = time.perf_counter()
         watched.view.picture(make_frame(k, START + 0.2 * k, (1024, 1280)))
         watched.view.show(make_measurement(k))
@@ -158,27 +149,31 @@ def test_stopped_it_is_replaced_and_holds_nothing_up(
     watched.close()
     assert longest < 1.0
     assert is_gone(stopped)
-    assert watched.told == ["warning: the view's process took nothing for 2 s (stopped?) and is started anew"]
+    assert watched.messages == [
+        "warning: the view's process took nothing for 2 s (stopped?) and is restarted"
+    ]
     assert rows_in(tmp_path / "view-2.rrd")["/strain/eyy"] == k + 1
 
 
-def test_at_the_end_a_stopped_one_is_killed_and_told(make: Callable[..., Watched], tmp_path: Path) -> None:
+def test_at_the_end_a_stopped_one_is_killed_and_reported(
+    make: Callable[..., ViewRecord], tmp_path: Path
+) -> None:
     watched = make(None, tmp_path / "view.rrd")
     until(lambda: watched.served)
     stopped = watched.view.pid or 0
     os.kill(stopped, signal.SIGSTOP)
     watched.view.close(0.3)
     assert is_gone(stopped)
-    assert len(watched.told) == 1
-    assert "did not finish in time" in watched.told[0]
+    assert len(watched.messages) == 1
+    assert "did not finish in time" in watched.messages[0]
 
 
 PARENT = """
     import time
     from pathlib import Path
-    from tests.live.ui.rerun.test_view import Watched, show
+    from tests.live.ui.rerun.test_view import ViewRecord, show
 
-    watched = Watched(None, Path("view.rrd"))
+    watched = ViewRecord(None, Path("view.rrd"))
     show(watched.view)
     while watched.view.report.startswith("0 maps"):
         time.sleep(0.02)
@@ -207,44 +202,44 @@ def test_it_ends_with_the_test_however_that_ends(tmp_path: Path) -> None:
     assert rows_in(tmp_path / "view.rrd")["/strain/eyy"] > 1
 
 
-def test_a_file_that_exists_is_left_alone_and_told(make: Callable[..., Watched], tmp_path: Path) -> None:
+def test_a_file_that_exists_is_not_overwritten(make: Callable[..., ViewRecord], tmp_path: Path) -> None:
     path = tmp_path / "view.rrd"
     path.write_text("precious")
     watched = make(None, path)
     until(lambda: watched.view.failed)
     assert "exists already and is not overwritten" in watched.view.failed
-    assert watched.told == [f"warning: {watched.view.failed}"]
+    assert watched.messages == [f"warning: {watched.view.failed}"]
     assert watched.view.rrd is None
     assert path.read_text() == "precious"
 
 
-def test_a_folder_that_is_not_there_is_told_and_the_rest_goes_on(
-    make: Callable[..., Watched], tmp_path: Path
+def test_without_its_folder_the_file_is_missing_and_the_rest_goes_on(
+    make: Callable[..., ViewRecord], tmp_path: Path
 ) -> None:
     watched = make(0, tmp_path / "no" / "view.rrd")
     until(lambda: watched.served)
     watched.close()
     assert (watched.view.failed, watched.view.rrd) == ("", None)
-    assert len(watched.told) == 1
-    assert "all else goes on" in watched.told[0]
+    assert len(watched.messages) == 1
+    assert "all else goes on" in watched.messages[0]
 
 
 def test_one_that_cannot_start_is_given_up(
-    make: Callable[..., Watched], monkeypatch: pytest.MonkeyPatch
+    make: Callable[..., ViewRecord], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(supervisor, "MOST_STARTS", 2)
+    monkeypatch.setattr(supervisor, "MAX_STARTS", 2)
     monkeypatch.setenv("PYTHONHOME", "/nowhere")
     watched = make(0, None)
     until(lambda: watched.view.failed)
     assert "does not start (ended with 1)" in watched.view.failed
-    assert len(watched.told) == 1
+    assert len(watched.messages) == 1
 
 
 def test_what_waits_is_bounded_and_counted() -> None:
     pending = Pending()
-    for k in range(MOST_ROWS + 100):
+    for k in range(MAX_ROWS + 100):
         pending.row(Kind.LOADS, (float(k), 0.0))
-    assert len(pending.rows[Kind.LOADS]) == MOST_ROWS
+    assert len(pending.rows[Kind.LOADS]) == MAX_ROWS
     assert pending.rows[Kind.LOADS][0][0] == 100.0
     assert pending.dropped == 100
 

@@ -1,4 +1,4 @@
-"""What is sent comes out the same; what is not one of our messages is refused."""
+"""A message is received as it was sent; anything else is refused."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 from acquire.events import Event, EventKind
 from live.ui.rerun.messages import (
-    MOST_PICTURE_BYTES,
+    MAX_PICTURE_BYTES,
     ViewSetup,
-    Where,
+    ViewTarget,
     events_message,
     events_of,
     field_message,
@@ -45,14 +45,14 @@ def send(ours: socket.socket, data: bytes) -> None:
     ours.shutdown(socket.SHUT_WR)
 
 
-def there_and_back(message: Message) -> Message:
+def sent_and_received(message: Message) -> Message:
     return passed(*encoded(message))
 
 
 def test_a_setup() -> None:
     setup = ViewSetup("a test", 128, 96, 12, make_grid(), START, area_m2=4e-5, axis="x", strain_range=0.01)
-    again, where = setup_of(there_and_back(setup_message(setup, Where(9876, "/tmp/view.rrd", "id"))))
-    assert where == Where(9876, "/tmp/view.rrd", "id")
+    again, target = setup_of(sent_and_received(setup_message(setup, ViewTarget(9876, "/tmp/view.rrd", "id"))))
+    assert target == ViewTarget(9876, "/tmp/view.rrd", "id")
     assert (again.title, again.area_m2, again.axis, again.strain_range) == ("a test", 4e-5, "x", 0.01)
     assert again.grid.to_dict() == setup.grid.to_dict()
     np.testing.assert_array_equal(again.grid.active, setup.grid.active)
@@ -60,7 +60,7 @@ def test_a_setup() -> None:
 
 def test_a_field() -> None:
     sent = make_measurement(3, 2e-3)
-    t, field = field_of(there_and_back(field_message(sent.t, sent.field)))
+    t, field = field_of(sent_and_received(field_message(sent.t, sent.field)))
     assert t == sent.t
     for name in ("u", "v", "exx", "eyy", "exy", "sigma_exx", "sigma_exy", "status"):
         np.testing.assert_array_equal(getattr(field, name), getattr(sent.field, name))
@@ -70,8 +70,8 @@ def test_a_field() -> None:
 @pytest.mark.parametrize("shape", [(96, 128), (3000, 4000)])
 def test_a_picture(shape: tuple[int, int]) -> None:
     frame = make_frame(0, START, shape)
-    picture = picture_of(there_and_back(picture_message(frame)))
-    assert picture.image.nbytes <= MOST_PICTURE_BYTES
+    picture = picture_of(sent_and_received(picture_message(frame)))
+    assert picture.image.nbytes <= MAX_PICTURE_BYTES
     assert picture.step == (1 if shape[0] < 100 else 2)
     np.testing.assert_array_equal(picture.image, frame.image[:: picture.step, :: picture.step])
     assert (picture.bits, picture.t) == (12, START)
@@ -79,15 +79,15 @@ def test_a_picture(shape: tuple[int, int]) -> None:
 
 def test_rows_and_events() -> None:
     rows = [(START, 1.0), (START + 1, float("nan"))]
-    again = rows_of(there_and_back(rows_message(Kind.LOADS, rows)))
+    again = rows_of(sent_and_received(rows_message(Kind.LOADS, rows)))
     assert again[0] == rows[0]
     np.testing.assert_array_equal(again, rows)
-    assert rows_of(there_and_back(rows_message(Kind.MEANS, []))) == []
+    assert rows_of(sent_and_received(rows_message(Kind.MEANS, []))) == []
     event = Event(START, EventKind.TARE, "operator", "Kraft ΔF genullt", "warning")
-    assert events_of(there_and_back(events_message([event]))) == [event]
+    assert events_of(sent_and_received(events_message([event]))) == [event]
 
 
-def test_it_comes_in_pieces() -> None:
+def test_it_is_received_in_pieces() -> None:
     ours, theirs = socket.socketpair()
     with ours, theirs:
         theirs.setblocking(False)
@@ -110,11 +110,11 @@ def listing(*arrays: Any) -> bytes:
 
 
 @pytest.mark.parametrize(
-    ("data", "says"),
+    ("data", "message"),
     [
         (framed(b"{}", magic=b"RRF2"), "not a message"),
         (framed(b"{}", version=2), "not a message of version 1"),
-        (framed(b"{}", kind=99), "knows no message 99"),
+        (framed(b"{}", kind=99), "has no message 99"),
         (framed(b"{}", total=2**60), "too long"),
         (framed(b"{}"), "damaged"),
         (framed(b"\xff"), "damaged"),
@@ -125,8 +125,8 @@ def listing(*arrays: Any) -> bytes:
         (framed(listing(["rows", "<f8", [1]]), b"1234567812345678"), "longer"),
     ],
 )
-def test_what_is_not_ours_is_refused(data: bytes, says: str) -> None:
-    with pytest.raises(WireError, match=says):
+def test_what_is_no_message_is_refused(data: bytes, message: str) -> None:
+    with pytest.raises(WireError, match=message):
         passed(data)
 
 
@@ -150,7 +150,7 @@ def test_any_bytes_are_a_message_or_refused(body: bytes, kind: Kind) -> None:
 )  # fmt: skip
 def test_a_message_with_something_else_in_it_is_refused(make: Any, message: Message) -> None:
     with pytest.raises(WireError):
-        make(there_and_back(message))
+        make(sent_and_received(message))
 
 
 def test_arrays_of_other_types_are_not_sent() -> None:

@@ -1,4 +1,4 @@
-"""Screen, ledger, journal and numbers in words."""
+"""The terminal screen and the status line, and the texts of events, counts and quantities."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from live.pipeline.event_log import EventLog, sentence
 from live.pipeline.frame_counts import FrameCounts
 from live.pipeline.measurement import TimeStep
 from live.pipeline.snapshot import Snapshot
-from live.results.figures import quantity
+from live.results.figures import value_text
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.terminal.status_line import status_line
 
@@ -24,7 +24,7 @@ class Terminal(io.StringIO):
         return True
 
 
-class Gone(Terminal):
+class ClosedTerminal(Terminal):
     def write(self, text: str) -> int:
         raise OSError(5, "Input/output error")
 
@@ -59,19 +59,19 @@ def test_the_progress_of_a_replay_is_one_line() -> None:
 
 def time_step() -> TimeStep:
     numbers = {f.name: 0.0 for f in dataclasses.fields(TimeStep) if f.default is dataclasses.MISSING}
-    told: Any = {**numbers, "force": 7.0, "exx": 1e-4, "eyy": -2e-4, "n_valid": 8, "n_zoi": 10}
-    return TimeStep(**told)
+    values: Any = {**numbers, "force": 7.0, "exx": 1e-4, "eyy": -2e-4, "n_valid": 8, "n_zoi": 10}
+    return TimeStep(**values)
 
 
 def snapshot(**more: Any) -> Snapshot:
     frame_counts = FrameCounts()
     frame_counts.add(grabbed=200, measured=120, skipped=8)
     known = {"force_N": 1234.5, "stress_Pa": 1234.5 / 40e-6, "latency_p95_s": 0.0421, "disk_s": 7200.0}
-    told: Any = known | more
-    return Snapshot(0.0, "REC", 75.0, 29.9, frames=frame_counts.as_dict(), time_step=time_step(), **told)
+    values: Any = known | more
+    return Snapshot(0.0, "REC", 75.0, 29.9, frames=frame_counts.as_dict(), time_step=time_step(), **values)
 
 
-def test_the_status_line_has_everything_where_there_is_room() -> None:
+def test_a_wide_status_line_has_everything() -> None:
     assert status_line(snapshot(peak_N=1500.0), 200) == (
         "REC  1:15  1234.5 N  30.9 MPa  peak 1500.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs"
         "  30 fps  measured 120  skipped 8  lost 0  p95 42 ms  disk 120 min"
@@ -109,13 +109,13 @@ def test_what_is_typed_is_not_overwritten() -> None:
     ]
 
 
-def test_a_device_is_told_by_its_name() -> None:
+def test_a_device_is_named_by_its_role() -> None:
     address = "sim:woven?bits=12&fps=60"
     event = Event(1.0, EventKind.DEVICE, address, f"{address}: the stream stalls")
     assert sentence(event, {address: "camera"}) == "camera: the stream stalls"
 
 
-def test_an_address_is_told_once_and_without_its_settings() -> None:
+def test_an_address_is_named_once_and_without_its_settings() -> None:
     long = "sim:woven?bits=12&fps=60&note=a:b"
     for text in ("the stream stalls: 1.5 s", f"{long}: the stream stalls: 1.5 s"):
         event = Event(1.0, EventKind.DEVICE, long, text)
@@ -124,12 +124,12 @@ def test_an_address_is_told_once_and_without_its_settings() -> None:
 
 
 def test_a_lost_terminal_does_not_matter() -> None:
-    screen = TerminalScreen(Gone())
+    screen = TerminalScreen(ClosedTerminal())
     screen.say("nobody reads this")
     screen.say("nor this")
 
 
-def test_the_ledger_tells_when_it_does_not_add_up() -> None:
+def test_the_frame_counts_show_when_they_do_not_add_up() -> None:
     frame_counts = FrameCounts()
     frame_counts.add(grabbed=10, measured=6, skipped=2, reference=1, left_out=1, recorded=10)
     assert frame_counts.adds_up
@@ -142,17 +142,17 @@ def test_the_ledger_tells_when_it_does_not_add_up() -> None:
     assert frame_counts.loss
 
 
-def test_late_listeners_hear_everything_once() -> None:
-    event_log, heard = EventLog(), []
+def test_late_listeners_get_every_event_once() -> None:
+    event_log, received = EventLog(), []
     event_log(Event(1.0, EventKind.DEVICE, "a", "first"))
-    event_log.add_listener(heard.append)
+    event_log.add_listener(received.append)
     event_log(Event(2.0, EventKind.LOST, "a", "second", "warning"))
-    assert [event.text for event in heard] == ["first", "second"]
+    assert [event.text for event in received] == ["first", "second"]
     assert [event.text for event in event_log.events("warning")] == ["second"]
 
 
 @pytest.mark.parametrize(
-    ("value", "sigma", "says"),
+    ("value", "sigma", "text"),
     [
         (70.123456, 0.0234, "70.123 +- 0.023 GPa"),
         (70.1, math.nan, "70.1 GPa"),
@@ -160,5 +160,5 @@ def test_late_listeners_hear_everything_once() -> None:
         (123456.0, 1200.0, "123456 +- 1200 GPa"),
     ],
 )
-def test_quantities_have_the_digits_they_deserve(value: float, sigma: float, says: str) -> None:
-    assert quantity(value, sigma, "GPa") == says
+def test_quantities_have_digits_by_their_sigma(value: float, sigma: float, text: str) -> None:
+    assert value_text(value, sigma, "GPa") == text

@@ -1,9 +1,4 @@
-"""The scale from a board, as the page asks for it: the same as ``phasedic scale`` takes from that picture.
-
-The rig file in the making.
-
-What is drawn with the mouse becomes exactly those pixels.
-"""
+"""Changes during set-up: the scale from a calibration board, the draft of the rig file, the drawn region."""
 
 from __future__ import annotations
 
@@ -20,7 +15,7 @@ from live.config.loading import load_config
 from live.setup.pictures import read_mask
 from live.setup.scale import from_board
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.config_draft import ConfigDraft, counted_up, still, with_setting
+from live.ui.web.config_draft import ConfigDraft, at_rest, next_name, with_setting
 from live.ui.web.draft_changes import CHANGES
 from live.ui.web.drawn_region import DrawnRegion
 from live.ui.web.setup_session import SetupSession
@@ -31,8 +26,8 @@ AS_CHECKER = {"columns": 9, "rows": 6, "square": 5, "marker": 0, "dictionary": "
 AS_CHARUCO = {"columns": 8, "rows": 6, "square": 6, "marker": 4.5, "dictionary": "4X4_50"}
 
 
-class Looking:
-    """The camera, which sees one picture for ever."""
+class FixedPreview:
+    """A camera preview with always the same picture."""
 
     info, trouble, collecting = None, "", False
 
@@ -43,27 +38,28 @@ class Looking:
         return self.frames
 
 
+Opened = tuple[SetupSession, FixedPreview]
+
+
 @pytest.fixture
-def looking(tmp_path: Path) -> Iterator[tuple[SetupSession, Looking]]:
+def opened(tmp_path: Path) -> Iterator[Opened]:
     rig = tmp_path / "rig.toml"
     rig.write_text("[scale]\nstand_off_mm = 400\n")
-    session, preview = SetupSession(ConfigDraft(load_config(rig, {}), rig, {}), Broadcaster()), Looking()
+    session, preview = SetupSession(ConfigDraft(load_config(rig, {}), rig, {}), Broadcaster()), FixedPreview()
     session.preview = preview  # type: ignore[assignment]
     yield session, preview
     session._folder.cleanup()
 
 
-def show(preview: Looking, picture: np.ndarray) -> None:
+def show(preview: FixedPreview, picture: np.ndarray) -> None:
     preview.frames = [Frame(frozen(picture), k, k / 10, "nominal", 0, 8, k / 10) for k in range(3)]
 
 
 @pytest.mark.parametrize(
     ("board", "said"), [(CHECKER, AS_CHECKER), (CHARUCO, AS_CHARUCO)], ids=["checker", "charuco"]
 )
-def test_a_board_gives_the_scale(
-    looking: tuple[SetupSession, Looking], board: Any, said: dict[str, Any]
-) -> None:
-    session, preview = looking
+def test_a_board_gives_the_scale(opened: Opened, board: Any, said: dict[str, Any]) -> None:
+    session, preview = opened
     picture = seen(board, PX_PER_MM)
     show(preview, picture)
     CHANGES["board"](session, said)
@@ -74,8 +70,10 @@ def test_a_board_gives_the_scale(
     assert session.state()["remarks"] == []
 
 
-def test_a_tilt_is_told_until_the_scale_is_taken_anew(looking: tuple[SetupSession, Looking]) -> None:
-    session, preview = looking
+def test_a_tilt_is_shown_until_the_scale_is_taken_again(
+    opened: Opened,
+) -> None:
+    session, preview = opened
     show(preview, seen(CHECKER, PX_PER_MM, degrees=12.0))
     CHANGES["board"](session, {"columns": 9, "rows": 6, "square": 5})
     (remark,) = session.state()["remarks"]
@@ -84,8 +82,8 @@ def test_a_tilt_is_told_until_the_scale_is_taken_anew(looking: tuple[SetupSessio
     assert session.state()["remarks"] == []
 
 
-def test_no_board_no_scale(looking: tuple[SetupSession, Looking]) -> None:
-    session, preview = looking
+def test_no_board_no_scale(opened: Opened) -> None:
+    session, preview = opened
     with pytest.raises(DataError, match="no picture yet"):
         CHANGES["board"](session, AS_CHECKER)
     show(preview, np.full((200, 200), 90, np.uint8))
@@ -102,8 +100,8 @@ def test_no_board_no_scale(looking: tuple[SetupSession, Looking]) -> None:
         {"marker": 7}, {"marker": "x"}, {"dictionary": 3}, {"dictionary": "__class__", "marker": 3},
     ],
 )  # fmt: skip
-def test_what_is_no_board_is_refused(looking: tuple[SetupSession, Looking], wrong: dict[str, Any]) -> None:
-    session, preview = looking
+def test_what_is_no_board_is_refused(opened: Opened, wrong: dict[str, Any]) -> None:
+    session, preview = opened
     show(preview, seen(CHECKER, PX_PER_MM))
     with pytest.raises(ConfigError):
         CHANGES["board"](session, AS_CHECKER | wrong)
@@ -171,7 +169,7 @@ def test_what_is_impossible_changes_nothing(draft: ConfigDraft, changes: dict[st
     assert draft.config == before and draft.path.read_text() == file
 
 
-def test_taken_out(draft: ConfigDraft) -> None:
+def test_keys_are_removed(draft: ConfigDraft) -> None:
     draft.change_all({"gauges.a": {"kind": "zoi", "at": [5, 5]}, "specimen.width_mm": 20})
     draft.save(None)
     draft.change_all({"gauges.a": None, "specimen.width_mm": None})
@@ -187,8 +185,8 @@ def test_settings_of_an_address() -> None:
 
 
 def test_only_a_simulated_specimen_has_to_be_held() -> None:
-    assert still("/dev/video0?fps=30") == "/dev/video0?fps=30"
-    assert "max_strain=0" in still("sim:hole?max_strain=0.01") and "max_strain=0.01" not in still(
+    assert at_rest("/dev/video0?fps=30") == "/dev/video0?fps=30"
+    assert "max_strain=0" in at_rest("sim:hole?max_strain=0.01") and "max_strain=0.01" not in at_rest(
         "sim:?max_strain=0.01"
     )
 
@@ -197,8 +195,8 @@ def test_only_a_simulated_specimen_has_to_be_held() -> None:
     ("name", "following"),
     [("bar-6", "bar-7"), ("bar-009", "bar-010"), ("B7", "B8"), ("bar", "bar-2"), ("3", "4")],
 )
-def test_counted_up(name: str, following: str) -> None:
-    assert counted_up(name) == following
+def test_next_name(name: str, following: str) -> None:
+    assert next_name(name) == following
 
 
 SHAPE = (60, 80)
@@ -215,7 +213,7 @@ def test_a_rectangle_from_any_corner() -> None:
     for points in ([[10.4, 20.2], [30.6, 40.0]], [[30.6, 20.2], [10.4, 40.0]]):
         found = drawn({"tool": "rectangle", "points": points})
         assert np.array_equal(found.mask, (X >= 10.4) & (X <= 30.6) & (Y >= 20.2) & (Y <= 40.0))
-        assert found.box == (11, 21, 20, 20) and found.is_box and found.words == "as drawn"
+        assert found.box == (11, 21, 20, 20) and found.is_box and found.origin == "as drawn"
 
 
 def test_a_rectangle_is_the_region_alone_unless_it_is_added() -> None:
@@ -251,7 +249,7 @@ def test_undo_goes_back_to_what_was_given() -> None:
     found = drawn({"tool": "rectangle", "points": [[0, 0], [9, 9]]}, start=True)
     found.undo()
     found.undo()
-    assert found.mask.all() and found.words == "as given"
+    assert found.mask.all() and found.origin == "as given"
 
 
 @pytest.mark.parametrize(

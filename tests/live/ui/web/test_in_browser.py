@@ -16,7 +16,7 @@ from live.setup.compiling import compile_ahead
 from live.setup.pictures import read_mask
 from live.ui.web.authorization import RequestGuard
 from tests.live.setup.test_scale import CHARUCO, seen
-from tests.live.ui.web.driven import FLAGS, Page, Program, chromium
+from tests.live.ui.web.browser import FLAGS, Page, Program, chromium
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 WIDTH, HEIGHT = 480, 384
@@ -28,7 +28,7 @@ WATCH_LAYOUT = """() => { window.moved = []; new PerformanceObserver(list => win
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     path = chromium()
-    compile_ahead(("uint16", "float32"))  # here, so that the patience of the tests need not cover it
+    compile_ahead(("uint16", "float32"))  # here, so that the time limits of the tests need not cover it
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as driver:
@@ -60,8 +60,8 @@ def opened(browser: Any, program: Program, **wanted: Any) -> Page:
     return page
 
 
-def distance_to_way(points: list[list[float]]) -> np.ndarray:
-    """Of each pixel to a way of the mouse, by brute force: many places along each piece."""
+def distance_to_path(points: list[list[float]]) -> np.ndarray:
+    """Distance of each pixel to a path of the mouse, by brute force: many points on each segment."""
     y, x = np.mgrid[:HEIGHT, :WIDTH].astype(float)
     nearest = np.hypot(x - points[0][0], y - points[0][1])
     for (x0, y0), (x1, y1) in itertools.pairwise(points):
@@ -77,10 +77,12 @@ def test_from_nothing_to_a_report(browser: Any, tmp_path: Path, start: Callable[
     set_up(page, tmp_path)
     run(page, program)
     after(page, tmp_path)
-    assert program.end() == 0, program.said
+    assert program.end() == 0, program.output
     here = program.address.partition("/?")[0]
-    assert page.asked and all(url.startswith((here, "data:")) for url in page.asked), "asks somebody else"
-    assert not [one for one in page.complaints if "ERR_" not in one], page.complaints
+    assert page.requested and all(url.startswith((here, "data:")) for url in page.requested), (
+        "requests another host"
+    )
+    assert not [one for one in page.errors if "ERR_" not in one], page.errors
 
 
 def set_up(page: Page, folder: Path) -> None:
@@ -132,9 +134,9 @@ def check_saved(page: Page, folder: Path) -> None:
     mask = read_mask(config.measure.mask, WIDTH, HEIGHT)
     painted = np.zeros((HEIGHT, WIDTH), bool)
     painted[y : y + h, x : x + w] = True
-    far = distance_to_way(erased["points"])
+    far = distance_to_path(erased["points"])
     painted &= far > erased["radius"]
-    sure = np.abs(far - erased["radius"]) > 0.02  # the brute force knows the way to a hundredth of a px
+    sure = np.abs(far - erased["radius"]) > 0.02  # the brute force is exact to a hundredth of a px
     assert mask is not None and np.array_equal(mask[sure], painted[sure])
     assert np.allclose(erased["points"][0], (60, 60), atol=1) and np.allclose(
         erased["points"][-1], (100, 100), atol=1
@@ -146,10 +148,10 @@ def run(page: Page, program: Program) -> None:
     page.until(lambda: page.page.get_attribute("#state", "data-word") == "measuring", "it measures")
     page.page.wait_for_timeout(1500)
     page.page.evaluate(WATCH_LAYOUT)
-    assert_a_second_page_without_the_token_sees_nothing(page, program)
+    assert_a_page_without_the_token_is_refused(page, program)
     page.page.keyboard.press("t")
     page.until(lambda: "tare" in page.text("answer"), "an answer to the tare")
-    if "order it again" in page.text("answer"):  # in mid-test, unless the noise is just zero
+    if "repeat the command" in page.text("answer"):  # in mid-test, unless the noise is just zero
         page.page.keyboard.press("t")
     page.until(lambda: "tare ✓" in page.text("answer"), "tared")
     page.page.keyboard.press("n")
@@ -172,10 +174,10 @@ def run(page: Page, program: Program) -> None:
     assert sum(moved) < 0.01, f"the layout moved: {moved}"
 
 
-def assert_a_second_page_without_the_token_sees_nothing(page: Page, program: Program) -> None:
+def assert_a_page_without_the_token_is_refused(page: Page, program: Program) -> None:
     context = page.page.context.browser.new_context()
-    stranger = context.new_page()
-    answer = stranger.goto(program.address.partition("?")[0])
+    other = context.new_page()
+    answer = other.goto(program.address.partition("?")[0])
     assert answer.status == 403
     context.close()
 
@@ -210,8 +212,8 @@ def test_the_scale_from_a_board(browser: Any, tmp_path: Path, start: Callable[..
     for name, value in (("columns", 8), ("rows", 6), ("square", 6), ("marker", 4.5)):
         page.page.fill(f"#scale [name={name}]", str(value))
     page.page.click("#scale button")
-    page.until(lambda: page.text("scale").startswith("9.00 px/mm"), "the scale is told")
-    assert page.text("answer") == "board ✓" and not page.complaints
+    page.until(lambda: page.text("scale").startswith("9.00 px/mm"), "the scale is shown")
+    assert page.text("answer") == "board ✓" and not page.errors
 
 
 def test_a_page_that_is_killed_changes_nothing(browser: Any, start: Callable[..., Program]) -> None:
@@ -231,8 +233,8 @@ def test_a_page_that_is_killed_changes_nothing(browser: Any, start: Callable[...
     page.page.keyboard.press("q")
     page.until(lambda: page.page.evaluate("() => document.body.classList.contains('ended')"), "it ends")
     assert page.stage() == "after" and "ZOIs valid" in page.text("summary"), "what came out stays on the page"
-    assert program.end() == 0, program.said
-    assert "adds up" in program.said and "STOPPED" not in program.said
+    assert program.end() == 0, program.output
+    assert "adds up" in program.output and "STOPPED" not in program.output
 
 
 def test_another_site_gets_nothing(browser: Any, start: Callable[..., Program]) -> None:

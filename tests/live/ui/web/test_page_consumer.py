@@ -1,7 +1,4 @@
-"""The page as a consumer: what it tells, and that it costs the measurement next to nothing.
-
-The languages of the page: one file each, every word of the page in it, none that is not there.
-"""
+"""The page as a consumer: its messages and its cost for the measurement; and the translations of the page."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ import cv2
 import numpy as np
 import pytest
 
-import live.serve
+import live.ui.web
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from analysis.evaluate import GAUGE_KINDS, GaugeValue
@@ -28,7 +25,7 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.results.maps.field_maps import FIELD_MAPS
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.page_consumer import MOST_POINTS, CurveHistory, PageConsumer
+from live.ui.web.page_consumer import MAX_POINTS, CurveHistory, PageConsumer
 from tests.live.made_up import make_frame, make_measurement
 
 
@@ -37,8 +34,8 @@ def measurement() -> Measurement:
     return replace(m, burst=replace(m.burst, mean=make_frame(0, 0.0).image))
 
 
-class Told:
-    """The newest of each kind that a page was told."""
+class Received:
+    """The newest message of each kind that a page received."""
 
     def __init__(self, broadcaster: Broadcaster) -> None:
         stream = broadcaster.open()
@@ -57,7 +54,7 @@ def config() -> Config:
 
 
 class Run:
-    """A run that is asked how it stands."""
+    """A run with a state."""
 
     paused, recording, folder = False, True, Path("run")
 
@@ -66,27 +63,27 @@ class Run:
         self.run_state.health.state, self.run_state.health.began_t = "REC", 0.0
 
 
-def ready(watching: PageConsumer) -> PageConsumer:
-    watching.begin()
-    return watching
+def ready(consumer: PageConsumer) -> PageConsumer:
+    consumer.begin()
+    return consumer
 
 
-def test_what_is_told(config: Config) -> None:
+def test_the_state_of_a_run(config: Config) -> None:
     broadcaster, run = Broadcaster(), Run(config)
-    told, watching = Told(broadcaster), ready(PageConsumer(broadcaster, config))
-    watching.attend(run)
+    received, consumer = Received(broadcaster), ready(PageConsumer(broadcaster, config))
+    consumer.attach(run)
     m = measurement()
     i = replace(
         m.time_step, gauges={"axial": GaugeValue(0.001, 2e-6), "b": GaugeValue(math.nan, math.nan, "lost")}
     )
-    watching.measurement(replace(m, time_step=i))
+    consumer.measurement(replace(m, time_step=i))
     run.run_state.history.add(i)
     for t, force in enumerate((500.0, -400.0)):
         run.run_state.loads.append(LoadSample(t, force))
         run.run_state.health.loaded(t, force)
-    watching.event(Event(0.0, EventKind.DEVICE, "camera", "a \x1b[31mfault", "error"))
-    watching.idle()
-    state = told["run"]
+    consumer.event(Event(0.0, EventKind.DEVICE, "camera", "a \x1b[31mfault", "error"))
+    consumer.idle()
+    state = received["run"]
     assert isinstance(state, dict)
     assert state["force_N"] == -400 and state["peak_N"] == 500 and state["stress_Pa"] == pytest.approx(-1e7)
     assert state["axial"] == {"name": "axial", "value": 0.001, "sigma": 2e-6}
@@ -94,30 +91,30 @@ def test_what_is_told(config: Config) -> None:
     assert state["events"][0]["level"] == "error" and "\x1b" not in state["events"][0]["text"]
 
 
-def test_the_map_is_made_only_while_somebody_looks(config: Config) -> None:
+def test_the_map_is_drawn_only_while_a_page_is_open(config: Config) -> None:
     broadcaster = Broadcaster()
-    watching = ready(PageConsumer(broadcaster, config))
-    watching.measurement(measurement())
-    watching.idle()
-    assert watching.picture == b""
+    consumer = ready(PageConsumer(broadcaster, config))
+    consumer.measurement(measurement())
+    consumer.idle()
+    assert consumer.picture == b""
     broadcaster.open()
-    watching.idle()
+    consumer.idle()
     m = measurement()
-    picture = cv2.imdecode(np.frombuffer(watching.picture, np.uint8), cv2.IMREAD_COLOR)
+    picture = cv2.imdecode(np.frombuffer(consumer.picture, np.uint8), cv2.IMREAD_COLOR)
     assert picture.shape[:2] == m.burst.mean.shape
 
 
 def test_another_map(config: Config) -> None:
     broadcaster = Broadcaster()
     broadcaster.open()
-    watching = ready(PageConsumer(broadcaster, config))
+    consumer = ready(PageConsumer(broadcaster, config))
     for name in ("exx", "e1", "u", "sigma", "status"):
-        watching.measurement(measurement())
-        assert watching.choose(name) == ""
-        before = watching.picture
-        while watching.picture == before:
-            watching.idle()
-    assert "there is no map" in watching.choose("exx; rm")
+        consumer.measurement(measurement())
+        assert consumer.select_map(name) == ""
+        before = consumer.picture
+        while consumer.picture == before:
+            consumer.idle()
+    assert "there is no map" in consumer.select_map("exx; rm")
 
 
 def test_points_are_bounded_and_a_page_gets_what_it_lacks() -> None:
@@ -130,14 +127,14 @@ def test_points_are_bounded_and_a_page_gets_what_it_lacks() -> None:
         "first": 7,
         "rows": [[7, 7], [8, 8], [9, 9]],
     }
-    for n in range(10, 5 * MOST_POINTS):
+    for n in range(10, 5 * MAX_POINTS):
         curve.add([n, n])
-    edition, count = curve.place
-    assert edition > 0 and count < MOST_POINTS
+    edition, count = curve.position
+    assert edition > 0 and count < MAX_POINTS
     anew = curve.since(0, 7)
     times = [row[0] for row in anew["rows"]]
     assert anew["first"] == 0 and len(times) == count
-    assert times[0] == 0 and len(set(np.diff(times))) == 1 and times[-1] > 5 * MOST_POINTS - 20
+    assert times[0] == 0 and len(set(np.diff(times))) == 1 and times[-1] > 5 * MAX_POINTS - 20
 
 
 @pytest.fixture
@@ -152,19 +149,19 @@ def worker(config: Config) -> Iterator[ConsumerThread]:
 
 
 def costs_of(worker: ConsumerThread, m: Measurement) -> list[float]:
-    """What each of many measurements takes of the thread that gives them, s."""
+    """Time that each of many measurements takes of the thread that passes it on, s."""
     costs = []
     for _ in range(200):
         began = time.thread_time()
         worker.give("measurement", m)
-        worker.give("settled", m)
+        worker.give("matched", m)
         costs.append(time.thread_time() - began)
         time.sleep(0.002)
     return costs
 
 
 def test_eight_frozen_pages_cost_the_measuring_thread_under_a_millisecond(worker: ConsumerThread) -> None:
-    """In the time of its own thread: another busy program is not the page's doing."""
+    """In thread time: other busy programs do not count."""
     assert np.percentile(costs_of(worker, measurement()), 95) < 1e-3
 
 
@@ -190,12 +187,12 @@ SCRIPTS = [
 
 def entries(name: str) -> dict[str, str]:
     lines = re.findall(r'^  "(.+?)": "(.+)",$', (STATIC / f"words-{name}.js").read_text("utf-8"), re.M)
-    assert len(lines) == len(dict(lines)), "a word stands twice"
+    assert len(lines) == len(dict(lines)), "a text is there twice"
     return dict(lines)
 
 
 def words() -> set[str]:
-    """All that is translated: marked in the page, or handed to ``t`` as it stands or by a table of words."""
+    """All translated texts: marked in the page, passed to ``t``, or in a table of texts."""
     html = (STATIC / "index.html").read_text("utf-8")
     found = set(re.findall(r'data-t="(.+?)"', html))
     for path in SCRIPTS:
@@ -210,10 +207,10 @@ def words() -> set[str]:
 
 
 @pytest.mark.parametrize("name", ["de", "fr"])
-def test_every_word_is_there(name: str) -> None:
+def test_every_text_is_translated(name: str) -> None:
     known = set(entries(name))
     assert not words() - known
-    # Of maps and of kinds of gauges the page has the names from the server; one without a translation is English.
+    # Names of maps and gauge kinds come from the server; one without a translation stays English.
     served = {*FIELD_MAPS, *(word for kind in GAUGE_KINDS.values() for word in (kind.label, kind.hint))}
     assert not known - words() - served
 

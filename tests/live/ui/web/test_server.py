@@ -1,4 +1,4 @@
-"""What the page's server answers, and every refusal."""
+"""The responses of the server of the page, and every refusal."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from typing import Any
 
 import pytest
 
-from live.ui.web.broadcaster import MOST_STREAMS, Broadcaster
-from live.ui.web.server import PageServer, of_json
-from tests.live.replay.batch.running import until
+from live.ui.web.broadcaster import MAX_PAGES, Broadcaster
+from live.ui.web.server import PageServer, json_response
+from tests.live.ui.waiting import until
 
 
 @pytest.fixture
 def page() -> Iterator[PageServer]:
     server = PageServer(
         Broadcaster(),
-        {"/picture": lambda query: of_json(dict(query))},
+        {"/picture": lambda query: json_response(dict(query))},
         {"/order": lambda value: {"got": value}},
         port=0,
     )
@@ -26,22 +26,22 @@ def page() -> Iterator[PageServer]:
     server.close()
 
 
-class Asked:
-    """An answer, read."""
+class ReadResponse:
+    """A response that was read."""
 
     def __init__(self, response: http.client.HTTPResponse) -> None:
         self.status, self.headers, self.body = response.status, response.headers, response.read()
 
 
-def ask(
+def fetch(
     page: PageServer,
     path: str,
     headers: Mapping[str, str] | None = None,
     *,
     method: str = "GET",
     body: Any = None,
-) -> Asked:
-    """As our own page asks, but for ``headers``; a header of "" is left out."""
+) -> ReadResponse:
+    """A request as the page sends it, except for ``headers``; a header of "" is left out."""
     guard = page.guard
     own = {"Host": guard.host, "Cookie": guard.cookie.partition(";")[0], "Sec-Fetch-Site": "same-origin"}
     if method == "POST":
@@ -55,12 +55,12 @@ def ask(
         if body is not None and "Content-Length" not in sent:
             connection.putheader("Content-Length", str(len(body)))
         connection.endheaders(body)
-        return Asked(connection.getresponse())
+        return ReadResponse(connection.getresponse())
     finally:
         connection.close()
 
 
-def test_only_this_machine_is_listened_to(page: PageServer) -> None:
+def test_only_this_machine_can_connect(page: PageServer) -> None:
     assert page.address.startswith("http://127.0.0.1:")
     others = {info[4][0] for info in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)} - {
         "127.0.0.1"
@@ -71,14 +71,14 @@ def test_only_this_machine_is_listened_to(page: PageServer) -> None:
 
 
 def test_the_address_sets_the_cookie_and_hides_the_token(page: PageServer) -> None:
-    answer = ask(page, f"/?token={page.guard.token}", {"Cookie": "", "Sec-Fetch-Site": "none"})
+    answer = fetch(page, f"/?token={page.guard.token}", {"Cookie": "", "Sec-Fetch-Site": "none"})
     assert answer.status == 303 and answer.headers["Location"] == "/"
     cookie = answer.headers["Set-Cookie"]
     assert page.guard.token in cookie and "HttpOnly" in cookie and "SameSite=Strict" in cookie
 
 
-def test_the_page_is_ours_alone(page: PageServer) -> None:
-    answer = ask(page, "/picture?a=1")
+def test_a_response_forbids_other_sites(page: PageServer) -> None:
+    answer = fetch(page, "/picture?a=1")
     assert answer.status == 200 and answer.body == b'{"a":"1"}'
     policy = answer.headers["Content-Security-Policy"]
     assert "default-src 'none'" in policy and "frame-ancestors 'none'" in policy and "unsafe" not in policy
@@ -88,8 +88,8 @@ def test_the_page_is_ours_alone(page: PageServer) -> None:
     )
 
 
-def test_an_order_is_taken(page: PageServer) -> None:
-    assert ask(page, "/order", method="POST", body=b'{"line":"tare"}').body == b'{"got":{"line":"tare"}}'
+def test_a_command_is_accepted(page: PageServer) -> None:
+    assert fetch(page, "/order", method="POST", body=b'{"line":"tare"}').body == b'{"got":{"line":"tare"}}'
 
 
 @pytest.mark.parametrize(
@@ -115,9 +115,9 @@ def test_an_order_is_taken(page: PageServer) -> None:
         (404, "/nothing", {}),
     ],
 )
-def test_what_is_not_shown(page: PageServer, status: int, path: str, headers: dict[str, str]) -> None:
+def test_refused_gets(page: PageServer, status: int, path: str, headers: dict[str, str]) -> None:
     known = {"token": page.guard.token, "port": page.guard.port}
-    answer = ask(page, path.format(**known), {key: value.format(**known) for key, value in headers.items()})
+    answer = fetch(page, path.format(**known), {key: value.format(**known) for key, value in headers.items()})
     assert answer.status == status
     assert page.guard.token.encode() not in answer.body and page.guard.token not in str(answer.headers)
 
@@ -145,14 +145,14 @@ def test_what_is_not_shown(page: PageServer, status: int, path: str, headers: di
         (400, {}, b"[1]"),
     ],
 )
-def test_what_is_not_taken(page: PageServer, status: int, headers: dict[str, str], body: bytes) -> None:
+def test_refused_posts(page: PageServer, status: int, headers: dict[str, str], body: bytes) -> None:
     asked = {key: value.format(port=page.guard.port) for key, value in headers.items()}
-    assert ask(page, "/order", asked, method="POST", body=body).status == status
+    assert fetch(page, "/order", asked, method="POST", body=body).status == status
 
 
 def test_no_preflight_is_answered(page: PageServer) -> None:
     asked = {"Origin": "http://evil.example", "Access-Control-Request-Method": "POST", "Cookie": ""}
-    answer = ask(page, "/order", asked, method="OPTIONS")
+    answer = fetch(page, "/order", asked, method="OPTIONS")
     assert answer.status >= 400
     assert not [name for name in answer.headers if name.lower().startswith("access-control")]
 
@@ -164,14 +164,14 @@ def stream(page: PageServer) -> http.client.HTTPResponse:
 
 
 def test_a_ninth_page_is_refused_until_one_goes(page: PageServer) -> None:
-    streams = [stream(page) for _ in range(MOST_STREAMS)]
+    streams = [stream(page) for _ in range(MAX_PAGES)]
     assert {one.status for one in streams} == {200}
-    assert ask(page, "/events").status == 503
+    assert fetch(page, "/events").status == 503
     streams[0].close()
 
     def gone() -> bool:
-        page.broadcaster.tell("state", "x" * 10)  # the server sees that a page has gone when it writes to it
-        return page.broadcaster.watched < MOST_STREAMS
+        page.broadcaster.publish("state", "x" * 10)  # the server notices a closed page when it writes to it
+        return page.broadcaster.open_pages < MAX_PAGES
 
     until(gone)
     again = stream(page)
@@ -180,18 +180,18 @@ def test_a_ninth_page_is_refused_until_one_goes(page: PageServer) -> None:
         one.close()
 
 
-def test_a_page_is_told_the_newest_and_then_what_comes(page: PageServer) -> None:
+def test_a_page_gets_the_newest_message_first(page: PageServer) -> None:
     for number in range(3):
-        page.broadcaster.tell("state", {"n": number, "nan": float("nan")})
-    with stream(page) as told:
-        assert told.fp.readline() == b"event: state\n"
-        assert told.fp.readline() == b'data: {"n":2,"nan":null}\n'
+        page.broadcaster.publish("state", {"n": number, "nan": float("nan")})
+    with stream(page) as events:
+        assert events.fp.readline() == b"event: state\n"
+        assert events.fp.readline() == b'data: {"n":2,"nan":null}\n'
 
 
-def test_a_frozen_page_holds_up_nobody() -> None:
+def test_a_frozen_page_delays_nothing() -> None:
     broadcaster = Broadcaster()
-    frozen = [broadcaster.open() for _ in range(MOST_STREAMS)]
+    frozen = [broadcaster.open() for _ in range(MAX_PAGES)]
     for number in range(1000):
-        broadcaster.tell("state", number)
+        broadcaster.publish("state", number)
     assert broadcaster.open() is None
-    assert [one.take(0) for one in frozen if one] == [{"state": b"999"}] * MOST_STREAMS
+    assert [one.take(0) for one in frozen if one] == [{"state": b"999"}] * MAX_PAGES

@@ -1,4 +1,4 @@
-"""The large figures as a picture, and what they say on the way to the process that draws."""
+"""The large figures as a picture, and their message to the drawing process."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from live.pipeline.snapshot import Snapshot
-from live.ui.rerun.drawing.board import HEIGHT, WIDTH, paint
+from live.ui.rerun.drawing.large_figures import HEIGHT, WIDTH, paint
 from live.ui.rerun.messages import figures_message, figures_of
 from live.ui.rerun.wire import Kind, Message, WireError
 
@@ -20,11 +20,11 @@ NOW = Snapshot(
 
 
 def test_figures_come_back_from_a_message() -> None:
-    some = replace(NOW, stress_Pa=math.nan, alarms=("strain limit: axial is 0.02",))
-    meta = json.loads(json.dumps(figures_message(some).meta, allow_nan=False))
+    sent = replace(NOW, stress_Pa=math.nan, alarms=("strain limit: axial is 0.02",))
+    meta = json.loads(json.dumps(figures_message(sent).meta, allow_nan=False))
     back = figures_of(Message(Kind.FIGURES, meta))
     assert math.isnan(back.stress_Pa)
-    assert paint(back).tobytes() == paint(some).tobytes()
+    assert paint(back).tobytes() == paint(sent).tobytes()
     for damaged in ({"state": "REC"}, meta | {"zois": "many"}, meta | {"axial": [1]}):
         with pytest.raises(WireError):
             figures_of(Message(Kind.FIGURES, damaged))
@@ -47,5 +47,5 @@ def test_an_alarm_is_red_and_digits_are_large() -> None:
         {"force_N": -1e7, "state": "\u2603" * 40},
     ],
 )
-def test_whatever_the_figures_are_they_are_painted(more: dict[str, Any]) -> None:
+def test_any_figures_are_painted(more: dict[str, Any]) -> None:
     assert paint(replace(NOW, **more)).any()

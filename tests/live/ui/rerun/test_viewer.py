@@ -1,4 +1,4 @@
-"""The viewer itself opens what we draw, without a complaint in any of its views; needs a graphics stack."""
+"""The viewer opens the drawing without an error in any of its views; needs a graphics stack."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from tests.live.ui.rerun.test_drawing import draw_a_test, make_setup, scene_into
 pytestmark = pytest.mark.slow
 
 
-def test_the_viewer_shows_every_view_without_complaint(tmp_path: Path) -> None:
+def test_the_viewer_shows_every_view_without_error(tmp_path: Path) -> None:
     path, shot = tmp_path / "view.rrd", tmp_path / "shot.png"
     with scene_into({path: Rates(5.0, 5.0)}, make_setup(area_m2=4e-5)) as (scene, _):
         draw_a_test(scene)

@@ -1,4 +1,4 @@
-"""What is done with signals for a while: held back until a process is ready for them, or handled."""
+"""Signals for a while: blocked until a process is ready for them, or sent to a handler."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from types import FrameType
 
 
 @contextlib.contextmanager
-def held_back(*signals: signal.Signals) -> Iterator[None]:
-    """A process started inside does not get ``signals``, however quick a hand is at Ctrl-C, until ``let_through``."""
+def blocked_signals(*signals: signal.Signals) -> Iterator[None]:
+    """A process started inside receives ``signals`` only after its own ``unblock_signals``: no early Ctrl-C."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
     try:
         yield
@@ -18,16 +18,16 @@ def held_back(*signals: signal.Signals) -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def let_through(*signals: signal.Signals) -> None:
-    """What was held back, by the process itself."""
+def unblock_signals(*signals: signal.Signals) -> None:
+    """Deliver what ``blocked_signals`` of the parent process keeps back; called by the child."""
     signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
 
 
 @contextlib.contextmanager
-def handled(
+def signal_handler(
     handler: Callable[[int, FrameType | None], object] | signal.Handlers, *signals: int
 ) -> Iterator[None]:
-    """``signals`` call ``handler``, and what they called before once this is left; in the main thread alone."""
+    """``signals`` call ``handler`` within the context, and then what they called before; in the main thread only."""
     before = {number: signal.signal(number, handler) for number in signals}
     try:
         yield

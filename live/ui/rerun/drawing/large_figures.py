@@ -1,4 +1,4 @@
-"""Paints the figures that must be readable from two metres; red while an alarm is on."""
+"""Paints the large figures, readable from two metres; red while an alarm is active."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
 from live.pipeline.snapshot import Snapshot
+from live.ui.rerun.drawing.shapes import BACKGROUND
 
 WIDTH, HEIGHT = 1600, 168
 """px of the picture; the digits are nearly half of the height."""
@@ -22,7 +23,6 @@ WHITE, GREY, RED, GREEN, AMBER = (
     (110, 220, 90),
     (60, 190, 255),
 )
-BACKGROUND = (24, 20, 18)
 _CELLS = ((14, 370), (400, 506), (920, 346), (1280, 306))  # left edge and width
 _LABEL_Y, _VALUE_Y, _LINE_Y = 28, 116, 157  # base lines
 _STATES = {"REC": RED, "ARMED": AMBER, "REPLAY": GREY}
@@ -32,7 +32,7 @@ def paint(snapshot: Snapshot) -> NDArray[np.uint8]:
     """(HEIGHT, WIDTH, 3) uint8, blue, green, red."""
     alarmed = bool(snapshot.alarms)
     picture = np.empty((HEIGHT, WIDTH, 3), np.uint8)
-    picture[:] = RED if alarmed else BACKGROUND
+    picture[:] = RED if alarmed else BACKGROUND[::-1]
     labels = WHITE if alarmed else GREY
     for (x, width), (label, value, colour) in zip(_CELLS, _cells(snapshot), strict=True):
         _write(picture, label, (x, _LABEL_Y), 24, width, labels)
@@ -46,17 +46,17 @@ def _cells(s: Snapshot) -> tuple[tuple[str, str, Colour], ...]:
     state = s.state.partition(",")[0]
     return (
         ("STATE", "PAUSED" if "PAUSED" in s.state else state, _STATES.get(state, GREEN)),
-        (f"STRAIN {sigma}um/m", _known(s.axial * 1e6, "+,.0f"), WHITE),
+        (f"STRAIN {sigma}um/m", _number(s.axial * 1e6, "+,.0f"), WHITE),
         ("FORCE N" if abs(s.force_N) < 1e4 else "FORCE kN", _force(s.force_N), WHITE),
-        ("STRESS MPa", _known(s.stress_Pa * 1e-6, ".1f"), WHITE),
+        ("STRESS MPa", _number(s.stress_Pa * 1e-6, ".1f"), WHITE),
     )
 
 
 def _force(value: float) -> str:
-    return _known(value, ".1f") if not abs(value) >= 1e4 else _known(value / 1e3, ".3f")
+    return _number(value, ".1f") if not abs(value) >= 1e4 else _number(value / 1e3, ".3f")
 
 
-def _known(value: float, form: str) -> str:
+def _number(value: float, form: str) -> str:
     return "-" if math.isnan(value) else format(value, form).replace(",", " ")
 
 
@@ -72,7 +72,7 @@ def _line(s: Snapshot) -> str:
 def _write(
     picture: NDArray[Any], text: str, at: tuple[int, int], height: int, width: int, colour: Colour
 ) -> None:
-    """Text of ``height`` px on a base line, smaller where it would be wider than ``width``."""
+    """Write text of ``height`` px on a base line, smaller where it would be wider than ``width``."""
     cv2 = load_cv2()
     font, thick = cv2.FONT_HERSHEY_SIMPLEX, max(2, height // 12)
     text = text.encode("ascii", "replace").decode()

@@ -1,4 +1,4 @@
-"""``phasedic page`` as a program, and a headless browser that looks at it."""
+"""``phasedic page`` as a program, and a headless browser on its page."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from live.results.report.saving import find_browser
 
 ROOT = Path(__file__).parents[4]
 FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
-PATIENCE_S = 60.0
+TIMEOUT_S = 60.0
 
 
 def chromium() -> str:
@@ -43,20 +43,20 @@ class Program:
         self.process = subprocess.Popen(
             command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=self._log, text=True
         )
-        self.said = ""
+        self.output = ""
         self.address = self._address()
 
     def _address(self) -> str:
         assert self.process.stdout is not None
         for line in self.process.stdout:
-            self.said += line
+            self.output += line
             if found := re.search(r"http://127\.0\.0\.1:\d+/\S+", line):
                 return found[0]
-        raise AssertionError(f"no page: {self.said}")
+        raise AssertionError(f"no page: {self.output}")
 
     @contextmanager
     def frozen(self) -> Iterator[None]:
-        """As if it hung."""
+        """Stop it for a while, as if it hung."""
         self.process.send_signal(signal.SIGSTOP)
         try:
             yield
@@ -64,79 +64,79 @@ class Program:
             self.process.send_signal(signal.SIGCONT)
 
     def end(self) -> int:
-        """Wait for its end, or make one."""
+        """Wait for its end; kill it after 30 s."""
         try:
-            self.said += self.process.communicate(timeout=30)[0]
+            self.output += self.process.communicate(timeout=30)[0]
         except subprocess.TimeoutExpired:
             self.kill()
         return self.process.returncode
 
     def kill(self) -> None:
-        """Now, where it still runs."""
+        """Kill it where it still runs."""
         if self.process.poll() is None:
             self.process.kill()
-            self.said += self.process.communicate()[0]
+            self.output += self.process.communicate()[0]
         self._log.close()
 
 
 class Page:
-    """A page of the browser with what it asked for and complained of."""
+    """A page of the browser with its requests and errors."""
 
     def __init__(self, page: Any) -> None:
         self.page = page
-        self.asked: list[str] = []
+        self.requested: list[str] = []
         self.posted: list[dict[str, Any]] = []
-        self.complaints: list[str] = []
+        self.errors: list[str] = []
         page.on("request", self._request)
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("console", self._said)
+        page.on("pageerror", lambda error: self.errors.append(str(error)))
+        page.on("console", self._logged)
 
-    def _said(self, message: Any) -> None:
+    def _logged(self, message: Any) -> None:
         if message.type in ("error", "warning"):
-            self.complaints.append(message.text)
+            self.errors.append(message.text)
 
     def _request(self, request: Any) -> None:
-        self.asked.append(request.url)
+        self.requested.append(request.url)
         if request.method == "POST":
             self.posted.append(json.loads(request.post_data))
 
     def until(self, holds: Callable[[], bool], what: str) -> None:
         """Wait until it holds."""
-        end = time.monotonic() + PATIENCE_S
+        end = time.monotonic() + TIMEOUT_S
         while not holds():
             if time.monotonic() > end:
-                raise AssertionError(f"not within {PATIENCE_S:g} s: {what}; {self.complaints}")
+                raise AssertionError(f"not within {TIMEOUT_S:g} s: {what}; {self.errors}")
             self.page.wait_for_timeout(100)
 
     def text(self, id_: str) -> str:
-        """What stands in an element."""
+        """The text of an element."""
         return str(self.page.text_content(f"#{id_}"))
 
     def stage(self) -> str:
-        """Where the page is."""
+        """The stage that the page shows."""
         return str(self.page.get_attribute("body", "data-stage"))
 
     def answered(self) -> None:
-        """Wait for the answer to the last order."""
+        """Wait for the answer to the last command."""
         self.until(lambda: bool(self.text("answer")), "an answer")
 
     def on_screen(self, points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-        """Places of the picture, px, as places of the mouse."""
+        """Positions of the picture, px, as positions of the mouse."""
         script = """points => { const m = document.getElementById("drawing").getScreenCTM();
             return points.map(([x, y]) => { const p = new DOMPoint(x, y).matrixTransform(m); return [p.x, p.y]; }); }"""
         return [tuple(p) for p in self.page.evaluate(script, points)]
 
     def drag(self, *points: tuple[float, float]) -> None:
-        """Press, move along places of the picture, and let go."""
+        """Press the mouse, move it along positions of the picture, and release it."""
         first, *others = self.on_screen(list(points))
         mouse = self.page.mouse
         mouse.move(*first)
         mouse.down()
-        for place in others:
-            mouse.move(*place, steps=4)
+        for position in others:
+            mouse.move(*position, steps=4)
         mouse.up()
 
     def click(self, *points: tuple[float, float]) -> None:
-        """Click places of the picture."""
-        for place in self.on_screen(list(points)):
-            self.page.mouse.click(*place)
+        """Click positions of the picture."""
+        for position in self.on_screen(list(points)):
+            self.page.mouse.click(*position)

@@ -1,4 +1,4 @@
-"""Pages that stop reading, or are killed, beside a real run: no result changes, and they cost next to nothing."""
+"""Pages that stop reading, or are killed, during a real run: no result changes, and they take next to no time."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ import pytest
 from live.cli import main
 from live.config.loading import load_config
 from live.pipeline.consumer_thread import ConsumerThread
-from live.ui.web.broadcaster import MOST_STREAMS
+from live.ui.web.broadcaster import MAX_PAGES
 from live.ui.web.page_controller import PageController
-from tests.live.ui.web.driven import Program
+from tests.live.ui.web.browser import Program
 from tests.live.ui.web.test_page_consumer import costs_of, measurement
 
 CAMERA = "sim:uniform?width=256&height=192&fps=20&seconds=12"
@@ -37,11 +37,11 @@ RUN = [
     "--zoi",
     "32",
 ]
-HARMLESS = ("latency_s", "kernel_s")  # of the machine, not of the specimen
+TIMINGS = ("latency_s", "kernel_s")  # of the machine, not of the specimen
 
 
 class Browser:
-    """A page as far as the server sees it: the cookie, then the events, which are read or not."""
+    """A page at the level of HTTP: the cookie, then the events, which are read or not."""
 
     def __init__(self, address: str) -> None:
         url = urlsplit(address)
@@ -69,14 +69,14 @@ class Browser:
             return one.recv(4096).decode()
 
     def read_for(self, seconds: float) -> int:
-        """Bytes that were read in this time."""
+        """Number of bytes read in this time."""
         end, got = time.monotonic() + seconds, 0
         while time.monotonic() < end:
             got += len(self.socket.recv(2**16))
         return got
 
     def rest(self) -> bytes:
-        """What still comes, to its end."""
+        """Read to the end."""
         found = b""
         with self.socket as one, contextlib.suppress(ConnectionResetError):
             while piece := one.recv(2**16):
@@ -84,26 +84,26 @@ class Browser:
         return found
 
     def kill(self) -> None:
-        """Gone without a word, as a browser that is killed: the connection is reset."""
+        """Reset the connection, as a killed browser does."""
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         self.socket.close()
 
 
 def numbers(folder: Path) -> dict[str, np.ndarray]:
-    """Everything that strain.h5 says of the specimen: maps, and means with their uncertainties."""
+    """All results in strain.h5: maps, and means with their uncertainties."""
     with h5py.File(folder / "strain.h5") as file:
         found = {}
         for group in ("entry/strain", "entry/mean"):
             items = file[group].items()
-            found |= {f"{group}/{name}": item[()] for name, item in items if name not in HARMLESS}
+            found |= {f"{group}/{name}": item[()] for name, item in items if name not in TIMINGS}
         return found
 
 
 def ended_well(program: Program) -> None:
     """A busy machine may lose frames of the simulated camera, with a page or without; all else is in order."""
-    code, said = program.end(), program.said
-    assert code == 0 or (code == 5 and "frames were lost" in said), said
-    assert "adds up" in said and "STOPPED" not in said
+    code, output = program.end(), program.output
+    assert code == 0 or (code == 5 and "frames were lost" in output), output
+    assert "adds up" in output and "STOPPED" not in output
 
 
 def assert_untouched(folder: Path) -> None:
@@ -111,10 +111,10 @@ def assert_untouched(folder: Path) -> None:
     again = folder.with_name("again")
     arguments = ["replay", str(folder / "session.h5"), "--as-measured", "--out", str(again)]
     assert main([*arguments, "--no-view", "--no-rrd"]) == 0
-    seen, alone = numbers(folder), numbers(again)
-    assert len(seen["entry/mean/eyy"]) > 20 and seen.keys() == alone.keys()
-    for name, values in seen.items():
-        np.testing.assert_array_equal(values, alone[name], err_msg=name)
+    with_page, without = numbers(folder), numbers(again)
+    assert len(with_page["entry/mean/eyy"]) > 20 and with_page.keys() == without.keys()
+    for name, values in with_page.items():
+        np.testing.assert_array_equal(values, without[name], err_msg=name)
 
 
 @pytest.fixture
@@ -125,10 +125,10 @@ def program(tmp_path: Path) -> Iterator[Program]:
 
 
 def test_eight_pages_that_do_not_read_change_no_result(program: Program, tmp_path: Path) -> None:
-    pages = [Browser(program.address) for _ in range(MOST_STREAMS)]
+    pages = [Browser(program.address) for _ in range(MAX_PAGES)]
     ended_well(program)
     for page in pages:
-        assert b"event: gone" not in page.rest(), "it did not stand in the way"
+        assert b"event: gone" not in page.rest(), "it read nothing"
     assert_untouched(tmp_path / "out")
 
 
@@ -139,14 +139,14 @@ def test_eight_pages_that_do_not_read_cost_under_a_millisecond_a_measurement() -
         watching = controller.begin(config)
         worker = ConsumerThread(watching, lambda *told: pytest.fail(str(told)))
         worker.start()
-        pages = [Browser(controller.address) for _ in range(MOST_STREAMS)]
-        streams = list(controller._broadcaster._streams)
-        controller._broadcaster.tell("large", "x" * 200_000)
+        pages = [Browser(controller.address) for _ in range(MAX_PAGES)]
+        streams = list(controller._broadcaster._subscribers)
+        controller._broadcaster.publish("large", "x" * 200_000)
         until = time.monotonic() + 10
         while not all(stream._waiting for stream in streams) and time.monotonic() < until:
             time.sleep(0.05)
         costs = costs_of(worker, m)
-        assert len(streams) == MOST_STREAMS and all(stream._waiting for stream in streams), "they are blocked"
+        assert len(streams) == MAX_PAGES and all(stream._waiting for stream in streams), "they are blocked"
         worker.end()
         for page in pages:
             page.kill()
@@ -159,7 +159,7 @@ def test_a_browser_that_is_killed_changes_no_result(program: Program, tmp_path: 
         page.read_for(seconds)
         page.kill()
     page = Browser(program.address)
-    assert page.read_for(2.0) > 1000, "who comes after them is told all"
+    assert page.read_for(2.0) > 1000, "a later page gets everything"
     page.kill()
     ended_well(program)
     assert_untouched(tmp_path / "out")
