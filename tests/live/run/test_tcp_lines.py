@@ -128,7 +128,7 @@ def test_places_that_cannot_be(text: str) -> None:
 
 def test_beyond_this_machine_only_with_a_token(tmp_path: Path) -> None:
     here, everywhere = ListenAddress.parse("localhost:5000"), ListenAddress.parse("0.0.0.0:5000")
-    assert here.is_here and not everywhere.is_here
+    assert here.is_loopback and not everywhere.is_loopback
     assert read_token(here, None, "it") == ""
     with pytest.raises(ConfigError, match="token_file"):
         read_token(everywhere, None, "it")
