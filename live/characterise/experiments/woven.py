@@ -28,7 +28,7 @@ from live.characterise.outcome import (
     verdict,
 )
 from live.characterise.truth import SensorModel, TrueScene, grey_picture, ours, papers
-from live.results.maps.colours import PAPER_LOW_PASS, for_display
+from live.results.maps.map import PAPER_LOW_PASS, for_display
 
 Floats = NDArray[np.float64]
 CELL, OVER, MEAN_STRAIN, NU = 160.0, 0.6, 1e-3, 0.3

@@ -14,7 +14,7 @@ from live.characterise.experiments.section41 import derived, low_pass_for
 from live.characterise.experiments.table2_design import CORNERS, PAPER, corner_values, fitted, model_matrix
 from live.characterise.imposed import ExpectedErrors, Imposed, robust_std
 from live.characterise.own_pattern import recommended
-from live.results.maps.colours import for_display
+from live.results.maps.map import for_display
 
 
 def test_the_papers_model_at_its_optimum_and_its_negative_corners() -> None:

@@ -18,7 +18,7 @@ from analysis.field.strain_field import StrainField
 from live.cli import main
 from live.results.export.atomic_file import new_file
 from live.results.export.formats import FORMATS, ExportRequest, export
-from live.results.export.job import ExportOptions, Job, chosen_rows
+from live.results.export.job import ExportJob, ExportOptions, chosen_rows
 from live.results.maps.painting import Levels, Painter
 from live.results.maps.scale import ColourScale
 from live.results.quantities import Display
@@ -196,7 +196,7 @@ def test_progress_is_told_after_two_seconds(run_dir: Path, capsys: pytest.Captur
     screen = TerminalScreen(now=lambda: next(ticks))
     with open_run(run_dir) as run:
         rows = chosen_rows(run.strain, None, None)
-        job = Job(run, ("eyy",), rows, Display(), screen, ExportOptions())
+        job = ExportJob(run, ("eyy",), rows, Display(), screen, ExportOptions())
         assert [row for _, row in job.steps(now)] == list(rows)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("instant 4 of 12, about 5 s left")
