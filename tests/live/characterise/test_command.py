@@ -19,7 +19,7 @@ from live.characterise.command import EXPERIMENTS, add_arguments, chosen, comman
 from live.characterise.inspect import add_arguments as add_inspect
 from live.characterise.inspect import command as inspect
 from live.characterise.outcome import Comparison, ExperimentContext, ExperimentOutcome, ProgressBar
-from live.characterise.page import page, standing, write_page
+from live.characterise.page import comparison_summary, page, write_page
 from tests.acquire.session.fixtures import CAMERA, frame, writer
 
 
@@ -48,19 +48,19 @@ def test_names_are_checked_and_ordered() -> None:
 def test_a_run_takes_up_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
 
-    def experiment(name: str, bench: ExperimentContext) -> ExperimentOutcome:
+    def experiment(name: str, context: ExperimentContext) -> ExperimentOutcome:
         calls.append(name)
-        bench.tick(0.5)
+        context.tick(0.5)
         return ExperimentOutcome(name, name, "words")
 
     monkeypatch.setattr(characterise, "_timed", experiment)
-    bench = ExperimentContext(tmp_path, quick=True)
+    context = ExperimentContext(tmp_path, quick=True)
     screen = io.StringIO()
-    run(["fig1"], bench, screen)
-    again = run(["fig1", "fig3"], bench, screen)
+    run(["fig1"], context, screen)
+    again = run(["fig1", "fig3"], context, screen)
     assert calls == ["fig1", "fig3"]
     assert [outcome.name for outcome in again] == ["fig1", "fig3"]
-    run(["fig1"], replace(bench, quick=False), screen)
+    run(["fig1"], replace(context, quick=False), screen)
     assert calls == ["fig1", "fig3", "fig1"]
     assert "as it was" in screen.getvalue()
 
@@ -97,12 +97,12 @@ def test_the_page_says_where_we_are_worse_first() -> None:
     outcome = ExperimentOutcome(
         "a", "A", "t", verdicts=(Comparison("x", "p", "better"), Comparison("y", "q", "worse"))
     )
-    said = standing([outcome])
+    said = comparison_summary([outcome])
     assert said.index("**Worse**") < said.index("**Better**")
     assert "better in 1, equal in 0, worse in 1" in said
     whole = page([outcome], "phasedic characterise --out a", "")
     assert "Made by `phasedic characterise --out a`" in whole
-    assert standing([]) == ""
+    assert comparison_summary([]) == ""
 
 
 @pytest.mark.slow

@@ -165,7 +165,7 @@ def test_averaging_falls_as_predicted_until_rounding_stops_it(monkeypatch: pytes
     from live.characterise.truth import SensorModel
 
     monkeypatch.setattr(burst, "LENGTHS", (1, 16))
-    study = burst.Study(quick=True)
+    study = burst.BurstStudy(quick=True)
     ratios = {}
     for noise in (0.1, 4.0):
         camera = SensorModel(12, noise)

@@ -161,4 +161,4 @@ def test_a_batch_measures_all_compares_them_and_goes_on(
     assert "broken/session.h5: failed (exit code 4)" in said
     assert (out / "all.html").is_file()
     batch(str(runs), str(out), "--zoi", "32", "--step", "16")
-    assert capsys.readouterr().out.count("is there already") == 2
+    assert capsys.readouterr().out.count("measured already") == 2
