@@ -234,8 +234,8 @@ and in both columns sizes are decided by the few corners with the largest errors
 full scale) and with 16 px speckle in a ZOI of 32 px, which holds a single speckle. There a one-shot estimator no
 longer measures, and the figures are the scatter of lost phases (or depend on how a program drops them, which the
 paper does not state). Leaving outliers out (median absolute deviation) or bounding them changes ranks and even signs.
-The effect of noise propagation only is known (method.md, section 7: sigma/(g s^2), g falling as 1/r): factors of 107 for
-the noise, 1/257 for the encoding, 8 for the speckle, 1/4 for the ROI, and no interaction on a logarithmic scale,
+Noise propagation by itself has known factors (method.md, section 7: sigma/(g s^2), g falling as 1/r): 107 for the
+noise, 1/257 for the encoding, 8 for the speckle, 1/4 for the ROI, and no interaction on a logarithmic scale,
 beside our last column."""
 
 
