@@ -1,8 +1,8 @@
 """Fills the tables of docs/session-format.md and docs/strain-format.md: ``python -m docs.make_formats``.
 
-A new file of each kind is made by the program's own writers and listed; the words come from the file, or from
+The writers of the program make a new file of each kind, which is listed; the definitions come from the file or from
 ``live.results.quantities``. A page holds each table between ``<!-- table NAME ... -->`` and ``<!-- end -->``. The tests
-compare the pages with what is made here.
+compare the pages with these tables.
 """
 
 from __future__ import annotations
@@ -53,13 +53,13 @@ MEANINGS: Mapping[str, str] = MappingProxyType({
     "size": "side of a ZOI",
     "step": "distance of neighbouring ZOIs",
 })  # fmt: skip
-"""Of datasets that carry no ``long_name``."""
+"""Of datasets without a ``long_name``."""
 
 Row = tuple[str, ...]
 
 
 def table(head: Row, rows: Iterable[Row]) -> str:
-    """Markdown."""
+    """A table in Markdown."""
     first, *others = ("| " + " | ".join(cells) + " |" for cells in (head, *rows))
     return "\n".join([first, "|" + "---|" * len(head), *others])
 
@@ -81,7 +81,9 @@ def strain_maps() -> str:
         Results(Path(folder), grid, _INFO).close()
         with h5py.File(Path(folder) / "strain.h5") as file:
             strain = file["entry/strain"]
-            own = {name: strain[name] for name in strain if not _stands_elsewhere(name, file["entry/mean"])}
+            own = {
+                name: strain[name] for name in strain if not _is_listed_elsewhere(name, file["entry/mean"])
+            }
             rows = [
                 row for name, item in own.items() for row in _described(name, item, quantity_of(name).words)
             ]
@@ -128,7 +130,7 @@ def _described(path: str, item: h5py.Dataset, words: str = "") -> Iterator[Row]:
     yield (f"`{path}`", named + shape, "" if unit == "none" else unit, meaning)
 
 
-def _stands_elsewhere(name: str, mean: h5py.Group) -> bool:
+def _is_listed_elsewhere(name: str, mean: h5py.Group) -> bool:
     """A second name of a column or of an uncertainty, or the uncertainty of a map."""
     return (
         (name in mean and name not in ("exx", "eyy", "exy")) or name.startswith("sigma_") or "_errors" in name
@@ -143,12 +145,12 @@ TABLES: Mapping[str, Callable[[], str]] = MappingProxyType({
     "session": session_layout, "flags": flags, "maps": strain_maps, "means": means, "status": statuses,
 })  # fmt: skip
 PAGES = (DOCS / "session-format.md", DOCS / "strain-format.md")
-_PLACE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)
+_TABLE = re.compile(r"(<!-- table (\w+)[^>]*-->\n).*?(\n<!-- end -->)", re.DOTALL)
 
 
 def filled(page: str) -> str:
-    """The page with all its tables as the code has them."""
-    return _PLACE.sub(lambda found: found[1] + "\n" + TABLES[found[2]]() + "\n" + found[3], page)
+    """The page with tables made from the code."""
+    return _TABLE.sub(lambda found: found[1] + "\n" + TABLES[found[2]]() + "\n" + found[3], page)
 
 
 if __name__ == "__main__":

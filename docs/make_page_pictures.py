@@ -27,31 +27,21 @@ def main(folder: Path, size: tuple[int, int] = (1280, 800), dark: bool = False) 
         browser = driver.chromium.launch(
             executable_path=chromium(), headless=True, chromium_sandbox=False, args=FLAGS
         )
-        words = [
-            "page",
-            "--camera",
-            CAMERA,
-            "--load",
-            "sim:",
-            "--section",
-            "20,2",
-            "--meta",
-            "specimen=bar-6",
-        ]
-        program = Program(Path(work), *words, "--no-view", "--no-rrd", "--page-port", "0")
+        test = ["--camera", CAMERA, "--load", "sim:", "--section", "20,2", "--meta", "specimen=bar-6"]
+        program = Program(Path(work), "page", *test, "--no-view", "--no-rrd", "--page-port", "0")
         try:
             scheme: Any = "dark" if dark else "light"
             viewport: Any = {"width": size[0], "height": size[1]}
             context = browser.new_context(viewport=viewport, locale="en-US", color_scheme=scheme)
-            through(Page(context.new_page()), program, folder)
+            take_pictures(Page(context.new_page()), program, folder)
         finally:
             program.kill()
             browser.close()
     return 0
 
 
-def through(page: Page, program: Program, folder: Path) -> None:
-    """From setting up to what came out."""
+def take_pictures(page: Page, program: Program, folder: Path) -> None:
+    """All stages of a test, from set-up to the results."""
     page.page.goto(program.address)
     page.until(lambda: "specimen" in page.text("region"), "the specimen is found")
     page.page.keyboard.press("g")
@@ -70,7 +60,7 @@ def through(page: Page, program: Program, folder: Path) -> None:
 
 
 def picture(page: Page, path: Path) -> None:
-    """A small PNG of what is seen."""
+    """A small PNG of the page."""
     page.page.screenshot(path=path)
     with Image.open(path) as seen:
         height = round(seen.height * WIDE / seen.width)

@@ -1,7 +1,7 @@
 """Makes the README's pictures of real images: ``python -m docs.make_pictures`` with PHASEDIC_DATA set.
 
-Open-hole tension of a carbon-fibre composite: DIC Challenge 1.0, sample 12 (SEM/iDICs), as it comes with
-DICe's regression tests. Tension of a polymer bar: the examples of muDIC (MIT).
+Open-hole tension of a carbon-fibre composite: DIC Challenge 1.0, sample 12 (SEM/iDICs), from DICe's regression
+tests. Tension of a polymer bar: the examples of muDIC (MIT).
 """
 
 from __future__ import annotations
@@ -37,23 +37,16 @@ def make(data: Path, work: Path) -> None:
     first = hole / "oht_cfrp_00.tiff"
     mask = specimen_mask(first, 30, work / "mask.png")
     found = replay(f"files:{hole}/*.tiff", work / "hole", "--mask", str(mask), "--zoi", "32", "--step", "5")
-    draw(
-        found,
-        "open_hole_eyy.png",
-        first,
-        "eyy",
-        "eyy of the open hole, last frame, ZOI 32 px",
-        "--limit",
-        "0.015",
-    )
-    draw(found, "open_hole_status.png", first, "status", "what became of each ZOI")
+    title = "eyy of the open hole, last frame, ZOI 32 px"
+    draw(found, "open_hole_eyy.png", first, "eyy", title, "--limit", "0.015")
+    draw(found, "open_hole_status.png", first, "status", "status of each ZOI")
     bar = data / "mudic_tension"
     first = bar / "ut_151.tif"
     found = replay(
         f"files:{bar}/*.tif", work / "bar", "--roi", "325,120,200,1620", "--zoi", "48", "--step", "8"
     )
     draw(found, "bar_eyy.png", first, "eyy", "eyy of the polymer bar, necking, ZOI 48 px", "--limit", "0.5")
-    draw(found, "bar_status.png", first, "status", "what became of each ZOI")
+    draw(found, "bar_status.png", first, "status", "status of each ZOI")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Makes the pictures of docs/guide.md and of the report: ``python -m docs.make_rig_pictures``.
 
-The patterns are rendered by the simulator; what stands below each is the strain noise of one ZOI that the kernel
-predicts for it. The report is that of the demo, as a browser shows it.
+The simulator renders the patterns; the text below each is the strain noise of one ZOI that the kernel predicts.
+The report is that of the demo, in a browser.
 """
 
 from __future__ import annotations
@@ -61,11 +61,11 @@ def panel(image: Image, words: str) -> NDArray[np.uint8]:
     part = image[:SHOWN, :SHOWN].astype(np.uint8)
     large = cv2.resize(part, None, fx=2, fy=2, interpolation=cv2.INTER_NEAREST)
     noise = strain_noise(image)
-    told = f"one ZOI: {noise:.0f} um/m" if np.isfinite(noise) else "no ZOI can be measured"
+    result = f"one ZOI: {noise:.0f} um/m" if np.isfinite(noise) else "no ZOI can be measured"
     foot = np.full((52, large.shape[1]), 255, np.uint8)
-    for line, (text, level) in enumerate(((words, 0), (told, 90))):
-        place = (4, 18 + 22 * line)
-        cv2.putText(foot, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.52, level, 1, cv2.LINE_AA)
+    for line, (text, level) in enumerate(((words, 0), (result, 90))):
+        origin = (4, 18 + 22 * line)
+        cv2.putText(foot, text, origin, cv2.FONT_HERSHEY_SIMPLEX, 0.52, level, 1, cv2.LINE_AA)
     framed = np.vstack([large, foot])
     return np.asarray(cv2.copyMakeBorder(framed, 4, 4, 4, 4, cv2.BORDER_CONSTANT, value=255), np.uint8)
 

@@ -1,7 +1,7 @@
 """Many sessions with the same settings: replayed one after the other, then compared on one page.
 
-``python -m examples.batch RUNS OUT --zoi 32 --step 8`` takes every session.h5 below RUNS. What lies in OUT already is
-not measured again, so that it can be interrupted and gone on with.
+``python -m examples.batch RUNS OUT --zoi 32 --step 8`` replays every session.h5 below RUNS. Results that exist in OUT
+are not made again, so an interrupted batch can be continued.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from pathlib import Path
 
 from live.cli import main as phasedic
 
-MEASURED = (0, 5)  # well, or with loss
+MEASURED = (0, 5)  # exit codes: all well, or finished with loss
 
 
 def measured(session: Path, out: Path, settings: list[str]) -> bool:
-    """Replay one; whether there are results."""
+    """Replay one session; return whether there are results."""
     if (out / "strain.h5").exists():
-        print(f"{session}: is there already, in {out}")
+        print(f"{session}: measured already, in {out}")
         return True
     code = phasedic(["replay", str(session), "--out", str(out), "--no-view", "--no-rrd", *settings])
     print(f"{session}: {'measured' if code in MEASURED else 'failed'} (exit code {code})")
@@ -25,17 +25,15 @@ def measured(session: Path, out: Path, settings: list[str]) -> bool:
 
 
 def main(runs: str, out: str, *settings: str) -> int:
-    """All sessions below ``runs`` into folders below ``out``; the worst that happened."""
+    """Replay all sessions below ``runs`` into folders below ``out``; return 4 if one failed."""
     sessions = sorted(Path(runs).rglob("session.h5"))
     folders = [Path(out) / session.parent.relative_to(runs) for session in sessions]
-    well = [
-        measured(session, folder, list(settings)) for session, folder in zip(sessions, folders, strict=True)
-    ]
-    good = [str(folder) for folder, is_well in zip(folders, well, strict=True) if is_well]
+    pairs = zip(sessions, folders, strict=True)
+    good = [str(folder) for session, folder in pairs if measured(session, folder, list(settings))]
     page = Path(out) / "all.html"
     if len(good) > 1 and not page.exists():
         phasedic(["report", "--compare", *good, "--out", str(page)])
-    return 0 if all(well) and sessions else 4
+    return 0 if sessions and len(good) == len(sessions) else 4
 
 
 if __name__ == "__main__":

@@ -1,6 +1,6 @@
 """A finished run from Python, step by step: curve, maps, pictures, export, report.
 
-``python -m examples.finished_run RUN_DIR`` prints what it finds and writes into ``RUN_DIR/from_python``.
+``python -m examples.finished_run RUN_DIR`` prints figures of the run and writes into ``RUN_DIR/from_python``.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def main(folder: str) -> int:
         v = display.shown("v", run.strain.maps("v", -1))
         print(f"last v: {np.nanmin(v):.4f} to {np.nanmax(v):.4f} mm, upwards")
 
-        # The pictures of the first and the last instant, where they were recorded.
+        # The pictures of the first and the last instant, if they were recorded.
         if run.pictures is not None:
             first, final = run.pictures.each([0, run.strain.n - 1])
             print(

@@ -45,7 +45,7 @@ arguments = ["--load", str(folder / "forces.csv"), "--section", "10,2", "--roi",
 quiet = ["--no-view", "--no-rrd", "--out", str(folder / "run")]
 assert main(["replay", str(folder / "shots"), *arguments, *quiet]) == 0
 
-# %% The results: numbers an instant, maps, uncertainties.
+# %% The results: columns, maps, uncertainties.
 from live.results import Strain  # noqa: E402
 from live.results.run_folder import open_run  # noqa: E402
 
@@ -78,4 +78,4 @@ save_page(
     make_report(run, ReportRequest(fields=("eyy",)), TerminalScreen(quiet=True)), folder / "report.html"
 )
 run.close()
-print(f"look at {folder / 'report.html'}")
+print(f"report: {folder / 'report.html'}")

@@ -1,4 +1,4 @@
-"""A consumer of one's own beside results and view: it prints the largest strain of every measurement.
+"""A consumer of your own beside results and view: it prints the largest strain of every measurement.
 
 ``python -m examples.second_consumer`` runs it on a simulated test of three seconds.
 """
@@ -16,7 +16,7 @@ from live.ui.terminal.screen import TerminalScreen
 
 
 class Largest(Consumer):
-    """Prints the largest strain of any ZOI; where the terminal is slow, the newest wins."""
+    """Prints the largest strain of any ZOI; if the terminal is slow, older measurements are skipped."""
 
     name = "largest strain"
     last = 0.0

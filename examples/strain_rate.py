@@ -1,8 +1,8 @@
-"""A controller of one's own: holds the strain rate of a machine with the strain that phasedic tells over TCP.
+"""A controller of your own: it holds the strain rate of a machine with the strain that phasedic sends over TCP.
 
-It reads lines of JSON from the strain output, drives the machine with a PID on the strain, and orders the end of
-the test. ``python -m examples.strain_rate`` runs it with a simulated machine, soft as machines are: the share of
-the crosshead's way that reaches the specimen jumps at yield. For a machine of yours, write ``Machine.drive`` anew.
+It reads lines of JSON from the strain output, drives the machine with a PID on the strain, and ends the test over
+the control port. ``python -m examples.strain_rate`` runs it with a simulated machine, as compliant as real ones: at
+yield, the share of the crosshead travel that reaches the specimen jumps. For your machine, rewrite ``Machine.drive``.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from live.run.live_run import LiveRun, run_live
 from live.run.outcome import Outcome
 from live.ui.terminal.screen import TerminalScreen
 
-STRAIN, ORDERS, MACHINE = 5610, 5611, 5612
+STRAIN_PORT, CONTROL_PORT, MACHINE_PORT = 5610, 5611, 5612
 
 
 class Lines:
-    """A TCP connection of lines."""
+    """A TCP connection for lines of text."""
 
     def __init__(self, port: int) -> None:
         self._socket = socket.create_connection(("127.0.0.1", port), 10)
         self._lines = self._socket.makefile("rw", encoding="utf-8", newline="\n")
 
     def ask(self, line: str) -> str:
-        """Say a line; the answer."""
+        """Send a line; return the answer."""
         self._lines.write(line + "\n")
         self._lines.flush()
         return self._lines.readline().strip()
@@ -53,7 +53,7 @@ class Machine:
 
     def drive(self, speed: float) -> None:
         if self._lines.ask(f"speed {speed:.6g}") != "ok":
-            raise RuntimeError("the machine does not take the speed")
+            raise RuntimeError("the machine did not accept the speed")
 
     def close(self) -> None:
         self._lines.close()
@@ -61,7 +61,7 @@ class Machine:
 
 @dataclass
 class Pid:
-    """A PID on the strain, which shall be on a ramp of ``rate`` (1/s); gives the speed."""
+    """A PID that keeps the strain on a ramp of ``rate`` (1/s) by the speed of the machine."""
 
     rate: float
     p: float = 5.0
@@ -86,8 +86,13 @@ class Pid:
 
 def control(rate: float, until: float) -> None:
     """Pull with a strain rate (1/s) until the strain is reached, then end the test."""
-    strains, machine, orders, pid = Lines(STRAIN), Machine(MACHINE), Lines(ORDERS), Pid(rate)
-    orders.ask(f"note strain rate {rate:g} 1/s")
+    strains, machine, commands, pid = (
+        Lines(STRAIN_PORT),
+        Machine(MACHINE_PORT),
+        Lines(CONTROL_PORT),
+        Pid(rate),
+    )
+    commands.ask(f"note strain rate {rate:g} 1/s")
     for line in strains:
         now = json.loads(line)
         if now["axial"] is None:
@@ -96,27 +101,27 @@ def control(rate: float, until: float) -> None:
             break
         machine.drive(pid.speed(now["time_s"], now["axial"]))
     machine.drive(0.0)
-    orders.ask("quit")
-    for one in (strains, machine, orders):
-        one.close()
+    commands.ask("quit")
+    for connection in (strains, machine, commands):
+        connection.close()
 
 
 def main(folder: str | None = None, rate: float = 5e-4, until: float = 4e-3) -> Outcome:
     """A run with the controller beside it."""
     settings = {
-        "camera.address": f"sim:uniform?seconds=60&fps=40&buffers=64&width=224&height=192&machine={MACHINE}",
+        "camera.address": f"sim:uniform?seconds=60&fps=40&buffers=64&width=224&height=192&machine={MACHINE_PORT}",
         "load.address": "sim:",
         "measure.burst": 2,
         "measure.zoi": 48,
         "view.enabled": False,
         "view.rrd": False,
-        "strain_out.tcp": str(STRAIN),
+        "strain_out.tcp": str(STRAIN_PORT),
         "strain_out.channels": ["time_s", "axial"],
         "output.dir": folder,
     }
     config = load_config(None, {key: value for key, value in settings.items() if value is not None})
     screen = TerminalScreen()
-    port = ControlPort(str(ORDERS), None, screen)
+    port = ControlPort(str(CONTROL_PORT), None, screen)
 
     def on_start(live: LiveRun) -> None:
         port.open(live)

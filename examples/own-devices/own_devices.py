@@ -1,6 +1,6 @@
 """A camera and a load cell of your own: raw frame dumps (``raw:``) and forces from a CSV (``csv:``).
 
-Copy this file, keep its shape, and put your device's calls where the files are read.
+Copy this file, keep its structure, and call your device where the files are read.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LOWEST_FPS, HIGHEST_FPS = 1e-3, 1e7
 
 
 class _Source(Closing):
-    """What camera and load cell share: a stop that any thread may give, and closing twice."""
+    """The common part of camera and load cell: ``stop`` from any thread, ``close`` any number of times."""
 
     def __init__(self) -> None:
         self._stopped = threading.Event()
@@ -37,13 +37,13 @@ class _Source(Closing):
         self._stopped.set()
 
     def close(self) -> None:
-        """Release what is held; nothing here, since files are opened while iterating."""
+        """Release the device; nothing here, since files are open only during the iteration."""
         self._stopped.set()
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """How frames lie in the file."""
+    """The format of the frames in the file."""
 
     width: int
     height: int
@@ -120,7 +120,7 @@ def open_raw(address: Address, on_event: EventSink) -> RawDump:
 
 
 def list_raw() -> list[CameraListing]:
-    """The dumps in this folder; a camera's maker has a call that finds what is plugged in."""
+    """The dumps in this folder; the library of a camera has a call that finds connected ones."""
     layout = Layout(640, 480, 8, 0)
     return [
         CameraListing(
@@ -128,7 +128,7 @@ def list_raw() -> list[CameraListing]:
             "raw dump",
             trouble=""
             if path.stat().st_size % layout.frame_bytes == 0
-            else "not 640x480 of 8 bits: say what it is",
+            else "not 640x480 of 8 bits: give its width, height and bits",
             details=(f"{path.stat().st_size} bytes",),
         )
         for path in sorted(Path().glob("*.raw"))
@@ -154,18 +154,18 @@ class CsvForces(_Source):
             yield LoadSample(t, force - self._offset, raw=raw.encode())
 
     def tare(self, *, force: bool = False) -> None:
-        """Make the present force zero."""
+        """Set the zero to the present force."""
         self._before.append(self._offset)
         self._move(self._last)
 
     def undo_tare(self) -> None:
-        """As before the last tare, if there was one."""
+        """Restore the zero before the last tare, if there was one."""
         if self._before:
             self._move(self._before.pop())
 
     def _move(self, offset: float) -> None:
         data = {"offset_N": offset, "step_N": offset - self._offset}
-        self._offset, text = offset, f"zero is at {offset:g} N now"
+        self._offset, text = offset, f"zero is now at {offset:g} N"
         self._on_event(Event(time.monotonic(), EventKind.TARE, self.info.address, text, "info", data))
 
 

@@ -1,8 +1,7 @@
-"""``phasedic characterise``: how well this measures, on rendered truth or on one's own pattern.
+"""``phasedic characterise``: the accuracy of the measurement, on rendered truth or on a pattern of the user.
 
-Each experiment is a function that returns an ``ExperimentOutcome``; what was done is kept in the output
-folder, so that an interrupted run goes on where it was. ``--pattern`` does the same for a picture of
-the user (live.characterise.own_pattern).
+Each experiment is a function that returns an ``ExperimentOutcome``. Outcomes are stored in the output folder, so
+an interrupted run continues. ``--pattern`` characterises a picture (live.characterise.own_pattern).
 """
 
 from __future__ import annotations
@@ -83,11 +82,11 @@ def command(arguments: argparse.Namespace) -> int:
         The machine measures a known pattern wrong.
     """
     with on_fit_machine():
-        return _characterised(arguments)
+        return _characterise(arguments)
 
 
-def _characterised(arguments: argparse.Namespace) -> int:
-    figure(1, 1)  # a missing matplotlib is told before the work
+def _characterise(arguments: argparse.Namespace) -> int:
+    figure(1, 1)  # a missing matplotlib ends the command before the work
     folder = _made(Path(arguments.out))
     if arguments.pattern:
         from live.characterise.own_pattern import characterise_pattern
@@ -103,12 +102,12 @@ def _characterised(arguments: argparse.Namespace) -> int:
 
 
 def chosen(only: Iterable[str] | None) -> list[str]:
-    """The experiments asked for, in the order of the page.
+    """The requested experiments, in the order of the page.
 
     Raises
     ------
     ConfigError
-        A name that is none.
+        There is no such experiment.
     """
     wanted = list(EXPERIMENTS) if only is None else list(only)
     unknown = [name for name in wanted if name not in EXPERIMENTS]
@@ -118,40 +117,40 @@ def chosen(only: Iterable[str] | None) -> list[str]:
 
 
 def run(
-    names: Iterable[str], bench: ExperimentContext, screen: TextIO | None = None
+    names: Iterable[str], context: ExperimentContext, screen: TextIO | None = None
 ) -> list[ExperimentOutcome]:
-    """Do the experiments, or take what an earlier run of the same kind has left."""
-    key = run_key(bench)
+    """Run the experiments, or take the stored outcomes of an earlier run with the same key."""
+    key = run_key(context)
     outcomes = []
     for name in names:
-        outcome = read_outcome(name, bench.folder, key)
+        outcome = read_outcome(name, context.folder, key)
         progress = ProgressBar(name, screen)
         if outcome is None:
-            outcome = _timed(name, replace(bench, tick=progress))
-            write_outcome(outcome, bench.folder, key)
+            outcome = _timed(name, replace(context, tick=progress))
+            write_outcome(outcome, context.folder, key)
             progress.done(f"{outcome.seconds:.1f} s")
         else:
-            progress.done("as it was")
+            progress.done("stored")
         outcomes.append(outcome)
     return outcomes
 
 
-def _timed(name: str, bench: ExperimentContext) -> ExperimentOutcome:
+def _timed(name: str, context: ExperimentContext) -> ExperimentOutcome:
     module, function = EXPERIMENTS[name]
     experiment: Experiment = getattr(importlib.import_module(module), function)
     begin = time.monotonic()
-    return replace(experiment(bench), name=name, seconds=time.monotonic() - begin)
+    return replace(experiment(context), name=name, seconds=time.monotonic() - begin)
 
 
-def run_key(bench: ExperimentContext) -> str:
-    """What an earlier result must have been made with to serve: the code, the extent, the data."""
+def run_key(context: ExperimentContext) -> str:
+    """The key of stored outcomes: the code, the extent and the data they were made with."""
     digest = hashlib.sha256()
     root = Path(__file__).parents[2]
-    rooms = ("analysis", "hw_mocks", "live/characterise")
-    sources = [path for room in rooms for path in (root / room).rglob("*.py")]
+    packages = ("analysis", "hw_mocks", "live/characterise")
+    sources = [path for package in packages for path in (root / package).rglob("*.py")]
     for path in sorted(sources):
         digest.update(path.read_bytes())
-    return f"{digest.hexdigest()[:16]} {'quick' if bench.quick else 'whole'} {bench.data or 'no data'}"
+    return f"{digest.hexdigest()[:16]} {'quick' if context.quick else 'whole'} {context.data or 'no data'}"
 
 
 def _made(folder: Path) -> Path:

@@ -1,8 +1,8 @@
-"""Imposed deformations of one's own picture: what to expect of it before anything is pulled.
+"""Imposed deformations of a picture: the errors to expect from its pattern.
 
-The picture is freed of its noise (Wiener filter), deformed by a quintic spline, given fresh noise and
-rounded again. Truth made by interpolation is not independent of a kernel that interpolates in the same
-way: noise and attenuation found here can be believed, bias is a lower bound.
+A Wiener filter removes the noise of the picture, a quintic spline deforms it, then it gets new noise and rounding.
+The kernel interpolates in the same way, so this truth is not independent: noise and attenuation found here are
+valid, bias is a lower bound.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from analysis import KernelSettings, PatternError, PhaseKernel
 from analysis.field import Roi, StrainField, ZoiGrid
 from analysis.picture.pattern import predicted_sigma, resolution_length
 from analysis.picture.spectrum import filtered_pattern
-from live.characterise.truth import QUANTISATION
+from live.characterise.truth import LENGTH_OF_C, QUANTISATION
 
 Floats = NDArray[np.float64]
 SHIFTS = (-0.4, -0.2, 0.2, 0.4)
 STRAIN = 1e-3
-EDGE = 8  # px left out around, where the spline sees its own continuation
-FEWEST = 6
+EDGE = 8  # px left out at the edge, where the spline continues the picture
+MIN_ZOIS = 6
 
 
 class Imposed:
@@ -47,7 +47,7 @@ class Imposed:
         self.noise, self.top = noise, top
         self._coefficients = spline_filter(self.light, order=5, mode="mirror")
         self._rng = np.random.default_rng(seed)
-        self._seen: dict[tuple[float, float, int], NDArray[np.float32]] = {}
+        self._observed: dict[tuple[float, float, int], NDArray[np.float32]] = {}
 
     def deformed(self, u: float, strain: float = 0.0, wave: tuple[float, float] | None = None) -> Floats:
         """The pattern shifted by u (px) along x, strained along x about the middle, or waved (amplitude, period)."""
@@ -59,7 +59,7 @@ class Imposed:
         back = middle + (x - middle - u) / (1 + strain)
         if wave is not None:
             amplitude, period = wave
-            for _ in range(8):  # the place that came to x; contracts as amplitude 2 pi/period
+            for _ in range(8):  # the point that moved to x; contracts as amplitude 2 pi/period
                 back = x - amplitude * np.sin(2 * np.pi * back / period)
         return np.asarray(
             map_coordinates(self._coefficients, [y, back], order=5, mode="mirror", prefilter=False)
@@ -68,10 +68,10 @@ class Imposed:
     def observed(self, u: float, strain: float, n: int) -> NDArray[np.float32]:
         """``burst`` of ``deformed``; n = 0: without noise. Made once, for ZOIs of all sizes."""
         key = (u, strain, n)
-        if key not in self._seen:
+        if key not in self._observed:
             light = self.deformed(u, strain) if u or strain else self.light
-            self._seen[key] = self.burst(light, n) if n else light.astype(np.float32)
-        return self._seen[key]
+            self._observed[key] = self.burst(light, n) if n else light.astype(np.float32)
+        return self._observed[key]
 
     def burst(self, light: Floats, n: int) -> NDArray[np.float32]:
         """Mean of n frames, each with its own noise and rounding, float32 GL."""
@@ -85,7 +85,7 @@ class Imposed:
 
 @dataclass(frozen=True, slots=True)
 class ExpectedErrors:
-    """What one size and order of ZOI gives on the picture, for bursts of n frames.
+    """The errors of one size and order of ZOI on the picture, for bursts of n frames.
 
     Attributes
     ----------
@@ -96,12 +96,11 @@ class ExpectedErrors:
     bias_u : float, px
         Largest median error over the shifts, without noise.
     sigma_u, sigma_strain : float, px and 1
-        Scatter over ZOIs, by the median absolute deviation: that of a typical ZOI, where some lie
-        partly beside the specimen.
+        Scatter over ZOIs, by the median absolute deviation: some ZOIs may lie partly beside the specimen.
     predicted_u, predicted_strain : float
-        Median of what the kernel predicts for each ZOI.
+        Median of the kernel's predictions for the ZOIs.
     limit_strain : float
-        From g and the window alone (order 1).
+        From g and the window only (order 1).
     strain_error : float
         Median relative error of an imposed strain of 1e-3, without noise.
     length : float, px
@@ -125,18 +124,18 @@ class ExpectedErrors:
     refused: float
 
 
-def grid_for(shape: tuple[int, int], size: int) -> ZoiGrid | None:
+def separate_zois(shape: tuple[int, int], size: int) -> ZoiGrid | None:
     """ZOIs side by side, away from the edge; None where fewer than 6 fit."""
     height, width = shape
-    room = (height - 2 * EDGE, width - 2 * EDGE)
-    if min(room) < size or (room[0] // size) * (room[1] // size) < FEWEST:
+    rows, columns = height - 2 * EDGE, width - 2 * EDGE
+    if min(rows, columns) < size or (rows // size) * (columns // size) < MIN_ZOIS:
         return None
-    return ZoiGrid.cover(Roi(EDGE, EDGE, room[1], room[0]), size, size)
+    return ZoiGrid.cover(Roi(EDGE, EDGE, columns, rows), size, size)
 
 
 def expected(imposed: Imposed, gradient: float, size: int, order: int, n: int) -> ExpectedErrors | None:
     """Measure imposed shifts and a strain; None where the picture is too small or shows no pattern."""
-    grid = grid_for(imposed.light.shape, size)
+    grid = separate_zois(imposed.light.shape, size)
     if grid is None:
         return None
     sigma = imposed.noise / math.sqrt(n)
@@ -146,7 +145,7 @@ def expected(imposed: Imposed, gradient: float, size: int, order: int, n: int) -
         return None
     fields = [kernel.measure(imposed.observed(s, 0, n), noise=sigma) for s in SHIFTS]
     ok = [float(np.mean(f.ok)) for f in fields]
-    if max(ok) * grid.n_active < FEWEST:
+    if max(ok) * grid.n_active < MIN_ZOIS:
         return None
     bias_u, strain_error = systematic(imposed, grid, order)
     theory = resolution_length(size) if order == 1 else measured_length(imposed, size, order)
@@ -173,18 +172,16 @@ def systematic(imposed: Imposed, grid: ZoiGrid, order: int) -> tuple[float, floa
     """(largest median error of u over the shifts px, relative median error of the strain) without noise."""
     kernel = PhaseKernel(imposed.observed(0, 0, 0), grid, KernelSettings(order=order), noise=imposed.noise)
 
-    def seen(u: float, strain: float) -> StrainField:
+    def measured(u: float, strain: float) -> StrainField:
         return kernel.measure(imposed.observed(u, strain, 0), noise=imposed.noise)
 
-    errors = [abs(float(np.nanmedian(seen(s, 0).u)) - s) for s in SHIFTS]
-    return max(errors), float(np.nanmedian(seen(0, STRAIN).exx)) / STRAIN - 1
+    errors = [abs(float(np.nanmedian(measured(s, 0).u)) - s) for s in SHIFTS]
+    return max(errors), float(np.nanmedian(measured(0, STRAIN).exx)) / STRAIN - 1
 
 
 def measured_length(imposed: Imposed, size: int, order: int) -> float:
     """l_10% on this picture, px, from noise-free sines of u of three periods; NaN where it is too small."""
-    from live.characterise.truth import LENGTH_OF_C
-
-    grid = grid_for(imposed.light.shape, size)
+    grid = separate_zois(imposed.light.shape, size)
     if grid is None:
         return float("nan")
     dense = ZoiGrid.cover(grid.roi, size, max(size // 4, 1))

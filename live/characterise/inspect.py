@@ -1,7 +1,6 @@
-"""``phasedic inspect``: one ZOI of a session, its windowed spectrum and what its phases say.
+"""``phasedic inspect``: one ZOI of a session, its windowed spectrum and its phases.
 
-The figure is that of live.characterise.spectrum and needs matplotlib. Nothing heavy is imported before
-the command runs.
+live.characterise.spectrum draws the figure and needs matplotlib. Heavy modules are imported when the command runs.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ def command(arguments: argparse.Namespace) -> int:
     from live.characterise.outcome import figure, save_new
     from live.characterise.spectrum import draw_spectrum, zoi_spectrum
 
-    row, column = _place(arguments.zoi)
+    row, column = _row_and_column(arguments.zoi)
     out = Path(arguments.out)
     drawn = figure(15, 4)
     with Session.open(arguments.session) as session:
@@ -58,7 +57,7 @@ def command(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _place(text: str) -> tuple[int, int]:
+def _row_and_column(text: str) -> tuple[int, int]:
     try:
         row, column = (int(part) for part in text.split(","))
     except ValueError:
@@ -72,7 +71,7 @@ def _picture(session: Any, number: int) -> Any:
 
 
 def _grid_of(session: Any, arguments: argparse.Namespace) -> ZoiGrid:
-    """The grid of the session's own configuration, or with the size and step asked for."""
+    """The grid of the session's configuration, or with the given size and step."""
     from analysis.field import Roi, ZoiGrid
     from live.config.loading import from_dict
     from live.setup.grid import whole_picture

@@ -1,9 +1,7 @@
-"""What an experiment of ``phasedic characterise`` hands back, and how it is kept.
+"""The outcome of an experiment of ``phasedic characterise``: what it consists of, its file, its progress.
 
-An ``ExperimentOutcome`` is text, tables and verdicts; it goes through JSON unchanged, so that a run that was
-interrupted takes up what it has. Figures and CSV files lie beside it.
-
-How far an experiment has come, on one line of the terminal.
+An ``ExperimentOutcome`` is text, tables and verdicts. It is stored as JSON without loss, so an interrupted run
+continues. Figures and CSV files are beside it.
 """
 
 from __future__ import annotations
@@ -23,6 +21,7 @@ from acquire.errors import ConfigError, DataError
 FORMAT = 1
 EQUAL_WITHIN = 0.1
 DPI = 80
+_BAR = 24  # letters
 Word = Literal["better", "equal", "worse"]
 
 
@@ -51,12 +50,12 @@ class ResultTable:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Where ours stands in one respect.
+    """Our result against another one.
 
     Attributes
     ----------
     subject : str
-        What was compared, with both figures.
+        The quantity, with both figures.
     against : str
         "the paper", "the paper's estimator", "the limit", the name of a peer ...
     word : "better" | "equal" | "worse"
@@ -75,7 +74,7 @@ class ExperimentOutcome:
     ----------
     name, title : str
     text : str
-        Markdown under the title; may hold ``![...](figure.png)``.
+        Markdown under the title, with links ``![...](figure.png)``.
     tables : tuple of ResultTable
     figures : tuple of str
         File names beside the page.
@@ -95,18 +94,18 @@ class ExperimentOutcome:
 
 @dataclass(frozen=True, slots=True)
 class ExperimentContext:
-    """What an experiment is given.
+    """The folder, extent, data and progress of an experiment.
 
     Attributes
     ----------
     folder : Path
-        Where its figures go.
+        Of its figures.
     quick : bool
         Fewer ZOIs and cases.
     data : Path or None
         Folder of real image sets.
     tick : callable
-        Told the share done so far, 0 to 1.
+        Called with the share done so far, 0 to 1.
     """
 
     folder: Path
@@ -123,7 +122,7 @@ class ExperimentContext:
 
 
 def shown(value: Any) -> str:
-    """A value for a reader: three digits, powers of ten where they are needed."""
+    """A value as text: three digits, with a power of ten where needed."""
     if not isinstance(value, float):
         return str(value)
     if math.isnan(value):
@@ -137,7 +136,7 @@ def shown(value: Any) -> str:
 
 
 def compared(ours: float, theirs: float) -> Word:
-    """The verdict for two figures of which the smaller is the better."""
+    """The verdict on two figures; smaller is better."""
     if ours < theirs * (1 - EQUAL_WITHIN):
         return "better"
     return "equal" if ours <= theirs * (1 + EQUAL_WITHIN) else "worse"
@@ -166,9 +165,9 @@ def figure(width: float = 9.0, height: float = 3.6) -> Any:
     return Figure(figsize=(width, height), layout="constrained")
 
 
-def save_figure(bench: ExperimentContext, name: str, drawn: Any) -> str:
+def save_figure(context: ExperimentContext, name: str, drawn: Any) -> str:
     """Write a figure beside the page; returns its file name."""
-    drawn.savefig(bench.folder / name, dpi=DPI, metadata={"Software": None})
+    drawn.savefig(context.folder / name, dpi=DPI, metadata={"Software": None})
     return name
 
 
@@ -186,7 +185,7 @@ def colour_map(axes: Any, values: Any, title: str, unit: str, limits: Sequence[f
 
 
 def write_outcome(outcome: ExperimentOutcome, folder: Path, key: str) -> None:
-    """Keep an outcome: JSON for taking up again, CSV for others. The JSON appears whole or not at all."""
+    """Store an outcome as JSON, and its tables as CSV. The JSON appears complete or not at all."""
     for table in outcome.tables:
         (folder / f"{table.name}.csv").write_text(table.csv(), encoding="utf-8")
     document = {"format": FORMAT, "key": key, "outcome": dataclasses.asdict(outcome)}
@@ -196,12 +195,12 @@ def write_outcome(outcome: ExperimentOutcome, folder: Path, key: str) -> None:
 
 
 def read_outcome(name: str, folder: Path, key: str) -> ExperimentOutcome | None:
-    """What an earlier run with the same key left; None where there is nothing that serves.
+    """The outcome of an earlier run with the same key; None where there is none.
 
     Raises
     ------
     DataError
-        The file cannot be read as what it should be.
+        The file is not an outcome.
     """
     path = folder / f"{name}.json"
     if not path.exists():
@@ -251,11 +250,8 @@ def save_new(drawn: Any, path: Path) -> None:
         ) from None
 
 
-BAR = 24
-
-
 class ProgressBar:
-    """A bar on a terminal, a line an experiment elsewhere; called with the share done."""
+    """The progress of an experiment: a bar on a terminal, else one line at the end. Called with the share done."""
 
     def __init__(self, name: str, screen: TextIO | None) -> None:
         self._name, self._screen = name, screen
@@ -264,11 +260,11 @@ class ProgressBar:
 
     def __call__(self, share: float) -> None:
         if self._live:
-            filled = round(BAR * min(max(share, 0.0), 1.0))
-            self._write(f"\r{self._name:12} [{'#' * filled}{'.' * (BAR - filled)}] {100 * share:3.0f} %")
+            filled = round(_BAR * min(max(share, 0.0), 1.0))
+            self._write(f"\r{self._name:12} [{'#' * filled}{'.' * (_BAR - filled)}] {100 * share:3.0f} %")
 
     def done(self, words: str) -> None:
-        """The experiment is finished."""
+        """Show the end of the experiment."""
         if self._live:
             self(1.0)
             self._write(f"  {words}\n")

@@ -1,4 +1,4 @@
-"""``phasedic characterise --pattern``: what one's own picture can give, and which ZOI, step and burst to take."""
+"""``phasedic characterise --pattern``: the accuracy that a picture allows, and the ZOI, step and burst to take."""
 
 from __future__ import annotations
 
@@ -19,25 +19,27 @@ from live.characterise.imposed import ExpectedErrors, Imposed, expected
 from live.characterise.outcome import (
     ExperimentContext,
     ExperimentOutcome,
+    ProgressBar,
     ResultTable,
     figure,
     save_figure,
     shown,
     write_outcome,
 )
+from live.characterise.page import write_page
 from live.characterise.truth import grey_picture
 
 SIZES = (16, 24, 32, 48, 64, 96, 128)
 BURSTS = (1, 4, 16, 64)
-LARGEST = 640  # px of a side that are used; the rest of a larger picture adds time, not knowledge
+LARGEST = 640  # px of a side that are used; more takes longer and improves nothing
 PAGE = "pattern.md"
 FINEST, COARSEST = 1.2, 5.0
 """Speckle radii, px, between which a pattern is neither aliased nor wasteful."""
 
-INTRODUCTION = """What this very picture can give. It is freed of its noise, deformed by a quintic spline, and given
-fresh noise and rounding; then the kernel measures it. **Bias found in this way shares its interpolation with the
-kernel: there is no independent truth for a picture whose scene is not known, so the bias is a lower bound.** Noise
-and spatial resolution do not suffer from that."""
+INTRODUCTION = """The accuracy that this picture allows. Its noise is removed, a quintic spline deforms it, it gets new
+noise and rounding, and the kernel measures it. **This truth shares its interpolation with the kernel: there is no
+independent truth for a picture whose scene is not known, so the bias is a lower bound.** Noise and spatial
+resolution are valid."""
 
 
 def characterise_pattern(arguments: argparse.Namespace, folder: Path) -> int:
@@ -50,9 +52,6 @@ def characterise_pattern(arguments: argparse.Namespace, folder: Path) -> int:
     DataError
         A file that is not a picture, or one without a pattern.
     """
-    from live.characterise.outcome import ProgressBar
-    from live.characterise.page import write_page
-
     picture, bits = _picture(Path(arguments.pattern), arguments.roi)
     if arguments.noise is not None and not arguments.noise >= 0:
         raise ConfigError(f"--noise {arguments.noise}: give a standard deviation in grey levels, 0 or more")
@@ -61,8 +60,8 @@ def characterise_pattern(arguments: argparse.Namespace, folder: Path) -> int:
     if not arguments.target > 0:
         raise ConfigError(f"--target {arguments.target}: give a strain noise in um/m above 0")
     progress, begin = ProgressBar("pattern", sys.stderr), time.monotonic()
-    bench = ExperimentContext(folder, arguments.quick, None, progress)
-    outcome = pattern(bench, picture, bits, arguments.noise, arguments.burst, arguments.target * 1e-6)
+    context = ExperimentContext(folder, arguments.quick, None, progress)
+    outcome = pattern(context, picture, bits, arguments.noise, arguments.burst, arguments.target * 1e-6)
     outcome = replace(outcome, seconds=time.monotonic() - begin)
     progress.done(f"{outcome.seconds:.1f} s")
     write_outcome(outcome, folder, "pattern")
@@ -87,13 +86,8 @@ def _picture(path: Path, roi: str | None) -> tuple[NDArray[Any], int]:
             x, y, width, height = (int(part) for part in roi.split(","))
         except ValueError:
             raise ConfigError(f"--roi {roi}: give four whole numbers x,y,width,height") from None
-        if (
-            x < 0
-            or y < 0
-            or x + width > picture.shape[1]
-            or y + height > picture.shape[0]
-            or min(width, height) < 1
-        ):
+        rows, columns = picture.shape
+        if min(x, y) < 0 or x + width > columns or y + height > rows or min(width, height) < 1:
             raise ConfigError(f"--roi {roi} leaves the picture of {picture.shape[1]} x {picture.shape[0]} px")
         picture = picture[y : y + height, x : x + width]
     top, left = (max(0, (side - LARGEST) // 2) for side in picture.shape)
@@ -114,25 +108,25 @@ def _depth(picture: NDArray[Any]) -> int:
 
 
 def pattern(
-    bench: ExperimentContext,
+    context: ExperimentContext,
     picture: NDArray[Any],
     bits: int,
     noise: float | None,
     burst: int | None,
     target: float,
 ) -> ExperimentOutcome:
-    """The whole study of one picture; ``target`` is a standard deviation of strain."""
+    """Characterise one picture; ``target`` is a standard deviation of strain."""
     report = describe_pattern(picture, bits, noise)
     sigma = math.sqrt(max(report.noise**2, 1 / 12))
     if not report.gradient > 0 or report.contrast < 1e-6:
         raise DataError("the picture shows no pattern; check focus, exposure and speckle")
     imposed = Imposed(picture, sigma, float(2**bits - 1))
-    bursts = (burst,) if burst else ((1, 16) if bench.quick else BURSTS)
-    sizes = SIZES[1:6:2] if bench.quick else SIZES
+    bursts = (burst,) if burst else ((1, 16) if context.quick else BURSTS)
+    sizes = SIZES[1:6:2] if context.quick else SIZES
     cases = [
         (size, order, n) for n in bursts for order in (1, 2) for size in sizes if order == 1 or n == bursts[0]
     ]
-    found = [result for case in bench.steps(cases) if (result := expected(imposed, report.gradient, *case))]
+    found = [result for case in context.steps(cases) if (result := expected(imposed, report.gradient, *case))]
     if not found:
         raise DataError(
             "no ZOI could be measured on this picture; give a larger region (--roi) or a better pattern"
@@ -141,7 +135,7 @@ def pattern(
     table = ResultTable(
         "pattern", tuple(_column(f.name) for f in fields(ExpectedErrors)), tuple(astuple(e) for e in found)
     )
-    name = _draw(bench, report, found, target)
+    name = _draw(context, report, found, target)
     text = "\n\n".join([_described(report, bits, noise), recommended(found, target, burst), _short(found).markdown(),
                         f"![Spectrum of the pattern, strain noise and bias against ZOI size]({name})"])  # fmt: skip
     return ExperimentOutcome("pattern", "Your pattern", text, (table, spectrum), (name,))
@@ -179,12 +173,12 @@ def _described(report: PatternReport, bits: int, noise: float | None) -> str:
         advice.append("clipped pixels: reduce exposure or light")
     if report.contrast < 0.08 * 2**bits:
         advice.append("little contrast: more light or a better pattern")
-    said = "; ".join(advice) if advice else "nothing stands against measuring with it"
+    verdict = "; ".join(advice) if advice else "suitable"
     width, band = shown(report.autocorrelation_fwhm), shown(report.band)
     return f"""{bits} bit, mean {shown(report.mean)} GL, contrast (std) {shown(report.contrast)} GL, noise
 {shown(report.noise)} GL ({source}), clipped pixels {100 * report.clipped:.2g} %. Speckle radius
 {shown(report.speckle_radius)} px (autocorrelation {width} px wide at half height), gradient
-g = {shown(report.gradient)} GL/px, pattern above the noise up to {band} cycles/px. Verdict: {said}."""
+g = {shown(report.gradient)} GL/px, pattern above the noise up to {band} cycles/px. Verdict: {verdict}."""
 
 
 def recommended(found: list[ExpectedErrors], target: float, burst: int | None) -> str:
@@ -223,7 +217,9 @@ def _short(found: list[ExpectedErrors]) -> ResultTable:
     return ResultTable("pattern_short", columns, rows)
 
 
-def _draw(bench: ExperimentContext, report: PatternReport, found: list[ExpectedErrors], target: float) -> str:
+def _draw(
+    context: ExperimentContext, report: PatternReport, found: list[ExpectedErrors], target: float
+) -> str:
     drawn = figure(14, 4)
     axes = drawn.subplots(1, 3)
     axes[0].semilogy(report.spectrum_radius, report.spectrum_power, label="picture")
@@ -242,4 +238,4 @@ def _draw(bench: ExperimentContext, report: PatternReport, found: list[ExpectedE
     for each in axes:
         each.grid(alpha=0.3, which="both")
         each.legend(fontsize=7)
-    return save_figure(bench, "pattern.png", drawn)
+    return save_figure(context, "pattern.png", drawn)

@@ -15,26 +15,26 @@ from live.characterise.outcome import Comparison, ExperimentOutcome, ResultTable
 WORDS: tuple[Word, ...] = ("better", "equal", "worse")
 LIBRARIES = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless")
 
-INTRODUCTION = """How well phase-DIC measures, on rendered truth and on real pictures, beside the paper it comes from:
+INTRODUCTION = """The accuracy of phase-DIC, on rendered truth and on real pictures, compared with its paper:
 J. Molimard, *Implementation of the direct evaluation of strains in a frequency-based image analysis code for random
 patterns*. Three columns run through the page: the figure the paper prints; the paper's own estimator as we read it
 (one shot, bi-triangular window for the displacement, Gaussian for the strain, errata mended:
 `analysis/paper_estimator.py`); and ours, the kernel with its default settings.
 
-What was assumed where the paper does not say: speckle is a sum of Gaussian blobs exp(-rho^2/(2 r^2)) of either sign, r
+Assumed where the paper gives nothing: speckle is a sum of Gaussian blobs exp(-rho^2/(2 r^2)) of either sign, r
 being "the radius", with a standard deviation of 18 % of full scale and no clipped pixels; noise is white, and "31 GL"
 its standard deviation unless a section says otherwise; a frequency is usable from 5 % of the largest amplitude of its
 ZOI; the pseudo-inverse is unweighted; the strain comes from the derivatives of the phases of all usable frequencies
 together, by least squares with six in-situ sensitivities. Truth is rendered analytically in the deformed place, no
-picture is interpolated. How the estimators work is derived in docs/method.md.
+picture is interpolated. docs/method.md derives the estimators.
 
-What your own pattern can give: `phasedic characterise --pattern reference.tif --noise GL --out DIR`. One ZOI of a
+The accuracy of your own pattern: `phasedic characterise --pattern reference.tif --noise GL --out DIR`. One ZOI of a
 recorded session: `phasedic inspect session.h5 --zoi R,C --frame N`.
 """
 
 
 def machine() -> str:
-    """What the figures were made with and on, in one line."""
+    """Processor, system and versions, in one line."""
     versions = []
     for name in LIBRARIES:
         try:
@@ -64,21 +64,21 @@ def page(outcomes: Sequence[ExperimentOutcome], command: str, images: str, intro
     ----------
     outcomes : sequence of ExperimentOutcome
     command : str
-        What made it, as typed.
+        The command as typed.
     images : str
-        Folder of the figures as seen from the page; "" where they lie beside it.
+        Folder of the figures relative to the page; "" for the same folder.
     intro : str
     """
     seconds = sum(outcome.seconds for outcome in outcomes)
     today = datetime.datetime.now(datetime.UTC).date().isoformat()
     made = f"Made by `{command}` on {today} in {seconds:.0f} s on {machine()}."
-    parts = ["# Characterisation", intro.strip(), made, standing(outcomes)]
+    parts = ["# Characterisation", intro.strip(), made, comparison_summary(outcomes)]
     parts += [f"## {outcome.title}\n\n{linked(outcome, images)}" for outcome in outcomes]
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
 def linked(outcome: ExperimentOutcome, images: str) -> str:
-    """The text of an outcome with its figures where they lie, and the names of its CSV files."""
+    """The text of an outcome with links to its figures and CSV files."""
     text = outcome.text.strip()
     prefix = f"{images}/" if images else ""
     for name in outcome.figures:
@@ -90,13 +90,13 @@ def linked(outcome: ExperimentOutcome, images: str) -> str:
     return text
 
 
-def standing(outcomes: Sequence[ExperimentOutcome]) -> str:
-    """Where ours is better, equal (within 10 %) or worse, from the figures of all sections."""
+def comparison_summary(outcomes: Sequence[ExperimentOutcome]) -> str:
+    """The comparisons in which ours is worse, equal (within 10 %) or better, from all sections."""
     verdicts = [verdict for outcome in outcomes for verdict in outcome.verdicts]
     if not verdicts:
         return ""
     counts = ", ".join(f"{word} in {sum(v.word == word for v in verdicts)}" for word in WORDS)
-    lines = ["## Where we stand", "", f"Of {len(verdicts)} comparisons (equal: within 10 %): {counts}."]
+    lines = ["## Comparisons", "", f"Of {len(verdicts)} comparisons (equal: within 10 %): {counts}."]
     for word in reversed(WORDS):
         chosen = [v for v in verdicts if v.word == word]
         if chosen:
@@ -116,7 +116,7 @@ def _table(verdicts: Sequence[Comparison]) -> ResultTable:
 def write_page(
     outcomes: list[ExperimentOutcome], target: Path, folder: Path, typed: str, intro: str | None = None
 ) -> None:
-    """Write the Markdown page, its figures linked from where it stands, and the verdicts as CSV beside them."""
+    """Write the Markdown page with links to the figures, and the verdicts as CSV beside them."""
     images = os.path.relpath(folder, target.parent)
     text = page(outcomes, typed, "" if images == "." else images, INTRODUCTION if intro is None else intro)
     try:

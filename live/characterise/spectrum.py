@@ -1,7 +1,6 @@
-"""The picture of the paper's Fig. 1 for any ZOI: its windowed spectrum and what its phases say.
+"""Fig. 1 of the paper for any ZOI: grey levels, windowed spectrum with the frequencies used, and their phases.
 
-The grey levels, the amplitude of the windowed spectrum with the frequencies used, and their phase
-difference against the one that the measured displacement predicts.
+The last panel compares the phase differences with those of the measured displacement.
 """
 
 from __future__ import annotations
@@ -77,7 +76,7 @@ def zoi_spectrum(
 
 
 def _cut(image: NDArray[Any], left: int, top: int, size: int) -> Floats:
-    """A square of the picture, its edge repeated beyond it."""
+    """A square of the picture; beyond the edge, the edge is repeated."""
     rows = np.clip(np.arange(top, top + size), 0, image.shape[0] - 1)
     columns = np.clip(np.arange(left, left + size), 0, image.shape[1] - 1)
     return image[np.ix_(rows, columns)].astype(np.float64)

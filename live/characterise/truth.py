@@ -1,8 +1,7 @@
-"""The world that ``phasedic characterise`` measures in: rendered truth, a camera, and the noise limit.
+"""Known truth for ``phasedic characterise``: rendered pictures, a camera model, and the noise limit.
 
-The pictures come from the analytic renderer of ``hw_mocks``, which interpolates nothing; the limit
-comes from the renderer's own gradient by weighted least squares and shares no code with what
-measures.
+The analytic renderer of ``hw_mocks`` makes the pictures without interpolation. The limit follows from the
+renderer's own gradient by weighted least squares and shares no code with the kernel.
 """
 
 from __future__ import annotations
@@ -28,12 +27,14 @@ Light = NDArray[np.float32]
 Image = NDArray[Any]
 
 QUANTISATION = 1 / 12
+LENGTH_OF_C = 1 / math.sqrt(-math.log(0.9))
+"""l_10% over c where a sine of period p keeps exp(-(c/p)^2)."""
 SLOPE_STEP = 0.05  # px, of the renderer's shifts for the gradient
 
 
 @dataclass(frozen=True, slots=True)
 class Tiles:
-    """Many single ZOIs in one picture, each with room around it.
+    """Many single ZOIs in one picture, with space around each.
 
     Attributes
     ----------
@@ -77,14 +78,14 @@ class TiledStrain:
         """See ``hw_mocks.deformation.Deformation``."""
         return Affine(0, 0, self.du_dx, self.du_dy, self.dv_dx, self.dv_dy).gradient(x, y)
 
-    def _from_centre(self, places: ArrayLike) -> Floats:
-        places = np.asarray(places, float)
-        return np.asarray((places + 0.5) % self.pitch - self.pitch / 2)
+    def _from_centre(self, positions: ArrayLike) -> Floats:
+        positions = np.asarray(positions, float)
+        return np.asarray((positions + 0.5) % self.pitch - self.pitch / 2)
 
 
 @dataclass(frozen=True, slots=True)
 class SensorModel:
-    """Encoding and white noise.
+    """A sensor: encoding and white noise.
 
     Attributes
     ----------
@@ -159,7 +160,7 @@ class Limit:
     sigma : (6, R, C) float64
         Standard deviation for noise of 1 (in the unit of the slopes) in either picture.
     response : (6, R, C) float64 or None
-        What noise-free pictures of a given displacement field give: the window's attenuation.
+        The result for noise-free pictures of a displacement field: the window's attenuation.
     """
 
     sigma: Floats
@@ -198,20 +199,20 @@ def limit(
             inverse = np.linalg.inv(jw @ j.T)
             sigma[:, row, column] = np.sqrt(2 * np.diag(inverse @ (jw * weight @ j.T) @ inverse))
             if field is not None:
-                seen = (fx * field[0][cut] + fy * field[1][cut]).ravel()
-                response[:, row, column] = inverse @ (jw @ seen)
+                change = (fx * field[0][cut] + fy * field[1][cut]).ravel()
+                response[:, row, column] = inverse @ (jw @ change)
     return Limit(sigma, None if field is None else response)
 
 
 def ours(
     pair: tuple[Image, Image], grid: ZoiGrid, noise: float | None, settings: KernelSettings | None = None
 ) -> StrainField:
-    """The kernel, with its defaults unless settings are given; ``noise`` GL of either picture."""
+    """The field of the kernel, by default with its default settings; ``noise`` GL of either picture."""
     return PhaseKernel(pair[0], grid, settings, noise=noise).measure(pair[1], noise=noise)
 
 
 def papers(pair: tuple[Image, Image], grid: ZoiGrid, settings: PaperSettings | None = None) -> PaperField:
-    """The paper's estimator, one shot unless settings say more."""
+    """The field of the paper's estimator, by default without iteration."""
     return PaperEstimator(pair[0], grid, settings).measure(pair[1])
 
 
@@ -221,10 +222,6 @@ def grey_picture(path: Path) -> Image:
     Raises
     ------
     DataError
-        Not there, not a picture, or damaged.
+        Missing, not a picture, or damaged.
     """
     return read_image(path, gray="luma")
-
-
-LENGTH_OF_C = 1 / math.sqrt(-math.log(0.9))
-"""l_10% over c where a sine of period p keeps exp(-(c/p)^2)."""

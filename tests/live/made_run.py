@@ -65,14 +65,13 @@ def make_run(
 
 
 def noisy(number: int, strain: float, sigma: float = 1e-5, stated: float | None = None) -> StrainField:
-    """Tension with noise ``sigma`` (px and strain) that is said to be ``stated``."""
+    """Tension with noise ``sigma`` (px and strain) whose stored uncertainty is ``stated``."""
     grid, rng = make_grid(), np.random.default_rng(number)
     plain = make_field(grid, strain)
     names = ("u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy")
     values = {n: np.nan_to_num(getattr(plain, n)) + rng.normal(0, sigma, grid.shape) for n in names}
-    said = sigma if stated is None else stated
     # The shear is the mean of two gradients that scatter independently.
-    return StrainField.from_values(grid, values, said, status=plain.status)
+    return StrainField.from_values(grid, values, sigma if stated is None else stated, status=plain.status)
 
 
 def _write_results(
@@ -129,7 +128,7 @@ def _write_session(
         for k, strain in enumerate(strains):
             t = START + 0.1 * k
             for sub in (3, 4):  # of the eight, those in the middle
-                # Grey levels tell the frame: its number, from 100.
+                # Grey levels identify the frame: its number, from 100.
                 frame = make_frame(8 * k + sub, t + 0.01 * (sub - 3.5))
                 image = np.full_like(frame.image, 100 + 8 * k + sub)
                 image.flags.writeable = False

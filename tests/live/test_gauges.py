@@ -94,7 +94,7 @@ def test_the_status_line_shows_gauges() -> None:
 
 
 @pytest.mark.parametrize(
-    ("gauge", "says"),
+    ("gauge", "message"),
     [
         ({"kind": "zoi"}, "gauges.g: a gauge of kind 'zoi' needs 'at'"),
         ({"start": [3, 4], "end": [3, 4]}, "are one point"),
@@ -102,6 +102,6 @@ def test_the_status_line_shows_gauges() -> None:
         ({"kind": "zoi", "at": [900, 3]}, "no ZOI is there; the centres of ZOIs reach from 15.5, 15.5 to"),
     ],
 )
-def test_gauges_that_cannot_be_are_refused(gauge: dict, says: str) -> None:
-    with pytest.raises(ConfigError, match=says.replace(".", r"\.")):
+def test_gauges_that_cannot_be_are_refused(gauge: dict, message: str) -> None:
+    with pytest.raises(ConfigError, match=message.replace(".", r"\.")):
         gauges_for(load_config(None, {"gauges.g": gauge}).gauges, "y", make_grid())

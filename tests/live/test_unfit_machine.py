@@ -50,10 +50,10 @@ def shots(tmp_path: Path) -> Path:
 
 def refused(capsys: pytest.CaptureFixture[str], *words: str) -> None:
     assert main(words) == 6
-    said = capsys.readouterr().err
-    assert "does not measure a known pattern right (self-test with ZOIs of" in said
-    assert f"nothing is measured with numpy {np.__version__} (BLAS and LAPACK: " in said
-    assert "Traceback" not in said
+    printed = capsys.readouterr().err
+    assert "does not measure a known pattern right (self-test with ZOIs of" in printed
+    assert f"nothing is measured with numpy {np.__version__} (BLAS and LAPACK: " in printed
+    assert "Traceback" not in printed
 
 
 QUIET = ("--no-view", "--no-rrd")

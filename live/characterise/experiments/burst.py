@@ -1,4 +1,4 @@
-"""What averaging of frames gives: strain noise against burst length, and where it stops helping."""
+"""Averaging of frames: strain noise against burst length, and its limits."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MOTIONS = (0.0, 0.05, 0.2, 0.5, 1.0, 2.0)
 MOTION_FRAMES = 16
 
 
-class Study:
+class BurstStudy:
     """One pattern and its grid; bursts of one shift against bursts at rest."""
 
     def __init__(self, quick: bool) -> None:
@@ -66,12 +66,12 @@ class Study:
         return float(np.nanstd(field.exx, ddof=1)), float(np.nanmean(field.u)) - SHIFT.u
 
 
-def burst(bench: ExperimentContext) -> ExperimentOutcome:
+def burst(context: ExperimentContext) -> ExperimentOutcome:
     """N = 1 .. 64, 8 and 12 bit, 0.1 to 4 GL; then fixed pattern and motion at 12 bit."""
-    study = Study(bench.quick)
+    study = BurstStudy(context.quick)
     rows: list[tuple[Any, ...]] = []
     cases = [(bits, noise, 0.0) for bits in (8, 12) for noise in NOISES] + [(12, 4.0, FIXED_PATTERN)]
-    for bits, noise, fixed in bench.steps(cases):
+    for bits, noise, fixed in context.steps(cases):
         camera = SensorModel(bits, noise)
         for n, reference, current in study.bursts(camera, fixed):
             std, error = study.scatter(reference, current, camera.sigma / math.sqrt(n))
@@ -82,7 +82,7 @@ def burst(bench: ExperimentContext) -> ExperimentOutcome:
     )  # fmt: skip
     table = ResultTable("burst", columns, tuple(rows))
     motion = _motion(study)
-    name = _draw(bench, table, motion)
+    name = _draw(context, table, motion)
     best = _at(table, 12, 4.0, 0.0, 64)
     found = (verdict("std of exx, 12 bit, 4 GL, 64 frames", "um/m", best[4], best[5], "the noise limit"),)
     return ExperimentOutcome(
@@ -90,7 +90,7 @@ def burst(bench: ExperimentContext) -> ExperimentOutcome:
     )
 
 
-def _motion(study: Study) -> ResultTable:
+def _motion(study: BurstStudy) -> ResultTable:
     """Steady motion during the current burst, 12 bit, 4 GL."""
     camera, rows = SensorModel(12, 4.0), []
     reference = _mean(study, camera, [study.scene.reference] * MOTION_FRAMES)
@@ -110,14 +110,14 @@ def _motion(study: Study) -> ResultTable:
     return ResultTable("burst_motion", columns, tuple(rows))
 
 
-def _mean(study: Study, camera: SensorModel, lights: list[Any]) -> Any:
+def _mean(study: BurstStudy, camera: SensorModel, lights: list[Any]) -> Any:
     total = np.zeros(lights[0].shape, np.uint32)
     for light in lights:
         total += camera.picture(light, study.scene.rng)
     return (total / len(lights)).astype(np.float32)
 
 
-def _draw(bench: ExperimentContext, table: ResultTable, motion: ResultTable) -> str:
+def _draw(context: ExperimentContext, table: ResultTable, motion: ResultTable) -> str:
     drawn = figure(14, 4)
     axes = drawn.subplots(1, 3)
     for place, bits in zip(axes, (8, 12), strict=False):
@@ -139,7 +139,7 @@ def _draw(bench: ExperimentContext, table: ResultTable, motion: ResultTable) -> 
     axes[2].set_title(f"{MOTION_FRAMES} frames, 12 bit, 4 GL, steady motion along x", fontsize=9)
     axes[2].legend(fontsize=7)
     axes[2].grid(alpha=0.3)
-    return save_figure(bench, "burst.png", drawn)
+    return save_figure(context, "burst.png", drawn)
 
 
 def _at(table: ResultTable, bits: int, noise: float, fixed: float, n: int) -> tuple[Any, ...]:

@@ -1,7 +1,4 @@
-"""Fig. 1 of the paper: a ZOI, its windowed spectrum, and the phases that carry its displacement.
-
-Fig. 3 of the paper: the relative error of strain against its level, at the paper's optimum.
-"""
+"""Figs. 1 and 3 of the paper: the phases of one ZOI, and the relative error of strain against its level."""
 
 from __future__ import annotations
 
@@ -25,17 +22,29 @@ from live.characterise.outcome import (
 from live.characterise.spectrum import draw_spectrum, zoi_spectrum
 from live.characterise.truth import SensorModel, TiledStrain, Tiles, TrueScene, limit, ours, papers
 
-U, V = 0.30, -0.20
+Floats = NDArray[np.float64]
+U, V = 0.30, -0.20  # px, of fig. 1
+SIZE, RADIUS, BITS = 64, 2.0, 16
+LEVELS = np.geomspace(2e-5, 2e-3, 7)
+PAPER_RELATIVE, PAPER_MEAN = 0.09, 58e-6
+ITERATED = PaperSettings(iterations=4)
+PHASE = KernelSettings(estimator="phase")
+WHO = {
+    "paper": "the paper's estimator",
+    "iterated": "the same, iterated",
+    "ours": "ours",
+    "phase": "ours, phase alone",
+}
 
 
-def fig1(bench: ExperimentContext) -> ExperimentOutcome:
+def fig1(context: ExperimentContext) -> ExperimentOutcome:
     """One ZOI of 32x32, 12 bit, no noise, moved by a known shift."""
     scene = TrueScene((96, 96), 2.0, seed=1)
     before, after = scene.pair(Affine(U, V), SensorModel(12))
     spectrum = zoi_spectrum(before, after, 32, 32, 32)
     drawn = figure(15, 4)
     draw_spectrum(drawn, spectrum, f"32x32 ZOI, speckle radius 2 px, true displacement u = {U}, v = {V} px")
-    name = save_figure(bench, "fig1_phases.png", drawn)
+    name = save_figure(context, "fig1_phases.png", drawn)
     used = spectrum.used
     columns = ("kx rad/px", "ky rad/px", "amplitude GL", "phase difference rad", "-k.(true displacement) rad")
     rows = zip(
@@ -50,30 +59,16 @@ those of at least 5 % of the largest amplitude, outside the lobe of zero frequen
 paper only asks for an "amplitude higher than zero"). By eq. (4), with the sign that belongs to its kernel, their
 phase differences lie on the plane -k.u. They leave it by {np.sqrt(np.mean(misfit**2)):.3f} rad rms, by
 {np.sqrt(np.average(misfit**2, weights=weight)):.3f} rad when weighted with the square of the amplitude: the weak
-frequencies carry most of the error, although there is no noise but rounding in this picture. The pseudo-inverse of
-eq. (5) gives every frequency the same say and finds u = {spectrum.u:.4f}, v = {spectrum.v:.4f} px for {U} and {V}.
+frequencies have most of the error, although rounding is the only noise in this picture. The pseudo-inverse of
+eq. (5) weights all frequencies alike and finds u = {spectrum.u:.4f}, v = {spectrum.v:.4f} px for {U} and {V}.
 The same picture of any ZOI of a recorded session: `phasedic inspect SESSION --zoi R,C --frame N`.
 
 ![A ZOI, its windowed spectrum, the frequencies used and their phases]({name})"""
     return ExperimentOutcome("fig1", "Fig. 1: the phases of one ZOI", text, (table,), (name,))
 
 
-Floats = NDArray[np.float64]
-SIZE, RADIUS, BITS = 64, 2.0, 16
-LEVELS = np.geomspace(2e-5, 2e-3, 7)
-PAPER_RELATIVE, PAPER_MEAN = 0.09, 58e-6
-ITERATED = PaperSettings(iterations=4)
-PHASE = KernelSettings(estimator="phase")
-WHO = {
-    "paper": "the paper's estimator",
-    "iterated": "the same, iterated",
-    "ours": "ours",
-    "phase": "ours, phase alone",
-}
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class NoiseLevels:
+class StrainLevels:
     """exx of one estimator, (L, Z) over levels and ZOIs."""
 
     exx: Floats
@@ -99,11 +94,11 @@ class NoiseLevels:
         return np.asarray(np.sqrt(np.nanmean((self.exx - LEVELS[:, None]) ** 2, axis=1)))
 
 
-def measured(scenes: list[TrueScene], tiles: Tiles, bench: ExperimentContext) -> dict[str, NoiseLevels]:
+def measured(scenes: list[TrueScene], tiles: Tiles, context: ExperimentContext) -> dict[str, StrainLevels]:
     """The estimators on the same pairs; each ZOI is strained about its own centre."""
     camera, grid = SensorModel(BITS), tiles.grid(SIZE)
     found: dict[str, list[list[Floats]]] = {name: [[] for _ in LEVELS] for name in WHO}
-    for scene, number in bench.steps([(s, n) for s in scenes for n in range(len(LEVELS))]):
+    for scene, number in context.steps([(s, n) for s in scenes for n in range(len(LEVELS))]):
         pair = scene.pair(TiledStrain(tiles.pitch, du_dx=float(LEVELS[number])), camera)
         fields: dict[str, Any] = {
             "paper": papers(pair, grid),
@@ -114,19 +109,19 @@ def measured(scenes: list[TrueScene], tiles: Tiles, bench: ExperimentContext) ->
         for name, field in fields.items():
             found[name][number].append(field.exx.ravel())
     return {
-        name: NoiseLevels(np.array([np.concatenate(row) for row in rows])) for name, rows in found.items()
+        name: StrainLevels(np.array([np.concatenate(row) for row in rows])) for name, rows in found.items()
     }
 
 
-def fig3(bench: ExperimentContext) -> ExperimentOutcome:
+def fig3(context: ExperimentContext) -> ExperimentOutcome:
     """64x64, radius 2 px, no noise, 16 bit, 120 ZOIs at 7 levels (24 when quick)."""
-    tiles = Tiles(SIZE + 24, 6, 4) if bench.quick else Tiles(SIZE + 24)
-    scenes = [TrueScene(tiles.shape, RADIUS, 70 + seed) for seed in range(1 if bench.quick else 2)]
-    results = measured(scenes, tiles, bench)
+    tiles = Tiles(SIZE + 24, 6, 4) if context.quick else Tiles(SIZE + 24)
+    scenes = [TrueScene(tiles.shape, RADIUS, 70 + seed) for seed in range(1 if context.quick else 2)]
+    results = measured(scenes, tiles, context)
     rounding = limit(scenes[0].slopes, tiles.grid(SIZE), SIZE / 6).sigma[1]
     bound = float(np.sqrt(np.mean(rounding**2))) * SensorModel(BITS).sigma / SensorModel(BITS).top
     table = _table(results, bound)
-    name = _draw(bench, results, bound)
+    name = _draw(context, results, bound)
     mine = results["ours"]
     verdicts = (
         verdict(
@@ -139,7 +134,7 @@ def fig3(bench: ExperimentContext) -> ExperimentOutcome:
     return ExperimentOutcome("fig3", "Fig. 3: relative error of strain", text, (table,), (name,), verdicts)
 
 
-def _table(results: dict[str, NoiseLevels], bound: float) -> ResultTable:
+def _table(results: dict[str, StrainLevels], bound: float) -> ResultTable:
     columns = ["true strain", "the paper std/eps %"]
     values = [LEVELS, np.full(len(LEVELS), 100 * PAPER_RELATIVE)]
     for key, who in WHO.items():
@@ -152,7 +147,7 @@ def _table(results: dict[str, NoiseLevels], bound: float) -> ResultTable:
     )
 
 
-def _draw(bench: ExperimentContext, results: dict[str, NoiseLevels], bound: float) -> str:
+def _draw(context: ExperimentContext, results: dict[str, StrainLevels], bound: float) -> str:
     drawn = figure(12, 4)
     left, right = drawn.subplots(1, 2)
     for number, (key, who) in enumerate(WHO.items()):
@@ -165,10 +160,10 @@ def _draw(bench: ExperimentContext, results: dict[str, NoiseLevels], bound: floa
     for axes in (left, right):
         axes.grid(alpha=0.3, which="both")
         axes.legend(fontsize=8)
-    return save_figure(bench, "fig3_strain.png", drawn)
+    return save_figure(context, "fig3_strain.png", drawn)
 
 
-def _text(results: dict[str, NoiseLevels], bound: float, table: ResultTable, name: str, count: int) -> str:
+def _text(results: dict[str, StrainLevels], bound: float, table: ResultTable, name: str, count: int) -> str:
     mine, paper = results["ours"], results["paper"]
     over = mine.relative_scatter[LEVELS >= 1e-4]
     return f"""Uniaxial strain of single ZOIs of 64x64 px about their centres, speckle radius {RADIUS:g} px, 16 bit, no

@@ -1,8 +1,8 @@
-"""Other people's DIC programs, where they are installed: pyvale and SUN-DIC, on pictures in memory.
+"""Other DIC programs, where they are installed: pyvale and SUN-DIC, on pictures in memory.
 
-Both are called as their own examples call them, with a subset of 33 px every 8 px; they write files,
-which go to a temporary folder. Neither is a dependency: ``installed`` says which are there. ``pyvale`` and
-``sun_dic`` give the map of u alone, ``pyvale_points`` and ``sun_dic_points`` where each value lies as well.
+Both run as in their own examples, with a subset of 33 px every 8 px; their files go to a temporary folder. Neither
+is a dependency: ``installed`` has those that can be imported. ``pyvale`` and ``sun_dic`` return the map of u,
+``pyvale_points`` and ``sun_dic_points`` the positions as well.
 """
 
 from __future__ import annotations
@@ -58,17 +58,17 @@ def pyvale_points(reference: Any, deformed: Any, cores: int | None = None) -> Po
     reference, deformed : (H, W) uint8 | uint16, grey levels
         No subset reaches into the outer ``RIM`` px of the reference.
     cores : int, optional
-        Its threads; by default it takes what it likes.
+        Its threads; by default it decides itself.
 
     Raises
     ------
     ImportError
-        Where it is not installed; besides, whatever pyvale raises.
+        It is not installed. pyvale may raise others.
     """
     mask = np.zeros(reference.shape, bool)
     mask[RIM:-RIM, RIM:-RIM] = True
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-        from pyvale import dic  # it opens a log file where it is imported
+        from pyvale import dic  # opens a log file in the current folder when imported
 
         dic.calculate_2d(
             reference, deformed[None], mask,
@@ -98,12 +98,12 @@ def sun_dic_points(reference: Any, deformed: Any, rim: int = RIM, cores: int = 1
         No centre of a subset lies in the outer ``rim`` px of the reference.
     cores : int
         Processes. With more than one it starts Ray (which takes some seconds and leaves its log in the folder
-        of temporary files), and each process is held to one thread: left alone, each starts a thread a core.
+        of temporary files), and each process is limited to one thread; by default each starts one a core.
 
     Raises
     ------
     ImportError
-        Where it is not installed; besides, whatever SUN-DIC and Ray raise.
+        It is not installed. SUN-DIC and Ray may raise others.
     """
     cv2 = load_cv2()
     import sundic.post_process as results
@@ -144,7 +144,7 @@ def _one_thread() -> Iterator[None]:
 
 @contextlib.contextmanager
 def _worker_environment() -> Iterator[None]:
-    """What Ray's processes inherit while it starts: one Numba thread each, and nothing reported to its makers."""
+    """The environment of Ray's processes: one Numba thread each, and no usage reports."""
     wanted = {"NUMBA_NUM_THREADS": "1", "RAY_USAGE_STATS_ENABLED": "0"}
     before = {name: os.environ.get(name) for name in wanted}
     os.environ.update(wanted)

@@ -75,9 +75,9 @@ def plane_strain(u: Floats, step: int) -> Floats:
     return np.asarray(slope[half:-half:GAUGE, half:-half:GAUGE])
 
 
-def peers(bench: ExperimentContext) -> ExperimentOutcome:
+def peers(context: ExperimentContext) -> ExperimentOutcome:
     """Bias and noise of rigid shifts, and strain on a 65 px gauge, of all engines on the same 8-bit pairs."""
-    shape = (320, 400) if bench.quick else (512, 640)
+    shape = (320, 400) if context.quick else (512, 640)
     scene = TrueScene(shape, RADIUS, seed=77)
     grid = ZoiGrid.cover(Roi(16, 16, shape[1] - 32, shape[0] - 32), ZOI, 8)
     engines = _engines(grid)
@@ -88,26 +88,26 @@ def peers(bench: ExperimentContext) -> ExperimentOutcome:
     rows: list[tuple[Any, ...]] = []
     curves: dict[str, list[float]] = {}
     failed: list[str] = []
-    for name, engine in bench.steps(engines.items()):
+    for name, engine in context.steps(engines.items()):
         try:
-            curve, row = _judged(name, engine, scene, shape)
+            curve, row = _compared(name, engine, scene, shape)
         except Exception as error:
             if name not in PROGRAMS:
                 raise
-            # Somebody else's program does not end our page; it is named there.
+            # An optional program that fails does not end the run; the page names it.
             log.warning("%s failed: %s", name, error)
             failed.append(f"{name.split(',')[0]} is installed but failed ({type(error).__name__}: {error}).")
             continue
         curves[name] = curve
         rows.append(row)
     table = ResultTable("peers", columns, tuple(rows))
-    name = _draw(bench, curves)
+    name = _draw(context, curves)
     return ExperimentOutcome(
         "peers", "Peers on the same pairs", _text(table, name, failed), (table,), (name,), _verdicts(table)
     )
 
 
-def _judged(
+def _compared(
     name: str, engine: Engine, scene: TrueScene, shape: tuple[int, int]
 ) -> tuple[list[float], tuple[Any, ...]]:
     """Bias at each shift, px, and the row of the table."""
@@ -131,7 +131,7 @@ def _engines(grid: ZoiGrid) -> dict[str, Engine]:
         field = ours((reference, deformed), grid, noise)
         return field.u, ours((reference, deformed), wide, noise).exx[2:-2:GAUGE, 2:-2:GAUGE]
 
-    def printed(reference: Any, deformed: Any, noise: float) -> tuple[Floats, Floats]:
+    def as_printed(reference: Any, deformed: Any, noise: float) -> tuple[Floats, Floats]:
         size = (ZOI - 32) // 2
         roi = Roi(16 + size, 16 + size, grid.roi.width - 2 * size, grid.roi.height - 2 * size)
         field = papers((reference, deformed), ZoiGrid.cover(roi, 32, 16))
@@ -146,7 +146,7 @@ def _engines(grid: ZoiGrid) -> dict[str, Engine]:
 
         return measure
 
-    known: dict[str, Engine] = {f"ours, {ZOI} px Gaussian": mine, "the paper's estimator, 32 px": printed}
+    known: dict[str, Engine] = {f"ours, {ZOI} px Gaussian": mine, "the paper's estimator, 32 px": as_printed}
     return (
         known
         | {name: of(flow) for name, flow in PEERS.items()}
@@ -183,7 +183,7 @@ def _illumination_error(scene: TrueScene, engine: Any) -> float:
     return float(np.sqrt(np.nanmean((u - 0.25) ** 2)))
 
 
-def _draw(bench: ExperimentContext, curves: dict[str, list[float]]) -> str:
+def _draw(context: ExperimentContext, curves: dict[str, list[float]]) -> str:
     drawn = figure(9, 4)
     axes = drawn.subplots()
     for name, values in curves.items():
@@ -191,7 +191,7 @@ def _draw(bench: ExperimentContext, curves: dict[str, list[float]]) -> str:
     axes.set(xlabel="true shift, px", ylabel="|mean error of u|, px", title="8 bit, no noise")
     axes.grid(alpha=0.3, which="both")
     axes.legend(fontsize=8)
-    return save_figure(bench, "peers.png", drawn)
+    return save_figure(context, "peers.png", drawn)
 
 
 def _verdicts(table: ResultTable) -> tuple[Comparison, ...]:
@@ -218,7 +218,7 @@ is coarser). DIS smooths its flow beyond the 33 px averaged here, which flatters
 
 
 def present() -> str:
-    """Which of the optional programs took part."""
+    """A sentence on which of the optional programs took part."""
     missing = [name.split(",")[0] for name in PROGRAMS if name not in installed()]
     if not missing:
         return "pyvale and SUN-DIC run with their own defaults (SUN-DIC with splines of order 5)."

@@ -132,11 +132,11 @@ def _star_fit(period: Floats, kept: Floats) -> float:
     return c2
 
 
-def resolution(bench: ExperimentContext) -> ExperimentOutcome:
+def resolution(context: ExperimentContext) -> ExperimentOutcome:
     """Sections 2.3 and 3.2: 9 px by autocorrelation, and what that is in the terms of the DIC Challenge."""
-    counts = {32: 34, 64: 24} if bench.quick else {32: 64, 64: 44}
-    periods = PERIODS[::2] if bench.quick else PERIODS
-    who = [name for name in WHO if not (bench.quick and name == "phase")]
+    counts = {32: 34, 64: 24} if context.quick else {32: 64, 64: 44}
+    periods = PERIODS[::2] if context.quick else PERIODS
+    who = [name for name in WHO if not (context.quick and name == "phase")]
     lines: dict[tuple[str, str], Floats] = {}
     rows: list[tuple[Any, ...]] = []
     kept_rows: list[tuple[Any, ...]] = []
@@ -150,7 +150,7 @@ def resolution(bench: ExperimentContext) -> ExperimentOutcome:
             kept_rows += [(label, estimator, p, float(k)) for p, k in zip(periods, kept, strict=True)]
             rows.append(
                 _row(
-                    bench,
+                    context,
                     label,
                     estimator,
                     size,
@@ -158,7 +158,7 @@ def resolution(bench: ExperimentContext) -> ExperimentOutcome:
                     fitted_length(np.array(periods), kept),
                 )
             )
-            bench.tick((number + (place + 1) / len(who)) / len(CASES))
+            context.tick((number + (place + 1) / len(who)) / len(CASES))
     columns = (
         "quantity", "estimator", "half-width of autocorrelation px", "diameter px", "the paper px",
         "l_10% of a sine px", "l_10% of theory px", "l_10% on the Star px", "equivalent square VSG px",
@@ -168,7 +168,7 @@ def resolution(bench: ExperimentContext) -> ExperimentOutcome:
     kept_table = ResultTable(
         "attenuation", ("quantity", "estimator", "period px", "share kept"), tuple(kept_rows)
     )
-    name = _draw(bench, lines, kept_rows)
+    name = _draw(context, lines, kept_rows)
     text = _text(table, name)
     found = tuple(_verdicts(rows))
     return ExperimentOutcome("resolution", "Spatial resolution", text, (table, kept_table), (name,), found)
@@ -184,17 +184,19 @@ def _verdicts(rows: list[tuple[Any, ...]]) -> Iterator[Comparison]:
 
 
 def _row(
-    bench: ExperimentContext, label: str, estimator: str, size: int, half: float, fit: tuple[float, float]
+    context: ExperimentContext, label: str, estimator: str, size: int, half: float, fit: tuple[float, float]
 ) -> tuple[Any, ...]:
     theory = resolution_length(size) if estimator == "ours" else float("nan")
     gauge = VSG_OF_SIGMA * size / 6 if estimator == "ours" else float("nan")
     star = float("nan")
-    if bench.data is not None and (bench.data / STAR[0]).is_dir() and label.startswith("displacement"):
-        star = star_length(bench.data, estimator, size)[0]
+    if context.data is not None and (context.data / STAR[0]).is_dir() and label.startswith("displacement"):
+        star = star_length(context.data, estimator, size)[0]
     return label, WHO[estimator], half, 2 * half, PAPER_WIDTH, fit[0], theory, star, gauge, fit[1]
 
 
-def _draw(bench: ExperimentContext, lines: dict[tuple[str, str], Floats], kept: list[tuple[Any, ...]]) -> str:
+def _draw(
+    context: ExperimentContext, lines: dict[tuple[str, str], Floats], kept: list[tuple[Any, ...]]
+) -> str:
     drawn = figure(12, 3.8)
     left, right = drawn.subplots(1, 2)
     for (label, estimator), line in lines.items():
@@ -216,13 +218,13 @@ def _draw(bench: ExperimentContext, lines: dict[tuple[str, str], Floats], kept: 
     )
     for axes in (left, right):
         axes.grid(alpha=0.3)
-    return save_figure(bench, "resolution.png", drawn)
+    return save_figure(context, "resolution.png", drawn)
 
 
 def _text(table: ResultTable, name: str) -> str:
     return f"""The paper adds two independent noises to one picture, measures one against the other and takes the
-width of the autocorrelation of the error map: 9 px. That width says over which distance errors repeat. It
-does not say how fine a strain field is still seen: a sine of displacement loses 10 % of its amplitude at l_10%,
+width of the autocorrelation of the error map: 9 px. That width is the distance over which errors repeat, not
+the finest strain field that can be measured: a sine of displacement loses 10 % of its amplitude at l_10%,
 several times longer. Both are given, for the paper's estimator and for ours at the paper's sizes, with the
 length that theory gives for our Gaussian weight (13.69 sigma_w) and the side of the square subset with the same
 strain noise (VSG). Phase alone (`estimator="phase"`) has less noise at the same size because its moment windows make

@@ -35,7 +35,7 @@ PAPER_S = {SMALL: 65.5 / 13.69, LARGE: 104 / 13.69}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Maps:
+class SineMaps:
     """Maps at the same places, (R, C): u (px) of the small ZOI, exx direct and classical."""
 
     u: Floats
@@ -61,7 +61,7 @@ def low_pass_for(direct: float, displacement: float, step: int) -> float:
     return math.sqrt(max(direct**2 - displacement**2 - step**2 / 3, 0.0))
 
 
-class Field:
+class SineField:
     """The picture, its grids and its truth."""
 
     def __init__(self, quick: bool) -> None:
@@ -85,7 +85,7 @@ class Field:
         return limit(self.scene.slopes, self.grid(size), size / 6, self.wave.displacement(x, y))
 
     def inner(self, values: Floats) -> Floats:
-        """Without the outermost points, where filters see the edge."""
+        """Without the outermost points, where filters reach the edge."""
         return values[2:-2, 2:-2]
 
     def rms(self, values: Floats, truth: Floats) -> float:
@@ -93,30 +93,27 @@ class Field:
         return float(np.sqrt(np.nanmean(self.inner(values - truth) ** 2)))
 
 
-def measured(field: Field, noise: float, bench: ExperimentContext, done: float) -> dict[str, Maps]:
+def measured(field: SineField, noise: float, context: ExperimentContext, done: float) -> dict[str, SineMaps]:
     """The paper's estimator, ours at the paper's sizes, and ours at its spatial resolution."""
     camera = SensorModel(BITS, noise)
     pair = field.scene.pair(field.wave, camera)
     small, large, same = (field.grid(size) for size in (SMALL, LARGE, SAME_LENGTH))
     paper_u, paper_direct = papers(pair, small).u, papers(pair, large).exx
-    bench.tick(done + 0.3)
-    mine_u, mine, mine_same = (
-        ours(pair, small, camera.sigma).u,
-        ours(pair, large, camera.sigma),
-        ours(pair, same, camera.sigma),
-    )
-    bench.tick(done + 0.4)
+    context.tick(done + 0.3)
+    mine_u = ours(pair, small, camera.sigma).u
+    mine, mine_same = (ours(pair, grid, camera.sigma) for grid in (large, same))
+    context.tick(done + 0.4)
     smooth = low_pass_for(PAPER_S[LARGE], PAPER_S[SMALL], field.step)
     smooth_ours = low_pass_for(LARGE / 6, SMALL / 6, field.step)
     smooth_same = low_pass_for(SAME_LENGTH / 6, SMALL / 6, field.step)
     return {
-        "paper": Maps(paper_u, paper_direct, derived(paper_u, field.step, smooth)),
-        "ours": Maps(mine_u, mine.exx, derived(mine_u, field.step, smooth_ours)),
-        "same": Maps(mine_u, mine_same.exx, derived(mine_u, field.step, smooth_same)),
+        "paper": SineMaps(paper_u, paper_direct, derived(paper_u, field.step, smooth)),
+        "ours": SineMaps(mine_u, mine.exx, derived(mine_u, field.step, smooth_ours)),
+        "same": SineMaps(mine_u, mine_same.exx, derived(mine_u, field.step, smooth_same)),
     }
 
 
-def bounds(field: Field, limits: dict[int, Limit], noise: float) -> dict[str, float]:
+def bounds(field: SineField, limits: dict[int, Limit], noise: float) -> dict[str, float]:
     """Predicted rms: noise of both pictures (rounding included) and window attenuation, in squares."""
     camera, found = SensorModel(BITS, noise), {}
     for name, size, index, truth in (
@@ -130,15 +127,15 @@ def bounds(field: Field, limits: dict[int, Limit], noise: float) -> dict[str, fl
     return found
 
 
-def section41(bench: ExperimentContext) -> ExperimentOutcome:
+def section41(context: ExperimentContext) -> ExperimentOutcome:
     """0.02 sin(2 pi x/128) px, 8 bit, without noise and with 1 %."""
-    field = Field(bench.quick)
+    field = SineField(context.quick)
     limits = {size: field.limit(size) for size in (SMALL, LARGE, SAME_LENGTH)}
     rows: list[tuple[Any, ...]] = []
     verdicts: list[Comparison] = []
-    kept: dict[str, Maps] = {}
+    kept: dict[str, SineMaps] = {}
     for number, (label, noise) in enumerate(NOISES.items()):
-        maps = measured(field, noise, bench, 0.5 * number)
+        maps = measured(field, noise, context, 0.5 * number)
         bound = bounds(field, limits, noise)
         found = _rows(field, label, maps, bound)
         rows += found
@@ -150,7 +147,7 @@ def section41(bench: ExperimentContext) -> ExperimentOutcome:
         f"ours, ZOI {SAME_LENGTH}, the paper's l_10%", "its limit",
     )  # fmt: skip
     table = ResultTable("section41", columns, tuple(rows))
-    name = _draw(bench, field, kept)
+    name = _draw(context, field, kept)
     whole = papers(
         field.scene.pair(field.wave, SensorModel(BITS)),
         field.grid(LARGE),
@@ -166,7 +163,9 @@ def section41(bench: ExperimentContext) -> ExperimentOutcome:
     )
 
 
-def _rows(field: Field, label: str, maps: dict[str, Maps], bound: dict[str, float]) -> list[tuple[Any, ...]]:
+def _rows(
+    field: SineField, label: str, maps: dict[str, SineMaps], bound: dict[str, float]
+) -> list[tuple[Any, ...]]:
     nothing = float("nan")
     clean = label == "no noise"
     u = [field.rms(maps[name].u, field.u) for name in ("paper", "ours")]
@@ -193,7 +192,7 @@ def _verdicts(rows: list[tuple[Any, ...]]) -> list[Comparison]:
     ]  # fmt: skip
 
 
-def _draw(bench: ExperimentContext, field: Field, maps: dict[str, Maps]) -> str:
+def _draw(context: ExperimentContext, field: SineField, maps: dict[str, SineMaps]) -> str:
     drawn = figure(14, 5.2)
     axes = drawn.subplots(2, 4)
     span, strain = (-0.03, 0.03), (-1500.0, 1500.0)
@@ -211,10 +210,10 @@ def _draw(bench: ExperimentContext, field: Field, maps: dict[str, Maps]) -> str:
     for place, (values, title) in zip(axes[1], strains, strict=True):
         colour_map(place, 1e6 * values, title, "um/m", strain)
     _draw_row(axes[0, 3], field, maps)
-    return save_figure(bench, "fig4_5_sine.png", drawn)
+    return save_figure(context, "fig4_5_sine.png", drawn)
 
 
-def _draw_row(axes: Any, field: Field, maps: dict[str, Maps]) -> None:
+def _draw_row(axes: Any, field: SineField, maps: dict[str, SineMaps]) -> None:
     x, row = field.grid(LARGE).x, len(field.exx) // 2
     axes.plot(x, 1e6 * field.exx[row], "k", label="truth")
     axes.plot(x, 1e6 * maps["paper"].direct[row], label="the paper's")

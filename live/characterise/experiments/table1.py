@@ -35,7 +35,7 @@ DRAWS = 10
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Shifts:
+class ShiftErrors:
     """Errors of one estimator at one noise, (S, Z) px over shifts and ZOIs."""
 
     errors: Floats
@@ -58,7 +58,7 @@ class Shifts:
 
 def measured(
     scenes: list[TrueScene], tiles: Tiles, noise: float, draws: int, tick: Callable[[], None]
-) -> dict[str, Shifts]:
+) -> dict[str, ShiftErrors]:
     """The estimators on the same pairs; ours on each with ``draws`` independent noises."""
     camera = SensorModel(BITS, noise)
     found: dict[str, list[list[Floats]]] = {
@@ -79,7 +79,9 @@ def measured(
                 for name, field in fields.items():
                     found[name][row].append(field.u.ravel() - shift)
             tick()
-    return {name: Shifts(np.array([np.concatenate(row) for row in rows])) for name, rows in found.items()}
+    return {
+        name: ShiftErrors(np.array([np.concatenate(row) for row in rows])) for name, rows in found.items()
+    }
 
 
 def limits(scenes: list[TrueScene], tiles: Tiles, size: int) -> float:
@@ -88,23 +90,23 @@ def limits(scenes: list[TrueScene], tiles: Tiles, size: int) -> float:
     return float(np.sqrt(np.mean(np.square(values))))
 
 
-def table1(bench: ExperimentContext) -> ExperimentOutcome:
+def table1(context: ExperimentContext) -> ExperimentOutcome:
     """10 shifts, 60 pairs (whole: 360, ours with noise 3600), 12 bit, 0 and 31 GL."""
     tiles = Tiles(SAME_LENGTH + 20)
-    scenes = [TrueScene(tiles.shape, RADIUS, seed) for seed in range(1 if bench.quick else 6)]
-    noises = dict(list(NOISES.items())[:2]) if bench.quick else NOISES
+    scenes = [TrueScene(tiles.shape, RADIUS, seed) for seed in range(1 if context.quick else 6)]
+    noises = dict(list(NOISES.items())[:2]) if context.quick else NOISES
     total, done = len(scenes) * len(SHIFTS) * len(noises), [0]
 
     def tick() -> None:
         done[0] += 1
-        bench.tick(done[0] / total)
+        context.tick(done[0] / total)
 
-    draws = {name: DRAWS if noise and not bench.quick else 1 for name, noise in noises.items()}
+    draws = {name: DRAWS if noise and not context.quick else 1 for name, noise in noises.items()}
     results = {name: measured(scenes, tiles, noise, draws[name], tick) for name, noise in noises.items()}
     unit = {size: limits(scenes[:3], tiles, size) for size in (SIZE, SAME_LENGTH)}
     summary = _summary(results, unit)
     curves = _curves(results)
-    name = _draw(bench, results)
+    name = _draw(context, results)
     verdicts = []
     for noise in ("0 GL", "31 GL (std)"):
         mine, paper = results[noise]["ours"], PAPER[noise]
@@ -123,7 +125,7 @@ def table1(bench: ExperimentContext) -> ExperimentOutcome:
     )
 
 
-def _summary(results: dict[str, dict[str, Shifts]], unit: dict[int, float]) -> ResultTable:
+def _summary(results: dict[str, dict[str, ShiftErrors]], unit: dict[int, float]) -> ResultTable:
     columns = (
         "noise", "figure", "the paper px", "its estimator px", "ours px", "ours, phase alone px",
         f"ours, {SAME_LENGTH} px ZOI, same l_10% px", "noise limit 32 px", f"noise limit {SAME_LENGTH} px",
@@ -146,7 +148,7 @@ def _summary(results: dict[str, dict[str, Shifts]], unit: dict[int, float]) -> R
     return ResultTable("table1", columns, tuple(rows))
 
 
-def _curves(results: dict[str, dict[str, Shifts]]) -> ResultTable:
+def _curves(results: dict[str, dict[str, ShiftErrors]]) -> ResultTable:
     columns = ["shift px"]
     values: list[Floats] = [SHIFTS]
     for noise, found in results.items():
@@ -158,7 +160,7 @@ def _curves(results: dict[str, dict[str, Shifts]]) -> ResultTable:
     )
 
 
-def _draw(bench: ExperimentContext, results: dict[str, dict[str, Shifts]]) -> str:
+def _draw(context: ExperimentContext, results: dict[str, dict[str, ShiftErrors]]) -> str:
     drawn = figure(12, 6.4)
     axes = drawn.subplots(2, 2, sharex=True)
     for column, noise in enumerate(("0 GL", "31 GL (std)")):
@@ -179,11 +181,11 @@ def _draw(bench: ExperimentContext, results: dict[str, dict[str, Shifts]]) -> st
             axes[row, column].set_ylabel("error of u, 1e-3 px\n(mean, +-1 std)")
             axes[row, column].grid(alpha=0.3)
         axes[1, column].set_xlabel("true shift, px")
-    return save_figure(bench, "fig2_shifts.png", drawn)
+    return save_figure(context, "fig2_shifts.png", drawn)
 
 
 def _text(
-    results: dict[str, dict[str, Shifts]],
+    results: dict[str, dict[str, ShiftErrors]],
     unit: dict[int, float],
     summary: ResultTable,
     name: str,
@@ -200,8 +202,8 @@ def _text(
     bound = unit[SIZE] * SensorModel(BITS, 31.0).sigma / SensorModel(BITS).top
     rounding = unit[SIZE] * SensorModel(BITS).sigma / SensorModel(BITS).top
     return f"""ZOI 32x32, 12 bit, speckle radius {RADIUS:g} px, shifts of u from -0.5 to 0.5 px in 10 equal steps,
-{pairs} pairs a shift; the spectral kernel sees each of them with {draws} noises. The paper samples a pattern
-drawn 10 times oversampled; here it is rendered analytically at the shifted place. It says neither whether 31 GL is a
+{pairs} pairs a shift; the spectral kernel measures each with {draws} noises. The paper samples a pattern
+drawn 10 times oversampled; here it is rendered analytically at the shifted place. It states neither whether 31 GL is a
 standard deviation or a range (both are shown) nor which mean of the bias it prints (three are shown). Ours is the
 default kernel with the same 32 px; its Gaussian weight (sigma 5.3 px) resolves finer (l_10% 73 px) than the paper's
 bi-triangular window (about 100 px), so a

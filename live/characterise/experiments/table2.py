@@ -1,4 +1,4 @@
-"""Table 2 of the paper: the table, the figure and the words about the design of ``characterise_design``."""
+"""Table 2 of the paper: the table, the figure and the text on the design of ``table2_design``."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from live.characterise.experiments.table2_design import (
     BITS,
     CORNERS,
     FACTORS,
-    FEWEST,
+    MIN_ZOIS,
     NOISES,
     PAPER,
     PAPER_CONFIDENCE,
@@ -40,9 +40,9 @@ Floats = NDArray[np.float64]
 NAMES = ("paper", "ours", "paper, range", "ours, range")
 
 
-def table2(bench: ExperimentContext) -> ExperimentOutcome:
+def table2(context: ExperimentContext) -> ExperimentOutcome:
     """The design at the paper's corners, its models in % strain and on log10."""
-    corners = measured(bench)
+    corners = measured(context)
     by = {name: [c for c in corners if c.estimator == name] for name in NAMES}
     by = {name: rows for name, rows in by.items() if rows}
     coded = {name: np.array([c.coded for c in rows]) for name, rows in by.items()}
@@ -52,7 +52,7 @@ def table2(bench: ExperimentContext) -> ExperimentOutcome:
         for name, rows in by.items()
     }
     effects, cells = _effects(linear, logs), _cells(corners)
-    name = _draw(bench, logs, corners)
+    name = _draw(context, logs, corners)
     text = _text(linear, logs, effects, cells, corners, name)
     return ExperimentOutcome(
         "table2",
@@ -119,7 +119,7 @@ def _verdicts(corners: list[Corner]) -> list[Comparison]:
     return found
 
 
-def _draw(bench: ExperimentContext, logs: dict[str, DesignFit], corners: list[Corner]) -> str:
+def _draw(context: ExperimentContext, logs: dict[str, DesignFit], corners: list[Corner]) -> str:
     drawn = figure(12, 4.2)
     left, right = drawn.subplots(1, 2, width_ratios=[1.2, 1])
     order = np.argsort(np.abs(logs["ours"].beta[1:]))
@@ -136,7 +136,7 @@ def _draw(bench: ExperimentContext, logs: dict[str, DesignFit], corners: list[Co
     )
     left.legend(fontsize=8)
     _draw_corners(right, corners)
-    return save_figure(bench, "table2_effects.png", drawn)
+    return save_figure(context, "table2_effects.png", drawn)
 
 
 def _label(coded: tuple[int, ...]) -> str:
@@ -172,7 +172,7 @@ def _text(
     corners: list[Corner],
     name: str,
 ) -> str:
-    refused = sum(row[-1] < FEWEST for row in cells.rows)
+    refused = sum(row[-1] < MIN_ZOIS for row in cells.rows)
     strongest = np.argsort(-np.abs(logs["ours"].beta[1:5]))
     first = ", ".join(f"{FACTORS[k]} (x {10 ** (2 * logs['ours'].beta[1 + k]):.2g})" for k in strongest)
     return f"""All 16 corners of ROI {SIZES} px, speckle radius {RADII} px, {BITS} bit and noise {NOISES} GL (standard
@@ -187,7 +187,7 @@ the same design is also fitted on log10, where a coefficient is a factor.
 
 For a user of ours, in this order (factor on the error from the low to the high level): {first}.
 Our kernel refuses to measure in {refused} of the 16 corners, where its predicted uncertainty of u exceeds 0.3 px:
-there the models stand on the other corners alone.
+there the models use the other corners only.
 
 {cells.markdown()}
 
@@ -198,32 +198,32 @@ def _agreement(linear: dict[str, DesignFit]) -> str:
     """Signs and ranking against the paper's significant effects, in words."""
     significant = [k for k in range(1, 11) if PAPER_CONFIDENCE[k] >= SIGNIFICANT]
     lines = []
-    said_of = {
+    names = {
         "paper": "the paper's estimator", "ours": "ours",
         "paper, range": "the paper's estimator, 31 GL read as a range", "ours, range": "ours, likewise",
     }  # fmt: skip
     for name, fit in linear.items():
-        who = said_of[name]
+        who = names[name]
         beta = fit.beta
         sure = fit.confidence[significant] >= SIGNIFICANT
         other = np.sign(beta[significant]) != np.sign(np.array(PAPER)[significant])
         wrong = [TERMS[k] for k, bad in zip(significant, other & sure, strict=True) if bad]
         unsure = [TERMS[k] for k, known in zip(significant, sure, strict=True) if not known]
         rho = _rank_correlation(np.array(PAPER)[significant], beta[significant])
-        said = "no sign against the paper's" if not wrong else f"other signs: {', '.join(wrong)}"
-        said += f" (not significant here: {', '.join(unsure)})" if unsure else ", all significant"
-        lines.append(f"- {who}: {said}; rank correlation of the sizes {rho:.2f}")
+        signs = "no sign against the paper's" if not wrong else f"other signs: {', '.join(wrong)}"
+        signs += f" (not significant here: {', '.join(unsure)})" if unsure else ", all significant"
+        lines.append(f"- {who}: {signs}; rank correlation of the sizes {rho:.2f}")
     heading = f"Of the paper's {len(significant)} effects with at least {SIGNIFICANT:g} % confidence:"
     return "\n".join([heading, "", *lines, "", _why(linear["paper"])])
 
 
 def _why(fit: DesignFit) -> str:
-    """What the sizes of the effects say, and why their ranking need not agree."""
-    alone, with_noise = (1, 2, 3), (7, 9, 10)
+    """The sizes of the effects, and why their ranking need not agree."""
+    main, with_noise = (1, 2, 3), (7, 9, 10)
     pairs = [
         ", ".join(
             f"{FACTORS[a - 1]} {abs(beta[a]):.2g} / {abs(beta[b]):.2g}"
-            for a, b in zip(alone, with_noise, strict=True)
+            for a, b in zip(main, with_noise, strict=True)
         )
         for beta in (np.array(PAPER), fit.beta)
     ]
@@ -232,10 +232,10 @@ noise nothing matters much, with noise everything does. Much the same here ({pai
 reproduced, for reasons that lie in the linear scale: four of the paper's seven sizes are within 0.072 and 0.080,
 and in both columns sizes are decided by the few corners with the largest errors, those with 31 GL on 8 bit (12 % of
 full scale) and with 16 px speckle in a ZOI of 32 px, which holds a single speckle. There a one-shot estimator no
-longer measures, and the figures tell the scatter of lost phases (or how a program drops them, which the paper does
-not say). Leaving outliers out (median absolute deviation) or bounding them changes ranks and even signs. What noise
-propagation alone would give is known (method.md, section 7: sigma/(g s^2), g falling as 1/r): factors of 107 for
-the noise, 1/257 for the encoding, 8 for the speckle, 1/4 for the ROI, and no interaction on a logarithmic scale,
+longer measures, and the figures are the scatter of lost phases (or depend on how a program drops them, which the
+paper does not state). Leaving outliers out (median absolute deviation) or bounding them changes ranks and even signs.
+Noise propagation by itself has known factors (method.md, section 7: sigma/(g s^2), g falling as 1/r): 107 for the
+noise, 1/257 for the encoding, 8 for the speckle, 1/4 for the ROI, and no interaction on a logarithmic scale,
 beside our last column."""
 
 

@@ -27,8 +27,8 @@ PAPER_CONFIDENCE = (98.4, 98.3, 98.0, 98.5, 98.0, 13.5, 73.1, 97.8, 93.6, 97.8, 
 GUARD = {2.0: 24, 16.0: 160}
 READINGS = {"": 1.0, ", range": 1 / math.sqrt(12)}
 """Of the paper's 31 GL: a standard deviation, or a range of equally likely values."""
-FEWEST = 10
-"""Corners in which fewer ZOIs than this are measured have no scatter worth the name."""
+MIN_ZOIS = 10
+"""With fewer measured ZOIs, a corner has no scatter."""
 SIGNIFICANT = 95.0
 
 
@@ -89,10 +89,10 @@ class Corner:
     measured: int
 
 
-def measured(bench: ExperimentContext) -> list[Corner]:
+def measured(context: ExperimentContext) -> list[Corner]:
     """All corners, levels and estimators; the pictures of a speckle size are rendered once."""
-    levels = (2e-4,) if bench.quick else tuple(np.geomspace(2e-5, 2e-3, 5))
-    readings = {"": READINGS[""]} if bench.quick else READINGS
+    levels = (2e-4,) if context.quick else tuple(np.geomspace(2e-5, 2e-3, 5))
+    readings = {"": READINGS[""]} if context.quick else READINGS
     found: list[Corner] = []
     for radius_code, radius in zip((-1, 1), RADII, strict=True):
         tiles = Tiles(64 + GUARD[radius])
@@ -101,7 +101,7 @@ def measured(bench: ExperimentContext) -> list[Corner]:
         corners = [c for c in CORNERS if c[1] == radius_code]
         for number, coded in enumerate(corners):
             found += _corner(scene, tiles, coded, list(zip(levels, lights, strict=True)), readings)
-            bench.tick((number + 1) / (2 * len(corners)) + 0.5 * (radius_code > 0))
+            context.tick((number + 1) / (2 * len(corners)) + 0.5 * (radius_code > 0))
     return found
 
 
@@ -137,7 +137,7 @@ def _ours_or_refused(pair: tuple[Any, Any], grid: ZoiGrid, camera: SensorModel) 
 
 def _figures(coded: tuple[int, ...], level: float, estimator: str, exx: Floats) -> Corner:
     good = exx[np.isfinite(exx)]
-    if good.size < FEWEST:
+    if good.size < MIN_ZOIS:
         return Corner(coded, level, estimator, float("nan"), float("nan"), int(good.size))
     std, rms = float(good.std(ddof=1)), float(np.sqrt(np.mean((good - level) ** 2)))
     return Corner(coded, level, estimator, std, rms, int(good.size))

@@ -1,7 +1,7 @@
 """Section 4.2 of the paper, Figs. 6 and 7: maps on a woven composite, simulated with known truth, and on a real one.
 
-The paper filters its strain maps "for cosmetic reasons". ``for_display`` does the same to what is
-drawn or exported; measured values stay as they are.
+The paper filters its strain maps "for cosmetic reasons". ``for_display`` does the same for pictures;
+measured values stay as they are.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from live.characterise.outcome import (
     verdict,
 )
 from live.characterise.truth import SensorModel, TrueScene, grey_picture, ours, papers
-from live.results.maps.colours import PAPER_LOW_PASS, for_display
+from live.results.maps.map import PAPER_LOW_PASS, for_display
 
 Floats = NDArray[np.float64]
 CELL, OVER, MEAN_STRAIN, NU = 160.0, 0.6, 1e-3, 0.3
@@ -41,10 +41,10 @@ HOLE_ROI = Roi(20, 30, 360, 980)
 BACKGROUND = 30  # grey levels, smoothed: below is hole or background
 
 
-def woven(bench: ExperimentContext) -> ExperimentOutcome:
+def woven(context: ExperimentContext) -> ExperimentOutcome:
     """A plain weave in tension along x with over-strain where the yarns cross; truth known."""
-    step = 16 if bench.quick else 8
-    shape = (256, 384) if bench.quick else (384, 544)
+    step = 16 if context.quick else 8
+    shape = (256, 384) if context.quick else (384, 544)
     modes = StrainModes("woven", "x", (shape[1] - 1) / 2, (shape[0] - 1) / 2, cell=CELL, overstrain=OVER)
     motion = SpecimenDeformation(modes, MEAN_STRAIN, -NU * MEAN_STRAIN)
     scene, camera = TrueScene(shape, 2.0, seed=31), SensorModel(BITS, NOISE)
@@ -56,18 +56,18 @@ def woven(bench: ExperimentContext) -> ExperimentOutcome:
     fine = ZoiGrid.cover(
         Roi(edge + inset, edge + inset, roi.width - 2 * inset, roi.height - 2 * inset), SMALLER, step
     )
-    bench.tick(0.1)
+    context.tick(0.1)
     fields: dict[str, Any] = {"ours": ours(pair, grid, camera.sigma), "fine": ours(pair, fine, camera.sigma)}
     fields["paper"] = papers(pair, grid)
-    bench.tick(0.5)
+    context.tick(0.5)
     fields["whole"] = papers(pair, grid, WHOLE)
-    bench.tick(0.9)
+    context.tick(0.9)
     y, x = np.meshgrid(grid.y, grid.x, indexing="ij")
     truth = dict(zip(("du_dx", "du_dy", "dv_dx", "dv_dy"), motion.gradient(x, y), strict=True))
     truth |= dict(zip(("u", "v"), motion.displacement(x, y), strict=True))
     truth["exx"], truth["exy"] = truth["du_dx"], 0.5 * (truth["du_dy"] + truth["dv_dx"])
     table = _errors(fields, truth, step)
-    name = _draw_woven(bench, fields, truth, step)
+    name = _draw_woven(context, fields, truth, step)
     return ExperimentOutcome(
         "woven",
         "Section 4.2: a simulated woven composite",
@@ -111,7 +111,9 @@ def _verdicts(table: ResultTable) -> tuple[Comparison, ...]:
     )  # fmt: skip
 
 
-def _draw_woven(bench: ExperimentContext, fields: dict[str, Any], truth: dict[str, Floats], step: int) -> str:
+def _draw_woven(
+    context: ExperimentContext, fields: dict[str, Any], truth: dict[str, Floats], step: int
+) -> str:
     drawn = figure(14, 6.2)
     axes = drawn.subplots(2, 4)
     for row, name in enumerate(("exx", "exy")):
@@ -124,7 +126,7 @@ def _draw_woven(bench: ExperimentContext, fields: dict[str, Any], truth: dict[st
         ]  # fmt: skip
         for place, (values, title) in zip(axes[row], maps, strict=True):
             colour_map(place, 1e6 * values, f"{name}, {title}", "um/m", limits)
-    return save_figure(bench, "fig7_woven.png", drawn)
+    return save_figure(context, "fig7_woven.png", drawn)
 
 
 def _woven_text(table: ResultTable, name: str) -> str:
@@ -140,26 +142,26 @@ paper's strain; overlaid by whole pixels, as its section 2.2 may be read, it sho
 ![Strain maps of the simulated weave]({name})"""
 
 
-def open_hole(bench: ExperimentContext) -> ExperimentOutcome:
+def open_hole(context: ExperimentContext) -> ExperimentOutcome:
     """The open-hole composite of the DIC Challenge 1.0 (sample 12), a real test."""
-    if bench.data is None or not (bench.data / HOLE).is_dir():
+    if context.data is None or not (context.data / HOLE).is_dir():
         text = "Left out: give the folder of the DIC Challenge image sets with `--data DIR`."
         return ExperimentOutcome("open-hole", "Section 4.2: a real composite with a hole", text)
-    pictures = [grey_picture(bench.data / HOLE / name) for name in HOLE_FRAMES]
-    step = 16 if bench.quick else 8
+    pictures = [grey_picture(context.data / HOLE / name) for name in HOLE_FRAMES]
+    step = 16 if context.quick else 8
     mask = _specimen(pictures[0])
     grids = {size: ZoiGrid.cover(HOLE_ROI, size, step, mask) for size in (48, 32)}
     fields: list[StrainField] = []
     for number, picture in enumerate(pictures[1:]):
         fields.append(ours((pictures[0], picture), grids[48], None))
-        bench.tick(0.2 * (number + 1))
+        context.tick(0.2 * (number + 1))
     paper = papers((pictures[0], pictures[1]), grids[48], PaperSettings(search_px=12))
     whole = papers((pictures[0], pictures[1]), grids[48], WHOLE)
-    bench.tick(0.9)
+    context.tick(0.9)
     gold = _against_gold(
-        bench.data / HOLE / "DICe_solution_04.txt", ours((pictures[0], pictures[1]), grids[32], None)
+        context.data / HOLE / "DICe_solution_04.txt", ours((pictures[0], pictures[1]), grids[32], None)
     )
-    name = _draw_hole(bench, pictures[0], fields[0], paper, whole)
+    name = _draw_hole(context, pictures[0], fields[0], paper, whole)
     columns = (
         "frame", "ZOIs on the specimen", "measured", "mean eyy um/m", "largest eyy um/m", "smallest eyy um/m",
         "predicted sigma of eyy um/m",
@@ -210,7 +212,7 @@ def _against_gold(path: Path, field: StrainField) -> str:
 
 
 def _draw_hole(
-    bench: ExperimentContext, picture: NDArray[Any], field: StrainField, paper: Any, whole: Any
+    context: ExperimentContext, picture: NDArray[Any], field: StrainField, paper: Any, whole: Any
 ) -> str:
     drawn = figure(13, 6.4)
     axes = drawn.subplots(1, 4)
@@ -234,7 +236,7 @@ def _draw_hole(
         )
         drawn_map.set_extent(extent)
         place.set(xlim=(0, picture.shape[1]), ylim=(picture.shape[0], 0))
-    return save_figure(bench, "fig6_7_open_hole.png", drawn)
+    return save_figure(context, "fig6_7_open_hole.png", drawn)
 
 
 def _hole_text(table: ResultTable, name: str, gold: str) -> str:

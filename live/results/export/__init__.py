@@ -1,5 +1,5 @@
 """A run in the formats of other programs.
 
 ``formats`` lists them and runs a ``job``. Text and arrays: ``tables``; ParaView: ``vtk``; ImageJ: ``tiff``;
-``films``; ``r3xa``.
+pictures: ``films``; metadata of the experiment: ``r3xa``.
 """

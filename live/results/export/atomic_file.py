@@ -1,4 +1,4 @@
-"""Files and folders that appear whole or not at all, and never in place of others."""
+"""Files and folders that appear complete or not at all, and never replace others."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from acquire.errors import ConfigError, DataError
 
 
 def check_free(*paths: Path) -> None:
-    """Raise ConfigError where one of ``paths`` is there already."""
+    """Raise ConfigError where one of ``paths`` exists."""
     for path in paths:
         if path.exists():
             raise ConfigError(f"{path} exists already and is not overwritten; choose another --out")
@@ -19,30 +19,30 @@ def check_free(*paths: Path) -> None:
 
 @contextlib.contextmanager
 def new_file(path: Path) -> Iterator[Path]:
-    """A path beside ``path`` to write to; it takes its name when all went well, and else is removed.
+    """A path beside ``path`` to write to; it is renamed to ``path`` at the end, and removed after an error.
 
     Raises
     ------
     ConfigError
-        ``path`` is taken.
+        ``path`` exists.
     DataError
         It cannot be written.
     """
-    with _appearing(path) as part:
+    with _atomic(path) as part:
         yield part
 
 
 @contextlib.contextmanager
 def new_folder(path: Path) -> Iterator[Path]:
-    """The same for a folder, which is there and empty."""
-    with _appearing(path) as part:
+    """The same for a folder, which is created empty."""
+    with _atomic(path) as part:
         part.mkdir()
         yield part
 
 
 @contextlib.contextmanager
-def _appearing(path: Path) -> Iterator[Path]:
-    # A film is told its format by its suffix, so this must stay the last.
+def _atomic(path: Path) -> Iterator[Path]:
+    # The suffix decides the format of a film, so it must stay the last.
     part = path.with_name(f"{path.stem}.part{path.suffix}")
     check_free(path, part)
     try:

@@ -1,4 +1,4 @@
-"""Pictures and films of a map over the pictures: ``png``, ``mp4`` (``.webm`` by the name of --out), ``gif``."""
+"""A map over the pictures of the test: ``png``, ``mp4`` (``.webm`` by the name of --out), ``gif``."""
 
 from __future__ import annotations
 
@@ -13,25 +13,25 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
 from live.results.export.atomic_file import new_file, new_folder
-from live.results.export.job import Job
+from live.results.export.job import ExportJob
 from live.results.maps.painting import Levels, Painter, caption
 from live.results.maps.scale import ColourScale
 from live.results.pictures import Pictures
 
-# What the encoders in OpenCV's wheel make, and who does not play it.
+# Codec of the encoders in OpenCV's wheel, and the programs that do not play it.
 _CODECS = {
     ".mp4": (
         "mp4v",
-        "MPEG-4 part 2: web browsers do not play it; --to gif or --out NAME.webm is for them",
+        "MPEG-4 part 2: web browsers do not play it; give --to gif or --out NAME.webm for them",
     ),
     ".webm": (
         "VP90",
-        "VP9: old versions of QuickTime and PowerPoint do not play it; --out NAME.mp4 is for them",
+        "VP9: old versions of QuickTime and PowerPoint do not play it; give --out NAME.mp4 for them",
     ),
 }
 
 
-def write_png(job: Job, path: Path) -> None:
+def write_png(job: ExportJob, path: Path) -> None:
     """A folder with one picture an instant."""
     cv2 = load_cv2()
     with new_folder(path) as folder:
@@ -40,7 +40,7 @@ def write_png(job: Job, path: Path) -> None:
             (folder / f"{job.fields[0]}_{k:05d}.png").write_bytes(bytes(data))
 
 
-def write_mp4(job: Job, path: Path) -> None:
+def write_mp4(job: ExportJob, path: Path) -> None:
     """A film, ``fps`` instants a second.
 
     Raises
@@ -71,12 +71,12 @@ def write_mp4(job: Job, path: Path) -> None:
             if writer is not None:
                 writer.release()
         if not part.exists():
-            raise DataError(f"{path}: the encoder wrote nothing; is there room on the disk?")
+            raise DataError(f"{path}: the encoder wrote nothing; is the disk full?")
     job.screen.say(remark)
 
 
-def write_gif(job: Job, path: Path) -> None:
-    """A film that any program shows; 256 colours, so large ones are reduced to 640 px.
+def write_gif(job: ExportJob, path: Path) -> None:
+    """A film that every program shows; 256 colours, at most 640 px.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def write_gif(job: Job, path: Path) -> None:
         )
 
 
-def _frames(job: Job, longest: int = 1280) -> Iterator[tuple[int, NDArray[np.uint8]]]:
+def _frames(job: ExportJob, longest: int = 1280) -> Iterator[tuple[int, NDArray[np.uint8]]]:
     """(k, BGR image) of each instant."""
     (name,) = job.fields
     pictures = job.run.pictures if job.options.picture else None
@@ -124,15 +124,15 @@ def _frames(job: Job, longest: int = 1280) -> Iterator[tuple[int, NDArray[np.uin
             yield k, painter.framed(image, [caption(job.strain, row)], row)
 
 
-def _images(job: Job, pictures: Pictures | None) -> Generator[Any]:
+def _images(job: ExportJob, pictures: Pictures | None) -> Generator[Any]:
     if pictures is not None:
         yield from pictures.each(job.rows)
     while True:
         yield None
 
 
-def _size(job: Job, pictures: Pictures | None) -> tuple[int, int]:
-    """Of the pictures; without, as far as the ZOIs reach and as much again beside them as on the left."""
+def _size(job: ExportJob, pictures: Pictures | None) -> tuple[int, int]:
+    """Of the pictures; without pictures, the extent of the ZOIs with equal margins."""
     if pictures is not None:
         return pictures.info.width, pictures.info.height
     grid = job.strain.grid

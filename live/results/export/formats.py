@@ -1,4 +1,4 @@
-"""The formats there are, and what each asks for."""
+"""The formats of an export, and the export itself."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 from acquire.errors import ConfigError
 from live.pipeline.screen import Screen
 from live.results.export.films import write_gif, write_mp4, write_png
-from live.results.export.job import USUAL, ExportOptions, Job, chosen_fields, chosen_rows
+from live.results.export.job import USUAL, ExportJob, ExportOptions, chosen_fields, chosen_rows
 from live.results.export.r3xa import write_r3xa
 from live.results.export.tables import write_csv, write_mat, write_npz
 from live.results.export.tiff import write_tiff
@@ -17,7 +17,7 @@ from live.results.export.vtk import write_vtk
 from live.results.quantities import Display
 from live.results.run_folder import RunFolder
 
-PLACE = "export"  # in the folder of the run
+FOLDER = "export"  # in the folder of the run
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,12 +29,12 @@ class ExportFormat:
     write : callable
         Takes the job and the path.
     name : str
-        Of the file or folder where none is given; {map} stands for the one map.
+        Of the file or folder by default; {map} is the name of the one map.
     one_map : bool
-        Takes a single map, the strain along the load where none is named.
+        Takes a single map, by default the strain along the load.
     """
 
-    write: Callable[[Job, Path], None]
+    write: Callable[[ExportJob, Path], None]
     name: str
     one_map: bool = False
 
@@ -54,7 +54,7 @@ FORMATS = {
 
 @dataclass(frozen=True, slots=True)
 class ExportRequest:
-    """What is asked for.
+    """What to export.
 
     Attributes
     ----------
@@ -80,12 +80,12 @@ class ExportRequest:
 
 
 def export(run: RunFolder, request: ExportRequest, screen: Screen) -> Path:
-    """Write ``run`` as asked; returns the file or folder.
+    """Export ``run``; returns the new file or folder.
 
     Raises
     ------
     ConfigError
-        No such map, no instant in the range, a name that is taken, a library that is missing.
+        No such map, no instant in the range, a file that exists, a library that is missing.
     DataError
         The run's files cannot be read, or the new ones not be written.
     """
@@ -97,8 +97,8 @@ def export(run: RunFolder, request: ExportRequest, screen: Screen) -> Path:
     if not fields:
         raise ConfigError(f"{run.strain.path}: holds none of the usual maps; name some with --fields")
     rows = chosen_rows(run.strain, request.start_s, request.end_s)
-    job = Job(run, fields, rows, request.display, screen, request.options)
-    path = request.out or run.path / PLACE / _name(kind, request, fields[0])
+    job = ExportJob(run, fields, rows, request.display, screen, request.options)
+    path = request.out or run.path / FOLDER / _name(kind, request, fields[0])
     kind.write(job, path)
     return path
 

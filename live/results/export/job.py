@@ -1,4 +1,4 @@
-"""What is exported: which run, which maps at which instants, in which units."""
+"""An export: the run, the maps and instants, the units, and the notes in the files."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from live.results.reader import Strain
 from live.results.run_folder import RunFolder
 
 USUAL = ("u", "v", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy", "status")
-_SAME_S = 1e-6  # times that were typed are rounded
-QUIET_S = 2.0  # what takes no longer shows no progress
+_ROUNDING_S = 1e-6  # of times that were typed
+QUIET_S = 2.0  # a shorter export shows no progress
 
 _MEASURES = {
     "engineering": "engineering strain: elongation over length of lines along x and y; exy half the shear angle",
@@ -31,7 +31,7 @@ _MEASURES = {
 
 @dataclass(frozen=True, slots=True)
 class ExportOptions:
-    """What only some formats ask for.
+    """Options of some formats.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class ExportOptions:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Job:
+class ExportJob:
     """An export.
 
     Attributes
@@ -64,7 +64,7 @@ class Job:
         Instants, ascending.
     display : Display
     screen : Screen
-        Told how far it is.
+        Shows the progress.
     options : ExportOptions
     """
 
@@ -81,11 +81,11 @@ class Job:
         return self.run.strain
 
     def map(self, name: str, row: int) -> NDArray[Any]:
-        """One map as it is exported, (R, C)."""
+        """One map in the units of the export, (R, C)."""
         return self.display.shown(name, self.strain.maps(name, row))
 
     def column(self, name: str) -> NDArray[Any]:
-        """One number an instant as it is exported, (number of rows,); a column of ``Strain.values``."""
+        """A column of ``Strain.values`` in the units of the export, (number of rows,)."""
         values = self.display.shown(name, self.strain.values[name][list(self.rows)])
         return -values if self.display.y_up and self._is_shear(name) else values
 
@@ -95,7 +95,7 @@ class Job:
         return gauge is not None and gauge.described.get("value") in ("exy", "gamma_xy")
 
     def steps(self, now: Callable[[], float] = time.monotonic) -> Iterator[tuple[int, int]]:
-        """(k, row) for each instant; tells how far it is once that has taken two seconds."""
+        """(k, row) for each instant; shows the progress after two seconds."""
         began = now()
         for k, row in enumerate(self.rows):
             spent = now() - began
@@ -105,7 +105,7 @@ class Job:
             yield k, row
 
     def notes(self) -> list[str]:
-        """What a reader of the file must know: origin, conventions, statuses."""
+        """Notes for the reader of the file: origin, conventions, statuses."""
         strain = self.strain
         version = strain.versions.get("phasedic", "")
         lines = [
@@ -119,19 +119,19 @@ class Job:
         return lines
 
 
-def chosen_fields(strain: Strain, asked: str | None, usual: Sequence[str] = USUAL) -> tuple[str, ...]:
-    """Names of maps: ``usual`` where nothing is asked for, all for "all", else those between commas.
+def chosen_fields(strain: Strain, requested: str | None, usual: Sequence[str] = USUAL) -> tuple[str, ...]:
+    """Names of maps: ``usual`` for None, all for "all", else the names between commas.
 
     Raises
     ------
     ConfigError
-        One that is not there.
+        There is no such map.
     """
-    if asked is None:
+    if requested is None:
         return tuple(name for name in usual if name in strain.names)
-    if asked == "all":
+    if requested == "all":
         return strain.names
-    names = tuple(dict.fromkeys(word.strip() for word in asked.split(",")))
+    names = tuple(dict.fromkeys(word.strip() for word in requested.split(",")))
     for name in names:
         if name not in strain.names:
             raise ConfigError(f"--fields {name}: there is no such map; there are {', '.join(strain.names)}")
@@ -148,11 +148,11 @@ def chosen_rows(strain: Strain, start_s: float | None, end_s: float | None) -> t
     """
     t = strain.time_s
     low, high = -np.inf if start_s is None else start_s, np.inf if end_s is None else end_s
-    rows = tuple(int(row) for row in np.flatnonzero((t >= low - _SAME_S) & (t <= high + _SAME_S)))
+    rows = tuple(int(row) for row in np.flatnonzero((t >= low - _ROUNDING_S) & (t <= high + _ROUNDING_S)))
     if rows:
         return rows
     if not len(t):
         raise ConfigError(f"{strain.path}: holds no measurement, there is nothing to export")
     raise ConfigError(
-        f"--from, --until: no measurement between {low:g} and {high:g} s; they reach from {t[0]:.6g} to {t[-1]:.6g} s"
+        f"--from, --until: no measurement between {low:g} and {high:g} s; the test has {t[0]:.6g} to {t[-1]:.6g} s"
     )

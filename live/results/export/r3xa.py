@@ -1,8 +1,8 @@
 """``r3xa``: a folder with the test described by R3XA metadata and the files that it names.
 
-R3XA (photomechanics) is JSON that says which settings, data sources and data sets belong to an experiment;
-version 2026.9.24 of its schema. What was not recorded is left out. The tables are plain CSV, without lines
-of comment, since R3XA counts rows.
+R3XA (photomechanics) is JSON with the settings, data sources and data sets of an experiment; this is version
+2026.9.24 of its schema. What was not recorded is left out. The tables are plain CSV without comments, since
+R3XA counts rows.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from pathlib import Path
 from typing import Any
 
 from live.results.export.atomic_file import new_folder
-from live.results.export.job import Job
+from live.results.export.job import ExportJob
 from live.results.export.tables import field_table, load_table, means
 from live.results.run_folder import RunFolder
 
 VERSION = "2026.9.24"
-_WHERE = "fields"
+_FIELDS = "fields"
 Json = dict[str, Any]
 
 
-def write_r3xa(job: Job, path: Path) -> None:
+def write_r3xa(job: ExportJob, path: Path) -> None:
     """``r3xa.json``, ``means.csv``, ``load.csv`` and a table an instant in ``fields``."""
     with new_folder(path) as folder:
         with (folder / "means.csv").open("x", encoding="utf-8", newline="\n") as file:
@@ -31,15 +31,15 @@ def write_r3xa(job: Job, path: Path) -> None:
         if samples:
             with (folder / "load.csv").open("x", encoding="utf-8", newline="\n") as file:
                 load_table(job.run, samples, file)
-        (folder / _WHERE).mkdir()
+        (folder / _FIELDS).mkdir()
         for k, row in job.steps():
-            with (folder / _WHERE / _table(k)).open("x", encoding="utf-8", newline="\n") as file:
+            with (folder / _FIELDS / _table(k)).open("x", encoding="utf-8", newline="\n") as file:
                 field_table(job, row, file)
         text = json.dumps(describe(job, path, bool(samples)), indent=1, ensure_ascii=False)
         (folder / "r3xa.json").write_text(text + "\n", encoding="utf-8")
 
 
-def describe(job: Job, path: Path, loaded: bool) -> Json:
+def describe(job: ExportJob, path: Path, loaded: bool) -> Json:
     """The metadata, paths relative to the folder ``path``."""
     run = job.run
     about = run.strain.metadata
@@ -115,7 +115,7 @@ def _load_cell(run: RunFolder) -> Json:
     return found
 
 
-def _displacements(job: Job) -> Json:
+def _displacements(job: ExportJob) -> Json:
     unit, grid = job.display.unit("u"), job.strain.grid
     return _source(
         "dic_measurement", "dic", "phase-DIC", "surface", [_unit(unit, title=n) for n in ("u", "v")]
@@ -131,7 +131,7 @@ def _displacements(job: Job) -> Json:
     }
 
 
-def _strains(job: Job) -> Json:
+def _strains(job: ExportJob) -> Json:
     unit, grid = job.display.unit("exx") or "1", job.strain.grid
     units = [_unit(unit, title=name) for name in ("exx", "eyy", "exy")]
     return _source("strain_computation", "strain", "strain from the fit of each ZOI", "surface", units) | {
@@ -143,7 +143,7 @@ def _strains(job: Job) -> Json:
 
 
 def _recordings(run: RunFolder, path: Path) -> list[Json]:
-    """The HDF5 files, where they are."""
+    """The HDF5 files, by their paths."""
     images = {
         "id": "set-images", "kind": "data_sets/generic", "title": "pictures and load as recorded",
         "data_type": "application/x-hdf5", "parent_data_sources": ["src-camera"],
@@ -177,7 +177,7 @@ def _load_set() -> Json:
     }  # fmt: skip
 
 
-def _mean_set(job: Job) -> Json:
+def _mean_set(job: ExportJob) -> Json:
     return {
         "id": "set-means", "kind": "data_sets/file", "title": "means over the valid ZOIs", "path": ".",
         "data_type": "numbers", "parent_data_sources": ["src-strain"], "time_reference": _unit("s", 0.0),
@@ -185,9 +185,9 @@ def _mean_set(job: Job) -> Json:
     }  # fmt: skip
 
 
-def _field_set(job: Job) -> Json:
+def _field_set(job: ExportJob) -> Json:
     return {
-        "id": "set-fields", "kind": "data_sets/list", "title": "maps, a table an instant", "path": _WHERE,
+        "id": "set-fields", "kind": "data_sets/list", "title": "maps, a table an instant", "path": _FIELDS,
         "data_type": "text/csv", "parent_data_sources": ["src-dic", "src-strain"],
         "time_reference": _unit("s", 0.0),
         "timestamps": [float(job.strain.time_s[row]) for row in job.rows],

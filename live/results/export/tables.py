@@ -1,10 +1,8 @@
-"""Tables as text: ``csv`` with one line a ZOI and instant, one line an instant, or the means.
+"""Maps and means as tables (``csv``) and arrays: ``npz`` (numpy), ``mat`` (MATLAB, Octave).
 
-The first lines begin with ``#`` and say what stands in the columns (``pandas.read_csv(..., comment="#")``,
-``numpy.genfromtxt`` and MATLAB's ``readtable(..., CommentStyle="#")`` pass over them); then come the
-names, with their units, and the numbers.
-
-Arrays for other programs: ``npz`` (numpy), ``mat`` (MATLAB, Octave), and xarray in memory.
+A table has one line a ZOI and instant, or one line an instant. Its first lines begin with ``#`` and define the
+columns (``pandas.read_csv(..., comment="#")``, ``numpy.genfromtxt`` and MATLAB's ``readtable(...,
+CommentStyle="#")`` skip them); then come the names with their units, and the numbers.
 """
 
 from __future__ import annotations
@@ -21,17 +19,17 @@ from numpy.typing import NDArray
 from acquire.errors import DataError
 from acquire.load_sample import LoadSample
 from live.results.export.atomic_file import new_file, new_folder
-from live.results.export.job import Job
+from live.results.export.job import ExportJob
 from live.results.quantities import mean_name, quantity_of
 from live.results.run_folder import RunFolder
 
 FIRST = ("time_s", "force_N", "stress_Pa", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy")
 _OF_AN_INSTANT = ("time_s", "force_N")
-_PLACE = ("row", "column", "x", "y")
+_POSITION = ("row", "column", "x", "y")
 _AVERAGED = ("u_px", "v_px", "exx", "eyy", "exy")
 
 
-def write_csv(job: Job, path: Path) -> None:
+def write_csv(job: ExportJob, path: Path) -> None:
     """A table in the layout of ``job.options``; the wide one is a folder with a file a map."""
     if job.options.layout == "wide":
         with new_folder(path) as folder:
@@ -44,8 +42,8 @@ def write_csv(job: Job, path: Path) -> None:
             _long(job, file)
 
 
-def means(job: Job, file: TextIO, notes: bool = True) -> None:
-    """One line an instant: the means over the valid ZOIs, and what else is known of it."""
+def means(job: ExportJob, file: TextIO, notes: bool = True) -> None:
+    """One line an instant: the means over the valid ZOIs, and the other columns of the results."""
     values = job.strain.values
     names = [name for name in FIRST if name in values]
     names += [name for name in values if name not in names]
@@ -55,27 +53,27 @@ def means(job: Job, file: TextIO, notes: bool = True) -> None:
     _rows(file, [job.column(name) for name in names])
 
 
-def _mean_words(job: Job, name: str) -> str:
+def _mean_words(job: ExportJob, name: str) -> str:
     if name in _AVERAGED:
         return job.display.definition(name) + ", mean over the valid ZOIs"
     if "gauge_" in name:
         return job.display.definition(name) + _gauge_words(job, name)
     if name.startswith("sigma_"):
-        return f"{job.display.definition(name)}, of that mean; the overlap of ZOIs is taken into account"
+        return f"{job.display.definition(name)}, of that mean, with the overlap of ZOIs"
     return job.display.definition(name)
 
 
-def _gauge_words(job: Job, name: str) -> str:
+def _gauge_words(job: ExportJob, name: str) -> str:
     gauge = job.run.gauges.get(name.removeprefix("gauge_"))
-    said = gauge.described if gauge is not None else {}
-    known = (f"{key} {value}" for key, value in said.items())
-    return f" ({', '.join(known)}; places in px, y down)" if said else ""
+    described = gauge.described if gauge is not None else {}
+    keys = (f"{key} {value}" for key, value in described.items())
+    return f" ({', '.join(keys)}; positions in px, y down)" if described else ""
 
 
-def field_table(job: Job, number: int, file: TextIO) -> None:
+def field_table(job: ExportJob, number: int, file: TextIO) -> None:
     """One instant, a line a ZOI, no notes."""
-    _line(file, [job.display.column(name) for name in (*_PLACE, *job.fields)])
-    _rows(file, [*_places(job), *_values(job, number)])
+    _line(file, [job.display.column(name) for name in (*_POSITION, *job.fields)])
+    _rows(file, [*_positions(job), *_values(job, number)])
 
 
 def load_table(run: RunFolder, samples: Sequence[LoadSample], file: TextIO) -> None:
@@ -84,30 +82,30 @@ def load_table(run: RunFolder, samples: Sequence[LoadSample], file: TextIO) -> N
     _rows(file, [[s.t - run.start_monotonic for s in samples], [s.force for s in samples]])
 
 
-def _long(job: Job, file: TextIO) -> None:
-    heads = ["instant", *_OF_AN_INSTANT, *_PLACE, *job.fields]
+def _long(job: ExportJob, file: TextIO) -> None:
+    heads = ["instant", *_OF_AN_INSTANT, *_POSITION, *job.fields]
     _comment(file, [*job.notes(), *(job.display.definition(name) for name in heads)])
     _line(file, [job.display.column(name) for name in heads])
-    places = _places(job)
+    places = _positions(job)
     for _, number in job.steps():
         same = [np.full(len(places[0]), value) for value in (number, *_time_step(job, number))]
         _rows(file, [*same, *places, *_values(job, number)])
 
 
-def _places(job: Job) -> list[NDArray[Any]]:
-    """Row, column, x and y of each ZOI that was asked for, (N,) each."""
+def _positions(job: ExportJob) -> list[NDArray[Any]]:
+    """Row, column, x and y of each active ZOI, (N,) each."""
     grid = job.strain.grid
     rows, columns = np.nonzero(grid.active)
     return [rows, columns, job.display.x(grid)[columns], job.display.y(grid)[rows]]
 
 
-def _values(job: Job, number: int) -> list[NDArray[Any]]:
+def _values(job: ExportJob, number: int) -> list[NDArray[Any]]:
     return [job.map(name, number)[job.strain.grid.active] for name in job.fields]
 
 
-def _wide(job: Job, folder: Path) -> None:
+def _wide(job: ExportJob, folder: Path) -> None:
     grid, display = job.strain.grid, job.display
-    _, _, x, y = _places(job)
+    _, _, x, y = _positions(job)
     unit = display.unit("x")
     heads = [*_OF_AN_INSTANT, *(f"x{a:.6g}_y{b:.6g}" for a, b in zip(x, y, strict=True))]
     for name in job.fields:
@@ -124,7 +122,7 @@ def _wide(job: Job, folder: Path) -> None:
                 )
 
 
-def _time_step(job: Job, number: int) -> list[float]:
+def _time_step(job: ExportJob, number: int) -> list[float]:
     return [float(job.strain.values[name][number]) for name in _OF_AN_INSTANT]
 
 
@@ -137,7 +135,7 @@ def _line(file: TextIO, words: Sequence[str]) -> None:
 
 
 def _rows(file: TextIO, columns: Sequence[NDArray[Any] | Sequence[Any]]) -> None:
-    """Columns of equal length as lines; enough digits to give single precision back."""
+    """Columns of equal length as lines, with the digits of single precision."""
     arrays = [np.asarray(column) for column in columns]
     form = ",".join(_form(array) for array in arrays) + "\n"
     file.writelines(form % values for values in zip(*(array.tolist() for array in arrays), strict=True))
@@ -149,27 +147,27 @@ def _form(array: NDArray[Any]) -> str:
     return "%.9g" if array.dtype == np.float32 else "%.10g"
 
 
-def write_npz(job: Job, path: Path) -> None:
-    """Maps (T, R, C) and the numbers of each instant (T,), ``x`` (C,), ``y`` (R,); ``about`` is JSON text."""
+def write_npz(job: ExportJob, path: Path) -> None:
+    """Maps (T, R, C), columns (T,), ``x`` (C,), ``y`` (R,); ``about`` is JSON text."""
     with new_file(path) as part, zipfile.ZipFile(part, "x", zipfile.ZIP_DEFLATED) as archive:
-        for name, values in _small(job).items():
+        for name, values in _columns_and_axes(job).items():
             _put(archive, name, values)
         _put(archive, "about", np.array(json.dumps(_about(job), ensure_ascii=False)))
         for name in job.fields:
             _put(archive, name, _stack(job, name))
 
 
-def write_mat(job: Job, path: Path) -> None:
-    """MATLAB 5: maps are (R, C, T), ``mean`` holds the numbers of each instant (T, 1), ``about`` the words."""
+def write_mat(job: ExportJob, path: Path) -> None:
+    """MATLAB 5: maps are (R, C, T), ``mean`` holds the columns (T, 1), ``about`` the definitions."""
     from scipy.io import savemat
     from scipy.io.matlab import MatWriteError
 
-    small, about = _small(job), _about(job)
+    columns, about = _columns_and_axes(job), _about(job)
     about["notes"] = np.array(about["notes"], object)  # a cell array
-    places = {name: small.pop(name) for name in ("x", "y", "active")}
+    places = {name: columns.pop(name) for name in ("x", "y", "active")}
     with new_file(path) as part, part.open("xb") as file:
         try:
-            savemat(file, {**places, "mean": {k: v[:, None] for k, v in small.items()}, "about": about})  # type: ignore[arg-type]
+            savemat(file, {**places, "mean": {k: v[:, None] for k, v in columns.items()}, "about": about})  # type: ignore[arg-type]
             for name in job.fields:
                 stack = {name: np.moveaxis(_stack(job, name), 0, -1)}
                 savemat(file, stack, do_compression=True)  # type: ignore[arg-type]
@@ -179,14 +177,14 @@ def write_mat(job: Job, path: Path) -> None:
             ) from error
 
 
-def _small(job: Job) -> dict[str, NDArray[Any]]:
+def _columns_and_axes(job: ExportJob) -> dict[str, NDArray[Any]]:
     """Everything but the maps."""
     grid = job.strain.grid
     places = {"x": job.display.x(grid), "y": job.display.y(grid), "active": grid.active}
     return {**places, **{mean_name(name): job.column(name) for name in job.strain.values}}
 
 
-def _about(job: Job) -> dict[str, Any]:
+def _about(job: ExportJob) -> dict[str, Any]:
     names = {mean_name(name): name for name in job.strain.values}
     units = {name: job.display.unit(name) or "1" for name in ("x", "y", *job.fields)}
     units |= {shown: job.display.unit(name) or "1" for shown, name in names.items()}
@@ -195,7 +193,7 @@ def _about(job: Job) -> dict[str, Any]:
     return {"notes": job.notes(), "units": units, "definitions": words}
 
 
-def _stack(job: Job, name: str) -> NDArray[Any]:
+def _stack(job: ExportJob, name: str) -> NDArray[Any]:
     """(T, R, C) of the chosen instants."""
     return np.stack([job.map(name, row) for _, row in job.steps()])
 

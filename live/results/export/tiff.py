@@ -1,7 +1,7 @@
 """``tiff``: one map at all instants as a stack of 32-bit floats, with the units that ImageJ reads.
 
-tifffile writes ImageJ's kind of TIFF: its description has the units and our notes, its private tags a label for
-each slice: time and force. Any other reader sees plain pages; a ZOI without a value is NaN.
+tifffile writes the TIFF of ImageJ: units and notes in its description, and time and force as the label of each slice
+in private tags. For other readers the pages are plain; a ZOI without a value is NaN.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
 from live.results.export.atomic_file import new_file
-from live.results.export.job import Job
+from live.results.export.job import ExportJob
 
-_MOST = 2**32 - 2**20
+_MAX_BYTES = 2**32 - 2**20
 
 
-def write_tiff(job: Job, path: Path) -> None:
+def write_tiff(job: ExportJob, path: Path) -> None:
     """The stack of ``job.fields[0]``.
 
     Raises
@@ -35,7 +35,7 @@ def write_tiff(job: Job, path: Path) -> None:
     (name,) = job.fields
     height, width = job.strain.grid.shape
     n = len(job.rows)
-    if n * (4 * height * width + 256) > _MOST:
+    if n * (4 * height * width + 256) > _MAX_BYTES:
         raise ConfigError(
             f"--to tiff: {n} maps of {width} x {height} are more than 4 GB; give --from and --until"
         )
@@ -52,13 +52,13 @@ def write_tiff(job: Job, path: Path) -> None:
         )
 
 
-def _maps(job: Job, name: str) -> Iterator[NDArray[np.float32]]:
+def _maps(job: ExportJob, name: str) -> Iterator[NDArray[np.float32]]:
     for _, row in job.steps():
         yield np.asarray(job.map(name, row), np.float32)
 
 
-def _metadata(job: Job, name: str) -> dict[str, Any]:
-    """What ImageJ reads, then our notes."""
+def _metadata(job: ExportJob, name: str) -> dict[str, Any]:
+    """The keys that ImageJ reads, then the notes."""
     unit = job.display.unit("x").replace("px", "pixel")
     times = job.strain.time_s[list(job.rows)]
     interval = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
@@ -74,11 +74,11 @@ def _metadata(job: Job, name: str) -> dict[str, Any]:
 
 
 def _plain(text: str) -> str:
-    """In one line of ASCII, as the description of a TIFF has to be."""
+    """One line of ASCII, which the description of a TIFF must be."""
     return " ".join(text.split()).encode("ascii", "replace").decode()
 
 
-def _labels(job: Job) -> list[str]:
+def _labels(job: ExportJob) -> list[str]:
     forces = job.strain.values["force_N"]
     return [
         f"{job.strain.time_s[row]:.4f} s" + (f", {forces[row]:.2f} N" if np.isfinite(forces[row]) else "")

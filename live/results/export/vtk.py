@@ -1,8 +1,8 @@
-"""``vtk``: a ``.vti`` an instant and a ``.pvd`` with their times, for ParaView and whatever reads VTK.
+"""``vtk``: a ``.vti`` an instant and a ``.pvd`` with their times, for ParaView and other readers of VTK.
 
 XML image data with appended raw data (VTK File Formats, https://docs.vtk.org/en/latest/vtk_file_formats/):
 the points are the centres of the ZOIs. Values are arrays of the points; ``displacement`` is the vector to warp
-by; time and force stand in the field data. VTK's y axis points up: without ``--y-up`` a map stands on its head.
+by; time and force are in the field data. VTK's y axis points up: without ``--y-up`` a map is upside down.
 """
 
 from __future__ import annotations
@@ -17,18 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from live.results.export.atomic_file import new_folder
-from live.results.export.job import Job
+from live.results.export.job import ExportJob
 
 _TYPES = {"f4": "Float32", "f8": "Float64", "u1": "UInt8", "i8": "Int64"}
 _ORDER = "LittleEndian" if sys.byteorder == "little" else "BigEndian"
-_HEAD = (
-    '<?xml version="1.0"?>\n<VTKFile type="{}" version="1.0" byte_order="'
-    + _ORDER
-    + '" header_type="UInt64">\n'
-)
+_HEAD = '<?xml version="1.0"?>\n<VTKFile type="{}" version="1.0" byte_order="{}" header_type="UInt64">\n'
 
 
-def write_vtk(job: Job, path: Path) -> None:
+def write_vtk(job: ExportJob, path: Path) -> None:
     """A folder with ``strain.pvd`` and ``strain_00000.vti`` and so on."""
     with new_folder(path) as folder:
         lines = []
@@ -37,13 +33,13 @@ def write_vtk(job: Job, path: Path) -> None:
             (folder / name).write_bytes(image(job, row))
             time = float(job.strain.time_s[row])
             lines.append(f'<DataSet timestep="{time:.10g}" part="0" file={quoteattr(name)}/>\n')
-        head = _HEAD.format("Collection") + _comment(job)
+        head = _HEAD.format("Collection", _ORDER) + _comment(job)
         (folder / "strain.pvd").write_text(
             f"{head}<Collection>\n{''.join(lines)}</Collection>\n</VTKFile>\n", encoding="utf-8"
         )
 
 
-def image(job: Job, row: int) -> bytes:
+def image(job: ExportJob, row: int) -> bytes:
     """The file of one instant."""
     grid, display = job.strain.grid, job.display
     # VTK counts rows upwards: with y up, the last row of ZOIs comes first.
@@ -57,7 +53,7 @@ def image(job: Job, row: int) -> bytes:
     facts = "".join(appended.add(name, np.array([value]), facts=True) for name, value in known.items())
     points = "".join(appended.add(name, data) for name, data in _points(job, row).items())
     text = (
-        f"{_HEAD.format('ImageData')}{_comment(job)}"
+        f"{_HEAD.format('ImageData', _ORDER)}{_comment(job)}"
         f'<ImageData WholeExtent="{extent}" Origin="{origin}" Spacing="{step} {step} 1">\n'
         f"<FieldData>\n{facts}</FieldData>\n"
         f'<Piece Extent="{extent}">\n<PointData>\n{points}</PointData>\n<CellData/>\n</Piece>\n</ImageData>\n'
@@ -66,7 +62,7 @@ def image(job: Job, row: int) -> bytes:
     return text.encode() + appended.data() + b"\n</AppendedData>\n</VTKFile>\n"
 
 
-def _points(job: Job, row: int) -> Mapping[str, NDArray[Any]]:
+def _points(job: ExportJob, row: int) -> Mapping[str, NDArray[Any]]:
     flip = slice(None, None, -1 if job.display.y_up else 1)
     found = {job.display.column(name): job.map(name, row)[flip].ravel() for name in job.fields}
     u, v = (job.map(name, row)[flip].ravel() for name in ("u", "v"))
@@ -75,7 +71,7 @@ def _points(job: Job, row: int) -> Mapping[str, NDArray[Any]]:
 
 
 class _Appended:
-    """The raw block at the end of a file, and the offsets into it."""
+    """The raw data at the end of a file, and the offsets into it."""
 
     def __init__(self) -> None:
         self._parts: list[bytes] = []
@@ -97,10 +93,10 @@ class _Appended:
         return element
 
     def data(self) -> bytes:
-        """All of it."""
+        """The raw data."""
         return b"".join(self._parts)
 
 
-def _comment(job: Job) -> str:
+def _comment(job: ExportJob) -> str:
     lines = [*job.notes(), *(job.display.definition(name) for name in job.fields)]
     return "<!--\n" + escape("\n".join(lines)).replace("--", "- -") + "\n-->\n"

@@ -1,3 +1,3 @@
-"""Strain maps as pictures: one ``scale`` and range, ``colours``, ``painting``; ``field_maps`` for displays,
-``map`` for a file.
+"""Strain maps as pictures: ``colours``, ``scale`` (range and unit), ``painting``; ``field_maps`` during a test,
+``map`` as a file.
 """

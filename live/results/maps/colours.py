@@ -1,10 +1,6 @@
-"""Numbers to colours: a diverging table, round numbers, ticks and units.
+"""Numbers to colours: a diverging table, round numbers, ticks and units; numpy only.
 
-numpy only. Blue is compression, red is tension, white is zero, transparent is not measured.
-
-Filters for pictures of maps, on request; measured values are never touched, and titles name the filter.
-
-The paper filters its strain maps "for cosmetic reasons": salt-and-pepper (median), then a Gaussian.
+Blue is compression, red is tension, white is zero, transparent is not measured.
 """
 
 from __future__ import annotations
@@ -32,7 +28,7 @@ MICROSTRAIN, PERCENT = Unit("µm/m", 1e6), Unit("%", 100.0)
 
 
 def unit_for(largest: float) -> Unit:
-    """The unit in which ``largest`` (a strain) reads well: percent from 2 % on."""
+    """The unit for strains up to ``largest``: percent from 2 % on, else µm/m."""
     return PERCENT if largest >= 0.02 else MICROSTRAIN
 
 
@@ -122,7 +118,7 @@ def ramp(height: int, width: int) -> NDArray[np.uint8]:
 
 
 def nice_above(value: float) -> float:
-    """The smallest number that reads well (1, 1.2, 1.5, 2 ... times a power of ten) >= value > 0."""
+    """The smallest round number (1, 1.2, 1.5, 2 ... times a power of ten) >= value > 0."""
     decade = 10.0 ** math.floor(math.log10(value))
     for step in (*_NICE, 10.0):
         if step * decade >= value * (1 - 1e-9):
@@ -143,40 +139,3 @@ def number(value: float) -> str:
     """A number for a tick: as short as it can be, thousands apart, a true minus sign."""
     text = f"{abs(value):,.6g}".replace(",", "\u202f") if abs(value) < 1e7 else f"{abs(value):.3g}"
     return f"−{text}" if value < 0 else text
-
-
-Floats = NDArray[np.float64]
-PAPER_LOW_PASS = 9.0
-
-
-def for_display(values: Floats, step: int, low_pass_px: float = PAPER_LOW_PASS, median: int = 3) -> Floats:
-    """A map as the paper shows it: salt-and-pepper (median) filter, then a Gaussian low-pass.
-
-    Parameters
-    ----------
-    values : (R, C), NaN where not measured; stays NaN there
-    step : int, px
-        Between the points of the map.
-    low_pass_px : float, px
-        sigma; 0: none.
-    median : int
-        Side of the median filter, points; 1: none.
-    """
-    from scipy.ndimage import gaussian_filter, generic_filter
-
-    valid = np.isfinite(values)
-    out = values.copy()
-    if median > 1:
-        out = np.where(
-            valid, generic_filter(np.where(valid, values, np.nan), _nanmedian, median, mode="nearest"), np.nan
-        )
-    if low_pass_px > 0:
-        weight = gaussian_filter(valid.astype(float), low_pass_px / step, mode="nearest")
-        total = gaussian_filter(np.where(valid, out, 0.0), low_pass_px / step, mode="nearest")
-        out = np.where(valid, total / np.maximum(weight, 1e-9), np.nan)
-    return np.asarray(out)
-
-
-def _nanmedian(values: Floats) -> float:
-    good = values[np.isfinite(values)]
-    return float(np.median(good)) if good.size else float("nan")

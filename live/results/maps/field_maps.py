@@ -1,4 +1,4 @@
-"""A field as maps in colours while it is measured: strains, principal strains, displacements, sigma, status."""
+"""The maps of a field in colours during a test: strains, principal strains, displacements, sigma, status."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from live.results.maps.scale import (
     ColourScale,
     Kind,
     StatusCount,
-    kind_of,
+    range_kind,
     status_colours,
     status_legend,
 )
@@ -28,15 +28,15 @@ FIELD_MAPS = ("exx", "eyy", "exy", *_PRINCIPAL, "u", "v", "sigma", "residual", "
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Painted:
-    """One map.
+    """A map in colours.
 
     Attributes
     ----------
     rgba : (R, C, 4) uint8
     scale : ColourScale or None
-        Of the colours; None where they have no order (status).
+        None for the map of statuses.
     legend : tuple of StatusCount
-        What the colours mean where they have no order.
+        Of the map of statuses.
     """
 
     rgba: NDArray[np.uint8]
@@ -54,7 +54,7 @@ class FieldMaps:
     fixed : float or None
         Range of the strains, -fixed to fixed.
     about_zero : bool
-        Colours of strains lie about zero; else over the values there are.
+        The range of strains is about zero; else over the values.
     alpha : int
         Opacity, 0..255.
     """
@@ -70,7 +70,7 @@ class FieldMaps:
         self._along, self._alpha = f"e{axis * 2}", alpha
         self._ranges: dict[str, AutoRange] = {}
         for name in FIELD_MAPS:
-            kind: Kind = kind_of(name)
+            kind: Kind = range_kind(name)
             strain = kind == "about zero"
             if strain and not about_zero and fixed is None:
                 kind = "free"

@@ -1,7 +1,7 @@
-"""A map of the results over the reference picture, to put into a report.
+"""A map of the results over the reference picture, as a file.
 
-Values are drawn as they were measured, one square a ZOI; filters and deconvolution are options, and
-the title names them. A ZOI that was rejected stays transparent, and the field "status" shows why.
+Values are drawn as measured, one square a ZOI. Filters and deconvolution are options for the picture only, and
+the title names them. A rejected ZOI is transparent; the field "status" shows why.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
 from analysis.evaluate import deconvolved, effect
 from analysis.field import ZoiGrid
-from live.results.maps.colours import for_display
 from live.results.maps.painting import Image, Painter
-from live.results.maps.scale import AutoRange, ColourScale, kind_of
+from live.results.maps.scale import AutoRange, ColourScale, range_kind
 from live.results.reader import Strain
 
 DISPLACEMENTS = ("u", "v")
 MAX_MEDIAN, MAX_STEPS = 51, 100
 FORMATS = (".png", ".jpg")
+PAPER_LOW_PASS = 9.0  # px; the paper filters its maps "for cosmetic reasons": median, then Gaussian
 
 
 @dataclass(frozen=True, slots=True)
 class MapRequest:
-    """What to draw.
+    """The map to draw.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class MapRequest:
     low_pass_px : float, px
         Sigma of a Gaussian filter; 0 for none.
     deconvolution : int
-        Steps that take off the window's blur (``analysis.evaluate.deconvolution``); 0 for none.
+        Steps that remove the window's blur (``analysis.evaluate.deconvolution``); 0 for none.
     """
 
     field: str
@@ -59,7 +59,7 @@ class MapRequest:
     deconvolution: int = 0
 
     def check(self, grid: ZoiGrid) -> None:
-        """Raises ConfigError where a number is impossible, or beyond what makes sense on ``grid``."""
+        """Raise ConfigError where a number is impossible, or out of range for ``grid``."""
         extent = max(grid.shape) * grid.step
         limit, low_pass, odd = self.limit, self.low_pass_px, self.median in range(1, MAX_MEDIAN + 1, 2)
         for what, value, well, allowed in (
@@ -72,7 +72,7 @@ class MapRequest:
                 raise ConfigError(f"a {what} of {value} is not possible; allowed: {allowed}")
 
     def treatment(self, grid: ZoiGrid) -> str:
-        """What was done to the map before it was drawn, in words; "" for nothing."""
+        """The filters applied to the map, as text; "" for none."""
         words = []
         if self.deconvolution:
             done = effect(grid, self.deconvolution)
@@ -83,7 +83,7 @@ class MapRequest:
         return ", ".join(words)
 
 
-def draw(strain: Strain, picture: MapRequest, background: NDArray[Any] | None) -> Image:
+def draw(strain: Strain, request: MapRequest, background: NDArray[Any] | None) -> Image:
     """The map over ``background`` (H, W) with title, axes and colour bar, (h, w, 3) uint8: blue, green, red.
 
     Raises
@@ -91,23 +91,58 @@ def draw(strain: Strain, picture: MapRequest, background: NDArray[Any] | None) -
     DataError
         There is no such map or row.
     ConfigError
-        ``picture`` asks for what is impossible.
+        ``request`` is impossible.
     """
-    picture.check(strain.grid)
-    name, row, grid = picture.field, picture.row, strain.grid
-    values = _treated(strain, picture)
+    request.check(strain.grid)
+    name, row, grid = request.field, request.row, strain.grid
+    values = _treated(strain, request)
     scale = None
     if name != "status":
-        span = AutoRange(kind_of(name), picture.limit).update(values, _sigma(strain, name, row))
+        span = AutoRange(range_kind(name), request.limit).update(values, _sigma(strain, name, row))
         scale = ColourScale.of(name, span)
     size = (2 * grid.roi.x + grid.roi.width, 2 * grid.roi.y + grid.roi.height)
     if background is not None:
         size = background.shape[1], background.shape[0]
     painter = Painter(strain, name, scale, size)
     painted = painter.over(painter.picture(background), row, values, moved=False)
-    treatment = picture.treatment(grid)
-    title = picture.title or f"{name}, {strain.time_s[row]:.2f} s, ZOI {grid.size} px"
+    treatment = request.treatment(grid)
+    title = request.title or f"{name}, {strain.time_s[row]:.2f} s, ZOI {grid.size} px"
     return painter.framed(painted, [title, treatment] if treatment else [title], row, axes=True)
+
+
+def for_display(
+    values: NDArray[np.float64], step: int, low_pass_px: float = PAPER_LOW_PASS, median: int = 3
+) -> NDArray[np.float64]:
+    """A map as the paper shows it: salt-and-pepper (median) filter, then a Gaussian low-pass.
+
+    Parameters
+    ----------
+    values : (R, C), NaN where not measured; stays NaN there
+    step : int, px
+        Between the points of the map.
+    low_pass_px : float, px
+        sigma; 0: none.
+    median : int
+        Side of the median filter, points; 1: none.
+    """
+    from scipy.ndimage import gaussian_filter, generic_filter
+
+    valid = np.isfinite(values)
+    out = values.copy()
+    if median > 1:
+        out = np.where(
+            valid, generic_filter(np.where(valid, values, np.nan), _nanmedian, median, mode="nearest"), np.nan
+        )
+    if low_pass_px > 0:
+        weight = gaussian_filter(valid.astype(float), low_pass_px / step, mode="nearest")
+        total = gaussian_filter(np.where(valid, out, 0.0), low_pass_px / step, mode="nearest")
+        out = np.where(valid, total / np.maximum(weight, 1e-9), np.nan)
+    return np.asarray(out)
+
+
+def _nanmedian(values: NDArray[np.float64]) -> float:
+    good = values[np.isfinite(values)]
+    return float(np.median(good)) if good.size else float("nan")
 
 
 def save(image: Image, path: Path) -> None:
@@ -138,25 +173,25 @@ def _sigma(strain: Strain, name: str, row: int) -> NDArray[Any] | None:
     return strain.maps(f"sigma_{name}", row) if f"sigma_{name}" in strain.names else None
 
 
-def _treated(strain: Strain, picture: MapRequest) -> NDArray[np.float64]:
-    """The map as it is to be drawn; stored values stay as they are."""
-    values = np.array(strain.maps(picture.field, picture.row), np.float64)
-    treated = picture.deconvolution or picture.median > 1 or picture.low_pass_px > 0
-    if picture.field == "status" and treated:
+def _treated(strain: Strain, request: MapRequest) -> NDArray[np.float64]:
+    """The map to draw; stored values stay as they are."""
+    values = np.array(strain.maps(request.field, request.row), np.float64)
+    treated = request.deconvolution or request.median > 1 or request.low_pass_px > 0
+    if request.field == "status" and treated:
         raise ConfigError("a map of statuses is neither filtered nor deconvolved")
-    if picture.deconvolution:
-        _check_blur(strain.config.get("measure", {}), picture.field)
+    if request.deconvolution:
+        _check_blur(strain.config.get("measure", {}), request.field)
         try:
-            values = deconvolved(values, strain.grid, picture.deconvolution)
+            values = deconvolved(values, strain.grid, request.deconvolution)
         except ValueError as error:
             raise ConfigError(str(error)) from None
-    return for_display(values, strain.grid.step, picture.low_pass_px, picture.median)
+    return for_display(values, strain.grid.step, request.low_pass_px, request.median)
 
 
 def _check_blur(measure: Mapping[str, Any], field: str) -> None:
-    """Raises ConfigError unless the map is one whose blur is known."""
+    """Raise ConfigError where the blur of the map is not known."""
     if field.startswith(("sigma", "residual")):
-        raise ConfigError(f"{field} has no blur to take off; deconvolve a displacement or a strain")
+        raise ConfigError(f"{field} has no blur to remove; deconvolve a displacement or a strain")
     for key, value in (("order", 1), ("window", "gaussian"), ("estimator", "spectral")):
         if measure.get(key, value) != value:
             raise ConfigError(

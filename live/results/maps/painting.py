@@ -1,7 +1,4 @@
-"""Maps painted over pictures: each ZOI where it is by then, a frame with the title and what the colours mean.
-
-OpenCV draws. Before its version 5 it has ASCII letters alone.
-"""
+"""Maps painted over pictures by OpenCV: each ZOI at its place at that instant, with title, colour bar or legend."""
 
 from __future__ import annotations
 
@@ -24,14 +21,9 @@ Image = NDArray[np.uint8]
 _SUB = 4  # bits of subpixel places in OpenCV's polygons
 _LONGEST, _SHORTEST = 1280, 560  # of a painted picture's longer side, px
 _PAPER, _INK, _LINE, _PLAIN = 255, (40, 35, 30), (120, 115, 110), 150
-_LEAST_WIDTH, _LEAST_HEIGHT = 480, 240
-_MARGIN, _TITLE, _AXIS, _BAR = (
-    14,
-    28,
-    (66, 48),
-    18,
-)  # px: around, a line of the title, room for ticks, the bar
-_TICK = 5
+_MIN_WIDTH, _MIN_HEIGHT = 480, 240
+_MARGIN, _TITLE, _BAR, _TICK = 14, 28, 18, 5  # px: around, a line of the title, the bar, a tick
+_AXIS = 66, 48  # px for ticks and labels, on the left and below
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,9 +49,9 @@ class Levels:
 def overlay_cells(
     picture: Image, zoom: float, grid: ZoiGrid, cells: Image, moved: tuple[float, float] = (0.0, 0.0)
 ) -> None:
-    """Lay RGBA ``cells`` (R, C, 4) of ``grid`` over a BGR ``picture``, in place, all moved by (x, y) px alike.
+    """Paint RGBA ``cells`` (R, C, 4) of ``grid`` over a BGR ``picture``, in place, all moved by (x, y) px.
 
-    For pictures that are shown while a test runs: a hundred times quicker than ``overlay_quads``.
+    For pictures during a test: a hundred times faster than ``overlay_quads``.
     """
     half = grid.step / 2
     across, down = (m if math.isfinite(m) else 0.0 for m in moved)
@@ -74,7 +66,7 @@ def overlay_cells(
 
 
 def overlay_quads(picture: Image, cells: Image, corners: NDArray[np.float64]) -> Image:
-    """RGBA ``cells`` (R, C, 4) over a BGR ``picture``, a new image; ``corners`` (R, C, 4, 2) of each, px of it."""
+    """RGBA ``cells`` (R, C, 4) over a BGR ``picture``, a new image; ``corners`` (R, C, 4, 2) in px of it."""
     cv2 = load_cv2()
     painted, alpha = picture.copy(), np.zeros(picture.shape[:2], np.uint8)
     shown = (cells[..., 3] > 0) & np.isfinite(corners).all((-1, -2))
@@ -103,7 +95,7 @@ class Painter:
     size : (width, height), px
         Of the pictures.
     longest : int, px
-        Of what is painted, at most.
+        Largest side of the painted image.
     """
 
     def __init__(
@@ -147,14 +139,14 @@ class Painter:
         return overlay_quads(base, cells, self._corners(row if moved else None))
 
     def framed(self, image: Image, title: Sequence[str], row: int, *, axes: bool = False) -> Image:
-        """With lines of words above, the colour bar or the legend on the right, and px along the edges."""
+        """The image with a title above, the colour bar or the legend on the right, and px along the edges."""
         legend = status_legend(self._strain.maps(self._name, row)) if self._scale is None else ()
         h, w = image.shape[:2]
         left, below = (_AXIS[0], _AXIS[1]) if axes else (_MARGIN, _MARGIN)
         top = _MARGIN + _TITLE * len(title)
         beside = 110 if self._scale is not None else 230
-        wide = _even(max(left + w + beside + 2 * _MARGIN, _LEAST_WIDTH))
-        high = _even(max(top + h + below, _LEAST_HEIGHT))
+        wide = _even(max(left + w + beside + 2 * _MARGIN, _MIN_WIDTH))
+        high = _even(max(top + h + below, _MIN_HEIGHT))
         full = np.full((high, wide, 3), _PAPER, np.uint8)
         full[top : top + h, left : left + w] = image
         for k, words in enumerate(title):
@@ -169,13 +161,11 @@ class Painter:
 
     def _corners(self, row: int | None) -> NDArray[np.float64]:
         """Corners of every ZOI's cell, (R, C, 4, 2), px of the painted picture: at an instant, or on the reference."""
-        grid, of = (
-            self._strain.grid,
-            {"u": 0.0, "v": 0.0, "du_dx": 0.0, "du_dy": 0.0, "dv_dx": 0.0, "dv_dy": 0.0},
-        )
-        at = {name: np.full((*grid.shape, 1), none) for name, none in of.items()}
-        if row is not None:
-            at = {name: _filled(self._strain.maps(name, row)) for name in of}
+        grid, names = self._strain.grid, ("u", "v", "du_dx", "du_dy", "dv_dx", "dv_dy")
+        if row is None:
+            at = {name: np.zeros((*grid.shape, 1)) for name in names}
+        else:
+            at = {name: _filled(self._strain.maps(name, row)) for name in names}
         dx = np.array([-0.5, 0.5, 0.5, -0.5]) * grid.step
         dy = np.array([-0.5, -0.5, 0.5, 0.5]) * grid.step
         x = (grid.x + at["u"][..., 0])[..., None] + dx + at["du_dx"] * dx + at["du_dy"] * dy
@@ -190,17 +180,17 @@ def caption(strain: Strain, row: int) -> str:
 
 
 def _filled(values: NDArray[Any]) -> NDArray[np.float64]:
-    """With a last axis; ZOIs without a value lie where they were (the status map shows them)."""
+    """With a last axis; ZOIs without a value stay in place (the map of statuses shows them)."""
     return np.where(np.isfinite(values), values, 0.0).astype(np.float64)[..., None]
 
 
 def _even(side: int) -> int:
-    """Of a film, whose encoders want even sides."""
+    """The next even number: encoders of films need even sides."""
     return side + side % 2
 
 
 def _bar(full: Image, place: tuple[int, int, int], name: str, scale: ColourScale) -> None:
-    """The colours with ticks and their unit; mixed with middle grey as a map is with its picture."""
+    """The colour bar with ticks and unit, mixed with grey like a map with its picture."""
     cv2 = load_cv2()
     left, top, bottom = place
     colours = ramp(bottom - top, _BAR)[..., ::-1]
@@ -240,21 +230,23 @@ def _edges(full: Image, box: tuple[int, int, int, int], size: tuple[int, int]) -
         y = top + round((value + 0.5) / size[1] * height)
         cv2.line(full, (left - _TICK, y), (left, y), _LINE, 1)
         _write(full, f"{value:g}", (left - _TICK - 6 - 8 * len(f"{value:g}"), y + 5), 0.42)
-    _write(full, "x, y: px; without colour: no value", (left, bottom + _TICK + 32), 0.42)
+    _write(full, "x, y: px; no colour: no value", (left, bottom + _TICK + 32), 0.42)
 
 
-def _write(full: Image, words: str, place: tuple[int, int], size: float, room: int | None = None) -> None:
-    """Words on a base line; smaller where they would be wider than ``room``."""
+def _write(
+    full: Image, words: str, origin: tuple[int, int], size: float, max_width: int | None = None
+) -> None:
+    """Text from ``origin`` on its base line; smaller where it is wider than ``max_width``."""
     cv2 = load_cv2()
     text, font = _letters(words), cv2.FONT_HERSHEY_SIMPLEX
     (wide, _), _ = cv2.getTextSize(text, font, size, 1)
-    if room is not None and wide > room:
-        size *= room / wide
-    cv2.putText(full, text, place, font, size, _INK, 1, cv2.LINE_AA)
+    if max_width is not None and wide > max_width:
+        size *= max_width / wide
+    cv2.putText(full, text, origin, font, size, _INK, 1, cv2.LINE_AA)
 
 
 def _letters(text: str) -> str:
-    """What OpenCV can write: version 5 most letters, those before it ASCII."""
+    """The text in letters that OpenCV has: most of Unicode from version 5, before it ASCII."""
     text = text.replace("\u202f", " ")
     if hasattr(load_cv2(), "FontFace"):
         return text

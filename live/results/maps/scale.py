@@ -1,4 +1,4 @@
-"""What the colours of a map stand for: the one rule of their range, their unit, and the colours of statuses."""
+"""The colour scale of a map: its range and unit, and the colours of statuses."""
 
 from __future__ import annotations
 
@@ -26,24 +26,24 @@ OPACITY = 184
 """Of a map over a picture, 0..255."""
 _WITHIN = 98.0  # percent of the values lie within the colours
 _NOISE = 4.0  # sigma that the colours reach at least
-_SHRINK, _PATIENCE = 0.55, 20
-_SAMPLE = 25  # instants that the range of a run is taken from
+_SHRINK, _SHRINK_AFTER = 0.55, 20
+_SAMPLE = 25  # instants that give the range of a run
 _UNITS = {"u": "px", "v": "px", "sigma_u": "px", "sigma_v": "px", "residual": "chi\u00b2", "iterations": ""}
 
 
-def kind_of(name: str) -> Kind:
-    """Where the range of a map lies: about zero for strains, from zero for uncertainties, else over the values."""
+def range_kind(name: str) -> Kind:
+    """The kind of range of a map: about zero for strains, from zero for uncertainties, else over the values."""
     if name in ("u", "v", "iterations"):
         return "free"
     return "from zero" if name.startswith("sigma") or name == "residual" else "about zero"
 
 
 class AutoRange:
-    """The range of a map: it follows the data in steps that read well, and does not flicker.
+    """The range of a map: it follows the data in round steps, and does not flicker.
 
-    98 % of the values lie within. It grows at once, and shrinks only when the data have stayed small for
-    ``patience`` maps. Noise alone does not fill the colours: the range of a strain reaches at least four
-    times the typical sigma. Of a single map, it is what the first ``update`` returns.
+    98 % of the values are inside. It grows at once, and shrinks when the data have been small for
+    ``shrink_after`` maps. Noise alone does not fill the colours: the range of a strain reaches at least four
+    times the typical sigma. For a single map, it is the result of the first ``update``.
 
     Parameters
     ----------
@@ -53,16 +53,16 @@ class AutoRange:
     """
 
     def __init__(
-        self, kind: Kind = "about zero", fixed: float | None = None, *, patience: int = _PATIENCE
+        self, kind: Kind = "about zero", fixed: float | None = None, *, shrink_after: int = _SHRINK_AFTER
     ) -> None:
-        self._kind, self._fixed, self._patience = kind, fixed, patience
+        self._kind, self._fixed, self._shrink_after = kind, fixed, shrink_after
         self._span: Span | None = None if fixed is None else (0.0 if kind == "from zero" else -fixed, fixed)
         self._small = 0
 
     def update(self, values: Floats, sigmas: Floats | None = None) -> Span:
-        """The ends of the range now in force, in the unit of ``values``, from a map and its uncertainty."""
+        """The ends of the range after a further map and its uncertainty, in the unit of ``values``."""
         if self._fixed is None:
-            wanted = _wanted(self._kind, values, sigmas)
+            wanted = _wanted_span(self._kind, values, sigmas)
             if wanted is not None:
                 self._follow(wanted)
         return self._span or (-1e-4 if self._kind == "about zero" else 0.0, 1e-4)
@@ -71,12 +71,12 @@ class AutoRange:
         low, high = self._span or (math.inf, -math.inf)
         outside = wanted[0] < low or wanted[1] > high
         self._small = self._small + 1 if wanted[1] - wanted[0] < _SHRINK * (high - low) else 0
-        if outside or self._small >= self._patience:
+        if outside or self._small >= self._shrink_after:
             self._span, self._small = _rounded(self._kind, wanted), 0
 
 
-def _wanted(kind: Kind, values: Floats, sigmas: Floats | None) -> Span | None:
-    """The range that a map asks for, before it is rounded; None where the map is empty or all zero."""
+def _wanted_span(kind: Kind, values: Floats, sigmas: Floats | None) -> Span | None:
+    """The range of one map before rounding; None where the map is empty or all zero."""
     found = np.asarray(values[np.isfinite(values)], np.float64)
     if not found.size:
         return None
@@ -84,8 +84,9 @@ def _wanted(kind: Kind, values: Floats, sigmas: Floats | None) -> Span | None:
     least = _NOISE * float(np.median(noise)) if noise.size else 0.0
     if kind == "free":
         low, high = (float(v) for v in np.percentile(found, (50 - _WITHIN / 2, 50 + _WITHIN / 2)))
-        room = max(2 * least, 1e-3 * max(abs(low), abs(high)), 1e-6) - (high - low)
-        return low - max(room, 0) / 2, high + max(room, 0) / 2
+        width = max(2 * least, 1e-3 * max(abs(low), abs(high)), 1e-6)
+        margin = max(width - (high - low), 0) / 2
+        return low - margin, high + margin
     largest = 1.05 * float(np.percentile(np.abs(found), _WITHIN))
     if kind == "about zero":
         largest = max(largest, least)
@@ -93,7 +94,7 @@ def _wanted(kind: Kind, values: Floats, sigmas: Floats | None) -> Span | None:
 
 
 def _rounded(kind: Kind, span: Span) -> Span:
-    """Ends that read well; those of a free range are whole steps of a fifth of it."""
+    """Round ends; those of a free range are multiples of a fifth of it."""
     low, high = span
     if kind == "free":
         step = nice_above(high - low) / 5
@@ -103,7 +104,7 @@ def _rounded(kind: Kind, span: Span) -> Span:
 
 @dataclass(frozen=True, slots=True)
 class ColourScale:
-    """What the colours of a map stand for.
+    """The values and the unit of the colours of a map.
 
     Attributes
     ----------
@@ -121,9 +122,9 @@ class ColourScale:
 
     @classmethod
     def of(cls, name: str, span: Span, unit: str = "", factor: float = 1.0) -> ColourScale:
-        """Of the map ``name`` with colours from ``span[0]`` to ``span[1]`` of its values.
+        """The scale of the map ``name`` from ``span[0]`` to ``span[1]`` of its values.
 
-        ``unit`` and the ``factor`` to it are those of the map, or as it reads well.
+        ``unit`` and ``factor`` convert the values; without a unit, strains are in um/m or %.
         """
         unit = unit or _UNITS.get(name, "")
         if not unit and name not in _UNITS:
@@ -147,10 +148,10 @@ class ColourScale:
         sigma = f"sigma_{name}"
         values = np.stack([strain.maps(name, row) for row in picked])
         sigmas = np.stack([strain.maps(sigma, row) for row in picked]) if sigma in strain.names else None
-        return cls.of(name, AutoRange(kind_of(name), limit).update(values, sigmas), unit, factor)
+        return cls.of(name, AutoRange(range_kind(name), limit).update(values, sigmas), unit, factor)
 
     def colours(self, values: Floats, alpha: int = OPACITY) -> Image:
-        """(R, C, 4) RGBA of values as they are stored; transparent where there is none."""
+        """(R, C, 4) RGBA of stored values; transparent where there is none."""
         middle, half = (self.low + self.high) / 2, (self.high - self.low) / 2
         return colour(np.asarray(values, np.float64) * self.factor - middle, half, alpha)
 
@@ -170,7 +171,7 @@ _UNKNOWN = (60, 60, 60)
 
 @dataclass(frozen=True, slots=True)
 class StatusCount:
-    """A line of the legend of a map of statuses: what, of how many ZOIs, in which red, green and blue."""
+    """A line of the legend of a map of statuses: status, number of ZOIs, and its red, green and blue."""
 
     name: str
     text: str
@@ -180,7 +181,7 @@ class StatusCount:
 
 @lru_cache(maxsize=8)
 def _status_table(alpha: int) -> Image:
-    """(256, 4) RGBA by the number of a status; what was not asked for is transparent."""
+    """(256, 4) RGBA by the number of a status; ZOIs that are not active are transparent."""
     table = np.full((256, 4), (*_UNKNOWN, alpha), np.uint8)
     table[Status.NOT_MEASURED] = 0
     for status, rgb in _STATUSES.items():
@@ -194,7 +195,7 @@ def status_colours(statuses: NDArray[np.integer], alpha: int = OPACITY) -> Image
 
 
 def status_legend(statuses: NDArray[np.integer]) -> tuple[StatusCount, ...]:
-    """The statuses that occur in a map and how often, but for ZOIs that were not asked for."""
+    """The statuses in a map and how often each occurs, without ZOIs that are not active."""
     numbers, counts = np.unique(np.asarray(statuses, np.uint8), return_counts=True)
     known = {int(status): (status.name, status.text) for status in Status}
     found = []

@@ -1,4 +1,4 @@
-"""The commands: characterise on rendered truth and on a picture of one's own, and inspect."""
+"""The commands: characterise on rendered truth and on a picture of the user, and inspect."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from live.characterise.command import EXPERIMENTS, add_arguments, chosen, comman
 from live.characterise.inspect import add_arguments as add_inspect
 from live.characterise.inspect import command as inspect
 from live.characterise.outcome import Comparison, ExperimentContext, ExperimentOutcome, ProgressBar
-from live.characterise.page import page, standing, write_page
+from live.characterise.page import comparison_summary, page, write_page
 from tests.acquire.session.fixtures import CAMERA, frame, writer
 
 
@@ -48,19 +48,19 @@ def test_names_are_checked_and_ordered() -> None:
 def test_a_run_takes_up_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[str] = []
 
-    def experiment(name: str, bench: ExperimentContext) -> ExperimentOutcome:
+    def experiment(name: str, context: ExperimentContext) -> ExperimentOutcome:
         calls.append(name)
-        bench.tick(0.5)
+        context.tick(0.5)
         return ExperimentOutcome(name, name, "words")
 
     monkeypatch.setattr(characterise, "_timed", experiment)
-    bench = ExperimentContext(tmp_path, quick=True)
+    context = ExperimentContext(tmp_path, quick=True)
     screen = io.StringIO()
-    run(["fig1"], bench, screen)
-    again = run(["fig1", "fig3"], bench, screen)
+    run(["fig1"], context, screen)
+    again = run(["fig1", "fig3"], context, screen)
     assert calls == ["fig1", "fig3"]
     assert [outcome.name for outcome in again] == ["fig1", "fig3"]
-    run(["fig1"], replace(bench, quick=False), screen)
+    run(["fig1"], replace(context, quick=False), screen)
     assert calls == ["fig1", "fig3", "fig1"]
     assert "as it was" in screen.getvalue()
 
@@ -87,7 +87,7 @@ def test_fig1_end_to_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert command(parsed(*words)) == 0
     text = target.read_text(encoding="utf-8")
     assert "](images/fig1_phases.png)" in text
-    assert "--data DIR" in text  # what is missing is said
+    assert "--data DIR" in text  # what is missing is named
     assert (out / "fig1_phases.png").stat().st_size > 10_000
     assert (out / "fig1_phases.csv").read_text(encoding="utf-8").startswith("kx rad/px,")
     assert "page:" in capsys.readouterr().out
@@ -97,12 +97,12 @@ def test_the_page_says_where_we_are_worse_first() -> None:
     outcome = ExperimentOutcome(
         "a", "A", "t", verdicts=(Comparison("x", "p", "better"), Comparison("y", "q", "worse"))
     )
-    said = standing([outcome])
-    assert said.index("**Worse**") < said.index("**Better**")
-    assert "better in 1, equal in 0, worse in 1" in said
+    text = comparison_summary([outcome])
+    assert text.index("**Worse**") < text.index("**Better**")
+    assert "better in 1, equal in 0, worse in 1" in text
     whole = page([outcome], "phasedic characterise --out a", "")
     assert "Made by `phasedic characterise --out a`" in whole
-    assert standing([]) == ""
+    assert comparison_summary([]) == ""
 
 
 @pytest.mark.slow
@@ -127,7 +127,7 @@ def test_ones_own_pattern(tmp_path: Path, picture: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "error", "said"),
+    ("words", "error", "message"),
     [
         (["--pattern", "none.png"], DataError, "none.png"),
         (["--only", "x"], ConfigError, "not known"),
@@ -146,10 +146,10 @@ def test_refusals(
     monkeypatch: pytest.MonkeyPatch,
     words: list[str],
     error: type[Exception],
-    said: str,
+    message: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(error, match=said):
+    with pytest.raises(error, match=message):
         command(parsed(*words, "--out", "out"))
 
 
@@ -183,20 +183,20 @@ def test_inspect_draws_one_zoi(session: Path, tmp_path: Path, capsys: pytest.Cap
     out = tmp_path / "zoi.png"
     words = [str(session), "--zoi", "1,2", "--frame", "1", "--out", str(out)]
     assert inspect(inspected(*words)) == 0
-    said = capsys.readouterr().out
-    assert "ZOI 1,2 (32 px at x 36, y 20)" in said
-    assert "u = 0.3" in said or "u = 0.4" in said
+    printed = capsys.readouterr().out
+    assert "ZOI 1,2 (32 px at x 36, y 20)" in printed
+    assert "u = 0.3" in printed or "u = 0.4" in printed
     assert out.stat().st_size > 10_000
     with pytest.raises(ConfigError, match="is not overwritten"):
         inspect(inspected(*words))
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "message"),
     [(["--zoi", "9,9", "--frame", "1"], "rows 0 to"), (["--zoi", "x", "--frame", "1"], "row,column")],
 )
-def test_inspect_refuses(session: Path, tmp_path: Path, words: list[str], said: str) -> None:
-    with pytest.raises(ConfigError, match=said):
+def test_inspect_refuses(session: Path, tmp_path: Path, words: list[str], message: str) -> None:
+    with pytest.raises(ConfigError, match=message):
         inspect(inspected(str(session), *words, "--out", str(tmp_path / "new.png")))
 
 

@@ -14,11 +14,11 @@ from live.characterise.experiments.section41 import derived, low_pass_for
 from live.characterise.experiments.table2_design import CORNERS, PAPER, corner_values, fitted, model_matrix
 from live.characterise.imposed import ExpectedErrors, Imposed, robust_std
 from live.characterise.own_pattern import recommended
-from live.results.maps.colours import for_display
+from live.results.maps.map import for_display
 
 
 def test_the_papers_model_at_its_optimum_and_its_negative_corners() -> None:
-    """51 um/m where the text says 58, and negative uncertainties at 7 of 16 corners (coded -1, 1)."""
+    """51 um/m where the text gives 58, and negative uncertainties at 7 of 16 corners (coded -1, 1)."""
     predicted = {corner_values(c): float(model_matrix(np.array([c]))[0] @ np.array(PAPER)) for c in CORNERS}
     assert predicted[64, 2.0, 16, 0.0] == pytest.approx(51e-4, rel=0.01)  # % strain
     assert sum(value < 0 for value in predicted.values()) == 7
@@ -137,9 +137,9 @@ def test_the_smallest_zoi_that_reaches_the_target_is_recommended() -> None:
         expectation(96, 1, 4e-5),
         expectation(32, 16, 1e-4),
     ]
-    said = recommended(cases, 1e-4, None)
-    assert "1 frame averaged: ZOI 64 px, step 16 px" in said
-    assert "16 frames averaged: ZOI 32 px" in said
+    text = recommended(cases, 1e-4, None)
+    assert "1 frame averaged: ZOI 64 px, step 16 px" in text
+    assert "16 frames averaged: ZOI 32 px" in text
     assert "not reached" in recommended(cases, 1e-6, None)
 
 
@@ -165,7 +165,7 @@ def test_averaging_falls_as_predicted_until_rounding_stops_it(monkeypatch: pytes
     from live.characterise.truth import SensorModel
 
     monkeypatch.setattr(burst, "LENGTHS", (1, 16))
-    study = burst.Study(quick=True)
+    study = burst.BurstStudy(quick=True)
     ratios = {}
     for noise in (0.1, 4.0):
         camera = SensorModel(12, noise)

@@ -1,4 +1,4 @@
-"""One made-up test for the readers of a run."""
+"""One made-up test for the readers and the report of a run."""
 
 from __future__ import annotations
 

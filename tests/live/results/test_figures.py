@@ -75,17 +75,17 @@ def test_a_laminate_has_no_proof_strength() -> None:
 
 
 @pytest.mark.parametrize(
-    ("settings", "says"),
+    ("settings", "message"),
     [
         ({"standard": "free", "modulus_between": (0.0002, 0.001)}, "free: strains 0.02"),
         ({"zero": "toe"}, "toe compensation"),
         ({"zero": "preload", "preload_MPa": 20.0}, "first reached the preload"),
     ],
 )
-def test_interval_and_zero_are_options(settings: dict, says: str) -> None:
+def test_interval_and_zero_are_options(settings: dict, message: str) -> None:
     specimen = replace(FLAT, **settings)
     history, loads = kept(ramberg_osgood())
-    assert says in "\n".join(figure_lines(evaluate(history, loads, specimen), specimen))
+    assert message in "\n".join(figure_lines(evaluate(history, loads, specimen), specimen))
 
 
 def test_without_a_section_forces_stand_for_stresses() -> None:
@@ -99,8 +99,8 @@ def test_without_a_section_forces_stand_for_stresses() -> None:
 def test_the_lag_of_the_load_is_told() -> None:
     history, loads = kept(ramberg_osgood(), lag=0.15)
     (line,) = lag_line(history, loads, FLAT)
-    told = float(line.split(": ")[1].split(" +-")[0])
-    assert abs(told - 150) < 40
+    found = float(line.split(": ")[1].split(" +-")[0])
+    assert abs(found - 150) < 40
     assert lag_line(history, LoadLog(), FLAT) == []
     (refused,) = lag_line(History(), loads, FLAT)
     assert "not known (0 frames have a strain" in refused

@@ -1,7 +1,4 @@
-"""Colours, units and ticks of the strain maps.
-
-Maps as PNG: drawn, treated only on request, and refused with words.
-"""
+"""Maps as pictures: colours, units and ticks, the file with its filters, and refusals."""
 
 from __future__ import annotations
 
@@ -151,7 +148,7 @@ def test_only_a_known_blur_is_taken_off(results: Path, key: str, value: object) 
 
 
 @pytest.mark.parametrize(
-    ("more", "code", "says"),
+    ("more", "code", "message"),
     [
         (["--field", "ezz"], 4, "no map 'ezz'"),
         (["--row", "7"], 4, "no row 7"),
@@ -172,15 +169,20 @@ def test_only_a_known_blur_is_taken_off(results: Path, key: str, value: object) 
     ],
 )
 def test_refusals(
-    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], code: int, says: str
+    results: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    more: list[str],
+    code: int,
+    message: str,
 ) -> None:
     assert main(["map", str(results / "out" / "strain.h5"), str(tmp_path / "x.png"), *more]) == code
-    assert says in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert not (tmp_path / "x.png").exists()
 
 
 @pytest.mark.parametrize(
-    ("name", "code", "says"),
+    ("name", "code", "message"),
     [
         ("nowhere/x.png", 4, "cannot be written: No such file"),
         ("x.xyz", 2, "ends in .png"),
@@ -189,11 +191,11 @@ def test_refusals(
     ],
 )
 def test_places_that_cannot_be_written(
-    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, code: int, says: str
+    results: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, code: int, message: str
 ) -> None:
     (tmp_path / "taken.png").touch()
     assert main(["map", str(results / "out" / "strain.h5"), str(tmp_path / name)]) == code
-    assert says in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["taken.png"]
 
 

@@ -10,7 +10,7 @@ import pytest
 from analysis.field import Status
 from live.results.maps.colours import diverging_table
 from live.results.maps.field_maps import FIELD_MAPS, FieldMaps
-from live.results.maps.scale import AutoRange, ColourScale, kind_of, status_colours, status_legend
+from live.results.maps.scale import AutoRange, ColourScale, range_kind, status_colours, status_legend
 from tests.live.made_up import make_field, make_grid
 
 
@@ -19,7 +19,7 @@ def full(value: float) -> np.ndarray:
 
 
 def test_the_range_grows_at_once_and_shrinks_only_after_a_while() -> None:
-    auto = AutoRange(patience=3)
+    auto = AutoRange(shrink_after=3)
     none = full(0.0)
     assert auto.update(full(1e-3), none) == (-1.2e-3, 1.2e-3)
     assert auto.update(full(-2.1e-3), none) == (-2.5e-3, 2.5e-3)
@@ -27,7 +27,7 @@ def test_the_range_grows_at_once_and_shrinks_only_after_a_while() -> None:
 
 
 def test_small_changes_do_not_move_the_range() -> None:
-    auto = AutoRange(patience=3)
+    auto = AutoRange(shrink_after=3)
     limits = {auto.update(full(value), full(0.0))[1] for value in (1e-3, 0.9e-3, 1.1e-3, 0.7e-3) * 5}
     assert limits == {1.2e-3}
 
@@ -67,7 +67,7 @@ def test_a_free_range_lies_over_the_values_and_shrinks_late() -> None:
      ("residual", "from zero")],
 )  # fmt: skip
 def test_where_the_colours_lie(name: str, kind: str) -> None:
-    assert kind_of(name) == kind
+    assert range_kind(name) == kind
 
 
 def test_the_colours_run_from_one_end_of_the_scale_to_the_other() -> None:

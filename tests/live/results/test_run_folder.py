@@ -1,7 +1,4 @@
-"""A run's folder read back: results and recording together, pictures by instant, and what is not there.
-
-Gauges laid over a finished run are those that the test would have had.
-"""
+"""The folder of a run read back: results, recording, pictures by instant, and gauges added afterwards."""
 
 from __future__ import annotations
 
@@ -171,7 +168,7 @@ def test_they_are_in_the_report_the_export_and_the_view(run_dir: Path, toml: Pat
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "message"),
     [
         ("[measure]\nzoi = 32\n", "holds no gauge; give a table [gauges.NAME] each"),
         ("[gauges.far]\nstart = [5000, 1]\nend = [5000, 9]\n", "gauges.far: no ZOI is there"),
@@ -179,11 +176,11 @@ def test_they_are_in_the_report_the_export_and_the_view(run_dir: Path, toml: Pat
     ],
 )
 def test_refusals(
-    run_dir: Path, toml: Path, capsys: pytest.CaptureFixture[str], text: str, says: str
+    run_dir: Path, toml: Path, capsys: pytest.CaptureFixture[str], text: str, message: str
 ) -> None:
     toml.write_text(text, encoding="utf-8")
     assert main(["show", str(run_dir), "--gauges", str(toml)]) == 2
-    assert says in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 def test_a_window_that_is_no_window_is_taken_as_the_usual_one(tmp_path: Path) -> None:

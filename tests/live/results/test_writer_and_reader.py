@@ -261,11 +261,11 @@ def test_a_killed_writer_leaves_what_is_older_than_its_last_flush(tmp_path: Path
     ) as writer:
         assert writer.stdout is not None
         began = float(writer.stdout.readline().split()[1])
-        said = next(line for line in writer.stdout if float(line.split()[1]) > began + 0.6)
+        lines = next(line for line in writer.stdout if float(line.split()[1]) > began + 0.6)
         os.kill(writer.pid, signal.SIGKILL)
         killed = time.monotonic()
-        said += writer.stdout.read()
-    written = [(int(k), float(t)) for k, t in (line.split() for line in said.splitlines())]
+        lines += writer.stdout.read()
+    written = [(int(k), float(t)) for k, t in (line.split() for line in lines.splitlines())]
     with Strain.open(tmp_path / "strain.h5") as strain:
         assert strain.unfinished
         # Half a second for a flush that waits for a core.

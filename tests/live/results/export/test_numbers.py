@@ -153,10 +153,10 @@ def test_tiff_says_its_units_to_imagej(run_dir: Path, tmp_path: Path) -> None:
     with pillow.open(out) as image:
         tags = image.tag_v2
         assert image.n_frames == 12
-        said = dict(line.split("=", 1) for line in tags[270].rstrip("\0\n").splitlines())
-        assert said["unit"] == "mm"
-        assert said["vunit"] == "mm"
-        assert (said["frames"], float(said["finterval"])) == ("12", pytest.approx(0.1))
+        described = dict(line.split("=", 1) for line in tags[270].rstrip("\0\n").splitlines())
+        assert described["unit"] == "mm"
+        assert described["vunit"] == "mm"
+        assert (described["frames"], float(described["finterval"])) == ("12", pytest.approx(0.1))
         # Pixels of the map, which are ZOIs 16 px apart, per mm.
         assert float(tags[282]) == pytest.approx(1 / (16 * SCALE))
         counts, labels = tags[50838], tags[50839]
@@ -166,12 +166,12 @@ def test_tiff_says_its_units_to_imagej(run_dir: Path, tmp_path: Path) -> None:
 
 def test_r3xa(run_dir: Path, tmp_path: Path) -> None:
     out = exported(run_dir, tmp_path / "r3xa", "--to", "r3xa")
-    told = json.loads((out / "r3xa.json").read_text(encoding="utf-8"))
-    assert told["authors"] == [{"name": "Zoé"}]
-    assert told["date"] == "2030-01-02"
-    ids = [item["id"] for part in ("settings", "data_sources", "data_sets") for item in told[part]]
+    described = json.loads((out / "r3xa.json").read_text(encoding="utf-8"))
+    assert described["authors"] == [{"name": "Zoé"}]
+    assert described["date"] == "2030-01-02"
+    ids = [item["id"] for part in ("settings", "data_sources", "data_sets") for item in described[part]]
     assert len(ids) == len(set(ids))
-    for item in told["data_sets"]:
+    for item in described["data_sets"]:
         place = out / item["path"]
         assert place.exists(), item
         assert set(item["parent_data_sources"]) <= set(ids)
@@ -183,7 +183,7 @@ def test_r3xa(run_dir: Path, tmp_path: Path) -> None:
                 comments, columns = table(place / part["filename"])
                 assert not comments
                 assert part["col"] in columns
-    assert {item["id"] for item in told["data_sets"]} == {
+    assert {item["id"] for item in described["data_sets"]} == {
         "set-images", "set-results", "set-load", "set-means", "set-fields",
     }  # fmt: skip
 

@@ -1,7 +1,4 @@
-"""png, mp4, webm, gif: the map lies where the specimen is by then.
-
-Nothing overwritten, nothing half written, and every refusal in words.
-"""
+"""png, mp4, webm, gif: the map follows the specimen; files are complete, and refusals have a message."""
 
 from __future__ import annotations
 
@@ -18,7 +15,7 @@ from analysis.field.strain_field import StrainField
 from live.cli import main
 from live.results.export.atomic_file import new_file
 from live.results.export.formats import FORMATS, ExportRequest, export
-from live.results.export.job import ExportOptions, Job, chosen_rows
+from live.results.export.job import ExportJob, ExportOptions, chosen_rows
 from live.results.maps.painting import Levels, Painter
 from live.results.maps.scale import ColourScale
 from live.results.quantities import Display
@@ -129,11 +126,11 @@ def test_nothing_is_overwritten(
 
 
 @pytest.mark.parametrize(
-    ("code", "says", "arguments"),
+    ("code", "message", "arguments"),
     [
         (2, "there is no such map", ["--fields", "ezz"]),
         (2, "one map at a time", ["--to", "tiff", "--fields", "exx,eyy"]),
-        (2, "no measurement between 5 and 6 s; they reach from 0 to 1.1 s", ["--from", "5", "--until", "6"]),
+        (2, "no measurement between 5 and 6 s; the test has 0 to 1.1 s", ["--from", "5", "--until", "6"]),
         (2, "--mm needs the scale", ["--mm"]),
         (2, "does nothing without --mm", ["--scale", "0.1"]),
         (2, "mm/px is not possible", ["--mm", "--scale", "-1"]),
@@ -142,10 +139,10 @@ def test_nothing_is_overwritten(
     ],
 )
 def test_arguments(
-    run_dir: Path, capsys: pytest.CaptureFixture[str], code: int, says: str, arguments: list[str]
+    run_dir: Path, capsys: pytest.CaptureFixture[str], code: int, message: str, arguments: list[str]
 ) -> None:
     assert main(["export", str(run_dir), "--to", "csv", *arguments]) == code
-    assert says in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 def test_broken_files_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -196,7 +193,7 @@ def test_progress_is_told_after_two_seconds(run_dir: Path, capsys: pytest.Captur
     screen = TerminalScreen(now=lambda: next(ticks))
     with open_run(run_dir) as run:
         rows = chosen_rows(run.strain, None, None)
-        job = Job(run, ("eyy",), rows, Display(), screen, ExportOptions())
+        job = ExportJob(run, ("eyy",), rows, Display(), screen, ExportOptions())
         assert [row for _, row in job.steps(now)] == list(rows)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].startswith("instant 4 of 12, about 5 s left")

@@ -17,7 +17,7 @@ TYPES = {"Float32": "f4", "Float64": "f8", "UInt8": "u1", "Int64": "i8"}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Vti:
-    """What a file says."""
+    """The content of a file."""
 
     extent: list[int]
     origin: list[float]

@@ -1,7 +1,4 @@
-"""Instants and elastic line of tests whose truth is known.
-
-Virtual gauges and lag in the report and in what is exported.
-"""
+"""Evaluation in the report against known truth: elastic line, instants, virtual gauges, lag."""
 
 from __future__ import annotations
 

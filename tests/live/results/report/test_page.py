@@ -77,16 +77,16 @@ def test_it_stands_alone(text: str) -> None:
 
 
 def test_what_comes_from_files_is_escaped(text: str) -> None:
-    said = " ".join(Reader(text).words)
-    assert "<script>alert('5 > 3 & so on')</script>" in said
-    assert "S1 <b>& so on</b>" in said
+    printed = " ".join(Reader(text).words)
+    assert "<script>alert('5 > 3 & so on')</script>" in printed
+    assert "S1 <b>& so on</b>" in printed
     assert "<script" not in text
     assert "<b>& so" not in text
 
 
 def test_it_holds_what_a_report_must(text: str, run_dir: Path) -> None:
     page = Reader(text)
-    said = " ".join(page.words)
+    printed = " ".join(page.words)
     for words in (
         "Rp0.2 = 210.2 MPa",  # drawn on the curve
         "first: t =", "elastic: t =", "yield (0.2 %)", "highest force", "last: t =",
@@ -95,12 +95,12 @@ def test_it_holds_what_a_report_must(text: str, run_dir: Path) -> None:
         "not recorded (phasedic run --meta aperture=...)", "50 mm", "6.4 x 4.8 mm", "0.05 mm/px",
         "half of the engineering shear", "numpy",
     ):  # fmt: skip
-        assert words in said, words
-    assert "not recorded (phasedic run --meta lens" not in said
+        assert words in printed, words
+    assert "not recorded (phasedic run --meta lens" not in printed
     for name in ("session.h5", "strain.h5", "strain.csv"):
-        assert hashlib.sha256((run_dir / name).read_bytes()).hexdigest() in said
+        assert hashlib.sha256((run_dir / name).read_bytes()).hexdigest() in printed
     # Each instant has its picture and its map, of two fields; the statuses have one.
-    assert page.seen["img"] == 2 * 2 * 5 + 1 - 2 * 2 * ("highest force, last" in said)
+    assert page.seen["img"] == 2 * 2 * 5 + 1 - 2 * 2 * ("highest force, last" in printed)
 
 
 def test_a_run_without_force_recording_and_section(tmp_path: Path) -> None:
@@ -108,11 +108,11 @@ def test_a_run_without_force_recording_and_section(tmp_path: Path) -> None:
     make_run(tmp_path, [1e-3, 2e-3], session=False, config=config, metadata={})
     with open_run(tmp_path) as run:
         run.strain.values["force_N"][:] = np.nan
-        said = " ".join(Reader(make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html).words)
-    assert "there is no stress-strain curve" in said
-    assert "No still phase was found" in said
-    assert "No frame counts were recorded" in said
-    assert "not known: forces, no stresses" in said
+        printed = " ".join(Reader(make_report(run, ReportRequest(), TerminalScreen(quiet=True)).html).words)
+    assert "there is no stress-strain curve" in printed
+    assert "No still phase was found" in printed
+    assert "No frame counts were recorded" in printed
+    assert "not known: forces, no stresses" in printed
 
 
 def test_a_large_page_takes_smaller_pictures(run_dir: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -143,11 +143,11 @@ def test_a_run_that_has_just_ended_gets_its_page(tmp_path: Path, capsys: pytest.
     make_run(tmp_path / "empty", [], session=False)
     for name in ("full", "empty", "full"):
         command.write_report(tmp_path / name, TerminalScreen())
-    said = capsys.readouterr().out
+    printed = capsys.readouterr().out
     assert Reader((tmp_path / "full" / "report.html").read_text(encoding="utf-8")).seen["svg"] > 3
-    assert "warning: no report was made: " in said
-    assert "holds no measurement" in said
-    assert "report.html exists already" in said, "nothing is overwritten"
+    assert "warning: no report was made: " in printed
+    assert "holds no measurement" in printed
+    assert "report.html exists already" in printed, "nothing is overwritten"
 
 
 @pytest.mark.skipif(find_browser() is None, reason="no browser here")
@@ -185,7 +185,7 @@ def test_comparison(run_dir: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("code", "says", "arguments"),
+    ("code", "message", "arguments"),
     [
         (2, "give the folder of a run", []),
         (4, "no strain.h5 there", ["{tmp}"]),
@@ -201,7 +201,7 @@ def test_refusals(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     code: int,
-    says: str,
+    message: str,
     arguments: list[str],
 ) -> None:
     made = {"run": run_dir, "tmp": tmp_path, "forces": tmp_path / "forces", "empty": tmp_path / "empty"}
@@ -209,7 +209,7 @@ def test_refusals(
     make_run(made["empty"], [], session=False)
     filled = [word.format(**made) for word in arguments]
     assert main(["report", *filled, "--out", str(tmp_path / "r.html")]) == code
-    assert says in capsys.readouterr().err
+    assert message in capsys.readouterr().err
     assert not (tmp_path / "r.html").exists()
 
 
@@ -228,8 +228,8 @@ def test_at_the_end_of_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert "Noise floor" in (folder / "report.html").read_text(encoding="utf-8")
     command.write_report(folder, TerminalScreen())
     command.write_report(tmp_path / "nowhere", TerminalScreen())
-    said = capsys.readouterr().out.splitlines()
-    assert [line[:12] for line in said if "hash" not in line] == [
+    printed = capsys.readouterr().out.splitlines()
+    assert [line[:12] for line in printed if "hash" not in line] == [
         "  " + str(folder)[:10],
         *["warning: no "] * 2,
     ]

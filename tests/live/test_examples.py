@@ -1,0 +1,69 @@
+"""The examples run, and print what their texts promise."""
+
+from __future__ import annotations
+
+import re
+import runpy
+import tempfile
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from examples.batch import main as batch
+from examples.finished_run import main as finished_run
+from hw_mocks.deformation import Affine
+from hw_mocks.speckle import Speckle
+from live.cli import main as phasedic
+from tests.live.made_run import PULLED, make_run
+
+
+def test_a_finished_run_is_read_and_exported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = make_run(tmp_path)
+    assert finished_run(str(folder)) == 0
+    printed = capsys.readouterr().out
+    assert f"S1: {len(PULLED)} measurements, force up to 4210 N" in printed
+    assert "pictures: 128 x 96 px" in printed
+    assert (folder / "from_python" / "report.html").is_file()
+    with np.load(folder / "from_python" / "strain.npz") as held:
+        assert held["v"].shape[0] == len(PULLED)
+
+
+def test_the_notebook_runs_cell_by_cell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    runpy.run_module("examples.notebook", run_name="__main__")
+    printed = capsys.readouterr().out
+    modulus = re.search(r"E = ([0-9.]+) GPa from 5 instants", printed)
+    assert modulus is not None
+    assert float(modulus[1]) == pytest.approx(70, rel=0.01)
+    assert re.search(r"<StrainField 11 x 15 ZOIs, 165 of 165 with a value; mean exx -0.0018", printed)
+    assert "<Strain strain.h5: 5 instants of 11 x 15 ZOIs, engineering strain>" in printed
+    assert list(tmp_path.glob("phasedic-*/report.html"))
+
+
+def test_a_batch_measures_all_compares_them_and_goes_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    runs, out = tmp_path / "runs", tmp_path / "out"
+    speckle = Speckle((128, 160), radius=2.0, seed=3)
+    for name in ("a", "b"):
+        shots = tmp_path / name
+        shots.mkdir()
+        for k in range(4):
+            picture = 255 * speckle.render(Affine(dv_dy=1e-3 * k, x0=80, y0=64), (128, 160))
+            cv2.imwrite(str(shots / f"{k}.png"), np.rint(picture).astype(np.uint8))
+        quiet = ["--zoi", "48", "--burst", "1", "--no-view", "--no-rrd", "--out", str(runs / name)]
+        assert phasedic(["run", "--camera", str(shots), *quiet]) == 0
+    (runs / "broken").mkdir()
+    (runs / "broken" / "session.h5").write_bytes(b"no session")
+    assert batch(str(runs), str(out), "--zoi", "32", "--step", "16") == 4
+    printed = capsys.readouterr().out
+    assert printed.count(": measured (exit code 0)") == 2
+    assert "broken/session.h5: failed (exit code 4)" in printed
+    assert (out / "all.html").is_file()
+    batch(str(runs), str(out), "--zoi", "32", "--step", "16")
+    assert capsys.readouterr().out.count("measured already") == 2
