@@ -65,7 +65,7 @@ def test_without_a_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     session = recorded(tmp_path, "uniform", "none:")
     words = ["study", str(session), "--zoi", "32,64", "--roi", "all", "--out", str(tmp_path / "a")]
     assert main(words) == 4
-    assert "no force tells" in capsys.readouterr().err
+    assert "there is no force" in capsys.readouterr().err
     assert main([*words, "--static", "0,1.5", "--loaded", "5,6"]) == 0
     assert "take 64 px ZOIs" in capsys.readouterr().out  # the strain is even
 

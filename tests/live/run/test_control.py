@@ -162,7 +162,7 @@ class TareSetup:
     ) -> None:
         self.now, self.cell, self.told = 10.0, FakeCell(capacity_N), list[tuple[EventKind, Level, str]]()
         sample = LoadSample(10.0, force)
-        self.orders = TareControl(self.cell, lambda: measured, lambda: sample, self._tell, lambda: self.now)
+        self.controls = TareControl(self.cell, lambda: measured, lambda: sample, self._tell, lambda: self.now)
 
     def _tell(self, kind: EventKind, source: str, text: str, level: Level) -> None:
         self.told.append((kind, level, text))
@@ -170,7 +170,7 @@ class TareSetup:
     def refused(self) -> str:
         """The reason why a tare command is refused."""
         with pytest.raises(ControlRefused) as refused:
-            self.orders.tare()
+            self.controls.tare()
         return str(refused.value)
 
 
@@ -178,7 +178,7 @@ def test_under_load_in_mid_test_it_takes_two() -> None:
     bench = TareSetup()
     assert "800 N in mid-test" in bench.refused() and bench.cell.calls == [] and not bench.told
     bench.now += 2.9
-    bench.orders.tare()
+    bench.controls.tare()
     assert bench.cell.calls == ["tare"] and bench.told[-1][0] is EventKind.TARE
 
 
@@ -193,7 +193,7 @@ def test_a_late_second_order_is_a_first_one() -> None:
 def test_a_third_order_asks_again() -> None:
     bench = TareSetup()
     bench.refused()
-    bench.orders.tare()
+    bench.controls.tare()
     bench.refused()
     assert bench.cell.calls == ["tare"]
 
@@ -201,13 +201,13 @@ def test_a_third_order_asks_again() -> None:
 @pytest.mark.parametrize(("force", "capacity_N"), [(0.0, None), (0.9, 1000.0)])
 def test_without_load_one_order_is_enough(force: float, capacity_N: float | None) -> None:
     bench = TareSetup(force, capacity_N=capacity_N)
-    bench.orders.tare()
+    bench.controls.tare()
     assert bench.cell.calls == ["tare"]
 
 
 def test_before_the_test_one_order_is_enough() -> None:
     bench = TareSetup(measured=False)
-    bench.orders.tare()
+    bench.controls.tare()
     assert bench.cell.calls == ["tare"]
 
 
@@ -219,14 +219,14 @@ def test_a_load_that_is_not_known_is_not_none() -> None:
 def test_without_a_load_cell_there_is_nothing_to_tare() -> None:
     bench = TareSetup()
     bench.cell = FakeCell(None, "none")
-    bench.orders = TareControl(bench.cell, lambda: False, lambda: None, bench._tell, lambda: bench.now)
+    bench.controls = TareControl(bench.cell, lambda: False, lambda: None, bench._tell, lambda: bench.now)
     assert "no load cell" in bench.refused()
 
 
 def test_forced_and_undone_at_once() -> None:
     bench = TareSetup()
-    bench.orders.tare(FORCED)
-    bench.orders.tare(UNDO)
+    bench.controls.tare(FORCED)
+    bench.controls.tare(UNDO)
     assert bench.cell.calls == ["forced", "undo"]
     assert [kind for kind, *_ in bench.told] == [EventKind.TARE] * 2
 
@@ -234,6 +234,6 @@ def test_forced_and_undone_at_once() -> None:
 def test_an_undoing_is_no_confirmation() -> None:
     bench = TareSetup()
     bench.refused()
-    bench.orders.tare(UNDO)
+    bench.controls.tare(UNDO)
     bench.refused()
     assert bench.cell.calls == ["undo"]

@@ -43,12 +43,12 @@ def datasets(path: Path) -> dict[str, np.ndarray]:
 
 
 def differing(one: Path, other: Path) -> set[str]:
-    """Datasets of numbers that are not the same to the last bit, but for what may never be."""
+    """Datasets that are not the same to the last bit, except settings, times and the number of threads."""
     first, second = datasets(one), datasets(other)
     assert len(first) > 20
     assert first.keys() == second.keys()
     differ = {name for name in first if first[name].tobytes() != second[name].tobytes()}
-    return {name for name in differ if first[name].dtype != "O"} - {"entry/config", "entry/mean/kernel_s"}
+    return differ - {"entry/config", "entry/mean/kernel_s", "entry/versions"}
 
 
 def until(true: Callable[[], bool], seconds: float = 60.0) -> None:

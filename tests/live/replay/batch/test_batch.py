@@ -65,7 +65,7 @@ def test_rows_of_a_task_are_flushed_seldom(
     """Nobody would have them from a broken one; those of a replay can be followed."""
     session, paces = str(runs / "hole-1" / "session.h5"), []
     monkeypatch.setattr(
-        strain_h5, "Pace", lambda every_s, now: paces.append(every_s) or FlushTimer(every_s, now)
+        strain_h5, "FlushTimer", lambda every_s, now: paces.append(every_s) or FlushTimer(every_s, now)
     )
     settings = {"measure.zoi": 48, "measure.step": 12}
     row = perform(Task("task", str(tmp_path), session, overrides=settings))

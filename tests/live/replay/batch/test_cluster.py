@@ -268,9 +268,9 @@ def test_on_a_busy_machine_dask_is_started_again(
     assert len(tries) == 3
 
 
-def test_a_worker_that_does_not_see_the_results_is_refused() -> None:
+def test_a_worker_without_the_folder_of_the_results_is_refused() -> None:
     with pytest.raises(ConfigError, match="does not find --out"):
-        cluster.check("tcp://a:1", {"tcp://b:1": answer(sees=False)})
+        cluster.check("tcp://a:1", {"tcp://b:1": answer(has_token=False)})
 
 
 def test_threads_that_are_too_many_are_told() -> None:
