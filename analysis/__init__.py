@@ -5,8 +5,8 @@
 >>> field = kernel.measure(deformed)
 >>> field.mean("exx")
 
-Nothing here knows of files, threads, devices or the clock. Compiled code (numba) is loaded when
-the first ``PhaseKernel`` is made; ``warm_up`` does that ahead of a test. The first kernel of a process measures a
+This package uses no files, threads, devices or clock. Compiled code (numba) is loaded when the first
+``PhaseKernel`` is made; ``warm_up`` does that ahead of a test. The first kernel of a process measures a
 known pattern first, and a machine that measures it wrong is refused (``MachineError``).
 """
 

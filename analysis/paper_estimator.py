@@ -5,16 +5,16 @@ code for random patterns. What it does, in the order of the paper:
 
 - section 2.2: whole-pixel correlation (eq. 2-3), then displacement from the phases of all usable
   frequencies of a bi-triangular window, by pseudo-inverse (eq. 4-5), unweighted, in one shot;
-- section 3.1: the deformed picture is laid over the reference by linear interpolation of grey levels;
+- section 3.1: the deformed picture is overlaid on the reference by linear interpolation of grey levels;
   derivatives of the phases through the derivative of a Gaussian window (eq. 6-9); the six affine
   modes from all of them together, by least squares with a sensitivity matrix that numerical
   deformations of each reference ZOI have calibrated ("in situ").
 
 Mended: (3) correlates instead of convolving; (4) carries the sign of the kernel exp(-ik.x); (8) has
-1/|k| instead of |k| (here implied by the calibration); (9) has the derivative of the window it
-speaks of; four reference deformations become six, since two translations, a rotation and a shear
+1/|k| instead of |k| (here implied by the calibration); (9) has the derivative of the window that
+it names; four reference deformations become six, since two translations, a rotation and a shear
 span no normal strain. Where the paper is silent the choice is a field of ``PaperSettings``.
-It knows no noise, no uncertainty and no rejection.
+It has no noise, no uncertainty and no rejection.
 
 A property of the printed recipe shows here: reading at a fraction a of a pixel by linear
 interpolation adds a (1 - a)/2 d2f/dx2, and under a Gaussian window that is, to phase derivatives, a
@@ -57,7 +57,7 @@ class PaperSettings:
         How the deformed picture is translated before the strain: by the displacement found, with linear
         interpolation (section 3.1, step 1), or by whole pixels (section 2.2), which interpolates nothing.
     iterations : int
-        How often the deformed picture is laid over the reference for the strain: 1 is one shot after
+        How often the deformed picture is overlaid on the reference for the strain: 1 is one shot after
         the translation; more until convergence, as the paper describes.
     search_px : int, px
         Whole-pixel search to either side.

@@ -1,8 +1,7 @@
-"""A pattern of known motion and strain, and how far off it is measured.
+"""The self-test of a machine: whether it computes and measures right what has a known result.
 
-Whether the linear algebra library computes what has a known result in whole numbers.
-
-Whether this machine measures a known pattern right, and what it measures with.
+The linear algebra library solves problems whose results are whole numbers, and the kernel measures a pattern of known
+motion and strain. A machine that is out of limits measures nothing; the message names its libraries.
 """
 
 from __future__ import annotations
@@ -24,19 +23,19 @@ STEP = 8
 """Pixels from one of the 2 x 2 ZOIs to the next."""
 LEVEL_GL, CONTRAST_GL = 2000.0, 400.0
 WAVES = 24
-SLOWEST, FASTEST = 0.03, 0.12
+MIN_FREQUENCY, MAX_FREQUENCY = 0.03, 0.12
 """Cycles per pixel of the waves of the pattern: what splines of degree 3 and 5 interpolate well."""
 GOLDEN = math.pi * (3 - math.sqrt(5))
 """Turn from one wave to the next, so that the pattern has no direction."""
-SMALLEST = 8
-LARGEST = {"spectral": 128, "phase": 64}
+MIN_SIZE = 8
+MAX_SIZE = {"spectral": 128, "phase": 64}
 """Sides of ZOIs, px. The estimator by phases needs much more time for large ones."""
 ERROR_PX = {1: 0.25, 3: 0.005, 5: 0.0005}
 """Largest error of a displacement by the degree of the spline. A machine that works shows up to half of it with
 degree 1, which interpolates badly, and a twentieth with degree 5, which tests use."""
 
 
-class Way(NamedTuple):
+class SelfTestCase(NamedTuple):
     """What of the settings the self-test depends on; ``size`` in px is that of a ZOI."""
 
     window: Window
@@ -46,13 +45,13 @@ class Way(NamedTuple):
     size: int
 
     @property
-    def tested(self) -> Way:
+    def tested(self) -> SelfTestCase:
         """The one that stands for it. Loops are the same for all sizes, only the time is not."""
-        return self._replace(size=min(max(self.size, SMALLEST), LARGEST[self.estimator]))
+        return self._replace(size=min(max(self.size, MIN_SIZE), MAX_SIZE[self.estimator]))
 
 
-Measure = Callable[[NDArray[np.float32], NDArray[np.float32], ZoiGrid, Way], StrainField]
-"""Measures a deformed picture (the second) against a reference, in this way."""
+Measure = Callable[[NDArray[np.float32], NDArray[np.float32], ZoiGrid, SelfTestCase], StrainField]
+"""Measures a deformed picture (the second) against a reference, with these settings."""
 
 
 class KnownMotion(NamedTuple):
@@ -79,17 +78,17 @@ class Errors(NamedTuple):
     refused: int
 
 
-def limits(way: Way) -> Errors:
+def limits(case: SelfTestCase) -> Errors:
     """What a machine may be off: a gradient by what moves the edge of a ZOI as far as ``ERROR_PX``."""
-    length = ERROR_PX[way.interpolant]
-    return Errors(length, length / (way.size / 2), 0)
+    length = ERROR_PX[case.interpolant]
+    return Errors(length, length / (case.size / 2), 0)
 
 
-def errors_of(measure: Measure, way: Way) -> Errors:
+def errors_of(measure: Measure, case: SelfTestCase) -> Errors:
     """How far off a known pattern is measured."""
-    inside, side = way.size + STEP, way.size + STEP + 2 * MARGIN
-    grid = ZoiGrid.cover(Roi(MARGIN, MARGIN, inside, inside), way.size, STEP)
-    field = measure(picture(side, STILL), picture(side, MOVED), grid, way)
+    inside, side = case.size + STEP, case.size + STEP + 2 * MARGIN
+    grid = ZoiGrid.cover(Roi(MARGIN, MARGIN, inside, inside), case.size, STEP)
+    field = measure(picture(side, STILL), picture(side, MOVED), grid, case)
     middle = (side - 1) / 2
     x, y = np.meshgrid(grid.x - middle, grid.y - middle)
     length = np.stack([
@@ -111,7 +110,7 @@ def picture(side: int, motion: KnownMotion) -> NDArray[np.float32]:
     a, b, c, d = 1 + motion.du_dx, motion.du_dy, motion.dv_dx, 1 + motion.dv_dy
     scale = 1 / (a * d - b * c)
     n = np.arange(WAVES)
-    k = 2 * math.pi * (SLOWEST + (FASTEST - SLOWEST) * (n + 0.5) / WAVES)
+    k = 2 * math.pi * (MIN_FREQUENCY + (MAX_FREQUENCY - MIN_FREQUENCY) * (n + 0.5) / WAVES)
     kx, ky = k * np.cos(GOLDEN * n), k * np.sin(GOLDEN * n)
     along_x, along_y = scale * (d * kx - c * ky), scale * (a * ky - b * kx)
     phase = 1.7 * n**2 - along_x * motion.u - along_y * motion.v
@@ -129,7 +128,7 @@ SIDE = 48
 """Of the matrices that are multiplied: more than the blocks that libraries cut them into."""
 
 
-def wrong_algebra() -> str:
+def algebra_fault() -> str:
     """The first function of numpy whose result is wrong, by name; empty where all are right."""
     for name, check in _CHECKS.items():
         try:
@@ -207,45 +206,45 @@ class MachineError(RuntimeError):
     """This machine computes wrong numbers: nothing may be measured on it."""
 
 
-def check(measure: Measure, way: Way) -> None:
-    """Solve known problems and measure a known pattern, once a process and way of measuring; a few ms.
+def check(measure: Measure, case: SelfTestCase) -> None:
+    """Solve known problems and measure a known pattern, once a process and case; a few ms.
 
     What passed is not tested again; what failed is, and fails again.
 
     Raises
     ------
     MachineError
-        Something is out of limits. The message says what, and names the libraries.
+        Something is out of limits. The message names what, and the libraries.
     """
     _check_algebra()
-    _check_measuring(measure, way.tested)
+    _check_measuring(measure, case.tested)
 
 
 @lru_cache(maxsize=1)
 def _check_algebra() -> None:
-    wrong = wrong_algebra()
+    wrong = algebra_fault()
     if wrong:
         raise MachineError(f"{wrong} gives a wrong result on this machine; {_what_to_do()}")
 
 
 @lru_cache(maxsize=256)
-def _check_measuring(measure: Measure, way: Way) -> None:
-    wrong = wrong_measuring(measure, way)
+def _check_measuring(measure: Measure, case: SelfTestCase) -> None:
+    wrong = measuring_fault(measure, case)
     if wrong:
         raise MachineError(
-            f"this machine does not measure a known pattern right (self-test with ZOIs of {way.size} px: {wrong}); "
+            f"this machine does not measure a known pattern right (self-test with ZOIs of {case.size} px: {wrong}); "
             f"{_what_to_do()}"
         )
 
 
-def wrong_measuring(measure: Measure, way: Way) -> str:
+def measuring_fault(measure: Measure, case: SelfTestCase) -> str:
     """What is wrong with the measuring of a known pattern; empty where nothing is."""
     try:
         with np.errstate(all="ignore"):  # whatever comes of a wrong library is looked at below
-            found = errors_of(measure, way)
+            found = errors_of(measure, case)
     except (ValueError, ArithmeticError, IndexError) as error:
         return f"{type(error).__name__}: {error}"
-    allowed = limits(way)
+    allowed = limits(case)
     if found.refused:
         return f"{found.refused} of 4 ZOIs have no value"
     if found.length <= allowed.length and found.slope <= allowed.slope:

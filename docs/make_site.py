@@ -1,8 +1,8 @@
 """Makes the pages of documentation: ``make docs``, or ``python -m docs.make_site`` with the extra ``docs``.
 
-README, docs and examples are copied into one folder in the same arrangement, so that the links between them work.
-mkdocs (mkdocs.yml) makes ``build/site`` of them, and mkdocstrings the reference from the docstrings. A dead link is an
-error.
+README, docs and examples are laid side by side as they lie here, so that every link between them holds; mkdocs
+(mkdocs.yml) makes ``build/site`` of them, and mkdocstrings the reference from the docstrings. A link that leads nowhere
+ends it with an error.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ PAGES = ROOT / "build" / "pages"
 REFERENCE = {
     "Kernel, grid and field": "analysis",
     "Gauges and figures of a test": "analysis.evaluate",
-    "A finished run": "live.results.run_folder",
     "Results": "live.results",
+    "A finished run": "live.results.run_folder",
     "Export": "live.results.export",
     "Report": "live.results.report",
     "Replay": "live.replay",
@@ -31,8 +31,8 @@ REFERENCE = {
 HIDDEN = ("__pycache__", "*.pyc", "make_*.py", "layers.py", "__init__.py")
 
 
-def copy_pages() -> None:
-    """Copy all sources of pages into one folder, the README as its first page."""
+def lay_out() -> None:
+    """All sources of pages in one folder, the README as its first page."""
     shutil.rmtree(PAGES, ignore_errors=True)
     PAGES.mkdir(parents=True)
     shutil.copy(ROOT / "README.md", PAGES / "index.md")
@@ -46,13 +46,13 @@ def copy_pages() -> None:
 def reference() -> str:
     """The page that mkdocstrings fills from the docstrings."""
     parts = [f"## {words}\n\n::: {module}\n" for words, module in REFERENCE.items()]
-    head = "# Reference\n\nFrom the docstrings. These names are public; others may change without notice.\n"
+    head = "# Reference\n\nFrom the docstrings. These names are public; the rest may change without notice.\n"
     return "\n".join([head, *parts])
 
 
 def main() -> int:
-    """Copy and build; return the exit code of mkdocs."""
-    copy_pages()
+    """Lay out and build; mkdocs' own exit code."""
+    lay_out()
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-f", str(ROOT / "mkdocs.yml")]
     code = subprocess.run(command, cwd=ROOT, check=False).returncode
     if code == 0:

@@ -14,7 +14,7 @@ from acquire.errors import PhasedicError
 from acquire.printable import brief, printable
 from live.commands.arguments import Command, parse
 from live.commands.exit_codes import EXIT_INTERRUPTED
-from live.commands.streams import unhurried_streams
+from live.commands.streams import nonblocking_streams
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -22,29 +22,29 @@ def main(argv: Sequence[str] | None = None) -> int:
     _replace_closed_streams()
     try:
         command, arguments = parse(sys.argv[1:] if argv is None else argv)
-        with unhurried_streams():
+        with nonblocking_streams():
             _set_up_logging(arguments)
-            code = _outcome(command, arguments)
+            code = _run(command, arguments)
     except KeyboardInterrupt:  # before or after the command
         code = _interrupted()
-    _let_go_of_lost_streams()
+    _drop_lost_streams()
     return code
 
 
 def _replace_closed_streams() -> None:
-    """Let a stream that was closed before we began lead nowhere, so that no file of ours gets its number."""
+    """Open closed standard streams on the null device, so that no other file gets their number."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)
         except OSError:
-            os.open(os.devnull, os.O_RDWR)  # takes the lowest free number: this one
+            os.open(os.devnull, os.O_RDWR)  # gets the lowest free number: this one
         if getattr(sys, name) is None:
             stream = os.fdopen(number, "w" if number else "r", encoding="utf-8", closefd=False)
             setattr(sys, name, stream)
 
 
-def _let_go_of_lost_streams() -> None:
-    """A terminal or pipe that has gone must not turn the exit code into Python's 120."""
+def _drop_lost_streams() -> None:
+    """Drop a terminal or pipe that is closed; else Python would exit with 120."""
     for stream in (sys.stdout, sys.stderr):
         try:
             stream.flush()
@@ -55,16 +55,18 @@ def _let_go_of_lost_streams() -> None:
 
 def _set_up_logging(arguments: argparse.Namespace) -> None:
     verbose = getattr(arguments, "verbose", False)
-    handler = _OverTheStatusLine(sys.stderr)
-    long = "%(asctime)s %(levelname)s %(name)s: %(message)s"
-    handler.setFormatter(_Harmless(long if verbose else "%(asctime)s %(levelname)s %(message)s", "%H:%M:%S"))
+    handler = _StatusLineHandler(sys.stderr)
+    detailed = "%(asctime)s %(levelname)s %(name)s: %(message)s"
+    handler.setFormatter(
+        _PrintableFormatter(detailed if verbose else "%(asctime)s %(levelname)s %(message)s", "%H:%M:%S")
+    )
     logging.basicConfig(level=logging.DEBUG if verbose else logging.WARNING, handlers=[handler])
     for name in ("acquire", "analysis", "live", "hw_mocks"):
         logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.INFO)
 
 
-class _OverTheStatusLine(logging.StreamHandler[TextIO]):
-    """On a terminal a message takes the place of the status line, which comes again below it."""
+class _StatusLineHandler(logging.StreamHandler[TextIO]):
+    """On a terminal, a message replaces the status line; the next status line follows below it."""
 
     def emit(self, record: logging.LogRecord) -> None:
         if self.stream.isatty():
@@ -72,15 +74,15 @@ class _OverTheStatusLine(logging.StreamHandler[TextIO]):
         super().emit(record)
 
 
-class _Harmless(logging.Formatter):
-    """Messages may hold words out of a file or a device."""
+class _PrintableFormatter(logging.Formatter):
+    """Makes messages printable; they may contain text of a file or a device."""
 
     def format(self, record: logging.LogRecord) -> str:
         return printable(super().format(record))
 
 
-def _outcome(command: Command, arguments: argparse.Namespace) -> int:
-    """Run the command; what it raises becomes a message and an exit code."""
+def _run(command: Command, arguments: argparse.Namespace) -> int:
+    """Run the command; an exception becomes a message and an exit code."""
     try:
         return command(arguments)
     except PhasedicError as error:

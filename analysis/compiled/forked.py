@@ -1,4 +1,4 @@
-"""A process that was forked off after its parent had measured has none of the parent's threads.
+"""A process that was forked off after its parent had measured lacks the threads of the parent.
 
 GNU OpenMP then ends the child without an exception, and a pool of such children waits for ever.
 """
@@ -8,13 +8,13 @@ from __future__ import annotations
 import os
 
 
-class Threads:
+class ForkGuard:
     """In which process the threads of the loops were started."""
 
     def __init__(self) -> None:
         self._process: int | None = None
 
-    def use(self) -> None:
+    def check(self) -> None:
         """To be called before the loops run; raises RuntimeError where they would not come back."""
         if self._process is None:
             self._process = os.getpid()
@@ -25,4 +25,4 @@ class Threads:
             )
 
 
-THREADS = Threads()
+FORK_GUARD = ForkGuard()

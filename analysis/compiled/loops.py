@@ -53,10 +53,10 @@ def parallel(function: Callable[..., Any]) -> Any:
     time in place of 25 for the iteration).
     """
     options = {"error_model": "numpy", "fastmath": FAST, "cache": True, "nogil": True, "parallel": True}
-    return InTurn(_stamped(numba.njit(function, **options)))
+    return ExclusiveLoop(_stamped(numba.njit(function, **options)))
 
 
-class InTurn:
+class ExclusiveLoop:
     """A loop that all threads of the program take in turn.
 
     Each uses all cores, so that two at once gain nothing, and where numba finds neither OpenMP nor TBB they
@@ -71,17 +71,17 @@ class InTurn:
 
     def __call__(self, *arguments: Any) -> Any:
         """Run the loop, once no other one runs."""
-        with InTurn._turn:
-            if not InTurn._started:
+        with ExclusiveLoop._turn:
+            if not ExclusiveLoop._started:
                 threading_layer()
-                InTurn._started = True
+                ExclusiveLoop._started = True
             return self.dispatcher(*arguments)
 
 
 def _stamped(dispatcher: Any) -> Any:
     """The same, compiled anew when any of the compiled modules has changed.
 
-    numba itself looks only at the file of the function, and would run the old code of its helpers.
+    numba itself compares only the file of the function, and would run the old code of its helpers.
     """
     try:
         file = _cache_file(dispatcher)
@@ -94,18 +94,18 @@ def _stamped(dispatcher: Any) -> Any:
 
 
 def stamp(package: Path) -> tuple[tuple[str, float, int], ...]:
-    """Name, time and size of every module of the rooms of a package in which loops are compiled.
+    """Name, time and size of every module of the folders of a package in which loops are compiled.
 
-    All modules of such a room: compiled code keeps the values of the constants that it was compiled with.
+    All modules of such a folder: compiled code keeps the values of the constants that it was compiled with.
     """
-    rooms = {m.parent for m in package.rglob("*.py") if _COMPILED.search(m.read_text("utf-8"))}
-    modules = sorted(m for room in rooms for m in room.glob("*.py"))
+    folders = {m.parent for m in package.rglob("*.py") if _COMPILED.search(m.read_text("utf-8"))}
+    modules = sorted(m for folder in folders for m in folder.glob("*.py"))
     return tuple((m.relative_to(package).as_posix(), m.stat().st_mtime, m.stat().st_size) for m in modules)
 
 
 @lru_cache(maxsize=1)
 def digest() -> str:
-    """What tells these loops from those of another version, whatever time stands on their files."""
+    """A hash of the sources of these loops, whatever the times of their files."""
     modules = (_PACKAGE / name for name, _, _ in _own_stamp())
     return hashlib.sha256(b"".join(module.read_bytes() for module in modules)).hexdigest()[:12]
 

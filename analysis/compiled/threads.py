@@ -1,12 +1,10 @@
-"""Keeping the threads of a loop apart: on Linux a worker that wakes up may be put on the core of the one that woke it.
+"""The threads of a loop: each kept on a core of its own, and the work shared among them as they come for it.
 
-It stays there while another core is idle: the scheduler looks again only some milliseconds later, and a frame is
-measured in that time. On two cores, a frame every 30 ms, nine of ten were measured on one of them. Where the caller
-only waits (``layer``) its core is as good as any: there a thread leaves the core on which another one has begun.
-Elsewhere nothing is done. OMP_PROC_BIND has the same effect, but it binds the calling thread too, and every thread and
-process that it starts.
-
-Sharing work among threads as they come for it.
+On Linux a worker that wakes up may be put on the core of the one that woke it, and stays there while another core
+is idle: the scheduler moves it only some milliseconds later, and a frame is measured in that time. On two cores, a
+frame every 30 ms, nine of ten were measured on one of them. Where the caller only waits (``layer``) its core is as
+good as any: there a thread leaves the core on which another one has begun. Other systems need nothing.
+OMP_PROC_BIND has the same effect, but it binds the calling thread too, and every thread and process that it starts.
 
 numba gives each thread its half beforehand; beside another busy program, or the threads of a live test, the thread
 that lost its core for a while is waited for. Here too each begins with a half of its own, since pieces side by side
@@ -33,6 +31,9 @@ from analysis.compiled.layer import caller_works
 from analysis.compiled.loops import helper
 
 LINUX = sys.platform == "linux"
+SHARES = 64
+"""Ranges that the pieces are cut into, whatever the number of threads; a thread begins with the first of its share of
+them and goes through all. For so many threads at most there is work."""
 _WORDS = 16
 """Of 64 bits: as many cores as the C library's own sets have."""
 _INT, _LONG = ir.IntType(32), ir.IntType(64)
@@ -109,16 +110,11 @@ def keep_apart(calling: Any) -> None:
         _set_cores(others)
 
 
-SHARES = 64
-"""Ranges that the pieces are cut into, whatever the number of threads; a thread begins with the first of its share of
-them and goes through all. For so many threads at most there is work."""
-
-
 @helper
 def next_piece(counters: Any, share: int, pieces: int) -> Any:
     """The number of the next of so many pieces, from the range ``share`` on; -1 when all are taken.
 
-    ``counters`` (SHARES,) int64, zero at first, says how many of each range are taken.
+    ``counters`` (SHARES,) int64, zero at first, has how many of each range are taken.
     """
     for i in range(SHARES):
         of = (share + i) % SHARES

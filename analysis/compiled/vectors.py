@@ -1,10 +1,9 @@
-"""Vectors of float32 in compiled loops, said outright: numba's own vectors leave half of the processor idle.
+"""Explicit vectors of float32 in compiled loops: numba's own vectors leave half of the processor idle.
 
 A loop over pixels that numba turns into vectors by itself first checks that its arrays do not overlap,
 which for a row of 32 pixels takes as long as the row, and uses half of a 512-bit unit. With these
 functions a compiled loop handles ``LANES`` pixels at a time, with + - * between vectors. Any array is
-taken as flat memory, C order, and nothing is checked: the caller sees to it that index .. index + LANES
-lies inside.
+taken as flat memory, C order, and nothing is checked: index .. index + LANES must lie inside.
 
 A row of 32 px took 62 ns in place of 175 (Xeon with AVX-512, numba 0.68, November 2026). Tried and rejected: 512-bit
 vectors made by the compiler against LLVM's preference (3 to 10 % faster without rotation, 10 % slower with it); helpers
@@ -168,7 +167,7 @@ def load_from(_typing: Any, place: Any, samples: Any) -> Any:
 
 
 def _fetching(level: int) -> Any:
-    """Asks for the cache line of a sample of a float32 array; any index (uintp) will do, it is not read."""
+    """Prefetch of the cache line of a sample of a float32 array; any index (uintp) will do, it is not read."""
 
     @intrinsic
     def ask_for(_typing: Any, array: Any, index: Any) -> Any:

@@ -1,26 +1,26 @@
-"""Figures from fields: what a test engineer or a map wants of them.
+"""Figures from fields: what a test engineer or a map needs.
 
 ``gauge_kinds`` are virtual ``gauges`` and extensometers on a field, by the ``extension`` of two ends. ``tensile``
 evaluates a test: a ``curve`` by one of the ``standards``, its ``elastic`` line and its ``strengths``, each a
-``figure`` with an interval, from ``series`` of noisy values. ``lag`` tells how late the
-load comes beside the frames. ``floor`` has the still phase of a test and the noise floor in it.
-``deconvolution`` takes the blur of the ZOI off a map.
+``figure`` with an interval. ``lag`` is the delay of the load beside the frames. ``floor`` has the still phase of
+a test and the noise floor in it. ``deconvolution`` removes the blur of the ZOI from a map.
 """
 
 from analysis.evaluate.curve import Curve, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import LoadAxis, load_axis, principal_direction
-from analysis.evaluate.figure import CONFIDENCE, STANDARDS, Band, Figure, Interval, Standard, free
-from analysis.evaluate.floor import FEWEST_STILL, NoiseFloor, evenly, noise_floor, still_phase
+from analysis.evaluate.figure import CONFIDENCE, Figure
+from analysis.evaluate.floor import MIN_STILL_INSTANTS, NoiseFloor, evenly, noise_floor, still_phase
 from analysis.evaluate.gauge_kinds import GAUGE_KINDS, AreaGauge, LineGauge, TransverseGauge, ZoiGauge
 from analysis.evaluate.gauges import Gauge, GaugeValue, Parameter, inside_polygon
 from analysis.evaluate.lag import Track, find_lag
+from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
 from analysis.evaluate.tensile import Span, StrainZero, TensileFigures, TensileOptions, ZeroBy, evaluate_test
 
 __all__ = [
     "CONFIDENCE",
-    "FEWEST_STILL",
     "GAUGE_KINDS",
+    "MIN_STILL_INSTANTS",
     "STANDARDS",
     "AreaGauge",
     "Band",

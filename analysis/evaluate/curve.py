@@ -1,9 +1,8 @@
-"""The stress-strain curve of a test: what is known of it, where it breaks, and its true stresses.
+"""The stress-strain curve of a test and what is read from noisy values over time.
 
-Arrays in, arrays out; nothing is corrected here. Strain is dimensionless, stress in Pa (or any multiple of
-the force), tension positive.
-
-Values over time: their noise, their mean course, and a value between samples.
+A curve has a part that can be evaluated (``Loading``), a break and true stresses. Its series of values have noise, a
+running mean, and a value between samples. Arrays in, arrays out; nothing is corrected here. Strain is dimensionless,
+stress in Pa (or any multiple of the force), tension positive.
 """
 
 from __future__ import annotations
@@ -14,89 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-_MEDIAN_OF_NORMAL = 0.6745
-
-
-def noise(values: Floats) -> float:
-    """Standard deviation of white noise on a smooth course, from second differences; 0 of fewer than 5 values.
-
-    Parameters
-    ----------
-    values : (N,) float64
-        At equal distances in time. The median keeps steps and kinks out.
-    """
-    second = np.diff(values[np.isfinite(values)], n=2)
-    if len(second) < 3:
-        return 0.0
-    return float(np.median(np.abs(second))) / _MEDIAN_OF_NORMAL / math.sqrt(6)
-
-
-def smoothed(values: Floats, half: int) -> Floats:
-    """Running mean over 2 ``half`` + 1 values; fewer, and still symmetric, towards the ends, (N,)."""
-    n = len(values)
-    total = np.concatenate([[0.0], np.cumsum(values)])
-    reach = np.minimum(half, np.minimum(np.arange(n), np.arange(n)[::-1]))
-    k = np.arange(n)
-    return np.asarray((total[k + reach + 1] - total[k - reach]) / (2 * reach + 1))
-
-
-@dataclass(frozen=True, slots=True)
-class UncertainValue:
-    """A value, its standard uncertainty, and its slope a sample."""
-
-    value: float
-    sigma: float
-    slope: float
-
-
-def reading(values: Floats, at: float, first: int, last: int, least_sigma: float = 0.0) -> UncertainValue:
-    """The value at a place between samples, by a parabola through ``values[first:last]``.
-
-    Parameters
-    ----------
-    values : (N,) float64
-    at : float, samples
-    first, last : int
-        A straight line between the two neighbours is taken where there are fewer than 6 samples.
-    least_sigma : float
-        Noise of one value, where that of the fit is smaller.
-    """
-    first, last = max(first, 0), min(last, len(values))
-    if last - first < 6:
-        return _between(values, at, least_sigma)
-    k = np.arange(first, last) - at
-    design = np.vander(k, 3, increasing=True)
-    normal = np.linalg.inv(design.T @ design)
-    found = normal @ (design.T @ values[first:last])
-    rest = values[first:last] - design @ found
-    scatter = math.sqrt(float(rest @ rest) / (len(k) - 3))
-    return UncertainValue(
-        float(found[0]), max(scatter, least_sigma) * math.sqrt(normal[0, 0]), float(found[1])
-    )
-
-
-def _between(values: Floats, at: float, sigma: float) -> UncertainValue:
-    if len(values) < 2:
-        return UncertainValue(float(values[0]), sigma, 0.0)
-    k = min(max(math.floor(at), 0), len(values) - 2)
-    slope = float(values[k + 1] - values[k])
-    return UncertainValue(float(values[k] + (at - k) * slope), sigma, slope)
-
-
-def first_crossing(values: Floats, level: float, start: int = 0) -> float:
-    """Where ``values`` first reach ``level`` from below, in samples; NaN where they never do, or begin above."""
-    above = np.flatnonzero(values[start:] >= level)
-    if not len(above) or above[0] == 0:
-        return math.nan
-    k = start + int(above[0])
-    return k - 1 + float((level - values[k - 1]) / (values[k] - values[k - 1]))
-
-
 Floats = NDArray[np.float64]
-
 _BROKEN = 0.02  # of the highest stress: below it there is no specimen any more
 _FALL = 5.0  # times what is usual from one sample to the next
 _PARTS, _WIDEST = 60, 4  # of a loading: half the width of its running means, and the most, samples
+_MEDIAN_OF_NORMAL = 0.6745
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -223,3 +144,76 @@ def true_curve(strain: Floats, stress: Floats) -> tuple[Floats, Floats]:
     uniform = np.arange(len(stress)) <= int(np.nanargmax(stress))
     stretch = np.where(uniform & (strain > -1), 1 + strain, math.nan)
     return np.log(stretch), stress * stretch
+
+
+@dataclass(frozen=True, slots=True)
+class UncertainValue:
+    """A value, its standard uncertainty, and its slope a sample."""
+
+    value: float
+    sigma: float
+    slope: float
+
+
+def reading(values: Floats, at: float, first: int, last: int, min_sigma: float = 0.0) -> UncertainValue:
+    """The value at a place between samples, by a parabola through ``values[first:last]``.
+
+    Parameters
+    ----------
+    values : (N,) float64
+    at : float, samples
+    first, last : int
+        A straight line between the two neighbours is taken where there are fewer than 6 samples.
+    min_sigma : float
+        Noise of one value, where that of the fit is smaller.
+    """
+    first, last = max(first, 0), min(last, len(values))
+    if last - first < 6:
+        return _between(values, at, min_sigma)
+    k = np.arange(first, last) - at
+    design = np.vander(k, 3, increasing=True)
+    normal = np.linalg.inv(design.T @ design)
+    found = normal @ (design.T @ values[first:last])
+    rest = values[first:last] - design @ found
+    scatter = math.sqrt(float(rest @ rest) / (len(k) - 3))
+    return UncertainValue(float(found[0]), max(scatter, min_sigma) * math.sqrt(normal[0, 0]), float(found[1]))
+
+
+def _between(values: Floats, at: float, sigma: float) -> UncertainValue:
+    if len(values) < 2:
+        return UncertainValue(float(values[0]), sigma, 0.0)
+    k = min(max(math.floor(at), 0), len(values) - 2)
+    slope = float(values[k + 1] - values[k])
+    return UncertainValue(float(values[k] + (at - k) * slope), sigma, slope)
+
+
+def noise(values: Floats) -> float:
+    """Standard deviation of white noise on a smooth course, from second differences; 0 of fewer than 5 values.
+
+    Parameters
+    ----------
+    values : (N,) float64
+        At equal distances in time. The median keeps steps and kinks out.
+    """
+    second = np.diff(values[np.isfinite(values)], n=2)
+    if len(second) < 3:
+        return 0.0
+    return float(np.median(np.abs(second))) / _MEDIAN_OF_NORMAL / math.sqrt(6)
+
+
+def smoothed(values: Floats, half: int) -> Floats:
+    """Running mean over 2 ``half`` + 1 values; fewer, and still symmetric, towards the ends, (N,)."""
+    n = len(values)
+    total = np.concatenate([[0.0], np.cumsum(values)])
+    reach = np.minimum(half, np.minimum(np.arange(n), np.arange(n)[::-1]))
+    k = np.arange(n)
+    return np.asarray((total[k + reach + 1] - total[k - reach]) / (2 * reach + 1))
+
+
+def first_crossing(values: Floats, level: float, start: int = 0) -> float:
+    """Where ``values`` first reach ``level`` from below, in samples; NaN where they never do, or begin above."""
+    above = np.flatnonzero(values[start:] >= level)
+    if not len(above) or above[0] == 0:
+        return math.nan
+    k = start + int(above[0])
+    return k - 1 + float((level - values[k - 1]) / (values[k] - values[k - 1]))

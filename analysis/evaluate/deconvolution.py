@@ -1,6 +1,6 @@
-"""An option for showing maps: take off the blur of the ZOI's window, at the price of noise.
+"""An option for showing maps: remove the blur of the ZOI's window, at the price of noise.
 
-Never applied to stored data; whoever shows such a map says so. An affine measurement under a Gaussian
+Never applied to stored data; a map shown so must be labelled. An affine measurement under a Gaussian
 window passes a sine with the transform W of that window, displacement and gradients alike. Blurring
 a map again passes W once more, so sums of repeated blurs make any polynomial of W; this module makes
 
@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 PASSES = 4
 """Order of the zero of the response where the window passes nothing: the more, the sharper its end."""
 
-_RIDGE = 1e-9  # of the slopes of a plane through points that do not tell them
+_RIDGE = 1e-9  # of the slopes of a plane that its points do not determine
 _LOST = 0.1  # what a sine has lost at the period called l_10%
 
 
@@ -51,7 +51,7 @@ class Effect:
 
 
 def deconvolved(values: Floats, grid: ZoiGrid, steps: int = 7) -> Floats:
-    """A map of an affine measurement under the Gaussian window, with the window's blur taken off.
+    """A map of an affine measurement under the Gaussian window, with the window's blur removed.
 
     Linear in the values. Constant and linear maps come back as they were, at borders and beside gaps
     too: where values are missing, a blur is the value of the plane fitted with the same weights. An edge

@@ -1,7 +1,7 @@
 """The elastic line of a stress-strain curve: modulus by regression and by chord, Poisson's ratio, direction.
 
 The noise of an optical strain is no smaller than that of the force, so that a least-squares line of stress
-over strain would be too flat; the line here knows of both noises (W. E. Deming, Statistical Adjustment of
+over strain would be too flat; the line here allows for both noises (W. E. Deming, Statistical Adjustment of
 Data, 1943; W. A. Fuller, Measurement Error Models, 1987, doi:10.1002/9780470316665, section 1.3).
 """
 
@@ -19,7 +19,7 @@ from analysis.evaluate.figure import Figure
 
 Floats = NDArray[np.float64]
 
-FEWEST = 8
+MIN_POINTS = 8
 """Points that a line needs."""
 
 _CLEAR = 20.0  # standard deviations of the noise that strains must move to have a direction
@@ -77,7 +77,7 @@ def line_through(loading: Loading, first: int, last: int) -> FittedLine | None:
     """The line through the points ``first:last``; None where they are too few or do not rise."""
     x, y = loading.strain[first:last], loading.stress[first:last]
     n = len(x)
-    if n < FEWEST:
+    if n < MIN_POINTS:
         return None
     dx, dy = x - x.mean(), y - y.mean()
     sxx, sxy, syy = float(dx @ dx), float(dx @ dy), float(dy @ dy)
@@ -138,9 +138,9 @@ def poisson(loading: Loading, line: FittedLine) -> Figure:
     across, stress = loading.transverse[line.first : line.last], loading.stress[line.first : line.last]
     known = np.isfinite(across)
     n = int(known.sum())
-    if n < FEWEST:
+    if n < MIN_POINTS:
         return Figure.none(
-            f"the transverse strain is known at {n} points of the elastic part, {FEWEST} are needed"
+            f"the transverse strain is known at {n} points of the elastic part, {MIN_POINTS} are needed"
         )
     ds, dt = stress[known] - stress[known].mean(), across[known] - across[known].mean()
     sss = float(ds @ ds) - (n - 1) * loading.noise_stress**2
@@ -166,8 +166,8 @@ def principal_direction(exx: Floats, eyy: Floats, exy: Floats) -> Figure:
     """
     known = np.isfinite(exx) & np.isfinite(eyy) & np.isfinite(exy)
     n = int(known.sum())
-    if n < FEWEST:
-        return Figure.none(f"strains are known at {n} instants, {FEWEST} are needed")
+    if n < MIN_POINTS:
+        return Figure.none(f"strains are known at {n} instants, {MIN_POINTS} are needed")
     cloud = np.stack([exx[known] - eyy[known], 2 * exy[known]])
     moved = cloud - cloud.mean(axis=1, keepdims=True)
     away = np.hypot(cloud[0] - cloud[0, 0], cloud[1] - cloud[1, 0])
@@ -191,14 +191,14 @@ class LoadAxis:
     ----------
     axis : "x" or "y"
     found : bool
-        Whether the strains tell it; else it is what was given, or y.
-    off : Figure
+        Whether it follows from the strains; else it is as given, or y.
+    angle : Figure
         Angle from the axis to the direction whose length changes most, rad, positive clockwise on the screen.
     """
 
     axis: Literal["x", "y"]
     found: bool
-    off: Figure
+    angle: Figure
 
 
 def load_axis(exx: Floats, eyy: Floats, exy: Floats, given: str = "auto") -> LoadAxis:
@@ -222,9 +222,9 @@ def load_axis(exx: Floats, eyy: Floats, exy: Floats, given: str = "auto") -> Loa
         axis = "x" if given == "x" else "y"
         return LoadAxis(axis, False, offs[axis])
     axis = "x" if abs(offs["x"].value) < math.pi / 4 else "y"
-    off = offs[axis]
-    found = max(abs(off.low), abs(off.high)) < math.pi / 4
-    return LoadAxis(axis if found else "y", found, off if found else offs["y"])
+    found = max(abs(offs[axis].low), abs(offs[axis].high)) < math.pi / 4
+    axis = axis if found else "y"
+    return LoadAxis(axis, found, offs[axis])
 
 
 def _is_longest(angle: float, exx: Floats, eyy: Floats, exy: Floats) -> bool:
@@ -240,13 +240,13 @@ def _is_longest(angle: float, exx: Floats, eyy: Floats, exy: Floats) -> bool:
 
 def _turned(angle: Figure, at: float) -> Figure:
     """From the direction ``at`` (rad), of two ways the nearer."""
-    off = angle.minus(at)
-    return off.minus(math.pi * round(off.value / math.pi)) if off.known else off
+    turned = angle.minus(at)
+    return turned.minus(math.pi * round(turned.value / math.pi)) if turned.known else turned
 
 
-def _ends(values: Floats, line: FittedLine, least_sigma: float) -> tuple[UncertainValue, UncertainValue]:
+def _ends(values: Floats, line: FittedLine, min_sigma: float) -> tuple[UncertainValue, UncertainValue]:
     reach = max(3, round(_END * line.n))
     first, last = (
-        reading(values, k, k - reach, k + reach + 1, least_sigma) for k in (line.first, line.last - 1)
+        reading(values, k, k - reach, k + reach + 1, min_sigma) for k in (line.first, line.last - 1)
     )
     return first, last

@@ -13,11 +13,11 @@ from analysis.evaluate.curve import noise
 
 Floats = NDArray[np.float64]
 
-FEWEST_STILL = 2
+MIN_STILL_INSTANTS = 2
 """Still instants that a noise floor needs."""
 
 _FORCE = 0.01  # of the range of the force
-_LOADED = 10.0  # standard deviations of its noise that a force must range over; noise alone ranges over 9
+_MIN_RANGE = 10.0  # standard deviations of its noise that a force must range over; noise alone ranges over 9
 _SIGMAS = 5.0
 
 
@@ -39,8 +39,8 @@ def still_phase(force: Floats, means: Mapping[str, tuple[Floats, Floats]] | None
     """The number of instants at the start of a test in which nothing moves.
 
     They end before the first one whose force differs from the first value by more than 1 % of the range of the
-    force, or is not known. The strains have no say there: instants chosen by their strain would lack the very
-    scatter that is looked for. Only where the force does not tell (it is not known at the first instant, or does
+    force, or is not known. The strains do not count there: instants chosen by their strain would lack the very
+    scatter that is measured. Only where the force does not decide (it is not known at the first instant, or does
     not range over more than its noise) the still phase ends before the first mean strain beyond 5 of its
     standard uncertainties.
 
@@ -51,24 +51,24 @@ def still_phase(force: Floats, means: Mapping[str, tuple[Floats, Floats]] | None
     means : mapping of str to two (T,) float64, optional
         Mean strains with their standard uncertainties.
     """
-    if _tells(force):
+    if _force_decides(force):
         return _leading(np.abs(force - force[0]) <= _FORCE * np.ptp(force[np.isfinite(force)]))
     within = [np.abs(mean) <= _SIGMAS * sigma for mean, sigma in (means or {}).values()]
     return _leading(np.all(within, axis=0)) if within else 0
 
 
-def _tells(force: Floats) -> bool:
+def _force_decides(force: Floats) -> bool:
     known = force[np.isfinite(force)]
-    return bool(len(force)) and math.isfinite(force[0]) and float(np.ptp(known)) > _LOADED * noise(known)
+    return bool(len(force)) and math.isfinite(force[0]) and float(np.ptp(known)) > _MIN_RANGE * noise(known)
 
 
 def _leading(good: NDArray[np.bool_]) -> int:
     return len(good) if good.all() else int(np.argmin(good))
 
 
-def evenly(count: int, most: int) -> NDArray[np.intp]:
-    """At most ``most`` of ``count`` places, from the first to the last."""
-    return np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(np.intp))
+def evenly(count: int, max_count: int) -> NDArray[np.intp]:
+    """At most ``max_count`` of ``count`` places, from the first to the last."""
+    return np.unique(np.linspace(0, count - 1, min(max_count, count)).round().astype(np.intp))
 
 
 def noise_floor(maps: Iterable[tuple[Floats, Floats]], *, planes: bool = False) -> NoiseFloor | None:

@@ -65,13 +65,13 @@ class ZoiGauge(Gauge):
 
     at: Point = field(metadata=_AT.metadata)
     value: str = field(default="eyy", metadata=_VALUE.metadata)
-    kind, label, usual, gesture = "zoi", "Point", "point", "click"
+    kind, label, default_name, gesture = "zoi", "Point", "point", "click"
     hint = "Click a place."
 
     def __post_init__(self) -> None:
         check_value(self.name, self.value)
 
-    def chosen(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         return (zois_near(grid, self.at, 0),)
 
     def measure(self, field: StrainField) -> GaugeValue:
@@ -85,7 +85,7 @@ class ZoiGauge(Gauge):
         return (self.at,)
 
     @classmethod
-    def placed(cls, handles: Sequence[Point]) -> dict[str, Any]:
+    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
         return {"at": near_px(handles[0])}
 
 
@@ -112,7 +112,7 @@ class AreaGauge(Gauge):
     corners: tuple[Point, ...] | None = field(default=None, metadata=_CORNERS.metadata)
     value: str = field(default="eyy", metadata=_VALUE.metadata)
     statistic: Statistic = field(default="mean", metadata=_STATISTIC.metadata)
-    kind, label, usual, gesture = "area", "Area", "area", "box"
+    kind, label, default_name, gesture = "area", "Area", "area", "box"
     hint = "Drag a rectangle: its mean strain."
 
     def __post_init__(self) -> None:
@@ -125,7 +125,7 @@ class AreaGauge(Gauge):
             known = ", ".join(_STATISTIC.choices)
             raise ValueError(f"gauge {self.name}: unknown statistic {self.statistic!r}; known: {known}")
 
-    def chosen(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         return (zois_inside(grid, self._polygon()),)
 
     def measure(self, field: StrainField) -> GaugeValue:
@@ -138,7 +138,7 @@ class AreaGauge(Gauge):
         return self.corners or self._polygon()[::2]
 
     @classmethod
-    def placed(cls, handles: Sequence[Point]) -> dict[str, Any]:
+    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
         if len(handles) == 2:
             return {"box": box_between(*handles)}
         return {"corners": tuple(near_px(place) for place in handles)}
@@ -163,7 +163,7 @@ class LineGauge(Gauge):
     start: Point = field(metadata=_START.metadata)
     end: Point = field(metadata=_END.metadata)
     radius_px: float | None = field(default=None, metadata=_RADIUS.metadata)
-    kind, label, usual, gesture = "line", "Extensometer", "axial", "line"
+    kind, label, default_name, gesture = "line", "Extensometer", "axial", "line"
     hint = "Drag from one end of the extensometer to the other."
 
     def __post_init__(self) -> None:
@@ -172,7 +172,7 @@ class LineGauge(Gauge):
         if self.radius_px is not None and not self.radius_px > 0:
             raise ValueError(f"gauge {self.name}: the radius must be positive, got {self.radius_px}")
 
-    def chosen(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         reach = self.radius_px or grid.size / 2
         return tuple(zois_near(grid, end, reach) for end in (self.start, self.end))
 
@@ -187,7 +187,7 @@ class LineGauge(Gauge):
         return self.start, self.end
 
     @classmethod
-    def placed(cls, handles: Sequence[Point]) -> dict[str, Any]:
+    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
         return {"start": near_px(handles[0]), "end": near_px(handles[-1])}
 
 
@@ -207,7 +207,7 @@ class TransverseGauge(Gauge):
 
     box: Box = field(metadata=_BOX.metadata)
     along: Literal["x", "y"] = field(default="x", metadata=_ALONG.metadata)
-    kind, label, usual, gesture = "transverse", "Transverse", "transverse", "box"
+    kind, label, default_name, gesture = "transverse", "Transverse", "transverse", "box"
     hint = "Drag a rectangle: strain across the load."
 
     def __post_init__(self) -> None:
@@ -216,7 +216,7 @@ class TransverseGauge(Gauge):
         if self.along not in ("x", "y"):
             raise ValueError(f"gauge {self.name}: along is x or y, got {self.along!r}")
 
-    def chosen(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         x, y, width, height = self.box
         if self.along == "x":
             third = width / 3
@@ -236,7 +236,7 @@ class TransverseGauge(Gauge):
         return corners_of(self.box)[::2]
 
     @classmethod
-    def placed(cls, handles: Sequence[Point]) -> dict[str, Any]:
+    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
         return {"box": box_between(handles[0], handles[-1])}
 
 

@@ -27,14 +27,14 @@ Mask = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 Statistic = Literal["mean", "largest", "smallest"]
 
-LEAST_SHARE = 0.5
+MIN_SHARE = 0.5
 """A gauge has a value as long as this share of the ZOIs of an area, or of each of its ends, has one."""
 _ROUND = 24  # corners of a circle that is drawn
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """What a parameter of a gauge may be; it stands in the metadata of its field.
+    """The kind, bounds and choices of a parameter of a gauge, in the metadata of its field.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class GaugeValue:
     Attributes
     ----------
     value, sigma : float
-        Strain, or the unit of the value asked for; NaN where there is none.
+        Strain, or the unit of the gauge's value; NaN where there is none.
     reason : str
         Why there is none; empty where there is one.
     """
@@ -92,8 +92,8 @@ class Gauge(ABC):
         Of its button on a page, and what to do with the mouse.
     gesture : "click", "line" or "box"
         How it is drawn: at one place, from one place to another, or between two opposite corners.
-    usual : str
-        The name of a new one.
+    default_name : str
+        Of a new one.
     """
 
     name: str
@@ -101,17 +101,17 @@ class Gauge(ABC):
     label: ClassVar[str]
     hint: ClassVar[str]
     gesture: ClassVar[Literal["click", "line", "box"]]
-    usual: ClassVar[str]
+    default_name: ClassVar[str]
 
     @abstractmethod
-    def chosen(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         """The ZOIs that lie where the gauge is, (R, C) bool: one mask, or one for each of its two ends."""
 
     @abstractmethod
     def measure(self, field: StrainField) -> GaugeValue:
         """Its value with its standard uncertainty.
 
-        NaN with a reason where fewer than ``LEAST_SHARE`` of its ZOIs, or of those of one end, have a value.
+        NaN with a reason where fewer than ``MIN_SHARE`` of its ZOIs, or of those of one end, have a value.
         """
 
     @abstractmethod
@@ -124,7 +124,7 @@ class Gauge(ABC):
 
     @classmethod
     @abstractmethod
-    def placed(cls, handles: Sequence[Point]) -> dict[str, Any]:
+    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
         """The parameters of a gauge with these handles, or drawn from the first to the second of them."""
 
     @classmethod
@@ -143,16 +143,16 @@ class Gauge(ABC):
         """
         known = cls.parameters()
         given = {key: value for key, value in table.items() if key in known and value is not None}
-        usual = {key: one.by_axis[axis] for key, one in known.items() if one.by_axis is not None}
+        by_axis = {key: one.by_axis[axis] for key, one in known.items() if one.by_axis is not None}
         needed = (f.name for f in fields(cls) if f.name in known and f.default is MISSING)
         for key in needed:
             if key not in given:
                 raise ValueError(f"a gauge of kind {cls.kind!r} needs {key!r}")
-        return cls(name, **(usual | given))
+        return cls(name, **(by_axis | given))
 
     def zois(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         """The active ZOIs that it takes, (R, C) bool: one mask, or one for each of its two ends."""
-        return tuple(mask & grid.active for mask in self.chosen(grid))
+        return tuple(mask & grid.active for mask in self.select(grid))
 
 
 # -- what kinds are made of ------------------------------------------------------------------------
@@ -194,7 +194,7 @@ def _missing(chosen: Mask, field: StrainField) -> str:
             f" {grid.y[-1]:g} px"
         )
     lost = Counter(Status(int(s)) for s in field.status[chosen] if s != Status.OK)
-    if total - lost.total() >= max(LEAST_SHARE * total, 1):
+    if total - lost.total() >= max(MIN_SHARE * total, 1):
         return ""
     words = ", ".join(f"{n} {status.name}" for status, n in lost.most_common())
     return f"{lost.total()} of {total} ZOIs have no value ({words})"

@@ -1,8 +1,8 @@
 """How late the load comes beside the frames, from the test itself.
 
 Up to the end of the elastic part the strain follows the force: strain(t) = a + b force(t + lag). The lag is
-the one for which the two fit best. It is seen where the force changes its pace, at the onset above all: on
-a straight ramp alone a lag and an offset are the same, and the answer is that it cannot be told.
+the one for which the two fit best. It shows where the force changes its pace, at the onset above all: on
+a straight ramp alone a lag and an offset are the same, and there is no answer.
 """
 
 from __future__ import annotations
@@ -18,24 +18,16 @@ from analysis.evaluate.figure import Figure, quantile
 
 Floats = NDArray[np.float64]
 
-FEWEST = 20
+MIN_FRAMES = 20
 """Frames that a lag needs."""
 
 _SMOOTH_S = 0.15  # over which the pace of the force is read
 _GRID_S = 0.02
 _STEPS = 20
-_SHARES = (
-    0.2,
-    0.25,
-    0.3,
-    0.38,
-    0.47,
-    0.6,
-    0.75,
-    1.0,
-)  # of the highest force: how far the elastic part is tried to reach
+_SHARES = (0.2, 0.25, 0.3, 0.38, 0.47, 0.6, 0.75, 1.0)
+"""Of the highest force: how far the elastic part is tried to reach."""
 _CURVED = 3.5  # standard deviations of a curvature that ends the elastic part
-_APART_S, _ALONE = 0.2, 20.0  # a lag this far away must fit worse by this many variances
+_APART_S, _SEPARATION = 0.2, 20.0  # a lag this far away must fit worse by this many variances
 _KNOWN = 0.95  # of the information that must come from the force itself and not from its noise
 
 
@@ -52,7 +44,7 @@ class Track:
         return Track(self.t[good], self.values[good])
 
 
-def find_lag(strain: Track, force: Track, most: float = 1.0, worst: float = 0.1) -> Figure:
+def find_lag(strain: Track, force: Track, max_lag: float = 1.0, max_half_width: float = 0.1) -> Figure:
     """The time by which the force is stamped later than the strain it belongs to.
 
     Parameters
@@ -61,88 +53,88 @@ def find_lag(strain: Track, force: Track, most: float = 1.0, worst: float = 0.1)
         Of the frames, one value a measurement.
     force : Track, N
         Of the load cell, at its own times.
-    most : float, s
-        Lags up to this, early or late, are looked for.
-    worst : float, s
+    max_lag : float, s
+        Lags up to this, early or late, are tried.
+    max_half_width : float, s
         A half-width of the interval above this is no answer.
 
     Returns
     -------
     Figure, s
-        Positive where the load comes late: the force at the time t of a frame is force(t + lag). ``why`` says
-        in words why there is none.
+        Positive where the load comes late: the force at the time t of a frame is force(t + lag). ``why`` is
+        the reason why there is none.
     """
     strain, force = strain.known(), force.known()
-    if why := _too_little(strain, force, most):
+    if why := _too_little(strain, force, max_lag):
         return Figure.none(why)
     best: _Fit | None = None
     for share in _SHARES:
-        part = _elastic(strain, force, share, most)
-        if len(part.t) < FEWEST:
+        part = _elastic(strain, force, share, max_lag)
+        if len(part.t) < MIN_FRAMES:
             continue
-        fit = _fit(part, force, most, noise(strain.values))
+        fit = _fit(part, force, max_lag, noise(strain.values))
         if not fit.straight:
             break
         best = fit
     if best is None:
         return Figure.none(
-            f"nowhere from the start on do {FEWEST} frames follow the force in a straight line; begin to measure some"
-            " seconds before the load"
+            f"nowhere from the start on do {MIN_FRAMES} frames follow the force in a straight line;"
+            " begin to measure some seconds before the load"
         )
-    return _judged(best, most, worst)
+    return _accepted(best, max_lag, max_half_width)
 
 
 @dataclass(frozen=True, slots=True)
 class _Fit:
-    """What a part of the test says.
+    """The lag over a part of the test.
 
     lag and its uncertainty (s); by how many variances any other lag fits worse; how significantly the strain
     follows the force; whether in a straight line; and the share of what is known of the lag that the noise of
-    the force does not feign.
+    the force does not imitate.
     """
 
     lag: float
     sigma: float
     n: int
-    alone: float
-    followed: float
+    separation: float
+    significance: float
     straight: bool
     known: float
 
 
-def _too_little(strain: Track, force: Track, most: float) -> str:
-    if len(strain.t) < FEWEST:
-        return f"{len(strain.t)} frames have a strain, {FEWEST} are needed"
-    if len(force.t) < FEWEST:
-        return f"{len(force.t)} load samples, {FEWEST} are needed"
-    if strain.t[-1] - strain.t[0] < 2 * most or force.t[-1] - force.t[0] < 2 * most:
-        return f"the test is shorter than twice the largest lag looked for, {most:g} s"
+def _too_little(strain: Track, force: Track, max_lag: float) -> str:
+    if len(strain.t) < MIN_FRAMES:
+        return f"{len(strain.t)} frames have a strain, {MIN_FRAMES} are needed"
+    if len(force.t) < MIN_FRAMES:
+        return f"{len(force.t)} load samples, {MIN_FRAMES} are needed"
+    if strain.t[-1] - strain.t[0] < 2 * max_lag or force.t[-1] - force.t[0] < 2 * max_lag:
+        return f"the test is shorter than twice the largest lag looked for, {max_lag:g} s"
     if np.ptp(force.values) <= 10 * noise(force.values):
         return "the force does not change beyond its noise"
     return ""
 
 
-def _elastic(strain: Track, force: Track, share: float, most: float) -> Track:
+def _elastic(strain: Track, force: Track, share: float, max_lag: float) -> Track:
     """The frames until the force reaches ``share`` of its highest, that have force around them at any lag."""
     base = float(np.median(force.values[: max(len(force.t) // 50, 3)]))
     swing = np.abs(force.values - base)
-    end = min(float(force.t[np.argmax(swing >= share * swing.max())]), force.t[-1] - most - _SMOOTH_S)
-    inside = (strain.t >= force.t[0] + most + _SMOOTH_S) & (strain.t <= end)
+    end = min(float(force.t[np.argmax(swing >= share * swing.max())]), force.t[-1] - max_lag - _SMOOTH_S)
+    inside = (strain.t >= force.t[0] + max_lag + _SMOOTH_S) & (strain.t <= end)
     return Track(strain.t[inside], strain.values[inside])
 
 
-def _fit(part: Track, force: Track, most: float, usual: float) -> _Fit:
-    """The best lag over ``part``. ``usual`` is the noise of one strain: a fit that leaves much more is not straight."""
-    lags = np.arange(-most, most + _GRID_S / 2, _GRID_S)
+def _fit(part: Track, force: Track, max_lag: float, noise_strain: float) -> _Fit:
+    """The best lag over ``part``; a fit that leaves much more than the noise of one strain is not straight."""
+    lags = np.arange(-max_lag, max_lag + _GRID_S / 2, _GRID_S)
     left = np.array([_left(part, force, lag)[0] for lag in lags])
     lag = float(lags[np.argmin(left)])
     for _ in range(_STEPS):
         step = float(np.clip(_step(part, force, lag), -_GRID_S, _GRID_S))
-        lag = float(np.clip(lag + step, -most, most))
+        lag = float(np.clip(lag + step, -max_lag, max_lag))
         if abs(step) < 1e-5:
             break
     elsewhere = left[np.abs(lags - lag) > _APART_S]
-    return _weighed(part, force, lag, float(elsewhere.min()) if len(elsewhere) else 0.0, usual)
+    return _assessed(part, force, lag, float(elsewhere.min()) if len(elsewhere) else 0.0, noise_strain)
 
 
 def _columns(part: Track, force: Track, lag: float) -> tuple[Floats, Floats]:
@@ -178,7 +170,7 @@ def _step(part: Track, force: Track, lag: float) -> float:
     return float(np.linalg.lstsq(full, part.values, rcond=None)[0][2])
 
 
-def _weighed(part: Track, force: Track, lag: float, elsewhere: float, usual: float) -> _Fit:
+def _assessed(part: Track, force: Track, lag: float, elsewhere: float, noise_strain: float) -> _Fit:
     shape, pace = _columns(part, force, lag)
     left, line = _left(part, force, lag)
     n = len(part.t)
@@ -189,13 +181,13 @@ def _weighed(part: Track, force: Track, lag: float, elsewhere: float, usual: flo
     level = shape[:, 1] - shape[:, 1].mean()
     bent = _without(level**2, np.column_stack([shape, pace]))
     curved = abs(float(bent @ part.values)) / math.sqrt(float(bent @ bent) * variance)
-    expected = max(usual, 1e-15) ** 2 * (1 + 5 * math.sqrt(2 / n))
+    expected = max(noise_strain, 1e-15) ** 2 * (1 + 5 * math.sqrt(2 / n))
     return _Fit(
         lag=lag,
         sigma=math.sqrt(variance / true) if true > 0 else math.inf,
         n=n,
-        alone=(elsewhere - left) / variance,
-        followed=abs(line[1]) * math.sqrt(float(level @ level) / variance),
+        separation=(elsewhere - left) / variance,
+        significance=abs(line[1]) * math.sqrt(float(level @ level) / variance),
         straight=curved < _CURVED and variance < expected,
         known=1 - spurious / information if information > 0 else 0.0,
     )
@@ -208,20 +200,20 @@ def _without(values: Floats, columns: Floats) -> Floats:
 
 def _pace_noise(force: Track) -> float:
     """Standard deviation that the noise of the force puts into its pace."""
-    # Of samples that come in bunches, several with one stamp, the mean distance tells, not the median.
+    # Of samples that come in bunches, several with one stamp, the mean distance counts, not the median.
     spacing = float(np.median(np.diff(force.t))) or float(np.ptp(force.t)) / (len(force.t) - 1)
     samples = max(_SMOOTH_S / spacing, 1.0)
     return noise(force.values) * math.sqrt(2 / samples) / _SMOOTH_S
 
 
-def _judged(fit: _Fit, most: float, worst: float) -> Figure:
-    if fit.followed < 10:
+def _accepted(fit: _Fit, max_lag: float, max_half_width: float) -> Figure:
+    if fit.significance < 10:
         return Figure.none("the strain does not follow the force")
     half = quantile(fit.n - 3) * fit.sigma
-    if fit.known < _KNOWN or fit.alone < _ALONE or not half <= worst:
+    if fit.known < _KNOWN or fit.separation < _SEPARATION or not half <= max_half_width:
         return Figure.none(
             "the force rises too evenly to tell a lag from an offset; begin to measure some seconds before the load"
         )
-    if abs(fit.lag) > 0.95 * most:
-        return Figure.none(f"no lag within {most:g} s fits; the clocks differ by more")
+    if abs(fit.lag) > 0.95 * max_lag:
+        return Figure.none(f"no lag within {max_lag:g} s fits; the clocks differ by more")
     return Figure.about(fit.lag, fit.sigma, fit.n - 3)

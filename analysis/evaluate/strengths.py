@@ -23,7 +23,7 @@ _TRANSIENT, _PLATEAU = (
     0.0025,
 )  # strain after ReH: its undershoot, and where ReL is looked for (clause 12)
 _ABOUT = 0.25  # of a proof strain: the part of the curve that its stress is read from
-_BEFORE = 5  # samples whose rise tells what may lie between two of them
+_BEFORE = 5  # samples whose rise bounds what may lie between two of them
 _SURE = 4.0  # standard deviations that a fall must exceed
 
 

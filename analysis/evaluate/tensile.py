@@ -1,7 +1,7 @@
 """A tensile test evaluated: modulus, Poisson's ratio, strengths, extensions and rates, each with its interval.
 
-``evaluate_test`` takes a ``Curve`` and a ``Standard``. The curve itself stays as it was measured; where its
-strain counts from is an option that the result tells of.
+``evaluate_test`` takes a ``Curve`` and a ``Standard``. The curve itself stays as it was measured; the zero of its
+strain is an option that the result names.
 """
 
 from __future__ import annotations
@@ -13,8 +13,9 @@ from typing import Literal
 import numpy as np
 
 from analysis.evaluate.curve import Curve, Loading, first_crossing, reading
-from analysis.evaluate.elastic import FEWEST, FittedLine, between, chord, line_through, poisson
-from analysis.evaluate.figure import STANDARDS, Band, Figure, Standard
+from analysis.evaluate.elastic import MIN_POINTS, FittedLine, between, chord, line_through, poisson
+from analysis.evaluate.figure import Figure
+from analysis.evaluate.standards import STANDARDS, Band, Standard
 from analysis.evaluate.strengths import (
     Yield,
     proof_strength,
@@ -72,7 +73,7 @@ class Span:
 
 @dataclass(frozen=True, slots=True)
 class TensileFigures:
-    """What a tensile test tells; every figure has an interval, or says why it cannot be had.
+    """The figures of a tensile test; each has an interval, or the reason why it cannot be had.
 
     Attributes
     ----------
@@ -134,7 +135,7 @@ def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> Tensil
     """
     options = options or TensileOptions()
     loading, strength = Loading.of(curve), tensile_strength(curve)
-    if loading.n < FEWEST or loading.stress[loading.top] <= 0:
+    if loading.n < MIN_POINTS or loading.stress[loading.top] <= 0:
         words = f"strain and a tensile stress are known together at {loading.n} points"
         return replace(_nothing(words, options), Rm=strength)
     elastic = _elastic(loading, options)
@@ -160,7 +161,7 @@ def _elastic(loading: Loading, options: TensileOptions) -> _Elastic | str:
             break
         line = line_through(loading, first, last)
         if line is None:
-            return f"{last - first} points {words}, and {FEWEST} that rise are needed"
+            return f"{last - first} points {words}, and {MIN_POINTS} that rise are needed"
         zero = _zero(loading, options, line)
         found = _Elastic(line, yield_point(loading, line), zero)
         known = [f for f in (found.flow.upper, proof_strength(loading, line, 0.002)) if f.known]
@@ -191,7 +192,7 @@ def _zero(loading: Loading, options: TensileOptions, line: FittedLine) -> Strain
             float(loading.strain[0]), "the first value; the preload was there from the beginning or never"
         )
     k = int(at)
-    value = reading(loading.strain, at, k - FEWEST, k + FEWEST, loading.noise_strain).value
+    value = reading(loading.strain, at, k - MIN_POINTS, k + MIN_POINTS, loading.noise_strain).value
     return StrainZero(value, "where the stress first reached the preload")
 
 

@@ -1,12 +1,9 @@
-"""Where strain is measured: the region of interest and the regular grid of ZOIs in it.
+"""Where strain is measured: the region of interest, the regular grid of ZOIs in it, and the window of a ZOI.
 
-A ZOI (zone of interest) is a square of ``size`` pixels; its centre is where its values stand.
-This module knows nothing of images or of how a ZOI is measured.
-
-The least-squares weight of a ZOI: one line of it, since all of them are separable.
-
-``gaussian`` has sigma = size/6. Where the paper speaks of an analysis window, the weight of its
-least squares is the square of that window (docs/method.md); here the window is the weight.
+A ZOI (zone of interest) is a square of ``size`` pixels; its values stand at its centre. The window is the
+least-squares weight of its pixels: a product of one line along x and the same line along y. ``gaussian`` has
+sigma = size/6. Where the paper has an analysis window, the weight of its least squares is the square of that
+window (docs/method.md); here the window is the weight.
 """
 
 from __future__ import annotations
@@ -21,50 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 
 Window = Literal["gaussian", "uniform", "tukey", "bi-triangular"]
 WINDOWS: tuple[Window, ...] = get_args(Window)
-
 TUKEY_FLANKS = 0.3
 """Share of the side of a "tukey" window that its two cosine flanks take together."""
-
-
-def profile(window: Window, size: int) -> NDArray[np.float64]:
-    """One line through the window, (size,), largest value about 1.
-
-    Raises
-    ------
-    ValueError
-        Unknown window; the message lists the known ones.
-    """
-    x: NDArray[np.float64] = np.arange(size, dtype=np.float64) - (size - 1) / 2
-    if window == "gaussian":
-        return np.asarray(np.exp(-0.5 * (6 * x / size) ** 2))
-    if window == "uniform":
-        return np.ones(size)
-    if window == "tukey":
-        return _tukey(x, size)
-    if window == "bi-triangular":
-        return np.asarray(1 - 2 * np.abs(x) / (size + 1))
-    raise ValueError(f"unknown window {window!r}; known: {', '.join(WINDOWS)}")
-
-
-def _tukey(x: NDArray[np.float64], size: int) -> NDArray[np.float64]:
-    flank = TUKEY_FLANKS * size / 2
-    depth = np.clip((size / 2 - np.abs(x)) / flank, 0, 1)
-    return np.asarray(0.5 * (1 - np.cos(np.pi * depth)))
-
-
-def overlap(window: Window, size: int, step: int, count: int, moment: int) -> NDArray[np.float64]:
-    """Correlation along one axis of two estimates whose ZOIs lie k steps apart, (count,).
-
-    For white pixel noise and a pattern without direction, the noise of an estimate weighs pixels
-    with x**moment w(x): moment 0 for a displacement and across a gradient, 1 along a gradient.
-    """
-    x = np.arange(size) - (size - 1) / 2
-    kernel = x**moment * profile(window, size)
-    full = np.correlate(kernel, kernel, mode="full")[size - 1 :] / (kernel @ kernel)
-    lags = np.arange(count) * step
-    return np.where(lags < size, full[np.minimum(lags, size - 1)], 0.0)
-
-
 MASK_COVERAGE = 0.99
 """A ZOI is active where at least this share of its window weight lies inside the mask."""
 
@@ -247,7 +202,7 @@ class ZoiGrid:
         return np.asarray(np.einsum("rkc,k->rc", over_x[self.first_y[:, None] + pixels], line))
 
     def to_dict(self) -> dict[str, Any]:
-        """What a file needs to know, beside ``active``; JSON values only."""
+        """What a file stores of it beside ``active``; JSON values only."""
         roi = self.roi
         return {
             "roi": {"x": roi.x, "y": roi.y, "width": roi.width, "height": roi.height},
@@ -261,3 +216,42 @@ class ZoiGrid:
         """The grid that ``to_dict`` described; all ZOIs are active unless ``active`` is given."""
         grid = cls.cover(Roi(**description["roi"]), description["size"], description["step"])
         return grid if active is None else grid.subset(active=active)
+
+
+def profile(window: Window, size: int) -> NDArray[np.float64]:
+    """One line through the window, (size,), largest value about 1.
+
+    Raises
+    ------
+    ValueError
+        Unknown window; the message lists the known ones.
+    """
+    x: NDArray[np.float64] = np.arange(size, dtype=np.float64) - (size - 1) / 2
+    if window == "gaussian":
+        return np.asarray(np.exp(-0.5 * (6 * x / size) ** 2))
+    if window == "uniform":
+        return np.ones(size)
+    if window == "tukey":
+        return _tukey(x, size)
+    if window == "bi-triangular":
+        return np.asarray(1 - 2 * np.abs(x) / (size + 1))
+    raise ValueError(f"unknown window {window!r}; known: {', '.join(WINDOWS)}")
+
+
+def _tukey(x: NDArray[np.float64], size: int) -> NDArray[np.float64]:
+    flank = TUKEY_FLANKS * size / 2
+    depth = np.clip((size / 2 - np.abs(x)) / flank, 0, 1)
+    return np.asarray(0.5 * (1 - np.cos(np.pi * depth)))
+
+
+def overlap(window: Window, size: int, step: int, count: int, moment: int) -> NDArray[np.float64]:
+    """Correlation along one axis of two estimates whose ZOIs lie k steps apart, (count,).
+
+    For white pixel noise and a pattern without direction, the noise of an estimate weighs pixels
+    with x**moment w(x): moment 0 for a displacement and across a gradient, 1 along a gradient.
+    """
+    x = np.arange(size) - (size - 1) / 2
+    kernel = x**moment * profile(window, size)
+    full = np.correlate(kernel, kernel, mode="full")[size - 1 :] / (kernel @ kernel)
+    lags = np.arange(count) * step
+    return np.where(lags < size, full[np.minimum(lags, size - 1)], 0.0)

@@ -1,4 +1,4 @@
-"""What a field says of the next one."""
+"""The motion that a field predicts for the next one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """What a field says of the next one, for its A active ZOIs.
+    """The motion of the A active ZOIs of a field, to predict the next one.
 
     Attributes
     ----------
@@ -23,7 +23,7 @@ class Motion:
     ahead : (A, modes)
         What to add to the parameters for the start in the next frame.
     age : (A,) uint8
-        Frames that this rests on.
+        Frames that it rests on.
     """
 
     index: NDArray[np.intp]
@@ -33,7 +33,7 @@ class Motion:
 
     @classmethod
     def none(cls, index: NDArray[np.intp], modes: int) -> Motion:
-        """Nothing known but the place."""
+        """No motion yet, of ZOIs at known places."""
         return cls(
             index, np.zeros((len(index), modes)), np.zeros((len(index), modes)), np.ones(len(index), np.uint8)
         )

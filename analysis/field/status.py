@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Status(IntEnum):
-    """What became of a ZOI; the numbers are what stands in files."""
+    """Whether a ZOI has a value, and why not; files store the numbers."""
 
     OK = 0
     NOT_MEASURED = 1

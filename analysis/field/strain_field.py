@@ -2,9 +2,8 @@
 
 Strains, rotation and principal values are derived here from the displacement gradient
 (docs/method.md); nothing is smoothed. x points right and y down on the screen, so a positive
-``omega`` is clockwise.
-
-The named values of a field as attributes: ``field.exx`` is ``field.value("exx")``, ``sigma_exx`` its sigma.
+``omega`` is clockwise. Named values are attributes: ``field.exx`` is
+``field.value("exx")``, ``sigma_exx`` its sigma.
 """
 
 from __future__ import annotations
@@ -34,8 +33,8 @@ from analysis.field.uncertainty import (
 )
 
 
-class Named(Protocol):
-    """What knows values by their names."""
+class NamedValues(Protocol):
+    """A result with values by their names."""
 
     def value(self, name: str, /) -> Floats: ...
 
@@ -43,7 +42,7 @@ class Named(Protocol):
 
 
 class Value:
-    """An attribute that is the value of its own name, (R, C); ``text`` says which and in what unit."""
+    """An attribute that is the value of its own name, (R, C); ``text`` describes it with its unit."""
 
     def __init__(self, text: str) -> None:
         self.__doc__ = text
@@ -56,12 +55,12 @@ class Value:
     def __get__(self, field: None, owner: type) -> Self: ...
 
     @overload
-    def __get__(self, field: Named, owner: type) -> Floats: ...
+    def __get__(self, field: NamedValues, owner: type) -> Floats: ...
 
-    def __get__(self, field: Named | None, owner: type) -> Self | Floats:
+    def __get__(self, field: NamedValues | None, owner: type) -> Self | Floats:
         return self if field is None else self.of(field)
 
-    def of(self, field: Named) -> Floats:
+    def of(self, field: NamedValues) -> Floats:
         return field.value(self.name)
 
 
@@ -74,7 +73,7 @@ class Sigma(Value):
     def __set_name__(self, owner: type, name: str) -> None:
         super().__set_name__(owner, name.removeprefix("sigma_"))
 
-    def of(self, field: Named) -> Floats:
+    def of(self, field: NamedValues) -> Floats:
         return field.sigma(self.name)
 
 
@@ -101,7 +100,7 @@ class StrainField:
     noise : float, GL
         Standard deviation of the deformed image that the uncertainty was computed with.
     window : str
-        The least-squares weight, which says how far neighbouring values are correlated.
+        The least-squares weight, from which the correlation of neighbouring values follows.
     motion : Motion, optional
         For the start in the next frame.
     measure : "small", "engineering", "green" or "hencky"
@@ -206,11 +205,11 @@ class StrainField:
 
     @property
     def refused(self) -> dict[Status, int]:
-        """How many ZOIs have no value for each reason, the commonest first; those not asked for are left out."""
+        """How many ZOIs have no value for each reason, the commonest first; NOT_MEASURED is left out."""
         found, counts = np.unique(self.status, return_counts=True)
         tally = {Status(int(s)): int(n) for s, n in zip(found, counts, strict=True)}
-        asked = {s: n for s, n in tally.items() if s not in (Status.OK, Status.NOT_MEASURED)}
-        return dict(sorted(asked.items(), key=lambda item: -item[1]))
+        refused = {s: n for s, n in tally.items() if s not in (Status.OK, Status.NOT_MEASURED)}
+        return dict(sorted(refused.items(), key=lambda item: -item[1]))
 
     @property
     def n_valid(self) -> int:
@@ -258,7 +257,7 @@ class StrainField:
     def mean(self, name: str, where: ArrayLike | None = None) -> tuple[float, float]:
         """Mean of a value over the valid ZOIs and the standard uncertainty of that mean.
 
-        Overlapping ZOIs see the same noise; their correlation, known from the window, is
+        Overlapping ZOIs have noise in common; their correlation, known from the window, is
         taken into account. (NaN, NaN) where no ZOI is valid.
 
         Parameters
@@ -275,10 +274,10 @@ class StrainField:
         value = fixed_sum(self.value(name)[chosen]) / count
         # A ZOI without predicted noise (sigma NaN) leaves the mean without a sigma, not without a value.
         variance = variance_of_sum(np.where(chosen, self.sigma(name), 0.0), name, self.grid, self.window)
-        return value, float(np.sqrt(max(variance, 0.0)) / count) * self._more(name, where)
+        return value, float(np.sqrt(max(variance, 0.0)) / count) * self._beyond_overlap(name, where)
 
-    def _more(self, name: str, where: ArrayLike | None) -> float:
-        """What the pattern of the ZOIs makes of the noise of a mean, over what their overlap says."""
+    def _beyond_overlap(self, name: str, where: ArrayLike | None) -> float:
+        """Noise of a mean that the pattern of the ZOIs makes, over that which follows from their overlap."""
         if self.sums is None:
             return 1.0
         gauge = self.grid.active if where is None else self.grid.active & np.asarray(where, bool)

@@ -1,6 +1,6 @@
 """Values as combinations of the fitted parameters, and the variance of their sums over overlapping ZOIs.
 
-Strain on the grid: small, engineering, Green-Lagrange, Hencky; principal values.
+Also the finite strain measures, since the names of values refer to them: small, engineering, Green-Lagrange, Hencky.
 """
 
 from __future__ import annotations
@@ -18,54 +18,12 @@ from analysis.field.grid import Window, ZoiGrid, overlap
 
 Floats = NDArray[np.float64]
 Measure = Literal["small", "engineering", "green", "hencky"]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class StrainTensor:
-    """Components of strain on the grid, each (R, C), dimensionless; exy is half the shear angle or its like."""
-
-    measure: Measure
-    exx: Floats
-    eyy: Floats
-    exy: Floats
-
-    @property
-    def principal(self) -> tuple[Floats, Floats, Floats]:
-        """Largest and smallest principal strain and the angle of the first to x, (R, C) each, rad."""
-        middle = (self.exx + self.eyy) / 2
-        radius = np.hypot((self.exx - self.eyy) / 2, self.exy)
-        angle = 0.5 * np.arctan2(2 * self.exy, self.exx - self.eyy)
-        return middle + radius, middle - radius, angle
-
-
-def elongations(cxx: Floats, cyy: Floats, cxy: Floats) -> StrainTensor:
-    """What an extensometer reads, from C = F^T F: the elongation of lines that lay along x and y, over their length.
-
-    exy is half of the change of the right angle between the two. No rotation changes any of it.
-    """
-    with np.errstate(invalid="ignore"):
-        along_x, along_y = np.sqrt(cxx), np.sqrt(cyy)
-        shear = np.arcsin(cxy / (along_x * along_y))
-    return StrainTensor("engineering", along_x - 1, along_y - 1, shear / 2)
-
-
-def half_logarithm(cxx: Floats, cyy: Floats, cxy: Floats) -> StrainTensor:
-    """ln(C)/2 of symmetric 2x2 matrices, through their eigenvalues."""
-    first, second, angle = StrainTensor("small", cxx, cyy, cxy).principal
-    with np.errstate(invalid="ignore", divide="ignore"):
-        h1, h2 = np.log(first) / 2, np.log(second) / 2
-    cos, sin = np.cos(angle), np.sin(angle)
-    return StrainTensor("hencky", h1 * cos**2 + h2 * sin**2, h1 * sin**2 + h2 * cos**2, (h1 - h2) * cos * sin)
-
-
-LANES = 64
-"""Sums that run side by side in ``fixed_sum``."""
 U, DU_DX, DU_DY, V, DV_DX, DV_DY = range(6)
+PARTIAL_SUMS = 64
+"""Sums that run side by side in ``fixed_sum``."""
 _PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]
 PAIR_INDEX = {pair: k for k, pair in enumerate(_PAIRS)} | {(j, i): k for k, (i, j) in enumerate(_PAIRS)}
 """Where the covariance of parameters i and j stands among the 21 of ``StrainField.covariance``."""
-
-
 # Each named value as a linear combination of u, du_dx, du_dy, v, dv_dx, dv_dy.
 _COMBINATIONS: Mapping[str, Mapping[int, float]] = {
     "u": {U: 1.0},
@@ -80,10 +38,8 @@ _COMBINATIONS: Mapping[str, Mapping[int, float]] = {
     "gamma_xy": {DU_DY: 1.0, DV_DX: 1.0},
     "omega": {DU_DY: -0.5, DV_DX: 0.5},
 }
-
-
 VALUES = tuple(_COMBINATIONS)
-"""Names that ``mean`` and ``sigma`` know."""
+"""Names of all values."""
 
 
 def combination(name: str) -> Mapping[int, float]:
@@ -99,14 +55,6 @@ def combination(name: str) -> Mapping[int, float]:
     return _COMBINATIONS[name]
 
 
-class Sums(Protocol):
-    """Who knows more of the noise of means than the overlap of windows says."""
-
-    def factor(self, name: str, where: NDArray[np.bool_]) -> float:
-        """Standard deviation of the mean of ``name`` over a gauge (R, C), over that of ``variance_of_sum``."""
-        ...
-
-
 @lru_cache(maxsize=len(VALUES))
 def products(name: str) -> tuple[tuple[int, float], ...]:
     """The variance of a named value as (which of the 21 covariances, factor); raises as ``combination``."""
@@ -114,11 +62,12 @@ def products(name: str) -> tuple[tuple[int, float], ...]:
     return tuple((PAIR_INDEX[i, j], a * b) for i, a in terms for j, b in terms)
 
 
-def fixed_sum(values: Floats) -> float:
-    """The sum of (N,) values, added in an order that no memory alignment changes: the same bits everywhere."""
-    whole = len(values) // LANES * LANES
-    rows = np.ascontiguousarray(values[:whole]).reshape(-1, LANES)
-    return math.fsum([*rows.sum(axis=0), *values[whole:]])
+class Sums(Protocol):
+    """The noise of means, more exactly than from the overlap of windows."""
+
+    def factor(self, name: str, where: NDArray[np.bool_]) -> float:
+        """Standard deviation of the mean of ``name`` over a gauge (R, C), over that of ``variance_of_sum``."""
+        ...
 
 
 def variance_of_sum(sigma: Floats, name: str, grid: ZoiGrid, window: Window) -> float:
@@ -144,3 +93,48 @@ def _correlations(
     rho = [overlap(window, size, step, n, moment) for n, moment in zip(shape, along, strict=True)]
     lags = [np.abs(np.subtract.outer(np.arange(n), np.arange(n))) for n in shape]
     return rho[0][lags[0]], rho[1][lags[1]]
+
+
+def fixed_sum(values: Floats) -> float:
+    """The sum of (N,) values, added in an order that no memory alignment changes: the same bits everywhere."""
+    whole = len(values) // PARTIAL_SUMS * PARTIAL_SUMS
+    rows = np.ascontiguousarray(values[:whole]).reshape(-1, PARTIAL_SUMS)
+    return math.fsum([*rows.sum(axis=0), *values[whole:]])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StrainTensor:
+    """Components of strain on the grid, each (R, C), dimensionless; exy is half the shear angle or its like."""
+
+    measure: Measure
+    exx: Floats
+    eyy: Floats
+    exy: Floats
+
+    @property
+    def principal(self) -> tuple[Floats, Floats, Floats]:
+        """Largest and smallest principal strain and the angle of the first to x, (R, C) each, rad."""
+        middle = (self.exx + self.eyy) / 2
+        radius = np.hypot((self.exx - self.eyy) / 2, self.exy)
+        angle = 0.5 * np.arctan2(2 * self.exy, self.exx - self.eyy)
+        return middle + radius, middle - radius, angle
+
+
+def elongations(cxx: Floats, cyy: Floats, cxy: Floats) -> StrainTensor:
+    """Engineering strain, from C = F^T F: the elongation of lines that lay along x and y, over their length.
+
+    exy is half of the change of the right angle between the two. No rotation changes any of it.
+    """
+    with np.errstate(invalid="ignore"):
+        along_x, along_y = np.sqrt(cxx), np.sqrt(cyy)
+        shear = np.arcsin(cxy / (along_x * along_y))
+    return StrainTensor("engineering", along_x - 1, along_y - 1, shear / 2)
+
+
+def half_logarithm(cxx: Floats, cyy: Floats, cxy: Floats) -> StrainTensor:
+    """Hencky strain, ln(C)/2 of symmetric 2x2 matrices, through their eigenvalues."""
+    first, second, angle = StrainTensor("small", cxx, cyy, cxy).principal
+    with np.errstate(invalid="ignore", divide="ignore"):
+        h1, h2 = np.log(first) / 2, np.log(second) / 2
+    cos, sin = np.cos(angle), np.sin(angle)
+    return StrainTensor("hencky", h1 * cos**2 + h2 * sin**2, h1 * sin**2 + h2 * cos**2, (h1 - h2) * cos * sin)

@@ -1,7 +1,4 @@
-"""A measured frame put together: residual and covariances of every ZOI, in compiled loops.
-
-How much of a ZOI lies on saturated pixels, in a compiled loop over the ZOIs.
-"""
+"""What a frame needs of every ZOI beside its fit, compiled: residual, covariances, share of saturated pixels."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from analysis.compiled.loops import helper, parallel
 
 RUN = 1024
 """ZOIs whose covariances are scaled at a time."""
-LEAST_GAIN = 0.1
+MIN_NOISE_GAIN = 0.1
 """The gain by which the noise of the deformed image is divided at least."""
 
 
@@ -44,7 +41,7 @@ def weigh(
         whole[z] = np.nan
         if measured[z]:
             from_reference[z] = reference[z]
-            whole[z] = reference[z] + current[z] / max(gain[z], LEAST_GAIN) ** 2
+            whole[z] = reference[z] + current[z] / max(gain[z], MIN_NOISE_GAIN) ** 2
 
 
 @parallel
@@ -82,12 +79,12 @@ def clipped_share(
     marked = np.ascontiguousarray(clipped).view(np.uint8)
     marked.flags.writeable = False  # numba takes what may be written for another type
     out = np.empty(len(first))
-    shares(marked, first, (line / line.sum()).astype(np.float32), out)
+    clipped_shares(marked, first, (line / line.sum()).astype(np.float32), out)
     return out
 
 
 @parallel
-def shares(marked: Any, first: Any, weight: Any, out: Any) -> None:
+def clipped_shares(marked: Any, first: Any, weight: Any, out: Any) -> None:
     """See ``clipped_share``; ``marked`` (H, W) uint8, ``out`` (A,) written."""
     size = weight.size
     for z in prange(len(first)):

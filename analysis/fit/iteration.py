@@ -4,7 +4,7 @@ One compiled loop over ZOIs; each is done by one thread from start to end, so it
 neither on the number of threads nor on the other ZOIs.
 
 A step of d px leaves about d (0.003 + 1.15 sigma_u + 0.03 d): the iteration stops by this measured law. A fixed share
-(0.12) in its place asked for two iterations where one was enough. The law holds for affine ZOIs with a uniform or
+(0.12) in its place needed two iterations where one was enough. The law holds for affine ZOIs with a uniform or
 Gaussian window; measure it again for another window.
 """
 
@@ -53,13 +53,13 @@ LEFT_BY_MISFIT = 0.003
 """The same without noise (measured: up to 0.002)."""
 LEFT_BY_LENGTH = 0.03
 """The same per px of the step, the next order of the expansion (measured: 0.004-0.03)."""
-LONGEST_STEP = 3.0
+MAX_STEP = 3.0
 """Pixels; a longer step at the edge of the ZOI is shortened to this."""
 CHUNK = 32
 """ZOIs that a thread takes at a time, where there are many."""
 AHEAD, BEYOND = 16, 3
-"""ZOIs ahead of the present one whose pixels are asked for; taps beyond the pixel that they make. Waiting for memory
-was 35 % of the time of the iteration without it and is 18 %; rows of the next ZOI, asked for once more, save another
+"""ZOIs ahead of the present one whose pixels are prefetched; taps beyond the pixel that they make. Waiting for memory
+was 35 % of the time of the iteration without it and is 18 %; rows of the next ZOI, prefetched once more, save another
 4 to 13 % (November 2026)."""
 
 
@@ -116,14 +116,14 @@ def compose(p: Any, order: int, d: Any) -> None:
 
 @inlined
 def _moments(
-    picture: Any, table: Any, fit: Any, top: int, first: int, q: Any, room: Any, next_one: Any, m: Any, bent_by: Any
+    picture: Any, table: Any, fit: Any, top: int, first: int, q: Any, buffers: Any, next_one: Any, m: Any, bent_by: Any
 ) -> Any:  # fmt: skip
     """Warp one ZOI and write J' w d to ``m`` and the sums with the shapes to ``bent_by``; returns d' w d.
 
-    ``next_one`` (first row and column of the next ZOI, motion down and right) is asked for meanwhile; a negative
+    ``next_one`` (first row and column of the next ZOI, motion down and right) is prefetched meanwhile; a negative
     row: it is not.
     """
-    plan, ramp, g, columns, sums = room
+    plan, ramp, g, columns, sums = buffers
     starts, taus, where, how = plan
     size, order, rows, mix = fit.size, fit.order, fit.rows, fit.mix
     half = 3 if order == 1 else 6
@@ -181,9 +181,9 @@ def _solve(inverse: Any, z: int, m: Any, step: Any, energy: Any, solved: Any) ->
 
 @inlined
 def _fetch(picture: Any, fit: Any, z: int, q: Any) -> None:
-    """Ask for what a ZOI to come needs of the images and its neighbours do not: its last rows and columns.
+    """Prefetch what a ZOI to come needs of the images and its neighbours do not: its last rows and columns.
 
-    Rows lie further apart than the processor looks ahead by itself. ``q`` says about where the ZOI has moved.
+    Rows lie further apart than the processor prefetches by itself. ``q`` is about where the ZOI has moved.
     """
     size = fit.size
     origin = fit.origins[min(z + AHEAD, len(fit.origins) - 1)]
@@ -199,7 +199,7 @@ def _fetch(picture: Any, fit: Any, z: int, q: Any) -> None:
 
 @inlined
 def _fetch_rows(picture: Any, fit: Any, next_one: Any, y: int, count: int) -> None:
-    """Ask for some rows of the next ZOI, where they reach beyond this one: while it is computed they come nearer."""
+    """Prefetch some rows of the next ZOI, where they reach beyond this one: while it is computed they come nearer."""
     top, left, down, right = next_one
     fresh = min(fit.spacing, fit.size)
     for row in range(top + y, top + y + count):
@@ -211,7 +211,7 @@ def _fetch_rows(picture: Any, fit: Any, next_one: Any, y: int, count: int) -> No
 
 @inlined
 def _fetch_all(array: Any, z: int) -> None:
-    """Ask for what an array (A, m, n) holds of ZOI ``z``."""
+    """Prefetch what an array (A, m, n) holds of ZOI ``z``."""
     each = array.shape[1] * array.shape[2]
     for n in range(0, each, LANES):
         fetch_later(array, np.uintp(z * each + n))
@@ -232,7 +232,7 @@ def track(picture: PictureArgs, table: Any, fit: FitArgs, stop: StopArgs, out: O
 
 @helper
 def _track_share(picture: Any, table: Any, fit: Any, stop: Any, out: Any, counters: Any, share: int) -> None:
-    """What one thread comes to do of all ZOIs."""
+    """The pieces of all ZOIs that one thread takes."""
     at_once = min(CHUNK, 1 + len(fit.origins) // SHARES)  # of some lost ones each may take as long as a frame
     pieces = (len(fit.origins) + at_once - 1) // at_once
     piece = next_piece(counters, share, pieces)
@@ -258,7 +258,7 @@ def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: 
     plan = new_plan(fit.size)
     columns = np.empty((DIFFERENCE_ROWS, line), np.float32)
     sums = np.empty((CHANNELS, DEGREES, DEGREES))
-    room = plan, ramp, g, columns, sums
+    buffers = plan, ramp, g, columns, sums
     m = np.empty(count)
     step = np.empty(count)
     solved = np.empty(count + LANES, np.float32)
@@ -278,7 +278,7 @@ def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: 
             coming = fit.origins[min(z + 1, end - 1)]
             motion = int(q[half]) + PAD + BEYOND, int(q[0]) + PAD + BEYOND
             next_one = (coming[0] if iteration == 0 else -1, coming[1], *motion)
-            energy = _moments(picture, table, fit, top, first, q, room, next_one, m, bent_by)
+            energy = _moments(picture, table, fit, top, first, q, buffers, next_one, m, bent_by)
             left[z] = _solve(fit.inverse, z, m, step, energy, solved)
             gain: Any = 1 + step[modes]
             nuisance[z, 0] = gain
@@ -292,18 +292,18 @@ def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: 
             if not longest < 1e3:
                 state[z] = DIVERGED
                 break
-            brake = min(1.0, LONGEST_STEP / longest) if longest > 0 else 1.0
+            brake = min(1.0, MAX_STEP / longest) if longest > 0 else 1.0
             for i in range(modes):
                 step[i] *= fit.units[i] / gain * brake
             compose(q, fit.order, step)
             iterations[z] = iteration + 1
-            if brake == 1.0 and _settled(step, half, lever, stop.length[z], stop.slope[z], stop.trust[z]):
+            if brake == 1.0 and _converged(step, half, lever, stop.length[z], stop.slope[z], stop.trust[z]):
                 state[z] = CONVERGED
                 break
 
 
 @helper
-def _settled(step: Any, half: int, lever: Any, length_left: Any, slope_left: Any, trust: Any) -> Any:
+def _converged(step: Any, half: int, lever: Any, length_left: Any, slope_left: Any, trust: Any) -> Any:
     """Whether the error that this step has left is below the tolerances of u, v and the gradients."""
     move = max(abs(step[0]), abs(step[half]))
     turn = 0.0

@@ -1,4 +1,4 @@
-"""What the compiled loops take and give, in bundles with names.
+"""The arguments of the compiled loops, in tuples with names.
 
 Plain tuples: the compiler takes them apart, so they cost a loop nothing and a call a few microseconds.
 In a parallel loop they are read by name; what is written to is given a name of its own before.
@@ -17,7 +17,7 @@ from analysis.picture.splines import TAPS, Box
 Floats = NDArray[np.float64]
 
 RUNNING, CONVERGED, LEFT_IMAGE, DIVERGED = 0, 1, 2, 3
-"""What became of the iteration of a ZOI (``OutArgs.state``)."""
+"""How the iteration of a ZOI ended (``OutArgs.state``)."""
 
 
 class PictureArgs(NamedTuple):
@@ -143,7 +143,7 @@ class OutArgs(NamedTuple):
 
     @classmethod
     def starting(cls, guess: Floats) -> OutArgs:
-        """Room for the results of ZOIs that start from ``guess`` (A, modes), which is copied."""
+        """Arrays for the results of ZOIs that start from ``guess`` (A, modes), which is copied."""
         count = len(guess)
         return cls(
             guess.copy(), np.empty(count), np.empty(count), np.empty((count, 2)),
@@ -151,7 +151,7 @@ class OutArgs(NamedTuple):
         )  # fmt: skip
 
     @classmethod
-    def nothing(cls, count: int, modes: int) -> OutArgs:
+    def unmeasured(cls, count: int, modes: int) -> OutArgs:
         """Of ZOIs that were not iterated: NaN."""
         empty = cls.starting(np.full((count, modes), np.nan))
         for array in (empty.left, empty.bending, empty.nuisance):
@@ -160,7 +160,7 @@ class OutArgs(NamedTuple):
         return empty
 
     def put(self, places: NDArray[np.intp], other: OutArgs) -> None:
-        """Take over what ``other`` holds of the ZOIs ``places``."""
+        """Copy what ``other`` holds of the ZOIs ``places``."""
         self.p[places], self.left[places], self.bending[places] = other.p, other.left, other.bending
         self.nuisance[places] = other.nuisance
         self.state[places], self.iterations[places] = other.state, other.iterations
@@ -174,7 +174,7 @@ class OutArgs(NamedTuple):
 
 
 class ReferenceArgs(NamedTuple):
-    """What the reference says of each ZOI, for its verdict.
+    """What is known of each ZOI from the reference, for its verdict.
 
     Attributes
     ----------
@@ -218,7 +218,7 @@ class VerdictArgs(NamedTuple):
     far: float
 
 
-class Images(NamedTuple):
+class ReferenceImages(NamedTuple):
     """The channels of a reference.
 
     Attributes
@@ -251,7 +251,7 @@ class WindowRows(NamedTuple):
     mix: Floats
 
 
-class Normal(NamedTuple):
+class NormalArgs(NamedTuple):
     """The linear fit of each ZOI, as ``sensitivity.prepare`` writes it.
 
     Attributes
@@ -278,7 +278,7 @@ class Normal(NamedTuple):
     energy: NDArray[np.float32]
 
     @classmethod
-    def room(cls, count: int, columns: int, shapes: int, by_level: bool) -> Normal:
+    def empty(cls, count: int, columns: int, shapes: int, by_level: bool) -> NormalArgs:
         """Arrays for ``count`` ZOIs."""
         inverse = np.empty((count + 1, columns, columns), np.float32)
         cross = np.empty((count + 1, columns, shapes), np.float32)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper, parallel
 from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
-from analysis.fit.kernel_args import Images, Normal, WindowRows
+from analysis.fit.kernel_args import NormalArgs, ReferenceImages, WindowRows
 from analysis.fit.shapes import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, cross_moments, product_moments
 
 CHUNK = 32
@@ -122,18 +122,24 @@ def _sandwich(inverse: Any, middle: Any, affine: Any, units: Any, out: Any) -> N
 
 @parallel
 def prepare(
-    images: Images, origins: Any, size: int, rows: WindowRows, table: Any, units: Any, out: Normal
+    images: ReferenceImages,
+    origins: Any,
+    size: int,
+    rows: WindowRows,
+    table: Any,
+    units: Any,
+    out: NormalArgs,
 ) -> None:
-    """Normal matrices of all ZOIs.
+    """NormalArgs matrices of all ZOIs.
 
     Parameters
     ----------
-    images : Images
+    images : ReferenceImages
     origins : (A, 2) int64
         First row and column of each ZOI.
     rows : WindowRows
     table : (P, 3), units : (6,)
-    out : Normal, written
+    out : NormalArgs, written
     """
     counters, calling = np.zeros(SHARES, np.int64), caller()
     for share in prange(SHARES):
@@ -153,7 +159,7 @@ def _prepare_share(
     counters: Any,
     share: int,
 ) -> None:
-    """What one thread comes to do of all ZOIs."""
+    """The pieces of all ZOIs that one thread takes."""
     pieces = (len(origins) + CHUNK - 1) // CHUNK
     piece = next_piece(counters, share, pieces)
     while piece >= 0:

@@ -1,15 +1,13 @@
-"""Shapes of displacement that a ZOI cannot follow: what remains of the difference is held against them.
+"""Shapes of displacement that a ZOI cannot follow, and the moments that the fit and the shapes are made of.
 
-An affine fit leaves the bending and the jumps of a displacement in the difference image. Its share
-in each of five shapes, orthonormal polynomials P of the window, tells how far the displacement at the
-centre can be believed: (P2(x) + P2(y)) / sqrt 2, whose share is the error of u at the centre if the
-field is a parabola, and the four of third degree, which a crack or an edge through the centre has.
+An affine fit leaves the bending and the jumps of a displacement in the difference image. Its share in each of five
+shapes, orthonormal polynomials P of the window, bounds the error of the displacement at the centre:
+(P2(x) + P2(y)) / sqrt 2, whose share is the error of u at the centre if the field is a parabola, and the four of third
+degree, which a crack or an edge through the centre has.
 
 Of the ZOIs across a slip line of 1.5 px the residual alone refuses 79 %, residual and shapes 99.8 %, for 2 to 8 % of
 the time of a frame. Tried and rejected: the same without an allowance for strain (refused the neck of a polymer bar);
 all shapes of second degree in place of their sum (refused 5 % of the ZOIs around a real open hole, not 3 %).
-
-Sums of images under the window times polynomials of x and y: columns first, then rows.
 
 All moments of a ZOI are sums over w(x) w(y) P_i(x) P_j(y) of some image. A vector of columns is summed
 down the rows with w(y) P_j(y) in registers, and what comes out, a few rows, is multiplied with
@@ -40,6 +38,8 @@ _PAIRS = ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2), (2, 2), (3, 3), (0, 3), (1, 3)
 N_PRODUCTS = len(_PAIRS)
 PRODUCT_ROWS, SQUARE_ROWS = 6, 5
 """Column sums of a product under the window (eta^0 .. eta^5) and under its square (eta^0 .. eta^4)."""
+N_SHAPES = 5
+_SQRT_HALF = math.sqrt(0.5)
 
 
 @inlined
@@ -227,10 +227,6 @@ def product_moments(
             row = np.uintp(PRODUCT_ROWS + y) * line
             for x in range(2 * order + 1 - y):
                 of_q[n, y, x] = dot(columns, row, under_q, np.uintp(x) * line, np.intp(line))
-
-
-N_SHAPES = 5
-_SQRT_HALF = math.sqrt(0.5)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,7 +3,7 @@
 Each value is a sum over the pixels of its ZOI: a row of (J' w J)^-1 times J' w. A mean over ZOIs is therefore one
 such sum over the picture, and the noise of the mean is the root of the sum of its squares. For gradients neighbours
 nearly cancel within a gauge, and what is left is decided by how the pattern differs from ZOI to ZOI, which no
-overlap of windows knows: on dense grids the mean scatters up to 1.5 times as much as those say.
+overlap of windows contains: on dense grids the mean scatters up to 1.5 times as much as it predicts.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ Floats = NDArray[np.float64]
 
 CHANNELS, MONOMIALS = 4, ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
 """f_x, f_y, f and 1, each times 1, x, y, x^2, xy, y^2."""
-MOST_KEPT = 64
+MAX_CACHED = 64
 """Gauges whose factors are remembered."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeanNoise:
-    """How far the noise of means over ZOIs of one reference exceeds what the overlap of windows says.
+    """How far the noise of means over ZOIs of one reference exceeds what follows from the overlap of windows.
 
     Attributes
     ----------
@@ -58,20 +58,19 @@ class MeanNoise:
     images: NDArray[np.float32]
     inverse: NDArray[np.float32]
     unit_covariance: NDArray[np.float32]
-    _known: dict[tuple[str, bytes], float] = field(default_factory=dict, repr=False)
+    _factors: dict[tuple[str, bytes], float] = field(default_factory=dict, repr=False)
 
     def factor(self, name: str, where: NDArray[np.bool_]) -> float:
         """Standard deviation of the mean of ``name`` over a gauge (R, C), over that of overlapping windows.
 
-        Of all its ZOIs that can be measured: for one that is lost the gauge is not asked again. 1 where nothing
-        can be said.
+        Of all its ZOIs that can be measured: one that is lost does not change it. 1 where there are too few.
         """
         key = name, np.packbits(where).tobytes()
-        if key not in self._known:
-            if len(self._known) >= MOST_KEPT:
-                self._known.clear()
-            self._known[key] = self._factor(name, where)
-        return self._known[key]
+        if key not in self._factors:
+            if len(self._factors) >= MAX_CACHED:
+                self._factors.clear()
+            self._factors[key] = self._factor(name, where)
+        return self._factors[key]
 
     def _factor(self, name: str, where: NDArray[np.bool_]) -> float:
         which = np.flatnonzero(self.able & where.ravel()[self.index])

@@ -1,4 +1,4 @@
-"""Which ZOIs can be believed: the limits of what a fit may leave, and which ZOIs have a pattern at all.
+"""Which ZOIs are valid: the limits of what a fit may leave, and which ZOIs have a pattern at all.
 
 Each ZOI is judged by its own numbers alone (``verdict``), so that a verdict depends neither on threads nor on
 neighbours. Tried and rejected (of 75 wrong ZOIs accepted before the shares were added, 34 are left):
@@ -45,13 +45,13 @@ less has the same picture before it."""
 MANY_STEPS, SLOW_SIGMA = 8, 0.065
 """A fit that took so many steps, where u or v is more uncertain than this (px), has been led along an edge of the
 specimen or through clutter (seen on a polymer bar and an open hole; a pattern takes one to five)."""
-LEAST_GAIN, MOST_GAIN = 0.2, 5.0
+MIN_GAIN, MAX_GAIN = 0.2, 5.0
 PATTERN_OVER_NOISE = 3.0
 """Gradient energy of a ZOI over that of filtered noise alone; less is no pattern."""
-WORST_SIGMA_U = 0.3
+MAX_SIGMA_U = 0.3
 """Pixels; a ZOI that predicts a larger uncertainty has no pattern."""
 CLIPPED_SHARE = 0.05
-"""Share of the window weight on clipped pixels from which on a ZOI is not believed."""
+"""Share of the window weight on clipped pixels from which on a ZOI is refused."""
 
 
 def has_pattern(
@@ -71,4 +71,4 @@ def has_pattern(
     """
     strong = np.all(energy > PATTERN_OVER_NOISE * noise_energy, axis=1)
     sigma = np.sqrt(np.maximum(unit_variance.max(axis=1), 0)) * max(noise, 0.1)
-    return np.asarray(strong & (unit_variance.min(axis=1) > 0) & (sigma < WORST_SIGMA_U))
+    return np.asarray(strong & (unit_variance.min(axis=1) > 0) & (sigma < MAX_SIGMA_U))

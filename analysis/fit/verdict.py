@@ -1,4 +1,4 @@
-"""Which ZOIs can be believed: a status for each from its own numbers, in a compiled loop.
+"""Which ZOIs are valid: a status for each from its own numbers, in a compiled loop.
 
 The limits are in ``validity``.
 """
@@ -17,11 +17,11 @@ from analysis.fit.validity import (
     CHANCE,
     EMPTY_SHARES,
     EMPTY_SIGMA,
-    LEAST_GAIN,
     LOST_SHARE,
     MANY_STEPS,
+    MAX_GAIN,
+    MIN_GAIN,
     MODEL_SHARE,
-    MOST_GAIN,
     NOISE_FACTOR,
     SLOW_SIGMA,
     UNKNOWN_NOISE_FACTOR,
@@ -63,7 +63,7 @@ def judge(
             out[z] = NOT_CONVERGED
         elif _is_empty(left[z] / expected[z]) and _sigma(known, z, expected[z]) > EMPTY_SIGMA:
             out[z] = NO_PATTERN
-        elif not (LEAST_GAIN < gain < MOST_GAIN and left[z] <= allowed + MODEL_SHARE * pattern):
+        elif not (MIN_GAIN < gain < MAX_GAIN and left[z] <= allowed + MODEL_SHARE * pattern):
             out[z] = POOR_MATCH
         else:
             by_noise = NOISE_FACTOR * expected[z] if rule.noise_known else allowed
@@ -91,9 +91,9 @@ def _slow(found: Any, z: int, known: Any, variance: Any) -> Any:
 
 
 @helper
-def _used(value: Any, by_noise: Any, room: Any) -> Any:
-    """The share of the room beyond what noise makes that a value takes; not less than 0."""
-    share = (value - by_noise) / room
+def _used(value: Any, by_noise: Any, margin: Any) -> Any:
+    """The share of the margin beyond what noise makes that a value takes; not less than 0."""
+    share = (value - by_noise) / margin
     return 0.0 if share < 0 else share
 
 

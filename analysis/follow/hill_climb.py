@@ -10,7 +10,7 @@ from numba import prange
 from analysis.compiled.loops import helper, parallel
 
 f4 = np.float32
-MOVES = 12
+MAX_MOVES = 12
 
 
 @helper
@@ -78,7 +78,7 @@ def climb(
             value = correlation(reference, deformed, top, left, cy, cx, size)
             if value > best:
                 best, x, y = value, cx, cy
-        for _ in range(MOVES):
+        for _ in range(MAX_MOVES):
             sx = 0
             sy = 0
             for ny in range(-1, 2):

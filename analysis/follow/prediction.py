@@ -1,6 +1,4 @@
-"""Where each ZOI will be in the next frame (``alpha_beta`` has the arithmetic).
-
-The alpha-beta filter that predicts a ZOI's parameters for the next frame: a compiled loop.
+"""The alpha-beta filter that predicts a ZOI's parameters for the next frame, in a compiled loop.
 
 What was measured carries the noise of its frame, and so does a difference of two frames. A start
 that averages over the frames lies nearer to the next answer, and the iteration ends after one step
@@ -21,13 +19,33 @@ from numpy.typing import NDArray
 from analysis.compiled.loops import helper
 from analysis.field import Motion
 
-LEAST_ALPHA, LEAST_BETA = 0.4, 0.1
+Floats = NDArray[np.float64]
+MIN_ALPHA, MIN_BETA = 0.4, 0.1
 """Parts of the news (measured less predicted) that enter position and motion after many frames."""
 BETA_MOVED = 0.4
 """The part that enters the motion where news are more than noise; the position is then the measured one."""
 NEWS = 4.0
 """Standard deviations of a frame's noise up to which news are taken for noise."""
-AGE_MOVED, OLDEST = 3, 20
+AGE_MOVED, MAX_AGE = 3, 20
+
+
+def motion_after(before: Motion, values: Floats, guess: Floats, sigma: Floats, lever: float) -> Motion:
+    """The motion that this frame predicts for the next one, given the one predicted for this.
+
+    Parameters
+    ----------
+    before : Motion
+    values, guess : (A, modes)
+        Measured and predicted for this frame; modes are u, du_dx, du_dy, ..., v, dv_dx, ...; NaN
+        where a ZOI was or is lost.
+    sigma : (A,), px
+        Uncertainty of u and v from the noise of one frame.
+    lever : float, px
+        What makes the uncertainty of a gradient one of a displacement.
+    """
+    motion = Motion(before.index, np.empty_like(values), np.empty_like(values), np.empty_like(before.age))
+    advance(values, guess, before.change, before.age, sigma, lever, motion.change, motion.ahead, motion.age)
+    return motion
 
 
 @helper
@@ -42,7 +60,7 @@ def advance(
     ahead: Any,
     new_age: Any,
 ) -> None:
-    """See ``prediction.motion_after``; the last three (A, modes), (A, modes) and (A,) are written."""
+    """See ``motion_after``; the last three (A, modes), (A, modes) and (A,) are written."""
     modes = values.shape[1]
     half = modes // 2
     for z in range(len(values)):
@@ -59,10 +77,10 @@ def advance(
                 ahead[z, i] = 0.0
             new_age[z] = 1
             continue
-        n = min(age[z] + 1, OLDEST)
+        n = min(age[z] + 1, MAX_AGE)
         # The gains of a least-squares line through the frames so far.
-        alpha = max(2 * (2 * n - 1) / (n * (n + 1.0)), LEAST_ALPHA)
-        beta = min(max(6 / (n * (n + 1.0)), LEAST_BETA), 1.0)
+        alpha = max(2 * (2 * n - 1) / (n * (n + 1.0)), MIN_ALPHA)
+        beta = min(max(6 / (n * (n + 1.0)), MIN_BETA), 1.0)
         if n > AGE_MOVED and reach > NEWS * sigma[z]:
             alpha, beta, n = 1.0, BETA_MOVED, AGE_MOVED
         for i in range(modes):
@@ -70,25 +88,3 @@ def advance(
             new_change[z, i] = change[z, i] + beta * news
             ahead[z, i] = new_change[z, i] - (1 - alpha) * news
         new_age[z] = n
-
-
-Floats = NDArray[np.float64]
-
-
-def motion_after(before: Motion, values: Floats, guess: Floats, sigma: Floats, lever: float) -> Motion:
-    """What this frame says of the next one, given what the one before said of this.
-
-    Parameters
-    ----------
-    before : Motion
-    values, guess : (A, modes)
-        Measured and predicted for this frame; modes are u, du_dx, du_dy, ..., v, dv_dx, ...; NaN
-        where a ZOI was or is lost.
-    sigma : (A,), px
-        Uncertainty of u and v from the noise of one frame.
-    lever : float, px
-        What makes the uncertainty of a gradient one of a displacement.
-    """
-    motion = Motion(before.index, np.empty_like(values), np.empty_like(values), np.empty_like(before.age))
-    advance(values, guess, before.change, before.age, sigma, lever, motion.change, motion.ahead, motion.age)
-    return motion

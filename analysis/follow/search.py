@@ -1,6 +1,4 @@
-"""Each ZOI found from nothing: blocks of the picture first, then its own whole pixel.
-
-The whole-pixel start: where the pattern of each ZOI went, from nothing.
+"""The whole-pixel start of each ZOI, from nothing: blocks of the picture first, then the ZOI's own whole pixel.
 
 Coarse to fine: one displacement for the whole region by zero-mean normalised correlation
 (errata of eq. 2-3 of the paper: FFT(g) conj(FFT(f))), then blocks at each level of an image
@@ -20,21 +18,59 @@ from numpy.typing import NDArray
 from analysis.field import Roi
 from analysis.follow.hill_climb import climb
 
-COARSEST = 48
+Image = NDArray[np.float32]
+MIN_SIDE = 48
 """Halving stops before the shorter side of the region falls below this (px)."""
 BLOCK = 24
 BLOCK_STEP = 20
 PARTS = 3
-"""The coarsest level is looked for in this many parts a side."""
+"""The coarsest level is searched for in this many parts a side."""
 PLANE_REACH = 2
 OUTLIER = 2.0
 """Pixels from the plane of its neighbours from which on a block is left out."""
-STEEPEST = 0.15
-"""Displacement gradient that a search from nothing reckons with."""
-LEAST_OVERLAP = 0.2
+MAX_GRADIENT = 0.15
+"""Largest displacement gradient that a search from nothing allows for."""
+MIN_OVERLAP = 0.2
 """Share of the region that must still lie in the deformed image."""
 
-Image = NDArray[np.float32]
+
+def search(
+    reference: NDArray[np.float32],
+    deformed: NDArray[np.float32],
+    offset: Any,
+    region: Roi,
+    origins: NDArray[np.int64],
+    size: int,
+) -> NDArray[np.float64]:
+    """Whole-pixel displacements of all ZOIs and the gradients of the blocks around them.
+
+    Parameters
+    ----------
+    reference, deformed : (H, W) float32, GL
+    offset : float32, GL
+        Taken off both, so that sums of squares keep their digits.
+    region : Roi
+        Of the reference, where the ZOIs lie.
+    origins : (A, 2) int64
+        First row and column of each ZOI.
+    size : int, px
+
+    Returns
+    -------
+    (A, 6) float64 : u, du_dx, du_dy, v, dv_dx, dv_dy, px and px per px.
+    """
+    blocks = find_blocks(reference, deformed, region)
+    centre = origins + (size - 1) / 2
+    out = blocks.plane_at(centre[:, 0], centre[:, 1])
+    around = blocks.around(centre[:, 0], centre[:, 1])
+    candidates = np.rint(np.concatenate([out[:, None, [0, 3]], around], axis=1)).astype(np.int64)
+    found = np.zeros((len(centre), 2), np.int64)
+    climb(
+        reference - offset, deformed - offset, origins, size,
+        np.ascontiguousarray(candidates), found, np.zeros(len(centre)),
+    )  # fmt: skip
+    out[:, [0, 3]] = found
+    return out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +102,7 @@ class Blocks:
         shift = self.shift[r[:, None, :, None], c[None, :, None, :]].reshape(rows, columns, -1, 2)
         start = np.median(shift, axis=2, keepdims=True)
         weight = weight.reshape(rows, columns, -1)
-        reach = 0.5 * np.hypot(np.ptp(self.x), np.ptp(self.y)) / max(rows, columns) * STEEPEST
+        reach = 0.5 * np.hypot(np.ptp(self.x), np.ptp(self.y)) / max(rows, columns) * MAX_GRADIENT
         keep = weight * (np.abs(shift - start).max(axis=-1) < np.maximum(OUTLIER, 4 * reach))
         fit = _planes(basis, shift, keep)
         error = np.abs(np.einsum("abkp,abpc->abkc", basis, fit) - shift).max(axis=-1)
@@ -114,7 +150,7 @@ def find_blocks(reference: Image, deformed: Image, roi: Roi) -> Blocks:
     ----------
     reference, deformed : (H, W) float32
     roi : Roi
-        The region of the reference that is looked for in the whole deformed image.
+        The region of the reference that is searched for in the whole deformed image.
     """
     levels = list(_pyramid(reference, deformed, roi))
     coarse = levels[-1]
@@ -136,7 +172,7 @@ def _pyramid(reference: Image, deformed: Image, roi: Roi) -> Iterator[tuple[Imag
     box = roi
     while True:
         yield reference, deformed, box
-        if min(box.width, box.height) < 2 * COARSEST:
+        if min(box.width, box.height) < 2 * MIN_SIDE:
             return
         size = (reference.shape[1] // 2, reference.shape[0] // 2)
         reference, deformed = (
@@ -169,7 +205,7 @@ def global_shift(reference: Image, deformed: Image, box: Roi) -> tuple[int, int]
     var_g = correlate(here, image**2) - sum_g**2 / count
     floor = 1e-6 * max(float(np.sum(part**2)), float(np.sum(image**2)), 1e-30)
     score = product / np.sqrt(np.maximum(var_f, floor) * np.maximum(var_g, floor))
-    score[count < LEAST_OVERLAP * part.size] = -2
+    score[count < MIN_OVERLAP * part.size] = -2
     row, column = np.unravel_index(int(np.argmax(score)), score.shape)
     dy = int(row) - (shape[0] if row >= image.shape[0] else 0) - box.y
     dx = int(column) - (shape[1] if column >= image.shape[1] else 0) - box.x
@@ -177,7 +213,7 @@ def global_shift(reference: Image, deformed: Image, box: Roi) -> tuple[int, int]
 
 
 def _match_parts(reference: Image, deformed: Image, box: Roi) -> Blocks:
-    """Displacements of 3 x 3 parts of the region, each looked for in the whole image.
+    """Displacements of 3 x 3 parts of the region, each searched for in the whole image.
 
     A rotated region as a whole correlates with nothing; its parts still do.
     """
@@ -244,42 +280,3 @@ def _match(
         if np.isfinite(value) and value > best:
             best, found = value, (float(left + place[0] - at[1]), float(top + place[1] - at[0]))
     return found
-
-
-def search(
-    reference: NDArray[np.float32],
-    deformed: NDArray[np.float32],
-    offset: Any,
-    region: Roi,
-    origins: NDArray[np.int64],
-    size: int,
-) -> NDArray[np.float64]:
-    """Whole-pixel displacements of all ZOIs and the gradients of the blocks around them.
-
-    Parameters
-    ----------
-    reference, deformed : (H, W) float32, GL
-    offset : float32, GL
-        Taken off both, so that sums of squares keep their digits.
-    region : Roi
-        Of the reference, where the ZOIs lie.
-    origins : (A, 2) int64
-        First row and column of each ZOI.
-    size : int, px
-
-    Returns
-    -------
-    (A, 6) float64 : u, du_dx, du_dy, v, dv_dx, dv_dy, px and px per px.
-    """
-    blocks = find_blocks(reference, deformed, region)
-    centre = origins + (size - 1) / 2
-    out = blocks.plane_at(centre[:, 0], centre[:, 1])
-    around = blocks.around(centre[:, 0], centre[:, 1])
-    candidates = np.rint(np.concatenate([out[:, None, [0, 3]], around], axis=1)).astype(np.int64)
-    found = np.zeros((len(centre), 2), np.int64)
-    climb(
-        reference - offset, deformed - offset, origins, size,
-        np.ascontiguousarray(candidates), found, np.zeros(len(centre)),
-    )  # fmt: skip
-    out[:, [0, 3]] = found
-    return out

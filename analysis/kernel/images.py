@@ -1,7 +1,4 @@
-"""What the kernel takes as a picture: kinds, sizes, saturated pixels, padding.
-
-What is known of the noise: a standard deviation, or one that grows with the light.
-"""
+"""Pictures as the kernel takes them: kinds, sizes, noise, saturated pixels, padding."""
 
 from __future__ import annotations
 

@@ -12,15 +12,15 @@ from copy import copy
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.compiled.forked import THREADS
+from analysis.compiled.forked import FORK_GUARD
 from analysis.field import Motion, StrainField, ZoiGrid
 from analysis.follow.renewal import taken
 from analysis.kernel.images import Noise, as_image, as_model, as_recorded, clipped_pixels
 from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.result import PredictedMotion, field_of
 from analysis.kernel.settings import Estimator, KernelSettings
-from analysis.kernel.solve import Solution, rescue
-from analysis.self_test import Way, check
+from analysis.kernel.solve import Solution, retry_lost
+from analysis.self_test import SelfTestCase, check
 
 Floats = NDArray[np.float64]
 
@@ -68,7 +68,7 @@ class PhaseKernel:
         noise: Noise | None = None,
         clipped: NDArray[np.bool_] | None = None,
     ) -> None:
-        THREADS.use()
+        FORK_GUARD.check()
         image = as_image(reference, "the reference")
         self.reference = ReferencePicture.first(image, grid, settings or KernelSettings(), noise, clipped)
         check_machine(self.settings, grid.size)
@@ -147,14 +147,14 @@ class PhaseKernel:
         Returns
         -------
         StrainField
-            NaN with a reason wherever a ZOI cannot be believed.
+            NaN with a reason wherever a ZOI is not valid.
 
         Raises
         ------
         ValueError
             The image has another size than the reference, or the start another grid.
         """
-        THREADS.use()
+        FORK_GUARD.check()
         reference = self.reference
         image, shape = as_recorded(deformed, "the deformed image"), reference.prepared.shape
         if image.shape != shape:
@@ -165,14 +165,14 @@ class PhaseKernel:
         model = None if noise is None else as_model(noise)
         saturated = clipped_pixels(image, clipped, model)
         if start is None:
-            attempt = Solution(reference, image, model, reference.searched(image))
-            rescue(attempt, None, saturated)
-            return field_of(attempt)
+            solution = Solution(reference, image, model, reference.searched(image))
+            retry_lost(solution, None, saturated)
+            return field_of(solution)
         before, carried = self._before(start), self._carried_motion(start)
         predicted = before + carried.ahead
-        attempt = Solution(reference, image, model, reference.local(predicted))
-        rescue(attempt, reference.local(before), saturated)
-        return field_of(attempt, PredictedMotion(predicted, carried))
+        solution = Solution(reference, image, model, reference.local(predicted))
+        retry_lost(solution, reference.local(before), saturated)
+        return field_of(solution, PredictedMotion(predicted, carried))
 
     def _before(self, start: StrainField) -> Floats:
         """Parameters of the field before, (A, modes); NaN for a ZOI without."""
@@ -181,7 +181,7 @@ class PhaseKernel:
         return taken(start.parameters, self.reference.index, self.reference.modes)
 
     def _carried_motion(self, start: StrainField) -> Motion:
-        """What the field before says of this one."""
+        """The motion that the field before predicts."""
         index, modes = self.reference.index, self.reference.modes
         motion = start.motion
         if motion is not None and motion.fits(index, modes):
@@ -192,8 +192,8 @@ class PhaseKernel:
 def check_machine(settings: KernelSettings, size: int) -> None:
     """Refuse a machine that measures a known pattern wrong, once a process and kind of ZOI; a few ms.
 
-    Every ``PhaseKernel`` asks for it. Tolerances, the limit of the iterations and ``bending_px`` are the usual
-    ones, whatever the settings say.
+    Every ``PhaseKernel`` calls it. Tolerances, the limit of the iterations and ``bending_px`` are the defaults,
+    whatever the settings.
 
     Parameters
     ----------
@@ -204,22 +204,23 @@ def check_machine(settings: KernelSettings, size: int) -> None:
     Raises
     ------
     MachineError
-        Motion or strain is out of limits. The message says what is wrong and names the libraries.
+        Motion or strain is out of limits. The message names what is wrong, and the libraries.
     """
-    THREADS.use()
+    FORK_GUARD.check()
     check(
-        _measure_known, Way(settings.window, settings.estimator, settings.order, settings.interpolant, size)
+        _measure_known,
+        SelfTestCase(settings.window, settings.estimator, settings.order, settings.interpolant, size),
     )
 
 
 def _measure_known(
-    reference: NDArray[np.float32], deformed: NDArray[np.float32], grid: ZoiGrid, way: Way
+    reference: NDArray[np.float32], deformed: NDArray[np.float32], grid: ZoiGrid, case: SelfTestCase
 ) -> StrainField:
     """As a new kernel measures its first picture."""
-    estimator: Estimator = "phase" if way.estimator == "phase" else "spectral"
-    settings = KernelSettings(way.window, estimator, way.order, way.interpolant)
+    estimator: Estimator = "phase" if case.estimator == "phase" else "spectral"
+    settings = KernelSettings(case.window, estimator, case.order, case.interpolant)
     made = ReferencePicture.first(as_image(reference, "the pattern"), grid, settings, None, None)
     moved = as_recorded(deformed, "the moved pattern")
-    attempt = Solution(made, moved, None, made.searched(moved))
-    rescue(attempt, None)
-    return field_of(attempt)
+    solution = Solution(made, moved, None, made.searched(moved))
+    retry_lost(solution, None)
+    return field_of(solution)

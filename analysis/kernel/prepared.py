@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Status, profile
-from analysis.fit.kernel_args import Images, Normal, WindowRows
+from analysis.fit.kernel_args import NormalArgs, ReferenceImages, WindowRows
 from analysis.fit.validity import CLIPPED_SHARE, has_pattern
 from analysis.kernel.images import NoiseModel, padded
 from analysis.kernel.settings import KernelSettings
@@ -136,7 +136,7 @@ def _fits(
     origins: NDArray[np.int64],
     line: NDArray[np.float64],
     order: int,
-) -> tuple[Normal, Shapes]:
+) -> tuple[NormalArgs, Shapes]:
     """The linear fit of each ZOI, and the shapes that it cannot follow."""
     from analysis.compiled.vectors import whole
     from analysis.fit.sensitivity import columns, parameter_scale, prepare, square_rows
@@ -147,9 +147,9 @@ def _fits(
     half = len(units) // 2
     affine = units[[0, 1, 2, half, half + 1, half + 2]]
     shapes = shapes_of(line, whole(size))
-    out = Normal.room(len(origins), len(table), 2 * N_SHAPES, by_level.size > 0)
+    out = NormalArgs.empty(len(origins), len(table), 2 * N_SHAPES, by_level.size > 0)
     prepare(
-        Images(images.ravel(), by_level.ravel(), images[0].size, images.shape[2]), origins, size,
+        ReferenceImages(images.ravel(), by_level.ravel(), images[0].size, images.shape[2]), origins, size,
         WindowRows(shapes.powers, square_rows(line, whole(size)), shapes.mix), table, affine, out,
     )  # fmt: skip
     return out, shapes

@@ -1,4 +1,4 @@
-"""The paper's road: phase alone, in quadrature to the reference, as sensors of each ZOI.
+"""The paper's method: phase alone, in quadrature to the reference, as sensors of each ZOI.
 
 For ``KernelSettings(estimator="phase")``. The windowed spectrum of the deformed ZOI enters only
 through Im(conj(F_k) G_k)/|F_k|, that is |G_k| sin(arg G_k - arg F_k), for the analysis window and
@@ -24,11 +24,11 @@ BAND = 0.30
 """Highest frequency used, cycles/px."""
 LOBE = 2.0
 """Frequencies below LOBE / (sigma of the analysis window), rad/px, belong to the mean and are left out."""
-LEAST_POWER = 10.0
+MIN_POWER = 10.0
 """A frequency is used where |F_k|^2 is this many times the power of the noise."""
 ERROR_LEFT = 0.1
-"""Share of a step that is reckoned to be left as error after it."""
-LONGEST_STEP = 2.0
+"""Share of a step that counts as error left after it."""
+MAX_STEP = 2.0
 CHUNK = 64
 
 Complex = NDArray[np.complex64]
@@ -143,7 +143,7 @@ def _sensors_of(
     modes = modes - np.sum(modes * basis.mean, axis=(2, 3), keepdims=True)
     reference = basis.spectra(level)
     power = np.abs(reference) ** 2
-    chosen = basis.used & (power > LEAST_POWER * noise**2)
+    chosen = basis.used & (power > MIN_POWER * noise**2)
     unit = np.where(chosen, reference / np.sqrt(np.maximum(power, 1e-20)), 0).astype(np.complex64)
     sensitivity = np.imag(np.conj(unit)[:, None] * basis.spectra(modes))  # (B, 6, 3, Ky, Kx)
     flat = sensitivity.reshape(*sensitivity.shape[:2], -1).astype(np.float64)
@@ -214,17 +214,17 @@ def iterate(
             compose_all(part, step)
             p[z] = part
             iterations[z] += 1
-            state[z[_settled(step, stop.at(z))]] = CONVERGED
+            state[z[_converged(step, stop.at(z))]] = CONVERGED
     return p, state, iterations
 
 
 def _shortened(step: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Steps (B, 6) of at most LONGEST_STEP."""
+    """Steps (B, 6) of at most MAX_STEP."""
     length = np.abs(step[:, [0, 3]]).max(axis=1)
-    return np.asarray(step * np.minimum(1, LONGEST_STEP / np.maximum(length, 1e-9))[:, None])
+    return np.asarray(step * np.minimum(1, MAX_STEP / np.maximum(length, 1e-9))[:, None])
 
 
-def _settled(step: NDArray[np.float64], stop: StopArgs) -> NDArray[np.bool_]:
+def _converged(step: NDArray[np.float64], stop: StopArgs) -> NDArray[np.bool_]:
     """Whether what a step (B, 6) has left is below the tolerances, (B,)."""
     left = ERROR_LEFT * np.abs(step)
     lengths = (left[:, [0, 3]] <= stop.length[:, None]).all(axis=1)

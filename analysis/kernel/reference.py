@@ -33,7 +33,7 @@ SPILL_PX = 0.5
 """How far a ZOI may stick out of the image. Farther, what is missing counts: two rows less of a 64 px
 Gaussian ZOI gave 270 um/m, many times the predicted uncertainty."""
 REACHED_PX, REACHED_SHARE = 12.0, 0.15
-"""How far beyond the guess, in px and shares of a ZOI, an image is made ready; what goes farther asks for all and is
+"""How far beyond the guess, in px and shares of a ZOI, an image is made ready; what goes farther needs all of it and is
 measured again, so that no value depends on it. 121 ZOIs: 0.7 ms a frame in place of 2 (November 2026)."""
 _AFFINE = ((0, 15), (6, 11, 18, 20))
 """Variances of u and v, and of the four gradients, among the 21 pairs."""

@@ -16,7 +16,7 @@ Covariance = NDArray[np.float32]
 
 
 class PredictedMotion(NamedTuple):
-    """What the field before said of this image: parameters (A, modes) and the motion they come from."""
+    """What the field before predicts for this image: parameters (A, modes) and the motion they come from."""
 
     values: Floats
     motion: Motion
@@ -29,24 +29,24 @@ class _Noise(NamedTuple):
     current: Floats
 
 
-def field_of(attempt: Solution, expected: PredictedMotion | None = None) -> StrainField:
-    """The field that an attempt has found.
+def field_of(solution: Solution, expected: PredictedMotion | None = None) -> StrainField:
+    """The field of a solution.
 
     Parameters
     ----------
-    attempt : Solution
+    solution : Solution
     expected : PredictedMotion, optional
-        None: the field says nothing of the motion.
+        None: the field has no motion.
     """
     from analysis.fit.assembly import weigh
 
-    reference, found = attempt.reference, attempt.found
-    ok = attempt.status == Status.OK
+    reference, found = solution.reference, solution.found
+    ok = solution.status == Status.OK
     gain = found.nuisance[:, 0]
-    noise = _noise_parts(attempt, ok)
+    noise = _noise_parts(solution, ok)
     residual, first, whole = np.empty((3, len(ok)), np.float32)
     weigh(ok, found.left, reference.prepared.freedom, gain, *noise, residual, first, whole)
-    covariance_reference, covariance = _covariances(attempt, ok, noise, first, whole)
+    covariance_reference, covariance = _covariances(solution, ok, noise, first, whole)
     values = reference.total(found.p)
     if not ok.all():
         values = np.where(ok[:, None], values, np.nan)
@@ -56,44 +56,44 @@ def field_of(attempt: Solution, expected: PredictedMotion | None = None) -> Stra
         covariance=covariance,
         covariance_reference=covariance_reference,
         residual=reference.spread(residual[:, None])[0],
-        status=reference.spread(attempt.status[:, None], Status.NOT_MEASURED)[0],
+        status=reference.spread(solution.status[:, None], Status.NOT_MEASURED)[0],
         iterations=reference.spread(found.iterations[:, None], 0)[0],
         gain=reference.spread(gain[:, None].astype(np.float32))[0],
-        noise=_noise_found(attempt, ok, noise.current),
+        noise=_noise_found(solution, ok, noise.current),
         window=reference.settings.window,
-        motion=None if expected is None else _motion(attempt, values, expected),
+        motion=None if expected is None else _motion(solution, values, expected),
         sums=reference.sums,
     )
 
 
-def _motion(attempt: Solution, values: Floats, expected: PredictedMotion) -> Motion:
+def _motion(solution: Solution, values: Floats, expected: PredictedMotion) -> Motion:
     from analysis.follow.prediction import motion_after
 
-    lever = attempt.reference.grid.size / 6
-    return motion_after(expected.motion, values, expected.values, attempt.tolerance.trust, lever)
+    lever = solution.reference.grid.size / 6
+    return motion_after(expected.motion, values, expected.values, solution.tolerance.trust, lever)
 
 
-def _noise_found(attempt: Solution, ok: NDArray[np.bool_], current: Floats) -> float:
+def _noise_found(solution: Solution, ok: NDArray[np.bool_], current: Floats) -> float:
     """Standard deviation of the deformed image, GL, as given or found; the median over the ZOIs."""
-    if attempt.noise is not None and attempt.noise.slope == 0 and ok.any():
-        return float(np.sqrt(attempt.noise.floor))
+    if solution.noise is not None and solution.noise.slope == 0 and ok.any():
+        return float(np.sqrt(solution.noise.floor))
     return float(np.sqrt(np.median(current[ok]))) if ok.any() else float("nan")
 
 
-def _noise_parts(attempt: Solution, ok: NDArray[np.bool_]) -> _Noise:
+def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     """The noise of the two images; what is not given, from the residual."""
-    reference, current = attempt.variances(np.s_[:], attempt.found.nuisance[:, 0])
-    if attempt.noise is not None or not ok.any():
+    reference, current = solution.variances(np.s_[:], solution.found.nuisance[:, 0])
+    if solution.noise is not None or not ok.any():
         return _Noise(reference, current)
-    pooled = float(np.median((attempt.found.left / attempt.reference.prepared.freedom)[ok]))
-    if attempt.reference.noise_model is None:  # shared equally
+    pooled = float(np.median((solution.found.left / solution.reference.prepared.freedom)[ok]))
+    if solution.reference.noise_model is None:  # shared equally
         return _Noise(np.full(len(ok), pooled / 2), np.full(len(ok), pooled / 2))
     rest = max(pooled - float(np.median(reference)), pooled / 4)
     return _Noise(reference, np.full(len(ok), rest))
 
 
 def _covariances(
-    attempt: Solution,
+    solution: Solution,
     ok: NDArray[np.bool_],
     noise: _Noise,
     first: NDArray[np.float32],
@@ -103,14 +103,14 @@ def _covariances(
 
     ``first`` and ``whole`` (A,) are what scales the unit covariances (``assembly.weigh``).
     """
-    reference = attempt.reference
-    grows = any(m is not None and m.slope > 0 for m in (reference.noise_model, attempt.noise))
+    reference = solution.reference
+    grows = any(m is not None and m.slope > 0 for m in (reference.noise_model, solution.noise))
     if reference.placement is None and not (grows and reference.prepared.covariance_level is not None):
-        return _scaled(attempt, first, whole)
-    from_reference, from_current = _level_covariances(attempt, noise)
+        return _scaled(solution, first, whole)
+    from_reference, from_current = _level_covariances(solution, noise)
     if reference.placement is not None:
         from_reference, from_current = _composed(
-            reference.placement, attempt.found.p, from_reference, from_current
+            reference.placement, solution.found.p, from_reference, from_current
         )
     invalid = np.where(ok, np.float32(0), np.float32(np.nan))[:, None]
     return (
@@ -120,12 +120,12 @@ def _covariances(
 
 
 def _scaled(
-    attempt: Solution, first: NDArray[np.float32], whole: NDArray[np.float32]
+    solution: Solution, first: NDArray[np.float32], whole: NDArray[np.float32]
 ) -> tuple[Covariance, Covariance]:
     """The unit covariances times two variances of each ZOI."""
     from analysis.fit.assembly import scale
 
-    reference, unit = attempt.reference, attempt.reference.unit_covariance
+    reference, unit = solution.reference, solution.reference.unit_covariance
     out = np.empty((2, *unit.shape), np.float32)
     flat = out.reshape(2, len(unit), -1)
     scale(
@@ -144,14 +144,14 @@ def _composed(
     return placement.carried(local) + renewed, placement.spread(local, from_current)
 
 
-def _level_covariances(attempt: Solution, noise: _Noise) -> tuple[Covariance, Covariance]:
+def _level_covariances(solution: Solution, noise: _Noise) -> tuple[Covariance, Covariance]:
     """The two parts (A, 21) with noise that grows with the grey level inside each ZOI."""
-    from analysis.fit.assembly import LEAST_GAIN
+    from analysis.fit.assembly import MIN_NOISE_GAIN
 
-    ready, model, own = attempt.reference.prepared, attempt.reference.noise_model, attempt.noise
+    ready, model, own = solution.reference.prepared, solution.reference.noise_model, solution.noise
     unit, slope = ready.covariance, ready.covariance_level
-    gain, offset = attempt.found.nuisance[:, 0], attempt.found.nuisance[:, 1]
-    by_gain = 1 / np.maximum(gain, LEAST_GAIN) ** 2
+    gain, offset = solution.found.nuisance[:, 0], solution.found.nuisance[:, 1]
+    by_gain = 1 / np.maximum(gain, MIN_NOISE_GAIN) ** 2
     first = noise.reference[:, None] * unit
     second = (noise.current * by_gain)[:, None] * unit
     if slope is not None and model is not None and model.slope > 0:

@@ -1,4 +1,4 @@
-"""How the kernel measures, and what it knows of the noise: settings as frozen dataclasses."""
+"""How the kernel measures: its settings as a frozen dataclass."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ class KernelSettings:
     window : "gaussian" | "uniform" | "tukey" | "bi-triangular"
         The least-squares weight of a ZOI (gaussian: sigma = size/6).
     estimator : "spectral" | "phase"
-        Phase and amplitude with the gain as a nuisance, or phase alone (the paper's road).
+        Phase and amplitude with the gain as a nuisance, or phase alone (the paper's method).
     order : 1 or 2
         Of the shape function of a ZOI: affine or quadratic.
     interpolant : 1, 3 or 5
         Degree of the B-spline that warps the deformed image.
     max_iterations : int
-        A ZOI that has not settled by then is NOT_CONVERGED.
+        A ZOI that has not converged by then is NOT_CONVERGED.
     tolerance_px : float, px
         Iteration stops when the error left in u and v is predicted below this ...
     tolerance_strain : float
@@ -40,7 +40,7 @@ class KernelSettings:
     Raises
     ------
     ValueError
-        An impossible value; the message says what is allowed.
+        An impossible value; the message names the allowed ones.
     """
 
     window: Window = "gaussian"

@@ -1,8 +1,7 @@
-"""The measuring of one image against a reference: iterate from a guess and judge.
+"""One image measured against a reference: every ZOI iterated from a guess and judged, lost ones tried again.
 
-``rescue`` tries again what was lost, ``result`` puts everything on the grid.
-
-Lost ZOIs tried again: without extrapolation, from their neighbours, by a search.
+A lost ZOI is tried again without extrapolation, from its neighbours, and by a search. ``result`` puts everything on
+the grid.
 """
 
 from __future__ import annotations
@@ -38,9 +37,9 @@ class Solution:
     Attributes
     ----------
     found : OutArgs
-        What the iteration says of all A ZOIs; NaN where there was none.
+        Of the iteration, for all A ZOIs; NaN where there was none.
     status : (A,) uint8
-    tolerance : Stop
+    tolerance : StopArgs
         Where the iteration may stop.
     """
 
@@ -59,12 +58,12 @@ class Solution:
         known = np.isfinite(guess.sum()) or np.isfinite(guess @ np.ones(guess.shape[1]))  # as a rule all
         which = np.flatnonzero(able & known)
         if len(which) == len(guess):  # as a rule: no copies
-            self.found, self.status = self.tried(which, guess)
+            self.found, self.status = self.solved(which, guess)
             return
-        self.found = OutArgs.nothing(*guess.shape)
+        self.found = OutArgs.unmeasured(*guess.shape)
         self.status = np.where(able & ~known, np.uint8(Status.LOST), prepared.status)
         if len(which):
-            self.keep(which, *self.tried(which, guess[which]))
+            self.keep(which, *self.solved(which, guess[which]))
 
     def _picture(self, box: Box) -> PictureArgs:
         from analysis.picture.prefilter import coefficients
@@ -79,19 +78,18 @@ class Solution:
             return self.reference.noise
         return float(np.sqrt(self.noise.variance(self.reference.prepared.pattern.mean)))
 
-    def tried(self, which: NDArray[np.intp], guess: Floats) -> tuple[OutArgs, NDArray[np.uint8]]:
+    def solved(self, which: NDArray[np.intp], guess: Floats) -> tuple[OutArgs, NDArray[np.uint8]]:
         """What comes of the B ZOIs ``which`` from their guesses (B, modes), and their status; kept by ``keep``."""
         reference = self.reference
         places: Places = which if len(which) < len(reference.index) else np.s_[:]
-        found = self._found(places, guess)
-        if (
-            self._box != reference.whole and (found.state == LEFT_IMAGE).any()
-        ):  # it may have left the box alone
+        found = self._fitted(places, guess)
+        # A ZOI may have left the box alone, not the image.
+        if self._box != reference.whole and (found.state == LEFT_IMAGE).any():
             self.picture = self._picture(reference.whole)
-            found = self._found(places, guess)
-        return found, self._judged(places, found)
+            found = self._fitted(places, guess)
+        return found, self._verdicts(places, found)
 
-    def _found(self, places: Places, guess: Floats) -> OutArgs:
+    def _fitted(self, places: Places, guess: Floats) -> OutArgs:
         if self.reference.sensors is None:
             return self._iterated(places, guess)
         return self._by_phases(self.reference.sensors, places, guess)
@@ -104,7 +102,7 @@ class Solution:
     def refuse_clipped(self, clipped: NDArray[np.bool_], among: NDArray[np.bool_] | None = None) -> None:
         """The status CLIPPED where too much of a ZOI lies on saturated pixels (H, W), found or as guessed.
 
-        ``among`` (A,) are those to be looked at; None: all.
+        ``among`` (A,) are those to be checked; None: all.
         """
         from analysis.fit.assembly import clipped_share
 
@@ -139,7 +137,7 @@ class Solution:
         )  # fmt: skip
 
     def _by_phases(self, sensors: Sensors, which: Places, guess: Floats) -> OutArgs:
-        """The same by phases alone; one step of the spectral fit tells gain and residual."""
+        """The same by phases alone; one step of the spectral fit gives gain and residual."""
         from analysis.kernel.quadrature import iterate
 
         ready = self.reference.prepared
@@ -150,7 +148,7 @@ class Solution:
         seen = self._iterated(which, values, max_iterations=1)
         return OutArgs(values, seen.left, seen.bending, seen.nuisance, state, iterations)
 
-    def _judged(self, which: Places, found: OutArgs) -> NDArray[np.uint8]:
+    def _verdicts(self, which: Places, found: OutArgs) -> NDArray[np.uint8]:
         from analysis.fit.verdict import judge
 
         reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
@@ -184,7 +182,7 @@ class Solution:
         return reference, own.variance(level if own.slope == 0 else level * np.maximum(gain, 0))
 
 
-RESCUE_ROUNDS = 40
+RETRY_ROUNDS = 40
 SEARCH_SHARE = 0.3
 """Share of lost ZOIs from which on the whole picture is searched again."""
 _WORTH_RETRYING = np.isin(
@@ -195,67 +193,67 @@ _DOWN, _RIGHT = (offset.ravel() - 1 for offset in np.indices((3, 3)))
 """Rows and columns to a ZOI's neighbours, itself among them."""
 
 
-def rescue(attempt: Solution, before: Floats | None, clipped: NDArray[np.bool_] | None = None) -> None:
+def retry_lost(solution: Solution, before: Floats | None, clipped: NDArray[np.bool_] | None = None) -> None:
     """Try lost ZOIs again from other guesses; a worse outcome does not replace a better one.
 
     Parameters
     ----------
-    attempt : Solution
+    solution : Solution
     before : (A, modes), or None
-        Parameters of the frame before; None: the guess of the attempt was searched for.
+        Parameters of the frame before; None: the guess was searched for.
     clipped : (H, W) bool, or None
         Saturated pixels: a ZOI on them is refused, before it is tried again and after.
     """
     if clipped is not None:
-        attempt.refuse_clipped(clipped)
-    lost = _lost(attempt)
+        solution.refuse_clipped(clipped)
+    lost = _lost(solution)
     if not lost.any():
         return
-    _rescue(attempt, before)
+    _retry_lost(solution, before)
     if clipped is not None:
-        attempt.refuse_clipped(clipped, lost)
+        solution.refuse_clipped(clipped, lost)
 
 
-def _rescue(attempt: Solution, before: Floats | None) -> None:
-    reference = attempt.reference
+def _retry_lost(solution: Solution, before: Floats | None) -> None:
+    reference = solution.reference
     # Without its gradients a guess is right for ZOIs beside a discontinuity.
     displacements = np.arange(reference.modes) % (reference.modes // 2) == 0
-    _retry(attempt, attempt.guess * displacements if before is None else before)
-    _retry_from_neighbours(attempt)
+    _retry(solution, solution.guess * displacements if before is None else before)
+    _retry_from_neighbours(solution)
     able = np.count_nonzero(reference.prepared.status == Status.OK)
-    if before is not None and np.count_nonzero(_lost(attempt)) > SEARCH_SHARE * able:
-        _retry(attempt, reference.searched(attempt.image))
-        _retry_from_neighbours(attempt)
+    if before is not None and np.count_nonzero(_lost(solution)) > SEARCH_SHARE * able:
+        _retry(solution, reference.searched(solution.image))
+        _retry_from_neighbours(solution)
 
 
-def _lost(attempt: Solution) -> NDArray[np.bool_]:
-    return np.asarray(_WORTH_RETRYING[attempt.status] & (attempt.reference.prepared.status == Status.OK))
+def _lost(solution: Solution) -> NDArray[np.bool_]:
+    return np.asarray(_WORTH_RETRYING[solution.status] & (solution.reference.prepared.status == Status.OK))
 
 
-def _retry(attempt: Solution, guess: Floats) -> None:
-    which = np.flatnonzero(_lost(attempt) & np.isfinite(guess).all(axis=1))
+def _retry(solution: Solution, guess: Floats) -> None:
+    which = np.flatnonzero(_lost(solution) & np.isfinite(guess).all(axis=1))
     if len(which):
-        _retry_some(attempt, which, guess[which])
+        _retry_some(solution, which, guess[which])
 
 
-def _retry_some(attempt: Solution, which: NDArray[np.intp], guess: Floats) -> None:
-    found, status = attempt.tried(which, guess)
+def _retry_some(solution: Solution, which: NDArray[np.intp], guess: Floats) -> None:
+    found, status = solution.solved(which, guess)
     good = np.flatnonzero(status == Status.OK)
-    attempt.keep(which[good], found.at(good), status[good])
+    solution.keep(which[good], found.at(good), status[good])
 
 
-def _retry_from_neighbours(attempt: Solution) -> None:
+def _retry_from_neighbours(solution: Solution) -> None:
     """Let good ZOIs lend their shape to lost neighbours, round by round."""
-    tried = np.zeros(len(attempt.status), np.uint8)
-    places = _Places.of(attempt.reference)
-    for _ in range(RESCUE_ROUNDS):
-        lost = np.flatnonzero(_lost(attempt))
-        guess, lenders = _lent(attempt, places, lost)
-        fresh = np.isfinite(guess[:, 0]) & (lenders > tried[lost])
+    solved = np.zeros(len(solution.status), np.uint8)
+    places = _Places.of(solution.reference)
+    for _ in range(RETRY_ROUNDS):
+        lost = np.flatnonzero(_lost(solution))
+        guess, lenders = _lent_guesses(solution, places, lost)
+        fresh = np.isfinite(guess[:, 0]) & (lenders > solved[lost])
         if not fresh.any():
             return
-        tried[lost] = lenders
-        _retry_some(attempt, lost[fresh], guess[fresh])
+        solved[lost] = lenders
+        _retry_some(solution, lost[fresh], guess[fresh])
 
 
 class _Places(NamedTuple):
@@ -282,17 +280,19 @@ class _Places(NamedTuple):
         return cls(zoi, row + 1, column + 1)
 
 
-def _lent(attempt: Solution, places: _Places, lost: NDArray[np.intp]) -> tuple[Floats, NDArray[np.uint8]]:
+def _lent_guesses(
+    solution: Solution, places: _Places, lost: NDArray[np.intp]
+) -> tuple[Floats, NDArray[np.uint8]]:
     """For each of the lost ZOIs (L,) the mean of what its good neighbours predict there, (L, modes), and their number.
 
     Of a ZOI's shape u, du_dx, du_dy, v, dv_dx, dv_dy count, moved by the step to the neighbour.
     """
-    reference, step = attempt.reference, attempt.reference.grid.step
-    good = np.append(attempt.status == Status.OK, False)  # the last for "none"
+    reference, step = solution.reference, solution.reference.grid.step
+    good = np.append(solution.status == Status.OK, False)  # the last for "none"
     zoi = places.zoi[places.row[lost, None] + _DOWN, places.column[lost, None] + _RIGHT]
     to, which = np.nonzero(good[zoi])
     lender = zoi[to, which]
-    part = reference.total(attempt.found.p[lender], lender)[:, reference.affine]
+    part = reference.total(solution.found.p[lender], lender)[:, reference.affine]
     for r in (0, 3):
         part[:, r] -= step * (_RIGHT[which] * part[:, r + 1] + _DOWN[which] * part[:, r + 2])
     number = np.bincount(to, minlength=len(lost))

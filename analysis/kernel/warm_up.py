@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.compiled.forked import THREADS
+from analysis.compiled.forked import FORK_GUARD
 from analysis.field import Motion, Roi, ZoiGrid, profile
 from analysis.kernel.images import as_image
 from analysis.picture.splines import Box
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 log = logging.getLogger("analysis")
 
 COMPILE_SECONDS = 80
-"""About how long one process takes for everything; said in the announcement."""
+"""About how long one process takes for everything; for the announcement."""
 ITERATION, REST, PHASE, ALL = "iteration", "rest", "phase", "all"
 COMPILE_PARTS = (ITERATION, REST)
 PICTURE_KINDS = ("uint8", "uint16", "float32")
@@ -35,14 +35,12 @@ def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) ->
     """Whether numba's cache lacks a loop that pictures of these kinds (and the estimator by phases) need."""
     from analysis.compiled.loops import is_cached
     from analysis.fit import assembly, iteration, sensitivity, sums, verdict
-    from analysis.fit import assembly as clipping
-    from analysis.follow import hill_climb as climb
-    from analysis.follow import prediction as alpha_beta
+    from analysis.follow import hill_climb, prediction
     from analysis.picture import prefilter
 
     loops = [
-        sensitivity.prepare, iteration.track, climb.climb, alpha_beta.advance, verdict.judge,
-        assembly.weigh, assembly.scale, clipping.shares, sums.scatter,
+        sensitivity.prepare, iteration.track, hill_climb.climb, prediction.advance, verdict.judge,
+        assembly.weigh, assembly.scale, assembly.clipped_shares, sums.scatter,
     ]  # fmt: skip
     loops += [iteration.warp_zois, iteration.compose_all, iteration.within_image] * phase
     return not (all(map(is_cached, loops)) and all(is_cached(prefilter.coefficients, kind) for kind in kinds))
@@ -73,7 +71,7 @@ def threading_library() -> str:
 def warm_up(part: str = ALL, kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) -> None:
     """Compile, or load from numba's cache, every loop that a kernel can need.
 
-    The first time on a machine this takes a minute or two and says so in the log.
+    The first time on a machine this takes a minute or two and is announced in the log.
 
     Parameters
     ----------
@@ -184,7 +182,7 @@ def _rest() -> None:
     from analysis.kernel.settings import KernelSettings
 
     image, grid = _small()
-    THREADS.use()
+    FORK_GUARD.check()
     # No PhaseKernel: its self-test would compile the iteration.
     reference = ReferencePicture.first(as_image(image, "the pattern"), grid, KernelSettings(), None, None)
     reference.searched(image)

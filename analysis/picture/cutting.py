@@ -19,7 +19,7 @@ from analysis.compiled.vectors import LANES
 
 ROWS = 16
 """Rows that are warped and summed before the next: few enough for the first-level cache."""
-MOST_PASSED = 2
+MAX_ROWS_PASSED = 2
 """Rows of the image that a vector of pixels may pass."""
 
 
@@ -41,7 +41,7 @@ def inside(x: Any, y: Any, left: Any, right: Any, top: Any, bottom: Any) -> Any:
 
 @helper
 def new_plan(size: int) -> Any:
-    """Room for ``plan_rows`` (starts, taus) and for ``warp_cut_rows`` (where, how)."""
+    """Arrays for ``plan_rows`` (starts, taus) and for ``warp_cut_rows`` (where, how)."""
     return (
         np.empty(size, np.int64), np.empty((2, size), np.float32),
         np.empty((ROWS * size, 3), np.int64), np.empty((ROWS * size, 4), np.float32),
@@ -52,7 +52,7 @@ def new_plan(size: int) -> Any:
 def plan_rows(p: Any, x: Any, y: Any, size: int, stride: int, starts: Any, taus: Any) -> bool:
     """Where each row of a ZOI of order 1 begins in ``c``; False if not every row is in one piece.
 
-    All rows are reckoned ahead, since the processor cannot look beyond the row that it computes.
+    All rows are planned ahead, since the processor cannot prefetch beyond the row that it computes.
 
     Parameters
     ----------
@@ -115,8 +115,8 @@ def cut_row(
         fx = xk - ix
         fy = yk - iy
         # A pixel that lies just on the edge is exact with the taps of either side.
-        room: Any = min((edge_x - fx) * inverse_x, (edge_y - fy) * inverse_y)
-        length: Any = min(np.intp(min(room, 1.0 * size)) + 1, size - k)
+        way: Any = min((edge_x - fx) * inverse_x, (edge_y - fy) * inverse_y)
+        length: Any = min(np.intp(min(way, 1.0 * size)) + 1, size - k)
         n = _append((iy - 2) * stride + ix + k - 2, at + k, length, fx, drift, fy, slope, n, where, how)
         k += length
     return n
@@ -150,11 +150,11 @@ def inverse_slope(slope: Any) -> Any:
 
 @helper
 def _bent_length(
-    most: int, x: Any, x1: Any, x2: Any, ix: Any, y: Any, y1: Any, y2: Any, iy: Any
+    count: int, x: Any, x1: Any, x2: Any, ix: Any, y: Any, y1: Any, y2: Any, iy: Any
 ) -> int:  # fmt: skip
-    """Pixels from the first of a bent row on, ``most`` at most, until an integer part changes."""
+    """Pixels from the first of a bent row on, ``count`` at most, until an integer part changes."""
     length = 1
-    while length < most:
+    while length < count:
         xe = x + length * (x1 - 1 + length * x2)
         ye = y + length * (y1 + length * y2)
         if not (ix <= xe < ix + 1 and iy <= ye < iy + 1):

@@ -1,7 +1,7 @@
 """What a picture of a pattern is worth before it is measured: size, contrast, gradient, noise, spectrum.
 
-Everything comes from one picture. No estimate of displacement is made here; ``predicted_sigma`` turns
-the figures into what a Gaussian ZOI can reach at best (docs/method.md, closed forms).
+Everything comes from one picture. No displacement is estimated here; ``predicted_sigma``, ``resolution_length``,
+``l10_strain`` and ``gauge_length`` are what a ZOI can reach at best (docs/method.md, closed forms).
 """
 
 from __future__ import annotations
@@ -12,14 +12,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.field import Window, profile
 from analysis.picture.spectrum import NOISE_BAND, filtered_pattern, radial_spectrum
 
 Floats = NDArray[np.float64]
 
 SIGNAL_OVER_NOISE = 2.0
 """A frequency carries pattern where its power is at least this many times that of the noise."""
-SMALLEST_PICTURE = 16
+MIN_SIDE = 16
 SLOW_SHARE = 12
+LOSS = 0.1
+"""l_10%: the period of a sine that has lost so much of its amplitude."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,7 +63,7 @@ class PatternReport:
     spectrum_power: Floats
 
     def predicted_sigma(self, size: int, noise: float | None = None) -> tuple[float, float]:
-        """(sigma_u px, sigma_strain) of a Gaussian ZOI against a reference of the same noise; see below."""
+        """(sigma_u px, sigma_strain) of a Gaussian ZOI against a reference of the same noise."""
         return predicted_sigma(size, self.noise if noise is None else noise, self.gradient)
 
 
@@ -190,10 +193,48 @@ def resolution_length(size: int) -> float:
     return math.pi * math.sqrt(2 / -math.log(0.9)) * size / 6
 
 
+def l10_strain(size: int, window: Window = "gaussian") -> float:
+    """l_10% of a strain, px: the period of a sine that has lost 10 %. The same for order 1 and 2.
+
+    A quadratic term is even, a gradient odd. Summed over the pixels of a ZOI, so that it holds for every window.
+    """
+    x = _centred(size)
+    weight = profile(window, size) * x
+    return _period(x, weight / (weight @ x))
+
+
+def gauge_length(size: int, window: Window = "gaussian") -> float:
+    """Side of the square, evenly weighted ZOI whose strain has the same noise, px: the size of the VSG."""
+    x, w = _centred(size), profile(window, size)
+    fitted = (w * x**2).sum() * w.sum()
+    noise = (w**2 * x**2).sum() * (w**2).sum()
+    return float((12 * fitted**2 / noise) ** 0.25)
+
+
+def _centred(size: int) -> Floats:
+    return np.asarray(np.arange(size) - (size - 1) / 2)
+
+
+def _period(x: Floats, weight: Floats) -> float:
+    """The longest period whose response is 1 - LOSS, by bisection from periods without loss."""
+
+    def response(period: float) -> float:
+        k = 2 * math.pi / period
+        return float(weight @ np.sin(k * x) / k)
+
+    long, short = 1000.0 * len(x), 1000.0 * len(x)
+    while response(short) > 1 - LOSS:
+        long, short = short, short / 1.1
+    for _ in range(60):
+        middle = (long + short) / 2
+        long, short = (middle, short) if response(middle) > 1 - LOSS else (long, middle)
+    return (long + short) / 2
+
+
 def _picture(image: ArrayLike) -> Floats:
     picture = np.asarray(image, np.float64)
-    if picture.ndim != 2 or min(picture.shape) < SMALLEST_PICTURE:
+    if picture.ndim != 2 or min(picture.shape) < MIN_SIDE:
         raise ValueError(
-            f"a grey picture of at least {SMALLEST_PICTURE} px is needed, got an array of shape {picture.shape}"
+            f"a grey picture of at least {MIN_SIDE} px is needed, got an array of shape {picture.shape}"
         )
     return picture

@@ -59,7 +59,7 @@ def coefficients(image: NDArray[Any], offset: Any, taps: NDArray[np.float32], bo
 
 @helper
 def _filter_share(image: Any, offset: Any, taps: Any, box: Any, counters: Any, share: int, out: Any) -> None:
-    """What one thread comes to do of all rows, a part after the other."""
+    """The parts of all rows that one thread takes, one after the other."""
     parts = (box.bottom - box.top + PART - 1) // PART
     part = next_piece(counters, share, parts)
     if part < 0:  # as for most shares: nothing is left
@@ -69,26 +69,26 @@ def _filter_share(image: Any, offset: Any, taps: Any, box: Any, counters: Any, s
     # An odd number of cache lines a row, or the rows would displace each other.
     ring = np.empty((RING, line.size - 2 * REACH + LINE), np.float32)
     band = np.empty((BAND, line.size), np.float32)
-    room = line, ring, band, np.empty(RING, np.intp)
+    buffers = line, ring, band, np.empty(RING, np.intp)
     ahead = -1
     while part >= 0:
         top = box.top + part * PART
         if ahead != top + REACH:  # else the rows above are still in the ring
             ahead = top - REACH
-        ahead = _filter_part(image, offset, taps, box, top, min(top + PART, box.bottom), ahead, room, out)
+        ahead = _filter_part(image, offset, taps, box, top, min(top + PART, box.bottom), ahead, buffers, out)
         part = next_piece(counters, share, parts)
 
 
 @helper
 def _filter_part(
-    image: Any, offset: Any, taps: Any, box: Any, top: int, bottom: int, ahead: int, room: Any, out: Any
+    image: Any, offset: Any, taps: Any, box: Any, top: int, bottom: int, ahead: int, buffers: Any, out: Any
 ) -> int:
     """Rows ``top`` .. of the coefficients, along x and y in one go, so that what lies between stays in the cache.
 
     Rows before ``ahead`` are in the ring already; returns up to where they are then.
     """
     height, width = image.shape
-    line, ring, band, starts = room
+    line, ring, band, starts = buffers
     left = box.left // GROUP * GROUP
     right = (box.right + GROUP - 1) // GROUP * GROUP
     for first in range(top, bottom, BAND):

@@ -22,7 +22,7 @@ LINE = 16
 """Samples of a cache line."""
 PAD = 8
 """Pixels of mirrored surroundings that the coefficients of an image are given."""
-LEAST = 2 * PAD
+MIN_BOX = 2 * PAD
 """Pixels from an edge of the image within which a box ends there: what is mirrored lies in it."""
 
 
@@ -41,9 +41,9 @@ class Box(NamedTuple):
 
 
 def _between(ends: tuple[float, float], length: int) -> tuple[int, int]:
-    first = int(min(max(ends[0], 0), max(length - LEAST, 0)))
-    last = int(min(max(ends[1] + 1, first + LEAST), length))
-    return (0 if first < LEAST else first), (length if last > length - LEAST else last)
+    first = int(min(max(ends[0], 0), max(length - MIN_BOX, 0)))
+    last = int(min(max(ends[1] + 1, first + MIN_BOX), length))
+    return (0 if first < MIN_BOX else first), (length if last > length - MIN_BOX else last)
 
 
 def basis(degree: int, x: NDArray[np.floating]) -> NDArray[np.float64]:

@@ -1,7 +1,7 @@
 """Rows of the deformed image along a deformed line: compiled loops.
 
 One kind of warp for all motions: the full 6 x 6 taps of the tensor-product spline, with the fraction of
-every pixel, a vector of pixels at a time (``cutting`` says where a row has to be cut for that). It runs at about half
+every pixel, a vector of pixels at a time (``cutting`` has where a row is cut for that). It runs at about half
 of the rate at which the processor issues multiply-adds.
 
 Tried and rejected: two rows at a time with shared loads (too few registers), six sums of taps side by side, ZOIs in the
@@ -20,7 +20,7 @@ import numpy as np
 from analysis.compiled.loops import helper, inlined
 from analysis.compiled.vectors import LANES, above, address, further, fused, load, load_from, spread, store
 from analysis.picture.cutting import (
-    MOST_PASSED,
+    MAX_ROWS_PASSED,
     cut_bent_row,
     cut_leaning_row,
     cut_row,
@@ -209,7 +209,7 @@ def warp_cut_rows(
         eta = row - reach
         u, v = displacement(p, order, -reach, eta)
         at = (row - first) * line
-        if passed <= MOST_PASSED:
+        if passed <= MAX_ROWS_PASSED:
             n = cut_leaning_row(
                 stride, size, x + u, p[1], inverse_x, y + row + v, p[4], at, n, where, how
             )  # fmt: skip
@@ -221,7 +221,7 @@ def warp_cut_rows(
             x1 = 1 + p[1] + p[4] * eta - 2 * p[3] * reach
             y1 = p[7] + p[10] * eta - 2 * p[9] * reach
             n = cut_bent_row(stride, size, x + u, x1, p[3], y + row + v, y1, p[9], at, n, where, how)
-    if passed <= MOST_PASSED:
+    if passed <= MAX_ROWS_PASSED:
         _warp_leaning_pieces(c, np.uintp(stride), n, where, how, ramp, table, out, passed > 1)
     elif order == 1:
         _warp_pieces(c, np.uintp(stride), n, where, how, ramp, table, out)

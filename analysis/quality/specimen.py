@@ -28,10 +28,10 @@ QUANTISATION = 12**-0.5  # GL: the least noise there is
 OVER_NOISE = 2.0  # times the variance that noise alone gives a gradient
 OF_ALL, OF_AROUND = 0.06, 0.4  # least share of the specimen's own quality, overall and within some speckles
 CAP = 1.5  # times the rms gradient of the speckle: no edge counts for more
-NARROWEST = 32.0  # px: what is narrower takes no ZOI
+MIN_WIDTH_PX = 32.0  # px: what is narrower takes no ZOI
 SPECKLES = 3.0  # radii: std of the window that judges
 WINDOW = (5.0, 24.0)  # px
-SMALLEST_SHARE = 0.005  # of the picture
+MIN_PICTURE_SHARE = 0.005  # of the picture
 SLOW_PX = 20.0  # std of what is taken for light and background, for the contrast
 
 
@@ -126,9 +126,9 @@ class _Gradient:
         np.maximum(share, np.float32(1e-18), out=share)
         np.divide(np.float32(cap**2), share, out=share)
         np.minimum(share, np.float32(1), out=share)
-        room = np.empty_like(share)
+        scratch = np.empty_like(share)
         for product in (self.xx, self.yy, self.xy):
-            yield _means(np.multiply(product, share, out=room))
+            yield _means(np.multiply(product, share, out=scratch))
 
     def power(self) -> Cells:
         """Mean square of one component, the noise taken out, GL^2/px^2."""
@@ -207,7 +207,7 @@ def _outlined(quality: Cells, core: Bools, variance: float, window: float) -> Bo
 
 def _smooth(good: Bools, window: float) -> Bools:
     """Gaps between speckles closed, what is too narrow for a ZOI opened; the picture's edge is no edge."""
-    gap, narrow = 0.6 * window / CELL, max(2 * window, NARROWEST / 2) / CELL
+    gap, narrow = 0.6 * window / CELL, max(2 * window, MIN_WIDTH_PX / 2) / CELL
     pad = math.ceil(2 * narrow)
     padded = np.pad(good, pad, mode="edge")
     closed = ~_grown(~_grown(padded, gap), gap)
@@ -230,7 +230,7 @@ def _largest(good: Bools) -> Bools | None:
     if n == 0:
         return None
     largest = np.asarray(labels == 1 + np.argmax(np.bincount(labels.ravel())[1:]))
-    return largest if largest.mean() >= SMALLEST_SHARE else None
+    return largest if largest.mean() >= MIN_PICTURE_SHARE else None
 
 
 def _without_pinholes(piece: Bools, px: float) -> Bools:

@@ -1,9 +1,7 @@
-"""The commands there are, and the parser of their arguments.
+"""The list of the commands, and the parser of their arguments.
 
-Only the module of the command that was asked for is imported, so that ``phasedic --help`` answers at
-once. Each module has ``add_arguments(parser)`` and ``command(arguments) -> exit code``.
-
-An example of each command, shown at the end of its ``--help``; a test has every one of them parsed.
+The module of a command is imported only when the command is called, so that ``phasedic --help`` starts fast. Each
+module has ``add_arguments(parser)`` and ``command(arguments) -> exit code``.
 """
 
 from __future__ import annotations
@@ -15,6 +13,7 @@ from dataclasses import dataclass
 
 from live.commands.exit_codes import EXIT_CODES
 
+# Shown at the end of the help of each command; a test parses them all.
 EXAMPLES = {
     "run": "phasedic run --camera '/dev/video0?format=Y12&fps=30' --load '/dev/ttyUSB0?protocol=ascii&unit=N' --report",
     "demo": "phasedic demo --specimen hole --seconds 20",
@@ -43,7 +42,7 @@ EXAMPLES = {
 
 
 def example_of(command: str) -> str:
-    """As it stands in the help; nothing where there is none."""
+    """The example of a command as shown in its help; empty without one."""
     return f"example:\n  {EXAMPLES[command]}\n\n" if command in EXAMPLES else ""
 
 
@@ -52,79 +51,79 @@ class Entry:
     """The module of a command, and its line in the help."""
 
     module: str
-    words: str
+    help: str
 
 
 COMMANDS = {
-    "run": Entry("live.commands.run", "measure live, recording everything"),
-    "demo": Entry("live.commands.demo", "the same on a simulated tensile test, compared with its truth"),
-    "page": Entry(
-        "live.commands.page", "set up, measure and conclude in the browser: point instead of typing"
-    ),
-    "replay": Entry("live.commands.replay", "measure a recorded session, or any folder of pictures"),
-    "batch": Entry("live.commands.batch", "many sessions or folders of pictures, replayed by workers"),
-    "study": Entry("live.commands.study", "one test with many settings: noise against what they show"),
+    "run": Entry("live.commands.run", "measure live and record the session"),
+    "demo": Entry("live.commands.demo", "measure a simulated tensile test and compare with its truth"),
+    "page": Entry("live.commands.page", "set up, measure and evaluate in the browser"),
+    "replay": Entry("live.commands.replay", "measure a recorded session or a folder of pictures"),
+    "batch": Entry("live.commands.batch", "replay many sessions or folders of pictures in parallel"),
+    "study": Entry("live.commands.study", "measure one test with many settings: noise against resolution"),
     "map": Entry("live.commands.map", "draw a map of the results over a picture, as a PNG"),
-    "show": Entry("live.commands.show", "a finished run in the view, with a slider in time"),
+    "show": Entry("live.commands.show", "show a finished run in the view, with a time slider"),
     "export": Entry(
-        "live.commands.export", "a finished run as csv, npz, mat, vtk, tiff, png, mp4, gif, r3xa"
+        "live.commands.export", "export a finished run as csv, npz, mat, vtk, tiff, png, mp4, gif, r3xa"
     ),
-    "report": Entry("live.commands.report", "a finished run, or several, as one page: HTML, PDF"),
+    "report": Entry("live.commands.report", "report one or several finished runs as a page: HTML, PDF"),
     "characterise": Entry(
         "live.characterise.command",
-        "how well this measures: the paper reproduced, peers, or your own pattern",
+        "measure the accuracy: the paper reproduced, peers, or your own pattern",
     ),
-    "inspect": Entry("live.characterise.inspect", "one ZOI of a session: its spectrum and its phases"),
+    "inspect": Entry("live.characterise.inspect", "show one ZOI of a session: its spectrum and phases"),
     "init": Entry(
-        "live.commands.init", "from camera and specimen to a rig.toml: devices, region, ZOIs, gauges"
+        "live.commands.init", "find devices and specimen and write a rig.toml: region, ZOIs, gauges"
     ),
-    "scale": Entry("live.commands.scale", "mm per px from two points, a board, or the width of the specimen"),
-    "check": Entry(
-        "live.commands.check", "is the picture good enough? measured before the test; go or no-go"
+    "scale": Entry(
+        "live.commands.scale", "measure mm per px from two points, a board, or the width of the specimen"
     ),
-    "average": Entry("live.commands.average", "average frames into a dark or flat frame"),
+    "check": Entry("live.commands.check", "check picture and load cell before a test: GO or NO-GO"),
+    "average": Entry("live.commands.average", "average frames to a dark or flat frame"),
     "load-check": Entry(
-        "live.commands.load_check", "listen to a load cell: rate, range, noise, flags; ready or not"
+        "live.commands.load_check", "check a load cell: rate, range, noise, flags; ready or not"
     ),
-    "identify": Entry("live.commands.identify", "find out what talks on a serial port; only listens"),
+    "identify": Entry(
+        "live.commands.identify", "identify the device on a serial port; without --ask it only listens"
+    ),
     "load-calibrate": Entry(
         "live.commands.load_calibrate", "calibrate a load cell: tare, known load, accept"
     ),
-    "recover": Entry("live.commands.recover", "copy what is readable of a damaged or unfinished session"),
-    "warm-up": Entry("live.commands.warm_up", "compile everything ahead of the first test"),
+    "recover": Entry("live.commands.recover", "copy the readable part of a damaged or unfinished session"),
+    "warm-up": Entry("live.commands.warm_up", "compile everything before the first test"),
     "completion": Entry(
-        "live.commands.completion", "a script that completes commands and options in the shell"
+        "live.commands.completion", "print a script with which the shell completes commands and options"
     ),
     "devices": Entry("live.commands.devices", "list cameras with their formats, and serial ports"),
 }
 
-_Plain = argparse.RawDescriptionHelpFormatter
+_Formatter = argparse.RawDescriptionHelpFormatter
 Command = Callable[[argparse.Namespace], int]
 
 
 def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
-    """The command that was asked for, and its arguments; help and bad usage end the program (exit code 2)."""
+    """The command and its arguments; help ends the program with exit code 0, bad usage with 2."""
     arguments = full_parser([word for word in argv if word in COMMANDS][:1]).parse_args(argv)
     command: Command = importlib.import_module(COMMANDS[arguments.command].module).command
     return command, arguments
 
 
-def full_parser(known: Iterable[str]) -> argparse.ArgumentParser:
-    """The parser of ``phasedic``; of the commands ``known`` with all their arguments."""
+def full_parser(complete: Iterable[str]) -> argparse.ArgumentParser:
+    """The parser of ``phasedic``, with all arguments of the commands ``complete``."""
     parser = argparse.ArgumentParser(
         prog="phasedic",
-        description="Live strain measurement by phase-DIC: frames, load, strain maps while the specimen is pulled.",
+        description="Live strain measurement by phase-DIC: frames, load and strain maps during a test.",
         epilog=EXIT_CODES,
-        formatter_class=_Plain,
+        formatter_class=_Formatter,
     )
     parser.add_argument("--version", action="version", version=_version())
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-    asked = set(known)
+    with_arguments = set(complete)
     for name, entry in COMMANDS.items():
         own = subparsers.add_parser(
-            name, help=entry.words, epilog=example_of(name) + EXIT_CODES, formatter_class=_Plain
+            name, help=entry.help, epilog=example_of(name) + EXIT_CODES, formatter_class=_Formatter
         )
-        if name in asked:
+        if name in with_arguments:
             importlib.import_module(entry.module).add_arguments(own)
     return parser
 

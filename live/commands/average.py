@@ -1,4 +1,4 @@
-"""``phasedic average``: a dark frame (lens covered) or a flat frame (evenly lit)."""
+"""``phasedic average``: average frames to a dark frame (lens covered) or a flat frame (evenly lit)."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from live.ui.terminal.screen import TerminalScreen
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic average``."""
-    parser.add_argument("--camera", required=True, metavar="ADDRESS")
-    parser.add_argument("--frames", type=int, default=64, metavar="N", help="default 64")
+    parser.add_argument("--camera", required=True, metavar="ADDRESS", help="address of the camera")
+    parser.add_argument("--frames", type=int, default=64, metavar="N", help="frames to average (default 64)")
     add_options(parser, "picture", "crop")
-    parser.add_argument("--out", required=True, metavar="FILE", help="a TIFF that does not exist yet")
+    parser.add_argument("--out", required=True, metavar="FILE", help="new TIFF file")
 
 
 def command(arguments: argparse.Namespace) -> int:
-    """``phasedic average``: a dark frame (lens covered) or a flat frame (evenly lit)."""
+    """``phasedic average``: average frames to a dark frame (lens covered) or a flat frame (evenly lit)."""
     from acquire.burst import average_bursts, compile_loops, save_mean
     from acquire.errors import DataError
-    from live.pipeline.warm_up import kinds_of
+    from live.pipeline.warm_up import picture_kinds
     from live.setup.devices import open_rig
 
     screen = TerminalScreen()
@@ -29,7 +29,7 @@ def command(arguments: argparse.Namespace) -> int:
     crop = tuple(given) if given else None
     rig = open_rig(arguments.camera, "none:", lambda event: screen.say(event.text), crop=crop)
     try:
-        compile_loops(kinds_of(rig.camera.info)[:1])
+        compile_loops(picture_kinds(rig.camera.info)[:1])
         with rig.camera:
             burst = next(average_bursts(rig.camera, arguments.frames), None)
     finally:
@@ -37,6 +37,6 @@ def command(arguments: argparse.Namespace) -> int:
     if burst is None:
         raise DataError(f"{arguments.camera}: gave fewer than {arguments.frames} frames without a gap")
     save_mean(burst.mean, Path(arguments.out))
-    noise = f", noise of one {burst.noise:.2f} GL" if burst.n > 1 else ""
+    noise = f", noise of one frame {burst.noise:.2f} GL" if burst.n > 1 else ""
     screen.say(f"{arguments.out}: {burst.n} frames, mean {burst.mean.mean():.1f} GL{noise}")
     return 0

@@ -1,4 +1,4 @@
-"""``phasedic batch``: many sessions or folders of pictures, replayed by workers."""
+"""``phasedic batch``: replay many sessions or folders of pictures in parallel."""
 
 from __future__ import annotations
 
@@ -10,7 +10,17 @@ from pathlib import Path
 
 from acquire.errors import ConfigError
 from live.commands.exit_codes import EXIT_WORDS
-from live.commands.options import MEASURE, add_options, add_verbose, overrides
+from live.commands.options import (
+    MEASURE,
+    add_as_measured,
+    add_config_file,
+    add_metadata,
+    add_options,
+    add_section,
+    add_time_span,
+    add_verbose,
+    overrides,
+)
 from live.commands.signals import signals
 from live.ui.terminal.screen import TerminalScreen
 
@@ -21,40 +31,37 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic batch``."""
     words = "sessions, folders of pictures, quoted globs such as 'runs/*/session.h5', or a list (.toml, .csv)"
     parser.add_argument("tests", nargs="+", metavar="TEST", help=words)
-    words = (
-        "a folder for each test is made in it, and summary.csv; called again, only what is missing is done"
-    )
+    words = "folder for summary.csv and a folder for each test; the same call again does only what is missing"
     parser.add_argument("--out", dest="folder", required=True, metavar="DIR", help=words)
     parser.add_argument(
-        "--workers", type=int, default=_cores(), metavar="N", help="processes (default: one a core)"
+        "--workers",
+        type=int,
+        default=_cores(),
+        metavar="N",
+        help="number of processes (default: one per core)",
     )
-    words = "a running Dask cluster in place of --workers, as tcp://HOST:PORT (extra cluster)"
+    words = "scheduler of a running Dask cluster instead of --workers: tcp://HOST:PORT (extra cluster)"
     parser.add_argument("--scheduler", metavar="ADDRESS", help=words)
-    words = (
-        "cut longer sessions into chunks of S seconds, for several workers; differs by less than 0.005 sigma"
-    )
+    words = "split longer sessions into chunks of S seconds for several workers (differs by less than 0.005 sigma)"
     parser.add_argument("--chunk", dest="chunk_s", type=float, metavar="S", help=words)
-    parser.add_argument("--as-measured", action="store_true", help="the bursts of the live runs, bit-equal")
-    parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin here, seconds")
-    parser.add_argument("--to", dest="end_s", type=float, metavar="S", help="end here, seconds")
-    parser.add_argument("--config", metavar="FILE", help="TOML file; what is given here overrides it")
+    add_as_measured(parser)
+    add_time_span(parser)
+    add_config_file(parser)
     add_options(parser, "measurement", *MEASURE)
     add_options(parser, "evaluation", *OUTPUT)
-    parser.add_argument("--section", metavar="W,T", help="width,thickness of the section in mm, for stresses")
-    parser.add_argument(
-        "--meta", action="append", default=[], metavar="KEY=TEXT", help="stored in every file"
-    )
+    add_section(parser)
+    add_metadata(parser)
     add_verbose(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:
-    """``phasedic batch``; 5 where a test failed or has losses."""
+    """``phasedic batch``; 5 if a test failed or has losses."""
     from live.replay.batch.campaign import CampaignRequest, run_campaign
     from live.replay.batch.test_list import find_tests
 
     if arguments.workers < 1:
         raise ConfigError(f"--workers {arguments.workers} is not possible; allowed: from 1")
-    wanted = CampaignRequest(
+    request = CampaignRequest(
         tests=find_tests(arguments.tests),
         out=Path(arguments.folder),
         workers=arguments.workers,
@@ -68,13 +75,13 @@ def command(arguments: argparse.Namespace) -> int:
     )
     screen, stopping = TerminalScreen(), threading.Event()
     with signals(stopping.set, screen.say):
-        done = run_campaign(wanted, screen, stopping)
+        done = run_campaign(request, screen, stopping)
     for path in done.files:
         screen.say(f"  {path}")
     if done.exit_code == 5:
-        screen.say("exit code 5: tests failed or have losses; the column error tells")
+        screen.say("exit code 5: tests failed or have losses; see the column error")
     elif done.exit_code in EXIT_WORDS:
-        screen.say("exit code 130: interrupted; what is whole is kept, the same call does the rest")
+        screen.say("exit code 130: interrupted; finished tests are kept, the same call does the rest")
     return done.exit_code
 
 
@@ -84,7 +91,7 @@ def _chunk_s(arguments: argparse.Namespace) -> float | None:
         raise ConfigError(f"--chunk {chunk_s} is not possible; allowed: seconds above 0")
     if chunk_s is not None and arguments.as_measured:
         raise ConfigError(
-            "--as-measured is bit-equal to the live run, which chunks are not; leave --chunk out"
+            "--as-measured is bit-identical to the live run and chunks are not; leave --chunk out"
         )
     return chunk_s
 
@@ -92,5 +99,5 @@ def _chunk_s(arguments: argparse.Namespace) -> float | None:
 def _cores() -> int:
     try:
         return len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
+    except AttributeError:  # not available on every system
         return os.cpu_count() or 1

@@ -1,4 +1,4 @@
-"""``phasedic check``: judge the still specimen before the test; exit code 6 for NO-GO."""
+"""``phasedic check``: picture and load cell before the test; exit code 6 for NO-GO."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
 from live.commands.check_watch import watch
 from live.commands.exit_codes import NOT_READY
-from live.commands.options import PICTURES, add_measure, add_options, configured, to_be_new
+from live.commands.options import PICTURES, add_measure, add_options, configured, require_new
 from live.commands.signals import interrupts
 from live.config.loading import Config
 from live.setup.check.check_list import CheckFigures, examine, table_lines
 from live.setup.check.sample import take
-from live.setup.check.verdict import WITHOUT_TARGET, judge
+from live.setup.check.verdict import DEFAULT_TARGET, check_lines
 from live.setup.devices import open_load
 from live.setup.placement import with_auto_gauges
-from live.setup.region import troubles
+from live.setup.region import report_warnings
 from live.setup.specimen_drawing import Overlay, snapshot
 from live.ui.terminal.screen import TerminalScreen
 
@@ -33,17 +33,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic check``."""
     add_options(parser, "devices", "camera", "crop", "dark", "flat", "load")
     parser.add_argument(
-        "--target", type=float, metavar="UM_M", help="strain noise of one ZOI that is needed, um/m"
+        "--target", type=float, metavar="UM_M", help="largest strain noise of one ZOI for the test, um/m"
     )
     parser.add_argument(
         "--snapshot",
         metavar="FILE",
-        help="a new PNG: picture with ruler, region, gauges, quality of the ZOIs",
+        help="write a new PNG: the picture with ruler, region, gauges and the noise of the ZOIs",
     )
     parser.add_argument(
         "--watch",
         action="store_true",
-        help="three times a second until Ctrl-C, with the peak of the sharpness",
+        help="repeat the check three times a second until Ctrl-C, with the peak of the sharpness",
     )
     add_measure(parser)
 
@@ -55,17 +55,17 @@ def command(arguments: argparse.Namespace) -> int:
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")
     if arguments.snapshot:
-        to_be_new(Path(arguments.snapshot), *PICTURES)
+        require_new(Path(arguments.snapshot), *PICTURES)
     target = None if arguments.target is None else arguments.target * 1e-6
     if arguments.watch:
         with interrupts() as stop:
             figures = watch(config, target, screen, stop.is_set)
     else:
-        figures = examine(take(config, troubles(screen.say)), config, _load(config))
+        figures = examine(take(config, report_warnings(screen.say)), config, _load(config))
     if arguments.snapshot:
         write_picture(Path(arguments.snapshot), _drawn(figures, config, target))
         screen.say(f"written: {arguments.snapshot}")
-    lines = judge(figures, target, config.measure.reference_shift_px)
+    lines = check_lines(figures, target, config.measure.reference_shift_px)
     for line in [*(line.text() for line in lines), "", *table_lines(figures)]:
         screen.say(line)
     ready = all(line.good for line in lines)
@@ -75,24 +75,24 @@ def command(arguments: argparse.Namespace) -> int:
 
 def _verdict(figures: CheckFigures, ready: bool) -> str:
     if not ready:
-        return "NO-GO: not ready, see what to look at above"
-    if figures.shots.few:
-        told = "noise in time, flicker, drift and vibration are not judged"
-        return f"GO, as far as {figures.shots.said} can tell: {told}"
+        return "NO-GO: not ready, see the lines with LOOK above"
+    if figures.stack.few:
+        open_points = "noise in time, flicker, drift and vibration are not measured"
+        return f"GO, as far as {figures.stack.count_text} can show: {open_points}"
     return "GO: ready"
 
 
 def _drawn(figures: CheckFigures, config: Config, target: float | None) -> NDArray[np.uint8]:
-    """The picture with what was judged over it."""
+    """The picture with region, ZOIs and gauges drawn over it."""
     zois = figures.zois
     gauges = with_auto_gauges(config, zois.grid).gauges
-    wanted = WITHOUT_TARGET if target is None else target
-    overlay = Overlay(figures.region, zois.grid, gauges, zois.sigma, wanted, figures.px_per_mm)
-    return snapshot(figures.shots.mean().mean, overlay)
+    limit = DEFAULT_TARGET if target is None else target
+    overlay = Overlay(figures.region, zois.grid, gauges, zois.sigma, limit, figures.px_per_mm)
+    return snapshot(figures.stack.mean().mean, overlay)
 
 
 def _load(config: Config) -> LoadReport | None:
-    """A few seconds of the load cell, where there is one."""
+    """The check of a few seconds of the load cell, if there is one."""
     if config.load.address == "none:":
         return None
     cell = open_load(config.load.address, camera_address=config.camera.address)

@@ -1,4 +1,4 @@
-"""``phasedic check --watch``: the figures in the terminal and in the view, three times a second."""
+"""``phasedic check --watch``: the check in the terminal and in the view, three times a second."""
 
 from __future__ import annotations
 
@@ -15,33 +15,33 @@ from live.config.loading import Config
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.pipeline.screen import Screen
 from live.setup.check.check_list import CheckFigures
-from live.setup.check.quick_check import GLANCE, QuickCheck, QuickChecker, RollingFrames
-from live.setup.check.verdict import CheckLine, judge
+from live.setup.check.quick_check import QUICK_FRAMES, QuickCheck, QuickChecker, RollingFrames
+from live.setup.check.verdict import CheckLine, check_lines
 from live.setup.devices import open_rig
-from live.setup.region import troubles
+from live.setup.region import report_warnings
 from live.ui.rerun.messages import ViewSetup
 from live.ui.rerun.view import View, spawn_viewer
 
 if TYPE_CHECKING:
     from analysis import ZoiGrid
 
-EVERY_S = 1 / 3
-BAR = 30
+PERIOD_S = 1 / 3
+BAR_LENGTH = 30
 CLOSE_S = 5.0
-MOST_NOTES = 4  # the newest
+MAX_NOTES = 4  # the newest
 
 
 def watch(config: Config, target: float | None, screen: Screen, stopped: Callable[[], bool]) -> CheckFigures:
-    """Show figure after figure until ``stopped`` or the camera ends; the figures of the last frames.
+    """Repeat the check until ``stopped`` or the camera ends; returns the figures of the last frames.
 
     Raises
     ------
     ConfigError, DataError, DeviceError
-        As a check, or whatever ended the camera.
+        As a check, or the error that ended the camera.
     """
     frames = 2 * (config.measure.reference_burst or DEFAULT_REFERENCE_BURST)
-    watch, show, notes = QuickChecker(config), RenewedLines(screen), list[str]()
-    rig = open_rig(config.camera.address, "none:", troubles(notes.append), crop=config.camera.crop)
+    checker, display, notes = QuickChecker(config), RenewedLines(screen), list[str]()
+    rig = open_rig(config.camera.address, "none:", report_warnings(notes.append), crop=config.camera.crop)
     try:
         with (
             RollingFrames(rig.camera, frames, config.camera.address) as rolling,
@@ -49,44 +49,44 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
         ):
             due = time.monotonic()
             while not (stopped() or rolling.over):
-                shots = rolling.newest(GLANCE)
-                if shots is not None:
-                    glance = watch.glance(shots)
-                    lines = judge(glance.figures, target, config.measure.reference_shift_px)
-                    told = [*notes[-MOST_NOTES:], peak_line(glance), *(line.text() for line in lines)]
-                    show.lines(told, short(glance, lines))
-                    view(rolling, glance, lines)
-                due = max(due + EVERY_S, time.monotonic() - EVERY_S)  # one that took longer is made up for
+                stack = rolling.newest(QUICK_FRAMES)
+                if stack is not None:
+                    quick = checker.check(stack)
+                    lines = check_lines(quick.figures, target, config.measure.reference_shift_px)
+                    shown = [*notes[-MAX_NOTES:], peak_line(quick), *(line.text() for line in lines)]
+                    display.lines(shown, short_line(quick, lines))
+                    view(rolling, quick, lines)
+                due = max(
+                    due + PERIOD_S, time.monotonic() - PERIOD_S
+                )  # a check that took longer is made up for
                 while not (stopped() or rolling.over) and time.monotonic() < due:
                     time.sleep(0.02)
             last = rolling.last(frames)
     finally:
         rig.close()
-    show.end()
-    return watch.last(last)
+    display.end()
+    return checker.full(last)
 
 
-def peak_line(glance: QuickCheck) -> str:
-    """The sharpness as a bar, the peak as its end."""
-    if not math.isfinite(glance.of_peak):
-        return "sharpness: no pattern is seen"
-    full = round(BAR * min(glance.of_peak, 1.0))
-    bar = "#" * full + "." * (BAR - full)
-    return (
-        f"sharpness {glance.figures.sharpness:.3f} [{bar}] {glance.of_peak:.0%} of the peak {glance.peak:.3f}"
-    )
+def peak_line(quick: QuickCheck) -> str:
+    """The sharpness as a bar that ends at the peak."""
+    if not math.isfinite(quick.of_peak):
+        return "sharpness: no pattern is visible"
+    full = round(BAR_LENGTH * min(quick.of_peak, 1.0))
+    bar = "#" * full + "." * (BAR_LENGTH - full)
+    return f"sharpness {quick.figures.sharpness:.3f} [{bar}] {quick.of_peak:.0%} of the peak {quick.peak:.3f}"
 
 
-def short(glance: QuickCheck, lines: list[CheckLine]) -> str:
-    """One line, for what is no terminal."""
+def short_line(quick: QuickCheck, lines: list[CheckLine]) -> str:
+    """One line for an output that is not a terminal."""
     wrong = ", ".join(line.what for line in lines if not line.good)
-    return f"sharpness {glance.figures.sharpness:.3f}, peak {glance.peak:.3f}; " + (
+    return f"sharpness {quick.figures.sharpness:.3f}, peak {quick.peak:.3f}; " + (
         f"LOOK: {wrong}" if wrong else "all well"
     )
 
 
 class RenewedLines:
-    """Lines that are renewed in place on a terminal; elsewhere a short one every few seconds."""
+    """Lines renewed in place on a terminal; elsewhere a short line every few seconds."""
 
     def __init__(self, screen: Screen, stream: TextIO | None = None) -> None:
         self._screen, self._stream = screen, stream or sys.stdout
@@ -94,41 +94,44 @@ class RenewedLines:
         self._up = 0
 
     def lines(self, lines: list[str], short: str) -> None:
-        """Show these in the place of the last ones."""
+        """Show these lines in place of the last ones."""
         if not self._terminal:
             self._screen.status(short)
             return
         width, height = shutil.get_terminal_size()
         shown = [printable(part)[: width - 1] for line in lines for part in line.split("\n")][: height - 2]
-        rest = "\x1b[0J"  # what is left of more lines than these
+        clear_below = "\x1b[0J"
         text = "".join(f"\x1b[2K{line}\n" for line in shown)
-        self._stream.write((f"\x1b[{self._up}A" if self._up else "") + text + rest)
+        self._stream.write((f"\x1b[{self._up}A" if self._up else "") + text + clear_below)
         self._stream.flush()
         self._up = len(shown)
 
     def end(self) -> None:
-        """The next lines stand below."""
+        """Further output begins below."""
         if self._terminal:
             self._stream.write("\n")
 
 
-Shown = Callable[[RollingFrames, QuickCheck, list[CheckLine]], None]
+ShowCheck = Callable[[RollingFrames, QuickCheck, list[CheckLine]], None]
 
 
 @contextmanager
-def _viewed(config: Config, notes: list[str]) -> Iterator[Shown]:
-    """What shows a glance in the view: the picture, and the lines as its status card; ``notes`` tell of it."""
+def _viewed(config: Config, notes: list[str]) -> Iterator[ShowCheck]:
+    """A function that shows a check in the view: the picture, and the lines as its status card.
+
+    The address and the warnings of the view are added to ``notes``.
+    """
     views: list[View] = []
 
-    def show(rolling: RollingFrames, glance: QuickCheck, lines: list[CheckLine]) -> None:
+    def show(rolling: RollingFrames, quick: QuickCheck, lines: list[CheckLine]) -> None:
         if not config.view.enabled:
             return
         if not views:
-            views.append(_view(config, glance.figures, glance.figures.zois.grid, notes))
+            views.append(_view(config, quick.figures, quick.figures.zois.grid, notes))
         frame = rolling.frame()
         if frame is not None:
             views[0].picture(frame)
-        views[0].status(card(glance, lines))
+        views[0].status(card(quick, lines))
 
     try:
         yield show
@@ -138,8 +141,8 @@ def _viewed(config: Config, notes: list[str]) -> Iterator[Shown]:
 
 
 def _view(config: Config, figures: CheckFigures, grid: ZoiGrid, notes: list[str]) -> View:
-    camera = figures.shots.camera
-    start = float(figures.shots.times[-1])
+    camera = figures.stack.camera
+    start = float(figures.stack.times[-1])
     setup = ViewSetup("phasedic check", camera.width, camera.height, camera.bits, grid, start)
 
     def serving(view: View) -> None:
@@ -153,12 +156,12 @@ def _view(config: Config, figures: CheckFigures, grid: ZoiGrid, notes: list[str]
     return View(setup, port=config.view.port, rrd=None, notify=tell, on_serving=serving)
 
 
-def card(glance: QuickCheck, lines: list[CheckLine]) -> str:
-    """The glance as Markdown."""
+def card(quick: QuickCheck, lines: list[CheckLine]) -> str:
+    """The check as Markdown."""
     rows = [
         f"| {'' if line.good else '**LOOK**'} | {_cell(line.what)} | {_cell(line.value)} |" for line in lines
     ]
-    return "\n".join([f"`{peak_line(glance)}`", "", "| | | |", "|---|---|---|", *rows])
+    return "\n".join([f"`{peak_line(quick)}`", "", "| | | |", "|---|---|---|", *rows])
 
 
 def _cell(text: str) -> str:

@@ -1,4 +1,4 @@
-"""``phasedic completion``: the script with which a shell completes commands, options and file names."""
+"""``phasedic completion``: a script with which the shell completes commands, options and file names."""
 
 from __future__ import annotations
 
@@ -9,9 +9,7 @@ SHELLS = ("bash", "zsh", "tcsh")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic completion``."""
-    parser.add_argument(
-        "shell", nargs="?", choices=SHELLS, default=SHELLS[0], help="which shell (default bash)"
-    )
+    parser.add_argument("shell", nargs="?", choices=SHELLS, default=SHELLS[0], help="shell (default bash)")
 
 
 def command(arguments: argparse.Namespace) -> int:
@@ -21,7 +19,7 @@ def command(arguments: argparse.Namespace) -> int:
 
 
 def script(shell: str) -> str:
-    """The script of one of ``SHELLS``, from the parsers of all commands."""
+    """The script for one of ``SHELLS``, from the parsers of all commands."""
     import shtab
 
     from live.commands.arguments import COMMANDS, full_parser
@@ -37,7 +35,7 @@ def _subparsers(parser: argparse.ArgumentParser) -> argparse._SubParsersAction[a
 
 
 def _complete_files(parser: argparse.ArgumentParser, files: object) -> None:
-    """What takes a value of any kind may be a file: the attribute ``complete`` is where shtab looks."""
+    """Complete file names for every argument with a free value: shtab reads the attribute ``complete``."""
     for action in parser._actions:
         if action.nargs != 0 and action.choices is None:
             action.complete = files  # type: ignore[attr-defined]

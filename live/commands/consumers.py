@@ -1,7 +1,4 @@
-"""The standard consumers of a test: results, view and status card; alarms and strain output of a live run.
-
-The signals that a configuration asks for, as consumers of a live run.
-"""
+"""The standard consumers of a test: results, view and status card; in a live run also alarms and strain output."""
 
 from __future__ import annotations
 
@@ -11,7 +8,7 @@ from contextlib import ExitStack
 from acquire.addresses import Options, parse_address
 from acquire.events import EventKind, Level
 from acquire.serial_line.ports import LineSettings
-from live.config.channels import STANDARD
+from live.config.channels import DEFAULT_CHANNELS
 from live.config.gauges import outlines
 from live.config.listen_address import ListenAddress, read_token
 from live.config.loading import Config
@@ -22,67 +19,71 @@ from live.pipeline.screen import Screen
 from live.results.summary import StatusCard
 from live.results.writer import write_results
 from live.run.alarms import ActionMeans, Alarm, AlarmWatch, actions_of
-from live.run.strain_output import Lines, SerialOut, StrainOut, TcpOut, UdpOut
+from live.run.strain_output import LineFormat, SerialOut, StrainOut, TcpOut, UdpOut
 from live.ui.rerun.consumer import CardWriter, FiguresWriter, RerunConsumer
 from live.ui.rerun.messages import ViewSetup
 from live.ui.rerun.view import View, spawn_viewer
 
-WHAT = "strain out"
+OUTPUT_NAME = "strain out"
 
 
 def signals_of(about: RunInfo, run_state: RunState, screen: Screen) -> list[Consumer]:
-    """Alarms and strain out of a live run; none of a replay.
+    """Alarms and strain outputs of a live run; none for a replay.
 
     Raises
     ------
     ConfigError, DeviceError
-        A port is taken, not there, or needs a token.
+        A port is taken or missing, or needs a token.
     """
     if about.end is None:
         return []
-    outs: list[StrainOut] = []
+    outputs: list[StrainOut] = []
     with ExitStack() as opened:
         for make in (_tcp, _udp, _serial):
             out = make(about.config, _lines(about, run_state))
             if out is not None:
                 opened.callback(out.end)
-                outs.append(out)
+                outputs.append(out)
                 screen.say(out.name)
         opened.pop_all()
-    means = ActionMeans(screen.bell, about.end, outs)
+    means = ActionMeans(screen.bell, about.end, outputs)
     alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
-    return [*_watch(alarms, about, run_state), *outs]
+    return [*_alarm_watch(alarms, about, run_state), *outputs]
 
 
-def _watch(alarms: Sequence[Alarm], about: RunInfo, run_state: RunState) -> list[Consumer]:
+def _alarm_watch(alarms: Sequence[Alarm], about: RunInfo, run_state: RunState) -> list[Consumer]:
     if not alarms:
         return []
-    readings, health = ChannelValues(about.start.monotonic, run_state.snapshot), run_state.health
-    return [AlarmWatch(alarms, readings, health.channels, run_state.alarms, run_state.event_log)]
+    values, health = ChannelValues(about.start.monotonic, run_state.snapshot), run_state.health
+    return [AlarmWatch(alarms, values, health.channels, run_state.alarms, run_state.event_log)]
 
 
-def _lines(about: RunInfo, run_state: RunState) -> Lines:
+def _lines(about: RunInfo, run_state: RunState) -> LineFormat:
     config = about.config
     gauges = tuple(f"{prefix}gauge_{name}" for name in config.gauges for prefix in ("", "sigma_"))
-    channels = config.strain_out.channels or (*STANDARD, *gauges)
-    return Lines(ChannelValues(about.start.monotonic, run_state.snapshot), channels, config.strain_out.format)
+    channels = config.strain_out.channels or (*DEFAULT_CHANNELS, *gauges)
+    return LineFormat(
+        ChannelValues(about.start.monotonic, run_state.snapshot), channels, config.strain_out.format
+    )
 
 
-def _tcp(config: Config, lines: Lines) -> StrainOut | None:
+def _tcp(config: Config, lines: LineFormat) -> StrainOut | None:
     if config.strain_out.tcp is None:
         return None
-    place = ListenAddress.parse(config.strain_out.tcp)
-    return TcpOut(place.listen(WHAT), read_token(place, config.operate.token_file, WHAT), lines)
+    address = ListenAddress.parse(config.strain_out.tcp)
+    return TcpOut(
+        address.listen(OUTPUT_NAME), read_token(address, config.operate.token_file, OUTPUT_NAME), lines
+    )
 
 
-def _udp(config: Config, lines: Lines) -> StrainOut | None:
+def _udp(config: Config, lines: LineFormat) -> StrainOut | None:
     if config.strain_out.udp is None:
         return None
-    place = ListenAddress.parse(config.strain_out.udp)
-    return UdpOut(place.host, place.port, lines)
+    address = ListenAddress.parse(config.strain_out.udp)
+    return UdpOut(address.host, address.port, lines)
 
 
-def _serial(config: Config, lines: Lines) -> StrainOut | None:
+def _serial(config: Config, lines: LineFormat) -> StrainOut | None:
     if config.strain_out.serial is None:
         return None
     address = parse_address(config.strain_out.serial)
@@ -94,21 +95,21 @@ def _serial(config: Config, lines: Lines) -> StrainOut | None:
 
 
 def standard_consumers(screen: Screen, more: Sequence[Consumer] = ()) -> Compose:
-    """For ``run_live`` and ``replay``: what a configuration asks for, and ``more`` of one's own.
+    """The consumers of a configuration, and ``more``, for ``run_live`` and ``replay``.
 
-    Raises, when it is called, ConfigError or DeviceError where a port is taken, not there, or needs a token, and
-    DataError where a file of the results exists already, or cannot be made.
+    The result raises ConfigError or DeviceError if a port is taken or missing, or needs a token, and DataError if a
+    file of the results exists already or cannot be made.
     """
 
     def compose(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
         signals = signals_of(about, run_state, screen)
-        return [*write_results(about, run_state), *_shown(about, run_state, screen), *more, *signals]
+        return [*write_results(about, run_state), *_view_consumers(about, run_state, screen), *more, *signals]
 
     return compose
 
 
-def _shown(about: RunInfo, run_state: RunState, screen: Screen) -> list[Consumer]:
-    """The view, and what keeps its words and figures new."""
+def _view_consumers(about: RunInfo, run_state: RunState, screen: Screen) -> list[Consumer]:
+    """The view, and the consumers that update its card and figures."""
     view = _view(about, run_state, screen)
     if view is None:
         return []
@@ -139,7 +140,7 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
     rrd = about.folder / "view.rrd" if v.rrd else None
 
     def tell(text: str, level: Level) -> None:
-        run_state.event_log.tell(EventKind.VIEW, "view", text, level)
+        run_state.event_log.emit(EventKind.VIEW, "view", text, level)
 
     def serving(view: View) -> None:
         run_state.health.view_port = view.port
@@ -150,11 +151,11 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
 
 
 def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], None]) -> None:
-    """Open the viewer where there is a display; else say how to look."""
+    """Open the viewer if there is a display; else print how to open it."""
     if spawn and view.port is not None and spawn_viewer(view.port, trouble) is not None:
-        screen.say("the viewer opens in a window of its own")
+        screen.say("the viewer opens in its own window")
         return
     why = "no display" if spawn else "view.spawn is off"
-    screen.say(f"no viewer is opened here ({why}); it runs without, and this shows it:")
+    screen.say(f"no viewer is opened ({why}); the test runs without it. To open one:")
     for line in view.instructions.splitlines():
         screen.say(f"  {line}")

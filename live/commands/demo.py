@@ -1,8 +1,8 @@
-"""``phasedic demo``: a live run on the simulated rig, and what it measured against the truth.
+"""``phasedic demo``: a live run on the simulated rig, compared with its truth.
 
-The truth of a ZOI is the best straight field (least squares with the ZOI's own weight) through the
-displacement that the simulator prescribes: what a ZOI of that size can see at all. It is computed
-here from the prescribed displacement alone, without any of the measuring code.
+The truth of a ZOI is the affine field (least squares with the weight of the ZOI) through the displacement that the
+simulator prescribes: the best that a ZOI of that size can resolve. It is computed here from the prescribed
+displacement, without any of the measuring code.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from live.commands.options import add_measure, add_options, configured
-from live.commands.run import conclude, run_to_the_end
+from live.commands.run import print_outcome, run_attended
 from live.config.loading import Config
 from live.pipeline.consumer import Consumer
 from live.pipeline.measurement import Measurement
@@ -32,28 +32,30 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 WIDTH_MM, THICKNESS_MM = 20.0, 2.0
 RELATIVE = 0.003  # of the strain, beside three times the predicted uncertainty
-LEAST_WITHIN = 0.97  # 99 % are to be expected; of 150 values, chance takes one in a few runs below that
+MIN_WITHIN = 0.97  # 99 % are to be expected; of 150 values, chance takes one in a few runs below that
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic demo``."""
-    parser.add_argument("--specimen", default="woven", help="woven (default), uniform or hole")
-    words = "frame rate of the simulated camera (default: what this machine renders, at most 30)"
+    parser.add_argument(
+        "--specimen", default="woven", help="simulated specimen: woven (default), uniform or hole"
+    )
+    words = "frame rate of the simulated camera (default: as fast as this machine renders, at most 30)"
     parser.add_argument("--fps", type=float, help=words)
     add_options(parser, "time", "seconds")
     add_measure(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:
-    """Run the demo; the exit code of the run, or 1 where it missed the truth."""
+    """``phasedic demo``; the exit code of the run, or 1 if the strain differs from the truth."""
     screen = TerminalScreen()
     config = configured(arguments, _defaults(arguments))
-    kept = Kept()
-    outcome = run_to_the_end(config, screen, [kept])
-    conclude(outcome, screen)
-    if outcome.rig.specimen is None or not kept.measurements:
+    collector = MeansCollector()
+    outcome = run_attended(config, screen, [collector])
+    print_outcome(outcome, screen)
+    if outcome.rig.specimen is None or not collector.measurements:
         return outcome.exit_code
-    agreed = compare(outcome, kept, config, screen.say)
+    agreed = compare(outcome, collector, config, screen.say)
     return outcome.exit_code if agreed else outcome.exit_code or 1
 
 
@@ -75,8 +77,8 @@ def _defaults(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Instance:
-    """What is kept of a measurement for the comparison; ``times`` (n,) are those of its frames, s."""
+class MeasuredMeans:
+    """The means of a measurement for the comparison; ``times`` (n,) are those of its frames, s."""
 
     times: Array
     valid: NDArray[np.bool_]
@@ -88,22 +90,22 @@ def _mean(values: Array) -> float:
     return float(values[np.isfinite(values)].mean()) if np.isfinite(values).any() else math.nan
 
 
-class Kept(Consumer):
-    """Collects what the comparison needs."""
+class MeansCollector(Consumer):
+    """Collects the means of all measurements."""
 
     name = "comparison with the truth"
     blocks = False
 
     def __init__(self) -> None:
-        self.measurements: list[Instance] = []
+        self.measurements: list[MeasuredMeans] = []
 
     def measurement(self, measurement: Measurement) -> None:
-        """Keep means of the small strains, which the truth is, sigmas and which ZOIs they are over."""
+        """Keep the means of the small strains, their sigmas and their ZOIs; the truth is a small strain."""
         m, i = measurement, measurement.time_step
         small = m.field.strain("small")
         times = m.t + np.linspace(-0.5, 0.5, m.burst.n) * m.burst.duration
         self.measurements.append(
-            Instance(
+            MeasuredMeans(
                 times,
                 np.isfinite(m.field.exx),
                 (_mean(small.exx), _mean(small.eyy), _mean(small.exy)),
@@ -163,14 +165,14 @@ def middle_of(specimen: VirtualSpecimen, times: Array) -> float:
     return float(np.interp(strain.mean(), strain, times))
 
 
-def compare(outcome: Outcome, kept: Kept, config: Config, say: Callable[[str], None]) -> bool:
+def compare(outcome: Outcome, collector: MeansCollector, config: Config, say: Callable[[str], None]) -> bool:
     """Print what was measured against the truth; whether the elastic part agrees."""
     specimen = outcome.rig.specimen
     assert specimen is not None
     crop = config.camera.crop or (0, 0, 0, 0)
     truth = ZoiTruth(specimen, outcome.grid, (crop[0], crop[1]))
     ratios, errors = [], []
-    for m in kept.measurements:
+    for m in collector.measurements:
         times = np.array([specimen.elapsed(t) for t in m.times])
         elapsed = middle_of(specimen, times)
         true = np.array([e[m.valid].mean() if m.valid.any() else math.nan for e in truth.strains(elapsed)])
@@ -201,7 +203,7 @@ def _say_strain(ratios: Array, errors: Array, say: Callable[[str], None]) -> boo
         f"  {within.mean():.1%} of these {within.size} values within {RELATIVE:.1%} of the strain + 3 sigma,"
         f" {beyond} beyond 5 sigma"
     )
-    return float(within.mean()) >= LEAST_WITHIN and beyond == 0
+    return float(within.mean()) >= MIN_WITHIN and beyond == 0
 
 
 def _say_force(outcome: Outcome, specimen: VirtualSpecimen, say: Callable[[str], None]) -> None:

@@ -1,4 +1,4 @@
-"""``phasedic devices``: cameras with their formats, serial ports, and the threads that measure."""
+"""``phasedic devices``: cameras with their formats, serial ports, and the number of measuring threads."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from live.ui.terminal.screen import say
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """``phasedic devices`` has none."""
+    """``phasedic devices`` has no arguments."""
 
 
 def command(arguments: argparse.Namespace) -> int:

@@ -18,17 +18,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic export``."""
     parser.add_argument("run", help="folder of a run or replay, or a strain.h5")
     parser.add_argument("--to", required=True, choices=tuple(FORMATS), help="format")
-    parser.add_argument("--out", metavar="PATH", help="file or folder to make (default: in RUN/export)")
-    words = "maps between commas, or all (default: the usual ones; of pictures and stacks the axial strain)"
+    parser.add_argument("--out", metavar="PATH", help="new file or folder (default: in RUN/export)")
+    words = (
+        "maps separated by commas, or all (default: the usual maps; for pictures and stacks the axial strain)"
+    )
     parser.add_argument("--fields", metavar="NAMES", help=words)
-    parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin here, seconds")
-    parser.add_argument("--until", dest="end_s", type=float, metavar="S", help="end here, seconds")
-    words = "tables: one line a ZOI and instant, one line an instant (a file a map), or the means"
+    parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin at this time, s")
+    parser.add_argument("--until", dest="end_s", type=float, metavar="S", help="end at this time, s")
+    words = "tables: long: a line per ZOI and instant; wide: a line per instant, a file per map; means: the means only"
     parser.add_argument("--layout", choices=("long", "wide", "means"), default="long", help=words)
     add_gauge_option(parser)
     add_display(parser)
     films = parser.add_argument_group("pictures and films")
-    films.add_argument("--fps", type=float, default=10.0, metavar="N", help="instants a second (default 10)")
+    films.add_argument(
+        "--fps", type=float, default=10.0, metavar="N", help="instants per second of film (default 10)"
+    )
     films.add_argument("--limit", type=float, help="colour range -LIMIT to LIMIT (default: automatic)")
     films.add_argument("--no-picture", action="store_true", help="maps on plain grey")
 
@@ -36,24 +40,26 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def add_display(parser: argparse.ArgumentParser) -> None:
     """Units and axes."""
     group = parser.add_argument_group("units and axes")
-    group.add_argument("--mm", action="store_true", help="lengths in mm, by --scale or the scale of the test")
-    group.add_argument("--scale", type=float, metavar="MM/PX", help="what one pixel measures, in mm")
-    group.add_argument("--y-up", action="store_true", help="y upwards: v and exy change their sign")
+    group.add_argument(
+        "--mm", action="store_true", help="lengths in mm, with --scale or the scale of the test"
+    )
+    group.add_argument("--scale", type=float, metavar="MM/PX", help="size of one pixel, mm")
+    group.add_argument("--y-up", action="store_true", help="y axis upwards: v and exy change sign")
     group.add_argument("--percent", action="store_true", help="strains in percent")
 
 
 def display_of(arguments: argparse.Namespace, stored: float | None = None) -> Display:
-    """Units and axes that were asked for; ``stored`` is the scale of the test, mm/px.
+    """The requested units and axes; ``stored`` is the scale of the test, mm/px.
 
     Raises
     ------
     ConfigError
-        mm are asked for without a scale, or a scale without mm.
+        mm without a scale, or a scale without mm.
     """
     if arguments.mm and arguments.scale is None and stored is None:
-        raise ConfigError("--mm needs the scale: give --scale with what one pixel measures, in mm")
+        raise ConfigError("--mm needs the scale: give --scale with the size of one pixel in mm")
     if arguments.scale is not None and not arguments.mm:
-        raise ConfigError("--scale does nothing without --mm; give both")
+        raise ConfigError("--scale has no effect without --mm; give both")
     scale = (stored if arguments.scale is None else arguments.scale) if arguments.mm else None
     return Display(scale, arguments.y_up, arguments.percent)
 

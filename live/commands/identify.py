@@ -1,4 +1,4 @@
-"""``phasedic identify``: find out what talks on a serial port."""
+"""``phasedic identify``: identify the device on a serial port."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ Say = Callable[[str], None]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic identify``."""
-    parser.add_argument("device", help="/dev/ttyUSB0")
+    parser.add_argument("device", help="serial port, as /dev/ttyUSB0")
     parser.add_argument("--ask", action="store_true", help="also send queries (an unknown machine may move)")
 
 
 def command(arguments: argparse.Namespace, say: Say = print) -> int:
-    """``phasedic identify DEVICE [--ask]``; 0 when something was recognised, 6 when not."""
-    for baud, heard, finding in identify.listen(arguments.device):
-        shown = heard[:60].decode("ascii", "backslashreplace")
-        say(f"{baud:7} baud: {len(heard)} bytes {shown!r}" if heard else f"{baud:7} baud: silence")
+    """``phasedic identify DEVICE [--ask]``; 0 if a device was identified, else 6."""
+    for baud, received, finding in identify.listen(arguments.device):
+        shown = received[:60].decode("ascii", "backslashreplace")
+        say(f"{baud:7} baud: {len(received)} bytes {shown!r}" if received else f"{baud:7} baud: silence")
         if finding is not None:
             _propose(finding.address, finding.remark, say)
             return 0
@@ -32,12 +32,12 @@ def command(arguments: argparse.Namespace, say: Say = print) -> int:
 
 
 def _ask_all(device: str, say: Say) -> int:
-    asked = identify.questions(device)
+    questions = identify.questions(device)
     say("will send, one after the other:")
-    for question in asked:
+    for question in questions:
         line = question.line
         say(f"  {question.data!r}  at {line.baud} {line.bytesize}{line.parity}1 ({question.protocol})")
-    for question in asked:
+    for question in questions:
         finding = identify.ask(question)
         say(f"  {question.protocol}: {'answers' if finding else 'no answer'}")
         if finding is not None:

@@ -1,4 +1,4 @@
-"""``phasedic init``: from devices and a first picture to a rig file; asks nothing."""
+"""``phasedic init``: write a rig file from the devices found and a first picture, without questions."""
 
 from __future__ import annotations
 
@@ -12,12 +12,13 @@ from acquire.addresses import parse_address
 from acquire.errors import DeviceError
 from acquire.files.picture import write_picture
 from acquire.printable import printable
-from live.commands.options import PICTURES, add_options, add_verbose, overrides, to_be_new
+from live.commands.options import PICTURES, add_options, add_section, add_verbose, overrides, require_new
 from live.config.loading import load_config
 from live.config.rig_file import new_rig
 from live.pipeline.screen import Screen
-from live.setup.gauge_proposal import Proposal, propose, rig_text
-from live.setup.region import look, mask_picture
+from live.setup.pictures import mask_picture
+from live.setup.region import first_look
+from live.setup.rig_proposal import Proposal, propose, rig_text
 from live.setup.specimen_drawing import Overlay, snapshot
 from live.ui.terminal.screen import TerminalScreen
 
@@ -25,25 +26,25 @@ RECORDED = ("files", "video", "session")
 MEASURE = (
     "roi", "mask", "zoi", "step", "gauges", "burst", "reference-burst", "noise", "scale", "axis",
 )  # fmt: skip
-OWN = ("measure.roi", "measure.mask", "measure.zoi", "measure.step", "measure.gauges", "camera.address",
+PROPOSED = ("measure.roi", "measure.mask", "measure.zoi", "measure.step", "measure.gauges", "camera.address",
        "load.address", "specimen.axis")  # fmt: skip
-"""Keys that the text of a proposal has; others that are given are added to it."""
+"""Keys in the text of a proposal; other given keys are added to it."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic init``."""
     parser.add_argument(
-        "file", nargs="?", default="rig.toml", help="the rig file to write (rig.toml); never overwritten"
+        "file", nargs="?", default="rig.toml", help="new rig file (default: rig.toml); never overwritten"
     )
     parser.add_argument(
-        "--fixed", action="store_true", help="write region, mask and gauges as they are now, in px"
+        "--fixed", action="store_true", help="fix region, mask and gauges in their present places, in px"
     )
-    parser.add_argument("--snapshot", metavar="FILE", help="the picture (default: beside the rig file, .png)")
-    add_options(
-        parser, "devices, looked for where they are not given", "camera", "crop", "load", "dark", "flat"
+    parser.add_argument(
+        "--snapshot", metavar="FILE", help="new picture of the set-up (default: beside the rig file)"
     )
+    add_options(parser, "devices (default: those found)", "camera", "crop", "load", "dark", "flat")
     add_options(parser, "measurement", *MEASURE)
-    parser.add_argument("--section", metavar="W,T", help="width,thickness of the section in mm, for stresses")
+    add_section(parser)
     add_verbose(parser)
 
 
@@ -53,30 +54,32 @@ def command(arguments: argparse.Namespace) -> int:
     rig = Path(arguments.file)
     png = Path(arguments.snapshot) if arguments.snapshot else rig.with_suffix(".png")
     mask = rig.with_name(f"{rig.stem}-mask.png") if arguments.fixed else None
-    to_be_new(rig)
-    to_be_new(png, *PICTURES)
+    require_new(rig)
+    require_new(png, *PICTURES)
     if mask is not None:
-        to_be_new(mask)
-    said = overrides(arguments)
-    found = find_devices(said, screen)
-    config = load_config(None, {**said, "camera.address": found.camera, "load.address": found.load})
-    seen = look(config, screen.say)
-    words = found.camera_words or printable(seen.camera.name), found.load_words
-    proposal = propose(seen, config, said, words, found.others)
+        require_new(mask)
+    given = overrides(arguments)
+    found = find_devices(given, screen)
+    config = load_config(None, {**given, "camera.address": found.camera, "load.address": found.load})
+    first = first_look(config, screen.say)
+    descriptions = found.camera_words or printable(first.camera.name), found.load_words
+    proposal = propose(first, config, given, descriptions, found.others)
     if mask is not None and proposal.region.mask is not None:
         write_picture(mask, mask_picture(proposal.region.mask))
     changes = {
-        key: value for key, value in said.items() if key not in OWN or key in _kept(said, arguments.fixed)
+        key: value
+        for key, value in given.items()
+        if key not in PROPOSED or key in _kept(given, arguments.fixed)
     }
     new_rig(rig, rig_text(proposal, rig, mask), changes)
-    _show(proposal, png)
-    _tell(proposal, rig, png, screen)
+    _draw(proposal, png)
+    _print(proposal, rig, png, screen)
     return 0
 
 
-def _kept(said: dict[str, object], fixed: bool) -> set[str]:
-    """What stands in the file as it was given, in place of what was found."""
-    return set() if fixed else {"measure.roi", "measure.mask", "measure.gauges"} & set(said)
+def _kept(given: dict[str, object], fixed: bool) -> set[str]:
+    """Keys that the file has as given, not as found."""
+    return set() if fixed else {"measure.roi", "measure.mask", "measure.gauges"} & set(given)
 
 
 # -- devices ------------------------------------------------------------------------------------
@@ -84,7 +87,7 @@ def _kept(said: dict[str, object], fixed: bool) -> set[str]:
 
 @dataclass(frozen=True, slots=True)
 class FoundDevices:
-    """Camera and load cell of the rig, and what else there is."""
+    """Camera and load cell of the rig, and the other cameras."""
 
     camera: str
     camera_words: str
@@ -93,21 +96,21 @@ class FoundDevices:
     others: tuple[str, ...] = ()
 
 
-def find_devices(said: dict[str, object], screen: Screen) -> FoundDevices:
-    """Camera and load cell as ``said``, else those that are there; raises DeviceError where there is no camera."""
-    camera, words, others = str(said.get("camera.address") or ""), "", tuple[str, ...]()
+def find_devices(given: dict[str, object], screen: Screen) -> FoundDevices:
+    """Camera and load cell as ``given``, else those found; raises DeviceError without a camera."""
+    camera, descriptions, others = str(given.get("camera.address") or ""), "", tuple[str, ...]()
     if not camera:
-        camera, words, others = _camera()
-        screen.say(f"camera: {camera}  {words}")
-    load, load_words = str(said.get("load.address") or ""), ""
+        camera, descriptions, others = _camera()
+        screen.say(f"camera: {camera}  {descriptions}")
+    load, load_words = str(given.get("load.address") or ""), ""
     if not load:
         load, load_words = _load(camera, screen)
         screen.say(f"load cell: {load}  {load_words}".rstrip())
-    return FoundDevices(camera, printable(words), load, printable(load_words), others)
+    return FoundDevices(camera, printable(descriptions), load, printable(load_words), others)
 
 
 def _camera() -> tuple[str, str, tuple[str, ...]]:
-    """The first camera that can be opened, its name, and the others."""
+    """The first usable camera, its name, and the others."""
     from acquire.camera import list_cameras
 
     cameras = list_cameras()
@@ -122,23 +125,23 @@ def _camera() -> tuple[str, str, tuple[str, ...]]:
 
 
 def _stable(address: str, stable: str) -> str:
-    """The name that plugging does not change, with the settings of the address."""
+    """The address that stays the same when the camera is plugged in again, with its settings."""
     _, mark, settings = address.partition("?")
     return f"{stable}{mark}{settings}" if stable and "?" not in stable else stable or address
 
 
 def _load(camera: str, screen: Screen) -> tuple[str, str]:
-    """The load cell that goes with a camera: a simulated one, none with pictures, else one that is heard."""
+    """The load cell for a camera: simulated with a simulated one, none with pictures, else one found."""
     from acquire.camera import with_scheme
 
     scheme = parse_address(with_scheme(camera)).scheme
     if scheme in ("sim", *RECORDED):
         return ("sim:", "simulated") if scheme == "sim" else ("none:", "pictures have none")
-    return next(_heard(screen), ("none:", "none was heard; say it with --load, see phasedic identify"))
+    return next(_listen(screen), ("none:", "none was found; give it with --load, see phasedic identify"))
 
 
-def _heard(screen: Screen) -> Iterator[tuple[str, str]]:
-    """What talks on the serial ports; a device that must be asked is silent here."""
+def _listen(screen: Screen) -> Iterator[tuple[str, str]]:
+    """The load cells on the serial ports that send without a query."""
     from acquire.serial_line import identify
     from acquire.serial_line.ports import list_serial_ports
 
@@ -146,28 +149,28 @@ def _heard(screen: Screen) -> Iterator[tuple[str, str]]:
         if not port.accessible:
             screen.say(port.text().strip())
             continue
-        screen.say(f"listening on {port.device} (--load ADDRESS or --load none: saves this)")
+        screen.say(f"listening on {port.device} (--load ADDRESS or --load none: skips this)")
         for _, _, finding in identify.listen(port.device):
             if finding is not None:
                 yield finding.address, finding.remark or finding.protocol
 
 
-# -- what is told -------------------------------------------------------------------------------
+# -- output -------------------------------------------------------------------------------------
 
 
-def _show(p: Proposal, png: Path) -> None:
-    grid = p.region.grid(p.config, *p.seen.size)
+def _draw(p: Proposal, png: Path) -> None:
+    grid = p.region.grid(p.config, *p.first_look.size)
     overlay = Overlay(p.region, grid, p.config.gauges, px_per_mm=p.config.scale.px_per_mm)
-    write_picture(png, snapshot(p.seen.picture, overlay))
+    write_picture(png, snapshot(p.first_look.picture, overlay))
 
 
-def _tell(p: Proposal, rig: Path, png: Path, screen: Screen) -> None:
-    grid = p.region.grid(p.config, *p.seen.size)
+def _print(p: Proposal, rig: Path, png: Path, screen: Screen) -> None:
+    grid = p.region.grid(p.config, *p.first_look.size)
     screen.say(p.region.words)
     screen.say(
         f"{grid.n_active} ZOIs of {grid.size} px, {grid.step} px apart; load along {p.config.specimen.axis}"
     )
     screen.say(f"gauges: {', '.join(p.config.gauges) or 'none'}")
-    screen.say(f"written: {rig}, and {png} to look at")
+    screen.say(f"written: {rig}, and {png} as a picture of it")
     name = shlex.quote(str(rig))
     screen.say(f"next: phasedic check --config {name}, then phasedic run --config {name}")

@@ -1,4 +1,4 @@
-"""``phasedic load-calibrate``: no load, a known load, no load again, and whether to keep it."""
+"""``phasedic load-calibrate``: measure no load, a known load and no load again, and save the calibration."""
 
 from __future__ import annotations
 
@@ -17,23 +17,24 @@ Say = Callable[[str], None]
 Ask = Callable[[str], str]
 
 GRAVITY = 9.80665  # m/s^2
-TRIES = 3  # of each reading
+MAX_TRIES = 3  # for each point
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic load-calibrate``."""
-    parser.add_argument("--load", required=True, metavar="ADDRESS")
+    parser.add_argument("--load", required=True, metavar="ADDRESS", help="address of the load cell")
     parser.add_argument("--mass", type=float, metavar="KG", help="the known load as a mass")
     parser.add_argument("--force", type=float, metavar="N", help="the known load as a force")
-    parser.add_argument("--out", required=True, metavar="FILE", help="where the calibration is kept")
-    parser.add_argument("--seconds", type=float, default=3.0, metavar="S", help="of each reading (default 3)")
+    parser.add_argument("--out", required=True, metavar="FILE", help="file for the calibration")
+    parser.add_argument(
+        "--seconds", type=float, default=3.0, metavar="S", help="duration of each reading (default 3)"
+    )
 
 
 def command(arguments: argparse.Namespace, say: Say = print, ask: Ask = input) -> int:
     """``phasedic load-calibrate --load ADDRESS (--mass KG | --force N) --out FILE [--seconds 3]``.
 
-    Reads no load, the known load, no load again; asks before each and before the result is kept.
-    6 when it was not accepted.
+    Asks before each of the three readings and before it saves the result; 6 if the result is not accepted.
     """
     if (arguments.mass is None) == (arguments.force is None):
         raise ConfigError("give the known load: --mass in kg, or --force in N")
@@ -41,17 +42,19 @@ def command(arguments: argparse.Namespace, say: Say = print, ask: Ask = input) -
     address = _raw(arguments.load)
 
     def read(force_N: float, what: str) -> calibration.Point:
-        for _ in range(TRIES):
+        for _ in range(MAX_TRIES):
             ask(f"{what}, wait until it is still, then press Enter ")
             cell = open_load(address, lambda event: say(f"{event.level}: {event.text}"))
-            heard = check.listen(cell, arguments.seconds)
-            why_not = _unfit(heard.samples)
+            received = check.listen(cell, arguments.seconds)
+            why_not = _unfit(received.samples)
             if not why_not:
-                found = calibration.point(force_N, [sample.force for sample in heard.samples])
+                found = calibration.point(force_N, [sample.force for sample in received.samples])
                 say(f"  {found.value:.8g} on the line (noise {found.noise:.3g}, {found.n} readings)")
                 return found
             say(f"  not taken: {why_not}")
-        raise DataError(f"{arguments.load}: {TRIES} times {why_not}; look at it with 'phasedic load-check'")
+        raise DataError(
+            f"{arguments.load}: {MAX_TRIES} times {why_not}; look at it with 'phasedic load-check'"
+        )
 
     points = [read(0.0, "take off all load"), read(known_N, f"put on {known_N:.6g} N")]
     points.append(read(0.0, "take off all load again"))
@@ -66,7 +69,7 @@ def command(arguments: argparse.Namespace, say: Say = print, ask: Ask = input) -
 
 
 def _unfit(samples: Sequence[LoadSample]) -> str:
-    """Why no point of a calibration can be made of these; "" where they are still."""
+    """Why these samples give no point of a calibration; "" if they do."""
     if any(sample.flags & (LoadFlag.OVERLOAD | LoadFlag.UNDERLOAD) for sample in samples):
         return "the cell was in overload or saturated"
     good = [sample for sample in samples if not math.isnan(sample.force)]
@@ -77,7 +80,7 @@ def _unfit(samples: Sequence[LoadSample]) -> str:
 
 
 def _raw(address: str) -> str:
-    """The address with what stands on the line as value: no unit, no sign, no earlier calibration."""
+    """The address for values as sent by the device: without unit, sign and earlier calibration."""
     body, mark, settings = address.partition("?")
     dropped = ("gain", "zero", "sign", "unit", "calibration", "capacity", "max_step", "mass_reads_force")
     kept = [part for part in settings.split("&") if mark and part.partition("=")[0] not in dropped]

@@ -1,4 +1,4 @@
-"""``phasedic load-check``: listen to a load cell; ready for a test or not."""
+"""``phasedic load-check``: check a load cell; ready for a test or not."""
 
 from __future__ import annotations
 
@@ -14,12 +14,14 @@ Say = Callable[[str], None]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic load-check``."""
-    parser.add_argument("--load", required=True, metavar="ADDRESS")
-    parser.add_argument("--seconds", type=float, default=10.0, metavar="S", help="default 10")
+    parser.add_argument("--load", required=True, metavar="ADDRESS", help="address of the load cell")
+    parser.add_argument(
+        "--seconds", type=float, default=10.0, metavar="S", help="duration of the check (default 10)"
+    )
 
 
 def command(arguments: argparse.Namespace, say: Say = print) -> int:
-    """0 when ready for a test, 6 when not."""
+    """``phasedic load-check``; 0 if ready for a test, else 6."""
     cell = open_load(arguments.load, lambda event: say(f"{event.level}: {event.text}"))
     say(f"listening to {cell.info.name} for {arguments.seconds:g} s ...")
     found = check.report(check.listen(cell, arguments.seconds), cell.info)

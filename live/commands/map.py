@@ -1,4 +1,4 @@
-"""``phasedic map``: a map of the results over a picture, as a PNG."""
+"""``phasedic map``: draw a map of the results over a picture."""
 
 from __future__ import annotations
 
@@ -12,23 +12,32 @@ from live.results import Strain
 from live.results.maps.map import MapRequest, draw, save
 from live.ui.terminal.screen import say
 
-_SEEN_PX = 2.0
+_VISIBLE_PX = 2.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic map``."""
     parser.add_argument("results", help="strain.h5")
-    parser.add_argument("png", help="the picture to write, .png or .jpg")
-    parser.add_argument("--field", default="eyy", help="u, v, exx, eyy, exy, sigma_eyy, residual, status ...")
-    parser.add_argument("--row", type=int, default=-1, help="which measured instant (default: the last)")
-    parser.add_argument("--over", metavar="FILE", help="image to draw over")
+    parser.add_argument("png", help="picture to write, .png or .jpg")
+    parser.add_argument(
+        "--field",
+        default="eyy",
+        help="u, v, exx, eyy, exy, sigma_eyy, residual, status ... (default eyy)",
+    )
+    parser.add_argument(
+        "--row",
+        type=int,
+        default=-1,
+        help="number of the instant, from 0 (default: the last)",
+    )
+    parser.add_argument("--over", metavar="FILE", help="picture under the map")
     parser.add_argument("--limit", type=float, help="colour range -LIMIT to LIMIT (default: automatic)")
-    parser.add_argument("--title")
-    words = "median filter of N x N ZOIs, for show"
+    parser.add_argument("--title", help="title (default: map, time and ZOI)")
+    words = "median filter of N x N ZOIs, for display only"
     parser.add_argument("--median", type=int, default=1, metavar="N", help=words)
-    words = "Gaussian filter, for show"
+    words = "Gaussian filter, for display only"
     parser.add_argument("--low-pass", type=float, default=0.0, metavar="PX", help=words)
-    words = "take the blur of the ZOI off, for show (order 1): 3 or 7 steps; the title says what they do"
+    words = "reduce the blur by the ZOI, for display only (order 1): 3 or 7 steps, noted in the title"
     parser.add_argument("--deconvolve", type=int, default=0, metavar="STEPS", help=words)
 
 
@@ -48,15 +57,15 @@ def command(arguments: argparse.Namespace) -> int:
         )
         save(draw(strain, picture, background), path)
         if arguments.over is not None:
-            _tell_of_motion(strain, arguments.row)
+            _warn_of_motion(strain, arguments.row)
     say(str(path))
     return 0
 
 
-def _tell_of_motion(strain: Strain, row: int) -> None:
-    """The map lies on the reference: over a later picture it would be misplaced."""
+def _warn_of_motion(strain: Strain, row: int) -> None:
+    """Warn if the specimen moved: the map lies on the reference, and on a later picture it is misplaced."""
     moved = float(np.nanmax(np.hypot(strain.maps("u", row), strain.maps("v", row)), initial=0.0))
-    if moved > _SEEN_PX:
+    if moved > _VISIBLE_PX:
         say(
             f"note: the map lies on the reference picture; the specimen moved by up to {moved:.0f} px since, so give"
             " the reference to --over, or phasedic export --to png, which moves the map with it"

@@ -1,7 +1,7 @@
-"""The options of the command line that stand for keys of the configuration, and what they set.
+"""The options of the command line that set keys of the configuration.
 
-An option is declared where its key is (``live.config.sections``): name, type, default and help are
-written once. Its value is stored under "section.key".
+An option is declared with its key in ``live.config.sections``: name, type, default and help stand once. Its value
+is stored under "section.key".
 """
 
 from __future__ import annotations
@@ -18,13 +18,11 @@ MEASURE = (
     "order", "bending", "noise",
 )  # fmt: skip
 OUTPUT = ("out", "no-view", "no-rrd", "light", "axis", "standard", "zero", "lag", "report")
-
-
 PICTURES = (".png", ".tif")
 
 
 def add_options(parser: argparse.ArgumentParser, title: str, *names: str) -> None:
-    """A group of options by their names."""
+    """Add a group of options by their names."""
     group, known = parser.add_argument_group(title), options()
     for name in names:
         key, field = known[name]
@@ -41,7 +39,7 @@ def add_options(parser: argparse.ArgumentParser, title: str, *names: str) -> Non
 
 
 def _reader(read: Any) -> Any:
-    """``read`` with words of its own where it refuses."""
+    """``read`` with a clear message for a value it rejects."""
 
     def reader(word: str) -> Any:
         try:
@@ -54,25 +52,53 @@ def _reader(read: Any) -> Any:
 
 
 def add_measure(parser: argparse.ArgumentParser) -> None:
-    """What says how to measure and where the files go."""
-    parser.add_argument("--config", metavar="FILE", help="TOML file; what is given here overrides it")
+    """Add the options of measurement and output."""
+    add_config_file(parser)
     add_options(parser, "measurement", *MEASURE)
     add_options(parser, "output", *OUTPUT)
-    parser.add_argument("--section", metavar="W,T", help="width,thickness of the section in mm, for stresses")
-    parser.add_argument(
-        "--meta", action="append", default=[], metavar="KEY=TEXT", help="stored in every file"
-    )
+    add_section(parser)
+    add_metadata(parser)
     add_verbose(parser)
 
 
+def add_config_file(parser: argparse.ArgumentParser) -> None:
+    """Add --config."""
+    words = "TOML file of the configuration; options override it"
+    parser.add_argument("--config", metavar="FILE", help=words)
+
+
+def add_section(parser: argparse.ArgumentParser) -> None:
+    """Add --section."""
+    words = "width,thickness of the section in mm, for stresses"
+    parser.add_argument("--section", metavar="W,T", help=words)
+
+
+def add_metadata(parser: argparse.ArgumentParser) -> None:
+    """Add --meta."""
+    words = "metadata, stored in every file; may be repeated"
+    parser.add_argument("--meta", action="append", default=[], metavar="KEY=TEXT", help=words)
+
+
+def add_time_span(parser: argparse.ArgumentParser) -> None:
+    """Add --from and --to."""
+    parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin at this time, s")
+    parser.add_argument("--to", dest="end_s", type=float, metavar="S", help="end at this time, s")
+
+
+def add_as_measured(parser: argparse.ArgumentParser) -> None:
+    """Add --as-measured."""
+    words = "use the bursts of the live run; results are bit-identical"
+    parser.add_argument("--as-measured", action="store_true", help=words)
+
+
 def add_gauge_option(parser: argparse.ArgumentParser) -> None:
-    """--gauges of the commands that look at a finished run."""
-    words = "virtual gauges to lay over the run: a TOML file with tables [gauges.NAME]"
+    """Add --gauges for commands on a finished run."""
+    words = "additional virtual gauges: a TOML file with tables [gauges.NAME]"
     parser.add_argument("--gauges", dest="more_gauges", metavar="FILE.toml", help=words)
 
 
-def to_be_new(path: Path, *endings: str) -> None:
-    """Raises ConfigError where there is such a file already, or its name does not end in one of these."""
+def require_new(path: Path, *endings: str) -> None:
+    """Raises ConfigError if the file exists, or its name does not end in one of ``endings``."""
     if path.exists() or path.is_symlink():
         raise ConfigError(f"{path} exists; nothing is overwritten, choose another name")
     if endings and path.suffix.lower() not in endings:
@@ -80,12 +106,12 @@ def to_be_new(path: Path, *endings: str) -> None:
 
 
 def add_verbose(parser: argparse.ArgumentParser) -> None:
-    """--verbose."""
-    parser.add_argument("--verbose", "-v", action="store_true", help="tell more")
+    """Add --verbose."""
+    parser.add_argument("--verbose", "-v", action="store_true", help="detailed log messages")
 
 
 def overrides(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What the command line sets, as "section.key" -> value."""
+    """The values that the command line sets, "section.key" -> value."""
     given = vars(arguments)
     found = {key: value for key, value in given.items() if "." in key and value is not None}
     if given.get("section"):
@@ -97,7 +123,7 @@ def overrides(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def configured(arguments: argparse.Namespace, defaults: dict[str, Any] | None = None) -> Config:
-    """The configuration: ``defaults``, overlaid by the file of --config, overlaid by the options."""
+    """The configuration: ``defaults``, overridden by the file of --config, overridden by the options."""
     path = Path(arguments.config) if arguments.config else None
     return load_config(path, {**(defaults or {}), **overrides(arguments)})
 

@@ -1,4 +1,4 @@
-"""``phasedic page``: the operator's page; set up, run, what came out, and again until it is ended."""
+"""``phasedic page``: the operator's page for set-up, run and results, test after test."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.init import find_devices
 from live.commands.options import add_measure, add_options, overrides
 from live.commands.report import write_report
-from live.commands.run import OTHER_PROGRAMS, RECORDING, invite, watched
+from live.commands.run import OTHER_PROGRAMS, RECORDING, open_page, run_with_page
 from live.commands.signals import signals
 from live.config.loading import load_config
 from live.pipeline.screen import Screen
@@ -29,17 +29,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "devices and recording", *RECORDING)
     add_options(parser, "other programs", *OTHER_PROGRAMS)
     add_measure(parser)
-    words = f"port of the page on 127.0.0.1 (default {DEFAULT_PORT}); the next free one is taken"
-    parser.add_argument("--page-port", type=int, default=DEFAULT_PORT, metavar="N", help=words)
+    port_help = f"port of the page on 127.0.0.1, or the next free one (default {DEFAULT_PORT})"
+    parser.add_argument("--page-port", type=int, default=DEFAULT_PORT, metavar="N", help=port_help)
 
 
 def command(arguments: argparse.Namespace) -> int:
-    """``phasedic page``; 0 when it is ended from the page, 130 when it is interrupted."""
+    """``phasedic page``; 0 if it is ended from the page, 130 if it is interrupted."""
     screen = TerminalScreen()
-    path, said = Path(arguments.config or RIG), overrides(arguments)
-    draft = ConfigDraft(load_config(path if path.exists() else None, said), path, said)
+    path, given = Path(arguments.config or RIG), overrides(arguments)
+    draft = ConfigDraft(load_config(path if path.exists() else None, given), path, given)
     if not draft.config.camera.address:
-        found = find_devices(said, screen)
+        found = find_devices(given, screen)
         draft.change_all({"camera.address": found.camera, "load.address": found.load})
     interrupted = threading.Event()
     with PageController(draft, arguments.page_port) as controller:
@@ -49,22 +49,22 @@ def command(arguments: argparse.Namespace) -> int:
             controller.quit()
 
         with signals(interrupt, screen.say):
-            invite(controller, screen)
+            open_page(controller, screen)
             serve(controller, screen, interrupted)
     return EXIT_INTERRUPTED if interrupted.is_set() else 0
 
 
 def serve(controller: PageController, screen: Screen, interrupted: threading.Event) -> None:
-    """Specimen after specimen."""
-    words = ""
-    while not interrupted.is_set() and (config := controller.set_up(words)) is not None:
+    """One test after the other until the page or the program is ended."""
+    message = ""
+    while not interrupted.is_set() and (config := controller.set_up(message)) is not None:
         try:
-            outcome = watched(controller, config, screen)
+            outcome = run_with_page(controller, config, screen)
         except PhasedicError as error:
-            words = brief(error)
-            screen.say(f"the test did not begin: {words}")
+            message = brief(error)
+            screen.say(f"the test did not begin: {message}")
             continue
-        words = ""
+        message = ""
         if outcome.exit_code == EXIT_INTERRUPTED:
             interrupted.set()
             return

@@ -1,23 +1,23 @@
-"""``phasedic recover``: copy what is readable of a damaged session."""
+"""``phasedic recover``: copy the readable part of a damaged session."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
 
-from live.ui.terminal.screen import say as told
+from live.ui.terminal.screen import say as print_line
 
 Say = Callable[[str], None]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic recover``."""
-    parser.add_argument("session")
-    parser.add_argument("--out", metavar="FILE", help="the copy (default: beside it)")
+    parser.add_argument("session", help="damaged or unfinished session.h5")
+    parser.add_argument("--out", metavar="FILE", help="new file (default: beside the session)")
 
 
-def command(arguments: argparse.Namespace, say: Say = told) -> int:
-    """``phasedic recover SESSION [--out FILE]``; 5 when something could not be read."""
+def command(arguments: argparse.Namespace, say: Say = print_line) -> int:
+    """``phasedic recover SESSION [--out FILE]``; 5 if a part cannot be read."""
     from acquire.session import recover as copy
 
     done = copy(arguments.session, arguments.out)

@@ -1,4 +1,4 @@
-"""``phasedic replay``: a session or pictures through the measuring path."""
+"""``phasedic replay``: measure a recorded session or pictures."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from live.commands.exit_codes import EXIT_WORDS
-from live.commands.options import add_measure, overrides
+from live.commands.options import add_as_measured, add_measure, add_time_span, overrides
 from live.commands.signals import signals
 from live.results.summary import file_lines, summary_lines
 from live.ui.terminal.screen import TerminalScreen
@@ -16,12 +16,11 @@ from live.ui.terminal.screen import TerminalScreen
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic replay``."""
-    parser.add_argument("source", help="session.h5, 'files:shots/*.tif' or 'video:file.mp4'")
-    parser.add_argument("--as-measured", action="store_true", help="the bursts of the live run, bit-equal")
-    parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin here, seconds")
-    parser.add_argument("--to", dest="end_s", type=float, metavar="S", help="end here, seconds")
+    parser.add_argument("source", help="session.h5, a folder, 'files:shots/*.tif' or 'video:file.mp4'")
+    add_as_measured(parser)
+    add_time_span(parser)
     parser.add_argument("--reference", metavar="FILE", help="reference picture (default: the first)")
-    words = "forces against file or time_s, as a CSV with a heading such as file,force_kN"
+    words = "forces by file or time_s: a CSV with a header such as file,force_kN"
     parser.add_argument("--load", dest="forces", metavar="FILE.csv", help=words)
     add_measure(parser)
 
@@ -59,7 +58,7 @@ def command(arguments: argparse.Namespace) -> int:
 
 
 def _overrides(arguments: argparse.Namespace) -> dict[str, Any]:
-    """What the command line sets; where the forces come from is stored with the results."""
+    """The values that the command line sets, and the file of the forces as metadata."""
     given = overrides(arguments)
     return (
         given

@@ -1,4 +1,4 @@
-"""``phasedic report``: a finished run, or several, as one HTML page."""
+"""``phasedic report``: report one or several finished runs as an HTML page."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ from live.ui.terminal.screen import TerminalScreen
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic report``."""
     parser.add_argument("run", nargs="?", help="folder of a run or replay, or a strain.h5")
+    parser.add_argument("--out", metavar="FILE.html", help="new page (default: report.html in the folder)")
+    parser.add_argument("--pdf", action="store_true", help="also print the page to a PDF; needs a browser")
     parser.add_argument(
-        "--out", metavar="FILE.html", help="page to write (default: report.html in the folder)"
+        "--figures", metavar="DIR", help="also write the figures as SVG, PNG and CSV to a new folder"
     )
-    parser.add_argument("--pdf", action="store_true", help="print it to a PDF beside it; needs a browser")
-    parser.add_argument("--figures", metavar="DIR", help="the figures as SVG, PNG and CSV in a new folder")
-    words = "instant of the maps, seconds; may be given again (default: first, elastic, yield, highest, last)"
+    words = "instant of the maps, s; may be repeated (default: first, elastic, yield, highest, last)"
     parser.add_argument(
         "--at", dest="times", action="append", type=float, default=[], metavar="S", help=words
     )
-    words = "map to show; may be given again (default: the strain along the load)"
+    words = "map to show; may be repeated (default: the strain along the load)"
     parser.add_argument("--field", dest="fields", action="append", default=[], metavar="NAME", help=words)
     parser.add_argument(
-        "--scale", type=float, metavar="MM/PX", help="what one pixel measures, in mm (default: as configured)"
+        "--scale", type=float, metavar="MM/PX", help="size of one pixel, mm (default: as configured)"
     )
-    words = "several tests in one page: curves, mean and scatter, and a CSV beside it"
+    words = "compare several tests in one page: curves, mean and scatter, and a CSV beside it"
     add_gauge_option(parser)
     parser.add_argument("--compare", nargs="+", default=[], metavar="RUN", help=words)
 
@@ -62,13 +62,13 @@ def command(arguments: argparse.Namespace) -> int:
                 write_table(tests, file)
             screen.say(str(out.with_suffix(".csv")))
         else:
-            report = make_report(found[0], _wanted(arguments, found[0]), screen)
+            report = make_report(found[0], _request(arguments, found[0]), screen)
     _save(report, out, arguments, screen)
     return 0
 
 
 def write_report(folder: Path, screen: Screen) -> None:
-    """``report.html`` in the folder of a run that has just ended; what goes wrong is told and harms nothing."""
+    """``report.html`` in the folder of a run; an error is printed and does not affect the run."""
     try:
         with open_run(folder) as run:
             save_page(
@@ -79,13 +79,13 @@ def write_report(folder: Path, screen: Screen) -> None:
         screen.say(f"warning: no report was made: {error}")
 
 
-def _wanted(arguments: argparse.Namespace, run: RunFolder) -> ReportRequest:
+def _request(arguments: argparse.Namespace, run: RunFolder) -> ReportRequest:
     scale = Display(arguments.scale).mm_per_px or run.mm_per_px
     return ReportRequest(tuple(arguments.fields), tuple(arguments.times), scale)
 
 
 def _targets(out: Path, arguments: argparse.Namespace) -> list[Path]:
-    """All that will be made, so that nothing is made where one of them is taken."""
+    """All files that will be made; if one exists, none is made."""
     beside = [".csv"] * bool(arguments.compare) + [".pdf"] * arguments.pdf
     figures = [Path(arguments.figures)] if arguments.figures else []
     return [out, *(out.with_suffix(suffix) for suffix in beside), *figures]

@@ -1,4 +1,4 @@
-"""``phasedic run``: a live test with signals, keyboard and what is printed at its end."""
+"""``phasedic run``: a live test with signals, keyboard, remote commands and the summary at its end."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from live.run.control import ControlPort
 from live.run.keyboard import listen
 from live.run.live_run import INTERRUPTED, LiveRun, run_live
 from live.run.outcome import Outcome, StopSignal
-from live.setup.region import searched
+from live.setup.region import located
 from live.ui.rerun.view import has_display, rerun_command, spawn_viewer
 from live.ui.terminal.screen import TerminalScreen
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from live.ui.web.page_controller import PageController
 
 RECORDING = ("camera", "load", "no-record", "record", "armed", "start-above", "dark", "flat", "crop")
-VIEWER_OPENS_S = 1.5  # where it cannot, it ends sooner than that
+VIEWER_OPENS_S = 1.5  # a viewer that cannot open ends sooner
 OTHER_PROGRAMS = ("orders", "strain-out", "strain-format", "strain-channels", "token-file")
 
 
@@ -39,7 +39,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic run``."""
     add_options(parser, "devices and recording", *RECORDING, "seconds")
     add_options(parser, "other programs", *OTHER_PROGRAMS)
-    words = "show the operator's page in the browser, on 127.0.0.1, while it runs (phasedic page sets up too)"
+    words = (
+        "show the operator's page in the browser, on 127.0.0.1, during the run (phasedic page also sets up)"
+    )
     parser.add_argument("--page", action="store_true", help=words)
     add_measure(parser)
 
@@ -47,43 +49,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
     screen = TerminalScreen()
-    with searched(configured(arguments), screen.say) as config:
-        outcome = run_beside_page(config, screen) if arguments.page else run_to_the_end(config, screen)
+    with located(configured(arguments), screen.say) as config:
+        outcome = run_and_show_page(config, screen) if arguments.page else run_attended(config, screen)
     if not arguments.page:
-        conclude(outcome, screen)
+        print_outcome(outcome, screen)
     return outcome.exit_code
 
 
-def run_beside_page(config: Config, screen: Screen) -> Outcome:
-    """Run with the operator's page, which ends with the run."""
+def run_and_show_page(config: Config, screen: Screen) -> Outcome:
+    """Run with the operator's page until the run ends."""
     from live.ui.web.page_controller import PageController
 
     with PageController(None) as controller:
-        invite(controller, screen)
-        return watched(controller, config, screen)
+        open_page(controller, screen)
+        return run_with_page(controller, config, screen)
 
 
-def watched(controller: PageController, config: Config, screen: Screen) -> Outcome:
-    """One test, with the page, told to its end."""
+def run_with_page(controller: PageController, config: Config, screen: Screen) -> Outcome:
+    """One test, shown on the page until its end."""
     from live.ui.web.page_controller import run_result
 
     controller.viewer = _open_viewer
-    outcome = run_to_the_end(config, screen, [controller.begin(config)], controller.attach)
-    conclude(outcome, screen)
+    outcome = run_attended(config, screen, [controller.begin(config)], controller.attach)
+    print_outcome(outcome, screen)
     words = EXIT_WORDS.get(outcome.exit_code, "")
     controller.end(run_result(outcome.run_state, outcome.config.specimen, outcome.folder, words))
     return outcome
 
 
-def invite(controller: PageController, screen: Screen) -> None:
-    """Open the page where there is a display; say how to open it."""
+def open_page(controller: PageController, screen: Screen) -> None:
+    """Open the page if there is a display, and print its address."""
     if has_display() and webbrowser.open(controller.address):
         screen.say("the page opens in the browser")
     screen.say(f"the page: {controller.address}")
 
 
 def _open_viewer(port: int) -> str:
-    """The viewer of the view, in a window of its own; what keeps it from opening comes soon."""
+    """Open the viewer in its own window; returns "ok", or "no: " and the reason."""
     trouble: queue.Queue[str] = queue.Queue()
     if spawn_viewer(port, trouble.put) is None:
         return "no: no window can be opened here; the folder of the run has view.rrd"
@@ -92,16 +94,16 @@ def _open_viewer(port: int) -> str:
     return "ok"
 
 
-def run_to_the_end(
+def run_attended(
     config: Config,
     screen: Screen,
     consumers: Sequence[Consumer] = (),
     attend: Callable[[LiveRun], None] = lambda live: None,
 ) -> Outcome:
-    """Run with signals, keyboard, port for orders and viewer attached; ``attend`` gives orders too."""
-    stop, operate = StopSignal(), config.operate
+    """Run with signals, keyboard and remote commands; ``attend`` may add controls of its own."""
+    stop, ports = StopSignal(), config.operate
     with contextlib.ExitStack() as stack:
-        port = ControlPort(operate.orders, operate.token_file, screen) if operate.orders else None
+        port = ControlPort(ports.orders, ports.token_file, screen) if ports.orders else None
 
         def on_start(live: LiveRun) -> None:
             keyboard = listen(live, sys.stdin, screen)
@@ -113,14 +115,14 @@ def run_to_the_end(
 
         if port is not None:
             stack.callback(port.close)
-        stack.enter_context(signals(lambda: stop.ask(INTERRUPTED), screen.say))
+        stack.enter_context(signals(lambda: stop.request(INTERRUPTED), screen.say))
         return run_live(
             config, screen, stop=stop, consumers=standard_consumers(screen, consumers), on_start=on_start
         )
 
 
-def conclude(outcome: Outcome, screen: Screen) -> None:
-    """Print the summary, the ledger, the losses and the files."""
+def print_outcome(outcome: Outcome, screen: Screen) -> None:
+    """Print the summary, the frame counts, the losses and the files."""
     screen.say()
     run_state = outcome.run_state
     for line in summary_lines(run_state, outcome.config.specimen):
@@ -128,16 +130,16 @@ def conclude(outcome: Outcome, screen: Screen) -> None:
     screen.say(run_state.frame_counts.line())
     for report in outcome.outputs.reports:
         screen.say(f"  {report.line()}")
-    troubles = run_state.event_log.events("warning", "error")
-    if troubles:
+    warnings = run_state.event_log.events("warning", "error")
+    if warnings:
         screen.say(
-            f"{len(troubles)} warnings and errors, the last: {sentence(troubles[-1], run_state.event_log.names)}"
+            f"{len(warnings)} warnings and errors, the last: {sentence(warnings[-1], run_state.event_log.names)}"
         )
     for line in file_lines(outcome.folder):
         screen.say(line)
     rrd = outcome.folder / "view.rrd"
     if rrd.exists():
-        screen.say(f"look at it again with: {rerun_command()} {rrd}")
+        screen.say(f"open the recorded view with: {rerun_command()} {rrd}")
     if outcome.config.output.report:
         from live.commands.report import write_report
 

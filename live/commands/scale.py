@@ -1,4 +1,4 @@
-"""``phasedic scale``: mm per px from two points, a board, or the specimen's width; into the rig file."""
+"""``phasedic scale``: measure mm per px from two points, a board, or the width of the specimen."""
 
 from __future__ import annotations
 
@@ -15,43 +15,54 @@ from live.config.loading import Config
 from live.config.rig_file import write_rig
 from live.config.values import AUTO
 from live.pipeline.screen import Screen
-from live.setup.region import look, region_of
+from live.setup.region import first_look, region_of
 from live.setup.scale import OUT_OF_PLANE_MM, Board, Scale, false_strain, from_board, from_points, from_width
 from live.ui.terminal.screen import TerminalScreen
 
 Number = TypeVar("Number", int, float)
-OF_THE_RIG = -1.0  # --width without a number
+WIDTH_OF_RIG = -1.0  # --width without a number
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic scale``."""
     parser.add_argument(
-        "--config", metavar="FILE", help="the rig file the scale is written to; without, it is told"
+        "--config", metavar="FILE", help="rig file to which the scale is written (default: print only)"
     )
     add_options(parser, "picture", "camera", "crop", "roi", "mask", "axis")
-    how = parser.add_argument_group("how, one of these")
-    how.add_argument("--points", metavar="X1,Y1,X2,Y2", help="two points in px, --length apart")
-    how.add_argument("--length", type=float, metavar="MM", help="between the two points")
-    how.add_argument("--checkerboard", metavar="CxR", help="so many inner corners, with --square")
+    how = parser.add_argument_group("method, one of these")
+    how.add_argument("--points", metavar="X1,Y1,X2,Y2", help="two points in px, with --length")
+    how.add_argument("--length", type=float, metavar="MM", help="distance between the two points")
     how.add_argument(
-        "--charuco", metavar="CxR", help="so many squares, with --square, --marker, --dictionary"
+        "--checkerboard",
+        metavar="CxR",
+        help="board with columns x rows of inner corners, with --square",
+    )
+    how.add_argument(
+        "--charuco",
+        metavar="CxR",
+        help="board with columns x rows of squares, with --square, --marker, --dictionary",
     )
     how.add_argument("--square", type=float, metavar="MM", help="side of a square of the board")
     how.add_argument("--marker", type=float, metavar="MM", help="side of a marker of a ChArUco board")
-    how.add_argument("--dictionary", default="4X4_50", metavar="NAME", help="of its markers (4X4_50)")
     how.add_argument(
-        "--width", type=float, nargs="?", const=OF_THE_RIG, metavar="MM",
-        help="the specimen is found and so wide; without a number width_mm of the rig file",
+        "--dictionary", default="4X4_50", metavar="NAME", help="its dictionary of markers (default 4X4_50)"
+    )
+    how.add_argument(
+        "--width", type=float, nargs="?", const=WIDTH_OF_RIG, metavar="MM",
+        help="width of the specimen, which is found in the picture (default: width_mm of the rig file)",
     )  # fmt: skip
     parser.add_argument(
         "--sigma",
         type=float,
         default=0.0,
         metavar="MM",
-        help="standard uncertainty of the length, width or board",
+        help="standard uncertainty of the length, the width or the board (default 0)",
     )
     parser.add_argument(
-        "--stand-off", type=float, metavar="MM", help="distance from the camera to the specimen"
+        "--stand-off",
+        type=float,
+        metavar="MM",
+        help="distance from the camera to the specimen",
     )
     add_verbose(parser)
 
@@ -68,10 +79,10 @@ def command(arguments: argparse.Namespace) -> int:
     )
     for remark in scale.remarks:
         screen.say(f"LOOK  {remark}")
-    _tell_out_of_plane(stand_off, screen)
+    _print_false_strain(stand_off, screen)
     if arguments.config:
         write_rig(Path(arguments.config), scale.changes(arguments.stand_off))
-        screen.say(f"written to {arguments.config}; what it was before: {arguments.config}.bak")
+        screen.say(f"written to {arguments.config}; the former file is {arguments.config}.bak")
     return 0
 
 
@@ -98,17 +109,17 @@ def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | Non
         return from_points((x1, y1, x2, y2), _needed(arguments, "length"), arguments.sigma)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS or --config rig.toml")
-    seen = look(config, screen.say)
+    first = first_look(config, screen.say)
     if arguments.width is None:
-        return from_board(seen.picture, _board(arguments), arguments.sigma, stand_off)
-    width = config.specimen.width_mm if arguments.width == OF_THE_RIG else arguments.width
+        return from_board(first.picture, _board(arguments), arguments.sigma, stand_off)
+    width = config.specimen.width_mm if arguments.width == WIDTH_OF_RIG else arguments.width
     if width is None or not 0 < width < math.inf:
         raise ConfigError(
             "--width: give the width of the specimen in mm, or specimen.width_mm in the rig file"
         )
-    sought = replace(config, measure=replace(config.measure, roi=AUTO, mask=None))
-    region = region_of(sought, seen.picture, seen.noise)
-    return from_width(seen.picture, region, config.specimen.first_axis, width, arguments.sigma)
+    searched = replace(config, measure=replace(config.measure, roi=AUTO, mask=None))
+    region = region_of(searched, first.picture, first.noise)
+    return from_width(first.picture, region, config.specimen.first_axis, width, arguments.sigma)
 
 
 def _board(arguments: argparse.Namespace) -> Board:
@@ -137,12 +148,12 @@ def _numbers(
     return values
 
 
-def _tell_out_of_plane(stand_off: float | None, screen: Screen) -> None:
+def _print_false_strain(stand_off: float | None, screen: Screen) -> None:
     moved = f"{OUT_OF_PLANE_MM:g} mm toward the camera"
     if stand_off is None:
-        screen.say(f"with --stand-off MM the false strain of {moved} is told")
+        screen.say(f"give --stand-off MM for the false strain of {moved}")
         return
-    feigned = false_strain(stand_off) * 1e6
+    strain = false_strain(stand_off) * 1e6
     screen.say(
-        f"{moved} at a stand-off of {stand_off:g} mm feigns a strain of {feigned:.0f} um/m (exx and eyy)"
+        f"{moved} at a stand-off of {stand_off:g} mm gives a false strain of {strain:.0f} um/m (exx and eyy)"
     )

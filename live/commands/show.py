@@ -1,4 +1,4 @@
-"""``phasedic show``: a finished run in the view, with a slider in time."""
+"""``phasedic show``: show a finished run in the view, with a time slider."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import threading
 from pathlib import Path
 
 from acquire.errors import ConfigError
-from live.commands.options import add_gauge_option
+from live.commands.options import add_gauge_option, add_time_span
 from live.commands.signals import signals
 from live.results.run_folder import add_gauges, open_run
 from live.ui.rerun.playback import ShowRequest, show
@@ -17,26 +17,25 @@ from live.ui.terminal.screen import TerminalScreen
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic show``."""
     parser.add_argument("run", help="folder of a run or replay, or a strain.h5")
-    parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin here, seconds")
-    parser.add_argument("--to", dest="end_s", type=float, metavar="S", help="end here, seconds")
-    words = "one instant in N (default: as many as the viewer can keep)"
+    add_time_span(parser)
+    words = "show one instant in N (default: as many as the memory of the viewer holds)"
     parser.add_argument("--every", type=int, metavar="N", help=words)
     add_gauge_option(parser)
-    parser.add_argument("--port", type=int, default=9876, help="of the view on 127.0.0.1 (default 9876)")
-    words = "write this file instead, for: rerun FILE.rrd"
+    parser.add_argument("--port", type=int, default=9876, help="port of the view on 127.0.0.1 (default 9876)")
+    words = "write this file instead of showing it, for: rerun FILE.rrd"
     parser.add_argument("--rrd", metavar="FILE.rrd", help=words)
 
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic show``."""
     _check(arguments)
-    screen, enough = TerminalScreen(), threading.Event()
-    asked = ShowRequest(arguments.start_s, arguments.end_s, arguments.every)
+    screen, stop = TerminalScreen(), threading.Event()
+    request = ShowRequest(arguments.start_s, arguments.end_s, arguments.every)
     rrd = Path(arguments.rrd) if arguments.rrd else None
-    with signals(enough.set, lambda text: None), open_run(arguments.run) as run:
+    with signals(stop.set, lambda text: None), open_run(arguments.run) as run:
         if arguments.more_gauges:
             add_gauges(run, Path(arguments.more_gauges))
-        show(run, asked, screen, enough, port=arguments.port, rrd=rrd)
+        show(run, request, screen, stop, port=arguments.port, rrd=rrd)
     if rrd is not None:
         screen.say(str(rrd))
     return 0

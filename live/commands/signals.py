@@ -1,4 +1,4 @@
-"""What Ctrl-C, SIGTERM and the end of a terminal do to a command."""
+"""The effect of Ctrl-C, SIGTERM and the loss of the terminal on a command."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from acquire.signal_mask import signal_handler
 
 @contextlib.contextmanager
 def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[None]:
-    """SIGINT and SIGTERM call ``stop`` (the third time they kill); a lost terminal is ignored."""
+    """SIGINT and SIGTERM call ``stop``, the third one kills; the loss of the terminal is ignored."""
     times = 0
 
     def handle(number: int, frame: FrameType | None) -> None:
@@ -22,7 +22,7 @@ def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[No
         if times > 2:
             signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)
-        say("closing the files ..." if times == 1 else "still closing; once more ends it at once")
+        say("closing the files ..." if times == 1 else "still closing; a third signal ends it at once")
         stop()
 
     with signal_handler(handle, signal.SIGINT, signal.SIGTERM), signal_handler(signal.SIG_IGN, signal.SIGHUP):
@@ -31,7 +31,7 @@ def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[No
 
 @contextlib.contextmanager
 def interrupts() -> Iterator[threading.Event]:
-    """Set by the first Ctrl-C or SIGTERM; the second ends the program, for nothing is lost with it."""
+    """An event that the first Ctrl-C or SIGTERM sets; the second one ends the program, where nothing can be lost."""
     stop = threading.Event()
 
     def handle(number: int, frame: FrameType | None) -> None:

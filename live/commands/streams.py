@@ -1,8 +1,7 @@
-"""Standard output and error that keep nobody waiting.
+"""Standard output and error that never block.
 
-A terminal stopped with Ctrl-S, or a pipe that nobody reads, would hold up whatever writes to it: the
-measurement, and through the log the grabbing of frames. Here a thread writes, and what finds no room is
-left out and counted.
+A terminal stopped with Ctrl-S, or a pipe that nobody reads, would block its writers: the measurement and, through
+the log, the grabbing of frames. Here a thread writes; writes beyond its queue are dropped and counted.
 """
 
 from __future__ import annotations
@@ -15,28 +14,28 @@ from collections import deque
 from collections.abc import Iterator
 from typing import TextIO
 
-ROOM = 2000  # writes that may wait
-LAST_S = 1.0  # how long the end waits for a stream that takes nothing
+QUEUE_SIZE = 2000  # writes
+STALL_S = 1.0  # the end waits so long for a blocked stream
 
 
 class NonBlockingStream:
-    """Passes writes on to ``stream`` from a thread of its own; what a failing stream does not take is let go."""
+    """Passes writes to ``stream`` in its own thread; writes that the stream refuses are dropped."""
 
-    def __init__(self, stream: TextIO, room: int = ROOM) -> None:
-        self._stream, self._room = stream, room
+    def __init__(self, stream: TextIO, queue_size: int = QUEUE_SIZE) -> None:
+        self._stream, self._queue_size = stream, queue_size
         self.encoding = getattr(stream, "encoding", None) or "utf-8"
         self._left_out = 0
         self._waiting: deque[str] = deque()
-        # Re-entrant, since a signal handler may write in the middle of a write.
+        # Re-entrant: a signal handler may write during a write.
         self._changed = threading.Condition(threading.RLock())
         self._busy = False
         self._thread = threading.Thread(target=self._work, name="terminal", daemon=True)
         self._thread.start()
 
     def write(self, text: str) -> int:
-        """Take ``text``; never waits."""
+        """Queue ``text``; never waits."""
         with self._changed:
-            if len(self._waiting) >= self._room:
+            if len(self._waiting) >= self._queue_size:
                 self._left_out += 1
                 return len(text)
             if self._left_out:
@@ -50,15 +49,15 @@ class NonBlockingStream:
         """Nothing to do: the thread flushes."""
 
     def isatty(self) -> bool:
-        """As the stream says."""
+        """As of the stream."""
         return self._stream.isatty()
 
     def fileno(self) -> int:
-        """As the stream says."""
+        """As of the stream."""
         return self._stream.fileno()
 
-    def drain(self, stall_s: float = LAST_S) -> bool:
-        """Wait until all is written; False where the stream took nothing for ``stall_s``."""
+    def drain(self, stall_s: float = STALL_S) -> bool:
+        """Wait until all is written; False if the stream accepted nothing for ``stall_s``."""
         with self._changed:
             while self._waiting or self._busy:
                 before = len(self._waiting)
@@ -78,7 +77,7 @@ class NonBlockingStream:
                 self._put(text)
 
     def _put(self, text: str) -> None:
-        """Past the buffer of the stream where that can be: its lock, held by a write that waits, outlives us."""
+        """Write to the file descriptor if there is one: a blocked write would hold the lock of the buffer at exit."""
         try:
             number = self._stream.fileno()
         except (OSError, ValueError, AttributeError):
@@ -91,14 +90,14 @@ class NonBlockingStream:
 
 
 @contextlib.contextmanager
-def unhurried_streams() -> Iterator[None]:
-    """``sys.stdout`` and ``sys.stderr`` made ``NonBlockingStream`` meanwhile."""
+def nonblocking_streams() -> Iterator[None]:
+    """``sys.stdout`` and ``sys.stderr`` replaced by ``NonBlockingStream`` within the context."""
     before = sys.stdout, sys.stderr
-    ours = [NonBlockingStream(stream) for stream in before]
-    sys.stdout, sys.stderr = ours
+    replaced = [NonBlockingStream(stream) for stream in before]
+    sys.stdout, sys.stderr = replaced
     try:
         yield
     finally:
-        for one in ours:
-            one.drain()
+        for stream in replaced:
+            stream.drain()
         sys.stdout, sys.stderr = before

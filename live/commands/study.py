@@ -1,4 +1,4 @@
-"""``phasedic study``: one test measured with many settings, and which to take."""
+"""``phasedic study``: measure one test with many settings, and recommend one."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import ConfigError
-from live.commands.options import add_options, add_verbose, overrides
+from live.commands.options import add_config_file, add_options, add_verbose, overrides
 from live.config.values import AUTO
 from live.results.export.atomic_file import check_free, new_folder
 from live.results.report.saving import save_figures
@@ -31,33 +31,43 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic study``."""
     parser.add_argument("source", help="session.h5, or pictures as for replay")
     parser.add_argument(
-        "--zoi", type=_numbers, default=[24, 32, 48, 64, 96], metavar="PX,PX", help="sides of ZOIs"
+        "--zoi",
+        type=_numbers,
+        default=[24, 32, 48, 64, 96],
+        metavar="PX,PX",
+        help="sides of ZOIs (24,32,48,64,96)",
     )
     parser.add_argument(
-        "--step", type=_numbers, metavar="PX,PX", help="distances (default: a quarter of the ZOI)"
+        "--step", type=_numbers, metavar="PX,PX", help="distances of ZOIs (default: a quarter of the side)"
     )
     parser.add_argument(
-        "--order", type=_numbers, default=[1], metavar="1,2", help="orders of the shape of a ZOI"
+        "--order", type=_numbers, default=[1], metavar="1,2", help="orders of the shape function (default 1)"
     )
-    parser.add_argument("--window", type=_windows, default=["gaussian"], metavar="NAME,NAME", help="weights")
-    words = "seconds in which nothing moves (default: as the force tells)"
-    words += "; none: there were none, the noise is the predicted one"
+    parser.add_argument(
+        "--window",
+        type=_windows,
+        default=["gaussian"],
+        metavar="NAME,NAME",
+        help="weights (default gaussian)",
+    )
+    words = "time without motion, s (default: from the force)"
+    words += "; none: no such time, the noise is predicted"
     parser.add_argument("--static", type=_still, metavar="A,B", help=words)
-    words = "seconds of the load to be studied (default: about the highest force)"
+    words = "time under load, s (default: around the highest force)"
     parser.add_argument("--loaded", type=_seconds, metavar="C,D", help=words)
-    words = "folder to make: table, figures, measure.toml"
+    words = "new folder for table, figures and measure.toml"
     parser.add_argument(
         "--out", dest="folder", default="study", metavar="DIR", help=f"{words} (default study)"
     )
-    parser.add_argument("--config", metavar="FILE", help="TOML file; what is given here overrides it")
+    add_config_file(parser)
     add_options(parser, "measurement", *MEASURE)
     add_verbose(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic study``."""
-    from live.pipeline.warm_up import kinds_of
-    from live.replay.opening import open_material
+    from live.pipeline.warm_up import picture_kinds
+    from live.replay.opening import open_source
     from live.replay.source import ReplayRequest
     from live.replay.study import recommended, study, take_windows
 
@@ -66,13 +76,15 @@ def command(arguments: argparse.Namespace) -> int:
     settings, found = _settings(arguments), []
     config_file = Path(arguments.config) if arguments.config else None
     request = ReplayRequest(arguments.source, False, None, None, None, config_file, overrides(arguments))
-    with open_material(request) as (material, config):
+    with open_source(request) as (material, config):
         if AUTO in (config.measure.roi, config.measure.gauges):
             raise ConfigError(
                 "a study does not look for the specimen; give --roi x,y,width,height or all, or the --mask that"
                 " 'phasedic replay' leaves beside its results"
             )
-        compile_ahead(kinds_of(material.camera), phase=config.measure.estimator == "phase", say=screen.status)
+        compile_ahead(
+            picture_kinds(material.camera), phase=config.measure.estimator == "phase", say=screen.status
+        )
         windows = take_windows(material, arguments.static, arguments.loaded)
         n = f"{len(windows.still)} still and {len(windows.loaded)} loaded bursts"
         screen.say(f"{len(settings)} settings on {n} of {arguments.source}")
@@ -102,7 +114,7 @@ def _settings(arguments: argparse.Namespace) -> list[StudySetting]:
     return list(dict.fromkeys(found))
 
 
-# -- what is shown ------------------------------------------------------------------------------
+# -- output -------------------------------------------------------------------------------------
 
 _HEAD = (
     "  zoi step order window        l10 px  VSG px  noise um/m  over predicted  strain um/m    +-"
@@ -112,7 +124,7 @@ _HEAD = (
 
 def _line(one: StudyResult) -> str:
     s = one.setting
-    mark = "" if one.is_told else "  noise"
+    mark = "" if one.is_significant else "  noise"
     over = f"{one.noise / one.predicted:.2f}" if one.measured else "-"
     return (
         f"{s.zoi:5d} {s.step:4d} {s.order:5d} {s.window:12s} {one.l10:7.1f} {one.vsg:7.1f} {one.noise * 1e6:11.1f}"
@@ -139,7 +151,7 @@ def _section(advice: Advice) -> str:
 
 
 def _figures(found: Sequence[StudyResult]) -> list[Plot]:
-    """Noise and strain over the size of the virtual gauge, a line for each order and weight."""
+    """Noise and strain over the size of the virtual gauge, one line per order and weight."""
     kinds = list(dict.fromkeys((one.setting.order, one.setting.window) for one in found))
     parts = [[one for one in found if (one.setting.order, one.setting.window) == kind] for kind in kinds]
     names = [f"order {order}, {window}" for order, window in kinds]
@@ -152,7 +164,7 @@ def _figures(found: Sequence[StudyResult]) -> list[Plot]:
     x = "size of the virtual gauge, px"
     return [
         Plot("noise", "Noise of one ZOI", x, "noise, um/m", noise),
-        Plot("strain", "Largest strain, its noise taken off", x, "strain, um/m", seen),
+        Plot("strain", "Largest strain, corrected for its noise", x, "strain, um/m", seen),
     ]
 
 
@@ -163,7 +175,7 @@ def _curve(name: str, part: Sequence[StudyResult], value: str, colour: int) -> P
     return PlotLine(name, x, y, sigma, colour)
 
 
-# -- what is read -------------------------------------------------------------------------------
+# -- arguments ----------------------------------------------------------------------------------
 
 
 def _numbers(word: str) -> list[int]:
@@ -184,9 +196,9 @@ def _windows(word: str) -> list[str]:
 
 
 def _still(word: str) -> tuple[float, float]:
-    from live.replay.study import NEVER
+    from live.replay.study import NO_WINDOW
 
-    return NEVER if word == "none" else _seconds(word)
+    return NO_WINDOW if word == "none" else _seconds(word)
 
 
 def _seconds(word: str) -> tuple[float, float]:

@@ -1,35 +1,44 @@
-"""The names of the channels, each with its unit."""
+"""The channels that alarms and strain output can use, each with its meaning and unit."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-MEASURED = {
+MEASURED_CHANNELS = {
     "time_s": "middle of the burst, s since the start of the test",
-    "frame": "sequence number of its first frame",
-    "axial": "strain along the load: the gauge axial, or else the mean",
-    "sigma_axial": "its standard uncertainty",
-    "strain_rate": "of axial over the last second, 1/s",
-    "force_N": "the newest value of the load cell",
-    "stress_MPa": "that over the section",
+    "frame": "sequence number of the first frame of the burst",
+    "axial": "strain along the load: the gauge axial, else the mean",
+    "sigma_axial": "standard uncertainty of axial",
+    "strain_rate": "rate of axial over the last second, 1/s",
+    "force_N": "newest value of the load cell, N",
+    "stress_MPa": "force over the area of the section",
     "exx": "mean strain of the valid ZOIs",
     "eyy": "mean strain of the valid ZOIs",
     "exy": "mean strain of the valid ZOIs",
-    "largest": "strain of largest magnitude of any ZOI",
-    "lost_share": "share of the ZOIs that have no value, 0 to 1",
-    "latency_s": "from the stamp of the last frame to the result, s",
-    "noise_GL": "of one frame",
+    "largest": "strain of the largest magnitude of any ZOI",
+    "lost_share": "share of the ZOIs without a value, 0 to 1",
+    "latency_s": "time from the stamp of the last frame to the result, s",
+    "noise_GL": "noise of one frame, grey levels",
 }
-MACHINE = {
+SYSTEM_CHANNELS = {
     "silent_s": "time since the last frame, s",
     "load_silent_s": "time since the last sample of the load cell, s",
-    "disk_min": "until the disk is full, minutes",
+    "disk_min": "time until the disk is full, minutes",
 }
-STANDARD = ("time_s", "frame", "axial", "sigma_axial", "force_N", "stress_MPa", "lost_share", "latency_s")
-"""What is told where nothing is chosen; the gauges beside."""
+DEFAULT_CHANNELS = (
+    "time_s",
+    "frame",
+    "axial",
+    "sigma_axial",
+    "force_N",
+    "stress_MPa",
+    "lost_share",
+    "latency_s",
+)
+"""The channels of the strain output without a choice; the gauges are added."""
 
 
-def channel_names(gauges: Iterable[str], *, machine: bool = False) -> tuple[str, ...]:
+def channel_names(gauges: Iterable[str], *, system: bool = False) -> tuple[str, ...]:
     """All channels of a test with these gauges: ``gauge_NAME`` and ``sigma_gauge_NAME`` as in the files."""
     own = (f"{prefix}gauge_{name}" for name in gauges for prefix in ("", "sigma_"))
-    return (*MEASURED, *own, *(MACHINE if machine else ()))
+    return (*MEASURED_CHANNELS, *own, *(SYSTEM_CHANNELS if system else ()))

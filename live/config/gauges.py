@@ -1,7 +1,7 @@
-"""Virtual gauges of the configuration: a table ``[gauges.NAME]`` each, made into gauges on a grid.
+"""The virtual gauges of the configuration: each a table ``[gauges.NAME]``, made into a gauge on a grid.
 
-The keys of a table are the parameters of its kind of gauge (``analysis.evaluate.GAUGE_KINDS``). The gauges called
-``axial`` and ``transverse`` make the stress-strain curve.
+The keys of a table are the parameters of its kind of gauge (``analysis.evaluate.GAUGE_KINDS``). The gauges with
+the names ``axial`` and ``transverse`` give the stress-strain curve.
 """
 
 from __future__ import annotations
@@ -19,17 +19,17 @@ if TYPE_CHECKING:
 
 Point = tuple[float, float]
 GaugeTable = Mapping[str, Any]
-"""``kind`` and the parameters given of one gauge, fit for JSON."""
+"""``kind`` and the given parameters of one gauge, as plain values for JSON."""
 
-NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
-"""A gauge's name stands in the columns of files."""
-USUAL = "line"
-"""The kind of a gauge that names none."""
-_PLACES = {"point": POINT, "box": RECTANGLE, "corners": CORNERS}
+NAME_PATTERN = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,31}")
+"""The name of a gauge is part of column names in files."""
+DEFAULT_KIND = "line"
+"""The kind of a gauge without ``kind``."""
+_POSITIONS = {"point": POINT, "box": RECTANGLE, "corners": CORNERS}
 
 
 def gauge_checks(kind: object) -> dict[str, Check]:
-    """What the keys of a gauge may be; those of other kinds are checked too, and do nothing."""
+    """The checks of the keys of a gauge; keys of other kinds are checked too, and have no effect."""
     own = [one for name, one in GAUGE_KINDS.items() if name == kind]
     checks = {"kind": choice(*GAUGE_KINDS)}
     for one in (*GAUGE_KINDS.values(), *own):
@@ -40,32 +40,32 @@ def gauge_checks(kind: object) -> dict[str, Check]:
 def _check(one: Parameter) -> Check:
     if one.kind == "choice":
         return choice(*one.choices)
-    return length(number(one.low, one.high)) if one.kind == "length" else _PLACES[one.kind]
+    return length(number(one.low, one.high)) if one.kind == "length" else _POSITIONS[one.kind]
 
 
 def make_gauge(name: str, table: GaugeTable, axis: str) -> Gauge:
-    """The gauge of a table with what follows from the ``axis`` of the load; raises ConfigError."""
+    """The gauge of a table, for a load along ``axis`` ("x" or "y"); raises ConfigError."""
     try:
-        return GAUGE_KINDS[table.get("kind", USUAL)].of(name, table, axis)
+        return GAUGE_KINDS[table.get("kind", DEFAULT_KIND)].of(name, table, axis)
     except ValueError as error:
         raise ConfigError(f"gauges.{name}: {error}") from None
 
 
 def gauges_for(tables: Mapping[str, GaugeTable], axis: str, grid: ZoiGrid) -> tuple[Gauge, ...]:
-    """The gauges of a configuration on a grid, in its order; ``axis`` ("x" or "y") is that of the load.
+    """The gauges of a configuration on a grid, in its order, for a load along ``axis`` ("x" or "y").
 
     Raises
     ------
     ConfigError
-        A key is missing or impossible, or no ZOI lies where a gauge is.
+        A key is missing or impossible, or a gauge covers no ZOI.
     """
     gauges = tuple(make_gauge(name, table, axis) for name, table in tables.items())
     for gauge in gauges:
-        _check_place(gauge, grid)
+        _check_zois(gauge, grid)
     return gauges
 
 
-def _check_place(gauge: Gauge, grid: ZoiGrid) -> None:
+def _check_zois(gauge: Gauge, grid: ZoiGrid) -> None:
     if all(mask.any() for mask in gauge.zois(grid)):
         return
     raise ConfigError(
@@ -75,7 +75,7 @@ def _check_place(gauge: Gauge, grid: ZoiGrid) -> None:
 
 
 def complete_gauges(gauges: Mapping[str, GaugeTable], axis: str = "y") -> Iterator[Gauge]:
-    """Those of which nothing is missing, to be drawn."""
+    """The gauges of which no key is missing, for drawing."""
     for name, table in gauges.items():
         try:
             yield make_gauge(name, table, axis)
@@ -84,5 +84,5 @@ def complete_gauges(gauges: Mapping[str, GaugeTable], axis: str = "y") -> Iterat
 
 
 def outlines(gauges: Mapping[str, GaugeTable], zoi: float) -> dict[str, tuple[tuple[Point, ...], ...]]:
-    """The lines to be drawn for each gauge, px, with ZOIs of a side of ``zoi`` px."""
+    """The outline of each complete gauge, px, for ZOIs with a side of ``zoi`` px."""
     return {gauge.name: gauge.outline(zoi) for gauge in complete_gauges(gauges)}

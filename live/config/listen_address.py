@@ -1,4 +1,4 @@
-"""Where a server listens: a port of this machine alone, or of an address of it, and then only with a token."""
+"""The address at which a server listens: a local port, or an address of this machine, which needs a token."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Self
 
 from acquire.errors import ConfigError
 
-HERE = "127.0.0.1"
-SHORTEST = 16  # letters of a token
+LOOPBACK = "127.0.0.1"
+MIN_TOKEN_LENGTH = 16  # characters
 ALLOWED = "PORT, or HOST:PORT with the address of this machine, PORT from 1024 to 65535 (0: any free one)"
 
 
@@ -24,25 +24,25 @@ class ListenAddress:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """From ``PORT`` or ``HOST:PORT``; raises ValueError that says what is allowed."""
+        """From ``PORT`` or ``HOST:PORT``; raises ValueError with what is allowed."""
         host, _, port = text.rpartition(":")
-        if not port.isascii() or not port.isdigit() or len(port) > 5 or not _may_be(int(port)):
+        if not port.isascii() or not port.isdigit() or len(port) > 5 or not _port_allowed(int(port)):
             raise ValueError(ALLOWED)
-        host = host or HERE
+        host = host or LOOPBACK
         if host != "localhost":
             try:
                 ipaddress.IPv4Address(host)
             except ValueError:
                 raise ValueError(ALLOWED) from None
-        return cls(HERE if host == "localhost" else host, int(port))
+        return cls(LOOPBACK if host == "localhost" else host, int(port))
 
     @property
-    def is_here(self) -> bool:
-        """Whether only programs of this machine can reach it."""
+    def is_loopback(self) -> bool:
+        """Whether only programs of this machine can connect."""
         return ipaddress.IPv4Address(self.host).is_loopback
 
     def listen(self, what: str) -> socket.socket:
-        """A listening socket; ``what`` names it in messages.
+        """A listening, non-blocking socket; ``what`` is its name in messages.
 
         Raises
         ------
@@ -50,7 +50,7 @@ class ListenAddress:
             The port is taken, or the address is not one of this machine.
         """
         try:
-            found = listening(self.host, self.port)
+            found = listening_socket(self.host, self.port)
         except OSError as error:
             raise ConfigError(
                 f"{what}: {self.host}:{self.port} cannot be listened to ({error.strerror}); choose another port"
@@ -59,13 +59,13 @@ class ListenAddress:
         return found
 
 
-def listening(host: str, port: int, tries: int = 1) -> socket.socket:
-    """A socket that listens at ``port``, or the next free one of as many as ``tries``.
+def listening_socket(host: str, port: int, tries: int = 1) -> socket.socket:
+    """A socket that listens at the first free one of ``tries`` ports from ``port``.
 
     Raises
     ------
     OSError
-        None is free; the error of the last.
+        No port is free; the error of the last one.
     """
     failed = OSError(f"there is no port {port}")
     for candidate in range(port, min(port + tries, 65536)):
@@ -82,29 +82,29 @@ def listening(host: str, port: int, tries: int = 1) -> socket.socket:
     raise failed
 
 
-def _may_be(port: int) -> bool:
+def _port_allowed(port: int) -> bool:
     return port == 0 or 1024 <= port <= 65535
 
 
-def read_token(place: ListenAddress, path: str | None, what: str) -> str:
-    """The token that a client must give first; empty where none is needed.
+def read_token(address: ListenAddress, path: str | None, what: str) -> str:
+    """The token that a client must send first; empty if none is needed.
 
     Raises
     ------
     ConfigError
-        There must be one and it is not there or too short.
+        A token is needed and there is none, or it is too short.
     """
     if path is None:
-        if place.is_here:
+        if address.is_loopback:
             return ""
         raise ConfigError(
-            f"{what}: {place.host} can be reached from other machines; give token_file, a file with a word of"
-            f" {SHORTEST} letters or more, or listen at {HERE}"
+            f"{what}: {address.host} can be reached from other machines; give token_file, a file with a word of"
+            f" {MIN_TOKEN_LENGTH} letters or more, or listen at {LOOPBACK}"
         )
     try:
         token = Path(path).read_text(encoding="utf-8").strip()
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(f"{what}: {path}: no token can be read ({error})") from None
-    if len(token) < SHORTEST or len(token.split()) != 1:
-        raise ConfigError(f"{what}: {path}: a token is one word of {SHORTEST} letters or more")
+    if len(token) < MIN_TOKEN_LENGTH or len(token.split()) != 1:
+        raise ConfigError(f"{what}: {path}: a token is one word of {MIN_TOKEN_LENGTH} letters or more")
     return token

@@ -1,8 +1,8 @@
-"""The configuration of a run: sections of a TOML file, overridden by the command line.
+"""The configuration of a run: the sections of a TOML file, overridden by the command line.
 
-Every key has a type, bounds and a default. An unknown key, a wrong type or an impossible value is a
-``ConfigError`` that names the key and says what is allowed. The configuration in force is stored in
-every file as JSON (``as_dict``) and read back with ``from_dict``.
+Every key has a type, bounds and a default. An unknown key, a wrong type or an impossible value raises a
+``ConfigError`` with the name of the key and what is allowed. Every file stores the configuration in force as
+JSON (``as_dict``); ``from_dict`` reads it back.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from acquire.bounds import NotAllowed
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
 from live.config.channels import channel_names
-from live.config.gauges import NAME, USUAL, GaugeTable, gauge_checks
+from live.config.gauges import DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_checks
 from live.config.sections import (
     AlarmConfig,
     CameraConfig,
@@ -38,17 +38,17 @@ from live.config.sections import (
 from live.config.values import AUTO, Check, Option, in_px
 
 Section = TypeVar("Section")
-MOST_BYTES = 10**6  # of a configuration file
-_WITHDRAWN = {
+MAX_BYTES = 10**6  # of a configuration file
+_REMOVED_KEYS = {
     ("measure", "shorten_bursts"): "a burst keeps its length; leave it out, and take a smaller measure.burst"
     " where the picture moves",
 }
-"""Keys of earlier versions, with what to do: left out of a stored configuration, refused in a new one."""
+"""Keys of earlier versions, with advice: left out of a stored configuration, refused in a new one."""
 
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """All sections, virtual gauges by name, and free metadata (specimen, operator, material, note ...)."""
+    """All sections, the virtual gauges by name, and free metadata (specimen, operator, material, note ...)."""
 
     camera: CameraConfig = field(default_factory=CameraConfig)
     load: LoadConfig = field(default_factory=LoadConfig)
@@ -65,13 +65,13 @@ class Config:
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
-        """Nested plain values, fit for JSON; sections of keys, alarms by their number."""
+        """Nested plain values for JSON: the keys of each section, the alarms by number."""
         plain = dataclasses.asdict(self)
         return plain | {"alarm": {str(n): alarm for n, alarm in enumerate(plain["alarm"], 1)}}
 
 
 AUTO_GAUGES = ("axial", "transverse", "area")
-"""Those that are placed on the specimen once it is found (``live.setup.placement``)."""
+"""The gauges that ``live.setup.placement`` places on the specimen."""
 
 _SECTIONS: dict[str, type] = {
     f.name: f.default_factory  # type: ignore[misc]
@@ -81,7 +81,7 @@ _SECTIONS: dict[str, type] = {
 
 
 def options() -> dict[str, tuple[str, dataclasses.Field[Any]]]:
-    """What can be said on the command line: option name to ("section.key", field of the section)."""
+    """The options of the command line: name to ("section.key", field of the section)."""
     found = {}
     for name, kind in _SECTIONS.items():
         for field_ in dataclasses.fields(kind):
@@ -92,7 +92,7 @@ def options() -> dict[str, tuple[str, dataclasses.Field[Any]]]:
 
 
 def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
-    """Read ``path`` and lay ``overrides`` ("measure.zoi" -> 32) over it.
+    """Read ``path`` and apply ``overrides`` ("measure.zoi" -> 32).
 
     Raises
     ------
@@ -103,19 +103,19 @@ def load_config(path: Path | None, overrides: Mapping[str, Any]) -> Config:
 
 
 def from_dict(stored: Mapping[str, Any], overrides: Mapping[str, Any], where: str) -> Config:
-    """The configuration stored in a file, with ``overrides`` laid over it; raises ConfigError.
+    """The configuration stored in a file, with ``overrides`` applied; raises ConfigError.
 
-    Keys of earlier versions that are withdrawn are left out.
+    Keys that only earlier versions have are left out.
     """
     tree = _without_none(stored)
-    for section, key in _WITHDRAWN:
+    for section, key in _REMOVED_KEYS:
         if isinstance(tree.get(section), dict):
             tree[section].pop(key, None)
     return _overlaid(tree, overrides, where)
 
 
 def settings_in(path: Path) -> dict[str, Any]:
-    """What ``path`` sets, as "section.key" -> value, once it has been checked; raises ConfigError."""
+    """The values that ``path`` sets, "section.key" -> value, checked; raises ConfigError."""
     load_config(path, {})
     tree = _read_toml(path)
     return {
@@ -153,7 +153,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
     if not path.exists():
         raise ConfigError(f"{path}: there is no such configuration file")
     try:
-        return tomllib.loads(read_bytes(path, MOST_BYTES).decode("utf-8-sig"))
+        return tomllib.loads(read_bytes(path, MAX_BYTES).decode("utf-8-sig"))
     except (DataError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read ({error}); give a text file in TOML") from None
     except RecursionError:
@@ -168,7 +168,7 @@ def _build(tree: Mapping[str, Any], where: str) -> Config:
     px_per_mm = _px_per_mm(tree, where)
     for name, content in tree.items():
         if name not in known:
-            raise ConfigError(f"{where}: unknown section [{name}]{_meant(name, known)}")
+            raise ConfigError(f"{where}: unknown section [{name}]{_suggestion(name, known)}")
         if name == "alarm":
             parts[name] = _alarms(content, where)
         elif not isinstance(content, Mapping):
@@ -208,32 +208,32 @@ def _accepted(
 ) -> dict[str, Any]:
     values = {}
     for key, value in content.items():
-        if (name, key) in _WITHDRAWN:
-            raise ConfigError(f"{where}: {name}.{key} is withdrawn: {_WITHDRAWN[name, key]}")
+        if (name, key) in _REMOVED_KEYS:
+            raise ConfigError(f"{where}: {name}.{key} is withdrawn: {_REMOVED_KEYS[name, key]}")
         if key not in checks:
-            raise ConfigError(f"{where}: unknown key {name}.{key}{_meant(key, list(checks))}")
+            raise ConfigError(f"{where}: unknown key {name}.{key}{_suggestion(key, list(checks))}")
         try:
             values[key] = checks[key].accept(in_px(value, checks[key], px_per_mm))
         except NotAllowed as allowed:
             raise ConfigError(
-                f"{where}: {name}.{key} = {_shown(value)} is not possible; allowed: {allowed}"
+                f"{where}: {name}.{key} = {_short_repr(value)} is not possible; allowed: {allowed}"
             ) from None
     return values
 
 
 def _gauge(name: str, table: Any, where: str, px_per_mm: float | None) -> GaugeTable:
-    if not NAME.fullmatch(name):
+    if not NAME_PATTERN.fullmatch(name):
         raise ConfigError(
             f"{where}: gauges.{name}: a name has up to 32 letters, digits and _, a letter first"
         )
     if not isinstance(table, Mapping):
         raise ConfigError(f"{where}: gauges.{name} must be a table, [gauges.{name}] with keys below it")
     values = _accepted(gauge_checks(table.get("kind")), f"gauges.{name}", table, where, px_per_mm)
-    return {"kind": USUAL, **values}
+    return {"kind": DEFAULT_KIND, **values}
 
 
 def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
-    if isinstance(content, Mapping):  # by their number, as files have them
+    if isinstance(content, Mapping):  # by number, as stored in files
         content = list(content.values())
     if not isinstance(content, list | tuple) or not all(isinstance(table, Mapping) for table in content):
         raise ConfigError(f"{where}: alarm must be tables, [[alarm]] with keys below it")
@@ -249,12 +249,14 @@ def _alarms(content: Any, where: str) -> tuple[AlarmConfig, ...]:
 def _check_channels(config: Config, where: str) -> None:
     placed = AUTO_GAUGES if config.measure.gauges == AUTO else ()
     gauges = dict.fromkeys((*config.gauges, *placed))
-    measured, known = channel_names(gauges), channel_names(gauges, machine=True)
-    asked = [("strain_out", channel, measured) for channel in config.strain_out.channels or ()]
-    asked += [(f"alarm {number}", alarm.channel, known) for number, alarm in enumerate(config.alarm, 1)]
-    for whose, channel, names in asked:
+    measured, known = channel_names(gauges), channel_names(gauges, system=True)
+    used = [("strain_out", channel, measured) for channel in config.strain_out.channels or ()]
+    used += [(f"alarm {number}", alarm.channel, known) for number, alarm in enumerate(config.alarm, 1)]
+    for whose, channel, names in used:
         if channel not in names:
-            raise ConfigError(f"{where}: {whose}: unknown channel {channel!r}{_meant(channel, list(names))}")
+            raise ConfigError(
+                f"{where}: {whose}: unknown channel {channel!r}{_suggestion(channel, list(names))}"
+            )
 
 
 def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:
@@ -267,14 +269,14 @@ def _check_metadata(metadata: Mapping[str, Any], where: str) -> None:
             raise ConfigError(f"{where}: metadata.{key} must be a text or a number, in one line")
 
 
-def _shown(value: Any) -> str:
+def _short_repr(value: Any) -> str:
     try:
         return reprlib.repr(value)
     except ValueError:  # thousands of digits
         return "this number"
 
 
-def _meant(word: str, known: list[str]) -> str:
+def _suggestion(word: str, known: list[str]) -> str:
     near = difflib.get_close_matches(word, known, 1)
     meant = f" (did you mean {near[0]}?)" if near else ""
     return f"{meant}; known: {', '.join(known)}"

@@ -1,7 +1,7 @@
-"""The rig file written and changed: comments and order kept, and only what ``load_config`` accepts.
+"""Write and change a rig file: its comments and order stay, and ``load_config`` accepts the result.
 
-What is to be written is checked in a file beside it first; an impossible value leaves everything as it was.
-What stood there before a change is kept as ``NAME.bak``.
+The new text is checked in a temporary file first; an impossible value changes nothing. A change keeps the former
+file as ``NAME.bak``.
 """
 
 from __future__ import annotations
@@ -15,42 +15,42 @@ from uuid import uuid4
 
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
-from live.config.loading import MOST_BYTES, Config, load_config
+from live.config.loading import MAX_BYTES, Config, load_config
 
 if TYPE_CHECKING:
     from tomlkit import TOMLDocument
 
 
 def new_rig(path: Path, text: str, changes: Mapping[str, Any] | None = None) -> Config:
-    """Write ``text``, with ``changes`` as in ``write_rig``, as a new rig file; the configuration that it makes.
+    """Write ``text``, with ``changes`` as in ``write_rig``, as a new rig file; returns its configuration.
 
     Raises
     ------
     ConfigError
-        There is a file already (nothing is overwritten), it cannot be written, or the text is no configuration.
+        The file exists (nothing is overwritten) or cannot be written, or the text is not a configuration.
     """
     if path.exists() or path.is_symlink():
         raise ConfigError(f"{path} exists; nothing is overwritten, choose another name")
-    return _put(path, _changed(_parsed(text, path), changes or {}, path))
+    return _write_checked(path, _changed(_parsed(text, path), changes or {}, path))
 
 
 def write_rig(path: Path, changes: Mapping[str, Any]) -> Config:
-    """Change some keys of a rig file, or make a new one of them; the configuration that it makes.
+    """Change keys of a rig file, or make a new file of them; returns its configuration.
 
     Parameters
     ----------
     path : Path
-        What stood there is kept beside it, as ``NAME.bak``.
+        The former file is kept beside it as ``NAME.bak``.
     changes : mapping of "section.key" or "gauges.NAME" to a value
-        Numbers, texts, flags, lists; for a gauge a mapping of its keys. None takes the key or gauge out.
+        Numbers, texts, flags, lists; for a gauge a mapping of its keys. None removes the key or gauge.
 
     Raises
     ------
     ConfigError
-        The file is no TOML, or would not be a configuration; then nothing is changed.
+        The file is not TOML, or the result is not a configuration; then nothing is changed.
     """
-    path = path.resolve()  # a link stays one
-    return _put(path, _changed(_read(path), changes, path))
+    path = path.resolve()  # a symbolic link stays a link
+    return _write_checked(path, _changed(_read(path), changes, path))
 
 
 def _changed(document: TOMLDocument, changes: Mapping[str, Any], path: Path) -> str:
@@ -66,7 +66,7 @@ def _read(path: Path) -> TOMLDocument:
     if not path.exists():
         return _parsed("", path)
     try:
-        return _parsed(read_bytes(path, MOST_BYTES).decode("utf-8-sig"), path)
+        return _parsed(read_bytes(path, MAX_BYTES).decode("utf-8-sig"), path)
     except (DataError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: cannot be read ({error}); give a text file in TOML") from None
 
@@ -96,18 +96,18 @@ def _change(document: TOMLDocument, section: str, key: str, value: Any, path: Pa
     if value is None:
         table.pop(key, None)  # type: ignore[attr-defined]
     else:
-        table[key] = _plain(value)  # type: ignore[index]
+        table[key] = _toml_value(value)  # type: ignore[index]
 
 
-def _plain(value: Any) -> Any:
-    """What TOML has: a tuple is a list, a key of None is none."""
+def _toml_value(value: Any) -> Any:
+    """A value that TOML can hold: a tuple becomes a list, a key of None is left out."""
     if isinstance(value, Mapping):
-        return {key: _plain(v) for key, v in value.items() if v is not None}
-    return [_plain(v) for v in value] if isinstance(value, list | tuple) else value
+        return {key: _toml_value(v) for key, v in value.items() if v is not None}
+    return [_toml_value(v) for v in value] if isinstance(value, list | tuple) else value
 
 
-def _put(path: Path, text: str) -> Config:
-    """Checked as a file of its own, then put in the place of what was there."""
+def _write_checked(path: Path, text: str) -> Config:
+    """Check ``text`` in a temporary file, then replace ``path`` by it."""
     part = path.with_name(f".{path.name}.{uuid4().hex[:8]}.part")
     try:
         with part.open("x", encoding="utf-8") as file:

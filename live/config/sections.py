@@ -1,4 +1,4 @@
-"""The sections of the configuration: each key with its check, its default, its meaning and its option."""
+"""The sections of the configuration: the check, default, help text and option of each key."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from live.config.values import (
     BOX,
     FLAG,
     GIVEN,
+    LISTEN_ADDRESS,
     NAMES,
-    PLACE,
     RECORD_MODE,
     REGION,
     STRAINS,
@@ -29,7 +29,7 @@ DEFAULT_BURST, DEFAULT_REFERENCE_BURST = 4, 32
 """Frames of a live camera; of files, 1."""
 
 
-# One key of the file per line: check, default, meaning, and its option on the command line.
+# One key of the file per line: check, default, help text, and option of the command line.
 # fmt: off
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +39,12 @@ class CameraConfig:
     address: str = key(TEXT, "", "address of the camera: /dev/video0?format=Y12&fps=30, sim:, files:...",
         Option("camera", "ADDRESS"))
     crop: tuple[int, int, int, int] | None = key(BOX, None,
-        "x, y, width, height of the part that is used; coordinates count from it", Option("crop", "X,Y,W,H"))
-    dark: str | None = key(TEXT, None, "dark frame (TIFF) that is taken off every burst", Option("dark", "FILE"))
-    flat: str | None = key(TEXT, None, "flat frame (TIFF) that every burst is divided by", Option("flat", "FILE"))
+        "x, y, width, height of the part of the picture to use, px; its corner is the origin of all coordinates",
+        Option("crop", "X,Y,W,H"))
+    dark: str | None = key(TEXT, None,
+        "dark frame (TIFF), subtracted from every burst", Option("dark", "FILE"))
+    flat: str | None = key(TEXT, None,
+        "flat frame (TIFF); every burst is divided by it", Option("flat", "FILE"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,9 +53,9 @@ class LoadConfig:
 
     address: str = key(TEXT, "none:", "address of the load cell: /dev/ttyUSB0?protocol=ascii, sim:, none:",
         Option("load", "ADDRESS"))
-    max_gap_s: float = key(number(0.001, 3600), 0.5, "samples further apart than this leave a gap, s")
+    max_gap_s: float = key(number(0.001, 3600), 0.5, "longest time between samples that is no gap, s")
     lag_s: float = key(number(-10, 10), 0.0,
-        "the load is stamped this much later than the frames it belongs to, s; as the summary tells it",
+        "delay of the load stamps behind the frames, s; the summary shows the measured value",
         Option("lag", "S"))
 
 
@@ -61,34 +64,42 @@ class MeasureConfig:
     """[measure]"""
 
     roi: tuple[int, int, int, int] | str | None = key(REGION, None,
-        "x, y, width, height of the measured region, px; auto: the specimen that is found (the default);"
-        " all: all but a rim",
+        "region to measure: x, y, width, height in px; auto (default): the specimen, found in a first picture;"
+        " all: the whole picture except a rim",
         Option("roi", "X,Y,W,H|auto|all"))
     zoi: int = key(length(integer(8, 1024), whole=True), 64, "side of a ZOI, px", Option("zoi", "PX"))
-    step: int = key(length(integer(1, 1024), whole=True), 16, "distance of neighbouring ZOIs, px",
+    step: int = key(length(integer(1, 1024), whole=True), 16, "distance between neighbouring ZOIs, px",
         Option("step", "PX"))
-    burst: int | None = key(integer(1, 10000), None, "frames averaged for one measurement (live 4, else 1)",
+    burst: int | None = key(integer(1, 10000), None,
+        "frames averaged for one measurement (default: 4 live, 1 for files)",
         Option("burst", "N"))
-    reference_burst: int | None = key(integer(1, 10000), None, "frames averaged for the reference (live 32, else 1)",
+    reference_burst: int | None = key(integer(1, 10000), None,
+        "frames averaged for the reference (default: 32 live, 1 for files)",
         Option("reference-burst", "N"))
-    mask: str | None = key(TEXT, None, "image; ZOIs where it is black are not measured", Option("mask", "FILE"))
+    mask: str | None = key(TEXT, None,
+        "mask image; ZOIs on its black parts are not measured", Option("mask", "FILE"))
     gauges: str = key(choice(GIVEN, AUTO), GIVEN,
-        "gauges: as given, or auto: axial, transverse and area on the specimen", Option("gauges"))
+        "virtual gauges: given: those of the configuration; auto: also axial, transverse and area on the specimen",
+        Option("gauges"))
     window: str = key(choice("gaussian", "uniform", "tukey", "bi-triangular"), "gaussian",
-        "least-squares weight of a ZOI", Option("window", "NAME"))
-    estimator: str = key(choice("spectral", "phase"), "spectral", "spectral, or phase alone",
+        "weight of the pixels of a ZOI in the least-squares fit: gaussian, uniform, tukey, bi-triangular",
+        Option("window", "NAME"))
+    estimator: str = key(choice("spectral", "phase"), "spectral", "estimator: spectral, or phase",
         Option("estimator", "NAME"))
-    order: int = key(integer(1, 2), 1, "order of the shape of a ZOI: 1 is affine", Option("order", "N"))
+    order: int = key(integer(1, 2), 1,
+        "order of the shape function of a ZOI: 1 (affine) or 2 (quadratic)", Option("order", "N"))
     strain: str = key(choice("engineering", "small", "green", "hencky"), "engineering",
-        "measure of strain: engineering (elongation over length, as an extensometer reads it), small, green or hencky",
+        "strain measure: engineering (elongation over length, as from an extensometer), small, green or hencky",
         Option("strain", "MEASURE"))
     bending_px: float = key(number(0, math.inf), 0.05,
-        "a ZOI in which the displacement jumps or bends by more is UNEVEN; inf never", Option("bending", "PX"))
+        "a ZOI in which the displacement jumps or bends by more than this is UNEVEN, px; inf: never",
+        Option("bending", "PX"))
     noise_GL: float | None = key(number(0, 65535), None,
-        "noise of one frame in grey levels; without, as the reference burst tells it", Option("noise", "GL"))
+        "noise of one frame, grey levels (default: measured from the reference burst)", Option("noise", "GL"))
     renew_at: float = key(number(0, 1), 0.2,
-        "share of ZOIs lost from one burst to the next that renews the reference; 1 never")
-    reference_shift_px: float = key(number(0, 10), 0.05, "motion during the reference burst that is accepted, px")
+        "share of ZOIs lost from one burst to the next above which the reference is renewed; 1: never")
+    reference_shift_px: float = key(number(0, 10), 0.05,
+        "largest motion accepted during the reference burst, px")
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,15 +107,15 @@ class ScaleConfig:
     """[scale]"""
 
     mm_per_px: float | None = key(number(1e-6, 1e3), None,
-        "length of a pixel on the specimen; lengths may then be given in mm", Option("scale", "MM_PER_PX"))
-    sigma_mm_per_px: float | None = key(number(0, 1e3), None, "its standard uncertainty")
-    date: str | None = key(TEXT, None, "when it was taken")
-    method: str | None = key(TEXT, None, "how it was taken")
-    stand_off_mm: float | None = key(number(1, 1e6), None, "distance from the camera to the specimen")
+        "size of a pixel on the specimen, mm; lengths can then be given in mm", Option("scale", "MM_PER_PX"))
+    sigma_mm_per_px: float | None = key(number(0, 1e3), None, "standard uncertainty of mm_per_px")
+    date: str | None = key(TEXT, None, "time of the scale measurement")
+    method: str | None = key(TEXT, None, "method of the scale measurement")
+    stand_off_mm: float | None = key(number(1, 1e6), None, "distance from the camera to the specimen, mm")
 
     @property
     def px_per_mm(self) -> float | None:
-        """None where it is not known."""
+        """None if the scale is not known."""
         return None if self.mm_per_px is None else 1 / self.mm_per_px
 
 
@@ -113,39 +124,48 @@ class RecordConfig:
     """[record]"""
 
     enabled: bool = key(FLAG, True, "record the session", Option("no-record", off=True))
-    mode: str = key(RECORD_MODE, "all", "all frames, only bursts (sums), or every=K frames", Option("record", "MODE"))
-    armed: bool = key(FLAG, False, "measure, and record nothing until start is ordered", Option("armed", on=True))
-    keep_s: float = key(number(0, 60), 2.0, "what came in this time before recording began is recorded too, s")
+    mode: str = key(RECORD_MODE, "all",
+        "frames to record: all, bursts (sums only), or every=K (one in K)", Option("record", "MODE"))
+    armed: bool = key(FLAG, False,
+        "measure at once, but record only after the start command", Option("armed", on=True))
+    keep_s: float = key(number(0, 60), 2.0,
+        "pre-trigger: frames of this time before the start are recorded too, s")
     start_above_N: float | None = key(number(1e-6, 1e9), None,
-        "armed: a force of this magnitude begins recording too, N", Option("start-above", "N"))
-    rotate_MB: float | None = key(number(10, 1e9), None, "begin another file after this much; the set is one session")
-    buffer_MB: float = key(number(1, 1e6), 512.0, "frames waiting for the disk, at most")
-    when_full: str = key(choice("gap", "stop"), "gap", "a full buffer or disk leaves a counted gap, or ends the run")
+        "with armed: a force of this magnitude also starts the recording, N", Option("start-above", "N"))
+    rotate_MB: float | None = key(number(10, 1e9), None,
+        "size after which another file is begun, MB; all files together are one session")
+    buffer_MB: float = key(number(1, 1e6), 512.0, "memory for frames that wait for the disk, MB")
+    when_full: str = key(choice("gap", "stop"), "gap",
+        "what a full buffer or disk does: gap (frames are left out and counted) or stop (the run ends)")
 
 
 @dataclass(frozen=True, slots=True)
 class OperateConfig:
     """[operate]"""
 
-    orders: str | None = key(PLACE, None,
-        "take orders as lines over TCP at this port (of 127.0.0.1 unless an address is given)",
+    orders: str | None = key(LISTEN_ADDRESS, None,
+        "TCP port for remote commands, one per line (on 127.0.0.1 unless HOST is given)",
         Option("orders", "[HOST:]PORT"))
     token_file: str | None = key(TEXT, None,
-        "file with the word that clients of a port say first; needed beyond 127.0.0.1", Option("token-file", "FILE"))
+        "file with the token that a client must send first; required for addresses other than 127.0.0.1",
+        Option("token-file", "FILE"))
 
 
 @dataclass(frozen=True, slots=True)
 class StrainOutConfig:
     """[strain_out]"""
 
-    tcp: str | None = key(PLACE, None,
-        "tell every measurement as a line to TCP clients of this port (of 127.0.0.1 unless an address is given)",
+    tcp: str | None = key(LISTEN_ADDRESS, None,
+        "TCP port that sends every measurement as a line to its clients (on 127.0.0.1 unless HOST is given)",
         Option("strain-out", "[HOST:]PORT"))
-    udp: str | None = key(PLACE, None, "send it by UDP to this HOST:PORT")
-    serial: str | None = key(TEXT, None, "write it to this port: /dev/ttyUSB1?baud=115200")
-    format: str = key(choice("json", "csv"), "json", "of a line; csv begins with the names", Option("strain-format"))
+    udp: str | None = key(LISTEN_ADDRESS, None, "HOST:PORT to which every measurement is sent by UDP")
+    serial: str | None = key(TEXT, None,
+        "serial port to which every measurement is written: /dev/ttyUSB1?baud=115200")
+    format: str = key(choice("json", "csv"), "json",
+        "format of a line; csv begins with the names of the channels", Option("strain-format"))
     channels: tuple[str, ...] | None = key(NAMES, None,
-        "what is told (docs/guide.md); without, the axial strain, load, gauges and what belongs to them",
+        "channels of a line (docs/guide.md; default: time, frame, axial strain, force, stress, lost share,"
+        " latency and all gauges)",
         Option("strain-channels", "NAME,NAME"))
 
 
@@ -153,13 +173,13 @@ class StrainOutConfig:
 class AlarmConfig:
     """[[alarm]]: any number of them; exactly one of above and below."""
 
-    channel: str = key(TEXT, "", "what is looked at: a channel (docs/guide.md)")
-    above: float | None = key(number(), None, "the alarm is on above this")
-    below: float | None = key(number(), None, "the alarm is on below this")
-    hysteresis: float = key(number(0), 0.0, "it goes when the channel is back by this much")
-    name: str = key(TEXT, "", "its name in messages")
-    end: bool = key(FLAG, False, "it ends the run")
-    line: str = key(TEXT, "", "sent as a line on all strain outputs when it comes")
+    channel: str = key(TEXT, "", "channel that is watched (docs/guide.md)")
+    above: float | None = key(number(), None, "the alarm is on above this value")
+    below: float | None = key(number(), None, "the alarm is on below this value")
+    hysteresis: float = key(number(0), 0.0, "distance back from the limit at which the alarm ends")
+    name: str = key(TEXT, "", "name of the alarm in messages")
+    end: bool = key(FLAG, False, "the alarm ends the run")
+    line: str = key(TEXT, "", "line sent on all strain outputs when the alarm begins")
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,16 +187,16 @@ class ViewConfig:
     """[view]"""
 
     enabled: bool = key(FLAG, True,
-        "serve the rerun view (its port on 127.0.0.1 asks for no token: all users of this machine can look)",
+        "serve the rerun view (its port on 127.0.0.1 needs no token: all users of this machine can open it)",
         Option("no-view", off=True))
     rrd: bool = key(FLAG, True, "write view.rrd", Option("no-rrd", off=True))
-    port: int = key(integer(1024, 65535), 9876, "port of the view on 127.0.0.1; the next free one is taken")
-    spawn: bool = key(FLAG, True, "open the viewer when there is a display")
+    port: int = key(integer(1024, 65535), 9876, "port of the view on 127.0.0.1, or the next free one")
+    spawn: bool = key(FLAG, True, "open the viewer if there is a display")
     strain_range: float | None = key(number(1e-7, 10), None,
-        "fixed symmetric range of the strain maps; follows the data without")
+        "fixed symmetric range of the strain maps (default: from the data)")
     scale: str = key(choice("symmetric", "automatic"), "symmetric",
-        "colours about zero, or over the values there are")
-    light: bool = key(FLAG, False, "for slow links: a small picture and the maps once a second",
+        "colour range: symmetric about zero, or automatic (from lowest to highest value)")
+    light: bool = key(FLAG, False, "for slow connections: a small picture, and maps once a second",
         Option("light", on=True))
 
 
@@ -184,30 +204,33 @@ class ViewConfig:
 class SpecimenConfig:
     """[specimen]"""
 
-    width_mm: float | None = key(number(1e-3, 1e5), None, "width of the section")
-    thickness_mm: float | None = key(number(1e-4, 1e5), None, "thickness of the section")
-    diameter_mm: float | None = key(number(1e-3, 1e5), None, "diameter of a round section")
+    width_mm: float | None = key(number(1e-3, 1e5), None, "width of the section, mm")
+    thickness_mm: float | None = key(number(1e-4, 1e5), None, "thickness of the section, mm")
+    diameter_mm: float | None = key(number(1e-3, 1e5), None, "diameter of a round section, mm")
     area_mm2: float | None = key(number(1e-6, 1e9), None,
-        "area of any section; goes before width, thickness and diameter")
-    gauge_length_mm: float | None = key(number(1e-3, 1e6), None, "gauge length, told beside the extensions")
+        "area of the section, mm^2; takes precedence over width, thickness and diameter")
+    gauge_length_mm: float | None = key(number(1e-3, 1e6), None,
+        "gauge length, mm; reported with the extensions")
     axis: str = key(choice(AUTO, "x", "y"), AUTO,
-        "direction of the load in the image; auto: of the largest strain, y until that tells", Option("axis"))
+        "direction of the load in the picture; auto: the direction of the largest strain, y until it is clear",
+        Option("axis"))
     standard: str = key(choice("iso6892", "iso527", "astm-d3039", "free"), "iso6892",
-        "standard of the evaluation; free: modulus_between alone", Option("standard"))
+        "standard of the evaluation; free: only modulus_between", Option("standard"))
     modulus_between: tuple[float, float] = key(STRAINS, (0.0005, 0.0025),
-        "strains between which a free evaluation takes the modulus")
+        "strain interval of the modulus in a free evaluation")
     zero: str = key(choice("raw", "toe", "preload"), "raw",
-        "strain counts as measured, from the foot of the elastic line, or from the preload", Option("zero"))
-    preload_MPa: float = key(number(1e-3, 1e5), 1.0, "stress from which strain counts with zero = preload")
+        "zero of the strain: raw (as measured), toe (foot of the elastic line) or preload", Option("zero"))
+    preload_MPa: float = key(number(1e-3, 1e5), 1.0,
+        "stress at which the strain is zero with zero = preload, MPa")
 
     @property
     def first_axis(self) -> Literal["x", "y"]:
-        """The direction of the load as far as it is known before the test."""
+        """The direction of the load before the test shows it."""
         return "x" if self.axis == "x" else "y"
 
     @property
     def area_m2(self) -> float | None:
-        """Section, m^2; None where it is not known."""
+        """Area of the section, m^2; None if it is not known."""
         if self.area_mm2 is not None:
             return self.area_mm2 * 1e-6
         if self.width_mm is not None and self.thickness_mm is not None:
@@ -219,7 +242,8 @@ class SpecimenConfig:
 class OutputConfig:
     """[output]"""
 
-    dir: str | None = key(TEXT, None, "where the files go; default: a new folder in runs/ named by the UTC time",
+    dir: str | None = key(TEXT, None,
+        "folder for the files (default: a new one in runs/, named by the UTC time)",
         Option("out", "DIR"))
-    seconds: float | None = key(number(0.01, 1e7), None, "end after this time", Option("seconds", "S"))
-    report: bool = key(FLAG, False, "write report.html at the end", Option("report", on=True))
+    seconds: float | None = key(number(0.01, 1e7), None, "end after this time, s", Option("seconds", "S"))
+    report: bool = key(FLAG, False, "write report.html at the end of the test", Option("report", on=True))

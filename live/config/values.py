@@ -1,6 +1,6 @@
-"""What a value of the configuration may be: checked as it comes from a file, and read from a word.
+"""The checks of the values of the configuration, from a file or from a word of the command line.
 
-A check that refuses says what is allowed; whoever asks adds the key and the value.
+The error of a check has what is allowed; the caller adds the key and the value.
 """
 
 from __future__ import annotations
@@ -19,18 +19,18 @@ from live.config.listen_address import ListenAddress
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """A kind of value.
+    """A kind of value: what is accepted and how it is read.
 
     Attributes
     ----------
     accept : callable
-        The value as it is used; raises ``NotAllowed``.
+        Returns the value to use; raises ``NotAllowed``.
     read : callable
-        From a word of the command line to what ``accept`` takes; raises ValueError.
+        Converts a word of the command line for ``accept``; raises ValueError.
     length : "", "px" or "whole px"
-        Whether it is a length in the picture, which may be said in mm; whole ones are rounded.
+        For a length in the picture, which may be given in mm; "whole px" is rounded.
     words : tuple of str
-        All that is accepted, where that is a few words.
+        The accepted words of a choice.
     """
 
     accept: Callable[[Any], Any]
@@ -41,14 +41,14 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """How a key is said on the command line.
+    """The option of a key on the command line.
 
     Attributes
     ----------
     name : str
         Without its dashes.
     metavar : str
-        "": the words of the check.
+        "": the option offers the words of the check.
     off, on : bool
         A switch that turns the key off, or on.
     """
@@ -59,10 +59,8 @@ class Option:
     on: bool = False
 
 
-def key(
-    check: Check, default: Any, help_text: str, option: Option | None = None, *, optional: bool = False
-) -> Any:
-    """A field of a section: its check, its default, its meaning; ``optional`` is for the reader alone."""
+def key(check: Check, default: Any, help_text: str, option: Option | None = None) -> Any:
+    """A field of a section: its check, default, help text and option."""
     return field(default=default, metadata={"check": check, "help": help_text, "option": option})
 
 
@@ -81,7 +79,7 @@ _IN_MM = re.compile(rf"\s*({_NUMBER}(?:\s*,\s*{_NUMBER})*)\s*mm\s*")
 
 
 def length(check: Check, *, whole: bool = False) -> Check:
-    """The same for a length in the picture: px, or mm as "6 mm" and "10, 20 mm" where the scale is known."""
+    """``check`` for a length in the picture: px, or mm as "6 mm" or "10, 20 mm" if the scale is known."""
 
     def read(word: str) -> Any:
         if _IN_MM.fullmatch(word):
@@ -96,7 +94,7 @@ def length(check: Check, *, whole: bool = False) -> Check:
 
 
 def in_px(value: Any, check: Check, px_per_mm: float | None) -> Any:
-    """What was said in mm in px, all else as it is; raises ``NotAllowed`` where the scale is not known."""
+    """A length given in mm as px, other values unchanged; raises ``NotAllowed`` if the scale is not known."""
     if isinstance(value, list | tuple):
         return [in_px(v, check, px_per_mm) for v in value]
     found = _IN_MM.fullmatch(value) if check.length and isinstance(value, str) else None
@@ -107,8 +105,8 @@ def in_px(value: Any, check: Check, px_per_mm: float | None) -> Any:
     lengths = [float(number) * px_per_mm for number in found[1].split(",")]
     if not all(abs(px) < 1e9 for px in lengths):
         raise NotAllowed("a length within the picture")
-    said = [round(px) if check.length == "whole px" else px for px in lengths]
-    return said if len(said) > 1 else said[0]
+    values = [round(px) if check.length == "whole px" else px for px in lengths]
+    return values if len(values) > 1 else values[0]
 
 
 def choice(*allowed: str) -> Check:
@@ -128,7 +126,7 @@ def _text(value: Any) -> str:
     return value
 
 
-def _place(value: Any) -> str:
+def _listen_address(value: Any) -> str:
     try:
         ListenAddress.parse(_text(value))
     except ValueError as allowed:
@@ -224,23 +222,24 @@ def _names(value: Any) -> tuple[str, ...]:
 
 TEXT = Check(_text)
 NAMES = Check(_names, lambda word: word.split(","))
-"""Names, on the command line with commas between."""
-PLACE = Check(_place)
-"""Where something listens: PORT or HOST:PORT."""
+"""Names; on the command line separated by commas."""
+LISTEN_ADDRESS = Check(_listen_address)
+"""PORT or HOST:PORT of a server."""
 FLAG = Check(_flag)
 BOX = length(Check(_box, _read_box), whole=True)
 """x, y, width, height in whole px."""
 RECTANGLE = length(Check(_rectangle))
-"""The same in any px."""
+"""x, y, width, height in px."""
 STRAINS = Check(_strains)
 """An interval of strains."""
 POINT = length(Check(_point))
+"""x, y in px."""
 CORNERS = length(Check(_corners))
-"""x, y in px; of the corners of a polygon."""
+"""x, y in px of each corner of a polygon."""
 AUTO, ALL = REGIONS = ("auto", "all")
-"""Regions in words: the specimen that is found, or the picture but for a rim."""
+"""Named regions: the specimen found in the picture, or the picture except a rim."""
 GIVEN = "given"
-"""Gauges that are not placed by themselves (``AUTO``)."""
+"""Only the gauges of the configuration; with ``AUTO``, others are placed too."""
 REGION = length(Check(_region, _read_region), whole=True)
-"""A box, or one of the words."""
+"""A box, or one of ``REGIONS``."""
 RECORD_MODE = Check(_record_mode)

@@ -1,4 +1,4 @@
-"""The values of the channels at a measurement, with the load as it is known at once."""
+"""The values of the output channels at a measurement, with the newest force."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ RATE_S = 1.0
 
 
 class ChannelValues:
-    """Reads the channels of one measurement after the other; one for each who asks.
+    """Computes the channels of one measurement after the other; each user has its own.
 
     Parameters
     ----------
@@ -27,26 +27,26 @@ class ChannelValues:
 
     def __init__(self, start: float, snapshot: Callable[[float, TimeStep], Snapshot]) -> None:
         self._start, self._snapshot = start, snapshot
-        self._course: deque[tuple[float, float]] = deque()
+        self._recent: deque[tuple[float, float]] = deque()
 
     def read(self, measurement: Measurement) -> dict[str, float]:
         """All channels by name; NaN where one is not known."""
-        i = measurement.time_step
-        now = self._snapshot(i.t, i)
+        step = measurement.time_step
+        now = self._snapshot(step.t, step)
         values = {
-            "time_s": i.t - self._start,
+            "time_s": step.t - self._start,
             "frame": measurement.burst.first_index,
             "axial": now.axial,
             "sigma_axial": now.sigma_axial,
-            "strain_rate": self._rate(i.t, now.axial),
+            "strain_rate": self._rate(step.t, now.axial),
             "force_N": now.force_N,
             "stress_MPa": now.stress_Pa * 1e-6,
-            "lost_share": 1 - i.n_valid / max(i.n_zoi, 1),
+            "lost_share": 1 - step.n_valid / max(step.n_zoi, 1),
         }
         values |= {
-            name: getattr(i, name) for name in ("exx", "eyy", "exy", "largest", "latency_s", "noise_GL")
+            name: getattr(step, name) for name in ("exx", "eyy", "exy", "largest", "latency_s", "noise_GL")
         }
-        for name, gauge in i.gauges.items():
+        for name, gauge in step.gauges.items():
             values |= {f"gauge_{name}": gauge.value, f"sigma_gauge_{name}": gauge.sigma}
         return values
 
@@ -54,12 +54,12 @@ class ChannelValues:
         """The slope of the least-squares line through the last second, three points or more."""
         if math.isnan(axial):
             return math.nan
-        if not self._course or t > self._course[-1][0]:
-            self._course.append((t, axial))
-        while len(self._course) > 3 and self._course[0][0] < t - RATE_S:
-            self._course.popleft()
-        if len(self._course) < 3:
+        if not self._recent or t > self._recent[-1][0]:
+            self._recent.append((t, axial))
+        while len(self._recent) > 3 and self._recent[0][0] < t - RATE_S:
+            self._recent.popleft()
+        if len(self._recent) < 3:
             return math.nan
-        middle = math.fsum(at for at, _ in self._course) / len(self._course)
-        spread = math.fsum((at - middle) ** 2 for at, _ in self._course)
-        return math.fsum((at - middle) * e for at, e in self._course) / spread if spread > 0 else math.nan
+        mean_t = math.fsum(at for at, _ in self._recent) / len(self._recent)
+        spread = math.fsum((at - mean_t) ** 2 for at, _ in self._recent)
+        return math.fsum((at - mean_t) * e for at, e in self._recent) / spread if spread > 0 else math.nan

@@ -1,7 +1,7 @@
-"""What takes what a test gives: frames, measurements, load samples and events.
+"""The contract of a consumer: it takes the frames, measurements, load samples and events of a test.
 
-Results, view, status card, strain out and report are all consumers. To write one, derive from
-``Consumer`` and define the methods you want; ``examples/second_consumer.py`` is one in ten lines.
+Results, view, status card and strain output are consumers. To write one, derive from ``Consumer``
+and define the methods you want; ``examples/second_consumer.py`` is one in ten lines.
 """
 
 from __future__ import annotations
@@ -26,46 +26,46 @@ if TYPE_CHECKING:
 
 
 class Policy(Enum):
-    """What becomes of measurements when a consumer falls behind by ``room`` of them.
+    """What happens to measurements when a consumer falls behind by ``queue_size`` of them.
 
-    Frames: the newest wins, whatever the policy, since a camera waits for nobody. Load samples and
-    events: all of them, up to ``MOST_SAMPLES`` and ``MOST_EVENTS``; then the oldest go and are counted.
+    Frames: the newest replaces the one before, whatever the policy, since a camera cannot wait. Load
+    samples and events: up to ``MAX_SAMPLES`` and ``MAX_EVENTS`` wait; then the oldest are dropped and counted.
     """
 
     WAIT = "the measurement waits, nothing is lost"
-    NEWEST = "the oldest one waiting gives way, and is counted"
-    BOUNDED = "the new one is refused, and is counted"
+    NEWEST = "the oldest measurement in the queue is dropped and counted"
+    BOUNDED = "the new measurement is refused and counted"
 
 
 class Consumer:
-    """One that takes what a test gives. Every method does nothing until it is defined anew.
+    """Takes the data of a test. Every method does nothing until a subclass overrides it.
 
-    Only kinds whose method is defined are passed on. Where ``blocks`` is True the methods are
-    called by a thread of the consumer's own, one at a time; else by whoever gives (the measuring
-    thread for measurements), who is then held up. What a method raises ends this consumer alone,
-    loudly; ``end`` is called all the same.
+    Only kinds whose method is overridden are passed on. Where ``blocks`` is True a thread of the
+    consumer calls the methods, one at a time; else the caller's thread does (the measuring thread for
+    measurements), and waits for the return. An exception of a method ends only this consumer and is
+    reported; ``end`` is called in any case.
 
     Attributes
     ----------
     name : str
-        For messages and the ledger.
+        For messages and the consumer's report.
     policy : Policy
-    room : int
+    queue_size : int
         Measurements that may wait.
     blocks : bool
         Whether a method may take longer than a few microseconds.
-    vital : bool
+    critical : bool
         Whether its failure makes the test one that finished with loss (exit code 5).
-    patience_s : float or None, s
+    timeout_s : float or None, s
         How long the end of a test waits for it; None: as long as it takes.
     """
 
     name: str = "consumer"
     policy: Policy = Policy.NEWEST
-    room: int = 2
+    queue_size: int = 2
     blocks: bool = True
-    vital: bool = False
-    patience_s: float | None = None
+    critical: bool = False
+    timeout_s: float | None = None
 
     def begin(self) -> None:
         """Once, before anything else, on the consumer's thread."""
@@ -74,35 +74,35 @@ class Consumer:
         """A frame as it was grabbed."""
 
     def measurement(self, measurement: Measurement) -> None:
-        """A measurement at once; its force may not be known yet."""
+        """A measurement as soon as it is made; its force may not be known yet."""
 
-    def settled(self, measurement: Measurement) -> None:
+    def matched(self, measurement: Measurement) -> None:
         """A measurement whose force is final (``live.pipeline.measurement.ForceMatching``)."""
 
     def load(self, sample: LoadSample) -> None:
         """A load sample with its flags and unit."""
 
     def event(self, event: Event) -> None:
-        """An event of any part of the test."""
+        """An event from any part of the test."""
 
     def idle(self) -> float:
-        """Nothing waits to be taken (only where ``blocks``): time to do what was put off.
+        """Called when the queue is empty (only where ``blocks``): time for deferred work.
 
         Returns
         -------
         float, s
-            When to be asked again, should nothing come until then; infinite for never.
+            Time until the next call if nothing arrives; infinite for no call.
         """
         return math.inf
 
     def end(self) -> str:
-        """Close everything; a few words for the ledger, empty where there is nothing to say."""
+        """Close everything; a few words for the consumer's report, or an empty text."""
         return ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunInfo:
-    """What a consumer may read of a test before it begins.
+    """The description of a test that its consumers are made from.
 
     Attributes
     ----------
@@ -114,9 +114,9 @@ class RunInfo:
     start : ClockPair
         Time zero of the files and curves.
     end : callable or None
-        Ends a live run cleanly, for the reason it is given; None in a replay.
-    aside : bool
-        Nobody looks into ``folder`` before all is done, and it counts for nothing until then.
+        Takes a reason and ends a live run cleanly; None in a replay.
+    deferred : bool
+        Nothing reads the files in ``folder`` before the test has ended, so they need not be flushed often.
     """
 
     config: Config
@@ -125,52 +125,52 @@ class RunInfo:
     grid: ZoiGrid
     start: ClockPair
     end: Callable[[str], None] | None = None
-    aside: bool = False
+    deferred: bool = False
 
 
 Compose = Callable[[RunInfo, RunState], Sequence[Consumer]]
-"""Makes the consumers of a test, once its folder is there and before its first frame."""
+"""Makes the consumers of a test, when its folder exists and before its first frame."""
 
-KINDS = ("event", "load", "frame", "settled", "measurement")
-"""Names of the methods that take something, in the order in which what waits is handed over."""
+KINDS = ("event", "load", "frame", "matched", "measurement")
+"""Names of the methods that take data, in the order in which queued data is delivered."""
 
 
-def wanted(consumer: Consumer) -> frozenset[str]:
-    """The kinds whose method ``consumer`` defines."""
+def kinds_taken(consumer: Consumer) -> frozenset[str]:
+    """The kinds whose method ``consumer`` overrides."""
     return frozenset(k for k in KINDS if getattr(type(consumer), k) is not getattr(Consumer, k))
 
 
 @dataclass(frozen=True, slots=True)
 class ConsumerReport:
-    """How a consumer fared, for the ledger.
+    """What a consumer took, and whether it stopped early.
 
     Attributes
     ----------
     name : str
-    taken, passed_over : mapping of kind to count
-    words : str
-        Its own.
+    taken, dropped : mapping of kind to count
+    summary : str
+        What ``Consumer.end`` returned.
     failed : str
         Why it stopped early; empty where it did not.
-    vital : bool
+    critical : bool
     """
 
     name: str
     taken: Mapping[str, int] = field(default_factory=dict)
-    passed_over: Mapping[str, int] = field(default_factory=dict)
-    words: str = ""
+    dropped: Mapping[str, int] = field(default_factory=dict)
+    summary: str = ""
     failed: str = ""
-    vital: bool = False
+    critical: bool = False
 
     def line(self) -> str:
         """One line for a person."""
-        counts = [self._count(kind) for kind in ("measurement", "settled", "frame", "load", "event")]
-        said = [*filter(None, counts), *filter(None, [self.words])]
+        counts = [self._count(kind) for kind in ("measurement", "matched", "frame", "load", "event")]
+        parts = [*filter(None, counts), *filter(None, [self.summary])]
         if self.failed:
-            said.append(f"STOPPED: {self.failed}")
-        return f"{self.name}: {'; '.join(said) or 'nothing came'}"
+            parts.append(f"STOPPED: {self.failed}")
+        return f"{self.name}: {'; '.join(parts) or 'nothing came'}"
 
     def _count(self, kind: str) -> str:
-        taken, over = self.taken.get(kind, 0), self.passed_over.get(kind, 0)
-        plural = {"settled": "measurements", "load": "load samples"}.get(kind, f"{kind}s")
-        return f"{taken} {plural}" + f", {over} passed over" * (over > 0) if taken or over else ""
+        taken, dropped = self.taken.get(kind, 0), self.dropped.get(kind, 0)
+        plural = {"matched": "measurements", "load": "load samples"}.get(kind, f"{kind}s")
+        return f"{taken} {plural}" + f", {dropped} dropped" * (dropped > 0) if taken or dropped else ""

@@ -1,7 +1,7 @@
-"""The journal: every event goes to the log, the screen, the session and the view, once.
+"""The event log: every event goes once to the log, the screen, the session and the view.
 
-Listeners that come later (the session is opened after the devices) are told what they missed, but
-for the one event a burst, which would fill the memory in a long test.
+A listener that is added later (the session is opened after the devices) gets the past events too, except
+the one event for each burst, which would fill the memory in a long test.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from acquire.printable import brief
 
 log = logging.getLogger(__name__)
 _LEVELS = {"info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
-_QUIET = {EventKind.MEASURED}  # one a burst: for the session, not for a person
+_SESSION_ONLY = {EventKind.MEASURED}  # one for each burst: not for a person
 
 
 def sentence(event: Event, names: Mapping[str, str] | None = None) -> str:
-    """Who says what: a device by its name of ``names``, else by its address without settings, and only once."""
+    """Source and text: a device by its name in ``names``, else by its address without settings, and only once."""
     source, text = brief(event.source), brief(event.text)
     text = text.removeprefix(f"{source}: ")
     return f"{(names or {}).get(event.source, source)}: {text}"
@@ -34,10 +34,10 @@ class EventLog:
     Attributes
     ----------
     origin : float, s
-        Taken off the stamps of devices and of ``tell``; not 0 where the pictures come with nominal
+        Subtracted from the stamps of devices and of ``emit``; not 0 where the pictures have nominal
         times from 0, so that events and pictures share one time.
     names : dict of str to str
-        What devices are called on the screen, by their addresses.
+        Names of devices on the screen, by their addresses.
     """
 
     def __init__(self) -> None:
@@ -48,21 +48,21 @@ class EventLog:
         self._lock = threading.RLock()
 
     def __call__(self, event: Event) -> None:
-        """Take an event stamped by this machine's clock; itself an ``EventSink``."""
+        """Take an event stamped by this machine's clock; makes the log an ``EventSink``."""
         self.record(dataclasses.replace(event, t=event.t - self.origin) if self.origin else event)
 
     def record(self, event: Event) -> None:
         """Take an event stamped with the time of a frame."""
         with self._lock:
-            if event.kind not in _QUIET:
+            if event.kind not in _SESSION_ONLY:
                 self._events.append(event)
             listeners = list(self._listeners)
-        if event.kind not in _QUIET:
+        if event.kind not in _SESSION_ONLY:
             log.log(_LEVELS[event.level], "%s", sentence(event, self.names))
         for listener in listeners:
             listener(event)
 
-    def tell(
+    def emit(
         self,
         kind: EventKind,
         source: str,
@@ -70,11 +70,11 @@ class EventLog:
         level: Level = "info",
         data: Mapping[str, Any] | None = None,
     ) -> None:
-        """Make an event, stamped now, and take it."""
+        """Make an event with the present time, and take it."""
         self(Event(time.monotonic(), kind, source, text, level, data or {}))
 
     def add_listener(self, listener: EventSink) -> None:
-        """Pass all past and coming events to ``listener``."""
+        """Pass all past and future events to ``listener``."""
         with self._lock:
             self._listeners.append(listener)
             past = list(self._events)

@@ -1,4 +1,4 @@
-"""The ledger of a run: every frame grabbed is accounted for, and the sums are checked."""
+"""The frame counts of a run: every grabbed frame is accounted for, and the sums are checked."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ class FrameCounts:
     grabbed : int
         Frames the camera handed out.
     recorded, unrecorded, thinned : int
-        Written to the session; not written although they should have been (a counted gap); left
-        out as the recording mode says (only bursts, every K-th).
+        Written to the session; not written although they should be (a counted gap); left out by the
+        recording mode (only bursts, every K-th).
     reference, measured, skipped, left_out : int
-        Part of the reference burst; of a measured burst; of a burst that was replaced by a newer
-        one or came while measuring was paused; of no complete burst, or damaged.
+        Part of the reference burst; of a measured burst; of a burst that a newer one replaced or that
+        came while measuring was paused; of no complete burst, or damaged.
     lost : int
-        Frames the camera, or the way to it, lost before they were handed out.
+        Frames that the camera or its connection lost.
     load_samples : int
     """
 
@@ -49,19 +49,19 @@ class FrameCounts:
 
     @property
     def adds_up(self) -> bool:
-        """Whether every grabbed frame has one fate, and one place on disk where recording was on."""
-        fates = self.reference + self.measured + self.skipped + self.left_out
+        """Whether every grabbed frame is counted once for measuring, and once for recording where that was on."""
+        used = self.reference + self.measured + self.skipped + self.left_out
         stored = self.recorded + self.unrecorded + self.thinned
-        return fates == self.grabbed and stored in (0, self.grabbed)
+        return used == self.grabbed and stored in (0, self.grabbed)
 
     @property
     def loss(self) -> bool:
-        """Whether anything is missing that cannot be had again."""
+        """Whether frames are missing for good."""
         return self.lost > 0 or self.unrecorded > 0
 
     @property
     def skipped_share(self) -> float:
-        """Share of the frames behind the reference that were not measured because measuring was late or paused."""
+        """Share of the frames after the reference that were not measured because measuring was late or paused."""
         return self.skipped / max(self.measured + self.skipped, 1)
 
     def line(self) -> str:

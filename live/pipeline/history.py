@@ -1,8 +1,6 @@
-"""The means of all measured instants, kept in memory for the summary and the status line; the axis they tell.
+"""The history of a test: the time steps in memory, as columns, and the load axis found from them.
 
-Instants in little memory: a test of a day has millions of them.
-
-A history that never grows beyond its bound: when full, every second item goes.
+A test of a day has millions of time steps, so they take little memory.
 """
 
 from __future__ import annotations
@@ -20,33 +18,39 @@ from acquire.load_cell import LoadLog
 from analysis.evaluate import GaugeValue, LoadAxis, load_axis
 from live.pipeline.measurement import AXIAL, TRANSVERSE, TimeStep, strains_along
 
+Array = NDArray[np.float64]
+Item = TypeVar("Item")
+
+MAX_KEPT = 2000
+"""Time steps that ``AxisFinder`` keeps, evenly thinned."""
+_FIRST, _GROWTH = 8, 1.1  # time steps before the first search for the axis, and the factor between searches
 _NUMBERS = tuple(one.name for one in fields(TimeStep) if one.name not in ("refused", "gauges"))
 _COUNTS = ("n_valid", "n_zoi")
 
 
 class TimeSeries(Sequence[TimeStep]):
-    """A list to which one thread appends and that any may read: numbers as columns, each word once.
+    """A list that one thread appends to and any thread reads: numbers as columns, each text once.
 
-    About 200 bytes an instant and 24 more for each gauge.
+    About 200 bytes for each time step and 24 more for each gauge.
     """
 
     def __init__(self) -> None:
         self._numbers = {name: array("d") for name in _NUMBERS}
-        self._refused = _Words()
+        self._refused = _TextColumn()
         self._gauges: dict[str, _GaugeColumn] = {}
         self._count = 0
 
     def append(self, time_step: TimeStep) -> None:
         """Add the newest."""
-        for name, kept in self._numbers.items():
-            kept.append(getattr(time_step, name))
+        for name, column in self._numbers.items():
+            column.append(getattr(time_step, name))
         self._refused.append(time_step.refused)
         for name in time_step.gauges:
             if name not in self._gauges:
                 self._gauges[name] = _GaugeColumn(self._count)
-        for name, column in self._gauges.items():
-            column.append(time_step.gauges.get(name))
-        # Counted last: whoever reads meanwhile sees whole instants only.
+        for name, gauge in self._gauges.items():
+            gauge.append(time_step.gauges.get(name))
+        # Counted last: another thread then reads whole time steps only.
         self._count += 1
 
     def column(self, name: str) -> Array:
@@ -55,11 +59,11 @@ class TimeSeries(Sequence[TimeStep]):
 
     @property
     def gauges(self) -> tuple[str, ...]:
-        """Names of the gauges that the first instant has."""
+        """Names of the gauges of the first time step."""
         return tuple(name for name, column in list(self._gauges.items()) if not column.since)
 
     def gauge(self, name: str) -> Array | None:
-        """Values of a gauge, (N,) float64; None where the first instant has none of that name."""
+        """Values of a gauge, (N,) float64; None where the first time step has none of that name."""
         column = self._gauges.get(name)
         return None if column is None or column.since else _copied(column.values, self._count)
 
@@ -74,56 +78,56 @@ class TimeSeries(Sequence[TimeStep]):
 
     def __getitem__(self, at: int | slice) -> TimeStep | list[TimeStep]:
         if isinstance(at, slice):
-            return [self._made(i) for i in range(*at.indices(self._count))]
+            return [self._time_step(i) for i in range(*at.indices(self._count))]
         if not -self._count <= at < self._count:
-            raise IndexError(f"instant {at} of {self._count}")
-        return self._made(at % self._count)
+            raise IndexError(f"time step {at} of {self._count}")
+        return self._time_step(at % self._count)
 
     def __iter__(self) -> Iterator[TimeStep]:
-        return (self._made(i) for i in range(self._count))
+        return (self._time_step(i) for i in range(self._count))
 
-    def _made(self, i: int) -> TimeStep:
-        numbers: dict[str, Any] = {name: kept[i] for name, kept in self._numbers.items()}
+    def _time_step(self, i: int) -> TimeStep:
+        numbers: dict[str, Any] = {name: column[i] for name, column in self._numbers.items()}
         numbers |= {name: int(numbers[name]) for name in _COUNTS}
-        asked = {name: column.at(i) for name, column in self._gauges.items()}
-        gauges = {name: value for name, value in asked.items() if value is not None}
+        values = {name: gauge.at(i) for name, gauge in self._gauges.items()}
+        gauges = {name: value for name, value in values.items() if value is not None}
         return TimeStep(**numbers, refused=self._refused[i], gauges=gauges)
 
 
-class _Words:
-    """Texts of which few differ."""
+class _TextColumn:
+    """Texts, each stored once: few of them differ."""
 
     def __init__(self) -> None:
-        self._known: dict[str, int] = {}
+        self._numbers: dict[str, int] = {}
         self._texts: list[str] = []
-        self._which = array("l")
+        self._column = array("l")
 
     def append(self, text: str) -> None:
-        if text not in self._known:
+        if text not in self._numbers:
             self._texts.append(text)
-            self._known[text] = len(self._known)
-        self._which.append(self._known[text])
+            self._numbers[text] = len(self._numbers)
+        self._column.append(self._numbers[text])
 
     def __getitem__(self, i: int) -> str:
-        return self._texts[self._which[i]]
+        return self._texts[self._column[i]]
 
 
 class _GaugeColumn:
-    """Of one gauge, which the first ``since`` instants do not have."""
+    """The values of one gauge, which the first ``since`` time steps do not have."""
 
     def __init__(self, since: int) -> None:
         nothing = [math.nan] * since
         self.since = since
         self.values, self._sigmas = array("d", nothing), array("d", nothing)
-        self._reasons, self._missing = _Words(), array("b", [1] * since)
+        self._reasons, self._missing = _TextColumn(), array("b", [1] * since)
         for _ in range(since):
             self._reasons.append("")
 
     def append(self, value: GaugeValue | None) -> None:
-        told = value or GaugeValue(math.nan, math.nan)
-        self.values.append(told.value)
-        self._sigmas.append(told.sigma)
-        self._reasons.append(told.reason)
+        stored = value or GaugeValue(math.nan, math.nan)
+        self.values.append(stored.value)
+        self._sigmas.append(stored.sigma)
+        self._reasons.append(stored.reason)
         self._missing.append(value is None)
 
     def at(self, i: int) -> GaugeValue | None:
@@ -135,27 +139,24 @@ def _copied(kept: array[float], count: int) -> Array:
     return np.frombuffer(kept[:count], np.float64).copy()
 
 
-Item = TypeVar("Item")
-
-
 class Thinned(Generic[Item]):
-    """Evenly thinned past, and always the newest item.
+    """A bounded list, evenly thinned, and always the newest item: when full, every second item is dropped.
 
     Parameters
     ----------
-    most : int
-        Items kept, at most (and one more, the newest).
+    size : int
+        Items kept at most (and one more, the newest).
 
     Attributes
     ----------
     kept : list
         Every ``2**halvings``-th item from the first on, oldest first.
     halvings : int
-        How often every second item went.
+        How often every second item was dropped.
     """
 
-    def __init__(self, most: int) -> None:
-        self._most, self._count = most, 0
+    def __init__(self, size: int) -> None:
+        self._size, self._count = size, 0
         self.kept, self.halvings = list[Item](), 0
         self._newest: list[Item] = []
 
@@ -164,29 +165,23 @@ class Thinned(Generic[Item]):
         self._newest = [item]
         if self._count % (1 << self.halvings) == 0:
             self.kept.append(item)
-            if len(self.kept) > self._most:
+            if len(self.kept) > self._size:
                 self.kept, self.halvings = self.kept[::2], self.halvings + 1
         self._count += 1
 
     def items(self) -> list[Item]:
-        """Oldest first, the newest always among them."""
+        """Oldest first, the newest always included."""
         is_kept = (self._count - 1) % (1 << self.halvings) == 0
         return self.kept + self._newest * (not is_kept)
 
 
-Array = NDArray[np.float64]
-MOST_INSTANTS = 2000
-"""That are kept, evenly thinned."""
-_FIRST, _GROWTH = 8, 1.1  # looked at first, and again whenever there are so many times more
-
-
 class History:
-    """All instants so far: added by one thread, read by any.
+    """All time steps so far: added by one thread, read by any.
 
     Parameters
     ----------
     axis : "x", "y" or "auto"
-        Of the load, as given.
+        Of the load, as configured.
     """
 
     def __init__(self, axis: str = "y") -> None:
@@ -198,13 +193,13 @@ class History:
         self._finder.add(time_step)
 
     @property
-    def axis_by_now(self) -> Literal["x", "y"]:
-        """Of the load: as given, or as the strains so far show it; y until they do."""
+    def current_axis(self) -> Literal["x", "y"]:
+        """Axis of the load: as configured, or as found from the strains so far; y until it is found."""
         return self._finder.axis
 
     @property
-    def told_something(self) -> bool:
-        """Whether any ZOI had a value at any instant."""
+    def has_values(self) -> bool:
+        """Whether any ZOI had a value at any time step."""
         return bool(self.column("n_valid").any())
 
     def column(self, name: str) -> Array:
@@ -212,19 +207,19 @@ class History:
         return self.time_steps.column(name)
 
     def forces(self, loads: LoadLog) -> Array:
-        """The force at each instant with all samples that have come by now, (N,) float64, N.
+        """The force at each time step with all samples so far, (N,) float64, N.
 
-        As if the zero of the first instant had held to the end: a tare in mid-test is no unloading.
+        All have the zero of the first time step: a tare in mid-test is no unloading.
         """
         return loads.forces_one_zero(self.column("t").tolist())
 
     def tared_in_mid_test(self, loads: LoadLog) -> float:
-        """What tares after the first instant have taken off the force by the last one, N."""
+        """What tares after the first time step have subtracted from the force of the last one, N."""
         t = self.column("t")
         return loads.zero_at(t[-1]) - loads.zero_at(t[0]) if t.size else 0.0
 
     def axis(self, given: str) -> LoadAxis:
-        """Of the load: "x" or "y" as ``given``, or what all instants tell where that is "auto"."""
+        """Axis of the load: "x" or "y" as ``given``, or found from all time steps where that is "auto"."""
         return load_axis(self.column("exx"), self.column("eyy"), self.column("exy"), given)
 
     def along(self, axis: str) -> tuple[Array, Array]:
@@ -243,7 +238,7 @@ class History:
 
 
 class AxisFinder:
-    """Given the same instants it tells the same, in a test and in its replay.
+    """Finds the axis of the load from the strains; the same time steps give the same axis, live and in a replay.
 
     Parameters
     ----------
@@ -252,18 +247,18 @@ class AxisFinder:
     Attributes
     ----------
     axis : "x" or "y"
-        As given, or as the strains tell it; y until they do.
+        As given, or as found from the strains; y until it is found.
     """
 
     def __init__(self, given: str) -> None:
         self.axis: Literal["x", "y"] = "x" if given == "x" else "y"
         self._seeks = given not in ("x", "y")
-        self._strains: Thinned[tuple[float, float, float]] = Thinned(MOST_INSTANTS)
+        self._strains: Thinned[tuple[float, float, float]] = Thinned(MAX_KEPT)
         self._count, self._next = 0, _FIRST
         self._t = -math.inf
 
     def add(self, time_step: TimeStep) -> Literal["x", "y"]:
-        """The axis with one instant more; one that is told again counts once."""
+        """The axis with one more time step; one that is added twice counts once."""
         if self._seeks and time_step.t > self._t:
             self._t, self._count = time_step.t, self._count + 1
             self._strains.append((time_step.exx, time_step.eyy, time_step.exy))

@@ -1,16 +1,8 @@
 """The measuring path: one plain generator for live and replay.
 
-``measure`` takes bursts (and commands among them) and gives measurements. It knows nothing of
-threads, files, devices or clocks, so a replay of the same bursts is bit-equal to the live run.
-
-The kernel in force from burst to burst, and the renewal of its reference.
-
-What warns of measurements that are not what they are taken for.
-
-Motion v during T multiplies the contrast at wave number k by |sinc(k v T / 2)|; up to 0.05 px that is
-nothing. The motion itself is estimated with each burst (``acquire.burst.accumulate``). A rotation by r changes small
-strains by r^2/2 (0.5 degrees: 40 um/m; 3 degrees: 1400 um/m), a strain e by about e^2/2 against the other
-measures (2 %: 200 um/m).
+``measure`` takes bursts (and commands among them) and gives measurements. It uses no thread, file,
+device or clock, so a replay of the same bursts is bit-equal to the live run. ``Tracker`` holds the kernel
+and renews its reference; the guards warn where a measurement is not valid as it stands.
 """
 
 from __future__ import annotations
@@ -35,10 +27,14 @@ if TYPE_CHECKING:
     from analysis.field import Measure, StrainField
 
 
-class Tracker:
-    """The kernel in force, the field before, and the renewal of the reference.
+MAX_ROTATION, MAX_STRAIN = math.radians(0.5), 0.02
+"""Limits of small strains, rad and 1: the error is then 40 um/m by the rotation and 200 um/m by the strain."""
 
-    All of it depends on the bursts alone, so that a replay of the same bursts does the same.
+
+class Tracker:
+    """The current kernel, the last field, and the renewal of the reference.
+
+    All depend on the bursts only, so that a replay of the same bursts does the same.
     """
 
     def __init__(
@@ -59,7 +55,7 @@ class Tracker:
         return field
 
     def renew_on_demand(self, burst: Burst) -> None:
-        """Make ``burst`` the reference; told and left where nothing ties it to the first one."""
+        """Make ``burst`` the reference; an event reports where nothing connects it to the first one."""
         here = self._against(self._kernel, burst, self._field)
         try:
             self._kernel = self._kernel.renewed(burst.mean, here, noise=averaged(self._noise_GL, burst.n))
@@ -73,7 +69,7 @@ class Tracker:
     def _renewed_for(
         self, burst: Burst, field: StrainField, lost: float, last: StrainField, last_burst: Burst
     ) -> StrainField:
-        """Measure again from the burst before as the reference; kept where it finds most of what was lost."""
+        """Measure again with the last burst as the reference; kept if that recovers half of the lost ZOIs."""
         try:
             kernel = self._kernel.renewed(last_burst.mean, last, noise=averaged(self._noise_GL, last_burst.n))
         except ValueError:
@@ -105,11 +101,11 @@ def _renewal(burst: Burst, *, automatic: bool) -> Event:
     return Event(burst.t, EventKind.REFERENCE, "measurement", text, level, data | {"renewed": True})
 
 
-MOST_ROTATION, MOST_STRAIN = math.radians(0.5), 0.02
-
-
 class SmearGuard:
-    """Looks at each measured burst, warns when smear begins and says when it ends.
+    """Checks the motion during each measured burst; an event when smear begins and when it ends.
+
+    Motion v during T multiplies the contrast at wave number k by |sinc(k v T / 2)|: negligible up to
+    0.05 px. The motion is estimated with each burst (``acquire.burst.accumulate``).
 
     Parameters
     ----------
@@ -121,46 +117,49 @@ class SmearGuard:
         self._on_event, self._limit = on_event, limit_px
         self._smeared = False
 
-    def look(self, burst: Burst) -> None:
-        """Take note of a burst; one whose motion is not known changes nothing."""
+    def check(self, burst: Burst) -> None:
+        """Check a burst; one whose motion is not known changes nothing."""
         smeared = burst.motion_px > self._limit
-        # What hovers about the limit is not told again and again.
+        # Hysteresis: a motion near the limit does not repeat the events.
         calm = burst.motion_px < 0.8 * self._limit
         if smeared and not self._smeared:
             text = (
                 f"the picture moves {burst.motion_px:.2f} px during a burst of {burst.n}; take shorter bursts"
             )
-            self._tell(burst, text, "warning")
+            self._emit(burst, text, "warning")
         elif calm and self._smeared:
-            self._tell(burst, "the picture stands still enough again during a burst", "info")
+            self._emit(burst, "the picture stands still enough again during a burst", "info")
         self._smeared = smeared or (self._smeared and not calm)
 
-    def _tell(self, burst: Burst, text: str, level: Level) -> None:
+    def _emit(self, burst: Burst, text: str, level: Level) -> None:
         data = {"motion_px": burst.motion_px, "n": burst.n}
         self._on_event(Event(burst.t, EventKind.MEASUREMENT, "burst", text, level, data))
 
 
 class StrainGuard:
-    """Looks at each field of small strains, and warns once where another measure says more.
+    """Checks each field of small strains, and warns once where another measure is more exact.
+
+    A rotation by r changes small strains by r^2/2 (3 degrees: 1400 um/m); they differ from the other measures
+    by about e^2/2 at a strain e.
 
     Parameters
     ----------
     measure : str
-        Of the strains that are reported; only small ones are looked at.
+        Measure of the reported strains; only small strains are checked.
     on_event : callable taking an Event
     """
 
     def __init__(self, measure: Measure, on_event: EventSink) -> None:
-        self._on_event, self._told = on_event, measure != "small"
+        self._on_event, self._warned = on_event, measure != "small"
 
-    def look(self, field: StrainField, t: float) -> None:
-        """Take note of a field, measured at ``t`` (s)."""
-        if self._told or not field.ok.any():
+    def check(self, field: StrainField, t: float) -> None:
+        """Check a field, measured at ``t`` (s)."""
+        if self._warned or not field.ok.any():
             return
         turned = abs(float(np.nanmedian(field.rotation)))
         strained = max(abs(float(np.nanmedian(values))) for values in (field.du_dx, field.dv_dy))
-        if turned > MOST_ROTATION or strained > MOST_STRAIN:
-            self._told = True
+        if turned > MAX_ROTATION or strained > MAX_STRAIN:
+            self._warned = True
             text = (
                 f"turned by {math.degrees(turned):.1f} degrees, strained by {strained:.1%}: small strains are off by"
                 f" about {(turned**2 + strained**2) / 2 * 1e6:.0f} um/m; measure with --strain engineering"
@@ -200,11 +199,11 @@ def measure(
     kernel : PhaseKernel
         Prepared on the reference.
     loads : LoadLog
-        Gives the force at a burst's time.
+        Gives the force at the time of a burst.
     noise_GL : float or None, GL
         Noise of one frame (``frame_noise``); None: estimated by the kernel from the residual.
     correct : callable
-        Takes the fixed pattern of the sensor out of a burst.
+        Removes the fixed pattern of the sensor from a burst.
     gauges : sequence of Gauge
         Read on every field.
     renew_at : float
@@ -213,14 +212,14 @@ def measure(
     strain : "small", "engineering", "green" or "hencky"
         The measure of strain of the fields and means.
     on_event : callable taking an Event
-        Told when the reference is renewed.
+        Called when the reference is renewed.
     timer : callable
         Gives seconds; only for ``Measurement.measure_s``.
 
     Yields
     ------
     Measurement
-        One a burst, in order.
+        One for each burst, in order.
     """
     tracker, guard = Tracker(kernel, noise_GL, renew_at, on_event), StrainGuard(strain, on_event)
     number = 0
@@ -231,6 +230,6 @@ def measure(
         began = timer()
         field = replace(tracker.measure(correct(item)), measure=strain)
         took = timer() - began
-        guard.look(field, item.t)
+        guard.check(field, item.t)
         yield Measurement.of(number, item, field, loads.force_at(item.t), took, gauges)
         number += 1

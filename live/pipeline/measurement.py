@@ -1,11 +1,6 @@
-"""The means of one measured field over its valid ZOIs, computed once for all who want them.
+"""What the pipeline gives: a measurement with its field, the means of it, and the force matched in time.
 
-One measured instant: what the pipeline hands to the results, the view and the screen.
-
-Waiting for the force: a measurement is settled once its force can no longer change.
-
-The force at a time is final when the load log reaches past it. Until then a measurement waits, at
-most ``HOLD_S`` of measured time, so that files and curves say what a replay will say.
+The means over the valid ZOIs are computed once for all who use them.
 """
 
 from __future__ import annotations
@@ -14,21 +9,18 @@ import math
 from collections import deque
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from acquire.frame import Burst
-from analysis.evaluate import Gauge
+from analysis.evaluate import Gauge, GaugeValue
 from analysis.field import StrainField
-
-if TYPE_CHECKING:
-    from acquire.frame import Burst
-    from analysis.evaluate import GaugeValue
-    from analysis.field import StrainField
 
 AXIAL, TRANSVERSE = "axial", "transverse"
 """Gauges of these names are the strain along and across the load."""
+HOLD_S = 2.0
+"""Measurements wait for their force at most this long, in measured time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,17 +44,17 @@ class TimeStep:
     refused : str
         Why ZOIs have no value ("3 UNEVEN, 1 LOST"), empty where all have one.
     noise_GL : float
-        Of one frame, from the burst; NaN where it tells nothing.
+        Of one frame, from the burst; NaN where it cannot be estimated.
     measure_s : float, s
-        Time the kernel took; 0.0 where nobody measured it.
+        Time the kernel took; 0.0 where it was not measured.
     latency_s : float, s
         From the stamp of the burst's last frame to this result; NaN in a replay.
     gauges : mapping of name to GaugeValue
         In the order of the configuration.
     force_raw : float, N
-        As stamped, where a lag of the load was taken off ``force``; else NaN.
+        As stamped, where ``force`` is corrected for a lag of the load; else NaN.
     zero : float, N
-        What tares have taken off ``force`` by then.
+        What tares have subtracted from ``force`` by then.
     """
 
     t: float
@@ -96,7 +88,7 @@ class TimeStep:
 
 
 def strains_along(gauges: Container[str], axis: str) -> tuple[str, str]:
-    """What is read as strain along and across the load, which runs along ``axis`` ("x" or "y").
+    """Names of the strains along and across the load, which runs along ``axis`` ("x" or "y").
 
     The gauges ``AXIAL`` and ``TRANSVERSE`` where they are among ``gauges``, else the mean strains.
     """
@@ -104,7 +96,7 @@ def strains_along(gauges: Container[str], axis: str) -> tuple[str, str]:
     return AXIAL if AXIAL in gauges else along, TRANSVERSE if TRANSVERSE in gauges else across
 
 
-def instant_of(burst: Burst, field: StrainField, force: float, measure_s: float = 0.0) -> TimeStep:
+def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: float = 0.0) -> TimeStep:
     """The means of ``field``, measured from ``burst``."""
     (exx, s_xx), (eyy, s_yy), (exy, s_xy) = (field.mean(name) for name in ("exx", "eyy", "exy"))
     valid = field.ok
@@ -131,9 +123,9 @@ def instant_of(burst: Burst, field: StrainField, force: float, measure_s: float 
 
 
 def ordered_mean(values: np.ndarray) -> float:
-    """The mean of finite values, NaN of none: the same bits wherever they lie in memory.
+    """The mean of finite values, NaN of none: the same bits wherever they are in memory.
 
-    numpy's own sum takes them in an order that depends on their alignment.
+    The order of numpy's own sum depends on the alignment of the values.
     """
     return float(np.cumsum(values, dtype=np.float64)[-1]) / values.size if values.size else math.nan
 
@@ -161,12 +153,12 @@ class Measurement:
         cls, number: int, burst: Burst, field: StrainField, force: float, measure_s: float = 0.0,
         gauges: Sequence[Gauge] = (),
     ) -> Measurement:  # fmt: skip
-        """The same with its means and ``gauges``.
+        """Compute the means and the values of ``gauges``.
 
-        ``force`` (N) is NaN where it is not known, ``measure_s`` (s) the kernel's time.
+        ``force`` (N) is NaN where it is not known, ``measure_s`` (s) the time of the kernel.
         """
-        read = {gauge.name: gauge.measure(field) for gauge in gauges}
-        return cls(number, burst, field, replace(instant_of(burst, field, force, measure_s), gauges=read))
+        values = {gauge.name: gauge.measure(field) for gauge in gauges}
+        return cls(number, burst, field, replace(time_step_of(burst, field, force, measure_s), gauges=values))
 
     @property
     def t(self) -> float:
@@ -179,20 +171,16 @@ class Measurement:
         return self.time_step.force
 
     def with_latency(self, latency_s: float) -> Measurement:
-        """The same once it is known how long it took, from the stamp of the last frame."""
+        """The same with its latency, from the stamp of the last frame."""
         return replace(self, time_step=replace(self.time_step, latency_s=latency_s))
 
     def with_force(self, force: float, raw: float = math.nan, zero: float = 0.0) -> Measurement:
-        """The same once the force is known; ``raw`` as stamped, where a lag was taken off; ``zero`` by tares."""
+        """The same with its force; ``raw`` as stamped, where a lag is corrected; ``zero`` by tares."""
         return replace(self, time_step=replace(self.time_step, force=force, force_raw=raw, zero=zero))
 
 
-HOLD_S = 2.0
-"""Measurements wait for their force at most this long, in measured time."""
-
-
 class Loads(Protocol):
-    """What is asked of a load log (``acquire.load_cell.LoadLog``)."""
+    """What ``ForceMatching`` uses of a load log (``acquire.load_cell.LoadLog``)."""
 
     def force_at(self, t: float) -> float: ...
 
@@ -204,7 +192,9 @@ class Loads(Protocol):
 
 
 class ForceMatching:
-    """Holds measurements until their force is final.
+    """Holds measurements until their force is final, so that files and curves agree with a replay.
+
+    The force at a time is final when the load log reaches past it, or after ``hold_s`` of measured time.
 
     Parameters
     ----------
@@ -221,15 +211,15 @@ class ForceMatching:
         return len(self._held)
 
     def add(self, measurement: Measurement) -> list[Measurement]:
-        """Take one measurement; those that are settled by now, in order, with their force."""
+        """Take one measurement; those whose force is final by now, in order, with it."""
         self._held.append(measurement)
-        settled = []
+        matched = []
         while self._held and self._is_final(self._held[0], measurement.t):
-            settled.append(self._with_force(self._held.popleft()))
-        return settled
+            matched.append(self._with_force(self._held.popleft()))
+        return matched
 
-    def rest(self) -> list[Measurement]:
-        """All that still wait, with the force as far as it is known."""
+    def flush(self) -> list[Measurement]:
+        """All that still wait, with the force where it is known."""
         held, self._held = self._held, deque()
         return [self._with_force(measurement) for measurement in held]
 

@@ -1,6 +1,6 @@
-"""The two channels between threads: a one-place mailbox and a byte-bounded buffer.
+"""The two queues between threads: ``LatestQueue`` keeps the newest item, ``BoundedQueue`` is bounded in bytes.
 
-Both count what they could not pass on; nothing is dropped silently.
+Both count the items that they cannot pass on; nothing is dropped silently.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from collections import deque
 from typing import Generic, TypeVar
 
 CATCH_UP_S = 2.0
-"""What is shown is what happens now: a reader far too slow for the pace is not kept among the first bursts."""
+"""A reader that has not caught up after this time continues with the newest item."""
 
 Item = TypeVar("Item")
 Stored = TypeVar("Stored")
 
 
-class _Channel(Generic[Stored]):
-    """What lies between two threads, and the end of it."""
+class _Queue(Generic[Stored]):
+    """Items between two threads, until it is closed."""
 
     def __init__(self) -> None:
         self._items: deque[Stored] = deque()
@@ -26,7 +26,7 @@ class _Channel(Generic[Stored]):
         self._closed = False
 
     def close(self) -> None:
-        """No more items; what lies there can still be taken."""
+        """No more items; those in the queue can still be taken."""
         with self._change:
             self._closed = True
             self._change.notify_all()
@@ -38,78 +38,77 @@ class _Channel(Generic[Stored]):
             return self._closed and not self._items
 
 
-class LatestQueue(_Channel[Item]):
-    """One place, newest wins: the measuring path never waits for old bursts.
+class LatestQueue(_Queue[Item]):
+    """Holds one item, and a newer one replaces it: the measuring path never waits for old bursts.
 
-    With ``waits=True`` ``put`` waits until the place is free, so that nothing is skipped: for
-    sources that wait for their reader. What was replaced before anybody took it is kept until
-    ``take_skipped`` fetches it.
+    With ``waits=True`` ``put`` waits until the queue is empty, so that nothing is skipped: for
+    sources that wait for their reader. Replaced items are kept until ``take_skipped``.
 
     Parameters
     ----------
     waits : bool
     at_first : int
-        Places until the reader, who has things to prepare, has caught up; one who has not after as many
-        items, or after ``CATCH_UP_S``, goes on with the newest.
+        Size of the queue until the reader, which has to prepare first, has caught up; after as many
+        items, or after ``CATCH_UP_S``, it continues with the newest in any case.
     """
 
     def __init__(self, *, waits: bool = False, at_first: int = 1) -> None:
         super().__init__()
         self._waits = waits
-        self._places = self._patience = at_first
-        self._reading, self._until = False, 0.0
+        self._size = self._catch_up_items = at_first
+        self._reading, self._catch_up_t = False, 0.0
         self._skipped: list[Item] = []
 
     def begin(self) -> None:
-        """The reader is ready: from now on it is behind, or has caught up."""
-        self._reading, self._until = True, time.monotonic() + CATCH_UP_S
+        """The reader is ready and begins to catch up."""
+        self._reading, self._catch_up_t = True, time.monotonic() + CATCH_UP_S
 
     def put(self, item: Item) -> None:
-        """Place ``item``; what lay there untaken is counted as skipped. Ignored after ``close``."""
+        """Put ``item``; the one that it replaces counts as skipped. After ``close`` ``item`` itself is skipped."""
         with self._change:
             while self._waits and self._items and not self._closed:
                 self._change.wait()
             if self._closed:
                 self._skipped.append(item)
                 return
-            while len(self._items) >= self._places:
+            while len(self._items) >= self._size:
                 self._skipped.append(self._items.popleft())
             self._items.append(item)
             self._change.notify_all()
 
     def get(self, timeout_s: float | None = None) -> Item | None:
-        """Take what is there, waiting up to ``timeout_s``; None where nothing came or all is over."""
+        """Take an item, waiting up to ``timeout_s``; None where there is none, or when closed and empty."""
         with self._change:
-            self._look_how_far()
+            self._check_caught_up()
             self._change.wait_for(lambda: self._items or self._closed, timeout_s)
             item = self._items.popleft() if self._items else None
             self._change.notify_all()
             return item
 
-    def _look_how_far(self) -> None:
-        if not self._reading or self._places == 1:
+    def _check_caught_up(self) -> None:
+        if not self._reading or self._size == 1:
             return
-        self._patience -= 1
-        if not self._items or self._patience < 0 or time.monotonic() > self._until:
-            self._places = 1
+        self._catch_up_items -= 1
+        if not self._items or self._catch_up_items < 0 or time.monotonic() > self._catch_up_t:
+            self._size = 1
             while len(self._items) > 1:
                 self._skipped.append(self._items.popleft())
 
     def take_skipped(self) -> list[Item]:
-        """What was skipped since the last call."""
+        """The items skipped since the last call."""
         with self._change:
             skipped, self._skipped = self._skipped, []
             return skipped
 
 
-class BoundedQueue(_Channel[tuple[Item, int]], Generic[Item]):
-    """A queue bounded in bytes; a put beyond the bound is refused and counted by the caller.
+class BoundedQueue(_Queue[tuple[Item, int]], Generic[Item]):
+    """A queue bounded in bytes; it refuses an item beyond the bound, and the caller counts that.
 
     Parameters
     ----------
     limit : int, bytes
     waits : bool
-        Wait for room instead of refusing (sources that wait for their reader).
+        Wait for free space instead of refusing (sources that wait for their reader).
     """
 
     def __init__(self, limit: int, *, waits: bool = False) -> None:
@@ -118,9 +117,9 @@ class BoundedQueue(_Channel[tuple[Item, int]], Generic[Item]):
         self._bytes = 0
 
     def put(self, item: Item, size: int, *, always: bool = False) -> bool:
-        """Queue ``item`` of ``size`` bytes; False where there is no room, or after ``close``.
+        """Queue ``item`` of ``size`` bytes; False where it does not fit, or after ``close``.
 
-        An empty buffer takes anything; ``always`` is for small things that must not be lost.
+        An empty queue takes any item; ``always`` is for small items that must not be lost.
         """
         with self._change:
             if self._waits and not always:

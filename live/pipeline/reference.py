@@ -1,7 +1,4 @@
-"""Before the first burst: noise of a frame, correction, and the kernel on the reference.
-
-A reference burst, whole and as two halves.
-"""
+"""The reference: its burst, the noise of a frame, the kernel prepared on it, and the motion during it."""
 
 from __future__ import annotations
 
@@ -23,11 +20,11 @@ if TYPE_CHECKING:
     from analysis import KernelSettings, PhaseKernel, ZoiGrid
 
 log = logging.getLogger(__name__)
-LEAST_FOUND = 0.2  # a background of noise may be the larger part of the picture
+MIN_FOUND = 0.2  # a background of noise may be the larger part of the picture
 
 
-def usable(error: ValueError, what: str) -> PhasedicError:
-    """An error of the numerics as one with an exit code: no pattern is the data's, the rest is usage."""
+def numerics_error(error: ValueError, what: str) -> PhasedicError:
+    """An error of the numerics as one with an exit code: DataError without a pattern, else ConfigError."""
     from analysis import PatternError
 
     kind = DataError if isinstance(error, PatternError) else ConfigError
@@ -36,7 +33,7 @@ def usable(error: ValueError, what: str) -> PhasedicError:
 
 @contextlib.contextmanager
 def on_fit_machine() -> Iterator[None]:
-    """Where kernels are made: a machine that measures a known pattern wrong raises MachineUnfit."""
+    """Context for making kernels: raises MachineUnfit where the machine measures a known pattern wrong."""
     from analysis import MachineError
 
     try:
@@ -49,14 +46,14 @@ Correction = Callable[[Burst], Burst]
 
 
 def unchanged(burst: Burst) -> Burst:
-    """The correction of those who have none."""
+    """The correction without a dark and flat frame."""
     return burst
 
 
 def frame_noise(burst: Burst, stated_GL: float | None) -> float | None:
     """The noise of one frame, GL: as stated, else as measured within the burst, else None.
 
-    A burst without any scatter (noise-free pictures) tells nothing.
+    A burst without any scatter (noise-free pictures) has no information on the noise.
     """
     if stated_GL is not None:
         return stated_GL
@@ -64,7 +61,7 @@ def frame_noise(burst: Burst, stated_GL: float | None) -> float | None:
 
 
 def averaged(noise_GL: float | None, n: int) -> float | None:
-    """The noise of the mean of n frames; quantisation, 1/12 GL^2, is the least there is of one frame."""
+    """The noise of the mean of n frames; that of one frame is at least the quantisation noise, 1/12 GL^2."""
     return None if noise_GL is None else max(noise_GL, 12**-0.5) / math.sqrt(n)
 
 
@@ -83,7 +80,7 @@ def prepare(
     ConfigError
         The grid leaves the picture.
     DataError
-        The reference, called ``what`` for a person, has no pattern.
+        The reference, called ``what`` in the message, has no pattern.
     MachineUnfit
         The machine measures a known pattern wrong.
     """
@@ -95,25 +92,25 @@ def prepare(
         with on_fit_machine():
             return PhaseKernel(correct(reference).mean, grid, settings, noise=noise), noise_GL
     except ValueError as error:
-        raise usable(error, what) from error
+        raise numerics_error(error, what) from error
 
 
 def motion_between(
     kernel: PhaseKernel, first: Burst, second: Burst, correct: Correction = unchanged
 ) -> float:
-    """How far the picture moved from one half of the reference burst to the other, px.
+    """The motion of the picture from one half of the reference burst to the other, px.
 
-    The median over the ZOIs of the displacement between the two; NaN where it cannot be told, since
-    no more than ``LEAST_FOUND`` of the ZOIs with a pattern are found in both.
+    The median over the ZOIs of the displacement between the two; NaN where no more than the share
+    ``MIN_FOUND`` of the ZOIs with a pattern are found in both.
     """
     first, second = correct(first), correct(second)
-    # A still picture is where it was: nothing is searched, and the test can begin that much sooner.
+    # A start without a search: a still picture has not moved, and the test can begin sooner.
     still = StrainField.from_values(kernel.grid, {})
     a = kernel.measure(first.mean, start=still, clipped=first.clipped)
     b = kernel.measure(second.mean, start=a, clipped=second.clipped)
-    moved = np.hypot(b.u - a.u, b.v - a.v)
-    found, wanted = np.isfinite(moved), ~np.isin(a.status, (Status.NOT_MEASURED, Status.NO_PATTERN))
-    return float(np.median(moved[found])) if found.sum() > LEAST_FOUND * wanted.sum() else math.nan
+    motion = np.hypot(b.u - a.u, b.v - a.v)
+    found, usable = np.isfinite(motion), ~np.isin(a.status, (Status.NOT_MEASURED, Status.NO_PATTERN))
+    return float(np.median(motion[found])) if found.sum() > MIN_FOUND * usable.sum() else math.nan
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +122,7 @@ class ReferenceBurst:
 
 
 class ReferenceTaker:
-    """Accumulates n frames as a whole and as two halves."""
+    """Averages n frames as a whole and as two halves."""
 
     def __init__(self, n: int) -> None:
         self._n = n

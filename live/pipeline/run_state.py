@@ -1,7 +1,4 @@
-"""What is kept of a test while it runs.
-
-The alarms that are on, and the vital signs of the machine: for whoever shows or asks.
-"""
+"""The state of a run: events, frame counts, loads, history, active alarms and the health of the machine."""
 
 from __future__ import annotations
 
@@ -20,12 +17,12 @@ from live.pipeline.snapshot import Snapshot, peak_force
 
 @dataclass(slots=True)
 class Health:
-    """Written by whoever knows, in one assignment.
+    """Health values, each written in one assignment by the thread that measures it.
 
     Attributes
     ----------
     began_t, frame_t, load_t : float, s
-        When the test began, and the last frame and the last load sample came, monotonic; NaN before.
+        Times of the begin of the test, of the last frame and of the last load sample, monotonic; NaN before.
     fps : float, 1/s
         As frames come.
     disk_s : float, s
@@ -37,7 +34,7 @@ class Health:
     state : str
         What a live run does with its frames; empty in a replay.
     view_port : int or None
-        Where viewers connect; None while they cannot.
+        Port of the view; None while there is none.
     """
 
     began_t: float = math.nan
@@ -51,12 +48,12 @@ class Health:
     view_port: int | None = None
 
     def loaded(self, t: float, force_N: float) -> None:
-        """A load sample came at ``t`` (s, monotonic)."""
+        """Note a load sample that arrived at ``t`` (s, monotonic)."""
         self.load_t = t
         self.peak_N = peak_force(self.peak_N, force_N)
 
     def channels(self, now: float) -> dict[str, float]:
-        """The channels of the machine (``live.pipeline``) at ``now``, monotonic s."""
+        """The channels of the machine (``live.config.channels``) at ``now``, monotonic s."""
         return {
             "silent_s": now - self.frame_t,
             "load_silent_s": now - self.load_t,
@@ -65,38 +62,38 @@ class Health:
 
 
 class ActiveAlarms:
-    """The alarms that are on, with their words, until they go or are silenced; for any thread."""
+    """The alarms that are on, with their texts, until they end or are silenced; for any thread."""
 
     def __init__(self) -> None:
         self._on: dict[str, str] = {}
         self._lock = threading.Lock()
 
-    def put(self, name: str, text: str) -> None:
-        """An alarm comes, or has new words."""
+    def set(self, name: str, text: str) -> None:
+        """An alarm comes on, or has a new text."""
         with self._lock:
             self._on[name] = text
 
-    def take_off(self, name: str) -> None:
-        """An alarm goes."""
+    def clear(self, name: str) -> None:
+        """An alarm goes off."""
         with self._lock:
             self._on.pop(name, None)
 
     def silence(self) -> tuple[str, ...]:
-        """Take all off; their names. Each comes again only when it has gone in between."""
+        """Remove all; their names. Each comes on again only when its value was within the limit in between."""
         with self._lock:
             names, self._on = tuple(self._on), {}
             return names
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """The words of the alarms that are on, the oldest first."""
+        """The texts of the alarms that are on, the oldest first."""
         with self._lock:
             return tuple(self._on.values())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RunState:
-    """Events, counts of frames, loads and means, each filled by whoever knows.
+    """Events, frame counts, loads and means of a run, filled by its threads.
 
     Attributes
     ----------
@@ -125,13 +122,13 @@ class RunState:
         return cls(EventLog(), FrameCounts(), loads, history, specimen=specimen)
 
     def snapshot(self, t: float, time_step: TimeStep | None = None) -> Snapshot:
-        """Where the test stands at ``t`` (s, monotonic), with ``time_step`` or else the last that was measured.
+        """The state of the test at ``t`` (s, monotonic), with ``time_step`` or else the last that was measured.
 
-        The force is the newest of the load cell; in a replay, and before the first sample, that of the instant.
+        The force is the newest of the load cell; in a replay, and before the first sample, that of the time step.
         """
         if time_step is None and self.history.time_steps:
             time_step = self.history.time_steps[-1]
-        health, area, axis = self.health, self.specimen.area_m2, self.history.axis_by_now
+        health, area, axis = self.health, self.specimen.area_m2, self.history.current_axis
         sample = self.loads.latest if health.state else None
         force = math.nan if time_step is None else time_step.force
         if sample is not None:

@@ -1,4 +1,4 @@
-"""Where a person reads how a test goes: what every part of the program may ask of a screen."""
+"""The interface of a screen: what every part of the program may print for a person."""
 
 from __future__ import annotations
 
@@ -7,24 +7,24 @@ from live.pipeline.snapshot import Snapshot
 
 
 class Screen:
-    """Lines that stay, and one status line that is renewed. Every method does nothing until it is defined anew.
+    """Permanent lines, and one status line that is renewed. Every method does nothing until it is overridden.
 
     ``live.ui.terminal.screen.TerminalScreen`` prints to a terminal or a log.
     """
 
     @property
     def is_due(self) -> bool:
-        """Whether the status line may be renewed by now."""
+        """Whether the status line may be renewed now."""
         return False
 
     def say(self, text: str = "") -> None:
-        """A line that stays."""
+        """Print a permanent line."""
 
     def bell(self) -> None:
-        """Ring."""
+        """Ring the bell of the terminal."""
 
     def status(self, text: str) -> None:
-        """The status line, where it is due."""
+        """Renew the status line, where it is due."""
 
     def snapshot(self, snapshot: Snapshot, words: str = "") -> None:
         """The status line of a live run; ``words`` name what it waits for."""
@@ -33,4 +33,4 @@ class Screen:
         """The status line of a replay: ``done`` bursts of the ``expected`` after ``elapsed_s``, ``i`` the last."""
 
     def prompt(self, text: str | None) -> None:
-        """What the operator types, in place of the status line; None: no more."""
+        """Show what the operator types, in place of the status line; None ends it."""

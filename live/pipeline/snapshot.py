@@ -1,4 +1,4 @@
-"""Where a test stands at one time: what status line, status card, view and page show."""
+"""The state of a test at one time: what status line, status card, view and page show."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from live.pipeline.measurement import TimeStep
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """Where a test stands at one time; NaN where a number is not known.
+    """The state of a test at one time; NaN where a number is not known.
 
     Attributes
     ----------
@@ -22,9 +22,9 @@ class Snapshot:
     elapsed_s : float, s
         Since the test began.
     fps : float, 1/s
-        As frames come.
+        Rate of the frames as they arrive.
     force_N, stress_Pa : float
-        The newest force, and that over the section.
+        The newest force, and the force divided by the section.
     peak_N : float, N
         The force of largest magnitude so far, with its sign.
     axial_name : str
@@ -38,11 +38,11 @@ class Snapshot:
     disk_s : float, s
         Until the disk is full; infinite where nothing is written.
     alarms : tuple of str
-        Words of the alarms that are on.
+        Texts of the alarms that are on.
     frames : mapping of str to int
         The counts of frames by name.
     time_step : TimeStep or None
-        The last that was measured.
+        The last one measured.
     """
 
     t: float
@@ -65,7 +65,7 @@ class Snapshot:
 
     @property
     def lost(self) -> int:
-        """Frames that were lost before they were handed out, or could not be recorded."""
+        """Frames that the camera lost, or that could not be recorded."""
         return self.frames.get("lost", 0) + self.frames.get("unrecorded", 0)
 
 

@@ -1,6 +1,6 @@
-"""A rehearsal before a test: everything that will run is run once, on made-up frames of the right kind.
+"""The dry run before a test: everything that will run is run once, on synthetic frames of the right kind.
 
-What compiles or is imported on first use does so here and not while a specimen is being pulled.
+Code that is compiled or imported on first use is loaded here, and not while a specimen is loaded.
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from analysis import KernelSettings, ZoiGrid
 
 
-def kinds_of(camera: CameraInfo) -> tuple[str, ...]:
-    """The kinds of pictures that a camera's frames and bursts are (of ``analysis.PICTURE_KINDS``)."""
+def picture_kinds(camera: CameraInfo) -> tuple[str, ...]:
+    """The kinds of pictures of a camera's frames and bursts (of ``analysis.PICTURE_KINDS``)."""
     return ("uint8" if camera.bits <= 8 else "uint16", "float32")
 
 
-def rehearse(camera: CameraInfo, grid: ZoiGrid, settings: KernelSettings, bursts: tuple[int, int]) -> None:
-    """Average, prepare, measure and evaluate made-up frames as the test will.
+def dry_run(camera: CameraInfo, grid: ZoiGrid, settings: KernelSettings, bursts: tuple[int, int]) -> None:
+    """Average, prepare, measure and evaluate synthetic frames as the test will.
 
     Parameters
     ----------
@@ -44,15 +44,15 @@ def rehearse(camera: CameraInfo, grid: ZoiGrid, settings: KernelSettings, bursts
     from analysis import warm_up
 
     with on_fit_machine():
-        warm_up(kinds=kinds_of(camera), phase=settings.estimator == "phase")
+        warm_up(kinds=picture_kinds(camera), phase=settings.estimator == "phase")
     images = [_image(camera, seed) for seed in (1, 2)]
     reference, *_ = [_averaged(camera, images, n) for n in bursts]
     kernel, noise_GL = prepare(reference.burst, grid, settings, None, what="measure")
     if reference.halves is not None:
         motion_between(kernel, *reference.halves)
-    again: list[Burst] = [reference.burst, reference.burst]
+    bursts_again: list[Burst] = [reference.burst, reference.burst]
     history = History()
-    for measurement in measure(again, kernel, LoadLog(), noise_GL=noise_GL):
+    for measurement in measure(bursts_again, kernel, LoadLog(), noise_GL=noise_GL):
         history.add(measurement.time_step)
 
 
@@ -66,7 +66,7 @@ def _averaged(camera: CameraInfo, images: list[NDArray[Any]], n: int) -> Referen
 
 
 def _image(camera: CameraInfo, seed: int) -> NDArray[Any]:
-    """A pattern of random blocks with a little noise: enough to be measured."""
+    """A pattern of random blocks with a little noise, which can be measured."""
     shape = (camera.height, camera.width)
     blocks = np.random.default_rng(0).integers(0, 2, (shape[0] // 4 + 1, shape[1] // 4 + 1))
     pattern = np.kron(blocks, np.ones((4, 4), int))[: shape[0], : shape[1]]

@@ -1,6 +1,6 @@
-"""Where the bursts of recorded frames lie, told by the table alone: what comes before a part need not be read.
+"""The bursts of a recorded session, which has all frames, every K-th frame, or bursts.
 
-The bursts of a recorded session, whatever it holds: all frames, every K-th frame, or bursts.
+The index comes from the table of frames only, so that the frames before a part need not be read.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from acquire.burst import average_bursts, burst_of
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Burst, Frame
 from acquire.session import Session
+from live.config.sections import DEFAULT_BURST
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,9 +31,9 @@ class BurstIndex:
     n : int
         Frames in each; 0 where they were recorded as bursts.
     t : (B,) float64, s
-        Their times, monotonic, to the last bit those that the bursts have.
+        Their times, monotonic, bit-equal to those of the bursts.
     starts, stops : (B,) int64
-        Rows to be read for each: from the end of the burst before, so that a burst knows what was lost before it.
+        Rows to read for each: from the end of the burst before, so that frames lost before a burst are counted.
     """
 
     n: int
@@ -47,7 +48,7 @@ class BurstIndex:
         return int(self.starts[numbers[0]]), int(self.stops[numbers[-1]])
 
 
-def places_of_frames(session: Session, last: int, n: int) -> BurstIndex:
+def index_of_frames(session: Session, last: int, n: int) -> BurstIndex:
     """The bursts of n frames after sequence number ``last``, as ``BurstAccumulator`` makes them."""
     index, t = session.indices, session.times.tolist()
     begin = int(np.searchsorted(index, last, side="right"))
@@ -64,7 +65,7 @@ def places_of_frames(session: Session, last: int, n: int) -> BurstIndex:
 
 
 def burst_ends(index: Sequence[int], lost_before: Sequence[int], damaged: Sequence[int], n: int) -> list[int]:
-    """The row after each burst of n frames without a gap; tests hold it to ``BurstAccumulator``."""
+    """The row after each burst of n frames without a gap; tests compare it with ``BurstAccumulator``."""
     ends, count, last = [], 0, 0
     for row, (number, lost, bad) in enumerate(zip(index, lost_before, damaged, strict=True)):
         if bad or (count and (lost > 0 or number != last + 1)):
@@ -79,44 +80,41 @@ def burst_ends(index: Sequence[int], lost_before: Sequence[int], damaged: Sequen
 
 
 def _middle(times: Sequence[float]) -> float:
-    """Of a burst of these frames."""
+    """The time of a burst of frames with these times."""
     if len(times) == 1:
         return times[0]
     start = times[0]
     return start + math.fsum(t - start for t in times) / len(times)
 
 
-def places_of_bursts(session: Session, last: int) -> BurstIndex:
+def index_of_bursts(session: Session, last: int) -> BurstIndex:
     """The bursts that were recorded as such after sequence number ``last``; rows are their numbers."""
     numbers = np.flatnonzero(session.burst_column("first_index") > last).astype(np.int64)
     return BurstIndex(0, session.burst_column("monotonic_s")[numbers], numbers, numbers + 1)
 
 
-DEFAULT_BURST = 4  # of a session whose configuration says nothing
+class BurstStore(Protocol):
+    """The bursts of a session, for a replay."""
 
-
-class Store(Protocol):
-    """What a replay asks of a session."""
-
-    def burst(self, told: Mapping[str, Any]) -> Burst:
-        """The burst that an event tells of (first, last, n); DataError where it was not recorded whole."""
+    def burst(self, data: Mapping[str, Any]) -> Burst:
+        """The burst of an event with this data (first, last, n); DataError where it was not recorded whole."""
         ...
 
     def first_burst(self, n: int) -> tuple[Burst, int]:
         """The first n frames, and the sequence number of the last; DataError where there are none."""
         ...
 
-    def places_after(self, last: int, n: int | None) -> BurstIndex:
+    def index_after(self, last: int, n: int | None) -> BurstIndex:
         """All bursts of n frames after sequence number ``last``; None: as they were recorded."""
         ...
 
-    def bursts_at(self, places: BurstIndex, numbers: range) -> Iterator[Burst]:
-        """Those of ``places`` with these numbers, one after the other; nothing else is read."""
+    def bursts_at(self, index: BurstIndex, numbers: range) -> Iterator[Burst]:
+        """The bursts of ``index`` with these numbers, one after the other; nothing else is read."""
         ...
 
 
-def open_store(session: Session, path: Path) -> Store:
-    """How to find the bursts of ``session``; raises DataError where it holds no pictures."""
+def open_store(session: Session, path: Path) -> BurstStore:
+    """The bursts of ``session``; raises DataError where it has no pictures."""
     if session.mode.kind == "bursts":
         return _Bursts(session, path)
     if len(session) == 0:
@@ -131,8 +129,8 @@ class _Frames:
         self._session, self._path = session, path
         self._indices = [int(i) for i in session.indices]
 
-    def burst(self, told: Mapping[str, Any]) -> Burst:
-        first, last, n = int(told["first"]), int(told["last"]), int(told["n"])
+    def burst(self, data: Mapping[str, Any]) -> Burst:
+        first, last, n = int(data["first"]), int(data["last"]), int(data["n"])
         frames = [frame for frame in self._between(first, last) if not frame.damaged]
         if len(frames) != n:
             raise DataError(
@@ -148,11 +146,11 @@ class _Frames:
             f"{self._path}: fewer than {n} frames without a gap; give a smaller --reference-burst"
         )
 
-    def places_after(self, last: int, n: int | None) -> BurstIndex:
-        return places_of_frames(self._session, last, n or DEFAULT_BURST)
+    def index_after(self, last: int, n: int | None) -> BurstIndex:
+        return index_of_frames(self._session, last, n or DEFAULT_BURST)
 
-    def bursts_at(self, places: BurstIndex, numbers: range) -> Iterator[Burst]:
-        return average_bursts(self._session.frames(*places.rows(numbers)), places.n)
+    def bursts_at(self, index: BurstIndex, numbers: range) -> Iterator[Burst]:
+        return average_bursts(self._session.frames(*index.rows(numbers)), index.n)
 
     def _between(self, first: int, last: int) -> Iterator[Frame]:
         start, stop = bisect_left(self._indices, first), bisect_right(self._indices, last)
@@ -160,11 +158,11 @@ class _Frames:
 
 
 class _EveryKth(_Frames):
-    """Only every K-th frame was recorded: what is left is taken as a slower camera."""
+    """Only every K-th frame was recorded: taken as a slower camera."""
 
-    def burst(self, told: Mapping[str, Any]) -> Burst:
-        """What was recorded of a burst; where that is nothing, the recorded frame next to it."""
-        first, last = int(told["first"]), int(told["last"])
+    def burst(self, data: Mapping[str, Any]) -> Burst:
+        """The recorded frames of a burst; without any, the next recorded frame."""
+        first, last = int(data["first"]), int(data["last"])
         frames = [frame for frame in self._between(first, last) if not frame.damaged]
         frames = (
             frames or [frame for frame in self._between(first, self._indices[-1]) if not frame.damaged][:1]
@@ -181,17 +179,17 @@ class _EveryKth(_Frames):
             raise DataError(f"{self._path}: fewer than {n} whole frames; give a smaller --reference-burst")
         return _averaged(frames), frames[-1].index
 
-    def places_after(self, last: int, n: int | None) -> BurstIndex:
+    def index_after(self, last: int, n: int | None) -> BurstIndex:
         if n is not None and n > 1:
             raise ConfigError(
                 f"{self._path} holds only one frame in {self._session.mode.every}, {n} of them are no burst;"
                 " give --burst 1"
             )
-        return super().places_after(last, 1)
+        return super().index_after(last, 1)
 
 
 def _averaged(frames: Sequence[Frame]) -> Burst:
-    """The mean of frames that do not follow one another; numbered as they are at the source."""
+    """The mean of frames that are not consecutive, with the numbers of the source."""
     rows = [replace(frame, index=row, lost_before=0) for row, frame in enumerate(frames)]
     return replace(burst_of(rows), first_index=frames[0].index, last_index=frames[-1].index)
 
@@ -210,11 +208,11 @@ class _Bursts:
         if not self._numbers:
             raise DataError(f"{path}: the session holds no bursts; there is nothing to replay")
 
-    def burst(self, told: Mapping[str, Any]) -> Burst:
-        number = self._numbers.get((int(told["first"]), int(told["last"])))
+    def burst(self, data: Mapping[str, Any]) -> Burst:
+        number = self._numbers.get((int(data["first"]), int(data["last"])))
         if number is None:
             raise DataError(
-                f"{self._path}: the burst of frames {told['first']} to {told['last']} was not recorded;"
+                f"{self._path}: the burst of frames {data['first']} to {data['last']} was not recorded;"
                 " replay without --as-measured measures what is there"
             )
         return self._session.burst(number)
@@ -222,13 +220,13 @@ class _Bursts:
     def first_burst(self, n: int) -> tuple[Burst, int]:
         raise ConfigError(f"{self._path} holds bursts, not frames; --reference-burst cannot be changed")
 
-    def places_after(self, last: int, n: int | None) -> BurstIndex:
-        places = places_of_bursts(self._session, last)
-        lengths = self._session.burst_column("n")[places.starts]
+    def index_after(self, last: int, n: int | None) -> BurstIndex:
+        index = index_of_bursts(self._session, last)
+        lengths = self._session.burst_column("n")[index.starts]
         if n is not None and np.any(other := lengths != n):
             length = int(lengths[np.argmax(other)])
             raise ConfigError(f"{self._path} holds bursts of {length} frames; give --burst {length}")
-        return places
+        return index
 
-    def bursts_at(self, places: BurstIndex, numbers: range) -> Iterator[Burst]:
-        return map(self._session.burst, places.starts[numbers.start : numbers.stop].tolist())
+    def bursts_at(self, index: BurstIndex, numbers: range) -> Iterator[Burst]:
+        return map(self._session.burst, index.starts[numbers.start : numbers.stop].tolist())

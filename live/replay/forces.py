@@ -1,8 +1,8 @@
-"""Forces from a CSV for a replay: against the time of the test or the name of a picture.
+"""Forces from a CSV for a replay, by the time of the test or the name of a picture.
 
-The heading names the columns and their units (``file,force_kN``; ``Time [s];Extension [mm];Load [N]``), or a second
-line has the units; without a heading there are two columns, name or seconds, and newtons. Commas, semicolons
-(then with decimal commas) and tabs part the columns; a line that begins with ``#`` is a remark.
+The heading has the names of the columns and their units (``file,force_kN``; ``Time [s];Extension [mm];Load [N]``), or
+a second line has the units; without a heading there are two columns, name or seconds, and newtons. Columns are
+separated by commas, tabs or semicolons (then with decimal commas); a line that begins with ``#`` is a comment.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from acquire.protocols.units import newtons_per
 
-_HEAD = re.compile(r"^\s*([A-Za-z]+)(?:[\s_]*[\[(]?\s*([A-Za-z]+)\s*[\])]?)?\s*$")
+_HEADING = re.compile(r"^\s*([A-Za-z]+)(?:[\s_]*[\[(]?\s*([A-Za-z]+)\s*[\])]?)?\s*$")
 _FORCE, _TIME = ("force", "load", "f"), ("time", "t", "seconds")
 _NAME = ("file", "filename", "picture", "image", "name")
 _LONGEST_UNIT = 6
@@ -32,7 +32,7 @@ _SECONDS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "sec": 1.0, "": 1.0}
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ForceTable:
-    """What stands in the file.
+    """The content of the file.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class ForceTable:
     forces : tuple of float, N
         NaN where the cell is empty.
     unit : str
-        As it was given; "" where it was not, and newtons were taken.
+        As given; "" where it is not, and the forces are in newtons.
     """
 
     path: Path
@@ -59,16 +59,16 @@ class ForceTable:
         Parameters
         ----------
         pictures : mapping of name to s, or None
-            Times of the pictures; None where the source has no names.
+            Times of the pictures by name; None where the source has no names.
         origin : float, s
             Zero of the times of the file.
 
         Raises
         ------
         DataError
-            No picture is named.
+            No name is that of a picture.
         ConfigError
-            Names are given for a source without.
+            The table has names, and the source has none.
         """
         if not self.names:
             return [
@@ -93,7 +93,7 @@ class ForceTable:
         return known
 
     def log(self, samples: Sequence[LoadSample], max_gap_s: float, lag_s: float = 0.0) -> LoadLog:
-        """The samples as a closed log; a table with times sets by its own pace what is a gap."""
+        """The samples as a closed log; a gap is at least three median intervals of a table with times."""
         steps = np.diff([sample.t for sample in samples])
         gap = math.inf if self.names else max(max_gap_s, 3 * float(np.median(steps)) if len(steps) else 0.0)
         log = LoadLog(gap, lag_s)
@@ -126,7 +126,7 @@ def read_forces(path: Path) -> ForceTable:
 
 @dataclass(frozen=True, slots=True)
 class _Columns:
-    """Which column is what, and in which unit."""
+    """The numbers of the columns, and their units."""
 
     key: int
     force: int
@@ -144,21 +144,21 @@ def _rows(path: Path) -> list[list[str]]:
     lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
     if not lines:
         raise DataError(f"{path}: holds no forces")
-    parting = max(";\t,", key=lambda mark: (mark in lines[0]) * (10 - ";\t,".index(mark)))
+    delimiter = max(";\t,", key=lambda mark: (mark in lines[0]) * (10 - ";\t,".index(mark)))
     try:
-        rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=parting)]
+        rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=delimiter)]
     except csv.Error as error:
         raise DataError(f"{path}: not a CSV: {error}") from error
-    return [[cell.replace(",", ".") for cell in row] for row in rows] if parting == ";" else rows
+    return [[cell.replace(",", ".") for cell in row] for row in rows] if delimiter == ";" else rows
 
 
 def _columns(path: Path, rows: list[list[str]]) -> tuple[_Columns, list[list[str]]]:
     """The columns, and the rows without heading and units."""
     if _is_number(rows[0][-1]) and len(rows[0]) == 2:
         return _Columns(0, 1, not _is_number(rows[0][0])), rows
-    heads = [_HEAD.match(cell) for cell in rows[0]]
-    said = [(head[1].lower(), head[2] or "") if head else ("", "") for head in heads]
-    force, time, name = (_find(path, said, words) for words in (_FORCE, _TIME, _NAME))
+    matches = [_HEADING.match(cell) for cell in rows[0]]
+    heads = [(head[1].lower(), head[2] or "") if head else ("", "") for head in matches]
+    force, time, name = (_find(path, heads, words) for words in (_FORCE, _TIME, _NAME))
     key = time if name is None else name
     if force is None or key is None:
         raise DataError(
@@ -166,8 +166,8 @@ def _columns(path: Path, rows: list[list[str]]) -> tuple[_Columns, list[list[str
             " one of: file, time_s"
         )
     rows = rows[1:]
-    unit, second = said[force][1], said[key][1]
-    under = _units_below(rows[:1], len(said)) if not unit else None
+    unit, second = heads[force][1], heads[key][1]
+    under = _units_below(rows[:1], len(heads)) if not unit else None
     if under is not None:
         unit, second, rows = under[force], under[key], rows[1:]
     if not rows:
@@ -185,10 +185,10 @@ def _units_below(rows: list[list[str]], n: int) -> list[str] | None:
     return cells if all(len(cell) <= _LONGEST_UNIT and "." not in cell for cell in cells) else None
 
 
-def _find(path: Path, said: Sequence[tuple[str, str]], words: tuple[str, ...]) -> int | None:
-    found = [k for k, (head, _) in enumerate(said) if head in words]
+def _find(path: Path, heads: Sequence[tuple[str, str]], words: tuple[str, ...]) -> int | None:
+    found = [k for k, (head, _) in enumerate(heads) if head in words]
     if len(found) > 1:
-        raise DataError(f"{path}: {len(found)} columns are called {said[found[0]][0]!r}; leave one")
+        raise DataError(f"{path}: {len(found)} columns are called {heads[found[0]][0]!r}; leave one")
     return found[0] if found else None
 
 

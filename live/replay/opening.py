@@ -1,4 +1,4 @@
-"""A source opened, and the kernel prepared on its reference."""
+"""Opening the source of a replay, and preparing the kernel on its reference."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ from live.config.loading import Config, load_config
 from live.config.values import AUTO
 from live.pipeline.reference import averaged
 from live.pipeline.screen import Screen
-from live.replay.pictures import picture_material
-from live.replay.session import session_config, session_material, session_path
+from live.replay.pictures import picture_source
+from live.replay.session import session_config, session_path, session_source
 from live.replay.source import ReplayRequest, ReplaySource, check_window
 from live.results.folder import differing_versions
 from live.setup.devices import open_rig
 from live.setup.pictures import read_mask
 from live.setup.prepared import MeasurePlan, PreparedKernel
-from live.setup.region import FirstLook, placed_on
+from live.setup.region import FirstLook, located_on
 
 
 @contextmanager
-def opened_session(
+def open_session_source(
     path: Path, request: ReplayRequest, screen: Screen
 ) -> Iterator[tuple[ReplaySource, Config]]:
-    """A session for a replay, with what is to be said of it; raises as ``replay``."""
+    """Open a session for a replay and show the notes on it; raises as ``replay``."""
     with Session.open(path) as session:
         for note in _notes(session, request):
             screen.say(f"note: {note}")
         overrides = {"camera.address": f"session:{path}", "load.address": f"session:{path}"}
         config = session_config(session, request, overrides, path)
         if request.overrides.get("measure.roi") == AUTO and "measure.mask" not in request.overrides:
-            config = replace(config, measure=replace(config.measure, mask=None))  # the one it found then
-        yield session_material(session, request, config, path), config
+            config = replace(config, measure=replace(config.measure, mask=None))  # found again
+        yield session_source(session, request, config, path), config
 
 
 def _notes(session: Session, request: ReplayRequest) -> Iterator[str]:
@@ -54,49 +54,49 @@ def _notes(session: Session, request: ReplayRequest) -> Iterator[str]:
 
 
 def _were_shortened(session: Session) -> bool:
-    """Whether the version that recorded it fitted the length of bursts to the motion (``shorten_bursts``)."""
+    """Whether the version that recorded it matched the length of bursts to the motion (``shorten_bursts``)."""
     measure = session.config.get("measure")
     return isinstance(measure, dict) and measure.get("shorten_bursts") is True
 
 
 @contextmanager
-def open_material(request: ReplayRequest) -> Iterator[tuple[ReplaySource, Config]]:
-    """The material of a replay and its configuration; raises as ``replay``. Forces of a file are left out."""
+def open_source(request: ReplayRequest) -> Iterator[tuple[ReplaySource, Config]]:
+    """The source of a replay and its configuration, without forces of a file; raises as ``replay``."""
     check_window(request)
     path = session_path(request.source)
     if path is not None:
         with Session.open(path) as session:
             config = session_config(session, request, {"camera.address": f"session:{path}"}, path)
-            yield session_material(session, request, config, path), config
+            yield session_source(session, request, config, path), config
         return
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
     config = replace(config, load=replace(config.load, address="none:"))
     rig = open_rig(config.camera.address, "none:", ignore_event, crop=config.camera.crop)
     try:
         with rig.camera as camera:
-            yield picture_material(camera, request, config), config
+            yield picture_source(camera, request, config), config
     finally:
         rig.close()
 
 
-def prepared(
-    source_of_bursts: ReplaySource,
+def prepare_replay(
+    source: ReplaySource,
     config: Config,
-    source: str,
+    name: str,
     screen: Screen,
     stopped: Callable[[], bool] = lambda: False,
 ) -> PreparedKernel:
-    """Look for the specimen where that is asked for, and prepare the kernel; raises as ``replay``."""
-    camera = source_of_bursts.camera
+    """Find the specimen where configured, and prepare the kernel; raises as ``replay``. ``name`` is for messages."""
+    camera = source.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
     if AUTO in (config.measure.roi, config.measure.gauges):
-        seen = FirstLook(source_of_bursts.reference.mean, _noise_of(source_of_bursts.reference), camera)
-        config, mask = placed_on(config, seen, screen.say)
+        look = FirstLook(source.reference.mean, _noise_of(source.reference), camera)
+        config, mask = located_on(config, look, screen.say)
     plan = MeasurePlan.of(config, camera, mask)
     plan.compile(camera, screen.status, stopped)
-    return plan.on(source_of_bursts.reference, f"the reference of {source}")
+    return plan.on(source.reference, f"the reference of {name}")
 
 
 def _noise_of(reference: Burst) -> float | None:
-    """Of the mean, GL; None where one frame tells nothing."""
+    """Noise of the mean, GL; None for a single frame."""
     return averaged(reference.noise, reference.n) if reference.noise > 0 else None

@@ -1,7 +1,7 @@
-"""A long session measured in parts, by several processes: what a part gives is kept as it is, and told as one replay.
+"""A long session measured in parts by several processes: each stores its results, and one replay joins them.
 
-A part is a file of arrays: for each burst its description, parameters, covariances, and what is known of the fit. Its
-pictures are not kept, nor the motion that only the next burst needed.
+A part is a file of arrays: for each burst its description, the parameters, covariances and status of the fit. It has
+no pictures, and not the motion that only the next burst needs.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from analysis import StrainField
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import unchanged
 from live.pipeline.screen import Screen
-from live.replay.opening import opened_session, prepared
+from live.replay.opening import open_session_source, prepare_replay
 from live.replay.session import session_path
-from live.replay.source import ReplayRequest, ahead, check_window
+from live.replay.source import ReplayRequest, check_window, prefetch
 from live.setup.prepared import PreparedKernel
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ def measure_part(request: ReplayRequest, file: IO[bytes], run_in: int, screen: S
     Returns
     -------
     bool
-        Whether all went as in the whole; False where a reference was renewed, which later parts would not know.
+        Whether the part agrees with the whole; False where a reference was renewed, which later parts do not have.
 
     Raises
     ------
@@ -65,16 +65,16 @@ def measure_part(request: ReplayRequest, file: IO[bytes], run_in: int, screen: S
         if event.kind is EventKind.REFERENCE:
             renewed.append(event)
 
-    with opened_session(path, request, screen) as (source_of_bursts, config):
-        ready = prepared(source_of_bursts, config, request.source, screen)
-        work = ahead(source_of_bursts.bursts)
+    with open_session_source(path, request, screen) as (source, config):
+        ready = prepare_replay(source, config, request.source, screen)
+        work = prefetch(source.bursts)
         try:
-            for m in ready.measurements(work, source_of_bursts.loads, listen):
+            for m in ready.measurements(work, source.loads, listen):
                 if renewed:
                     return False
                 if m.number >= run_in:
                     _put(m, file)
-                screen.progress(m.time_step, m.number + 1, source_of_bursts.expected, 0.0)
+                screen.progress(m.time_step, m.number + 1, source.expected, 0.0)
         finally:
             work.close()
     return not renewed
@@ -94,18 +94,18 @@ class _Stored:
 
 
 class StoredResults:
-    """Stands where a kernel does, and says of each burst what was found of it."""
+    """Takes the place of a kernel, and gives the stored field of each burst."""
 
     def __init__(self, parts: Sequence[Path], ready: PreparedKernel) -> None:
         self._parts, self._ready = parts, ready
         self._fields: deque[StrainField] = deque()
-        told = dataclasses.replace(
+        stored = dataclasses.replace(
             ready,
             plan=dataclasses.replace(ready.plan, correct=unchanged),
             kernel=cast("PhaseKernel", self),
             timer=lambda: 0.0,
         )
-        self.measurements = told.measurements
+        self.measurements = stored.measurements
 
     @classmethod
     def of(cls, parts: Sequence[Path], ready: PreparedKernel) -> StoredResults | None:
@@ -124,7 +124,7 @@ class StoredResults:
         return self._fields.popleft()
 
     def renewed(self, *_: object, **__: object) -> PhaseKernel:
-        """Never: in no part was a reference renewed."""
+        """Always raises: no part has a renewed reference."""
         raise ValueError("no reference was renewed")
 
 

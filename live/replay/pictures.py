@@ -1,4 +1,4 @@
-"""Pictures as the material of a replay: a folder, a video, anything that a camera address names."""
+"""Pictures as the source of a replay: a folder, a video, any camera address."""
 
 from __future__ import annotations
 
@@ -21,24 +21,24 @@ from live.config.loading import Config
 from live.replay.source import PictureCount, ReplayRequest, ReplaySource, Window
 
 
-def picture_material(camera: Camera, request: ReplayRequest, config: Config) -> ReplaySource:
-    seen = PictureCount()
-    frames = seen.passing(camera)
+def picture_source(camera: Camera, request: ReplayRequest, config: Config) -> ReplaySource:
+    count = PictureCount()
+    frames = count.passing(camera)
     if request.reference is not None:
         reference = reference_from(request.reference, camera.info)
     else:
         reference = _leading_burst(frames, config.measure.reference_burst or 1, request.source)
-        seen.reference = reference.n
+        count.reference = reference.n
     loads = LoadLog(config.load.max_gap_s, config.load.lag_s)
     loads.close()
     bursts = Window.of(request, 0.0).part(average_bursts(frames, config.measure.burst or 1))
     start = ClockPair(0.0, datetime.datetime.now(datetime.UTC))
     expected = _expected(camera.info, 0 if request.reference is not None else reference.n, config)
-    return ReplaySource(camera.info, reference, bursts, loads, start, expected=expected, seen=seen)
+    return ReplaySource(camera.info, reference, bursts, loads, start, expected=expected, count=count)
 
 
 def _expected(camera: CameraInfo, taken: int, config: Config) -> int | None:
-    """Bursts in the files or frames that there are, but for those ``taken`` for the reference."""
+    """Number of bursts of the files or frames, without those ``taken`` for the reference."""
     there = camera.controls.get("files") or camera.controls.get("frames")
     return (
         (there - taken) // (config.measure.burst or 1) if isinstance(there, int) and there > taken else None
@@ -52,7 +52,7 @@ def _leading_burst(frames: Iterator[Frame], n: int, source: str) -> Burst:
 
 
 def reference_from(path: str, camera: CameraInfo) -> Burst:
-    """A picture file as the reference of what ``camera`` gave.
+    """A picture file as the reference of the pictures of ``camera``.
 
     Raises
     ------
@@ -76,7 +76,7 @@ def reference_from(path: str, camera: CameraInfo) -> Burst:
 
 
 def write_names(source: str, path: Path) -> None:
-    """Which file each frame of the results was, as a CSV; nothing where the source has no files.
+    """Write the file name of each frame of the results as a CSV; nothing where the source has no files.
 
     Raises
     ------
@@ -96,7 +96,7 @@ def write_names(source: str, path: Path) -> None:
 
 
 def picture_of(burst: Burst) -> Frame:
-    """What the view shows of a burst: its mean, rounded."""
+    """The picture of a burst for the view: its mean, rounded."""
     kind = np.uint8 if burst.bits <= 8 else np.uint16
     image = burst.mean if burst.mean.dtype == kind else np.rint(burst.mean).astype(kind)
     return Frame(frozen(image), burst.first_index, burst.t, burst.clock, 0, burst.bits, burst.t)

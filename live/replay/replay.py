@@ -1,4 +1,4 @@
-"""Replay: a recorded session, or any folder of pictures, through the very same measuring path.
+"""Replay: a recorded session, or any folder of pictures, through the measuring path of a live run.
 
 ``replay`` measures every burst; ``--as-measured`` measures the bursts that the live run measured,
 with the references it took, and is then bit-equal to it on the same machine.
@@ -29,23 +29,23 @@ from live.pipeline.history import History
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.replay.forces import read_forces
-from live.replay.opening import opened_session, prepared
+from live.replay.opening import open_session_source, prepare_replay
 from live.replay.parts import StoredResults
-from live.replay.pictures import picture_material, picture_of, write_names
+from live.replay.pictures import picture_of, picture_source, write_names
 from live.replay.session import session_path
-from live.replay.source import ReplayRequest, ReplaySource, Work, ahead, check_window
+from live.replay.source import ReplayRequest, ReplaySource, Work, check_window, prefetch
 from live.results.folder import make_folder
 from live.results.writer import write_results
 from live.setup.devices import open_rig
 from live.setup.pictures import with_mask
-from live.setup.region import is_sought
+from live.setup.region import is_auto_region
 
 _MOST_TOLD = 5  # pictures that were left out, in the summary
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Replayed:
-    """What a replay leaves behind.
+    """The result of a replay.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Replayed:
     config : Config
     exit_code : int
     lines : tuple of str
-        How it went, for a person: pictures that were left out, pace, the kernel's share of the time.
+        A summary for a person: pictures that were left out, speed, the kernel's share of the time.
     left_out : int
         Pictures that could not be read or are not like the first.
     """
@@ -70,7 +70,7 @@ class Replayed:
 def replay(
     request: ReplayRequest, screen: Screen, stopping: threading.Event, consumers: Compose = write_results
 ) -> Replayed:
-    """Replay ``request.source`` into ``consumers``; setting ``stopping`` ends it early and cleanly.
+    """Replay ``request.source`` into ``consumers``; setting ``stopping`` ends it early but cleanly.
 
     Raises
     ------
@@ -81,9 +81,9 @@ def replay(
     check_window(request)
     if path is None:
         return _replay_pictures(request, screen, stopping, consumers)
-    with opened_session(path, request, screen) as (found, config):
-        source_of_bursts = _with_forces(found, request, config)
-        return _run(source_of_bursts, config, request, screen, stopping, EventLog(), consumers)
+    with open_session_source(path, request, screen) as (found, config):
+        source = _with_forces(found, request, config)
+        return _run(source, config, request, screen, stopping, EventLog(), consumers)
 
 
 # -- pictures -----------------------------------------------------------------------------------
@@ -95,7 +95,7 @@ def _replay_pictures(
     if request.as_measured:
         raise ConfigError(f"{request.source}: --as-measured needs a session; pictures have none")
     config = load_config(request.config_file, {"camera.address": request.source, **request.overrides})
-    region = AUTO if is_sought(config) else config.measure.roi
+    region = AUTO if is_auto_region(config) else config.measure.roi
     config = replace(
         config,
         load=replace(config.load, address="none:"),
@@ -105,28 +105,28 @@ def _replay_pictures(
     rig = open_rig(config.camera.address, "none:", _in_test_time(event_log), crop=config.camera.crop)
     try:
         with rig.camera as camera:
-            source_of_bursts = _with_forces(picture_material(camera, request, config), request, config)
-            return _run(source_of_bursts, config, request, screen, stopping, event_log, consumers)
+            source = _with_forces(picture_source(camera, request, config), request, config)
+            return _run(source, config, request, screen, stopping, event_log, consumers)
     finally:
         rig.close()
 
 
-def _with_forces(source_of_bursts: ReplaySource, request: ReplayRequest, config: Config) -> ReplaySource:
-    """The same with the forces of the CSV that was given."""
+def _with_forces(source: ReplaySource, request: ReplayRequest, config: Config) -> ReplaySource:
+    """The same source with the forces of the given CSV."""
     if request.forces is None:
-        return source_of_bursts
+        return source
     address, table = parse_address(with_scheme(request.source)), read_forces(request.forces)
     names = picture_times(address) if table.names and address.scheme == "files" else None
-    samples = table.samples(names, source_of_bursts.start.monotonic)
+    samples = table.samples(names, source.start.monotonic)
     return replace(
-        source_of_bursts,
+        source,
         samples=tuple(samples),
         loads=table.log(samples, config.load.max_gap_s, config.load.lag_s),
     )
 
 
 def _in_test_time(event_log: EventLog) -> EventSink:
-    """Events of a picture have its time, which is data of theirs."""
+    """A sink that stamps events of pictures with the time of the picture, which is in their data."""
 
     def record(event: Event) -> None:
         event_log.record(replace(event, t=float(event.data.get("t", 0.0))))
@@ -138,7 +138,7 @@ def _in_test_time(event_log: EventLog) -> EventSink:
 
 
 def _run(
-    source_of_bursts: ReplaySource,
+    source: ReplaySource,
     config: Config,
     request: ReplayRequest,
     screen: Screen,
@@ -146,57 +146,55 @@ def _run(
     event_log: EventLog,
     consumers: Compose,
 ) -> Replayed:
-    ready = prepared(source_of_bursts, config, request.source, screen, stopping.is_set)
+    ready = prepare_replay(source, config, request.source, screen, stopping.is_set)
     stored = StoredResults.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements
-    bursts = _not_empty(stored.bursts() if stored else source_of_bursts.bursts, request.source)
+    bursts = _not_empty(stored.bursts() if stored else source.bursts, request.source)
     folder = make_folder(ready.plan.config.output.dir, datetime.datetime.now(datetime.UTC))
-    config = _settled(with_mask(ready.plan.config, ready.plan.mask, folder), request.settled)
+    config = _with_final_folder(with_mask(ready.plan.config, ready.plan.mask, folder), request.final_folder)
     run_state = RunState(
         event_log,
         FrameCounts(),
-        source_of_bursts.loads,
+        source.loads,
         History(config.specimen.axis),
         specimen=config.specimen,
     )
     write_names(request.source, folder / "pictures.csv")
-    screen.say(f"replaying {request.source} into {request.settled or folder}")
+    screen.say(f"replaying {request.source} into {request.final_folder or folder}")
     about = RunInfo(
         config,
         folder,
-        source_of_bursts.camera,
+        source.camera,
         ready.plan.grid,
-        source_of_bursts.start,
-        aside=request.settled is not None,
+        source.start,
+        deferred=request.final_folder is not None,
     )
     outputs = Outputs(consumers(about, run_state), run_state.loads, event_log, run_state.history)
-    began, work = time.perf_counter(), ahead(bursts)
+    began, work = time.perf_counter(), prefetch(bursts)
     try:
-        _give_past(source_of_bursts, outputs)
-        for m in measured(work, source_of_bursts.loads, run_state.event_log):
+        _pass_on_recorded(source, outputs)
+        for m in measured(work, source.loads, run_state.event_log):
             run_state.frame_counts.add(measured=m.burst.n, grabbed=m.burst.n, lost=m.burst.lost)
             if outputs.wants_frames:
                 outputs.frame(picture_of(m.burst))
-            screen.progress(
-                outputs.add(m), m.number + 1, source_of_bursts.expected, time.perf_counter() - began
-            )
-            del m  # its pictures are not kept while the next burst is measured
+            screen.progress(outputs.add(m), m.number + 1, source.expected, time.perf_counter() - began)
+            del m  # frees its pictures before the next burst is measured
             if stopping.is_set():
                 break
         took = time.perf_counter() - began
     finally:
         work.close()
         outputs.end()
-    pace = f"joined of {len(request.parts)} chunks" if request.parts else pace_line(run_state.history, took)
-    lines = [*_account(source_of_bursts, run_state), pace]
-    left_out = source_of_bursts.seen.left_out if source_of_bursts.seen else 0
-    lossy = outputs.failed or not run_state.history.told_something or left_out > 0
+    speed = f"joined of {len(request.parts)} chunks" if request.parts else speed_line(run_state.history, took)
+    lines = [*_account(source, run_state), speed]
+    left_out = source.count.left_out if source.count else 0
+    lossy = outputs.failed or not run_state.history.has_values or left_out > 0
     code = 130 if stopping.is_set() else 5 if lossy else 0
     return Replayed(folder, run_state, config, code, tuple(lines), left_out)
 
 
-def _settled(config: Config, folder: Path | None) -> Config:
-    """The configuration that the results hold, of where they will lie."""
+def _with_final_folder(config: Config, folder: Path | None) -> Config:
+    """The configuration for the results, with the folder where they will be."""
     if folder is None:
         return config
     mask = config.measure.mask and str(folder / "mask.png")
@@ -207,24 +205,22 @@ def _settled(config: Config, folder: Path | None) -> Config:
     )
 
 
-def _account(source_of_bursts: ReplaySource, run_state: RunState) -> list[str]:
-    """The fate of every picture, and why some were left out."""
-    seen = source_of_bursts.seen
-    if seen is None or not seen.left_out:
+def _account(source: ReplaySource, run_state: RunState) -> list[str]:
+    """The counts of pictures, and why some were left out."""
+    count = source.count
+    if count is None or not count.left_out:
         return []
     why = [event.text for event in run_state.event_log.events("warning") if event.kind is EventKind.DEVICE]
     more = [f"... and {len(why) - _MOST_TOLD} more; the log (-v) has all"] if len(why) > _MOST_TOLD else []
     measured = run_state.frame_counts.measured
-    words = (
-        f"{seen.pictures} pictures: reference {seen.reference}, measured {measured}, left out {seen.left_out}"
-    )
-    rest = seen.pictures - seen.reference - measured - seen.left_out
+    words = f"{count.pictures} pictures: reference {count.reference}, measured {measured}, left out {count.left_out}"
+    rest = count.pictures - count.reference - measured - count.left_out
     words += f", of no whole burst {rest}" * (rest > 0)
     return [words, *(f"  {text}" for text in [*why[:_MOST_TOLD], *more])]
 
 
-def pace_line(history: History, seconds: float) -> str:
-    """How fast it went, and how much of the time the kernel took."""
+def speed_line(history: History, seconds: float) -> str:
+    """The speed, and the kernel's share of the time."""
     n, zois = len(history.time_steps), history.column("n_zoi").sum()
     share = history.column("measure_s").sum() / seconds
     return (
@@ -234,7 +230,7 @@ def pace_line(history: History, seconds: float) -> str:
 
 
 def _not_empty(bursts: Iterable[Work], source: str) -> Iterator[Work]:
-    """The same; nothing is written where there is nothing to measure."""
+    """The same bursts; raises DataError before anything is written where there are none."""
     rest = iter(bursts)
     first = [*itertools.islice(rest, 1)]
     if not first:
@@ -245,16 +241,16 @@ def _not_empty(bursts: Iterable[Work], source: str) -> Iterator[Work]:
 
 
 def _after(first: list[Work], rest: Iterator[Work]) -> Iterator[Work]:
-    """``first``, which is let go of, and the rest."""
+    """``first``, without keeping a reference, and the rest."""
     while first:
         yield first.pop()
     yield from rest
 
 
-def _give_past(source_of_bursts: ReplaySource, outputs: Outputs) -> None:
-    """What was recorded beside the pictures: events and loads."""
-    for event in source_of_bursts.events:
+def _pass_on_recorded(source: ReplaySource, outputs: Outputs) -> None:
+    """Pass the recorded events and load samples to the outputs."""
+    for event in source.events:
         if event.kind is not EventKind.MEASURED:
             outputs.event(event)
-    for sample in source_of_bursts.samples:
+    for sample in source.samples:
         outputs.load(sample)

@@ -1,4 +1,4 @@
-"""A recorded session as the material of a replay."""
+"""A recorded session as the source of a replay."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from acquire.load_cell import LoadLog
 from acquire.session import Session
 from live.config.loading import Config, from_dict, settings_in
 from live.pipeline.measure import NewReference
-from live.replay.burst_index import Store, open_store
+from live.replay.burst_index import BurstStore, open_store
 from live.replay.pictures import reference_from
 from live.replay.source import ReplayRequest, ReplaySource, Window, Work
 
@@ -40,10 +40,10 @@ def session_path(source: str) -> Path | None:
 
 
 def session_config(session: Session, request: ReplayRequest, extra: Mapping[str, Any], path: Path) -> Config:
-    """The configuration in force when the session was recorded, overridden by file and command line."""
+    """The configuration of the recorded run, overridden by file and command line."""
     stored = {k: v for k, v in session.config.items() if k not in LIVE_ONLY}
     stored["metadata"] = dict(session.metadata)
-    stored["measure"] = {"strain": "small", **stored.get("measure", {})}  # of those that could not choose
+    stored["measure"] = {"strain": "small", **stored.get("measure", {})}  # older versions had no choice
     for section, keys in (("measure", ("mask",)), ("camera", ("dark", "flat"))):
         stored[section] = _beside(stored.get(section, {}), keys, path)
     file = {} if request.config_file is None else settings_in(request.config_file)
@@ -55,20 +55,20 @@ def session_config(session: Session, request: ReplayRequest, extra: Mapping[str,
 
 
 def _check_stored(stored: Mapping[str, Any], path: str) -> None:
-    """What is wrong may be what the session says, not what was asked for; raises DataError then."""
+    """Raises DataError where the error is in the session, and not in the overrides."""
     try:
         from_dict(stored, {}, path)
     except ConfigError as error:
-        raise DataError(f"{error} (it stands so in the session; the command line can set it anew)") from error
+        raise DataError(f"{error} (stored so in the session; the command line can override it)") from error
 
 
 def _beside(section: Mapping[str, Any], keys: Iterable[str], path: Path) -> dict[str, Any]:
-    """A folder that was moved has its mask, dark and flat frame beside the session."""
+    """Where the folder was moved, mask, dark and flat frame are beside the session."""
     moved = {key: section[key] for key in keys if section.get(key) and not Path(section[key]).exists()}
     return {**section, **{key: str(path.with_name(Path(old).name)) for key, old in moved.items()}}
 
 
-def session_material(session: Session, request: ReplayRequest, config: Config, path: Path) -> ReplaySource:
+def session_source(session: Session, request: ReplayRequest, config: Config, path: Path) -> ReplaySource:
     if request.as_measured and session.mode.every > 1:
         raise ConfigError(
             f"{path} holds only one frame in {session.mode.every}, not the bursts that were measured; replay it"
@@ -86,12 +86,12 @@ def session_material(session: Session, request: ReplayRequest, config: Config, p
     for event in events:
         loads.take_event(event)
     loads.close()
-    told = [e for e in events if e.kind is EventKind.REFERENCE and not e.data.get("renewed")]
+    references = [e for e in events if e.kind is EventKind.REFERENCE and not e.data.get("renewed")]
     stored = open_store(session, path)
     if request.reference is not None:
         reference, after = reference_from(request.reference, session.camera), -1
-    elif told and "measure.reference_burst" not in request.overrides:
-        reference, after = stored.burst(told[-1].data), int(told[-1].data["last"])
+    elif references and "measure.reference_burst" not in request.overrides:
+        reference, after = stored.burst(references[-1].data), int(references[-1].data["last"])
     else:
         reference, after = stored.first_burst(config.measure.reference_burst or 1)
     window = Window.of(request, session.start_monotonic)
@@ -116,35 +116,37 @@ class _Found:
     times: NDArray[np.float64] | None = None
 
 
-def _all_after(stored: Store, after: int, n: int | None, window: Window, numbers: range | None) -> _Found:
-    """Every burst."""
-    places = stored.places_after(after, n)
-    found = window.numbers(places.t)
+def _all_after(
+    stored: BurstStore, after: int, n: int | None, window: Window, numbers: range | None
+) -> _Found:
+    """Every burst in the window."""
+    index = stored.index_after(after, n)
+    found = window.numbers(index.t)
     if numbers is not None:
         found = found[numbers.start : numbers.stop]
-    return _Found(stored.bursts_at(places, found), len(found), places.t[found.start : found.stop])
+    return _Found(stored.bursts_at(index, found), len(found), index.t[found.start : found.stop])
 
 
-def _measured_then(stored: Store, events: Iterable[Event], window: Window) -> _Found:
+def _measured_then(stored: BurstStore, events: Iterable[Event], window: Window) -> _Found:
     """The bursts of the live run."""
     wanted = _measured_within(events, window)
     return _Found(_as_measured(stored, events, wanted), len(wanted) or None)
 
 
 def _measured_within(events: Iterable[Event], window: Window) -> set[int]:
-    """The first frames of the bursts to be read: those within; where none is, the last, for ``window`` to tell of."""
-    told = [event for event in events if event.kind is EventKind.MEASURED]
-    inside = [event for event in told if window.holds(event.t)] or told[-1:]
+    """First frames of the bursts to read: those within, or the last where none is, for ``Window.part`` to report."""
+    measured = [event for event in events if event.kind is EventKind.MEASURED]
+    inside = [event for event in measured if window.holds(event.t)] or measured[-1:]
     return {int(event.data["first"]) for event in inside}
 
 
-def _as_measured(stored: Store, events: Iterable[Event], wanted: set[int]) -> Iterator[Work]:
+def _as_measured(stored: BurstStore, events: Iterable[Event], wanted: set[int]) -> Iterator[Work]:
     for event in events:
         renewed = event.kind is EventKind.REFERENCE and event.data.get("renewed")
         if renewed and not event.data.get("automatic"):  # the pipeline does those again by itself
             yield NewReference(stored.burst(event.data))
         elif event.kind is EventKind.MEASURED and int(event.data["first"]) in wanted:
             burst = stored.burst(event.data)
-            # Sessions of older programs do not say it; then it is what the burst itself knows.
+            # Sessions of older versions have no such value; the burst then has its own count.
             lost = event.data.get("lost")
             yield replace(burst, lost=lost) if isinstance(lost, int) else burst

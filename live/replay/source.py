@@ -1,7 +1,4 @@
-"""What is asked of a replay, and what it works on.
-
-Reading ahead of the kernel: the next bursts are read and averaged while one is measured.
-"""
+"""The request and the source of a replay, the window of time, and the prefetch of bursts while one is measured."""
 
 from __future__ import annotations
 
@@ -28,7 +25,7 @@ from live.pipeline.measure import NewReference
 
 @dataclass(frozen=True, slots=True)
 class ReplayRequest:
-    """What is asked for.
+    """The settings of one replay.
 
     Attributes
     ----------
@@ -44,11 +41,11 @@ class ReplayRequest:
     config_file : Path or None
     overrides : mapping of "section.key" to value
     numbers : range or None
-        Of the bursts within that part those from this number on, up to that one, by their order; of a session alone.
+        Numbers of the bursts to measure, in the order within that part; only of a session.
     parts : sequence of Path
-        What ``measure_part`` has stored of all of it, in order: told, and not measured again.
-    settled : Path or None
-        Where the folder of the results will lie in the end, if that is not where they are written.
+        Files of ``measure_part`` for the whole session, in order: joined, and not measured again.
+    final_folder : Path or None
+        The later folder of the results, where it is not the one they are written to.
     """
 
     source: str
@@ -61,7 +58,7 @@ class ReplayRequest:
     forces: Path | None = None
     numbers: range | None = None
     parts: Sequence[Path] = ()
-    settled: Path | None = None
+    final_folder: Path | None = None
 
 
 Work = Burst | NewReference
@@ -73,14 +70,14 @@ class PictureCount:
     Attributes
     ----------
     pictures, left_out, reference : int
-        All of them; those that cannot be read or are not like the first; those of the reference.
+        All; those that cannot be read or differ from the first in format; those of the reference.
     """
 
     def __init__(self) -> None:
         self.pictures = self.left_out = self.reference = 0
 
     def passing(self, frames: Iterable[Frame]) -> Iterator[Frame]:
-        """The same frames."""
+        """The same frames, counted."""
         for frame in frames:
             self.pictures += 1
             self.left_out += frame.damaged
@@ -89,16 +86,16 @@ class PictureCount:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReplaySource:
-    """A source taken apart: what the reference is, and the bursts to measure.
+    """A source: its reference, the bursts to measure, and the recorded loads and events.
 
     Attributes
     ----------
     expected : int or None
-        How many bursts there will be at most, where that is known.
+        The largest number of bursts, where it is known.
     times : (B,) float64 or None, s
-        Of the bursts, where they are known before they are read.
-    seen : PictureCount or None
-        The pictures so far; None for a session, whose bursts say what was lost.
+        Times of the bursts, where they are known before the bursts are read.
+    count : PictureCount or None
+        The pictures so far; None for a session, whose bursts have the number of lost frames.
     """
 
     camera: CameraInfo
@@ -110,7 +107,7 @@ class ReplaySource:
     samples: tuple[LoadSample, ...] = ()
     expected: int | None = None
     times: NDArray[np.float64] | None = None
-    seen: PictureCount | None = None
+    count: PictureCount | None = None
 
 
 def check_window(request: ReplayRequest) -> None:
@@ -132,24 +129,24 @@ class Window:
 
     @classmethod
     def of(cls, request: ReplayRequest, origin: float) -> Window:
-        """As ``request`` says."""
+        """The window of ``request``."""
         low = -math.inf if request.start_s is None else origin + request.start_s
         high = math.inf if request.end_s is None else origin + request.end_s
         return cls(low, high, origin)
 
     def holds(self, t: float) -> bool:
-        """Whether a burst of that time is measured."""
+        """Whether a burst at ``t`` is measured."""
         return self.low <= t <= self.high
 
     def numbers(self, times: NDArray[np.float64]) -> range:
-        """Of bursts in order, those to be read: within; where none is, the last one, for ``part`` to tell of."""
+        """Numbers of the bursts to read: those within, or the last where none is, for the message of ``part``."""
         inside = np.flatnonzero((times >= self.low) & (times <= self.high))
         if not inside.size:
             return range(max(0, len(times) - 1), len(times))
         return range(int(inside[0]), int(inside[-1]) + 1)
 
     def part(self, bursts: Iterable[Work]) -> Iterator[Work]:
-        """Those within; raises DataError at the end where there was a burst, but none within."""
+        """The bursts within; raises DataError at the end where there are bursts, but none within."""
         last, found = math.nan, False
         for item in bursts:
             if isinstance(item, NewReference):
@@ -166,22 +163,22 @@ class Window:
 
 
 Item = TypeVar("Item")
-_LOOK_S = 0.1
+_POLL_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class _End:
-    """Nothing follows; ``error`` is what ended it early."""
+    """The end of the items; ``error`` is what ended them early."""
 
     error: BaseException | None = None
 
 
-class _Reader(Generic[Item]):
-    """A thread that takes items and puts them in a queue with bounded room."""
+class _Prefetcher(Generic[Item]):
+    """A thread that puts items into a bounded queue."""
 
-    def __init__(self, items: Iterable[Item], room: int) -> None:
+    def __init__(self, items: Iterable[Item], queue_size: int) -> None:
         self._items = items
-        self.queue: queue.Queue[Item | _End] = queue.Queue(room)
+        self.queue: queue.Queue[Item | _End] = queue.Queue(queue_size)
         self._stopped = threading.Event()
         self._thread = threading.Thread(target=self._read, name="read ahead", daemon=True)
         self._thread.start()
@@ -192,30 +189,30 @@ class _Reader(Generic[Item]):
             for item in self._items:
                 if not self._put(item):
                     return
-        except BaseException as error:  # raised again where the items are taken
+        except BaseException as error:  # raised again in the thread that takes the items
             end = _End(error)
         self._put(end)
 
     def _put(self, item: Item | _End) -> bool:
-        """Whether there was room before the end."""
+        """Whether the item was queued before the end."""
         while not self._stopped.is_set():
             with contextlib.suppress(queue.Full):
-                self.queue.put(item, timeout=_LOOK_S)
+                self.queue.put(item, timeout=_POLL_S)
                 return True
         return False
 
     def close(self) -> None:
-        """Take nothing more, and let go of the source."""
+        """Stop reading, and wait for the thread."""
         self._stopped.set()
         self._thread.join()
 
 
-def ahead(items: Iterable[Item], room: int = 1) -> Generator[Item]:
-    """The same items in the same order, taken ahead by a thread of their own: ``room`` wait, and it has one at hand.
+def prefetch(items: Iterable[Item], queue_size: int = 1) -> Generator[Item]:
+    """The same items in order, read ahead by a thread: ``queue_size`` wait, and the thread holds one more.
 
-    What ``items`` raises is raised here, after those that came before. Closing the iterator ends the thread.
+    An error of ``items`` is raised here, after the items before it. Closing the iterator ends the thread.
     """
-    reader = _Reader(items, room)
+    reader = _Prefetcher(items, queue_size)
     try:
         while not isinstance(item := reader.queue.get(), _End):
             yield item

@@ -1,10 +1,8 @@
-"""A study of settings: what each shows of the strain, and with how much noise (the VSG study of the iDICs guide).
+"""A study of settings: the largest strain and the noise of each (the VSG study of the iDICs guide).
 
-Only the bursts of a still and of a loaded window are measured. A largest value is one of noise too where noise
-is large; so the ZOI is looked for in one half of the bursts and read in the other, less its value when still,
-which takes the noise of the reference off.
-
-Bursts of a still and of a loaded window, kept to be measured with many settings.
+Only the bursts of a still and of a loaded window are measured. Noise increases the largest value of a map; so the
+ZOI is chosen in one half of the bursts and its value taken from the other half, minus its value when still, which
+removes the noise of the reference.
 """
 
 from __future__ import annotations
@@ -20,8 +18,8 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Burst
-from analysis.evaluate import FEWEST_STILL, evenly, noise_floor, still_phase
-from analysis.quality.exposure import gauge_length, l10_strain
+from analysis.evaluate import MIN_STILL_INSTANTS, evenly, noise_floor, still_phase
+from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.loading import Config
 from live.pipeline.reference import averaged
 from live.replay.source import ReplaySource
@@ -32,88 +30,91 @@ if TYPE_CHECKING:
     from analysis.field import StrainField
 
 _LOADED_FORCE = 0.98  # of the highest
-MOST_STILL, MOST_LOADED = 8, 6
-LEAST_STILL, LEAST_LOADED = FEWEST_STILL, 2
+MAX_STILL, MAX_LOADED = 8, 6
+MIN_STILL, MIN_LOADED = MIN_STILL_INSTANTS, 2
 
 Seconds = tuple[float, float]
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Windows:
-    """Averaged bursts.
+    """Averaged bursts of both windows, to be measured with many settings.
 
     Attributes
     ----------
     still, loaded : tuple of Burst
-        At least two each; no still ones where there were none.
+        At least two each; no still ones where there is no still window.
     """
 
     still: tuple[Burst, ...]
     loaded: tuple[Burst, ...]
 
 
-NEVER: Seconds = (math.inf, -math.inf)
-"""The still window of a test in which nothing was still."""
+NO_WINDOW: Seconds = (math.inf, -math.inf)
+"""The still window of a test without a still phase."""
 
 
-def take_windows(source_of_bursts: ReplaySource, still: Seconds | None, loaded: Seconds | None) -> Windows:
-    """Read the bursts of both windows, s since the start; without one, as the force tells it; ``NEVER`` for none.
+def take_windows(source: ReplaySource, still: Seconds | None, loaded: Seconds | None) -> Windows:
+    """Read the bursts of both windows, s since the start; None: found from the force; ``NO_WINDOW`` for none.
 
     Raises
     ------
     DataError
-        There are not enough bursts in one, or no force tells it.
+        There are not enough bursts in one, or no force to find it from.
     """
-    told = (still or still_window(source_of_bursts), loaded or _loaded(source_of_bursts))
+    wanted = (still or still_window(source), loaded or _loaded(source))
     found: tuple[list[Burst], list[Burst]] = ([], [])
-    for item in source_of_bursts.bursts:
+    for item in source.bursts:
         if not isinstance(item, Burst):
             raise DataError("the reference was renewed in this session; a study needs one without")
-        t = item.t - source_of_bursts.start.monotonic
-        for (low, high), bursts in zip(told, found, strict=True):
+        t = item.t - source.start.monotonic
+        for (low, high), bursts in zip(wanted, found, strict=True):
             if low <= t <= high:
                 bursts.append(item)
-        if t > max(high for _, high in told):
+        if t > max(high for _, high in wanted):
             break
-    for name, bursts, least, (low, high) in zip(
-        ("static", "loaded"), found, (LEAST_STILL, LEAST_LOADED), told, strict=True
+    for name, bursts, minimum, (low, high) in zip(
+        ("static", "loaded"), found, (MIN_STILL, MIN_LOADED), wanted, strict=True
     ):
-        if len(bursts) < least and (low, high) != NEVER:
+        if len(bursts) < minimum and (low, high) != NO_WINDOW:
             raise DataError(
-                f"{len(bursts)} bursts from {low:.3g} to {high:.3g} s, {least} are needed; give --{name} A,B"
+                f"{len(bursts)} bursts from {low:.3g} to {high:.3g} s, {minimum} are needed; give --{name} A,B"
             )
-    return Windows(_spread(found[0], MOST_STILL), _spread(found[1], MOST_LOADED))
+    return Windows(_spread(found[0], MAX_STILL), _spread(found[1], MAX_LOADED))
 
 
-def _untold(option: str) -> DataError:
-    return DataError(f"no force tells when it was still and when loaded; give --{option} A,B in seconds")
+def _no_force(option: str) -> DataError:
+    return DataError(
+        f"there is no force to find the still and the loaded window from; give --{option} A,B in seconds"
+    )
 
 
-def _forces(source_of_bursts: ReplaySource, option: str) -> tuple[np.ndarray, np.ndarray]:
-    t, force = source_of_bursts.loads.arrays()
+def _forces(source: ReplaySource, option: str) -> tuple[np.ndarray, np.ndarray]:
+    t, force = source.loads.arrays()
     if not len(t) or not np.isfinite(force).any():
-        raise _untold(option)
-    return t - source_of_bursts.start.monotonic, force
+        raise _no_force(option)
+    return t - source.start.monotonic, force
 
 
-def still_window(source_of_bursts: ReplaySource) -> Seconds:
-    """The still phase by the force at the bursts, as report and batch find it once they are measured.
+def still_window(source: ReplaySource) -> Seconds:
+    """The still phase by the force at the bursts, by the rule of report and batch.
 
     Raises
     ------
     DataError
-        No force tells it.
+        There is no force to find it from.
     """
-    times = np.zeros(0) if source_of_bursts.times is None else source_of_bursts.times
-    count = still_phase(source_of_bursts.loads.forces_one_zero(times.tolist()))
+    times = np.zeros(0) if source.times is None else source.times
+    count = still_phase(source.loads.forces_one_zero(times.tolist()))
     if not count:
-        raise _untold("static")
-    return -math.inf, float(times[count - 1]) - source_of_bursts.start.monotonic
+        raise _no_force("static")
+    return -math.inf, float(times[count - 1]) - source.start.monotonic
 
 
-def _loaded(source_of_bursts: ReplaySource) -> Seconds:
-    """About the highest force, for as long as it stays near it."""
-    t, force = _forces(source_of_bursts, "loaded")
+def _loaded(source: ReplaySource) -> Seconds:
+    """The time around the highest force in which the force is near it."""
+    t, force = _forces(source, "loaded")
     high = np.abs(force) >= _LOADED_FORCE * np.nanmax(np.abs(force))
     top = low = int(np.nanargmax(np.abs(force)))
     while low > 0 and high[low - 1]:
@@ -128,9 +129,8 @@ def _spread(bursts: Sequence[Burst], most: int) -> tuple[Burst, ...]:
     return tuple(bursts[row] for row in evenly(len(bursts), most))
 
 
-Array = NDArray[np.float64]
-KEEPS = 0.95  # of the largest strain
-TOLD = 3.0  # sigmas above which a strain is told from noise
+KEPT_SHARE = 0.95  # of the largest strain
+SIGNIFICANT = 3.0  # sigmas above which a strain is more than noise
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,20 +150,20 @@ class StudySetting:
 
 @dataclass(frozen=True, slots=True)
 class StudyResult:
-    """What one setting gave; strains dimensionless.
+    """The result of one setting; strains dimensionless.
 
     Attributes
     ----------
     setting : StudySetting
     noise, predicted : float
-        Standard deviation of the strain along the load of one ZOI, over the ZOIs of still instants; the same as
-        predicted where nothing was still.
+        Standard deviation of the strain along the load of one ZOI, over the ZOIs of the still window: measured
+        and predicted; both predicted without a still window.
     measured : bool
-        Whether something was.
+        Whether there was a still window.
     l10, vsg : float, px
         Period of a strain that has lost 10 %; side of the square with the same noise.
     seen, sigma : float
-        Largest strain along the load under load, its noise taken off, and its standard uncertainty.
+        Largest strain along the load under load, corrected for noise, and its standard uncertainty.
     gradient : float, 1/px
         Largest difference of neighbours over their distance, in the same way.
     valid : float
@@ -182,21 +182,21 @@ class StudyResult:
     measured: bool = True
 
     @property
-    def is_told(self) -> bool:
-        """Whether the strain stands out of its noise."""
-        return self.seen >= TOLD * self.sigma
+    def is_significant(self) -> bool:
+        """Whether the strain is larger than its noise."""
+        return self.seen >= SIGNIFICANT * self.sigma
 
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """The setting to take, and why."""
+    """The recommended setting, and why."""
 
     found: StudyResult
     why: str
 
 
 def study(
-    source_of_bursts: ReplaySource, windows: Windows, config: Config, settings: Sequence[StudySetting]
+    source: ReplaySource, windows: Windows, config: Config, settings: Sequence[StudySetting]
 ) -> Iterator[StudyResult]:
     """Measure both windows with one setting after the other.
 
@@ -208,15 +208,15 @@ def study(
     for setting in settings:
         measure = dataclasses.replace(config.measure, **dataclasses.asdict(setting))
         one = dataclasses.replace(config, measure=measure, gauges={})  # none is read
-        yield _found(setting, one.specimen.axis, *_fields(source_of_bursts, windows, one))
+        yield _found(setting, one.specimen.axis, *_fields(source, windows, one))
 
 
 def _fields(
-    source_of_bursts: ReplaySource, windows: Windows, config: Config
+    source: ReplaySource, windows: Windows, config: Config
 ) -> tuple[list[StrainField], list[StrainField]]:
-    camera = source_of_bursts.camera
+    camera = source.camera
     mask = read_mask(config.measure.mask, camera.width, camera.height)
-    ready = MeasurePlan.of(config, camera, mask).on(source_of_bursts.reference)
+    ready = MeasurePlan.of(config, camera, mask).on(source.reference)
 
     def measured(bursts: Sequence[Burst]) -> list[StrainField]:
         start, found = None, []
@@ -264,7 +264,7 @@ def _stacked(fields: Sequence[StrainField], name: str) -> Array:
 
 
 def _largest(first: Array, second: Array) -> float:
-    """The place is that of the largest magnitude of ``first``, the value that of ``second``; 0 without one."""
+    """The value of ``second`` where ``first`` has its largest magnitude; 0 without one."""
     if not np.isfinite(first).any():
         return 0.0
     place = np.unravel_index(int(np.nanargmax(np.abs(first))), first.shape)
@@ -277,21 +277,21 @@ def recommended(found: Sequence[StudyResult]) -> Advice:
     Raises
     ------
     ConfigError
-        No setting shows a strain that stands out of its noise.
+        No setting shows a strain larger than its noise.
     """
-    told = [one for one in found if one.is_told]
-    if not told:
+    significant = [one for one in found if one.is_significant]
+    if not significant:
         raise ConfigError(
             "no setting shows a strain above its noise: take larger ZOIs (--zoi), or another --loaded window"
         )
-    top = max(told, key=lambda one: one.seen - one.sigma)
-    keep = [one for one in told if one.seen >= KEEPS * (top.seen - top.sigma)]
+    top = max(significant, key=lambda one: one.seen - one.sigma)
+    keep = [one for one in significant if one.seen >= KEPT_SHARE * (top.seen - top.sigma)]
     best = min(keep, key=lambda one: one.noise)
     why = (
-        f"of the {len(keep)} settings that show at least {KEEPS:.0%} of the largest strain"
+        f"of the {len(keep)} settings that show at least {KEPT_SHARE:.0%} of the largest strain"
         f" ({top.seen * 1e6:.0f} um/m, with {top.setting.words}) it has the least noise"
     )
-    larger = [one for one in told if one.noise < best.noise]
+    larger = [one for one in significant if one.noise < best.noise]
     if larger:
         nearest = max(larger, key=lambda one: one.seen)
         why += f"; {nearest.setting.words} has less, but shows {nearest.seen / top.seen:.0%}"

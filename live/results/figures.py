@@ -161,12 +161,12 @@ def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
 
 def axis_text(load: LoadAxis) -> str:
     """The axis of the load and the angle to the largest strain; empty where it is not known."""
-    if not load.off.known:
+    if not load.angle.known:
         return ""
-    words = f"largest strain {figure_text(load.off, math.pi / 180, 'degrees')} off {load.axis} (clockwise)"
+    words = f"largest strain {figure_text(load.angle, math.pi / 180, 'degrees')} off {load.axis} (clockwise)"
     if load.found:
         return f"{words}; {load.axis} was found to be the axis of the load"
-    wrong = abs(load.off.value) > math.pi / 4
+    wrong = abs(load.angle.value) > math.pi / 4
     return words + (f"; is specimen.axis = {load.axis!r} right?" if wrong else "")
 
 

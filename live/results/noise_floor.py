@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate import FEWEST_STILL, NoiseFloor, evenly, noise_floor, still_phase
+from analysis.evaluate import MIN_STILL_INSTANTS, NoiseFloor, evenly, noise_floor, still_phase
 from live.results.reader import Strain
 
 MAX_INSTANTS = 64
@@ -37,7 +37,7 @@ def still_phase_of(strain: Strain, names: Sequence[str] = (*_DISPLACEMENTS, *_ME
     """The still phase of ``strain``, with the noise floors of the maps ``names``; raises DataError as ``maps``."""
     means = {name: (_column(strain, name), _column(strain, f"sigma_{name}")) for name in _MEANS}
     count = still_phase(strain.force_one_zero, means)
-    if count < FEWEST_STILL:
+    if count < MIN_STILL_INSTANTS:
         return StillPhase(count, {})
     rows = evenly(count, MAX_INSTANTS).tolist()
     floors = {name: noise_floor(_maps(strain, name, rows), planes=name in _DISPLACEMENTS) for name in names}

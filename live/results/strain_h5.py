@@ -131,7 +131,7 @@ class StrainWriter:
         exx, eyy, exy = (np.asarray(mean[name], np.float64) for name in STRAINS)
         load = load_axis(exx, eyy, exy, self._axis)
         mean.attrs.modify("load_axis", np.array(load.axis, "S1"))
-        mean.attrs.modify("load_angle_deg", np.float64(math.degrees(load.off.value)))
+        mean.attrs.modify("load_angle_deg", np.float64(math.degrees(load.angle.value)))
 
     def _guard(self, action: Callable[[], Any]) -> Any:
         try:

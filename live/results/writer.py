@@ -108,13 +108,13 @@ class ResultsConsumer(Consumer):
 
     name = "results"
     policy = Policy.WAIT
-    room = 64
-    vital = True
+    queue_size = 64
+    critical = True
 
     def __init__(self, results: Results) -> None:
         self._results = results
 
-    def settled(self, measurement: Measurement) -> None:
+    def matched(self, measurement: Measurement) -> None:
         """Write one row."""
         self._results.add(measurement)
 
@@ -151,5 +151,7 @@ def write_results(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
         lagged=config.load.lag_s != 0,
     )
     return [
-        ResultsConsumer(Results(about.folder, about.grid, info, DEFERRED_FLUSH_S if about.aside else FLUSH_S))
+        ResultsConsumer(
+            Results(about.folder, about.grid, info, DEFERRED_FLUSH_S if about.deferred else FLUSH_S)
+        )
     ]

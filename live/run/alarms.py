@@ -1,8 +1,6 @@
-"""One alarm: on beyond its limit, off when it is back by the hysteresis.
+"""The alarms of a test: limits of channels with hysteresis, the actions of an alarm, and the consumer that checks them.
 
-Looks at every measurement, and several times a second at what is silent; tells alarms that come and go.
-
-What an alarm does when it comes. A new action is a class here, in ``ACTIONS``, and its key in ``AlarmConfig``.
+A new action is a class here, in ``ACTIONS``, and its key in ``AlarmConfig``.
 """
 
 from __future__ import annotations
@@ -16,13 +14,18 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from acquire.events import Event, EventKind, EventSink
-from live.config.channels import MACHINE
+from live.config.channels import SYSTEM_CHANNELS
 from live.config.sections import AlarmConfig
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import ActiveAlarms
 from live.run.strain_output import StrainOut
+
+log = logging.getLogger(__name__)
+
+EVERY_S = 0.2
+"""The channels of the machine are checked at this interval."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +35,7 @@ class ActionMeans:
     Attributes
     ----------
     bell : callable
-        Rings at the terminal.
+        Rings the bell of the terminal.
     end : callable taking a str
         Ends the run for this reason.
     outs : sequence of StrainOut
@@ -44,12 +47,12 @@ class ActionMeans:
 
 
 class Action(ABC):
-    """One thing an alarm does when it comes.
+    """One thing an alarm does when it comes on.
 
     Attributes
     ----------
     key : str
-        Of ``[[alarm]]``, which asks for it; empty: every alarm does it.
+        Key in ``[[alarm]]`` that requests it; empty: every alarm does it.
     """
 
     key: ClassVar[str] = ""
@@ -59,11 +62,11 @@ class Action(ABC):
 
     @abstractmethod
     def fire(self, event: Event) -> None:
-        """Do it, at once and without waiting; ``event`` is that of the alarm, not yet passed on."""
+        """Do it, without blocking; ``event`` is that of the alarm, not yet passed on."""
 
 
 class RingBell(Action):
-    """The terminal rings."""
+    """Rings the bell of the terminal."""
 
     def fire(self, event: Event) -> None:
         """Ring."""
@@ -71,18 +74,18 @@ class RingBell(Action):
 
 
 class SendLine(Action):
-    """A line goes out on all strain outputs."""
+    """Sends a line to all strain outputs."""
 
     key = "line"
 
     def fire(self, event: Event) -> None:
-        """Leave the line with each output, which sends it with the event of the alarm."""
+        """Post the line to each output, which sends it with the event of the alarm."""
         for out in self.means.outs:
             out.post(self.config.line)
 
 
 class EndRun(Action):
-    """The run ends."""
+    """Ends the run."""
 
     key = "end"
 
@@ -95,18 +98,18 @@ ACTIONS: tuple[type[Action], ...] = (RingBell, SendLine, EndRun)
 
 
 def actions_of(config: AlarmConfig, means: ActionMeans) -> list[Action]:
-    """Those that ``config`` asks for, in the order of ``ACTIONS``."""
+    """The actions that ``config`` requests, in the order of ``ACTIONS``."""
     return [kind(config, means) for kind in ACTIONS if not kind.key or getattr(config, kind.key)]
 
 
 class Alarm:
-    """Follows one channel.
+    """One alarm: on beyond its limit, off when the value is back by the hysteresis.
 
     Parameters
     ----------
     config : AlarmConfig
     actions : sequence of Action
-        What it does when it comes.
+        What it does when it comes on.
 
     Attributes
     ----------
@@ -123,8 +126,8 @@ class Alarm:
         self.name = c.name or f"{c.channel} {limit}"
         self._sign, self._limit = (1.0, c.above) if c.above is not None else (-1.0, c.below or 0.0)
 
-    def look(self, value: float) -> bool:
-        """Take note of a value; whether the alarm has come or gone. A value that is not known changes nothing."""
+    def check(self, value: float) -> bool:
+        """Check a value; whether the alarm went on or off. A value that is not known changes nothing."""
         if math.isnan(value):
             return False
         beyond = self._sign * (value - self._limit)
@@ -132,94 +135,88 @@ class Alarm:
         self.on = beyond > 0 or (before and beyond > -self.config.hysteresis)
         return self.on is not before
 
-    def words(self, value: float) -> str:
-        """What is told of it at ``value``."""
+    def message(self, value: float) -> str:
+        """Its text at ``value``."""
         return f"{self.name}: {self.config.channel} is {value:.6g}"
 
 
-log = logging.getLogger(__name__)
-
-EVERY_S = 0.2
-"""What is silent is looked at so often."""
-
-
 class AlarmWatch(Consumer):
-    """The alarms of a test.
+    """Checks the alarms with every measurement, and those on channels of the machine every ``EVERY_S``.
 
     Parameters
     ----------
     alarms : sequence of Alarm
-    readings : ChannelValues
+    values : ChannelValues
     machine : callable
         The channels of the machine at a monotonic time.
-    board : ActiveAlarms
-    tell : callable taking an Event
+    active : ActiveAlarms
+    on_event : callable taking an Event
     clock : callable giving monotonic seconds
     """
 
     name = "alarms"
     policy = Policy.NEWEST
-    room = 64
+    queue_size = 64
 
     def __init__(
         self,
         alarms: Sequence[Alarm],
-        readings: ChannelValues,
+        values: ChannelValues,
         machine: Callable[[float], Mapping[str, float]],
-        board: ActiveAlarms,
-        tell: EventSink,
+        active: ActiveAlarms,
+        on_event: EventSink,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._alarms = alarms
-        self._readings, self._machine, self._board = readings, machine, board
-        self._tell, self._clock = tell, clock
-        self._came = 0
+        self._values, self._machine, self._active = values, machine, active
+        self._on_event, self._clock = on_event, clock
+        self._count = 0
 
     def measurement(self, measurement: Measurement) -> None:
-        """Look at the channels of a measurement."""
+        """Check the channels of a measurement."""
         burst = measurement.burst
         stamp = math.nan if burst.clock == "nominal" else burst.t + burst.duration / 2
-        self._look(self._readings.read(measurement), stamp)
+        self._check(self._values.read(measurement), stamp)
 
     def idle(self) -> float:
-        """Look at the channels of the machine."""
-        self._look(self._machine(self._clock()), math.nan)
-        return EVERY_S if any(alarm.config.channel in MACHINE for alarm in self._alarms) else math.inf
+        """Check the channels of the machine."""
+        self._check(self._machine(self._clock()), math.nan)
+        return EVERY_S if any(alarm.config.channel in SYSTEM_CHANNELS for alarm in self._alarms) else math.inf
 
     def end(self) -> str:
-        """How often an alarm came."""
-        return f"{self._came} came" if self._came else "none came"
+        """How often an alarm came on."""
+        return f"{self._count} came" if self._count else "none came"
 
-    def _look(self, values: Mapping[str, float], stamp: float) -> None:
+    def _check(self, values: Mapping[str, float], stamp: float) -> None:
         for alarm in self._alarms:
             value = values.get(alarm.config.channel, math.nan)
-            if alarm.look(value):
+            if alarm.check(value):
                 self._changed(alarm, value, stamp)
 
     def _changed(self, alarm: Alarm, value: float, stamp: float) -> None:
-        now, words = self._clock(), alarm.words(value)
+        now, text = self._clock(), alarm.message(value)
         if alarm.on:
-            self._came += 1
-            self._board.put(alarm.name, words)
+            self._count += 1
+            self._active.set(alarm.name, text)
         else:
-            self._board.take_off(alarm.name)
+            self._active.clear(alarm.name)
         data: dict[str, Any] = {"alarm": alarm.name, "on": alarm.on, "value": value}
         if not math.isnan(stamp):
             data["after_s"] = now - stamp
         if not alarm.on:
-            self._tell(Event(now, EventKind.ALARM, "alarm", f"over: {words}", "info", data))
+            self._on_event(Event(now, EventKind.ALARM, "alarm", f"over: {text}", "info", data))
             return
         data |= {action.key: getattr(alarm.config, action.key) for action in alarm.actions if action.key}
-        event = Event(now, EventKind.ALARM, "alarm", f"ALARM {words}", "warning", data)
+        event = Event(now, EventKind.ALARM, "alarm", f"ALARM {text}", "warning", data)
         for action in alarm.actions:
             self._fire(action, event)
-        self._tell(event)
+        self._on_event(event)
 
     def _fire(self, action: Action, event: Event) -> None:
-        """One action; where it fails the others and the event go on."""
+        """One action; if it fails, the others and the event still follow."""
         try:
             action.fire(event)
         except Exception as error:
             log.exception("an action of an alarm failed")
             text = f"{type(action).__name__} of an alarm failed: {error!r}"
-            self._tell(Event(event.t, EventKind.ALARM, "alarm", text, "error"))
+            self._on_event(Event(event.t, EventKind.ALARM, "alarm", text, "error"))

@@ -1,4 +1,4 @@
-"""From the grab thread to the measuring path: references and bursts in order, skips counted."""
+"""References and bursts in order from the grab thread to the measuring thread; skipped ones are counted."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class BurstQueue:
     ----------
     grabber : Grabber
     frame_counts : FrameCounts
-        Told of every burst that is not measured.
+        Takes the frames of bursts that are not measured.
     idle : callable
-        Called with a few words whenever nothing has come for a while, and after each burst with "".
+        Called with a few words whenever nothing has arrived for a while, and after each burst with "".
     """
 
     def __init__(self, grabber: Grabber, frame_counts: FrameCounts, idle: Callable[[str], None]) -> None:
@@ -35,7 +35,7 @@ class BurstQueue:
 
     @property
     def fps(self) -> float:
-        """Frames a second, as they come."""
+        """Rate of the frames as they arrive, 1/s."""
         return self._grabber.fps
 
     def next_reference(self) -> ReferenceBurst | None:
@@ -58,8 +58,8 @@ class BurstQueue:
                 return reference
             self._idle(TAKING)
 
-    def another_reference(self) -> ReferenceBurst | None:
-        """Have a reference taken from the next frames, and wait for it."""
+    def retake_reference(self) -> ReferenceBurst | None:
+        """Take a reference from the next frames, and wait for it."""
         if self._held is not None:
             self._skip(self._held)
             self._held = None
@@ -67,9 +67,9 @@ class BurstQueue:
         return self.next_reference()
 
     def bursts(self) -> Iterator[Burst | NewReference]:
-        """The newest burst each time, and a new reference before the bursts that come after it.
+        """The newest burst each time, and a new reference before the bursts that follow it.
 
-        Those that came while the first reference was prepared come too, until it has caught up.
+        The bursts that arrived while the first reference was prepared come first, until the reader has caught up.
         """
         self._grabber.bursts.begin()
         while self._held is not None or not self._grabber.bursts.finished:
@@ -96,8 +96,8 @@ class BurstQueue:
         self._lost += reference.lost
         return reference
 
-    def let_pass(self) -> None:
-        """Measure nothing any more; all that comes is counted as skipped."""
+    def skip_rest(self) -> None:
+        """Take all that still comes and count it as skipped."""
         self.paused = True
         for _ in self.bursts():
             pass
@@ -113,6 +113,6 @@ class BurstQueue:
             self._lost += burst.lost
 
     def _with_all_lost(self, burst: Burst) -> Burst:
-        """What was lost since the burst that was measured before, whatever was skipped in between."""
+        """The burst with all frames lost since the last measured burst, those of skipped bursts included."""
         lost, self._lost = burst.lost + self._lost, 0
         return replace(burst, lost=lost)

@@ -1,26 +1,17 @@
-"""What an operator can ask of a run: one line, one order, one answer.
+"""The commands of the operator: one line, one command, one answer.
 
-The same words from the keyboard, the port for orders and the page::
+The same commands from the keyboard, the TCP port and the page::
 
     start, stop             begin and end recording (a run begins recording unless it is armed)
     reference               take a new reference from the next frames
     tare, tare force, tare undo
-                            zero of the load; under load in mid-test it has to be ordered twice
+                            zero of the load; under load in mid-test it must be given twice
     pause, resume           measuring; recording goes on
-    note TEXT               words of the operator, stored with the test
+    note TEXT               note of the operator, stored with the test
     alarm off               silence the alarms that are on
     quit                    end the run and close the files
 
-The answer is ``ok``, ``ok: TEXT`` or ``no: REASON``; what has been carried out is an event of the test.
-
-Why an order is not carried out.
-
-Tare as an order: at once without load or before the test, by two orders within 3 s under load in mid-test.
-
-A tare in mid-test moves the zero of every force after it: modulus, stress and yield point are then
-those of two different zeros. So one key pressed by mistake must not do it, and what was done can be undone.
-
-The port for orders: a line in, an answer out (``orders`` has the words).
+The answer is ``ok``, ``ok: TEXT`` or ``no: REASON``; a command that is carried out is an event of the test.
 """
 
 from __future__ import annotations
@@ -36,98 +27,19 @@ from live.config.listen_address import ListenAddress, read_token
 from live.pipeline.screen import Screen
 from live.run.tcp_lines import LineServer
 
-
-class ControlRefused(Exception):
-    """Says in a sentence why an order is not carried out, and what to do."""
-
-
-FORCED, UNDO = "force", "undo"
-"""What an order of ``EventKind.TARE`` may say besides nothing."""
-CONFIRM_S = 3.0
-LITTLE = 1e-3  # of the capacity: no load
-
-Tell = Callable[[EventKind, str, str, Level], None]  # kind, source, sentence, level
-
-
-class Tared(Protocol):
-    """What is used of a load cell."""
-
-    @property
-    def info(self) -> LoadCellInfo: ...
-
-    def tare(self, *, force: bool = False) -> None: ...
-
-    def undo_tare(self) -> None: ...
-
-
-class TareControls:
-    """Carries out orders to tare.
-
-    Parameters
-    ----------
-    cell : LoadCell
-    measured : callable
-        Whether anything has been measured yet; before that a tare falsifies nothing.
-    latest : callable giving LoadSample or None
-        The newest sample.
-    tell : callable taking kind, source, text and level
-    clock : callable giving monotonic seconds
-    """
-
-    def __init__(
-        self,
-        cell: Tared,
-        measured: Callable[[], bool],
-        latest: Callable[[], LoadSample | None],
-        tell: Tell,
-        clock: Callable[[], float],
-    ) -> None:
-        self._cell, self._measured, self._latest = cell, measured, latest
-        self._tell, self._clock = tell, clock
-        self._asked = -math.inf  # when a confirmation was asked for
-
-    def order(self, how: str = "") -> None:
-        """Tare; FORCED: whatever the load does; UNDO: let zero be where it was before the last tare.
-
-        Raises
-        ------
-        OrderRefused
-            There is nothing to tare, or it has to be ordered again.
-        """
-        if self._cell.info.protocol == "none":
-            raise ControlRefused("there is no load cell")
-        asked, self._asked = self._asked, -math.inf
-        risk = "" if how else self._risk()
-        if how == UNDO:
-            self._tell(EventKind.TARE, "operator", "undo the last tare", "info")
-            self._cell.undo_tare()
-        elif risk and self._clock() - asked > CONFIRM_S:
-            self._asked = self._clock()
-            text = (
-                f"{risk}: forces before and after a tare have different zeros, and so have modulus and stress"
-            )
-            raise ControlRefused(f"{text}; order it again within {CONFIRM_S:g} s to do it")
-        else:
-            self._tell(EventKind.TARE, "operator", "tare" + (", forced" if how else ""), "info")
-            self._cell.tare(force=how == FORCED)
-
-    def _risk(self) -> str:
-        """Why a tare now would falsify what was measured; "" where it would not."""
-        sample, capacity = self._latest(), self._cell.info.capacity_N
-        if sample is None or not self._measured() or abs(sample.force) <= LITTLE * (capacity or 0.0):
-            return ""
-        load = "an unknown load" if math.isnan(sample.force) else f"{sample.force:.6g} N"
-        return f"not tared yet: {load} in mid-test"
-
-
 START, STOP = "start", "stop"
-"""What an order of ``EventKind.RECORD`` says."""
+"""Notes of a command of ``EventKind.RECORD``."""
+FORCED, UNDO = "force", "undo"
+"""Notes of a command of ``EventKind.TARE``, which may also have none."""
+CONFIRM_S = 3.0
+NO_LOAD = 1e-3  # share of the capacity
 ENDED = "ended by the operator"
-MOST_LETTERS = 500  # of a line
-WORDS = (
+MAX_LENGTH = 500  # of a line
+COMMANDS = (
     "start, stop, reference, tare, tare force, tare undo, pause, resume, note TEXT, alarm off, quit;"
     " short: s, r, t, t!, u, p, n TEXT, a, q"
 )
+WHAT = "the port for commands"
 _SHORT = {"s": "start", "r": "reference", "t": "tare", "t!": "tare force", "u": "tare undo", "a": "alarm off",
           "n": "note", "q": "quit"}  # fmt: skip
 _COMMANDS = {
@@ -142,9 +54,89 @@ _COMMANDS = {
     "alarm off": (EventKind.ALARM, ""),
 }
 
+EmitEvent = Callable[[EventKind, str, str, Level], None]  # kind, source, text, level
+
+
+class ControlRefused(Exception):
+    """Its text is why a command is not carried out, and what to do."""
+
+
+class TareableCell(Protocol):
+    """What ``TareControl`` uses of a load cell."""
+
+    @property
+    def info(self) -> LoadCellInfo: ...
+
+    def tare(self, *, force: bool = False) -> None: ...
+
+    def undo_tare(self) -> None: ...
+
+
+class TareControl:
+    """Carries out tare commands: at once without load or before the test, else only when given twice in 3 s.
+
+    A tare in mid-test moves the zero of every force after it: modulus, stress and yield point then have
+    two different zeros. So one key pressed by mistake must not do it, and a tare can be undone.
+
+    Parameters
+    ----------
+    cell : LoadCell
+    measured : callable
+        Whether anything has been measured yet; before that a tare falsifies nothing.
+    latest : callable giving LoadSample or None
+        The newest sample.
+    emit : callable taking kind, source, text and level
+    clock : callable giving monotonic seconds
+    """
+
+    def __init__(
+        self,
+        cell: TareableCell,
+        measured: Callable[[], bool],
+        latest: Callable[[], LoadSample | None],
+        emit: EmitEvent,
+        clock: Callable[[], float],
+    ) -> None:
+        self._cell, self._measured, self._latest = cell, measured, latest
+        self._emit, self._clock = emit, clock
+        self._confirm_t = -math.inf  # time of the last request for a confirmation
+
+    def tare(self, how: str = "") -> None:
+        """Tare; FORCED: whatever the load does; UNDO: restore the zero before the last tare.
+
+        Raises
+        ------
+        ControlRefused
+            There is no load cell, or the command must be given again.
+        """
+        if self._cell.info.protocol == "none":
+            raise ControlRefused("there is no load cell")
+        confirm_t, self._confirm_t = self._confirm_t, -math.inf
+        risk = "" if how else self._risk()
+        if how == UNDO:
+            self._emit(EventKind.TARE, "operator", "undo the last tare", "info")
+            self._cell.undo_tare()
+        elif risk and self._clock() - confirm_t > CONFIRM_S:
+            self._confirm_t = self._clock()
+            text = (
+                f"{risk}: forces before and after a tare have different zeros, and so have modulus and stress"
+            )
+            raise ControlRefused(f"{text}; repeat the command within {CONFIRM_S:g} s to do it")
+        else:
+            self._emit(EventKind.TARE, "operator", "tare" + (", forced" if how else ""), "info")
+            self._cell.tare(force=how == FORCED)
+
+    def _risk(self) -> str:
+        """Why a tare now would falsify what was measured; "" where it would not."""
+        sample, capacity = self._latest(), self._cell.info.capacity_N
+        if sample is None or not self._measured() or abs(sample.force) <= NO_LOAD * (capacity or 0.0):
+            return ""
+        load = "an unknown load" if math.isnan(sample.force) else f"{sample.force:.6g} N"
+        return f"not tared yet: {load} in mid-test"
+
 
 class Controls(Protocol):
-    """Who carries orders out; every method may be called from any thread."""
+    """The part of a run that carries out commands; every method may be called from any thread."""
 
     @property
     def paused(self) -> bool:
@@ -161,69 +153,66 @@ class Controls(Protocol):
         ...
 
     def command(self, kind: EventKind, note: str = "") -> str:
-        """Carry out a command and write it down as an event; what to add to ``ok``, mostly nothing.
+        """Carry out a command and log it as an event; the text after ``ok``, mostly empty.
 
-        ``note`` is START or STOP for a recording, one of the words of ``tare`` for a tare.
+        ``note`` is START or STOP for a recording, "", FORCED or UNDO for a tare.
 
         Raises
         ------
-        OrderRefused
-            It is not carried out.
+        ControlRefused
+            The command is not carried out.
         """
         ...
 
 
-def answer(line: str, orders: Controls) -> str:
+def answer(line: str, controls: Controls) -> str:
     """Carry out one line; ``ok``, ``ok: TEXT`` or ``no: REASON``, in one line."""
     try:
-        text = _carried_out(_in_full(line, orders), orders)
+        text = _execute(_expanded(line, controls), controls)
     except ControlRefused as refused:
         return f"no: {_in_one_line(refused)}"
     return f"ok: {_in_one_line(text)}" if text else "ok"
 
 
-def _in_full(line: str, orders: Controls) -> str:
-    """The order with its short form written out, its words one blank apart."""
-    if len(line) > MOST_LETTERS:
-        raise ControlRefused(f"an order has up to {MOST_LETTERS} letters")
+def _expanded(line: str, controls: Controls) -> str:
+    """The command with its short form expanded, its words separated by one blank."""
+    if len(line) > MAX_LENGTH:
+        raise ControlRefused(f"a command has up to {MAX_LENGTH} letters")
     first, *rest = line.split() or [""]
     if first == "p":
-        first = "resume" if orders.paused else "pause"
+        first = "resume" if controls.paused else "pause"
     return " ".join([_SHORT.get(first, first), *rest])
 
 
-def _carried_out(order: str, orders: Controls) -> str:
-    word, _, text = order.partition(" ")
-    if order in _COMMANDS:
-        return orders.command(*_COMMANDS[order])
-    if order == "quit":
-        orders.stop(ENDED)
+def _execute(command: str, controls: Controls) -> str:
+    word, _, text = command.partition(" ")
+    if command in _COMMANDS:
+        return controls.command(*_COMMANDS[command])
+    if command == "quit":
+        controls.stop(ENDED)
         return ""
     if word == "note" and text:
-        return orders.command(EventKind.NOTE, printable(text))
-    if order in ("help", "?"):
-        return WORDS
-    raise ControlRefused(f"{order!r} is no order; there are {WORDS}")
+        return controls.command(EventKind.NOTE, printable(text))
+    if command in ("help", "?"):
+        return COMMANDS
+    raise ControlRefused(f"{command!r} is no command; there are {COMMANDS}")
 
 
 def _in_one_line(text: object) -> str:
     return " ".join(printable(text).split())
 
 
-WHAT = "the port for orders"
-
-
 class ControlPort:
-    """Takes orders over TCP, from ``open`` to ``close``.
+    """Takes commands over TCP, from ``open`` to ``close``: a line in, an answer out.
 
     Parameters
     ----------
     where : str
         ``PORT`` or ``HOST:PORT``.
     token_file : str or None
-        Holds what a client must say first; needed beyond this machine.
+        File with the token that a client must send first; needed beyond this machine.
     screen : Screen
-        Told where it listens.
+        Shows the address.
 
     Raises
     ------
@@ -232,21 +221,21 @@ class ControlPort:
     """
 
     def __init__(self, where: str, token_file: str | None, screen: Screen) -> None:
-        place = ListenAddress.parse(where)
-        self._token, self._screen = read_token(place, token_file, WHAT), screen
-        self._host, self._listening = place.host, place.listen(WHAT)
+        address = ListenAddress.parse(where)
+        self._token, self._screen = read_token(address, token_file, WHAT), screen
+        self._host, self._listening = address.host, address.listen(WHAT)
         self._server: LineServer | None = None
 
-    def open(self, orders: Controls) -> int:
-        """Begin to take orders; the port."""
-        self._server = LineServer(self._listening, self._token, lambda line: answer(line, orders))
+    def open(self, controls: Controls) -> int:
+        """Begin to take commands; the port."""
+        self._server = LineServer(self._listening, self._token, lambda line: answer(line, controls))
         self._server.start()
         token = " (with a token)" if self._token else ""
-        self._screen.say(f"orders are taken at {self._host}:{self._server.port}{token}")
+        self._screen.say(f"commands are taken at {self._host}:{self._server.port}{token}")
         return self._server.port
 
     def close(self) -> None:
-        """Take no more orders; again without effect."""
+        """Take no more commands; again without effect."""
         if self._server is not None:
             self._server.close()
             self._server = None

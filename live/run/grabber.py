@@ -1,7 +1,7 @@
-"""The grab thread: drains the camera, hands frames to the recorder and makes bursts.
+"""The grab thread: takes frames from the camera, passes them to the recorder and averages bursts.
 
-It does nothing else, so that the camera is never kept waiting. The reference is taken from the
-first frames, and again on demand; everything after it becomes bursts.
+It does nothing else, so that the camera never waits. The reference is taken from the first frames, and
+again on demand; all frames after it become bursts.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from live.pipeline.run_state import RunState
 
 log = logging.getLogger(__name__)
 HELD_BYTES, HELD_S = 256_000_000, 1.0
-"""What may wait for the first measurement: bytes of means, seconds of frames."""
+"""Limits of the bursts that wait for the first measurement: bytes of means, seconds of frames."""
 
 
 @dataclass(frozen=True, slots=True)
 class GrabPlan:
-    """What becomes of the frames.
+    """How frames become bursts.
 
     Attributes
     ----------
     burst, reference_burst : int
         Frames in each.
     seconds : float, s
-        End after this time of frames.
+        The run ends after this time of frames.
     """
 
     burst: int
@@ -60,7 +60,7 @@ def _held_at_first(camera: CameraInfo) -> int:
 
 
 class Grabber:
-    """Runs the camera in a thread of its own.
+    """Runs the camera in its own thread.
 
     Parameters
     ----------
@@ -69,15 +69,15 @@ class Grabber:
     plan : GrabPlan
     run_state : RunState
     on_frame, on_burst : callable
-        Told of every frame, and of every burst; they must not wait.
+        Called with every frame, and with every burst; they must not block.
 
     Attributes
     ----------
     references : queue of ReferenceBurst
     bursts : LatestQueue of Burst
-        Newest wins; with a source that waits for its reader, nothing is skipped.
+        Keeps the newest; with a source that waits for its reader, nothing is skipped.
     error : Exception or None
-        Why the camera ended, where it did not end well.
+        The error that ended the camera.
     """
 
     def __init__(
@@ -102,15 +102,15 @@ class Grabber:
         self.fps = 0.0
         self._taker: ReferenceTaker | None = ReferenceTaker(plan.reference_burst)
         self._accumulator = BurstAccumulator(plan.burst)
-        self._fed = 0
-        self._muffler, self._unsaid = RateLimiter(), 0
+        self._unassigned = 0
+        self._limiter, self._unreported = RateLimiter(), 0
         self._first_t: float | None = None
         self._last_t: float | None = None
         self._retake = threading.Event()
         self._thread = threading.Thread(target=self._work, name="grab", daemon=True)
 
     def start(self) -> None:
-        """Begin to drain the camera, which must have been entered."""
+        """Begin to take frames from the camera, which must have been entered."""
         self._thread.start()
 
     def take_reference(self) -> None:
@@ -128,7 +128,7 @@ class Grabber:
 
     @property
     def running(self) -> bool:
-        """Whether frames may still come."""
+        """Whether frames may still arrive."""
         return self._thread.is_alive()
 
     def _work(self) -> None:
@@ -143,20 +143,20 @@ class Grabber:
             log.exception("the grab thread failed")
             self._ended_by(error, f"a defect in the grab thread: {error!r}")
         finally:
-            self._frame_counts.add(left_out=self._fed)
+            self._frame_counts.add(left_out=self._unassigned)
             self.bursts.close()
 
     def _ended_by(self, error: Exception, text: str) -> None:
         self.error = error
-        self._event_log.tell(EventKind.DEVICE, self._camera.info.address, text, "error")
+        self._event_log.emit(EventKind.DEVICE, self._camera.info.address, text, "error")
 
     def _take(self, frame: Frame) -> None:
         self._frame_counts.add(grabbed=1, lost=frame.lost_before)
         if frame.lost_before:
-            self._tell_loss(frame)
+            self._report_loss(frame)
         self._rate(frame)
         self._on_frame(frame)
-        self._fed += 1
+        self._unassigned += 1
         if self._retake.is_set():
             self._retake.clear()
             self._taker = ReferenceTaker(self._plan.reference_burst)
@@ -167,15 +167,15 @@ class Grabber:
             self._on_burst(burst)
             self.bursts.put(burst)
 
-    def _tell_loss(self, frame: Frame) -> None:
-        """Each gap stands in the session; the screen hears of them at most every two seconds."""
-        self._unsaid += frame.lost_before
-        if not self._muffler.due(frame.t):
+    def _report_loss(self, frame: Frame) -> None:
+        """Emit the lost frames at most every two seconds; the session has every gap."""
+        self._unreported += frame.lost_before
+        if not self._limiter.due(frame.t):
             return
-        text = f"{self._unsaid} frames were lost, the last before frame {frame.index}"
-        data = {"count": self._unsaid, "before": frame.index}
-        self._event_log.tell(EventKind.LOST, self._camera.info.address, text, "warning", data)
-        self._unsaid = 0
+        text = f"{self._unreported} frames were lost, the last before frame {frame.index}"
+        data = {"count": self._unreported, "before": frame.index}
+        self._event_log.emit(EventKind.LOST, self._camera.info.address, text, "warning", data)
+        self._unreported = 0
 
     def _feed_reference(self, taker: ReferenceTaker, frame: Frame) -> None:
         reference = taker.add(frame)
@@ -188,8 +188,8 @@ class Grabber:
         self.references.put(reference)
 
     def _used(self, n: int) -> None:
-        self._frame_counts.add(left_out=self._fed - n)
-        self._fed = 0
+        self._frame_counts.add(left_out=self._unassigned - n)
+        self._unassigned = 0
 
     def _rate(self, frame: Frame) -> None:
         if self._first_t is None:

@@ -1,7 +1,4 @@
-"""The keyboard during a run: single keys where it is a terminal, whole lines where it only looks like one.
-
-What single keys mean: orders at once, and lines that are typed first.
-"""
+"""Commands from the keyboard: single keys where the terminal allows it, else whole lines."""
 
 from __future__ import annotations
 
@@ -20,32 +17,39 @@ from live.run.control import ENDED, Controls, answer
 
 HELP = (
     "keys: r new reference, t tare (T whatever the load does, u undo it), p pause/go on, s start recording,"
-    " n note, a alarm off, : any order, qq quit, ? the orders"
+    " n note, a alarm off, : any command, qq quit, ? the commands"
 )
-AT_ONCE = {"r": "r", "t": "t", "T": "t!", "u": "u", "p": "p", "s": "s", "a": "a", "?": "?"}
-AGAIN_S = 3.0
+LINES_HELP = (
+    "keys (with Enter): r new reference, t tare (t! whatever the load does, u undo it), p pause/go on,"
+    " s start recording, n TEXT note, a alarm off, q quit; or the words: ? lists them"
+)
+SINGLE_KEYS = {"r": "r", "t": "t", "T": "t!", "u": "u", "p": "p", "s": "s", "a": "a", "?": "?"}
+QUIT_AGAIN_S = 3.0
 """The second q must come within this time: one key alone ends no test."""
-ENTER, BACK, ESCAPE = ("\r", "\n"), ("\x7f", "\b"), "\x1b"
+ENTER, BACKSPACE, ESCAPE = ("\r", "\n"), ("\x7f", "\b"), "\x1b"
+_POLL_S = 0.5
 
 
 class Keys:
-    """Takes what is typed, letter by letter.
+    """Reads typed letters: single keys are commands, ``n`` and ``:`` begin a line that is typed first.
 
     Parameters
     ----------
-    orders : Controls
+    controls : Controls
     screen : Screen
-        Shows a line while it is typed, and answers that say more than ok.
+        Shows a line while it is typed, and answers other than ``ok``.
     clock : callable giving seconds
     """
 
-    def __init__(self, orders: Controls, screen: Screen, clock: Callable[[], float] = time.monotonic) -> None:
-        self._orders, self._screen, self._clock = orders, screen, clock
+    def __init__(
+        self, controls: Controls, screen: Screen, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._controls, self._screen, self._clock = controls, screen, clock
         self._line: str | None = None
-        self._quit_asked = -math.inf
+        self._quit_t = -math.inf
 
     def type(self, text: str) -> None:
-        """Take letters as they came; one that begins with an escape is a key without a letter."""
+        """Take typed letters; a text that begins with an escape is a key without a letter."""
         if text.startswith(ESCAPE) and len(text) > 1:
             return
         for letter in text:
@@ -55,8 +59,8 @@ class Keys:
                 self._edit(letter)
 
     def _press(self, letter: str) -> None:
-        if letter in AT_ONCE:
-            self._order(AT_ONCE[letter])
+        if letter in SINGLE_KEYS:
+            self._command(SINGLE_KEYS[letter])
         elif letter == "n":
             self._show("note ")
         elif letter == ":":
@@ -71,10 +75,10 @@ class Keys:
         if letter in ENTER:
             self._show(None)
             if line.strip() not in ("", "note"):
-                self._order(line)
+                self._command(line)
         elif letter == ESCAPE:
             self._show(None)
-        elif letter in BACK:
+        elif letter in BACKSPACE:
             self._show(line[:-1])
         elif letter.isprintable():
             self._show(line + letter)
@@ -83,37 +87,30 @@ class Keys:
         self._line = line
         self._screen.prompt(None if line is None else f": {line}_")
 
-    def _order(self, line: str) -> None:
-        if (said := answer(line, self._orders)) != "ok":
-            self._screen.say(said)
+    def _command(self, line: str) -> None:
+        if (text := answer(line, self._controls)) != "ok":
+            self._screen.say(text)
 
     def _quit(self) -> None:
-        asked, self._quit_asked = self._quit_asked, self._clock()
-        if self._quit_asked - asked <= AGAIN_S:
-            self._orders.stop(ENDED)
+        before, self._quit_t = self._quit_t, self._clock()
+        if self._quit_t - before <= QUIT_AGAIN_S:
+            self._controls.stop(ENDED)
         else:
-            self._screen.say(f"q again within {AGAIN_S:g} s ends the test")
-
-
-LINES = (
-    "keys (with Enter): r new reference, t tare (t! whatever the load does, u undo it), p pause/go on,"
-    " s start recording, n TEXT note, a alarm off, q quit; or the words: ? lists them"
-)
-_LOOK_S = 0.5
+            self._screen.say(f"q again within {QUIT_AGAIN_S:g} s ends the test")
 
 
 class Keyboard:
-    """Listens in a thread of its own, from ``start`` to ``close``."""
+    """Reads the keyboard in its own thread, from ``start`` to ``close``."""
 
-    def __init__(self, orders: Controls, stream: TextIO, screen: Screen) -> None:
-        self._orders, self._stream, self._screen = orders, stream, screen
+    def __init__(self, controls: Controls, stream: TextIO, screen: Screen) -> None:
+        self._controls, self._stream, self._screen = controls, stream, screen
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._work, name="keyboard", daemon=True)
         self._terminal = _Terminal.of(stream)
 
     def start(self) -> None:
-        """Begin; says which keys there are."""
-        self._screen.say(HELP if self._terminal else LINES)
+        """Show the keys, and begin to read."""
+        self._screen.say(HELP if self._terminal else LINES_HELP)
         self._thread.start()
 
     def join(self, seconds: float) -> None:
@@ -121,11 +118,11 @@ class Keyboard:
         self._thread.join(seconds)
 
     def close(self) -> None:
-        """Listen no more; the terminal is again as it was."""
+        """Stop reading, and restore the terminal."""
         self._closed.set()
         if self._terminal is not None:
-            self._thread.join(2 * _LOOK_S)
-            self._terminal.put_back()
+            self._thread.join(2 * _POLL_S)
+            self._terminal.restore()
 
     def _work(self) -> None:
         with contextlib.suppress(OSError, ValueError):
@@ -136,48 +133,48 @@ class Keyboard:
 
     def _take_lines(self) -> None:
         for text in self._stream:
-            if text.strip() and (said := answer(text, self._orders)) != "ok":
-                self._screen.say(said)
+            if text.strip() and (reply := answer(text, self._controls)) != "ok":
+                self._screen.say(reply)
 
     def _take_keys(self, terminal: _Terminal) -> None:
-        keys = Keys(self._orders, self._screen)
+        keys = Keys(self._controls, self._screen)
         for text in self._typed(terminal):
             keys.type(text)
 
     def _typed(self, terminal: _Terminal) -> Iterator[str]:
         decoder = codecs.getincrementaldecoder("utf-8")("replace")
         while not self._closed.is_set():
-            if not terminal.single():
-                self._closed.wait(_LOOK_S)  # what is typed is for somebody else
-            elif select.select([terminal.number], [], [], _LOOK_S)[0] and terminal.ours:
-                data = os.read(terminal.number, 256)
+            if not terminal.set_single_keys():
+                self._closed.wait(_POLL_S)  # another program has the terminal
+            elif select.select([terminal.descriptor], [], [], _POLL_S)[0] and terminal.in_foreground:
+                data = os.read(terminal.descriptor, 256)
                 if not data:
                     return
                 yield decoder.decode(data)
 
 
-def listen(orders: Controls, stream: TextIO | None, screen: Screen) -> Keyboard | None:
-    """Listen to ``stream``, where it is a terminal."""
+def listen(controls: Controls, stream: TextIO | None, screen: Screen) -> Keyboard | None:
+    """Read commands from ``stream``, where it is a terminal."""
     if stream is None or stream.closed or not stream.isatty():
         return None
-    keyboard = Keyboard(orders, stream, screen)
+    keyboard = Keyboard(controls, stream, screen)
     keyboard.start()
     return keyboard
 
 
 class _Terminal:
-    """A terminal that gives each key at once, unseen, while it is this program's.
+    """A terminal that gives each key at once and without echo while the program is in the foreground.
 
-    A shell that stopped the program (Ctrl-Z) has its own way with the terminal, and leaves it so when the
-    program goes on: it is set again. In the background it is left alone: touching it would stop the program.
+    A shell that stopped the program (Ctrl-Z) changes the terminal and leaves it so when the program
+    continues: it is set again. In the background the terminal is not changed: that would stop the program.
     """
 
-    def __init__(self, number: int, before: Any) -> None:
-        self.number, self._before = number, before
+    def __init__(self, descriptor: int, before: Any) -> None:
+        self.descriptor, self._before = descriptor, before
 
     @classmethod
     def of(cls, stream: TextIO) -> _Terminal | None:
-        """The terminal that ``stream`` is, set to single keys; None where that cannot be."""
+        """The terminal of ``stream``, set to single keys; None where that is not possible."""
         try:
             import termios
         except ImportError:  # another system
@@ -186,34 +183,34 @@ class _Terminal:
             terminal = cls(stream.fileno(), termios.tcgetattr(stream.fileno()))
         except (OSError, ValueError, termios.error):
             return None
-        return terminal if terminal.single() else None
+        return terminal if terminal.set_single_keys() else None
 
     @property
-    def ours(self) -> bool:
+    def in_foreground(self) -> bool:
         """Whether the program is in the foreground."""
         try:
-            return os.tcgetpgrp(self.number) == os.getpgrp()
+            return os.tcgetpgrp(self.descriptor) == os.getpgrp()
         except OSError:
             return False
 
-    def single(self) -> bool:
-        """Have it give single keys, where it does not; whether it does."""
+    def set_single_keys(self) -> bool:
+        """Set it to single keys, where it is not; whether it is then."""
         import termios
         import tty
 
-        if not self.ours:
+        if not self.in_foreground:
             return False
         try:
-            if termios.tcgetattr(self.number)[tty.LFLAG] & termios.ICANON:
-                tty.setcbreak(self.number, termios.TCSADRAIN)
+            if termios.tcgetattr(self.descriptor)[tty.LFLAG] & termios.ICANON:
+                tty.setcbreak(self.descriptor, termios.TCSADRAIN)
         except (OSError, ValueError, termios.error):
             return False
         return True
 
-    def put_back(self) -> None:
-        """As it was."""
+    def restore(self) -> None:
+        """Set it as it was before."""
         import termios
 
-        if self.ours:
+        if self.in_foreground:
             with contextlib.suppress(OSError, ValueError, termios.error):
-                termios.tcsetattr(self.number, termios.TCSADRAIN, self._before)
+                termios.tcsetattr(self.descriptor, termios.TCSADRAIN, self._before)

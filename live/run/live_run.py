@@ -1,8 +1,7 @@
 """A live run: devices, threads and outputs joined.
 
-Threads: grab (``Grabber``), load (``LoadThread``), record (``Recorder``), one for each consumer that may
-block, and one that measures. Bursts reach it through a one-place mailbox, so that it
-always has the newest.
+Threads: grab (``Grabber``), load (``LoadThread``), record (``Recorder``), measure (``MeasureThread``) and
+one for each consumer that may block. The measuring thread takes the newest burst each time (``LatestQueue``).
 """
 
 from __future__ import annotations
@@ -27,26 +26,26 @@ from live.results.writer import write_results
 from live.run.burst_queue import TAKING, BurstQueue
 from live.run.control import ControlRefused
 from live.run.grabber import Grabber, GrabPlan
-from live.run.load_thread import LoadThread, tare_orders
-from live.run.measuring import Measuring
+from live.run.load_thread import LoadThread, tare_controls
+from live.run.measuring import MeasureThread
 from live.run.outcome import Outcome, StopSignal
 from live.run.pre_trigger import PreTriggerBuffer
 from live.run.prepared_run import PreparedRun, set_up
 from live.run.recorder import open_recording
 from live.setup.devices import Rig, open_rig
 
-_ARMED = "; nothing is recorded until start is ordered"
+_ARMED = "; nothing is recorded until the command start"
 _SILENT_S = 1.0
 _HINT_AFTER = 3  # times the frames of a reference
 _GRACE_S = 5.0  # a timed run without frames ends this much later
 INTERRUPTED = "interrupted"
-"""The reason that makes exit code 130."""
+"""The reason to stop that gives exit code 130."""
 
 
 class LiveRun:
-    """A test that runs from the moment it is entered; leaving it closes everything.
+    """A test: entering it starts the threads, leaving it closes everything.
 
-    It carries out orders (``live.run.control.Controls``) from any thread.
+    It carries out commands (``live.run.control.Controls``) from any thread.
 
     Parameters
     ----------
@@ -74,14 +73,16 @@ class LiveRun:
         seconds = prepared.config.output.seconds
         self._deadline = math.inf if seconds is None else time.monotonic() + seconds + _GRACE_S
         plan = GrabPlan.of(prepared.config, prepared.bursts)
-        self.grabber = Grabber(self._rig.camera, plan, run_state, self._take, self._averaged)
+        self.grabber = Grabber(self._rig.camera, plan, run_state, self._take, self._take_burst)
         run_state.health.began_t, self._hinted = time.monotonic(), False
         self._has_recorded = self.recording
         self._burst_queue = BurstQueue(self.grabber, run_state.frame_counts, self._idle)
         self._load = LoadThread(self._rig.load, run_state, outputs, recording)
-        self._tares = tare_orders(self._rig.load, run_state)
+        self._tares = tare_controls(self._rig.load, run_state)
         latency = LatencyMonitor(lambda: recording.backlog if recording else 0.0)
-        self._measuring = Measuring(prepared, run_state, outputs, self._burst_queue, latency, self._show)
+        self._measure_thread = MeasureThread(
+            prepared, run_state, outputs, self._burst_queue, latency, self._show
+        )
 
     # -- what may be called from other threads ------------------------------------------------
 
@@ -97,7 +98,7 @@ class LiveRun:
 
     @property
     def run_state(self) -> RunState:
-        """What is kept of the test so far."""
+        """Events, counts, loads and history of the test so far."""
         return self._run_state
 
     @property
@@ -107,44 +108,44 @@ class LiveRun:
 
     def stop(self, reason: str) -> None:
         """End the run cleanly, soon."""
-        self._stop.ask(reason)
+        self._stop.request(reason)
 
     def command(self, kind: EventKind, note: str = "") -> str:
-        """Carry out a command of the operator and write it down; raises OrderRefused where it cannot be."""
+        """Carry out a command of the operator and log it; raises ControlRefused where that is not possible."""
         if kind is EventKind.TARE:
-            self._tares.order(note)
+            self._tares.tare(note)
         elif kind in (EventKind.PAUSE, EventKind.RESUME):
             self._pause(kind is EventKind.PAUSE)
         elif kind is EventKind.NEW_REFERENCE:
-            self._told(kind, "a new reference is taken from the next frames")
+            self._emit(kind, "a new reference is taken from the next frames")
             self.grabber.take_reference()
         elif kind is EventKind.NOTE:
-            self._told(kind, note)
+            self._emit(kind, note)
         elif kind is EventKind.ALARM:
             self._silence()
         elif kind is EventKind.RECORD:
             if self._recording is None:
-                raise ControlRefused("this run records nothing, as it was asked (--no-record)")
-            said = self._recording.order(note)
+                raise ControlRefused("this run records nothing (--no-record)")
+            text = self._recording.command(note)
             self._has_recorded = True
-            return said
+            return text
         return ""
 
     def _pause(self, wanted: bool) -> None:
         if wanted is self._burst_queue.paused:
             raise ControlRefused("measuring is paused already" if wanted else "measuring is not paused")
         kind = EventKind.PAUSE if wanted else EventKind.RESUME
-        self._told(kind, "measuring is paused" if wanted else "measuring goes on")
+        self._emit(kind, "measuring is paused" if wanted else "measuring goes on")
         self._burst_queue.paused = wanted
 
     def _silence(self) -> None:
         names = self._run_state.alarms.silence()
         if not names:
             raise ControlRefused("no alarm is on")
-        self._told(EventKind.ALARM, f"silenced: {', '.join(names)}")
+        self._emit(EventKind.ALARM, f"silenced: {', '.join(names)}")
 
-    def _told(self, kind: EventKind, text: str) -> None:
-        self._run_state.event_log.tell(kind, "operator", text)
+    def _emit(self, kind: EventKind, text: str) -> None:
+        self._run_state.event_log.emit(kind, "operator", text)
 
     # -- the run ------------------------------------------------------------------------------
 
@@ -152,25 +153,25 @@ class LiveRun:
         with ExitStack() as stack:
             stack.enter_context(self._rig.camera)
             stack.enter_context(self._rig.load)
-            self._stop.then(self._rig.camera.stop)
+            self._stop.on_request(self._rig.camera.stop)
             waits = "" if self.recording or self._recording is None else _ARMED
             self._run_state.health.state = self.state
-            self._run_state.event_log.tell(EventKind.START, "phasedic", f"the test begins{waits}")
+            self._run_state.event_log.emit(EventKind.START, "phasedic", f"the test begins{waits}")
             self._load.start()
             self.grabber.start()
             stack.pop_all()
         return self
 
-    def to_the_end(self) -> None:
-        """Wait until the camera has ended and all is measured; raises where the start has failed."""
+    def wait(self) -> None:
+        """Measure until the camera has ended; raises where the start has failed."""
         try:
-            self._measuring.to_the_end()
+            self._measure_thread.run()
         except PhasedicError:
             self.stop("the start failed")
             raise
 
     def __exit__(self, *_: object) -> None:
-        """Close everything, whatever happened before; the recording last, so that it knows all."""
+        """End all threads and close the devices, whatever happened before."""
         self._rig.camera.stop()
         self._rig.load.stop()
         self.grabber.bursts.close()
@@ -183,42 +184,42 @@ class LiveRun:
 
     @property
     def exit_code(self) -> int:
-        """What the run says to scripts, once it has been left."""
+        """The exit code of the run, after it has been left."""
         error = self.grabber.error
         if error is not None:
             return error.exit_code if isinstance(error, PhasedicError) else 1
-        if failure := self._load.failure or self._measuring.failure:
+        if failure := self._load.failure or self._measure_thread.failure:
             return failure
         if self._stop.reason == INTERRUPTED:
             return 130
         frame_counts = self._run_state.frame_counts
         unwritten = self._recording is not None and self._recording.failed is not None
         lossy = frame_counts.loss or self._outputs.failed or unwritten
-        return 5 if lossy or not frame_counts.adds_up or not self._run_state.history.told_something else 0
+        return 5 if lossy or not frame_counts.adds_up or not self._run_state.history.has_values else 0
 
     def _take(self, frame: Frame) -> None:
         health = self._run_state.health
         health.frame_t, health.fps = time.monotonic(), self.grabber.fps
         if self._recording is not None:
-            self._recording.frame(frame, needed=self.grabber.taking_reference)
+            self._recording.frame(frame, is_reference=self.grabber.taking_reference)
         self._outputs.frame(frame)
 
-    def _averaged(self, burst: Burst) -> None:
+    def _take_burst(self, burst: Burst) -> None:
         if self._recording is not None:
-            self._recording.burst(burst, needed=self.grabber.taking_reference)
+            self._recording.burst(burst, is_reference=self.grabber.taking_reference)
 
     def _idle(self, words: str) -> None:
-        """Between bursts; a camera that gives nothing must not keep a timed run alive for ever."""
+        """Called between bursts; ends a timed run whose camera gives no frames."""
         if words or self.paused:
             silent = not time.monotonic() - self._run_state.health.frame_t < _SILENT_S
             self._show(words if silent or not self._has_measured else "")
         if words == TAKING:
             self._hint_once()
-        if time.monotonic() > self._deadline and not self._stop.asked:
+        if time.monotonic() > self._deadline and not self._stop.requested:
             self.stop("the time is over")
 
     def _hint_once(self) -> None:
-        """A reference needs frames in a row: where they are lost again and again, say what helps."""
+        """A reference needs frames without a gap: warn once where frames are lost again and again."""
         n, counts = self._prepared.bursts[0], self._run_state.frame_counts
         if self._hinted or self._has_measured or not counts.lost or counts.grabbed < _HINT_AFTER * n:
             return
@@ -227,7 +228,7 @@ class LiveRun:
             f"no {n} frames in a row for the reference, {counts.lost} were lost: lower the rate of the camera, or take"
             " --reference-burst smaller"
         )
-        self._run_state.event_log.tell(EventKind.MEASUREMENT, "reference", text, "warning")
+        self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "warning")
 
     def _show(self, words: str = "") -> None:
         """Renew the status line; called with every measurement."""
@@ -241,7 +242,7 @@ class LiveRun:
 
     @property
     def state(self) -> str:
-        """What is done with the frames, in a word or two."""
+        """What is done with the frames: "REC", "ARMED" ..."""
         if self.recording:
             state = "REC"
         elif self._recording is not None:
@@ -266,11 +267,11 @@ def run_live(
     config : Config
     screen : Screen
     stop : StopSignal, optional
-        Ends the test from anywhere, also while the devices are being opened.
+        Ends the test from any thread, also while the devices are opened.
     consumers : callable taking RunInfo and RunState
         Makes the consumers of the test; ``live.commands.consumers`` has the standard ones.
     on_start : callable taking the LiveRun
-        Called once when the test has begun, for a keyboard and the like.
+        Called once when the test has begun, to attach keyboard and other controls.
 
     Raises
     ------
@@ -291,7 +292,12 @@ def run_live(
         for line in announcement(rig, prepared.folder):
             screen.say(line)
         about = RunInfo(
-            prepared.config, prepared.folder, rig.camera.info, prepared.plan.grid, prepared.start, stop.ask
+            prepared.config,
+            prepared.folder,
+            rig.camera.info,
+            prepared.plan.grid,
+            prepared.start,
+            stop.request,
         )
         outputs = Outputs(
             consumers(about, run_state), run_state.loads, run_state.event_log, run_state.history
@@ -303,7 +309,7 @@ def run_live(
 
 
 def announcement(rig: Rig, folder: Path) -> Iterator[str]:
-    """The devices, what is to be said of them, and where the files will lie."""
+    """The lines on the devices, their warnings, and the folder of the files."""
     c, cell = rig.camera.info, rig.load.info
     fps = f", {c.fps:g} fps" if c.fps else ""
     yield f"camera: {c.name}, {c.width} x {c.height} px, {c.bits} bits{fps}"
@@ -313,7 +319,7 @@ def announcement(rig: Rig, folder: Path) -> Iterator[str]:
 
 
 def device_names(config: Config) -> dict[str, str]:
-    """What camera and load cell are called on the screen; nothing where both have one address."""
+    """Names of camera and load cell on the screen, by address; none where both have the same address."""
     names = {config.load.address: "load cell", config.camera.address: "camera"}
     return names if len(names) == 2 else {}
 
@@ -326,7 +332,7 @@ def _with_outputs(
     stop: StopSignal,
     on_start: Callable[[LiveRun], object],
 ) -> int:
-    """The run proper; outputs and recording are closed whatever happens, the recording last."""
+    """The run itself; outputs and recording are closed in any case, the recording last, with all events."""
     with ExitStack() as closing:
         closing.callback(outputs.end)
         config = json.dumps(prepared.config.as_dict(), indent=1)
@@ -337,7 +343,7 @@ def _with_outputs(
         live = LiveRun(prepared, run_state, outputs, recording, screen, stop)
         with live:
             on_start(live)
-            live.to_the_end()
+            live.wait()
     return live.exit_code
 
 
@@ -346,6 +352,6 @@ def _close(
 ) -> None:
     outputs.end()
     reason = stop.reason or "camera ended"
-    run_state.event_log.tell(EventKind.STOP, "phasedic", f"the test ends: {reason}")
+    run_state.event_log.emit(EventKind.STOP, "phasedic", f"the test ends: {reason}")
     if recording is not None:
         recording.close({"stop_reason": reason})

@@ -1,4 +1,4 @@
-"""The load thread: drains the load cell into the log, the recording and the outputs."""
+"""The load thread: passes the samples of the load cell to the load log, the recording and the outputs."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ from acquire.errors import PhasedicError
 from acquire.events import EventKind
 from acquire.load_cell import LoadCell
 from live.pipeline.consumer_thread import Outputs
-from live.pipeline.latency import LOAD, yield_to_others
+from live.pipeline.latency import LOAD, lower_priority
 from live.pipeline.run_state import RunState
-from live.run.control import TareControls
+from live.run.control import TareControl
 from live.run.pre_trigger import PreTriggerBuffer
 
 log = logging.getLogger(__name__)
 
 
 class LoadThread:
-    """Drains ``cell`` in a thread of its own; a trouble there never ends the images.
+    """Reads ``cell`` in its own thread; a failure there never ends the images.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ class LoadThread:
     Attributes
     ----------
     failure : int
-        The exit code of what ended the load; 0 where all was well.
+        The exit code of the error that ended the load; 0 without one.
     """
 
     def __init__(
@@ -52,7 +52,7 @@ class LoadThread:
             self._thread.join()
 
     def _work(self) -> None:
-        yield_to_others(LOAD)
+        lower_priority(LOAD)
         try:
             for sample in self._cell:
                 self._run_state.loads.append(sample)
@@ -66,17 +66,17 @@ class LoadThread:
                 log.exception("the load thread failed")
             self.failure = getattr(error, "exit_code", 1)
             text = f"the load is lost, images go on: {error}"
-            self._run_state.event_log.tell(EventKind.DEVICE, self._cell.info.address, text, "error")
+            self._run_state.event_log.emit(EventKind.DEVICE, self._cell.info.address, text, "error")
         finally:
             self._run_state.loads.close()
 
 
-def tare_orders(cell: LoadCell, run_state: RunState) -> TareControls:
-    """What carries out orders to tare ``cell`` in this test."""
+def tare_controls(cell: LoadCell, run_state: RunState) -> TareControl:
+    """The control that tares ``cell`` in this test."""
 
     def measured() -> bool:
         return bool(run_state.history.time_steps)
 
-    return TareControls(
-        cell, measured, lambda: run_state.loads.latest, run_state.event_log.tell, time.monotonic
+    return TareControl(
+        cell, measured, lambda: run_state.loads.latest, run_state.event_log.emit, time.monotonic
     )

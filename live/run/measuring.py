@@ -1,7 +1,4 @@
-"""Measuring live: the reference, then burst after burst, whatever else happens.
-
-Taking the reference: a still specimen, checked for motion, its force and noise written down.
-"""
+"""The measuring thread: takes a reference without motion, then measures burst after burst."""
 
 from __future__ import annotations
 
@@ -16,7 +13,7 @@ from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
 from live.pipeline.consumer_thread import Outputs
-from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample, yield_to_others
+from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample, lower_priority
 from live.pipeline.measure import SmearGuard
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import ReferenceBurst, motion_between
@@ -25,10 +22,11 @@ from live.run.burst_queue import BurstQueue
 from live.run.prepared_run import PreparedRun
 from live.setup.prepared import PreparedKernel
 
+log = logging.getLogger(__name__)
 TRIES = 3
 
 
-class ReferenceStep:
+class ReferenceSelector:
     """Takes references until one is still.
 
     Parameters
@@ -54,80 +52,77 @@ class ReferenceStep:
         reference = self._burst_queue.next_reference()
         if reference is None:
             text = f"the camera ended before the reference was complete ({self._run_state.frame_counts.grabbed} frames)"
-            self._run_state.event_log.tell(EventKind.MEASUREMENT, "reference", text, "error")
+            self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "error")
             return None
         what = f"the reference from {self._prepared.config.camera.address}"
         for attempt in itertools.count(1):
             ready = self._prepared.plan.on(reference.burst, what)
-            moved = _moved(ready, reference)
-            if moved <= self._prepared.config.measure.reference_shift_px:
+            motion = _motion(ready, reference)
+            if motion <= self._prepared.config.measure.reference_shift_px:
                 break
-            again = self._another(moved, attempt)
-            if again is None and math.isnan(moved):
+            again = self._another(motion, attempt)
+            if again is None and math.isnan(motion):
                 text = "no reference could be measured; keep the specimen still, look at light and focus"
-                self._run_state.event_log.tell(EventKind.MEASUREMENT, "reference", text, "error")
+                self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "error")
                 return None
             if again is None:
-                text = f"the reference moved by {moved:.3f} px; keep the specimen still when strains must be absolute"
-                self._run_state.event_log.tell(EventKind.MEASUREMENT, "reference", text, "warning")
+                text = f"the reference moved by {motion:.3f} px; keep the specimen still when strains must be absolute"
+                self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "warning")
                 break
             self._run_state.frame_counts.add(reference=-reference.burst.n, left_out=reference.burst.n)
             reference = again
-        self._tell(reference.burst, moved)
+        self._report(reference.burst, motion)
         return ready
 
-    def _another(self, moved: float, attempt: int) -> ReferenceBurst | None:
-        """The next one; None where the run ends, or where a reference that moved has to do.
+    def _another(self, motion: float, attempt: int) -> ReferenceBurst | None:
+        """The next reference; None where the run ends, or where one that moved must be used.
 
-        With one that cannot be measured nothing can be: until there is a better one, it is tried again.
+        A reference that cannot be measured is never used: the next one is tried until one is good.
         """
-        if attempt >= TRIES and not math.isnan(moved):
+        if attempt >= TRIES and not math.isnan(motion):
             return None
-        what = f"the picture moved by {moved:.3f} px during the reference burst"
-        if math.isnan(moved):
+        what = f"the picture moved by {motion:.3f} px during the reference burst"
+        if math.isnan(motion):
             what = "the reference burst cannot be measured (fast motion, glare, no focus?)"
         if attempt < TRIES:
-            self._run_state.event_log.tell(
+            self._run_state.event_log.emit(
                 EventKind.MEASUREMENT, "reference", f"{what}; taking another", "warning"
             )
         elif attempt == TRIES:
             text = f"{what}; tried again until the picture is still"
-            self._run_state.event_log.tell(EventKind.MEASUREMENT, "reference", text, "error")
-        return self._burst_queue.another_reference()
+            self._run_state.event_log.emit(EventKind.MEASUREMENT, "reference", text, "error")
+        return self._burst_queue.retake_reference()
 
-    def _tell(self, burst: Burst, moved: float) -> None:
+    def _report(self, burst: Burst, motion: float) -> None:
         force, n = self._run_state.loads.mean(burst.t - burst.duration / 2, burst.t + burst.duration / 2)
         data = {
             "first": burst.first_index,
             "last": burst.last_index,
             "n": burst.n,
-            "noise_GL": _plain(burst.noise),
-            "force_N": _plain(force),
-            "shift_px": _plain(moved),
+            "noise_GL": _or_none(burst.noise),
+            "force_N": _or_none(force),
+            "shift_px": _or_none(motion),
         }
-        noise = f", noise of one {burst.noise:.2f} GL, motion {moved:.4f} px" if burst.n > 1 else ""
+        noise = f", noise of one {burst.noise:.2f} GL, motion {motion:.4f} px" if burst.n > 1 else ""
         text = f"reference: {burst.n} frames{noise}" + (f", force {force:.2f} N" if n else "")
         self._run_state.event_log.record(
             Event(burst.t, EventKind.REFERENCE, "measurement", text, "info", data)
         )
 
 
-def _moved(ready: PreparedKernel, reference: ReferenceBurst) -> float:
-    """How far it moved within the burst, px; NaN where it cannot be measured, which is not still."""
+def _motion(ready: PreparedKernel, reference: ReferenceBurst) -> float:
+    """The motion within the burst, px; NaN where it cannot be measured, and then it is not still."""
     if reference.halves is None:
         return 0.0
     return motion_between(ready.kernel, *reference.halves, ready.plan.correct)
 
 
-def _plain(value: float) -> float | None:
+def _or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-log = logging.getLogger(__name__)
-
-
-class Measuring:
-    """Measures what the feed gives; a trouble here never ends the recording.
+class MeasureThread:
+    """Measures the bursts of the queue; a failure here never ends the recording.
 
     Parameters
     ----------
@@ -165,8 +160,8 @@ class Measuring:
         self._refused: PhasedicError | None = None
         self._thread = threading.Thread(target=self._work, name="measure", daemon=True)
 
-    def to_the_end(self) -> None:
-        """Measure, in a thread of its own, until the camera ends.
+    def run(self) -> None:
+        """Measure in the thread until the camera ends.
 
         Raises
         ------
@@ -179,11 +174,11 @@ class Measuring:
             raise self._refused
 
     def _work(self) -> None:
-        yield_to_others(MEASURE)
+        lower_priority(MEASURE)
         try:
-            ready = ReferenceStep(self._prepared, self._run_state, self._burst_queue).take()
+            ready = ReferenceSelector(self._prepared, self._run_state, self._burst_queue).take()
             if ready is None:
-                self._burst_queue.let_pass()
+                self._burst_queue.skip_rest()
             else:
                 self._measure(ready)
         except PhasedicError as error:
@@ -192,8 +187,8 @@ class Measuring:
             log.exception("the measurement failed")
             self.failure = 1
             text = f"measuring has stopped by a defect, recording goes on: {error!r}"
-            self._run_state.event_log.tell(EventKind.MEASUREMENT, "measurement", text, "error")
-            self._burst_queue.let_pass()
+            self._run_state.event_log.emit(EventKind.MEASUREMENT, "measurement", text, "error")
+            self._burst_queue.skip_rest()
 
     def _measure(self, ready: PreparedKernel) -> None:
         event_log = self._run_state.event_log
@@ -204,8 +199,8 @@ class Measuring:
             m = self._timed(m)
             self._outputs.add(m)
             self._show()
-            guard.look(m.burst)
-            self._keep_pace(m)
+            guard.check(m.burst)
+            self._check_latency(m)
 
     def _timed(self, m: Measurement) -> Measurement:
         """With its latency, where the frames were stamped by a clock of this machine."""
@@ -213,11 +208,11 @@ class Measuring:
             return m
         return m.with_latency(time.monotonic() - (m.t + m.burst.duration / 2))
 
-    def _keep_pace(self, m: Measurement) -> None:
+    def _check_latency(self, m: Measurement) -> None:
         if math.isnan(m.time_step.latency_s):
             return
-        lag = LatencySample(m.t, m.time_step.latency_s, m.time_step.measure_s)
-        warning = self._latency.look(lag, m.burst.n / max(self._burst_queue.fps, 1e-3))
+        sample = LatencySample(m.t, m.time_step.latency_s, m.time_step.measure_s)
+        warning = self._latency.check(sample, m.burst.n / max(self._burst_queue.fps, 1e-3))
         self._run_state.health.latency_p95_s = self._latency.p95_s
         if warning:
             event = Event(m.t, EventKind.MEASUREMENT, "measurement", warning, "warning")

@@ -1,7 +1,4 @@
-"""What a run leaves behind.
-
-The wish to end a test: said once, from anywhere, heard by everybody.
-"""
+"""The end of a run: the signal that stops it from any thread, and its outcome."""
 
 from __future__ import annotations
 
@@ -23,18 +20,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outcome:
-    """What a run leaves behind.
+    """The result of a run.
 
     Attributes
     ----------
     folder : Path
     config : Config
-        As it was in force.
+        As used in the run.
     run_state : RunState
-        Events, ledger, loads, and the means of every measured instant.
+        Events, frame counts, loads, and the means of every time step.
     outputs : Outputs
     rig : Rig
-        Closed; its specimen tells the truth of a simulated test.
+        Closed; its specimen has the true strain of a simulated test.
     grid : ZoiGrid
     exit_code : int
     """
@@ -49,33 +46,33 @@ class Outcome:
 
 
 class StopSignal:
-    """Asked from any thread or signal handler; the first reason counts.
+    """Stops a run from any thread or signal handler; the first reason counts.
 
     Attributes
     ----------
     reason : str
-        Empty until it was asked.
+        Empty until the stop is requested.
     """
 
     def __init__(self) -> None:
         self.reason = ""
-        self._asked = threading.Event()
-        self._hearers: list[Callable[[], None]] = []
+        self._requested = threading.Event()
+        self._callbacks: list[Callable[[], None]] = []
 
-    def ask(self, reason: str) -> None:
+    def request(self, reason: str) -> None:
         """End the test cleanly, soon."""
         self.reason = self.reason or reason
-        self._asked.set()
-        for hear in list(self._hearers):
-            hear()
+        self._requested.set()
+        for callback in list(self._callbacks):
+            callback()
 
-    def then(self, hear: Callable[[], None]) -> None:
-        """Call ``hear``, which must stand being called twice, when it is asked; at once where it has been."""
-        self._hearers.append(hear)
-        if self._asked.is_set():
-            hear()
+    def on_request(self, callback: Callable[[], None]) -> None:
+        """Call ``callback`` when the stop is requested, or now where it has been; perhaps more than once."""
+        self._callbacks.append(callback)
+        if self._requested.is_set():
+            callback()
 
     @property
-    def asked(self) -> bool:
-        """Whether somebody has asked."""
-        return self._asked.is_set()
+    def requested(self) -> bool:
+        """Whether the stop is requested."""
+        return self._requested.is_set()

@@ -1,7 +1,7 @@
-"""The gate before the recorder: shut, it keeps the last seconds; opened, these go first and then all that comes.
+"""The pre-trigger buffer before the recorder: while off it keeps the last seconds; switched on it records these first.
 
-What a replay cannot do without passes also a shut gate: the frames of references, the load, and what is told. A
-burst that was measured while its frames were not recorded is not in the recorded list of bursts.
+Frames of references, load samples and events are recorded also while it is off, since a replay needs them. A burst
+that was measured while its frames were not recorded is not in the recorded list of bursts.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from live.run.control import START, ControlRefused
 _SMALL = 512  # bytes counted for an event
 
 
-class Recorded(Protocol):
-    """Who records what passes the gate; nothing here waits."""
+class RecordingSink(Protocol):
+    """What the buffer uses of ``Recorder``; no method blocks."""
 
     @property
     def failed(self) -> str | None: ...
@@ -44,20 +44,20 @@ class Recorded(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class PreTrigger:
-    """What is kept while the gate is shut, and what opens it.
+    """What is kept while recording is off, and what switches it on.
 
     Attributes
     ----------
     seconds : float, s
-    most_bytes : int
+    max_bytes : int
     above_N : float, N
-        A force of this magnitude opens it, once; infinite: only an order does.
+        A force of this magnitude switches it on, once; infinite: only a command does.
     bursts : bool
         Bursts are recorded in place of frames.
     """
 
     seconds: float
-    most_bytes: int
+    max_bytes: int
     above_N: float = math.inf
     bursts: bool = False
 
@@ -66,36 +66,36 @@ Item = Frame | Burst | Event
 
 
 class PreTriggerBuffer:
-    """Passes on to ``recorder`` while it is open; may be called from any thread.
+    """Passes frames on to ``recorder`` while recording is on; may be called from any thread.
 
     Attributes
     ----------
     on : bool
-        Whether it is open.
+        Whether recording is on.
     """
 
     def __init__(
         self,
-        recorder: Recorded,
+        recorder: RecordingSink,
         frame_counts: FrameCounts,
         event_log: EventLog,
-        keep: PreTrigger,
+        settings: PreTrigger,
         *,
         on: bool = True,
     ) -> None:
-        self._recorder, self._frame_counts, self._event_log, self._keep = (
+        self._recorder, self._frame_counts, self._event_log, self._settings = (
             recorder,
             frame_counts,
             event_log,
-            keep,
+            settings,
         )
         self.on = on
         self._kept: deque[tuple[float, int, Item]] = deque()
         self._bytes = 0
-        self._above_N = math.inf if on else keep.above_N
-        # Sequence numbers that were recorded last, without a gap of ours; inf: from the next that comes.
-        self._from: float = 0 if on else math.inf
-        self._to = -1
+        self._above_N = math.inf if on else settings.above_N
+        # Sequence numbers recorded last, without a gap while off; inf: from the next item on.
+        self._first_recorded: float = 0 if on else math.inf
+        self._last_recorded = -1
         self._lock = threading.RLock()
 
     @property
@@ -108,28 +108,28 @@ class PreTriggerBuffer:
         """Share of the buffer that waits for the disk."""
         return self._recorder.backlog
 
-    def frame(self, frame: Frame, *, needed: bool) -> None:
-        """A frame; ``needed``: part of a reference."""
+    def frame(self, frame: Frame, *, is_reference: bool) -> None:
+        """Take a frame; ``is_reference``: part of a reference."""
         with self._lock:
-            if self._keep.bursts:
+            if self._settings.bursts:
                 self._recorder.frame(frame)  # which only counts it
             else:
-                self._picture(frame, frame.t, frame.image.nbytes, needed)
+                self._picture(frame, frame.t, frame.image.nbytes, is_reference)
 
-    def burst(self, burst: Burst, *, needed: bool) -> None:
-        """A burst, which is recorded where bursts are; ``needed``: a reference."""
-        if self._keep.bursts:
+    def burst(self, burst: Burst, *, is_reference: bool) -> None:
+        """Take a burst, recorded where bursts replace frames; ``is_reference``: a reference."""
+        if self._settings.bursts:
             with self._lock:
-                self._picture(burst, burst.t, burst.mean.nbytes, needed)
+                self._picture(burst, burst.t, burst.mean.nbytes, is_reference)
 
     def sample(self, sample: LoadSample) -> None:
-        """A load sample: small, and wanted for the pictures just before it; always recorded."""
+        """Take a load sample: always recorded, since the pictures just before it need its force."""
         self._recorder.sample(sample)
         if abs(sample.force) > self._above_N and not self.on:
-            self._open(f"the force is above {self._above_N:g} N")
+            self._switch_on(f"the force is above {self._above_N:g} N")
 
     def event(self, event: Event) -> None:
-        """An event; those of the recorder's own thread must not wait for whoever waits for that thread."""
+        """Take an event; without the lock where it may come from the recorder's own thread."""
         if event.kind is not EventKind.MEASURED:
             self._recorder.event(event)
             return
@@ -139,76 +139,77 @@ class PreTriggerBuffer:
             elif not self.on:
                 self._hold(event, event.t, _SMALL)
 
-    def order(self, what: str) -> str:
-        """Begin (START) or end recording; raises OrderRefused where it is so already, or nothing can be written."""
+    def command(self, what: str) -> str:
+        """Begin (START) or end recording; raises ControlRefused where it is so already, or nothing can be written."""
         if self.failed is not None:
             raise ControlRefused(f"nothing can be recorded: {self.failed}")
         if (what == START) is self.on:
             raise ControlRefused("recording already" if self.on else "not recording")
-        return self._open("ordered") if what == START else self._shut()
+        return self._switch_on("ordered") if what == START else self._switch_off()
 
     def close(self, frame_counts: dict[str, Any]) -> None:
-        """Let go what is kept, and close the recording."""
+        """Drop what is kept, and close the recording."""
         with self._lock:
-            self._let_go()
-        # Without the lock: what is still to be written may be told of.
+            self._drop_kept()
+        # Without the lock: the recorder may still emit events while it writes.
         self._recorder.close(frame_counts)
 
-    def _open(self, why: str) -> str:
+    def _switch_on(self, why: str) -> str:
         with self._lock:
             if self.on:
                 return ""
             pictures = [item for _, _, item in self._kept if isinstance(item, Frame | Burst)]
             self.on, self._above_N = True, math.inf
-            self._from = math.inf
+            self._first_recorded = math.inf
             kept, self._kept, self._bytes = self._kept, deque(), 0
             for _, _, item in kept:
                 self._pass(item)
-        text = f"recording begins ({why}), with {len(pictures)} {'bursts' if self._keep.bursts else 'frames'} before"
-        self._event_log.tell(EventKind.RECORD, "operator", text, data={"on": True, "before": len(pictures)})
+        kind = "bursts" if self._settings.bursts else "frames"
+        text = f"recording begins ({why}), with {len(pictures)} {kind} before"
+        self._event_log.emit(EventKind.RECORD, "operator", text, data={"on": True, "before": len(pictures)})
         return f"with {len(pictures)} before"
 
-    def _shut(self) -> str:
+    def _switch_off(self) -> str:
         with self._lock:
             self.on = False
-        self._event_log.tell(
+        self._event_log.emit(
             EventKind.RECORD, "operator", "recording ends, measuring goes on", data={"on": False}
         )
         return ""
 
-    def _picture(self, item: Frame | Burst, t: float, size: int, needed: bool) -> None:
+    def _picture(self, item: Frame | Burst, t: float, size: int, is_reference: bool) -> None:
         if self.on:
             self._pass(item)
-        elif needed:
-            self._let_go()  # what came before would be out of order
-            if _first(item) != self._to + 1:
-                self._from = math.inf
+        elif is_reference:
+            self._drop_kept()  # older items would be out of order
+            if _first(item) != self._last_recorded + 1:
+                self._first_recorded = math.inf
             self._pass(item)
         else:
             self._hold(item, t, size)
 
     def _pass(self, item: Item) -> None:
         if isinstance(item, Frame | Burst):
-            self._from = min(self._from, _first(item))
+            self._first_recorded = min(self._first_recorded, _first(item))
         if isinstance(item, Frame):
-            self._to = item.index
+            self._last_recorded = item.index
             self._recorder.frame(item)
         elif isinstance(item, Burst):
-            self._to = item.last_index
+            self._last_recorded = item.last_index
             self._recorder.burst(item)
         elif self._has(item):
             self._recorder.event(item)
 
     def _has(self, event: Event) -> bool:
-        """Whether the burst that ``event`` tells of is recorded whole."""
-        if event.data["first"] < self._from:
+        """Whether the burst of ``event`` is recorded whole."""
+        if event.data["first"] < self._first_recorded:
             return False
-        return self.on or bool(event.data["last"] <= self._to)
+        return self.on or bool(event.data["last"] <= self._last_recorded)
 
     def _hold(self, item: Item, t: float, size: int) -> None:
         self._kept.append((t, size, item))
         self._bytes += size
-        while self._kept[0][0] < t - self._keep.seconds or self._bytes > self._keep.most_bytes:
+        while self._kept[0][0] < t - self._settings.seconds or self._bytes > self._settings.max_bytes:
             self._drop()
             if not self._kept:
                 return
@@ -219,7 +220,7 @@ class PreTriggerBuffer:
         if isinstance(item, Frame):
             self._frame_counts.add(thinned=1)
 
-    def _let_go(self) -> None:
+    def _drop_kept(self) -> None:
         while self._kept:
             self._drop()
 

@@ -1,4 +1,4 @@
-"""Everything that stands ready before the first frame of a test: devices, grid, settings, folder."""
+"""A prepared run: devices, grid, settings and folder before the first frame of a test."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
 from live.pipeline.event_log import EventLog
 from live.pipeline.screen import Screen
-from live.pipeline.warm_up import rehearse
+from live.pipeline.warm_up import dry_run
 from live.results.folder import make_folder
 from live.run.outcome import StopSignal
 from live.setup.devices import Rig
@@ -26,14 +26,14 @@ from live.setup.prepared import MeasurePlan
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PreparedRun:
-    """What a test is set up with.
+    """All that a test needs before its first frame.
 
     Attributes
     ----------
     rig : Rig
         Open, not yet entered.
     plan : MeasurePlan
-        Its configuration is in force; mask, dark and flat frame lie in ``folder``.
+        With the final configuration; mask, dark and flat frame are in ``folder``.
     bursts : (reference, measured)
         Frames in each.
     folder : Path
@@ -50,35 +50,35 @@ class PreparedRun:
 
     @property
     def config(self) -> Config:
-        """In force."""
+        """The final configuration."""
         return self.plan.config
 
 
 def set_up(config: Config, rig: Rig, event_log: EventLog, screen: Screen, stop: StopSignal) -> PreparedRun:
-    """Lay the grid, run everything once, and make the folder.
+    """Make the grid, compile, run everything once, and make the folder.
 
     Raises
     ------
     ConfigError, DataError
-        Something does not fit, or cannot be read or made.
+        A setting does not fit, or a file cannot be read or made.
     Interrupted
-        ``stop`` was asked while loops were compiled.
+        ``stop`` was requested while loops were compiled.
     """
     camera = rig.camera.info
     plan = MeasurePlan.of(config, camera, _mask(config, rig))
     bursts = _burst_lengths(config, camera.live)
-    took = plan.compile(camera, screen.status, lambda: stop.asked)
+    took = plan.compile(camera, screen.status, lambda: stop.requested)
     if took > 0:
         screen.say(f"everything is compiled ({took:.0f} s)")
     compile_loops()
-    rehearse(camera, plan.grid, plan.settings, bursts)
+    dry_run(camera, plan.grid, plan.settings, bursts)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
     in_force = with_flat_field(with_mask(config, plan.mask, folder), folder)
     return PreparedRun(rig, replace(plan, config=in_force), bursts, folder, _time_zero(rig, event_log))
 
 
 def _mask(config: Config, rig: Rig) -> NDArray[np.bool_] | None:
-    """The mask that was given; a simulated specimen knows its own."""
+    """The configured mask, or that of a simulated specimen."""
     path = config.measure.mask
     if path is None and rig.specimen is not None:
         mask = RecordMode(crop=config.camera.crop).cut(rig.specimen.mask())

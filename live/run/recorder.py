@@ -1,7 +1,7 @@
-"""The recording path: a byte-bounded buffer and one thread that writes the session.
+"""The recording: a byte-bounded buffer and one thread that writes the session.
 
-It takes everything. When the buffer or the disk is full it counts what it could not write, says
-so, and the measurement goes on.
+When the buffer or the disk is full, the recorder counts what it cannot write and emits an event; the
+measurement goes on.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from live.run.prepared_run import PreparedRun
 
 log = logging.getLogger(__name__)
 _SMALL = 512  # bytes counted for a sample or an event
-_PATIENCE_S = 0.5
+_MAX_WAIT_S = 0.5
 _CLOCK_EVERY_S = 60.0
 _DISK_EVERY_S = 5.0
 _DISK_WARN_S = 180.0
@@ -45,7 +45,7 @@ Item = Frame | Burst | LoadSample | Event
 def open_recording(
     prepared: PreparedRun, run_state: RunState, screen: Screen, stop: StopSignal
 ) -> PreTriggerBuffer | None:
-    """The recording that the configuration asks for, in the folder of the run; None where it asks for none.
+    """The configured recording, in the folder of the run; None where recording is off.
 
     Raises
     ------
@@ -57,7 +57,7 @@ def open_recording(
         return None
     path, mode = prepared.folder / "session.h5", RecordMode.parse(record.mode)
     writer = _open_writer(path, prepared, mode)
-    run_state.health.disk_s = _tell_room(path, camera, mode, screen)
+    run_state.health.disk_s = _announce_disk(path, camera, mode, screen)
     recorder = Recorder(
         writer,
         run_state.frame_counts,
@@ -65,21 +65,21 @@ def open_recording(
         int(record.buffer_MB * 1e6),
         mode=mode,
         waits=not camera.live,
-        on_failure=lambda: stop.ask("recording failed") if record.when_full == "stop" else None,
+        on_failure=lambda: stop.request("recording failed") if record.when_full == "stop" else None,
         health=run_state.health,
     )
-    keep = PreTrigger(
+    settings = PreTrigger(
         record.keep_s, int(record.buffer_MB * 5e5), record.start_above_N or math.inf, mode.kind == "bursts"
     )
     pre_trigger = PreTriggerBuffer(
-        recorder, run_state.frame_counts, run_state.event_log, keep, on=not record.armed
+        recorder, run_state.frame_counts, run_state.event_log, settings, on=not record.armed
     )
     run_state.event_log.add_listener(pre_trigger.event)
     return pre_trigger
 
 
 def _open_writer(path: Path, prepared: PreparedRun, mode: RecordMode) -> SessionWriter | RotatingWriter:
-    """A new session file, or a set of files that begins another one when it has grown."""
+    """A new session file, or a set of files with a new file at a given size."""
     config, rotate_MB = prepared.config, prepared.config.record.rotate_MB
     info = SessionInfo(
         camera=prepared.rig.camera.info,
@@ -95,8 +95,8 @@ def _open_writer(path: Path, prepared: PreparedRun, mode: RecordMode) -> Session
     return RotatingWriter(path, info, int(rotate_MB * 1e6))
 
 
-def _tell_room(path: Path, camera: CameraInfo, mode: RecordMode, screen: Screen) -> float:
-    """Say how long the disk lasts (s), and that a network share is a risk."""
+def _announce_disk(path: Path, camera: CameraInfo, mode: RecordMode, screen: Screen) -> float:
+    """Show how long the disk lasts, and warn of a network share; the time, s."""
     rate = camera.width * camera.height * (2 if camera.bits > 8 else 1) * (camera.fps or 30.0) / mode.every
     minutes = forecast(path, rate) / 60
     where = f"recording about {rate / 1e6:.0f} MB/s at most, room for {minutes:.0f} minutes"
@@ -107,7 +107,7 @@ def _tell_room(path: Path, camera: CameraInfo, mode: RecordMode, screen: Screen)
 
 
 class Recorder:
-    """Writes frames, load samples and events from a thread of its own.
+    """Writes frames, load samples and events in its own thread.
 
     Parameters
     ----------
@@ -117,15 +117,15 @@ class Recorder:
         Which frames are written, or bursts in their place.
     frame_counts : FrameCounts
     event_log : EventLog
-        Told of gaps and of a disk that takes no more.
+        Takes events on gaps and on a full disk.
     limit : int, bytes
-        What may wait for the disk.
+        Size of the buffer.
     waits : bool
-        Wait for room instead of leaving a gap (sources that wait for their reader).
+        Wait for free space instead of leaving a gap (sources that wait for their reader).
     on_failure : callable
         Called once when nothing more can be written.
     health : Health, optional
-        Told how long the disk lasts.
+        Takes the time until the disk is full.
     now : callable
         The clock, s.
     """
@@ -152,14 +152,14 @@ class Recorder:
         self._began = now()
         self._next_clock = self._began + _CLOCK_EVERY_S
         self._next_disk = self._began + _DISK_EVERY_S
-        self._disk_told = False
-        self._patience_s = _PATIENCE_S
+        self._disk_warned = False
+        self._wait_s = _MAX_WAIT_S
         self.failed: str | None = None
         self._thread = threading.Thread(target=self._work, name="record", daemon=True)
         self._thread.start()
 
     def frame(self, frame: Frame) -> None:
-        """Queue a frame, where the mode keeps it; one that finds no room is part of a counted gap."""
+        """Queue a frame, where the mode keeps it; one that does not fit is part of a counted gap."""
         self._number += 1
         if not self._mode.keeps(self._number - 1):
             self._frame_counts.add(thinned=1)
@@ -179,7 +179,7 @@ class Recorder:
             return True
         if self._gap == 0 and self.failed is None:
             text = "the disk is too slow, frames are not recorded; measuring goes on"
-            self._event_log.tell(EventKind.RECORDER, "recorder", text, "error", {"from": index})
+            self._event_log.emit(EventKind.RECORDER, "recorder", text, "error", {"from": index})
         self._gap += n
         return False
 
@@ -187,7 +187,7 @@ class Recorder:
         if not self._gap:
             return
         text = f"recording again after {self._gap} frames that are not in the session"
-        self._event_log.tell(EventKind.RECORDER, "recorder", text, "warning", {"count": self._gap})
+        self._event_log.emit(EventKind.RECORDER, "recorder", text, "warning", {"count": self._gap})
         self._gap = 0
 
     def sample(self, sample: LoadSample) -> None:
@@ -205,11 +205,11 @@ class Recorder:
 
     @property
     def waiting_bytes(self) -> int:
-        """What waits for the disk."""
+        """Bytes that wait for the disk."""
         return self._buffer.waiting_bytes
 
     def close(self, frame_counts: dict[str, Any]) -> None:
-        """Write what waits, then the ledger, and close the file."""
+        """Write what is queued, then the frame counts, and close the file."""
         self._buffer.close()
         self._thread.join()
         if self.failed is None:
@@ -220,34 +220,34 @@ class Recorder:
     def _work(self) -> None:
         self._guarded(lambda: self._writer.write_clock(ClockPair.now()))
         while not self._buffer.finished:
-            item = self._buffer.get(self._patience_s)
+            item = self._buffer.get(self._wait_s)
             if item is not None:
                 self._write(item)
             if self.failed is None:
                 self._guarded(self._flush_when_due)
-                self._now_and_then(self._now())
+                self._do_periodic(self._now())
 
     def _flush_when_due(self) -> None:
-        """What is written last must not wait for an item that does not come."""
-        self._patience_s = min(_PATIENCE_S, self._writer.flush_when_due())
+        """Flush by time too: the last item must not wait for another one."""
+        self._wait_s = min(_MAX_WAIT_S, self._writer.flush_when_due())
 
-    def _now_and_then(self, now: float) -> None:
+    def _do_periodic(self, now: float) -> None:
         if now > self._next_clock:
             self._next_clock += _CLOCK_EVERY_S
             self._guarded(lambda: self._writer.write_clock(ClockPair.now()))
         if now > self._next_disk:
             self._next_disk = now + _DISK_EVERY_S
-            self._look_at_the_disk(now - self._began)
+            self._check_disk(now - self._began)
 
-    def _look_at_the_disk(self, elapsed_s: float) -> None:
+    def _check_disk(self, elapsed_s: float) -> None:
         rate = self._writer.bytes_written / elapsed_s
         left = self._health.disk_s = forecast(self._writer.path, rate)
-        if left < _DISK_WARN_S and not self._disk_told:
+        if left < _DISK_WARN_S and not self._disk_warned:
             text = f"the disk is full in {left:.0f} s at this rate; free some space, the recording goes on"
-            self._event_log.tell(
+            self._event_log.emit(
                 EventKind.RECORDER, str(self._writer.path), text, "warning", {"seconds": left}
             )
-        self._disk_told = left < _DISK_WARN_S
+        self._disk_warned = left < _DISK_WARN_S
 
     def _write(self, item: Item) -> None:
         if isinstance(item, Frame):
@@ -264,7 +264,7 @@ class Recorder:
             self._guarded(lambda: self._writer.write_event(item))
 
     def _guarded(self, write: Callable[[], object]) -> bool:
-        """Run one write; the first one that fails ends the recording, loudly, and nothing else."""
+        """Run one write; the first one that fails ends only the recording, and is reported."""
         try:
             write()
         except DataError as error:
@@ -283,5 +283,5 @@ class Recorder:
         lost = self._writer.unflushed_frames  # written, and gone with the file
         self._frame_counts.add(recorded=-lost, unrecorded=lost)
         text = f"recording has stopped, measuring goes on: {why}"
-        self._event_log.tell(EventKind.RECORDER, "recorder", text, "error")
+        self._event_log.emit(EventKind.RECORDER, "recorder", text, "error")
         self._on_failure()

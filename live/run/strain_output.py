@@ -1,9 +1,7 @@
-"""Strain out: every measurement as a line to TCP clients, by UDP, or to a serial port.
+"""Strain output: every measurement as a line of JSON or CSV to TCP clients, by UDP, or to a serial port.
 
-Each way has a thread of its own and takes the newest measurement: one that stalls skips and counts, and
-neither the measurement nor another way feels it.
-
-A measurement as a line: JSON, or CSV under a line of names.
+Each output has its own thread and takes the newest measurement: one that stalls skips and counts, and
+delays neither the measurement nor another output.
 """
 
 from __future__ import annotations
@@ -26,33 +24,36 @@ from live.pipeline.consumer import Consumer, Policy
 from live.pipeline.measurement import Measurement
 from live.run.tcp_lines import LineServer
 
+REOPEN_S = 1.0
+"""A lost serial port is opened again at this interval."""
 
-class Lines:
-    """Writes the chosen channels of measurements.
+
+class LineFormat:
+    """Formats the chosen channels of a measurement.
 
     Parameters
     ----------
-    readings : ChannelValues
+    values : ChannelValues
     channels : sequence of str
     form : "json" or "csv"
 
     Attributes
     ----------
     heading : str
-        The first line a client is told; empty where there is none.
+        The first line for a client, with the names; empty for JSON.
     """
 
-    def __init__(self, readings: ChannelValues, channels: Sequence[str], form: str) -> None:
-        self._readings, self._channels, self._json = readings, tuple(channels), form == "json"
+    def __init__(self, values: ChannelValues, channels: Sequence[str], form: str) -> None:
+        self._values, self._channels, self._json = values, tuple(channels), form == "json"
         self.heading = "" if self._json else ",".join(channels)
 
     def of(self, measurement: Measurement) -> str:
-        """The line, without its end; what is not known is null in JSON and nan in CSV."""
-        values = self._readings.read(measurement)
+        """The line, without its end; an unknown value is null in JSON and nan in CSV."""
+        values = self._values.read(measurement)
         if not self._json:
             return ",".join(_number(values.get(channel, math.nan)) for channel in self._channels)
-        told = {channel: _rounded(values.get(channel, math.nan)) for channel in self._channels}
-        return json.dumps(told, separators=(",", ":"))
+        rounded = {channel: _rounded(values.get(channel, math.nan)) for channel in self._channels}
+        return json.dumps(rounded, separators=(",", ":"))
 
 
 def _number(value: float) -> str:
@@ -65,18 +66,14 @@ def _rounded(value: float) -> float | None:
     return float(f"{value:.8g}") if math.isfinite(value) else None
 
 
-AGAIN_S = 1.0
-"""A serial port that was lost is opened again so often."""
-
-
 class StrainOut(Consumer, ABC):
-    """One way out; ``send`` takes a line without its end."""
+    """One output; ``send`` takes a line without its end."""
 
     policy = Policy.NEWEST
-    room = 2
-    patience_s = 2.0
+    queue_size = 2
+    timeout_s = 2.0
 
-    def __init__(self, name: str, lines: Lines) -> None:
+    def __init__(self, name: str, lines: LineFormat) -> None:
         self.name, self._lines = name, lines
         self._posted: deque[str] = deque()
 
@@ -85,11 +82,11 @@ class StrainOut(Consumer, ABC):
         self.send(self._lines.of(measurement))
 
     def post(self, line: str) -> None:
-        """Leave a line, from any thread; it goes out with the next event."""
+        """Queue a line, from any thread; the next event sends it."""
         self._posted.append(line)
 
     def event(self, event: Event) -> None:
-        """Send the lines that were left."""
+        """Send the queued lines."""
         while self._posted:
             self.send(self._posted.popleft())
 
@@ -101,7 +98,7 @@ class StrainOut(Consumer, ABC):
 class TcpOut(StrainOut):
     """To any number of TCP clients."""
 
-    def __init__(self, listening: socket.socket, token: str, lines: Lines) -> None:
+    def __init__(self, listening: socket.socket, token: str, lines: LineFormat) -> None:
         self._server = LineServer(listening, token, greeting=lines.heading)
         super().__init__(f"strain out (port {self._server.port})", lines)
         self.port = self._server.port
@@ -111,11 +108,11 @@ class TcpOut(StrainOut):
         self._server.start()
 
     def send(self, line: str) -> None:
-        """To all clients; those that do not read are passed over."""
-        self._server.tell(line)
+        """To all clients; those that do not read are skipped."""
+        self._server.send(line)
 
     def end(self) -> str:
-        """Let the clients go."""
+        """Close the connections."""
         self._server.close()
         skipped = f", {self._server.skipped} skipped by clients that did not read" * (
             self._server.skipped > 0
@@ -124,9 +121,9 @@ class TcpOut(StrainOut):
 
 
 class UdpOut(StrainOut):
-    """To one address by UDP, which nobody confirms."""
+    """To one address by UDP, without confirmation."""
 
-    def __init__(self, host: str, port: int, lines: Lines) -> None:
+    def __init__(self, host: str, port: int, lines: LineFormat) -> None:
         super().__init__(f"strain out (udp {host}:{port})", lines)
         self._to = (host, port)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
@@ -134,7 +131,7 @@ class UdpOut(StrainOut):
         self._sent = self._skipped = 0
 
     def send(self, line: str) -> None:
-        """Send a datagram; where nobody listens, or there is no room, it is counted."""
+        """Send a datagram; one that the system refuses is counted."""
         try:
             self._socket.sendto(line.encode() + b"\n", self._to)
             self._sent += 1
@@ -148,7 +145,7 @@ class UdpOut(StrainOut):
 
 
 class SerialOut(StrainOut):
-    """To a serial port, opened again where it is lost.
+    """To a serial port, opened again after it is lost.
 
     Raises
     ------
@@ -156,22 +153,22 @@ class SerialOut(StrainOut):
         The port cannot be opened at the start.
     """
 
-    def __init__(self, line: LineSettings, lines: Lines) -> None:
+    def __init__(self, line: LineSettings, lines: LineFormat) -> None:
         super().__init__(f"strain out ({line.url})", lines)
         self._settings = line
         self._port: Any = open_port(line)
         self._lost = -float("inf")
         self._sent = self._skipped = 0
-        self._told_heading = False
+        self._sent_heading = False
 
     def send(self, line: str) -> None:
-        """Write; a port that takes nothing for half a second is lost, and tried again a second later."""
-        if not self._told_heading and self._lines.heading:
+        """Write; a port that takes nothing for half a second is lost, and opened again a second later."""
+        if not self._sent_heading and self._lines.heading:
             line = f"{self._lines.heading}\n{line}"
-        if self._port is None and time.monotonic() - self._lost > AGAIN_S:
+        if self._port is None and time.monotonic() - self._lost > REOPEN_S:
             self._open_again()
         if self._port is not None and self._written(line.encode() + b"\n"):
-            self._told_heading = True
+            self._sent_heading = True
             self._sent += 1
         else:
             self._skipped += 1

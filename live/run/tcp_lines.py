@@ -1,7 +1,4 @@
-"""A server of lines: any number of clients, none of which is ever waited for.
-
-One client of a server of lines: what it says, line by line, and what it is told, never waited for.
-"""
+"""A TCP server of lines: it answers the lines of its clients and sends lines to all, and never waits for a client."""
 
 from __future__ import annotations
 
@@ -14,54 +11,58 @@ import threading
 import time
 from collections.abc import Callable
 
-MOST_BYTES = 4096
-"""Of a line that a client sends; one that sends more without an end of line is let go."""
-_SEND_BUFFER = 1 << 16  # of the kernel: a client that stalls reads little that is old when it goes on
+log = logging.getLogger(__name__)
+
+MAX_CLIENTS = 32
+MAX_LINE_BYTES = 4096
+"""Of a line that a client sends; the connection is closed where more comes without an end of line."""
+_SEND_BUFFER = 1 << 16  # of the kernel: small, so that a client that stalls reads few old lines later
+_PAUSE_S = 0.05
 
 
 class Client:
-    """A connection that is never waited for.
+    """A connection without blocking.
 
     Attributes
     ----------
-    admitted : bool
-        Has given the token, or needs none.
+    authorized : bool
+        Whether the client has sent the token, or needs none.
     taken, skipped : int
-        Lines that were sent, and that found no room since it did not read.
+        Lines that were sent, and lines that were not since the client did not read.
     """
 
     def __init__(self, connection: socket.socket, name: str, token: str) -> None:
         self._connection, self.name, self._token = connection, name, token
-        self.admitted = not token
+        self.authorized = not token
         self.taken = self.skipped = 0
-        self._said, self._unsent = b"", b""
+        self._unfinished, self._unsent = b"", b""
         connection.setblocking(False)
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BUFFER)
 
-    def heard(self) -> list[str]:
-        """The whole lines that came; raises OSError where the connection is over."""
+    def receive(self) -> list[str]:
+        """The whole lines that have arrived; raises OSError where the connection is closed."""
         try:
-            data = self._connection.recv(MOST_BYTES)
+            data = self._connection.recv(MAX_LINE_BYTES)
         except BlockingIOError:
             return []
         if not data:
             raise ConnectionError("closed by the client")
-        *lines, self._said = (self._said + data).split(b"\n")
-        if len(self._said) > MOST_BYTES or any(len(line) > MOST_BYTES for line in lines):
+        *lines, self._unfinished = (self._unfinished + data).split(b"\n")
+        if len(self._unfinished) > MAX_LINE_BYTES or any(len(line) > MAX_LINE_BYTES for line in lines):
             raise ConnectionError("a line without an end")
         return [line.decode("utf-8", "replace").strip() for line in lines]
 
-    def admits(self, line: str) -> bool:
-        """Whether ``line`` is ``token`` and the token; then the client is admitted."""
+    def authorize(self, line: str) -> bool:
+        """Authorize the client where ``line`` is the token, with or without ``token`` before it; whether it was."""
         given = line.removeprefix("token ").strip()
-        self.admitted = hmac.compare_digest(given.encode(), self._token.encode())
-        return self.admitted
+        self.authorized = hmac.compare_digest(given.encode(), self._token.encode())
+        return self.authorized
 
-    def tell(self, line: bytes) -> bool:
-        """Send a line, where the client has room for it; else it is skipped and counted.
+    def send(self, line: bytes) -> bool:
+        """Send a line without blocking; where that is not possible it is skipped and counted.
 
-        Raises OSError where the connection is over.
+        Raises OSError where the connection is closed.
         """
         if self._unsent:
             self._unsent = self._rest(self._unsent)
@@ -75,7 +76,7 @@ class Client:
         return rest != line
 
     def _rest(self, data: bytes) -> bytes:
-        """What could not be sent now."""
+        """The part of ``data`` that could not be sent now."""
         try:
             return data[self._connection.send(data) :]
         except BlockingIOError:
@@ -91,17 +92,11 @@ class Client:
             self._connection.close()
 
 
-log = logging.getLogger(__name__)
-
-MOST_CLIENTS = 32
-_PAUSE_S = 0.05
-
-
 class LineServer:
-    """Answers the lines of its clients, and tells all of them lines.
+    """Answers the lines of its clients, and sends lines to all of them.
 
-    A client of a server with a token says ``token WORD`` first. A request of a browser is let go, so
-    that no page from elsewhere can say anything here.
+    A client of a server with a token sends ``token WORD`` first. The server closes the connection of a
+    browser, so that no web page can send commands.
 
     Parameters
     ----------
@@ -109,20 +104,20 @@ class LineServer:
         Closed with the server.
     token : str
         Empty where none is needed.
-    hear : callable, optional
-        Called with a line, gives the answer; without it, what clients say is passed over.
+    answer : callable, optional
+        Takes a line and gives the answer; without it the lines of clients are ignored.
     greeting : str
-        The first line that a client is told, where there is one.
+        The first line sent to a client; empty for none.
     """
 
     def __init__(
         self,
         listening: socket.socket,
         token: str = "",
-        hear: Callable[[str], str] | None = None,
+        answer: Callable[[str], str] | None = None,
         greeting: str = "",
     ) -> None:
-        self._listening, self._token, self._hear, self._greeting = listening, token, hear, greeting
+        self._listening, self._token, self._answer, self._greeting = listening, token, answer, greeting
         self.port: int = listening.getsockname()[1]
         self.served = self.taken = self.skipped = 0
         self._clients: dict[int, Client] = {}
@@ -135,23 +130,23 @@ class LineServer:
         """Begin to listen."""
         self._thread.start()
 
-    def tell(self, line: str) -> None:
-        """Tell all clients a line; one that does not read is passed over, and counted."""
+    def send(self, line: str) -> None:
+        """Send a line to all clients; one that does not read is skipped and counted."""
         data = line.encode() + b"\n"
         with self._lock:
             for client in list(self._clients.values()):
-                if client.admitted:
-                    self._told(client, data)
+                if client.authorized:
+                    self._send(client, data)
 
     def close(self) -> None:
-        """Let all clients go."""
+        """Close all connections."""
         self._ending = True
         self._waker.send(b"x")
         if self._thread.ident is not None:
             self._thread.join()
         with self._lock:
             for client in list(self._clients.values()):
-                self._let_go(client)
+                self._drop(client)
         for one in (self._listening, self._woken, self._waker):
             one.close()
 
@@ -171,54 +166,54 @@ class LineServer:
     def _accept(self, selector: selectors.BaseSelector) -> None:
         try:
             connection, (host, port, *_) = self._listening.accept()
-        except OSError:  # gone again, or no handle is left: then it would be tried without a pause
+        except OSError:  # closed again, or no file descriptor is left: then a pause before the next try
             time.sleep(_PAUSE_S)
             return
-        if len(self._clients) >= MOST_CLIENTS:
+        if len(self._clients) >= MAX_CLIENTS:
             connection.close()
             return
         client = Client(connection, f"{host}:{port}", self._token)
         self._clients[client.fileno()] = client
         selector.register(client, selectors.EVENT_READ)
         self.served += 1
-        if client.admitted:
+        if client.authorized:
             self._greet(client)
 
     def _greet(self, client: Client) -> None:
         if self._greeting:
-            self._told(client, self._greeting.encode() + b"\n")
+            self._send(client, self._greeting.encode() + b"\n")
 
     def _listen_to(self, client: Client, selector: selectors.BaseSelector) -> None:
         try:
-            for line in client.heard():
-                if not self._answered(client, line):
-                    raise ConnectionError("let go")
+            for line in client.receive():
+                if not self._handle(client, line):
+                    raise ConnectionError("refused")
         except OSError as over:
             log.debug("%s: %s", client.name, over)
             selector.unregister(client)
-            self._let_go(client)
+            self._drop(client)
 
-    def _answered(self, client: Client, line: str) -> bool:
-        """Whether the client may go on."""
-        if not client.admitted:
-            admitted = client.admits(line)
-            self._told(client, b"ok\n" if admitted else b"no: give the token first: token WORD\n")
-            if admitted:
+    def _handle(self, client: Client, line: str) -> bool:
+        """Answer ``line``; False where the connection is to be closed."""
+        if not client.authorized:
+            authorized = client.authorize(line)
+            self._send(client, b"ok\n" if authorized else b"no: give the token first: token WORD\n")
+            if authorized:
                 self._greet(client)
-            return admitted
+            return authorized
         if " HTTP/" in line:
             return False
-        if self._hear is None or not line:
+        if self._answer is None or not line:
             return True
-        return client.tell(self._hear(line).encode() + b"\n")
+        return client.send(self._answer(line).encode() + b"\n")
 
-    def _told(self, client: Client, data: bytes) -> None:
+    def _send(self, client: Client, data: bytes) -> None:
         try:
-            client.tell(data)
+            client.send(data)
         except OSError:
-            return  # the listening thread finds it closed, and lets it go
+            return  # the server's thread finds it closed, and drops it
 
-    def _let_go(self, client: Client) -> None:
+    def _drop(self, client: Client) -> None:
         if self._clients.pop(client.fileno(), None) is not None:
             self.taken += client.taken
             self.skipped += client.skipped

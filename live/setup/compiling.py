@@ -1,10 +1,7 @@
-"""Compiling ahead of a test, by processes of its own; a test itself only loads what is compiled.
+"""Compiling ahead of a test in separate processes, each ``python -m live.setup.compiling PART KINDS PHASE``.
 
-``python -m live.setup PART KINDS PHASE`` is one of the two processes. The process that compiles a loop
-may sum in another order than one that loads it, so a run or a replay does not measure with what it has compiled
-itself, unless numba's cache cannot be written.
-
-``python -m live.setup PART KINDS PHASE``: one of the processes of ``compiling``.
+The process that compiles a loop may sum in another order than one that loads it from the cache. Therefore a run
+or a replay does not measure with loops that it has compiled itself, unless numba's cache cannot be written.
 """
 
 from __future__ import annotations
@@ -36,23 +33,23 @@ def compile_ahead(
     say: Callable[[str], object] = lambda text: None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> float:
-    """Have compiled what pictures of these kinds need, where it is not; the seconds that took.
+    """Compile what pictures of these kinds need and the cache lacks; returns the seconds that took.
 
     Parameters
     ----------
     kinds : sequence of str
         Of ``analysis.PICTURE_KINDS``.
     phase : bool
-        Also for the estimator by phases.
+        Also for the phase estimator.
     say : callable taking a text, optional
-        Told again and again how far it is.
+        Receives the progress several times a second.
     stopped : callable, optional
-        Asked again and again whether it shall end.
+        Polled several times a second; True ends the compilation.
 
     Raises
     ------
     Interrupted
-        So it was, or by Ctrl-C or SIGTERM; whoever handles these hears of them too.
+        ``stopped`` returned True, or Ctrl-C or SIGTERM came; handlers of these signals are called too.
     """
     from analysis import COMPILE_PARTS, not_compiled
 
@@ -60,7 +57,7 @@ def compile_ahead(
         return 0.0
     began = time.monotonic()
     words = [",".join(kinds), "phase" if phase else "-"]
-    commands = [[sys.executable, "-m", "live.setup.compiling", part, *words] for part in COMPILE_PARTS]
+    commands = [[sys.executable, "-m", __name__, part, *words] for part in COMPILE_PARTS]
     with blocked_signals(signal.SIGINT):
         processes = [subprocess.Popen(command, stdout=subprocess.DEVNULL) for command in commands]
     try:
@@ -87,27 +84,27 @@ def compile_ahead(
 
 @contextlib.contextmanager
 def _interruptions() -> Iterator[threading.Event]:
-    """Set by Ctrl-C and SIGTERM, beside what these do otherwise; outside the main thread by nothing."""
-    heard = threading.Event()
+    """An event that Ctrl-C and SIGTERM set, besides their own handlers; outside the main thread nothing sets it."""
+    interrupted = threading.Event()
     if threading.current_thread() is not threading.main_thread():
-        yield heard
+        yield interrupted
         return
     now = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     before = {number: handler for number, handler in now.items() if handler not in (signal.SIG_IGN, None)}
 
-    def hear(number: int, frame: FrameType | None) -> None:
-        heard.set()
+    def handle(number: int, frame: FrameType | None) -> None:
+        interrupted.set()
         handler = before[signal.Signals(number)]
         if callable(handler):
             handler(number, frame)
 
-    with signal_handler(hear, *before):
-        yield heard
+    with signal_handler(handle, *before):
+        yield interrupted
 
 
 def main(part: str, kinds: str, phase: str) -> int:
-    """One of the processes."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)  # to end without a word
+    """One of the compiling processes; returns the exit code."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)  # end without a message
     unblock_signals(signal.SIGINT)
     from acquire import burst, hdf5
     from analysis import COMPILE_PARTS, warm_up

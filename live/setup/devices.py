@@ -1,6 +1,6 @@
-"""From addresses to devices: opens camera and load cell together.
+"""Open camera and load cell from their addresses.
 
-The one door to ``hw_mocks``: two ``sim:`` addresses share one specimen.
+Only this module opens the simulated devices of ``hw_mocks``. Two ``sim:`` addresses share one specimen.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ class Rig:
     camera : Camera
     load : LoadCell
     specimen : VirtualSpecimen or None
-        The truth, where the camera is simulated.
+        The true specimen, if the camera is simulated.
     """
 
     camera: Camera
@@ -48,7 +48,7 @@ def open_rig(
     Parameters
     ----------
     crop : (x, y, width, height), px, optional
-        The part of the picture that is used.
+        The part of the picture to use.
     """
     specimen = _specimen(camera_address, load_address)
     camera = _open_camera(camera_address, on_event, specimen)
@@ -96,8 +96,8 @@ def _open_load(address: str, on_event: EventSink, specimen: VirtualSpecimen | No
 
 
 def open_load(address: str, on_event: EventSink = ignore_event, camera_address: str = "none:") -> LoadCell:
-    """A load cell alone, a simulated one too; raises as ``open_load_cell``.
+    """Open a load cell alone, also a simulated one; raises as ``open_load_cell``.
 
-    A simulated one pulls the specimen that a simulated camera at ``camera_address`` sees.
+    A simulated load cell shares its specimen with a simulated camera at ``camera_address``.
     """
     return _open_load(address, on_event, _specimen(camera_address, address))

@@ -1,4 +1,4 @@
-"""From the configuration to the grid, the kernel settings, the mask, the results and the view."""
+"""The grid of ZOIs and the kernel settings of a configuration."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from numpy.typing import NDArray
 from acquire.errors import ConfigError
 from live.config.loading import Config
 from live.config.values import AUTO
-from live.pipeline.reference import usable
+from live.pipeline.reference import numerics_error
 
 if TYPE_CHECKING:
     from analysis import KernelSettings, ZoiGrid
 
 
 def grid_for(config: Config, width: int, height: int, mask: NDArray[np.bool_] | None) -> ZoiGrid:
-    """The grid of ZOIs on pictures of ``width`` x ``height`` px; only where ``mask`` (H, W) is True.
+    """The grid of ZOIs on pictures of ``width`` x ``height`` px, active where ``mask`` (H, W) is True.
 
     Raises
     ------
     ConfigError
-        The ROI leaves the picture, was not looked for, or no ZOI fits into it.
+        The ROI leaves the picture, is still "auto", or no ZOI fits into it.
     """
     from analysis import Roi, ZoiGrid
 
     m = config.measure
     if m.roi == AUTO and m.mask is None:
         raise ConfigError(
-            "measure.roi = 'auto' is looked for by run, check and replay; here give x,y,width,height or 'all'"
+            "measure.roi = 'auto' is found by run, check and replay; here give x,y,width,height or 'all'"
         )
     x, y, w, h = m.roi if isinstance(m.roi, tuple) else whole_picture(width, height, m.zoi)
     if x + w > width or y + h > height:
@@ -44,9 +44,9 @@ def grid_for(config: Config, width: int, height: int, mask: NDArray[np.bool_] | 
 
 
 def whole_picture(width: int, height: int, zoi: int) -> tuple[int, int, int, int]:
-    """The region measured where none is given: all, but for a rim of an eighth of a ZOI.
+    """The region (x, y, width, height) without a ROI: the whole picture except a rim of an eighth of a ZOI.
 
-    A ZOI at the very edge would leave the picture with the first small motion.
+    A ZOI at the edge would leave the picture with the first small motion.
     """
     rim = zoi // 8
     if min(width, height) < zoi + 2 * rim:
@@ -55,7 +55,7 @@ def whole_picture(width: int, height: int, zoi: int) -> tuple[int, int, int, int
 
 
 def kernel_settings(config: Config) -> KernelSettings:
-    """The settings of the kernel; raises ConfigError where they do not go together."""
+    """The settings of the kernel; raises ConfigError if they cannot be combined."""
     from analysis import KernelSettings
 
     m = config.measure
@@ -67,4 +67,4 @@ def kernel_settings(config: Config) -> KernelSettings:
             bending_px=m.bending_px,
         )
     except ValueError as error:
-        raise usable(error, "measure") from None
+        raise numerics_error(error, "measure") from None

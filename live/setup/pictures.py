@@ -1,4 +1,4 @@
-"""The pictures a test is set up with: mask, dark and flat frame."""
+"""The pictures of a set-up: mask, dark and flat frame."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from live.pipeline.reference import Correction, unchanged
 
 
 def read_mask(path: str | None, width: int, height: int) -> NDArray[np.bool_] | None:
-    """A mask, (H, W) bool: True where the picture is not black; None for no mask.
+    """A mask, (H, W) bool: True where the picture is not black; None without a ``path``.
 
     Raises
     ------
     DataError
-        Missing, unreadable, or not the size of the pictures.
+        The file is missing or unreadable, or its size is not that of the pictures.
     """
     from acquire.opencv.images import read_image
 
@@ -39,22 +39,27 @@ def read_mask(path: str | None, width: int, height: int) -> NDArray[np.bool_] | 
     return found
 
 
+def mask_picture(mask: NDArray[np.bool_]) -> NDArray[np.uint8]:
+    """The picture of a mask (H, W), as ``read_mask`` reads it: black where nothing is measured."""
+    return np.where(mask, np.uint8(255), np.uint8(0))
+
+
 def with_mask(config: Config, mask: NDArray[np.bool_] | None, folder: Path) -> Config:
-    """Keep the mask in the folder of the run, so that a replay finds it there."""
+    """The configuration with a mask, written to ``mask.png`` in ``folder``; unchanged without a mask."""
     if mask is None:
         return config
     path = folder / "mask.png"
-    write_picture(path, mask.astype(np.uint8) * 255)
+    write_picture(path, mask_picture(mask))
     return replace(config, measure=replace(config.measure, mask=str(path)))
 
 
 def correction(config: Config, camera: CameraInfo, cut: tuple[slice, slice] | None = None) -> Correction:
-    """What takes the sensor's fixed pattern out of a burst, or out of the rows and columns ``cut`` of one.
+    """The correction of the sensor's fixed pattern for bursts, or for the rows and columns ``cut`` of bursts.
 
     Raises
     ------
     DataError
-        It cannot be used.
+        A dark or flat frame cannot be read, or its size is not that of the pictures.
     """
     dark, flat = load_mean(config.camera.dark), load_mean(config.camera.flat)
     if dark is None and flat is None:
@@ -72,10 +77,12 @@ def correction(config: Config, camera: CameraInfo, cut: tuple[slice, slice] | No
 
 
 def with_flat_field(config: Config, folder: Path) -> Config:
-    """Keep the dark and flat frames in the folder of the run, so that a replay finds them there."""
+    """The configuration with dark and flat frames copied into ``folder``, the folder of a run."""
 
-    def kept(path: str | None, name: str) -> str | None:
+    def copied(path: str | None, name: str) -> str | None:
         return None if path is None else str(shutil.copy(path, folder / name))
 
     c = config.camera
-    return replace(config, camera=replace(c, dark=kept(c.dark, "dark.tif"), flat=kept(c.flat, "flat.tif")))
+    return replace(
+        config, camera=replace(c, dark=copied(c.dark, "dark.tif"), flat=copied(c.flat, "flat.tif"))
+    )

@@ -1,4 +1,4 @@
-"""Gauges placed by themselves on the specimen: an axial line, a transverse one, an area."""
+"""Automatic gauges on the specimen: an axial line, a transverse gauge, an area."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ Floats = NDArray[np.float64]
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 
-LENGTH = 0.8
-"""Of the specimen found, between the ends of the axial line."""
-BAND = 0.1  # of its length: height of the transverse gauge
-FULL = 0.9  # of the usual number of ZOIs across: a row beside a hole has fewer
+AXIAL_SHARE = 0.8
+"""Length of the axial line over the length of the specimen."""
+TRANSVERSE_SHARE = 0.1  # height of the transverse gauge over the length of the specimen
+MIN_ROW_SHARE = 0.9  # of the median number of ZOIs across: a row beside a hole has fewer
 
 
 def with_auto_gauges(config: Config, grid: ZoiGrid) -> Config:
-    """The configuration with gauges placed, where it asks for them; those it has by these names stay.
+    """The configuration with the gauges that ``measure.gauges = "auto"`` adds; its own gauges take precedence.
 
     Raises
     ------
@@ -48,14 +48,14 @@ def auto_gauges(grid: ZoiGrid, axis: str) -> dict[str, GaugeTable]:
     Parameters
     ----------
     grid : ZoiGrid
-        Its region is the box around the specimen, its active ZOIs lie on the specimen.
+        Its ROI is the box around the specimen, its active ZOIs lie on the specimen.
     axis : "x" or "y"
         Of the load.
 
     Returns
     -------
     dict of name to table, px
-        Without ``transverse`` where a single ZOI fits across.
+        Without ``transverse`` if only one ZOI fits across.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def auto_gauges(grid: ZoiGrid, axis: str) -> dict[str, GaugeTable]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Frame:
-    """A grid turned so that its rows follow one another along the load."""
+    """A grid, turned so that its rows are ordered along the load."""
 
     active: Bools
     along: Floats
@@ -117,13 +117,13 @@ def _ends(frame: _Frame) -> tuple[int, int]:
             " take smaller ZOIs or steps, or a larger region"
         )
     low, high = frame.span
-    rim = (1 - LENGTH) / 2 * (high - low)
+    rim = (1 - AXIAL_SHARE) / 2 * (high - low)
     first, last = (int(rows[np.argmin(abs(frame.along[rows] - at))]) for at in (low + rim, high - rim))
     return (first, last) if first < last else (int(rows[0]), int(rows[-1]))
 
 
 def _axial(frame: _Frame, first: int, last: int) -> GaugeTable:
-    """On the middle line of the specimen, or as near to it as both ends have a ZOI."""
+    """On the middle line of the specimen, or as near to it as there is a ZOI at both ends."""
     middle = float(np.average(frame.across, weights=frame.active.sum(axis=0)))
     both = frame.active[first] & frame.active[last]
     ends = [both, both] if both.any() else [frame.active[first], frame.active[last]]
@@ -137,14 +137,14 @@ def _nearest(columns: NDArray[np.intp], across: Floats, middle: float) -> int:
 
 
 def _band(frame: _Frame, first: int, last: int) -> NDArray[np.intp]:
-    """Rows for the transverse gauge: nearest to the middle where no hole takes ZOIs away."""
+    """Rows for the transverse gauge: nearest to the middle, without those that a hole shortens."""
     rows = np.arange(first, last + 1)
     counts = frame.active[rows].sum(axis=1)
-    rows = rows[counts >= FULL * np.median(counts[counts > 0])]
+    rows = rows[counts >= MIN_ROW_SHARE * np.median(counts[counts > 0])]
     low, high = frame.span
     best = rows[np.argmin(abs(frame.along[rows] - (low + high) / 2))]
-    half = BAND / 2 * (high - low)
+    half = TRANSVERSE_SHARE / 2 * (high - low)
     near = rows[abs(frame.along[rows] - frame.along[best]) <= half]
-    # Rows on both sides of a hole are no band: only those that follow one another.
+    # Rows on both sides of a hole are not one gauge: only consecutive rows.
     pieces = np.split(near, np.flatnonzero(np.diff(near) > 1) + 1)
     return next(piece for piece in pieces if best in piece)

@@ -1,4 +1,4 @@
-"""What a configuration means for the pictures of one camera, and the kernel on a reference."""
+"""The plan of a measurement for the pictures of one camera, and the kernel on a reference."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from live.config.loading import Config
 from live.pipeline.measure import NewReference, measure
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, prepare
-from live.pipeline.warm_up import kinds_of
+from live.pipeline.warm_up import picture_kinds
 from live.setup.compiling import compile_ahead
 from live.setup.grid import grid_for, kernel_settings
 from live.setup.pictures import correction
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasurePlan:
-    """All that is settled before there is a reference.
+    """All that is fixed before there is a reference.
 
     Attributes
     ----------
@@ -40,7 +40,7 @@ class MeasurePlan:
     gauges : tuple of Gauge
     settings : KernelSettings
     correct : callable
-        Takes the fixed pattern of the sensor out of a burst.
+        Corrects the fixed pattern of the sensor in a burst.
     """
 
     config: Config
@@ -57,22 +57,19 @@ class MeasurePlan:
         Raises
         ------
         ConfigError, DataError
-            The grid, a gauge or a correction does not fit, or cannot be read.
+            The grid, a gauge or a correction does not fit, or a file cannot be read.
         """
         grid = grid_for(config, camera.width, camera.height, mask)
-        gauges, settings = (
-            gauges_for(config.gauges, config.specimen.first_axis, grid),
-            kernel_settings(config),
-        )
-        return cls(config, mask, grid, gauges, settings, correction(config, camera))
+        gauges = gauges_for(config.gauges, config.specimen.first_axis, grid)
+        return cls(config, mask, grid, gauges, kernel_settings(config), correction(config, camera))
 
     def compile(self, camera: CameraInfo, say: Callable[[str], object], stopped: Callable[[], bool]) -> float:
-        """Compile what is not compiled yet (``compile_ahead``); the seconds that took."""
+        """Compile what is not compiled yet (``compile_ahead``); returns the seconds that took."""
         phase = self.settings.estimator == "phase"
-        return compile_ahead(kinds_of(camera), phase=phase, say=say, stopped=stopped)
+        return compile_ahead(picture_kinds(camera), phase=phase, say=say, stopped=stopped)
 
     def on(self, reference: Burst, what: str = "the reference") -> PreparedKernel:
-        """The kernel on ``reference``, which errors call ``what``; raises as ``live.pipeline.reference.prepare``."""
+        """The kernel on ``reference``, named ``what`` in errors; raises as ``live.pipeline.reference.prepare``."""
         stated = self.config.measure.noise_GL
         kernel, noise_GL = prepare(reference, self.grid, self.settings, stated, self.correct, what)
         return PreparedKernel(self, kernel, noise_GL)
@@ -99,8 +96,8 @@ class PreparedKernel:
     def measurements(
         self, bursts: Iterable[Burst | NewReference], loads: LoadLog, on_event: EventSink
     ) -> Iterator[Measurement]:
-        """One burst after the other (``live.pipeline.measure.measure``)."""
-        wanted = self.plan.config.measure
+        """The measurement of each burst (``live.pipeline.measure.measure``)."""
+        settings = self.plan.config.measure
         return measure(
             bursts,
             self.kernel,
@@ -108,8 +105,8 @@ class PreparedKernel:
             noise_GL=self.noise_GL,
             correct=self.plan.correct,
             gauges=self.plan.gauges,
-            renew_at=wanted.renew_at,
-            strain=cast(Any, wanted.strain),
+            renew_at=settings.renew_at,
+            strain=cast(Any, settings.strain),
             on_event=on_event,
             timer=self.timer,
         )

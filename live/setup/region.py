@@ -1,7 +1,7 @@
-"""Where is measured: as given, else on the specimen that is found in a picture, else all but a rim.
+"""The region to measure: as given, else the specimen found in a picture, else the picture except a rim.
 
-``searched`` puts what was found into the configuration, as a box and a mask, so that all that comes after
-(the run, its folder, a replay) has it as if a person had drawn it.
+``located`` writes the region into the configuration as a box and a mask, as if a person had drawn them; the run,
+its folder and a replay use it from there.
 """
 
 from __future__ import annotations
@@ -19,13 +19,12 @@ from numpy.typing import NDArray
 from acquire.cv2_loader import load_cv2
 from acquire.errors import ConfigError, DataError
 from acquire.events import Event, EventSink
-from acquire.files.picture import write_picture
 from acquire.frame import CameraInfo
 from live.config.loading import Config
 from live.config.values import ALL, AUTO
 from live.setup.devices import open_rig
 from live.setup.grid import grid_for, whole_picture
-from live.setup.pictures import read_mask
+from live.setup.pictures import read_mask, with_mask
 from live.setup.placement import with_auto_gauges
 
 if TYPE_CHECKING:
@@ -34,24 +33,24 @@ if TYPE_CHECKING:
 Box = tuple[int, int, int, int]
 Bools = NDArray[np.bool_]
 
-LOOK_FRAMES = 4
-"""Taken of a live camera to find the specimen; of pictures, one."""
-ALL_SHARE = 0.98  # of the picture: the specimen fills it, but for holes that a ZOI would feel
+FIRST_LOOK_FRAMES = 4
+"""Frames of a live camera in which the specimen is searched; of recorded pictures, one."""
+FILLS_PICTURE = 0.98  # of the picture: above it the specimen fills the picture, unless it has a hole
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Region:
-    """Where is measured.
+    """The region to measure.
 
     Attributes
     ----------
     box : (x, y, width, height) or None, px
-        None: all but a rim.
+        None: the picture except a rim.
     mask : (H, W) bool or None
     words : str
-        Where it comes from, for a person.
+        Origin of the region, for a person.
     found : bool
-        Whether it is a specimen that was looked for and found.
+        Whether it is a specimen found in the picture.
     """
 
     box: Box | None
@@ -60,11 +59,11 @@ class Region:
     found: bool = False
 
     def config(self, config: Config) -> Config:
-        """The configuration with this box (the mask is a file and comes apart)."""
+        """The configuration with this box; the mask is a file (``with_mask``)."""
         return replace(config, measure=replace(config.measure, roi=self.box or ALL))
 
     def grid(self, config: Config, width: int, height: int) -> ZoiGrid:
-        """The ZOIs of the test in it; raises ConfigError where none fits."""
+        """The ZOIs of the test in the region; raises ConfigError if none fits."""
         return grid_for(self.config(config), width, height, self.mask)
 
     def inside(self, width: int, height: int, zoi: int) -> Bools:
@@ -75,8 +74,8 @@ class Region:
         return inside if self.mask is None else inside & self.mask
 
 
-def is_sought(config: Config) -> bool:
-    """Whether the specimen is to be found: nothing is given, or that it shall be."""
+def is_auto_region(config: Config) -> bool:
+    """Whether the specimen must be found: neither ROI nor mask is given, or the ROI is "auto"."""
     return config.measure.mask is None and config.measure.roi in (None, AUTO)
 
 
@@ -86,11 +85,11 @@ def region_of(config: Config, picture: NDArray[Any], noise: float | None = None)
     Raises
     ------
     DataError
-        The mask cannot be read, or is not the size of the picture.
+        The mask cannot be read, or its size is not that of the picture.
     """
     height, width = picture.shape
     box = config.measure.roi if isinstance(config.measure.roi, tuple) else None
-    if not is_sought(config):
+    if not is_auto_region(config):
         mask = read_mask(config.measure.mask, width, height)
         words = "as given" if box is not None or mask is not None else "all but a rim, as given"
         return Region(box, mask, words)
@@ -105,7 +104,7 @@ def _found(config: Config, picture: NDArray[Any], noise: float | None) -> Region
     specimen = find_specimen(picture, noise) if min(picture.shape) >= config.measure.zoi else None
     if specimen is None:
         return none
-    if specimen.share > ALL_SHARE and _deepest_gap(specimen.mask) < config.measure.zoi / 4:
+    if specimen.share > FILLS_PICTURE and _deepest_gap(specimen.mask) < config.measure.zoi / 4:
         return Region(None, None, "the specimen fills the picture: all but a rim", found=True)
     box = _within(specimen.box.x, specimen.box.y, specimen.box.width, specimen.box.height, config, picture)
     share = f"{specimen.share:.0%} of the picture"
@@ -122,13 +121,13 @@ def _found(config: Config, picture: NDArray[Any], noise: float | None) -> Region
 
 
 def _deepest_gap(mask: Bools) -> float:
-    """How far inside what is left out one can be, px: the radius of a hole."""
+    """Radius of the largest gap in the mask, px."""
     gaps = np.where(mask, np.uint8(0), np.uint8(1))
     return float(load_cv2().distanceTransform(gaps, load_cv2().DIST_L2, 5).max()) if gaps.any() else 0.0
 
 
 def _within(x: int, y: int, w: int, h: int, config: Config, picture: NDArray[Any]) -> Box:
-    """The box without the rim of the picture that is left out everywhere."""
+    """The box, cut by the rim of the picture."""
     height, width = picture.shape
     x0, y0, w0, h0 = whole_picture(width, height, config.measure.zoi)
     left, top = max(x, x0), max(y, y0)
@@ -137,14 +136,14 @@ def _within(x: int, y: int, w: int, h: int, config: Config, picture: NDArray[Any
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FirstLook:
-    """A first look at what the camera sees.
+    """A first look at the picture of a camera.
 
     Attributes
     ----------
-    picture : (H, W) float32 or as it came, GL
+    picture : (H, W) float32, or the type of the frame, GL
         Mean of the frames.
     noise : float or None, GL
-        Of that mean; None where one frame tells nothing.
+        Noise of that mean; None if there is only one frame.
     camera : CameraInfo
     """
 
@@ -159,18 +158,18 @@ class FirstLook:
         return width, height
 
 
-def look(config: Config, say: Callable[[str], None]) -> FirstLook:
-    """Open the camera, take a few frames, and close it again; raises as ``open_rig``.
+def first_look(config: Config, say: Callable[[str], None]) -> FirstLook:
+    """Open the camera, take a few frames, and close it; raises as ``open_rig``.
 
-    What goes wrong meanwhile is said: a camera that gives nothing is waited for.
+    ``say`` receives the warnings of the camera meanwhile.
 
     Raises
     ------
     DataError
-        The camera gave nothing.
+        The camera ended without a whole frame.
     """
-    rig = open_rig(config.camera.address, "none:", troubles(say), crop=config.camera.crop)
-    n = LOOK_FRAMES if rig.camera.info.live else 1
+    rig = open_rig(config.camera.address, "none:", report_warnings(say), crop=config.camera.crop)
+    n = FIRST_LOOK_FRAMES if rig.camera.info.live else 1
     images: list[NDArray[Any]] = []
     try:
         with rig.camera:
@@ -185,14 +184,14 @@ def look(config: Config, say: Callable[[str], None]) -> FirstLook:
     return FirstLook(*_mean_and_noise(images), rig.camera.info)
 
 
-def troubles(say: Callable[[str], None]) -> EventSink:
-    """Warnings and errors of a device, said."""
+def report_warnings(say: Callable[[str], None]) -> EventSink:
+    """An event sink that passes the warnings and errors of a device to ``say``."""
 
-    def tell(event: Event) -> None:
+    def report(event: Event) -> None:
         if event.level != "info":
             say(event.text)
 
-    return tell
+    return report
 
 
 def _mean_and_noise(images: list[NDArray[Any]]) -> tuple[NDArray[Any], float | None]:
@@ -204,42 +203,29 @@ def _mean_and_noise(images: list[NDArray[Any]]) -> tuple[NDArray[Any], float | N
 
 
 @contextmanager
-def searched(config: Config, say: Callable[[str], None]) -> Iterator[Config]:
-    """The configuration of a test, with the specimen found where nothing is given, and gauges placed where asked.
+def located(config: Config, say: Callable[[str], None]) -> Iterator[Config]:
+    """The configuration of a test with the specimen found, if no region is given, and automatic gauges placed.
 
-    The mask lies in a folder that is gone afterwards: a run has its own copy by then.
+    The mask lies in a temporary folder; a run copies it into its own.
     """
-    if not config.camera.address or not (is_sought(config) or config.measure.gauges == AUTO):
+    if not config.camera.address or not (is_auto_region(config) or config.measure.gauges == AUTO):
         yield config
         return
-    sought = is_sought(config)
-    config, mask = placed_on(config, look(config, say), say)
+    auto_region = is_auto_region(config)
+    config, mask = located_on(config, first_look(config, say), say)
     with TemporaryDirectory(prefix="phasedic-") as folder:
-        yield with_mask_at(config, mask if sought else None, Path(folder) / "mask.png")
+        yield with_mask(config, mask if auto_region else None, Path(folder))
 
 
-def placed_on(config: Config, seen: FirstLook, say: Callable[[str], None]) -> tuple[Config, Bools | None]:
-    """The configuration with region and gauges in px, as far as they are sought, and the mask (H, W).
+def located_on(config: Config, first: FirstLook, say: Callable[[str], None]) -> tuple[Config, Bools | None]:
+    """The configuration with region and automatic gauges in px, and the mask (H, W).
 
     Raises
     ------
     ConfigError, DataError
-        As ``region_of``; no ZOI fits, or too few for gauges.
+        As ``region_of``; no ZOI fits, or too few for the gauges.
     """
-    region = region_of(config, seen.picture, seen.noise)
-    if is_sought(config):
-        say(f"{region.words} (--roi all or --roi X,Y,W,H say otherwise)")
-    return with_auto_gauges(region.config(config), region.grid(config, *seen.size)), region.mask
-
-
-def with_mask_at(config: Config, mask: Bools | None, path: Path) -> Config:
-    """The configuration with a mask, which is written to ``path``; as it is without one."""
-    if mask is None:
-        return config
-    write_picture(path, mask_picture(mask))
-    return replace(config, measure=replace(config.measure, mask=str(path)))
-
-
-def mask_picture(mask: Bools) -> NDArray[np.uint8]:
-    """A mask (H, W) as the picture that is read again: black where nothing is measured."""
-    return np.where(mask, np.uint8(255), np.uint8(0))
+    region = region_of(config, first.picture, first.noise)
+    if is_auto_region(config):
+        say(f"{region.words} (--roi all or --roi X,Y,W,H choose another region)")
+    return with_auto_gauges(region.config(config), region.grid(config, *first.size)), region.mask

@@ -1,12 +1,9 @@
-"""The scale of the picture, mm per px, with its uncertainty: from two points, or from the specimen's width.
+"""The scale of the picture, mm per px, with its uncertainty: from two points, the width of the specimen or a board.
 
-``board`` has it from a checkerboard.
-
-The scale from a checkerboard or ChArUco board held where the specimen will be; its tilt told.
-
-The corners are found by OpenCV. A plane seen by a camera without distortion is a homography; its derivative
-in the middle of the board is the scale there, its unevenness the tilt (R. Hartley, A. Zisserman, Multiple
-View Geometry, 2nd ed., sections 2.3 and 8.1).
+A checkerboard or ChArUco board is held in the place of the specimen; OpenCV finds its corners. A camera without
+distortion maps a plane by a homography. Its derivative in the middle of the board is the scale; the difference of
+its singular values and its gradient give the tilt (R. Hartley, A. Zisserman, Multiple View Geometry, 2nd ed.,
+sections 2.3 and 8.1).
 """
 
 from __future__ import annotations
@@ -25,28 +22,33 @@ from acquire.errors import ConfigError, DataError
 from live.setup.region import Region
 
 Bools = NDArray[np.bool_]
+Floats = NDArray[np.float64]
 
 POINT_PX = 1.0
-"""Standard uncertainty of a place that a person has picked, each way."""
-EDGE_PX = 1.0  # of an edge of the specimen that its pattern shows, systematic
-MASK_PX = 6.0  # of an edge of the mask, where the pattern does not show it
-ROWS, FEWEST_ROWS = 48, 12  # px along the load over which an edge is found
-REACH = 24  # px to both sides of the mask's edge
+"""Standard uncertainty of a point that a person has picked, in x and in y."""
+EDGE_PX = 1.0  # standard uncertainty of an edge of the specimen, from the end of its pattern; systematic
+MASK_PX = 6.0  # standard uncertainty of an edge of the mask
+MAX_ROWS, MIN_ROWS = 48, 12  # px along the load for one position of an edge
+SEARCH_PX = 24  # on both sides of the edge of the mask
 OUT_OF_PLANE_MM = 0.1
+MAX_UNEVEN = 0.005
+"""Change of the scale over the board, or between its directions, above which a remark gives the tilt."""
+MIN_CORNERS = 6
+MAX_SQUARES = 60
 
 
 @dataclass(frozen=True, slots=True)
 class Scale:
-    """A scale that was taken.
+    """A measured scale.
 
     Attributes
     ----------
     mm_per_px, sigma : float
-        With its standard uncertainty.
+        mm per px, with its standard uncertainty.
     method : str
-        How, in words.
+        The method, as text.
     remarks : tuple of str
-        What a person should know or mend, as a tilt.
+        Advice for a person, for example about a tilt.
     """
 
     mm_per_px: float
@@ -56,11 +58,11 @@ class Scale:
 
     @property
     def relative(self) -> float:
-        """Its uncertainty as a part of it."""
+        """The relative uncertainty."""
         return self.sigma / self.mm_per_px
 
     def changes(self, stand_off_mm: float | None = None) -> dict[str, Any]:
-        """What it sets in a rig file (``live.config.rig_file.write_rig``)."""
+        """The changes of a rig file (``live.config.rig_file.write_rig``)."""
         changes: dict[str, Any] = {
             "scale.mm_per_px": float(f"{self.mm_per_px:.7g}"),
             "scale.sigma_mm_per_px": float(f"{self.sigma:.2g}"),
@@ -71,7 +73,7 @@ class Scale:
 
 
 def from_points(points: tuple[float, float, float, float], length_mm: float, sigma_mm: float = 0.0) -> Scale:
-    """Two points x1, y1, x2, y2 (px) that are ``length_mm`` apart; raises ConfigError where they are one."""
+    """Two points x1, y1, x2, y2 (px) that are ``length_mm`` apart; raises ConfigError if they coincide."""
     x1, y1, x2, y2 = points
     px = math.hypot(x2 - x1, y2 - y1)
     if not (px > 1 and length_mm > 0 and math.isfinite(px) and math.isfinite(length_mm)):
@@ -89,7 +91,7 @@ def from_width(
     Raises
     ------
     DataError
-        Its edges are not seen.
+        Its edges are not visible.
     """
     px, sigma_px = specimen_width(picture, region, axis)
     scale = width_mm / px
@@ -101,7 +103,7 @@ def from_width(
 
 
 def false_strain(stand_off_mm: float, out_of_plane_mm: float = OUT_OF_PLANE_MM) -> float:
-    """Strain that a motion toward the camera feigns: the image grows as the distance falls."""
+    """False strain of a motion toward the camera: the image grows as the distance falls."""
     return out_of_plane_mm / stand_off_mm
 
 
@@ -116,7 +118,9 @@ def specimen_width(picture: NDArray[Any], region: Region, axis: str) -> tuple[fl
     """
     mask = region.mask
     if mask is None or not region.found:
-        raise DataError("the edges of the specimen are not seen; give two points, or a larger field of view")
+        raise DataError(
+            "the edges of the specimen are not visible; give two points, or a larger field of view"
+        )
     if axis == "x":
         picture, mask = picture.T, mask.T
     grey = np.asarray(picture, np.float32)
@@ -139,12 +143,12 @@ def _bands(mask: Bools) -> Iterator[slice]:
     rows = np.flatnonzero(mask.any(axis=1))
     quarter = len(rows) // 4
     first, last = int(rows[quarter]), int(rows[len(rows) - 1 - quarter])
-    size = min(ROWS, max(FEWEST_ROWS, last + 1 - first))
+    size = min(MAX_ROWS, max(MIN_ROWS, last + 1 - first))
     yield from (slice(top, top + size) for top in range(first, max(last + 2 - size, first + 1), size))
 
 
 def _sides(mask: Bools) -> tuple[float, float] | None:
-    """Left and right edge of the mask over some rows; None where it reaches the picture's."""
+    """Left and right edge of the mask over some rows; None if it reaches the edge of the picture."""
     inside = np.flatnonzero(mask.mean(axis=0) > 0.5)
     if not inside.size or inside[0] == 0 or inside[-1] == mask.shape[1] - 1:
         return None
@@ -157,7 +161,11 @@ def _band_width(grey: NDArray[np.float32], mask: Bools) -> float | None:
         return None
     left, right = (round(side) for side in sides)
     scatter = grey.std(axis=0)
-    inner = float(np.median(scatter[left + REACH : right - REACH])) if right - left > 3 * REACH else math.nan
+    inner = (
+        float(np.median(scatter[left + SEARCH_PX : right - SEARCH_PX]))
+        if right - left > 3 * SEARCH_PX
+        else math.nan
+    )
     edges = [_edge(scatter[::-1], len(scatter) - left, inner), _edge(scatter, right, inner)]
     if None in edges:
         return None
@@ -165,9 +173,9 @@ def _band_width(grey: NDArray[np.float32], mask: Bools) -> float | None:
 
 
 def _edge(scatter: NDArray[np.float32], at: int, inner: float) -> float | None:
-    """Where the scatter falls for good, coming from the left; px from the left edge of the picture."""
-    near = scatter[max(at - REACH, 0) : at + REACH]
-    outer = float(np.median(near[-REACH // 2 :])) if len(near) > 1.5 * REACH else math.nan
+    """The last fall of the scatter from left to right, px from the left edge of the picture."""
+    near = scatter[max(at - SEARCH_PX, 0) : at + SEARCH_PX]
+    outer = float(np.median(near[-SEARCH_PX // 2 :])) if len(near) > 1.5 * SEARCH_PX else math.nan
     if not outer < inner / 2:
         return None
     middle = (inner + outer) / 2
@@ -176,20 +184,15 @@ def _edge(scatter: NDArray[np.float32], at: int, inner: float) -> float | None:
         return None
     last = int(above[-1])
     part = (near[last] - middle) / (near[last] - near[last + 1])
-    return max(at - REACH, 0) + last + 0.5 + float(part)
+    return max(at - SEARCH_PX, 0) + last + 0.5 + float(part)
 
 
-Floats = NDArray[np.float64]
-
-MOST_UNEVEN = 0.005
-"""Change of the scale over the board, or between its directions, above which the tilt is warned of."""
-FEWEST_CORNERS = 6
-MOST_SQUARES = 60
+# -- a board ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A board.
+    """A checkerboard or ChArUco board.
 
     Attributes
     ----------
@@ -199,7 +202,7 @@ class Board:
     marker_mm : float
         Of a ChArUco board; 0 for a checkerboard.
     dictionary : str
-        Of its markers, as OpenCV names it: ``4X4_50``.
+        Of its markers, by the name in OpenCV: ``4X4_50``.
     """
 
     columns: int
@@ -209,15 +212,15 @@ class Board:
     dictionary: str = "4X4_50"
 
     def __post_init__(self) -> None:
-        if not (3 <= self.columns <= MOST_SQUARES and 3 <= self.rows <= MOST_SQUARES and self.square_mm > 0):
-            raise ConfigError(f"a board has 3 to {MOST_SQUARES} columns and rows, and squares above 0 mm")
+        if not (3 <= self.columns <= MAX_SQUARES and 3 <= self.rows <= MAX_SQUARES and self.square_mm > 0):
+            raise ConfigError(f"a board has 3 to {MAX_SQUARES} columns and rows, and squares above 0 mm")
         if not 0 <= self.marker_mm < self.square_mm:
             raise ConfigError("the markers of a ChArUco board are smaller than its squares")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Corners:
-    """Corners that were found: ``mm`` (N, 2) on the board and ``px`` (N, 2) in the picture."""
+    """Corners of a board: ``mm`` (N, 2) on the board and ``px`` (N, 2) in the picture."""
 
     mm: Floats
     px: Floats
@@ -229,18 +232,18 @@ def find_corners(picture: NDArray[Any], board: Board) -> Corners:
     Raises
     ------
     DataError
-        There are too few.
+        Too few corners are found.
     ConfigError
         OpenCV has no such dictionary.
     """
     low, high = np.percentile(picture, (0.5, 99.5))
     grey = np.clip((picture - low) * (255 / max(float(high - low), 1e-6)), 0, 255).astype(np.uint8)
     found = _charuco(grey, board) if board.marker_mm else _checkerboard(grey, board)
-    if found is None or len(found.px) < FEWEST_CORNERS:
+    if found is None or len(found.px) < MIN_CORNERS:
         kind = "ChArUco board" if board.marker_mm else "checkerboard"
         count = "squares" if board.marker_mm else "inner corners"
         raise DataError(
-            f"no {kind} of {board.columns} x {board.rows} {count} is seen; hold all of it in the picture, in focus"
+            f"no {kind} of {board.columns} x {board.rows} {count} is found; hold all of it in the picture, in focus"
             " and evenly lit, and count again"
         )
     return found
@@ -289,7 +292,7 @@ def from_board(
     sigma_mm : float
         Standard uncertainty of the length of the whole board.
     stand_off_mm : float, optional
-        Distance to the camera; the tilt is told in degrees with it.
+        Distance to the camera, for the tilt in degrees.
 
     Raises
     ------
@@ -303,20 +306,20 @@ def from_board(
     gradient = -h[2, :2] / (h[2, :2] @ middle + h[2, 2])  # of ln(px per mm), per mm
     extent = float(np.ptp(corners.mm, axis=0).max())
     spread = math.sqrt(float(((corners.mm - middle) ** 2).sum(axis=1).mean()))
-    rest = math.sqrt(float(((_mapped(h, corners.mm) - corners.px) ** 2).mean()))
-    # Foreshortened one way: half of the difference is not known to belong to the scale.
+    rms = math.sqrt(float(((_mapped(h, corners.mm) - corners.px) ** 2).mean()))
+    # A tilt shortens one direction: half of the difference is uncertain.
     uneven = 1 - smaller / larger
-    fit = rest / (larger * spread * math.sqrt(len(corners.mm)))
+    fit = rms / (larger * spread * math.sqrt(len(corners.mm)))
     relative = math.sqrt(fit**2 + (sigma_mm / extent) ** 2 + uneven**2 / 12)
     kind = "ChArUco board" if board.marker_mm else "checkerboard"
     scale = float(math.sqrt(1 / (larger * smaller)))
-    method = f"{kind} of {len(corners.mm)} corners, {rest:.2f} px rms"
+    method = f"{kind} of {len(corners.mm)} corners, {rms:.2f} px rms"
     change = float(np.hypot(*gradient)) * extent
     return Scale(scale, scale * relative, method, tuple(_tilt(change, float(uneven), extent, stand_off_mm)))
 
 
 def _tilt(change: float, uneven: float, extent: float, stand_off_mm: float | None) -> Iterator[str]:
-    if max(change, uneven) <= MOST_UNEVEN:
+    if max(change, uneven) <= MAX_UNEVEN:
         return
     degrees = math.degrees(math.acos(min(1 - uneven, 1.0)))
     if stand_off_mm is not None:
@@ -330,16 +333,16 @@ def _tilt(change: float, uneven: float, extent: float, stand_off_mm: float | Non
 def _homography(corners: Corners) -> Floats:
     h, _ = load_cv2().findHomography(corners.mm, corners.px, 0)
     if h is None:
-        raise DataError("the corners found make no plane; hold the board still and in focus")
+        raise DataError("the corners found do not lie on a plane; hold the board still and in focus")
     return np.asarray(h, np.float64)
 
 
 def _mapped(h: Floats, mm: Floats) -> Floats:
-    seen = np.column_stack([mm, np.ones(len(mm))]) @ h.T
-    return np.asarray(seen[:, :2] / seen[:, 2:])
+    mapped = np.column_stack([mm, np.ones(len(mm))]) @ h.T
+    return np.asarray(mapped[:, :2] / mapped[:, 2:])
 
 
 def _derivative(h: Floats, at: Floats) -> Floats:
-    """px per mm there, (2, 2)."""
-    seen = h @ np.array([*at, 1.0])
-    return np.asarray((h[:2, :2] - np.outer(seen[:2] / seen[2], h[2, :2])) / seen[2])
+    """The derivative of the homography, px per mm, (2, 2)."""
+    mapped = h @ np.array([*at, 1.0])
+    return np.asarray((h[:2, :2] - np.outer(mapped[:2] / mapped[2], h[2, :2])) / mapped[2])

@@ -1,6 +1,6 @@
-"""A picture for a person: ruler, region, ZOIs coloured by their quality, gauges.
+"""A drawing of the set-up: picture, ruler, region, ZOIs coloured by their noise, gauges.
 
-Coordinates on the ruler are those of the configuration, whatever the size of what is drawn.
+The ruler has the coordinates of the configuration, at any size of the drawing.
 """
 
 from __future__ import annotations
@@ -24,17 +24,17 @@ Colour = tuple[int, int, int]
 Canvas = NDArray[np.uint8]
 
 GOOD, FAIR, POOR = (80, 200, 60), (40, 200, 240), (60, 60, 230)  # BGR
-EDGE, GAUGE, PAPER, INK = (240, 190, 60), (255, 120, 255), (245, 245, 245), (30, 30, 30)
-OUTSIDE = 0.45  # how much of the picture's light is left beside the region
-LONGEST, SHORTEST = 1800, 500  # px of the longer side of what is drawn
-LEFT, TOP, FOOT = 64, 34, 34
+EDGE, GAUGE, BACKGROUND, INK = (240, 190, 60), (255, 120, 255), (245, 245, 245), (30, 30, 30)
+OUTSIDE = 0.45  # brightness of the picture outside the region
+MAX_SIDE, MIN_SIDE = 1800, 500  # px of the longer side of the drawing
+LEFT, TOP, BOTTOM = 64, 34, 34
 FONT = 0.45
-MOST_SQUARES = 40  # of ZOIs along the longer side
+MAX_SQUARES = 40  # along the longer side of the grid
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Overlay:
-    """What is drawn over a picture.
+    """The overlay of a picture.
 
     Attributes
     ----------
@@ -42,9 +42,9 @@ class Overlay:
     grid : ZoiGrid
     gauges : mapping of name to its table
     sigma : (R, C) or None
-        Strain noise of each ZOI, NaN without pattern; None: not drawn.
-    wanted : float
-        Strain noise up to which a ZOI is good; to twice that it is fair.
+        Strain noise of each ZOI, NaN without pattern; None draws no ZOI.
+    target : float
+        Strain noise up to which a ZOI is good; up to twice that it is fair.
     px_per_mm : float or None
         For the ruler.
     """
@@ -53,12 +53,12 @@ class Overlay:
     grid: ZoiGrid
     gauges: Mapping[str, GaugeTable] = field(default_factory=dict)
     sigma: NDArray[np.float64] | None = None
-    wanted: float = 1e-3
+    target: float = 1e-3
     px_per_mm: float | None = None
 
 
 def snapshot(picture: NDArray[Any], overlay: Overlay) -> Canvas:
-    """``picture`` (H, W) with what lies over it, (H', W', 3) uint8, BGR."""
+    """``picture`` (H, W) with its overlay, (H', W', 3) uint8, BGR."""
     drawing = _Drawing.of(picture)
     drawing.region(overlay)
     if overlay.sigma is not None:
@@ -69,7 +69,7 @@ def snapshot(picture: NDArray[Any], overlay: Overlay) -> Canvas:
 
 
 class _Drawing:
-    """A canvas with the picture on it; ``zoom`` px of it are one of the picture of ``shape`` (H, W)."""
+    """A canvas with the picture on it; ``zoom`` px of the canvas are one px of the picture of ``shape`` (H, W)."""
 
     def __init__(self, canvas: Canvas, zoom: float, shape: tuple[int, ...]) -> None:
         self.canvas, self.zoom, self.shape, self.cv2 = canvas, zoom, shape, load_cv2()
@@ -80,17 +80,17 @@ class _Drawing:
         low, high = np.percentile(picture, (0.2, 99.8))
         grey = np.clip((picture - low) * (255 / max(float(high - low), 1e-6)), 0, 255).astype(np.uint8)
         longer = max(grey.shape)
-        zoom = min(max(1.0, SHORTEST / longer), LONGEST / longer)
+        zoom = min(max(1.0, MIN_SIDE / longer), MAX_SIDE / longer)
         size = tuple(max(1, round(side * zoom)) for side in grey.shape[::-1])
         grey = cv2.resize(grey, size, interpolation=cv2.INTER_AREA if zoom < 1 else cv2.INTER_NEAREST)
         return cls(cv2.cvtColor(grey, cv2.COLOR_GRAY2BGR), zoom, picture.shape)
 
     def at(self, x: float, y: float) -> tuple[int, int]:
-        """A place of the picture on the canvas."""
+        """A point of the picture in px of the canvas."""
         return round(x * self.zoom), round(y * self.zoom)
 
     def region(self, o: Overlay) -> None:
-        """What lies outside is darkened, the edge is drawn."""
+        """Darken the picture outside the region and draw its edge."""
         cv2, (height, width) = self.cv2, self.canvas.shape[:2]
         shape = o.region.mask.shape if o.region.mask is not None else self.shape
         inside = o.region.inside(shape[1], shape[0], o.grid.size).astype(np.uint8)
@@ -101,30 +101,30 @@ class _Drawing:
         cv2.drawContours(self.canvas, edges, -1, EDGE, 2)
 
     def quality(self, o: Overlay, sigma: NDArray[np.float64]) -> None:
-        """A square at the centre of a ZOI in the colour of its noise; a cross where there is no pattern."""
-        every = max(1, math.ceil(max(o.grid.shape) / MOST_SQUARES))
+        """A square at the centre of each ZOI in the colour of its noise; a cross without pattern."""
+        every = max(1, math.ceil(max(o.grid.shape) / MAX_SQUARES))
         half = max(2, round(0.22 * o.grid.step * every * self.zoom))
         for row, column in np.argwhere(o.grid.subset(every=every).active):
             x, y = self.at(o.grid.x[column], o.grid.y[row])
             value = float(sigma[row, column])
             corners = (x - half, y - half), (x + half, y + half)
             if math.isfinite(value):
-                colour = GOOD if value <= o.wanted else FAIR if value <= 2 * o.wanted else POOR
+                colour = GOOD if value <= o.target else FAIR if value <= 2 * o.target else POOR
                 self.cv2.rectangle(self.canvas, *corners, colour, -1)
             else:
                 self.cv2.line(self.canvas, *corners, POOR, 2)
                 self.cv2.line(self.canvas, (x - half, y + half), (x + half, y - half), POOR, 2)
 
     def gauge(self, name: str, outline: tuple[tuple[tuple[float, float], ...], ...]) -> None:
-        """Its outline and its name."""
+        """The outline of a gauge and its name."""
         for line in outline:
-            points = np.array([self.at(*place) for place in line], np.int32)
+            points = np.array([self.at(*point) for point in line], np.int32)
             self.cv2.polylines(self.canvas, [points], False, GAUGE, 2, self.cv2.LINE_AA)
         left, low = self.at(*outline[0][0])
         self.text(name, left + 8, low - 6, GAUGE)
 
     def text(self, words: str, x: int, y: int, colour: Colour) -> None:
-        """Readable on any ground."""
+        """Text on a box, readable on any picture."""
         font = self.cv2.FONT_HERSHEY_SIMPLEX
         (width, height), base = self.cv2.getTextSize(words, font, FONT, 1)
         x = max(0, min(x, self.canvas.shape[1] - width))
@@ -132,9 +132,9 @@ class _Drawing:
         self.cv2.putText(self.canvas, words, (x, y), font, FONT, colour, 1, self.cv2.LINE_AA)
 
     def framed(self, o: Overlay) -> Canvas:
-        """With a ruler at the left and the top, and what the colours mean below."""
+        """With a ruler at the left and the top, and the legend below."""
         height, width = self.canvas.shape[:2]
-        page = np.full((height + TOP + FOOT, width + LEFT, 3), PAPER, np.uint8)
+        page = np.full((height + TOP + BOTTOM, width + LEFT, 3), BACKGROUND, np.uint8)
         page[TOP : TOP + height, LEFT:] = self.canvas
         self.canvas = page
         unit = 1.0 if o.px_per_mm is None else o.px_per_mm
@@ -154,7 +154,7 @@ class _Drawing:
 
 
 def _ticks(length: int, zoom: float) -> Iterator[tuple[str, int]]:
-    """Values and places of the ruler, about every 100 px of the canvas."""
+    """Values and positions of the ruler, about every 100 px of the canvas."""
     rough = 100 / zoom
     power = 10.0 ** math.floor(math.log10(rough))
     step = power * next(nice for nice in (1, 2, 5, 10) if nice * power >= rough * 0.999)
@@ -166,8 +166,8 @@ def _legend(o: Overlay) -> str:
     if o.sigma is None:
         return f"{o.grid.n_active} ZOIs of {o.grid.size} px"
     known = o.sigma[o.grid.active]
-    good = int((known <= o.wanted).sum())
+    good = int((known <= o.target).sum())
     return (
-        f"{good} of {known.size} ZOIs of {o.grid.size} px within {o.wanted * 1e6:.0f} um/m (green);"
+        f"{good} of {known.size} ZOIs of {o.grid.size} px within {o.target * 1e6:.0f} um/m (green);"
         " to twice that yellow, more red, cross: no pattern"
     )

@@ -39,7 +39,7 @@ def wrong(u: Floats) -> NDArray[np.bool_]:
         for dy in (-1, 0, 1) for dx in (-1, 0, 1) if dy or dx
     ]  # fmt: skip
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of places where nobody says anything
+        warnings.simplefilter("ignore", RuntimeWarning)  # of places without valid neighbours
         middle = np.nanmedian(around, axis=0)
     several = np.isfinite(around).sum(axis=0) >= 3
     return np.asarray(several & (np.abs(u - middle) > FARTHEST_PX))

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Scene:
-    """Levels 0..1, the true displacement at (x, y), and where a ZOI of half side h sees the trouble."""
+    """Levels 0..1, the true displacement at (x, y), and where a ZOI of half side h contains the trouble."""
 
     reference: Array
     deformed: Array
@@ -69,7 +69,7 @@ def crack(opening: float, slip: float) -> Callable[..., Scene]:
 
 
 def hole(s: Speckle, x: Array, y: Array) -> Scene:
-    """A hole through which a still background shows; what is right for a ZOI centred in it nobody can say."""
+    """A hole through which a still background shows; a ZOI centred in it has no right value."""
     still = Speckle(3.0, 9).at(x, y) * 0.3
     mx = (x - 0.4) / 1.01
     return Scene(

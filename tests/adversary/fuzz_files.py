@@ -1,4 +1,4 @@
-"""Changes the structure of session and strain files in many ways and looks what reading them does.
+"""Changes the structure of session and strain files in many ways and checks what reading them does.
 
 ``python -m tests.adversary.fuzz_files session|strain [--seconds 600] [--seed 0]`` prints how often each end
 was reached, and every case that did not end in words with exit code 4 or in the right numbers.
@@ -24,7 +24,7 @@ from typing import Any
 from acquire.errors import DataError, PhasedicError
 from acquire.session import Session, recover
 from live.cli import main as phasedic
-from live.replay.session import session_config, session_material
+from live.replay.session import session_config, session_source
 from live.replay.source import ReplayRequest
 from live.results import Strain
 from tests.adversary.structure import change, make_fifo
@@ -50,7 +50,7 @@ def look_at_session(path: Path) -> Numbers:
         for as_measured in (True, False):
             request = ReplayRequest(str(path), as_measured, None, None, None, None, {})
             config = session_config(session, request, {}, path)
-            material = session_material(session, request, config, path)
+            material = session_source(session, request, config, path)
             for burst in material.bursts:
                 key = f"burst {getattr(burst, 'first_index', '-')} {getattr(burst, 'n', '-')}"
                 mean = getattr(burst, "mean", None)

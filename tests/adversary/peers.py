@@ -1,4 +1,4 @@
-"""Peers on the other end of a load cell's line that say what a test wants: on a pty, a socket, and by RFC 2217."""
+"""Peers on the other end of a load cell's line that send what a test needs: on a pty, a socket, and by RFC 2217."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ class SocketPeer(Peer):
 
 
 class Rfc2217Peer(SocketPeer):
-    """The same, by Telnet with RFC 2217, as pyserial's own server speaks it."""
+    """The same, by Telnet with RFC 2217, by pyserial's own server."""
 
     scheme = "rfc2217"
 
@@ -191,7 +191,7 @@ class Rfc2217Peer(SocketPeer):
                 with sending:
                     self._send(connection, data.replace(b"\xff", b"\xff\xff"))
 
-            time.sleep(0.05)  # until it is known who speaks
+            time.sleep(0.05)  # until the peer is known
             self._speak(write)
             with contextlib.suppress(OSError):
                 connection.shutdown(socket.SHUT_RDWR)

@@ -1,6 +1,6 @@
 """Changes of the structure of an HDF5 file, each of which its format allows.
 
-``change`` makes one, chosen by a random number generator, and says what it did.
+``change`` makes one, chosen by a random number generator, and returns what it did.
 """
 
 from __future__ import annotations
@@ -321,7 +321,7 @@ OF_GROUPS = {
     for f in (removed, type_instead, soft_link, external_link, extra_link, another_name, attribute)
 }
 TOUCH_VALUES = {"values_beyond", "values_turned", "other_text", "another_name", "attribute"}
-"""Changes after which other numbers are what the file says."""
+"""Changes after which the file holds other numbers."""
 
 
 def change(path: Path, rng: random.Random, elsewhere: Path, fifo: Path) -> tuple[str, bool]:

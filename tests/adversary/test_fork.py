@@ -1,4 +1,4 @@
-"""A process forked off after measuring says so, and its parent does not wait for ever."""
+"""A process forked off after measuring is refused, and its parent does not wait for ever."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ with multiprocessing.get_context("fork").Pool(1) as pool:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("when", "says"), [("after", "forked off after its parent"), ("before", "measured True")]
+    ("when", "message"), [("after", "forked off after its parent"), ("before", "measured True")]
 )
-def test_a_fork(when: str, says: str) -> None:
+def test_a_fork(when: str, message: str) -> None:
     root = Path(__file__).parents[2]
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, when], capture_output=True, text=True, timeout=300, cwd=root
     )
     assert done.returncode == 0, done.stderr
-    assert all(says in line for line in done.stdout.splitlines())
+    assert all(message in line for line in done.stdout.splitlines())
     assert done.stdout

@@ -77,7 +77,7 @@ def test_any_configuration_is_taken_or_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "message"),
     [
         ("[mesure]\nzoi=3", "did you mean measure"),
         ("[qqqqqqqq]\nzoi=3", "unknown section"),
@@ -92,10 +92,10 @@ def test_any_configuration_is_taken_or_refused(tmp_path: Path) -> None:
         ("x" * 2_000_000, "MB"),
     ],
 )
-def test_what_was_found(tmp_path: Path, text: str, says: str) -> None:
+def test_what_was_found(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "a.toml"
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(ConfigError, match=f"a.toml: .*{says}"):
+    with pytest.raises(ConfigError, match=f"a.toml: .*{message}"):
         load_config(path, {})
 
 

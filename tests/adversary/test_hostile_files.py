@@ -104,7 +104,7 @@ def session(tmp_path: Path) -> Path:
 
 
 def refused(path: Path, out: Path, capfd: pytest.CaptureFixture[str]) -> str:
-    """What a replay says that ends with exit code 4."""
+    """The message of a replay that ends with exit code 4."""
     code = main(["replay", str(path), "--out", str(out), "--no-view", "--no-rrd"])
     said = capfd.readouterr().err
     assert code == 4, said
@@ -170,7 +170,7 @@ def test_a_pipe_or_a_folder_is_no_session(tmp_path: Path, capfd: pytest.CaptureF
             recover(path)
 
 
-def test_a_frame_without_a_time_is_told_and_counted_and_the_others_are_kept(session: Path) -> None:
+def test_a_frame_without_a_time_is_reported_and_counted_and_the_others_are_kept(session: Path) -> None:
     with h5py.File(session, "r+") as file:
         file[f"{FRAMES}/monotonic_s"][[7, 8]] = np.nan
         indices = np.delete(file[f"{FRAMES}/index"][()], [7, 8]).tolist()
@@ -183,7 +183,7 @@ def test_a_frame_without_a_time_is_told_and_counted_and_the_others_are_kept(sess
         np.testing.assert_array_equal(back.frame(7).image, whole.frame(9).image)
 
 
-def test_times_that_run_backwards_are_told(session: Path) -> None:
+def test_times_that_run_backwards_are_reported(session: Path) -> None:
     with h5py.File(session, "r+") as file:
         times = file[f"{FRAMES}/monotonic_s"]
         times[10:] = times[10:] - 3600.0
@@ -286,7 +286,7 @@ def test_columns_of_another_version_are_let_be(strain: Path) -> None:
         np.testing.assert_array_equal(back.values["more"], np.arange(4))
 
 
-def test_odd_times_of_results_are_told(strain: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_odd_times_of_results_are_reported(strain: Path, caplog: pytest.LogCaptureFixture) -> None:
     with h5py.File(strain, "r+") as file:
         file["entry/mean/time_s"][[0, 2]] = [9.0, np.nan]
     with Strain.open(strain) as back:

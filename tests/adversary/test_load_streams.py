@@ -22,7 +22,7 @@ from live.ui.terminal.screen import TerminalScreen
 from tests.acquire.protocols.conversation import parser
 from tests.adversary.peers import PEERS, TALKS, Peer, SocketPeer, leave, stamped
 
-SOON_S = 2.0  # on a busy machine; the contract says half a second to stop
+SOON_S = 2.0  # on a busy machine; the contract allows half a second to stop
 
 
 class Reader:
@@ -107,7 +107,7 @@ def test_a_test_goes_on_beside_it(kind: str, talk: str, tmp_path: Path) -> None:
 RATE, STALL_AT_S, STALL_S, SECONDS = 200.0, 1.0, 0.7, 2.4
 
 
-def heard(kind: str) -> list[LoadSample]:
+def received(kind: str) -> list[LoadSample]:
     """What comes of a stream whose values are the times at which they were due, with a stall on the way."""
     with PEERS[kind](stamped(RATE, STALL_AT_S, STALL_S)) as peer:
         cell = opened(peer, [])
@@ -120,7 +120,7 @@ def heard(kind: str) -> list[LoadSample]:
 @pytest.fixture(scope="module")
 def streams() -> dict[str, list[LoadSample]]:
     found: dict[str, list[LoadSample]] = {}
-    threads = [threading.Thread(target=lambda k=kind: found.update({k: heard(k)})) for kind in PEERS]
+    threads = [threading.Thread(target=lambda k=kind: found.update({k: received(k)})) for kind in PEERS]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -141,7 +141,7 @@ def test_what_waited_on_the_way_is_stale(kind: str, streams: dict[str, list[Load
 # -- peers that hang up -------------------------------------------------------------------------
 
 
-def test_a_peer_that_hangs_up_at_once_is_told_of_once() -> None:
+def test_a_peer_that_hangs_up_at_once_is_reported_once() -> None:
     events: list[Event] = []
     with SocketPeer(leave) as peer:
         cell = opened(peer, events)
@@ -203,7 +203,7 @@ def test_a_stream_with_wrong_check_digits_gives_no_value(name: str) -> None:
     sent = [answer(1000 + k) for k in range(3000)]
     wrong = [WRONG[name](sound) for sound in sent if WRONG[name](sound) != sound]
     for damaged in wrong:
-        values += [reading.value for reading in modbus.burst_queue(damaged) + modbus.silence()]
+        values += [reading.value for reading in modbus.feed(damaged) + modbus.silence()]
     assert len(values) >= len(wrong) > 2900 and all(math.isnan(value) for value in values)
 
 
@@ -212,7 +212,7 @@ def test_sound_answers_between_wrong_ones_are_read(name: str) -> None:
     modbus, values = parser("modbus", PROFILE), []
     for k in range(300):
         wrong = k % 3 == 0
-        readings = modbus.burst_queue(WRONG[name](answer(k)) if wrong else answer(k)) + modbus.silence()
+        readings = modbus.feed(WRONG[name](answer(k)) if wrong else answer(k)) + modbus.silence()
         values += [math.nan if wrong and len(readings) > 1 else readings[0].value]
     good = [value for value in values if not math.isnan(value)]
     assert good == [k for k in range(300) if k % 3]
@@ -226,7 +226,7 @@ def test_every_flip_of_up_to_two_bits_is_found() -> None:
     for flip in flips:
         modbus = parser("modbus", PROFILE)
         damaged = (whole ^ flip).to_bytes(len(sound), "big") if flip.bit_count() else sound
-        readings = modbus.burst_queue(damaged) + modbus.silence()
+        readings = modbus.feed(damaged) + modbus.silence()
         assert all(math.isnan(reading.value) for reading in readings)
 
 

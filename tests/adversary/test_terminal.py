@@ -69,7 +69,7 @@ class Stuck(io.StringIO):
 
 def test_what_finds_no_room_is_counted() -> None:
     stream = Stuck()
-    patient = NonBlockingStream(stream, room=3)
+    patient = NonBlockingStream(stream, queue_size=3)
     for k in range(10):
         patient.write(f"{k}\n")
     assert not patient.drain(0.01)

@@ -1,11 +1,4 @@
-"""The threads of a loop are not on the core of the one that called it.
-
-Compiled code is kept, found again by the next process, and thrown away when anything in it changes.
-
-Pieces of work that threads come for: each is done once, whoever does it.
-
-Explicit vectors in compiled loops, and the moments that are made with them, against numpy.
-"""
+"""Compiled loops: their threads and pieces of work, their cache, and explicit vectors against numpy."""
 
 from __future__ import annotations
 
@@ -56,8 +49,8 @@ def where(threads: Any, found: Any) -> Any:
     return calling
 
 
-@pytest.fixture(autouse=True)
-def _caller_works() -> None:
+@pytest.fixture
+def caller_works() -> None:
     if threading_layer() == "workqueue":
         pytest.skip("the caller of a loop only waits here (test_layer.py)")
 
@@ -67,6 +60,7 @@ def _run() -> tuple[Any, np.ndarray, np.ndarray]:
     return where(threads, found), threads, found
 
 
+@pytest.mark.usefixtures("caller_works")
 @pytest.mark.skipif(not cores.LINUX, reason="threads are told apart on Linux only")
 def test_the_threads_of_a_loop_leave_the_core_of_its_caller() -> None:
     allowed = os.sched_getaffinity(0)
@@ -84,6 +78,7 @@ def test_the_threads_of_a_loop_leave_the_core_of_its_caller() -> None:
     assert os.sched_getaffinity(0) == allowed, "the caller may go where it could"
 
 
+@pytest.mark.usefixtures("caller_works")
 @pytest.mark.skipif(not cores.LINUX, reason="threads are told apart on Linux only")
 def test_on_one_core_they_stay() -> None:
     allowed = os.sched_getaffinity(0)
@@ -97,9 +92,7 @@ def test_on_one_core_they_stay() -> None:
 
 
 PACKAGE = Path(analysis.__file__).parent
-
-
-COMPILING = ("analysis.compiled.loops", "analysis.compiled.vectors")
+COMPILERS = ("analysis.compiled.loops", "analysis.compiled.vectors")
 
 
 def imports_numba(module: Path) -> bool:
@@ -107,12 +100,12 @@ def imports_numba(module: Path) -> bool:
     nodes = ast.parse(module.read_text(encoding="utf-8")).body
     names = [n.module or "" for n in nodes if isinstance(n, ast.ImportFrom)]
     names += [alias.name for n in nodes if isinstance(n, ast.Import) for alias in n.names]
-    return any(name.split(".")[0] == "numba" or name.startswith(COMPILING) for name in names)
+    return any(name.split(".")[0] == "numba" or name.startswith(COMPILERS) for name in names)
 
 
 COMPILED = sorted(m.relative_to(PACKAGE).as_posix() for m in PACKAGE.rglob("*.py") if imports_numba(m))
 # Their constants are part of the compiled code.
-CONSTANTS = ["fit/validity.py", "fit/bundles.py", "picture/splines.py"]
+CONSTANTS = ["fit/validity.py", "fit/kernel_args.py", "picture/splines.py"]
 
 
 @pytest.fixture(scope="module")
@@ -122,7 +115,9 @@ def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_modules_with_compiled_code_were_found() -> None:
-    assert {"compiled/loops.py", "compiled/vectors.py", "picture/warp.py", "follow/climb.py"} <= set(COMPILED)
+    assert {"compiled/loops.py", "compiled/vectors.py", "picture/warp.py", "follow/hill_climb.py"} <= set(
+        COMPILED
+    )
 
 
 @pytest.mark.parametrize("module", [*COMPILED, *CONSTANTS])
@@ -215,7 +210,7 @@ def of_the_difference(images, samples, at, pitch, g, line, size, rows, columns, 
     return difference_moments(columns, rows, line, out)
 
 
-def test_a_vector_does_what_is_said() -> None:
+def test_operations_on_vectors() -> None:
     a, out = RNG.normal(size=LANES + 5).astype(np.float32), np.zeros(LANES + 3, np.float32)
     found = every_operation(a, 3, np.float32(1.5), out)
     expected = a[3 : 3 + LANES] * 1.5 - 1.5 + a[3 : 3 + LANES] + 1.5

@@ -1,4 +1,4 @@
-"""Maps with the window's blur taken off: the response and the noise that the theory says, also at gaps."""
+"""Maps with the window's blur removed: response and noise as in theory, also at gaps."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def design(kept: float, steps: int) -> float:
 
 @pytest.mark.parametrize("steps", [1, 3, 7, 15])
 @pytest.mark.parametrize("period", [26.0, 40.0, 80.0])
-def test_a_sine_comes_back_as_the_design_says(steps: int, period: float) -> None:
+def test_a_sine_comes_back_as_designed(steps: int, period: float) -> None:
     kept = np.exp(-2 * np.pi**2 * SIGMA**2 / period**2)
     assert response([period], GRID, steps)[0] == pytest.approx(design(kept, steps), abs=0.015)
     found = deconvolved(kept * wave(period), GRID, steps)

@@ -1,9 +1,4 @@
-"""Where ZOIs lie, which are active, and what is refused.
-
-Strain measures, principal values, and the uncertainty of means over overlapping ZOIs.
-
-Windows and the correlation of estimates whose ZOIs overlap.
-"""
+"""Grids, strain measures and windows: where ZOIs lie, values and the uncertainty of their means, overlap."""
 
 from __future__ import annotations
 
@@ -166,7 +161,7 @@ def test_arrays_are_read_only() -> None:
         uniform(u=1.0).u[0, 0] = 3
 
 
-def test_the_refused_are_told_by_their_reasons() -> None:
+def test_the_refused_are_counted_by_their_reasons() -> None:
     grid = ZoiGrid.cover(Roi(0, 0, 128, 32), 32, 32)
     status = [[Status.LOST, Status.OK, Status.LOST, Status.UNEVEN]]
     field = StrainField.from_values(grid, {}, status=status)
@@ -234,7 +229,7 @@ def test_a_sum_has_the_same_bits_wherever_its_values_lie() -> None:
     assert fixed_sum(values[:0]) == 0.0
 
 
-def test_a_field_and_a_grid_are_told_in_one_line() -> None:
+def test_a_field_and_a_grid_are_described_in_one_line() -> None:
     grid = ZoiGrid.cover(Roi(4, 8, 640, 480), size=32, step=16)
     status = np.zeros(grid.shape)
     status[3, :4] = Status.LOST

@@ -1,13 +1,4 @@
-"""Residual and covariances against the same sums in plain numpy.
-
-The share of a ZOI on saturated pixels is that of plain arithmetic.
-
-Shapes that a ZOI cannot follow: their polynomials, and what of them is found in made-up pictures.
-
-The noise of means over ZOIs: what is said of it against how they scatter.
-
-Who is rejected: the pictures of tests/accuracy at one noise and size, and the rule itself.
-"""
+"""The fit of a ZOI: residual and covariances, shapes that it cannot follow, the noise of means, and the verdict."""
 
 from __future__ import annotations
 
@@ -99,8 +90,8 @@ def bending(
         reference.astype(np.float32), GRID, KernelSettings(order=order), model, None
     )
     image = deformed.astype(np.float32)
-    attempt = Solution(ready, image, model, ready.searched(image))
-    return attempt.found.bending, attempt
+    solution = Solution(ready, image, model, ready.searched(image))
+    return solution.found.bending, solution
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -121,15 +112,15 @@ def test_a_parabola_is_found_with_the_error_that_it_makes() -> None:
 
 def test_noise_alone_leaves_what_is_expected_of_it() -> None:
     x, _ = pixels(SHAPE)
-    found, attempt = bending(0.2 + 0 * x, noise=0.02)
-    reference = attempt.reference
+    found, solution = bending(0.2 + 0 * x, noise=0.02)
+    reference = solution.reference
     unit = reference.share_variance * 2 * ((0.02 * 4095) ** 2 + 0.1)
     expected = unit.sum(axis=1) * reference.prepared.shapes.noise[0]
     assert np.mean(found / expected) == pytest.approx(1.0, abs=0.3)
 
 
 @pytest.mark.parametrize("angle", [0, 30, 45, 90])
-def test_a_jump_through_a_zoi_is_said_to_be_one(angle: float) -> None:
+def test_a_jump_through_a_zoi_is_uneven(angle: float) -> None:
     x, y = pixels(SHAPE)
     along = np.cos(np.deg2rad(angle)) * x + np.sin(np.deg2rad(angle)) * y
     pattern, rng, noise = Speckle(2.0, 6), np.random.default_rng(4), 0.02
@@ -148,7 +139,7 @@ PAIRS = 240
 NAMES = ("exx", "eyy", "exy", "u")
 
 
-def scatter_over_said(
+def scatter_over_predicted(
     size: int, step: int, count: int, order: int, noise: float | None, where: np.ndarray | None = None
 ) -> dict[str, float]:
     """Root mean square of means of a still picture over their own uncertainty, new noise in both pictures."""
@@ -178,21 +169,23 @@ def scatter_over_said(
         (48, 12, 9, 2, NOISE_GL),
     ],
 )  # fmt: skip
-def test_means_scatter_as_said(size: int, step: int, count: int, order: int, noise: float | None) -> None:
+def test_means_scatter_as_predicted(
+    size: int, step: int, count: int, order: int, noise: float | None
+) -> None:
     """Eight pictures share a reference, so a ratio is known to about 8 %; by overlap alone it would be 1.3 to 1.5."""
-    found = scatter_over_said(size, step, count, order, noise)
+    found = scatter_over_predicted(size, step, count, order, noise)
     assert all(0.8 < ratio < 1.22 for ratio in found.values()), found
     assert 0.87 < np.mean([found[name] for name in ("exx", "eyy", "exy")]) < 1.13, found
 
 
 def test_a_gauge_of_any_shape() -> None:
     where = np.add.outer(np.abs(np.arange(13) - 6), np.abs(np.arange(13) - 6)) <= 5
-    found = scatter_over_said(32, 8, 13, 1, NOISE_GL, where)
+    found = scatter_over_predicted(32, 8, 13, 1, NOISE_GL, where)
     assert 0.87 < np.mean([found[name] for name in ("exx", "eyy", "exy")]) < 1.13, found
 
 
 def test_dense_grids_are_not_more_certain_than_they_are() -> None:
-    """The same region with more ZOIs in it tells hardly more of its mean."""
+    """The same region with more ZOIs in it makes its mean hardly more certain."""
     image = np.asarray(128 + 12 * Speckle(2.0, 5, span=300).at(*affine((160, 160))), np.float32)
     sigmas = []
     for step in (4, 8):
@@ -201,7 +194,7 @@ def test_dense_grids_are_not_more_certain_than_they_are() -> None:
     assert sigmas[0] > 0.9 * sigmas[1], sigmas
 
 
-def test_what_was_asked_once_is_remembered_within_bounds() -> None:
+def test_factors_are_cached_within_bounds() -> None:
     image = np.asarray(128 + 12 * Speckle(2.0, 5, span=300).at(*affine((160, 160))), np.float32)
     grid = ZoiGrid.cover(Roi(8, 8, 128, 128), 32, 16)
     sums = PhaseKernel(image, grid, noise=1.0).reference.sums
@@ -210,7 +203,7 @@ def test_what_was_asked_once_is_remembered_within_bounds() -> None:
     masks = [rng.random(grid.shape) < 0.5 for _ in range(100)]
     once = [sums.factor("exx", mask) for mask in masks]
     assert once == [sums.factor("exx", mask) for mask in masks]
-    assert len(sums._known) <= 64
+    assert len(sums._factors) <= 64
     single = np.zeros(grid.shape, bool)
     single[2, 2] = True
     assert sums.factor("exx", single) == 1.0
@@ -280,7 +273,7 @@ def test_a_little_in_both_residual_and_bending_is_too_much() -> None:
     assert verdict(left=6.5, bending=more_bent, unit=1e-8, known=False) != Status.OK
 
 
-def test_a_centre_beyond_the_pattern_is_told_by_its_uncertainty() -> None:
+def test_a_centre_beyond_the_pattern_shows_in_its_uncertainty() -> None:
     doubtful = {"left": 1.0, "bending": 0.0015, "unit": 1e-8}
     assert verdict(**doubtful, beyond=3.9) == Status.OK
     assert verdict(**doubtful, beyond=8.0) == Status.UNEVEN

@@ -17,7 +17,7 @@ MOVES = {"eyy": (np.array([0.0, 4e-6, -4e-6, 2e-4, 0.0, 0.0]), np.full(6, 1e-6))
     [
         ([5.0, 5.1, 4.9, 5.05, 8.0, 5.0, 100.0], 4),
         ([0.0, 0.0, -90.0, -6000.0], 2),  # pressed
-        ([1.0, 1.0, np.nan, 9.0], 2),  # nobody knows what it did then
+        ([1.0, 1.0, np.nan, 9.0], 2),  # unknown from there on
         ([np.nan, 1.0, 9.0], 0),
         ([np.nan] * 5, 0),
         ([0.0] * 9, 0),  # nothing was pulled
@@ -29,13 +29,13 @@ def test_still_until_the_force_leaves_its_first_value(force: list[float], count:
 
 
 @pytest.mark.parametrize("force", [UNKNOWN, np.full(6, 3.0), np.array([np.nan, 0, 0, 0, 50, 100])])
-def test_the_strains_tell_where_the_force_does_not(force: NDArray[np.float64]) -> None:
+def test_the_strains_decide_where_the_force_does_not(force: NDArray[np.float64]) -> None:
     assert still_phase(force, MOVES) == 3
     unknown = {"exx": (np.array([0, 0, np.nan, 0, 0, 0]), np.full(6, 1e-6))}
     assert still_phase(force, MOVES | unknown) == 2
 
 
-def test_strains_that_scatter_do_not_end_what_the_force_tells() -> None:
+def test_strains_that_scatter_do_not_end_what_the_force_decides() -> None:
     """They are the scatter that is looked for."""
     assert still_phase(np.array([0.0, 0, 0, 0, 0, 900]), MOVES) == 5
 

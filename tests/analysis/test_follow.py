@@ -1,11 +1,4 @@
-"""The start of each ZOI in the next frame: averages noise away, follows what moves, survives a lost ZOI.
-
-A renewed reference: results stay those of the original grid, uncertainty included.
-
-The search of whole pixels, ZOI by ZOI.
-
-Large motion from nothing, and through a sequence.
-"""
+"""From one picture to the next: prediction, a renewed reference, and the search of whole pixels."""
 
 from __future__ import annotations
 
@@ -14,7 +7,7 @@ import pytest
 
 from analysis import PhaseKernel, Roi, Status, ZoiGrid
 from analysis.field.motion import Motion
-from analysis.follow.prediction import AGE_MOVED, OLDEST, motion_after
+from analysis.follow.prediction import AGE_MOVED, MAX_AGE, motion_after
 from analysis.follow.search import find_blocks, global_shift, search
 from tests.analysis.speckle import SHAPE, picture
 
@@ -43,7 +36,7 @@ def test_a_steady_motion_is_predicted_better_than_from_the_last_frame() -> None:
     assert missed[-1] == pytest.approx(np.sqrt(1.45), rel=0.03)
     assert np.all(np.diff(missed[1:6]) < 0)
     assert motion.change.mean(axis=0) == pytest.approx(velocity, abs=1e-4)
-    assert np.median(motion.age) == OLDEST
+    assert np.median(motion.age) == MAX_AGE
 
 
 def test_after_a_jolt_it_starts_from_what_was_measured() -> None:
@@ -53,7 +46,7 @@ def test_after_a_jolt_it_starts_from_what_was_measured() -> None:
     assert missed[19] > 30
     assert missed[20] < 20  # a part of the jolt is taken for motion
     assert missed[-1] < 2
-    assert motion.age.max() < OLDEST
+    assert motion.age.max() < MAX_AGE
 
 
 def test_a_lost_zoi_is_forgotten_and_begins_anew() -> None:
@@ -85,7 +78,7 @@ def test_it_is_of_the_same_zois_or_of_none() -> None:
 
 GRID = ZoiGrid.cover(Roi(36, 36, 168, 128), size=32, step=24)
 NOISE = 0.01
-SIGMA_RENEWAL = NOISE * 4095
+NOISE_GL = NOISE * 4095
 HALF = {"u": 2.3, "v": -1.2, "du_dx": 0.03, "dv_dy": -0.01, "du_dy": -0.02, "dv_dx": 0.02}
 WHOLE = {"u": 4.1, "v": -2.2, "du_dx": 0.06, "dv_dy": -0.02, "du_dy": -0.04, "dv_dx": 0.04}
 
@@ -112,12 +105,10 @@ def test_results_are_composed_on_the_original_grid() -> None:
 def test_uncertainty_accumulates_as_the_scatter_does() -> None:
     errors, sigmas = [], []
     for seed in range(12):
-        kernel = PhaseKernel(picture(NOISE, 3 * seed), GRID, noise=SIGMA_RENEWAL)
+        kernel = PhaseKernel(picture(NOISE, 3 * seed), GRID, noise=NOISE_GL)
         middle = picture(NOISE, 3 * seed + 1, **HALF)
-        first = kernel.measure(middle, noise=SIGMA_RENEWAL)
-        field = kernel.renewed(middle, first).measure(
-            picture(NOISE, 3 * seed + 2, **WHOLE), noise=SIGMA_RENEWAL
-        )
+        first = kernel.measure(middle, noise=NOISE_GL)
+        field = kernel.renewed(middle, first).measure(picture(NOISE, 3 * seed + 2, **WHOLE), noise=NOISE_GL)
         errors.append(field.u - true_u(GRID, WHOLE))
         sigmas.append(field.sigma_u)
     assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.sqrt(np.mean(np.square(sigmas))), rel=0.1)
@@ -153,11 +144,11 @@ def test_every_zoi_is_found_on_its_nearest_pixel() -> None:
     assert np.abs(found[:, [1, 2, 4, 5]]).max() < 0.02
 
 
-GRID_START = ZoiGrid.cover(Roi(4, 4, 232, 192), size=32, step=20)
+WIDE_GRID = ZoiGrid.cover(Roi(4, 4, 232, 192), size=32, step=20)
 
 
 def truth(m: dict) -> tuple[np.ndarray, np.ndarray]:
-    x, y = np.meshgrid(GRID_START.x - (SHAPE[1] - 1) / 2, GRID_START.y - (SHAPE[0] - 1) / 2)
+    x, y = np.meshgrid(WIDE_GRID.x - (SHAPE[1] - 1) / 2, WIDE_GRID.y - (SHAPE[0] - 1) / 2)
     u = m.get("u", 0) + m.get("du_dx", 0) * x + m.get("du_dy", 0) * y
     v = m.get("v", 0) + m.get("dv_dx", 0) * x + m.get("dv_dy", 0) * y
     return u, v
@@ -172,36 +163,36 @@ def turned(degrees: float) -> dict:
 def test_half_the_image_is_found(shift: tuple) -> None:
     motion = {"u": float(shift[0]), "v": float(shift[1])}
     reference, deformed = (picture(**m).astype(np.float32) for m in ({}, motion))
-    assert global_shift(reference, deformed, GRID_START.roi) == shift
-    field = PhaseKernel(picture(), GRID_START).measure(picture(**motion))
+    assert global_shift(reference, deformed, WIDE_GRID.roi) == shift
+    field = PhaseKernel(picture(), WIDE_GRID).measure(picture(**motion))
     assert field.n_valid > 10
     assert np.nanmax(np.hypot(field.u - shift[0], field.v - shift[1])) < 0.01
 
 
 @pytest.mark.parametrize("motion", [turned(5), turned(10), {"du_dx": 0.1, "dv_dy": -0.03}])
 def test_rotation_and_strain_from_nothing(motion: dict) -> None:
-    field = PhaseKernel(picture(), GRID_START).measure(picture(**motion))
+    field = PhaseKernel(picture(), WIDE_GRID).measure(picture(**motion))
     u, v = truth(motion)
-    inside = (np.abs(GRID_START.x + u - 119.5) < 98) & (np.abs(GRID_START.y[:, None] + v - 99.5) < 78)
+    inside = (np.abs(WIDE_GRID.x + u - 119.5) < 98) & (np.abs(WIDE_GRID.y[:, None] + v - 99.5) < 78)
     assert field.ok[inside].mean() > 0.99
     assert np.nanmax(np.hypot(field.u - u, field.v - v)) < 0.01
 
 
 @pytest.mark.parametrize("end", [turned(30), {"du_dx": 0.3, "dv_dy": -0.09}])
 def test_large_deformation_through_a_sequence(end: dict) -> None:
-    kernel, field = PhaseKernel(picture(), GRID_START), None
+    kernel, field = PhaseKernel(picture(), WIDE_GRID), None
     steps = 10
     for i in range(1, steps + 1):
         motion = turned(3 * i) if "du_dy" in end else {k: v * i / steps for k, v in end.items()}
         field = kernel.measure(picture(**motion), start=field)
     u, v = truth(end)
-    inside = (np.abs(GRID_START.x + u - 119.5) < 92) & (np.abs(GRID_START.y[:, None] + v - 99.5) < 72)
+    inside = (np.abs(WIDE_GRID.x + u - 119.5) < 92) & (np.abs(WIDE_GRID.y[:, None] + v - 99.5) < 72)
     assert field is not None and field.ok[inside].mean() > 0.99
     assert np.nanmax(np.hypot(field.u - u, field.v - v)) < 0.02
 
 
 def test_a_jump_within_a_sequence_is_caught() -> None:
-    kernel = PhaseKernel(picture(), GRID_START)
+    kernel = PhaseKernel(picture(), WIDE_GRID)
     field = kernel.measure(picture(u=40.0, v=25.0), start=kernel.measure(picture(u=0.2)))
     assert field.n_valid > 20
     assert np.nanmax(np.abs(field.u - 40)) < 0.01
@@ -209,6 +200,6 @@ def test_a_jump_within_a_sequence_is_caught() -> None:
 
 def test_blocks_know_nothing_of_zois() -> None:
     reference, deformed = picture().astype(np.float32), picture(u=7.0).astype(np.float32)
-    blocks = find_blocks(reference, deformed, GRID_START.roi)
+    blocks = find_blocks(reference, deformed, WIDE_GRID.roi)
     assert np.all(np.abs(blocks.shift[..., 0] - 7) <= 1.5)
     assert np.median(np.abs(blocks.planes()[..., 1:3])) < 0.01

@@ -1,4 +1,4 @@
-"""Virtual gauges: what they take, what they say of known fields, and that their sigma is their scatter."""
+"""Virtual gauges: the ZOIs they take, their values in known fields, and their sigma against their scatter."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def lost(*, share: float) -> np.ndarray:
 
 def test_lost_zois_give_a_reason() -> None:
     broken = field(lost(share=0.5), dv_dy=1e-3)
-    for gauge, says in (
+    for gauge, message in (
         (ZoiGauge("", (80, 20)), "1 of 1 ZOIs have no value (1 LOST)"),
         (AreaGauge("", (0, 0, 200, 60)), "ZOIs have no value"),
         (LINE, "end 1: "),
@@ -76,14 +76,14 @@ def test_lost_zois_give_a_reason() -> None:
     ):
         found = gauge.measure(broken)
         assert math.isnan(found.value) and math.isnan(found.sigma)
-        assert says in found.reason
+        assert message in found.reason
     some = lost(share=0.0)
     some[3, 4] = Status.UNEVEN
     whole = AreaGauge("", (0, 0, 200, 200)).measure(field(some, dv_dy=1e-3))
     assert whole.value == pytest.approx(1e-3)
 
 
-def test_a_gauge_beside_the_grid_says_where_the_grid_is() -> None:
+def test_a_gauge_beside_the_grid_names_where_the_grid_is() -> None:
     for gauge in (
         ZoiGauge("", (500, 80)),
         AreaGauge("", (500, 0, 9, 9)),
@@ -96,7 +96,7 @@ def test_a_gauge_beside_the_grid_says_where_the_grid_is() -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "says"),
+    ("make", "message"),
     [
         (lambda: ZoiGauge("a", (0, 0), "ezz"), "gauge a: unknown value 'ezz'; known: u, v"),
         (lambda: AreaGauge("a", corners=((0, 0), (1, 1))), "at least 3 corners"),
@@ -107,8 +107,8 @@ def test_a_gauge_beside_the_grid_says_where_the_grid_is() -> None:
         (lambda: TransverseGauge("a", (0, 0, 5, 5), "z"), "along is x or y"),  # type: ignore[arg-type]
     ],
 )
-def test_impossible_gauges_are_refused(make, says: str) -> None:
-    with pytest.raises(ValueError, match=says):
+def test_impossible_gauges_are_refused(make, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
         make()
 
 
@@ -139,29 +139,29 @@ class TestEveryKind:
     DRAWN = ((60.0, 40.0), (130.0, 110.0))
 
     def test_it_is_made_of_what_is_dragged_and_of_its_own_handles(self, kind: type[Gauge]) -> None:
-        gauge = kind.of("g", kind.placed(self.DRAWN), "y")
-        assert kind.of("g", kind.placed(gauge.handles()), "y") == gauge
-        assert kind.of("g", {**kind.placed(self.DRAWN), "of another": 1}, "y") == gauge
-        assert set(kind.placed(self.DRAWN)) <= set(kind.parameters())
+        gauge = kind.of("g", kind.from_handles(self.DRAWN), "y")
+        assert kind.of("g", kind.from_handles(gauge.handles()), "y") == gauge
+        assert kind.of("g", {**kind.from_handles(self.DRAWN), "of another": 1}, "y") == gauge
+        assert set(kind.from_handles(self.DRAWN)) <= set(kind.parameters())
 
     def test_it_takes_zois_and_reads_a_strain(self, kind: type[Gauge]) -> None:
-        gauge = kind.of("g", kind.placed(self.DRAWN), "y")
+        gauge = kind.of("g", kind.from_handles(self.DRAWN), "y")
         assert all(mask.any() and mask.dtype == bool for mask in gauge.zois(GRID))
         found = gauge.measure(field(du_dx=1e-3, dv_dy=1e-3))
         assert found.value == pytest.approx(1e-3, rel=1e-9) and found.sigma > 0
         assert math.isnan(gauge.measure(field(lost(share=1.0))).value)
 
     def test_its_outline_follows_its_handles(self, kind: type[Gauge]) -> None:
-        gauge = kind.of("g", kind.placed(self.DRAWN), "y")
-        moved = kind.of("g", kind.placed([(x + 7, y + 3) for x, y in gauge.handles()]), "y")
+        gauge = kind.of("g", kind.from_handles(self.DRAWN), "y")
+        moved = kind.of("g", kind.from_handles([(x + 7, y + 3) for x, y in gauge.handles()]), "y")
         for before, after in zip(gauge.outline(32), moved.outline(32), strict=True):
             assert len(before) > 1
             np.testing.assert_allclose(np.array(after) - before, [(7, 3)] * len(before), atol=0.2)
 
-    def test_it_says_what_it_needs(self, kind: type[Gauge]) -> None:
+    def test_it_names_what_it_needs(self, kind: type[Gauge]) -> None:
         with pytest.raises(ValueError, match=f"a gauge of kind '{kind.kind}' needs '"):
             kind.of("g", {}, "y")
-        assert kind.label and kind.hint and kind.usual.isidentifier()
+        assert kind.label and kind.hint and kind.default_name.isidentifier()
         assert kind.gesture in ("click", "line", "box")
 
 
@@ -175,8 +175,8 @@ def test_what_follows_from_the_axis_of_the_load() -> None:
 
 
 def test_a_box_is_drawn_in_whole_px_within_the_picture() -> None:
-    assert AreaGauge.placed([(30.4, 20.2), (-3.0, 10.6)]) == {"box": (0, 11, 30, 9)}
-    assert AreaGauge.placed([(5, 5), (5, 5)]) == {"box": (5, 5, 1, 1)}
+    assert AreaGauge.from_handles([(30.4, 20.2), (-3.0, 10.6)]) == {"box": (0, 11, 30, 9)}
+    assert AreaGauge.from_handles([(5, 5), (5, 5)]) == {"box": (5, 5, 1, 1)}
     corners = ((1.0, 2.0), (9.0, 2.0), (4.0, 8.0))
-    assert AreaGauge.placed(AreaGauge("g", corners=corners).handles()) == {"corners": corners}
-    assert LineGauge.placed([(1.234, 5), (9, 7.77)]) == {"start": (1.2, 5), "end": (9, 7.8)}
+    assert AreaGauge.from_handles(AreaGauge("g", corners=corners).handles()) == {"corners": corners}
+    assert LineGauge.from_handles([(1.234, 5), (9, 7.77)]) == {"start": (1.2, 5), "end": (9, 7.8)}

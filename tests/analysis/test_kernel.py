@@ -1,9 +1,4 @@
-"""The kernel as its users see it: truth, uncertainty, independence of ZOIs, refusals.
-
-Of a deformed image no more is made ready than the ZOIs can reach; no value depends on it.
-
-The estimator by phases alone: the same answers, blind to brightness, with its own uncertainty.
-"""
+"""The kernel through its public interface: truth, uncertainty, independence of ZOIs, refusals, both estimators."""
 
 from __future__ import annotations
 
@@ -168,11 +163,11 @@ def test_inactive_zois_are_not_measured() -> None:
     assert np.isnan(field.u[~few.active]).all() and np.isfinite(field.u[few.active]).all()
 
 
-GRID_BOX = ZoiGrid.cover(Roi(90, 60, 64, 64), size=32, step=16)
+SMALL_GRID = ZoiGrid.cover(Roi(90, 60, 64, 64), size=32, step=16)
 
 
 def measured(settings: KernelSettings, motion: dict[str, float], start: StrainField | None) -> StrainField:
-    kernel = PhaseKernel(picture(), GRID_BOX, settings, noise=1.0)
+    kernel = PhaseKernel(picture(), SMALL_GRID, settings, noise=1.0)
     return kernel.measure(picture(**motion), start=start, noise=1.0)
 
 
@@ -184,7 +179,7 @@ def test_the_same_as_with_the_whole_image(
     settings: KernelSettings, motion: dict[str, float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also where the motion is beyond what the start made one expect, or leads out of the picture."""
-    still = StrainField.from_values(GRID_BOX, {})
+    still = StrainField.from_values(SMALL_GRID, {})
     own = measured(settings, motion, still)
     monkeypatch.setattr(ReferencePicture, "reached", lambda self, guess: self.whole)
     whole = measured(settings, motion, still)
@@ -194,7 +189,7 @@ def test_the_same_as_with_the_whole_image(
 
 
 def test_a_small_region_reaches_a_part_of_the_image() -> None:
-    kernel = PhaseKernel(picture(), GRID_BOX, noise=1.0)
+    kernel = PhaseKernel(picture(), SMALL_GRID, noise=1.0)
     box = kernel.reference.reached(np.zeros((len(kernel.reference.index), 6)))
     assert (box.bottom - box.top) * (box.right - box.left) < 0.5 * picture().size
     assert (
@@ -203,7 +198,7 @@ def test_a_small_region_reaches_a_part_of_the_image() -> None:
 
 
 def test_zois_far_apart_ask_for_their_own_pixels() -> None:
-    """The distance of the ZOIs that are measured, not of the grid they were taken from, tells what to fetch."""
+    """The distance of the ZOIs that are measured, not of the grid they were taken from, decides what to fetch."""
     grid = ZoiGrid.cover(Roi(8, 8, 208, 168), size=32, step=8)
     some = np.zeros(grid.shape, bool)
     some[::2, ::3] = True
@@ -212,28 +207,28 @@ def test_zois_far_apart_ask_for_their_own_pixels() -> None:
     assert (kernel.measure(picture(), noise=1.0).status[some] == Status.OK).all()
 
 
-GRID_QUADRATURE = ZoiGrid.cover(Roi(16, 16, 208, 168), size=32, step=20)
+PHASE_GRID = ZoiGrid.cover(Roi(16, 16, 208, 168), size=32, step=20)
 PHASE = KernelSettings(estimator="phase")
 
 
 def test_phases_alone_find_shift_and_strain() -> None:
-    kernel = PhaseKernel(picture(), GRID_QUADRATURE, PHASE)
+    kernel = PhaseKernel(picture(), PHASE_GRID, PHASE)
     field = kernel.measure(picture(u=0.3, v=-0.2, du_dx=0.002))
     assert field.ok.all()
-    assert np.mean(field.u) == pytest.approx(0.3 + 0.002 * (np.mean(GRID_QUADRATURE.x) - 119.5), abs=2e-4)
+    assert np.mean(field.u) == pytest.approx(0.3 + 0.002 * (np.mean(PHASE_GRID.x) - 119.5), abs=2e-4)
     assert np.mean(field.du_dx) == pytest.approx(0.002, abs=2e-5)
     assert np.mean(field.dv_dy) == pytest.approx(0, abs=2e-5)
 
 
 def test_contrast_and_brightness_do_not_enter() -> None:
-    kernel = PhaseKernel(picture(), GRID_QUADRATURE, PHASE)
+    kernel = PhaseKernel(picture(), PHASE_GRID, PHASE)
     plain = kernel.measure(picture(u=0.3).astype(np.float32))
     dim = kernel.measure(picture(u=0.3).astype(np.float32) * 0.6 + 500)
     assert np.max(np.abs(plain.u - dim.u)) < 5e-4
 
 
 def test_predicted_uncertainty_is_the_scatter() -> None:
-    kernel = PhaseKernel(picture(0.01, 1), GRID_QUADRATURE, PHASE, noise=41.0)
+    kernel = PhaseKernel(picture(0.01, 1), PHASE_GRID, PHASE, noise=41.0)
     values = np.stack([kernel.measure(picture(0.01, s), noise=41.0).u for s in range(2, 12)])
     predicted = np.mean(kernel.measure(picture(0.01, 2), noise=41.0).sigma("u", "current"))
     assert np.sqrt(np.mean(values.var(axis=0, ddof=1))) == pytest.approx(predicted, rel=0.1)

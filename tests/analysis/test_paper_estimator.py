@@ -133,7 +133,7 @@ def test_equation_8_on_a_grid_needs_the_inverse_factor() -> None:
     assert -(after - before) * k == pytest.approx(0.6e-3, rel=0.05)  # as printed
 
 
-def test_on_a_random_pattern_single_frequencies_do_not_tell_the_strain() -> None:
+def test_on_a_random_pattern_single_frequencies_do_not_give_the_strain() -> None:
     """Even mended, eq. (7)-(9) frequency by frequency fail: neighbouring carriers leak into each other."""
     speckle, strain = Speckle((96, 96), 2.0, seed=3), 1e-3
     inner = np.s_[16:80, 16:80]

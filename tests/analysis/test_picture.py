@@ -1,7 +1,4 @@
-"""Figures of a pattern against patterns whose figures are known.
-
-Tables of the B-splines, the prefilter and the warp, against scipy and against known functions.
-"""
+"""Figures of a pattern against known patterns; B-splines, prefilter and warp against scipy and known functions."""
 
 from __future__ import annotations
 

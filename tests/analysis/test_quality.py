@@ -1,9 +1,4 @@
-"""How still a series is; what a result does not have is None, so that equal results are equal.
-
-The figures by differences of pixels are those of the filtered pattern, at less cost.
-
-The specimen found among what an operator's picture has beside it.
-"""
+"""Steadiness of a series, the pattern of ZOIs by differences of pixels, and the specimen found in a picture."""
 
 from __future__ import annotations
 
@@ -17,9 +12,9 @@ from scipy.ndimage import distance_transform_edt, gaussian_filter
 from analysis.field import Roi, ZoiGrid
 from analysis.picture.pattern import autocorrelation_fwhm
 from analysis.picture.spectrum import filtered_pattern
-from analysis.quality.exposure import mains_of, steadiness
 from analysis.quality.pattern import box_sums, speckle_radius, zoi_pattern
 from analysis.quality.specimen import find_specimen
+from analysis.quality.steadiness import mains_of, steadiness
 
 TIMES = np.arange(60) / 30.0
 
@@ -100,7 +95,7 @@ HEIGHT_SPECIMEN, WIDTH_SPECIMEN = 520, 440
 HALF_A_ZOI = 16.0
 
 
-def scene_specimen(
+def cluttered_scene(
     radius: float = 2.0, noise: float = 1.0, light: float = 0.0, seed: int = 0
 ) -> tuple[np.ndarray, np.ndarray]:
     """A strip with a hole in brushed grips, letters and a blurred pattern beside it; picture and truth (H, W)."""
@@ -123,7 +118,7 @@ def scene_specimen(
     [(1.5, 0.5, 0.0), (2.0, 1.0, 0.6), (2.0, 6.0, 0.0), (4.0, 1.0, 0.0), (3.0, 3.0, -0.6)],
 )
 def test_the_mask_follows_the_edge(radius: float, noise: float, light: float) -> None:
-    picture, strip = scene_specimen(radius, noise, light)
+    picture, strip = cluttered_scene(radius, noise, light)
     found = find_specimen(picture)
     assert found is not None
     outside, inside = distance_transform_edt(~strip), distance_transform_edt(strip)
@@ -137,7 +132,7 @@ def test_the_mask_follows_the_edge(radius: float, noise: float, light: float) ->
 
 def test_dark_and_bright_decide_nothing() -> None:
     """The same picture as a negative."""
-    picture, _ = scene_specimen()
+    picture, _ = cluttered_scene()
     one, other = find_specimen(picture), find_specimen(255 - picture)
     assert one is not None
     assert other is not None

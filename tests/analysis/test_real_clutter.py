@@ -27,7 +27,7 @@ LEAST_OK = {"dic_challenge_1_sample12_ohtcfrp": (1280, 1270, 305), "mudic_tensio
 
 
 def wrong(field: StrainField, step: int) -> NDArray[np.bool_]:
-    """Valid ZOIs farther than FARTHEST_PX from the median of what three valid neighbours or more say of them."""
+    """Valid ZOIs farther than FARTHEST_PX from the median of three valid neighbours or more."""
     value = np.where(field.ok, field.parameters, np.nan)
     padded = np.pad(value, ((0, 0), (1, 1), (1, 1)), constant_values=np.nan)
     rows, columns = field.grid.shape
@@ -37,7 +37,7 @@ def wrong(field: StrainField, step: int) -> NDArray[np.bool_]:
         said.append([p[r] - step * (dx * p[r + 1] + dy * p[r + 2]) for r in (0, 3)])
     several = np.isfinite(said)[:, 0].sum(axis=0) >= 3
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", RuntimeWarning)  # of places where nobody says anything
+        warnings.simplefilter("ignore", RuntimeWarning)  # of places without valid neighbours
         middle = np.nanmedian(said, axis=0)
     return several & (np.hypot(value[0] - middle[0], value[3] - middle[1]) > FARTHEST_PX)
 

@@ -1,7 +1,4 @@
-"""A reference is made once: whole from the start, and not changed by what is measured or renewed.
-
-Lost ZOIs are found from their neighbours; what is found better before is kept.
-"""
+"""A reference is made once and never changed; lost ZOIs are measured from the values of their neighbours."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ from analysis import KernelSettings, PatternError, PhaseKernel, Roi, Status, Zoi
 from analysis.kernel.images import as_model
 from analysis.kernel.prepared import PatternError as Raised
 from analysis.kernel.reference import ReferencePicture
-from analysis.kernel.solve import Solution, rescue
+from analysis.kernel.solve import Solution, retry_lost
 from tests.analysis.speckle import SHAPE, picture
 
 GRID = ZoiGrid.cover(Roi(8, 8, 160, 128), size=32, step=16)
@@ -89,54 +86,54 @@ def test_the_pattern_is_kept_once() -> None:
         assert np.array_equal(image, ready.images[k, : SHAPE[0], : SHAPE[1]])
 
 
-GRID_RESCUE = ZoiGrid.cover(Roi(8, 8, 208, 168), size=32, step=16)
+WIDE_GRID = ZoiGrid.cover(Roi(8, 8, 208, 168), size=32, step=16)
 MOTION = {"u": 4.3, "v": -1.2, "du_dx": 0.004}
 
 
 @pytest.fixture
-def reference_rescue() -> ReferencePicture:
-    return ReferencePicture.first(picture().astype(np.float32), GRID_RESCUE, KernelSettings(), 1.0, None)
+def wide() -> ReferencePicture:
+    return ReferencePicture.first(picture().astype(np.float32), WIDE_GRID, KernelSettings(), 1.0, None)
 
 
-def attempt(reference_rescue: ReferencePicture, guess: np.ndarray) -> Solution:
-    return Solution(reference_rescue, picture(**MOTION), as_model(1.0), guess)
+def solved(wide: ReferencePicture, guess: np.ndarray) -> Solution:
+    return Solution(wide, picture(**MOTION), as_model(1.0), guess)
 
 
-def test_neighbours_lend_their_shape_round_by_round(reference_rescue: ReferencePicture) -> None:
+def test_neighbours_lend_their_shape_round_by_round(wide: ReferencePicture) -> None:
     image = picture(**MOTION)
-    good = reference_rescue.searched(image)
+    good = wide.searched(image)
     guess = good.copy()
-    guess[len(guess) // 8 :, 0] += 15  # one row or so knows where it is
-    made = attempt(reference_rescue, guess)
-    assert np.mean(made.status == Status.OK) < 0.5
-    rescue(made, guess)
-    assert (made.status == Status.OK).all()
-    assert np.max(np.abs(made.found.p - attempt(reference_rescue, good).found.p)[:, :2]) < 1e-3
+    guess[len(guess) // 8 :, 0] += 15  # one row or so has a good guess
+    solution = solved(wide, guess)
+    assert np.mean(solution.status == Status.OK) < 0.5
+    retry_lost(solution, guess)
+    assert (solution.status == Status.OK).all()
+    assert np.max(np.abs(solution.found.p - solved(wide, good).found.p)[:, :2]) < 1e-3
 
 
 def test_a_zoi_without_a_guess_is_lost_until_a_neighbour_lends_it_one(
-    reference_rescue: ReferencePicture,
+    wide: ReferencePicture,
 ) -> None:
-    guess = reference_rescue.searched(picture(**MOTION))
+    guess = wide.searched(picture(**MOTION))
     guess[7] = np.nan
-    made = attempt(reference_rescue, guess)
-    assert np.flatnonzero(made.status != Status.OK).tolist() == [7]
-    assert made.status[7] == Status.LOST and np.isnan(made.found.p[7]).all()
-    kept = made.found.p[8].copy()
-    rescue(made, guess)
-    assert made.status[7] == Status.OK
-    assert np.array_equal(made.found.p[8], kept)
+    solution = solved(wide, guess)
+    assert np.flatnonzero(solution.status != Status.OK).tolist() == [7]
+    assert solution.status[7] == Status.LOST and np.isnan(solution.found.p[7]).all()
+    kept = solution.found.p[8].copy()
+    retry_lost(solution, guess)
+    assert solution.status[7] == Status.OK
+    assert np.array_equal(solution.found.p[8], kept)
 
 
-def test_a_worse_outcome_does_not_replace_what_there_is(reference_rescue: ReferencePicture) -> None:
+def test_a_worse_outcome_does_not_replace_what_there_is(wide: ReferencePicture) -> None:
     image = np.where(np.arange(240) < 80, np.uint16(2000), picture(**MOTION))
-    made = Solution(reference_rescue, image, as_model(1.0), reference_rescue.searched(picture(**MOTION)))
-    lost = made.status != Status.OK
+    solution = Solution(wide, image, as_model(1.0), wide.searched(picture(**MOTION)))
+    lost = solution.status != Status.OK
     assert 0 < lost.sum() < len(lost)
-    before = made.status.copy(), made.found.p.copy()
-    rescue(made, None)
-    assert np.array_equal(made.status[~lost], before[0][~lost])
-    assert np.array_equal(made.found.p[~lost], before[1][~lost])
-    still = made.status != Status.OK
+    before = solution.status.copy(), solution.found.p.copy()
+    retry_lost(solution, None)
+    assert np.array_equal(solution.status[~lost], before[0][~lost])
+    assert np.array_equal(solution.found.p[~lost], before[1][~lost])
+    still = solution.status != Status.OK
     assert still.any()
-    assert np.array_equal(made.found.p[still], before[1][still], equal_nan=True)
+    assert np.array_equal(solution.found.p[still], before[1][still], equal_nan=True)

@@ -11,27 +11,25 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis import KernelSettings, MachineError, PhaseKernel, Roi, ZoiGrid, warm_up
-from analysis import self_test as known
-from analysis import self_test as machine
+from analysis import KernelSettings, MachineError, PhaseKernel, Roi, ZoiGrid, self_test, warm_up
 from analysis.field import WINDOWS
-from analysis.kernel import solve as attempt
+from analysis.kernel import solve
 from analysis.kernel.phase_kernel import _measure_known as measure_known
 from analysis.kernel.phase_kernel import check_machine
-from analysis.self_test import Way, errors_of, limits, picture, wrong_measuring
+from analysis.self_test import SelfTestCase, errors_of, limits, measuring_fault, picture
 
 GRID = ZoiGrid.cover(Roi(8, 8, 80, 80), size=32, step=16)
-IMAGE = picture(96, known.STILL)
+IMAGE = picture(96, self_test.STILL)
 WAYS = [("spectral", 1), ("spectral", 2), ("phase", 1)]
 
 
 @pytest.fixture
 def untested() -> Iterator[None]:
     """As in a process that has measured nothing yet; the same again afterwards."""
-    for remembered in (machine._check_algebra, machine._check_measuring):
+    for remembered in (self_test._check_algebra, self_test._check_measuring):
         remembered.cache_clear()
     yield
-    for remembered in (machine._check_algebra, machine._check_measuring):
+    for remembered in (self_test._check_algebra, self_test._check_measuring):
         remembered.cache_clear()
 
 
@@ -51,26 +49,28 @@ def spoilt(function: Callable[..., Any], factor: float) -> Callable[..., Any]:
 @pytest.mark.parametrize("size", [3, 8, 12, 16, 20, 31, 32, 48, 64, 96, 128, 1024])
 @pytest.mark.parametrize(("estimator", "order"), WAYS)
 def test_a_healthy_machine_passes(estimator: Any, order: int, size: int) -> None:
-    """With room: at most two thirds of any limit, a tenth of those of the degree that tests use."""
+    """With a margin: at most two thirds of any limit, a tenth of those of the degree that tests use."""
     for window, degree in itertools.product(WINDOWS, (1, 3, 5)):
-        way = Way(window, estimator, order, degree, size).tested
-        found, allowed = errors_of(measure_known, way), limits(way)
-        room = 10 if degree == 5 else 1.5
-        assert found.length < allowed.length / room and found.slope < allowed.slope / room, (way, found)
+        case = SelfTestCase(window, estimator, order, degree, size).tested
+        found, allowed = errors_of(measure_known, case), limits(case)
+        margin = 10 if degree == 5 else 1.5
+        assert found.length < allowed.length / margin and found.slope < allowed.slope / margin, (case, found)
 
 
 def test_the_pattern_has_its_motion() -> None:
     """Against the sum of cosines, pixel by pixel, at the place that moved there."""
-    side, m = 24, known.MOVED
+    side, m = 24, self_test.MOVED
     found = picture(side, m)
     motion = np.array([[1 + m.du_dx, m.du_dy], [m.dv_dx, 1 + m.dv_dy]])
-    n = np.arange(known.WAVES)
-    k = 2 * np.pi * np.linspace(known.SLOWEST, known.FASTEST, 2 * len(n) + 1)[1::2]
+    n = np.arange(self_test.WAVES)
+    k = 2 * np.pi * np.linspace(self_test.MIN_FREQUENCY, self_test.MAX_FREQUENCY, 2 * len(n) + 1)[1::2]
     for row, column in [(0, 0), (3, 20), (23, 11)]:
         here = np.array([column, row]) - (side - 1) / 2
         x, y = np.linalg.solve(motion, here - [m.u, m.v])
-        waves = np.cos(k * np.cos(known.GOLDEN * n) * x + k * np.sin(known.GOLDEN * n) * y + 1.7 * n**2)
-        expected = known.LEVEL_GL + known.CONTRAST_GL * np.sqrt(2 / len(n)) * waves.sum()
+        waves = np.cos(
+            k * np.cos(self_test.GOLDEN * n) * x + k * np.sin(self_test.GOLDEN * n) * y + 1.7 * n**2
+        )
+        expected = self_test.LEVEL_GL + self_test.CONTRAST_GL * np.sqrt(2 / len(n)) * waves.sum()
         assert found[row, column] == pytest.approx(expected, abs=1e-2)
 
 
@@ -80,27 +80,29 @@ def test_the_pattern_has_its_motion() -> None:
 def test_wrong_taps_are_found(
     untested: None, monkeypatch: pytest.MonkeyPatch, estimator: Any, order: int, size: int, factor: float
 ) -> None:
-    monkeypatch.setattr(attempt, "tap_table", spoilt(attempt.tap_table, factor))
+    monkeypatch.setattr(solve, "tap_table", spoilt(solve.tap_table, factor))
     with pytest.raises(MachineError, match=rf"ZOIs of {size} px: "):
         check_machine(KernelSettings(estimator=estimator, order=order), size)
 
 
-def test_a_kernel_is_refused_and_says_the_libraries(untested: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(attempt, "tap_table", spoilt(attempt.tap_table, 0.1))
+def test_a_kernel_is_refused_with_the_names_of_the_libraries(
+    untested: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(solve, "tap_table", spoilt(solve.tap_table, 0.1))
     for _ in range(2):  # a failure is never remembered as a success
         with pytest.raises(MachineError) as caught:
             PhaseKernel(IMAGE, GRID)
-    said = str(caught.value)
+    message = str(caught.value)
     blas = np.show_config(mode="dicts")["Build Dependencies"]["blas"]  # type: ignore[index,call-overload]
-    assert "nothing is measured" in said
-    assert f"numpy {np.__version__} (BLAS and LAPACK: {blas['name']} {blas['version']}" in said
-    assert "scipy 1." in said and "numba 0." in said
+    assert "nothing is measured" in message
+    assert f"numpy {np.__version__} (BLAS and LAPACK: {blas['name']} {blas['version']}" in message
+    assert "scipy 1." in message and "numba 0." in message
     monkeypatch.undo()
     assert PhaseKernel(IMAGE, GRID).measure(IMAGE).ok.all()
 
 
 def test_warming_up_is_refused(untested: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(attempt, "tap_table", spoilt(attempt.tap_table, 0.1))
+    monkeypatch.setattr(solve, "tap_table", spoilt(solve.tap_table, 0.1))
     with pytest.raises(MachineError):
         warm_up(phase=False)
 
@@ -149,23 +151,23 @@ def test_one_that_gives_up_is_named(untested: None, monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.0])
 def test_taps_without_a_value(monkeypatch: pytest.MonkeyPatch, value: float) -> None:
     """Whatever comes of it, it is no traceback and no pass."""
-    monkeypatch.setattr(attempt, "tap_table", lambda degree: np.full(18, value, np.float32))
+    monkeypatch.setattr(solve, "tap_table", lambda degree: np.full(18, value, np.float32))
     for estimator, order in WAYS:
-        assert wrong_measuring(measure_known, Way("gaussian", estimator, order, 5, 32))
+        assert measuring_fault(measure_known, SelfTestCase("gaussian", estimator, order, 5, 32))
 
 
 def test_what_passed_is_not_tested_again(untested: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    seen: list[Way] = []
+    seen: list[SelfTestCase] = []
 
-    def counted(measure: known.Measure, way: Way) -> known.Errors:
-        seen.append(way)
-        return errors_of(measure, way)
+    def counted(measure: self_test.Measure, case: SelfTestCase) -> self_test.Errors:
+        seen.append(case)
+        return errors_of(measure, case)
 
-    monkeypatch.setattr(machine, "errors_of", counted)
+    monkeypatch.setattr(self_test, "errors_of", counted)
     for bending in (0.05, np.inf):  # no part of what is tested
         PhaseKernel(IMAGE, GRID, KernelSettings(bending_px=bending))
     PhaseKernel(IMAGE, GRID, KernelSettings(order=2))
-    assert seen == [Way("gaussian", "spectral", order, 5, 32) for order in (1, 2)]
+    assert seen == [SelfTestCase("gaussian", "spectral", order, 5, 32) for order in (1, 2)]
 
 
 def test_the_process_that_compiles_the_rest_leaves_the_iteration_alone() -> None:

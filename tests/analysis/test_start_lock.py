@@ -48,7 +48,7 @@ def test_a_process_that_is_ended_is_not_complained_about(tmp_path: Path) -> None
     assert (done.stdout, done.stderr) == ("56.0\n", "")
 
 
-def test_a_lock_that_is_there_stays_and_one_that_is_not_asked_for_is_not_made() -> None:
+def test_a_lock_that_is_there_stays_and_one_that_is_not_needed_is_not_made() -> None:
     there, other = SimpleNamespace(_backend_init_process_lock="numba's"), SimpleNamespace()
     give_start_lock(there)
     give_start_lock(other)

@@ -1,7 +1,4 @@
-"""Tensile figures against analytic curves: their intervals hold the truth as often as they say.
-
-The lag of the load, recovered from simulated tests, and refused where a test does not tell it.
-"""
+"""Tensile figures and the lag of the load against known tests: intervals hold the truth as often as they should."""
 
 from __future__ import annotations
 
@@ -95,7 +92,7 @@ def known(found: TensileFigures) -> set[str]:
     return {name for name, figure in figures.items() if isinstance(figure, Figure) and figure.known}
 
 
-def test_what_cannot_be_had_says_why() -> None:
+def test_what_cannot_be_had_has_a_reason() -> None:
     found = evaluate_test(noisy(linear(), 0))
     assert "0.2 % is needed" in found.Rp02.why
     assert "no yield point" in found.ReH.why
@@ -130,7 +127,7 @@ def test_no_transverse_strain_leaves_nu_alone_unknown() -> None:
     assert "transverse strain is known at 0 points" in found.nu.why
 
 
-def test_the_interval_that_was_used_is_told() -> None:
+def test_the_interval_that_was_used_is_in_the_result() -> None:
     span = evaluate_test(noisy(composite(), 0), LAMINATE).span
     assert span is not None
     assert span.strain == pytest.approx((0.001, 0.003), abs=3e-5)
@@ -153,7 +150,7 @@ def test_rates_are_held_against_the_standard() -> None:
     assert laminate.seconds.why.startswith("within 60 to 600 s")
 
 
-def test_the_zero_is_told_and_the_curve_stays() -> None:
+def test_the_zero_is_named_and_the_curve_stays() -> None:
     curve = noisy(ramberg_osgood(), 1, toe=3e-4)
     before = curve.strain.copy()
     raw, compensated = (evaluate_test(curve, TensileOptions(zero=zero)) for zero in ("raw", "toe"))
@@ -195,14 +192,14 @@ def uniaxial(degrees: float, most: float, seed: int = 3) -> list[np.ndarray]:
 def test_the_axis_of_the_load_is_found(degrees: float, axis: str, off: float, most: float) -> None:
     found = load_axis(*uniaxial(degrees, most))
     assert found.found and found.axis == axis
-    assert math.degrees(found.off.value) == pytest.approx(off, abs=0.3)
+    assert math.degrees(found.angle.value) == pytest.approx(off, abs=0.3)
     other = load_axis(*uniaxial(degrees, most), "x" if axis == "y" else "y")
     assert other.axis != axis and not other.found, "what is given holds"
-    assert abs(math.degrees(other.off.value)) == pytest.approx(90 - abs(off), abs=0.3)
+    assert abs(math.degrees(other.angle.value)) == pytest.approx(90 - abs(off), abs=0.3)
 
 
 @pytest.mark.parametrize(("degrees", "most"), [(45.0, 2e-3), (-45.0, -2e-3), (3.0, 1e-6)])
-def test_an_axis_that_the_strains_do_not_tell_is_y(degrees: float, most: float) -> None:
+def test_an_axis_that_the_strains_do_not_decide_is_y(degrees: float, most: float) -> None:
     found = load_axis(*uniaxial(degrees, most))
     assert (found.axis, found.found) == ("y", False)
 
@@ -273,14 +270,14 @@ def test_the_lag_is_recovered_within_15_ms(lag: float) -> None:
     assert abs(np.mean([f.value for f in figures]) - lag) < 0.004
 
 
-def test_a_slower_test_tells_it_less_well_and_says_so() -> None:
+def test_a_slower_test_gives_a_wider_interval() -> None:
     figures = found(0.15, rate=2e-4, total=24.0)
     assert sum(f.low <= 0.15 <= f.high for f in figures) >= 44
     assert np.mean([f.high - f.low for f in figures]) > 1.3 * np.mean([f.high - f.low for f in found(0.15)])
 
 
 @pytest.mark.parametrize(
-    ("test", "says"),
+    ("test", "message"),
     [
         ({"still": -1.0}, "begin to measure some seconds before"),
         ({"rate": 0.0}, "does not change"),
@@ -288,10 +285,10 @@ def test_a_slower_test_tells_it_less_well_and_says_so() -> None:
         ({"total": 0.5}, "frames have a strain"),
     ],
 )
-def test_it_is_refused_in_words(test: dict[str, float], says: str) -> None:
+def test_it_is_refused_in_words(test: dict[str, float], message: str) -> None:
     for figure in found(0.15, **test)[:20]:
         assert not figure.known
-        assert says in figure.why
+        assert message in figure.why
 
 
 def test_a_lag_beyond_the_search_is_not_answered() -> None:

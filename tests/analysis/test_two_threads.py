@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.compiled.loops import InTurn
+from analysis.compiled.loops import ExclusiveLoop
 
 MISSING = 3  # what the program below ends with where the layer cannot be loaded
 
@@ -79,7 +79,7 @@ class Together:
 def test_two_loops_are_never_at_work_at_once() -> None:
     """Nor two different ones: numba's own work queue ends the process where two begin together."""
     together = Together()
-    threads = [threading.Thread(target=InTurn(together)) for _ in range(4)]
+    threads = [threading.Thread(target=ExclusiveLoop(together)) for _ in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:
@@ -92,5 +92,5 @@ def test_a_loop_that_fails_lets_the_next_one_in() -> None:
         raise ValueError("of the loop")
 
     with pytest.raises(ValueError, match="of the loop"):
-        InTurn(failing)()
-    assert InTurn(lambda: 7)() == 7
+        ExclusiveLoop(failing)()
+    assert ExclusiveLoop(lambda: 7)() == 7

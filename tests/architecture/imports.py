@@ -52,11 +52,11 @@ def circles_of_packages(packages: Mapping[str, str]) -> Iterator[str]:
         }
     )
     if cycle:
-        yield f"packages in a circle: {' > '.join(cycle)}; one of these lines says too much"
+        yield f"packages in a circle: {' > '.join(cycle)}; one of these lines allows too much"
 
 
 def libraries(sources: Sources, packages: Collection[str], homes: Mapping[str, str]) -> Iterator[str]:
-    """Libraries imported outside the packages that alone know them."""
+    """Libraries imported outside the packages that alone may."""
     for module in sources.values():
         for found in module.imports:
             home = homes.get(_top(found))

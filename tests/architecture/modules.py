@@ -18,23 +18,21 @@ _IN_A_STRING = re.compile(rf"({_MODULE})(?::(\w+))?")
 
 
 def interfaces(sources: Sources) -> Iterator[str]:
-    """Faces that hold more than a docstring, imports and ``__all__`` (``live`` also its version)."""
+    """Interfaces (``__init__``) with more than a docstring, imports and ``__all__`` (``live`` also its version)."""
     for interface in (module for module in sources.values() if module.is_package):
         if not ast.get_docstring(interface.tree):
-            yield violation(interface, 1, "a interface begins with a docstring: the map of its package")
+            yield violation(interface, 1, "an interface begins with a docstring: the map of its package")
         imported = {(node.lineno, name) for node in interface.tree.body for name in _bound(node)}
         for line, name in sorted(imported):
             if name not in interface.exports:
                 yield violation(
-                    interface, line, f"a interface exports what it imports; add {name} to __all__"
+                    interface, line, f"an interface exports what it imports; add {name} to __all__"
                 )
         for name in sorted(interface.exports - {name for _, name in imported}):
             yield violation(interface, 1, f"__all__ has {name}, which the interface does not import")
         for node in interface.tree.body[1:]:
-            if not _belongs_in_a_interface(node, interface.name):
-                text = (
-                    "a interface holds a docstring, imports and __all__; move this to a module of the package"
-                )
+            if not _belongs_in_an_interface(node, interface.name):
+                text = "an interface holds a docstring, imports and __all__; move this to a module of the package"
                 yield violation(interface, node.lineno, text)
 
 
@@ -102,7 +100,7 @@ def pickles(module: Module) -> Iterator[str]:
             and ast.unparse(node.value) != "False"
         ):
             yield violation(
-                module, node.value.lineno, "allow_pickle executes what a file says; it must be False"
+                module, node.value.lineno, "allow_pickle executes what a file contains; it must be False"
             )
 
 
@@ -152,7 +150,7 @@ def _bound(node: ast.stmt) -> list[str]:
     return []
 
 
-def _belongs_in_a_interface(node: ast.stmt, name: str) -> bool:
+def _belongs_in_an_interface(node: ast.stmt, name: str) -> bool:
     if isinstance(node, ast.Assign):
         targets = {ast.unparse(target) for target in node.targets}
         return targets == {"__all__"} or (name == "live" and targets == {"VERSION"})

@@ -1,4 +1,4 @@
-"""The words of the program that its documents quote, and where they stand in the sources."""
+"""Messages of the program that its documents quote, and where they stand in the sources."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def quoted(page: Path) -> Iterator[tuple[int, str]]:
             yield number, line[2:].strip()
 
 
-def spoken(modules: Iterable[Path]) -> list[str]:
+def strings(modules: Iterable[Path]) -> list[str]:
     """All strings of the sources but docstrings, joined where they are written in parts."""
     found = []
     for path in modules:
@@ -35,9 +35,9 @@ def _part(value: ast.expr) -> str:
     return value.value if isinstance(value, ast.Constant) and isinstance(value.value, str) else GAP
 
 
-def unsaid(page: Path, words: list[str]) -> Iterator[str]:
-    """Quotes that no string of the sources says; ``…`` stands for anything."""
+def missing(page: Path, words: list[str]) -> Iterator[str]:
+    """Quotes that no string of the sources contains; ``…`` stands for anything."""
     for number, quote in quoted(page):
         pattern = re.compile(".*".join(re.escape(part) for part in quote.split("…")), re.DOTALL)
-        if not any(pattern.search(said) for said in words):
-            yield f"{page.name}:{number}: the program does not say: {quote}"
+        if not any(pattern.search(text) for text in words):
+            yield f"{page.name}:{number}: the program has no message: {quote}"

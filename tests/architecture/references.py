@@ -1,4 +1,4 @@
-"""What documentation, docstrings and comments say of our modules and files, and whether it is there."""
+"""References to our modules and files in documentation, docstrings and comments, and whether they exist."""
 
 from __future__ import annotations
 

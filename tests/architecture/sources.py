@@ -29,7 +29,7 @@ class Import:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Module:
-    """A file, named as it is imported; a interface has the name of its folder."""
+    """A file, named as it is imported; an interface has the name of its folder."""
 
     name: str
     path: str

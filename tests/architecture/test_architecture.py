@@ -51,7 +51,7 @@ def test_the_lines_make_no_circle() -> None:
     none_of(imports.circles_of_packages(LAYERS))
 
 
-def test_packages_import_what_their_line_says(sources: Sources) -> None:
+def test_packages_import_what_their_line_allows(sources: Sources) -> None:
     none_of(imports.forbidden(sources, LAYERS, EXCEPTIONS))
 
 

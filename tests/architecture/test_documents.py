@@ -14,7 +14,7 @@ from docs import make_formats, make_site
 from live.commands.arguments import COMMANDS, full_parser
 from tests.architecture.layers import PACKAGES
 from tests.architecture.links import dead_links
-from tests.architecture.quotes import quoted, spoken, unsaid
+from tests.architecture.quotes import missing, quoted, strings
 from tests.architecture.references import dead_in, dead_references, words
 
 ROOT = Path(__file__).parents[2]
@@ -145,8 +145,8 @@ def test_a_dead_reference_is_found(text: str, dead: bool) -> None:
 
 def test_code_is_not_words(tmp_path: Path) -> None:
     module = tmp_path / "module.py"
-    module.write_text('"""Says live.gone."""\nlive.stop()\n# live.lost\n', encoding="utf-8")
-    assert sorted(words(module)) == [(1, "Says live.gone."), (3, "# live.lost")]
+    module.write_text('"""Names live.gone."""\nlive.stop()\n# live.lost\n', encoding="utf-8")
+    assert sorted(words(module)) == [(1, "Names live.gone."), (3, "# live.lost")]
 
 
 def test_the_citation_and_the_changes_are_of_this_version() -> None:
@@ -157,18 +157,18 @@ def test_the_citation_and_the_changes_are_of_this_version() -> None:
     assert f"## {version}, {released}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").splitlines()
 
 
-def test_quoted_messages_are_said() -> None:
+def test_quoted_messages_exist() -> None:
     sources = [path for place in PACKAGES for path in sorted((ROOT / place).rglob("*.py"))]
-    page, words = ROOT / "docs" / "troubleshooting.md", spoken(sources)
+    page, words = ROOT / "docs" / "troubleshooting.md", strings(sources)
     assert len(list(quoted(page))) > 40
-    assert not list(unsaid(page, words)), "\n" + "\n".join(unsaid(page, words))
+    assert not list(missing(page, words)), "\n" + "\n".join(missing(page, words))
 
 
 @pytest.mark.parametrize(
-    ("quote", "said"), [("the … is full", True), ("the disk is full of …", False), ("full. Go", False)]
+    ("quote", "exists"), [("the … is full", True), ("the disk is full of …", False), ("full. Go", False)]
 )
-def test_a_message_nobody_says_is_found(tmp_path: Path, quote: str, said: bool) -> None:
+def test_a_message_that_does_not_exist_is_found(tmp_path: Path, quote: str, exists: bool) -> None:
     page, module = tmp_path / "page.md", tmp_path / "module.py"
     page.write_text(f"text\n> {quote}\n", encoding="utf-8")
     module.write_text("'full. Go'\nraise E(f'{path}: the {what} ' 'is full; go')\n", encoding="utf-8")
-    assert bool(list(unsaid(page, spoken([module])))) is not said
+    assert bool(list(missing(page, strings([module])))) is not exists

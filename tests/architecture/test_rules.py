@@ -1,4 +1,4 @@
-"""Each rule of the sources, held against a made-up sources that breaks it, and one that does not."""
+"""Each rule of the sources, held against made-up sources that breaks it, and one that does not."""
 
 from __future__ import annotations
 
@@ -11,13 +11,18 @@ from tests.architecture import imports, modules
 from tests.architecture.sources import Module, Sources, read_sources
 
 LAYERS = {"live": "", "live.up": "live.down", "live.down": ""}
-FACE = '"""A package."""\n\nfrom live.down.inner import Thing\n\n__all__ = ["Thing"]\n'
+INTERFACE = '"""A package."""\n\nfrom live.down.inner import Thing\n\n__all__ = ["Thing"]\n'
 INNER = "class Thing: ...\n"
 
 
 def built(root: Path, files: Mapping[str, str]) -> Sources:
     """A package ``live`` with the packages ``up`` and ``down``."""
-    named = {"__init__": '"""All."""', "up/__init__": '"""Up."""', "down/__init__": FACE, "down/inner": INNER}
+    named = {
+        "__init__": '"""All."""',
+        "up/__init__": '"""Up."""',
+        "down/__init__": INTERFACE,
+        "down/inner": INNER,
+    }
     for name, text in {**named, **files}.items():
         path = root / "live" / f"{name}.py"
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -30,7 +35,7 @@ def module(root: Path, text: str) -> Module:
 
 
 def only(violations: Iterable[str], place: str) -> None:
-    """There is one violation, and it says where."""
+    """There is one violation, and it begins with the place."""
     (found,) = violations
     assert found.startswith(place), found
 
@@ -67,7 +72,7 @@ def test_a_circle_is_found_also_one_of_types(tmp_path: Path) -> None:
     assert not list(imports.circles(built(tmp_path, {"up/two": ""})))
 
 
-def test_a_circle_through_a_interface(tmp_path: Path) -> None:
+def test_a_circle_through_an_interface(tmp_path: Path) -> None:
     """Who imports a module of a package runs the package's interface before it."""
     sources = built(
         tmp_path, {"down/inner": "import live.up.one", "up/one": "import live.down.other", "down/other": ""}
@@ -100,19 +105,21 @@ def test_libraries_numba_and_what_packages_do_without(tmp_path: Path) -> None:
     [
         (
             "from live.down.inner import Thing\n__all__ = ['Thing']",
-            "live/down/__init__.py:1: a interface begins with",
+            "live/down/__init__.py:1: an interface begins with",
         ),
-        ('"""A."""\nfrom live.down.inner import Thing', "live/down/__init__.py:2: a interface exports"),
+        ('"""A."""\nfrom live.down.inner import Thing', "live/down/__init__.py:2: an interface exports"),
         ('"""A."""\n__all__ = ["Thing"]', "live/down/__init__.py:1: __all__ has Thing"),
-        ('"""A."""\nLIMIT = 3', "live/down/__init__.py:2: a interface holds"),
+        ('"""A."""\nLIMIT = 3', "live/down/__init__.py:2: an interface holds"),
     ],
 )
-def test_a_interface_holds_imports_alone(tmp_path: Path, interface: str, place: str) -> None:
+def test_an_interface_holds_imports_alone(tmp_path: Path, interface: str, place: str) -> None:
     assert any(
         found.startswith(place) for found in modules.interfaces(built(tmp_path, {"down/__init__": interface}))
     )
     assert not list(
-        modules.interfaces(built(tmp_path, {"down/__init__": FACE, "__init__": '"""A."""\nVERSION = "1"'}))
+        modules.interfaces(
+            built(tmp_path, {"down/__init__": INTERFACE, "__init__": '"""A."""\nVERSION = "1"'})
+        )
     )
 
 

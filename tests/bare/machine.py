@@ -167,7 +167,7 @@ def clone(root: Path) -> None:
 
 
 def check_python(machine: Machine) -> None:
-    """A Debian that has moved on to another Python is not what was asked for.
+    """A Debian that has moved on to another Python is not the one wanted.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What stands in the way of a bare machine is said, and nothing of the host's own comes into it."""
+"""What stands in the way of a bare machine is reported, and nothing of the host's own comes into it."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def no(*_: object) -> str:
         ("tests.bare.machine.shutil.which", lambda name: None, "apt-get install debootstrap"),
     ],
 )
-def test_what_is_missing_is_said_before_anything_is_made(
+def test_what_is_missing_is_reported_before_anything_is_made(
     where: str,
     what: object,
     says: str,
@@ -51,7 +51,7 @@ def test_what_is_missing_is_said_before_anything_is_made(
     assert says in capsys.readouterr().err
 
 
-def test_a_mirror_that_is_not_reached_is_said_and_nothing_is_left(
+def test_a_mirror_that_is_not_reached_is_reported_and_nothing_is_left(
     means: None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     def refused(argv: list[str], **_: object) -> subprocess.CompletedProcess[str]:

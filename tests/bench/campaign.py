@@ -92,7 +92,7 @@ def speed(folder: Path, seconds: float) -> list[dict[str, Any]]:
 
 
 def empty(folder: Path, count: int) -> list[dict[str, Any]]:
-    """Tasks that are done already, which a worker sees by their ``batch.json``."""
+    """Tasks that are done already, which a worker finds by their ``batch.json``."""
     tasks = [Task(f"{number:05d}", str(folder), "nothing.h5", key="key") for number in range(count)]
     for task in tasks:
         task.folder.mkdir()

@@ -44,7 +44,7 @@ class Watch(Consumer):
     blocks = False
 
     def __init__(self) -> None:
-        self._numbers = array("d")  # not a list of tuples: a soak looks at what grows
+        self._numbers = array("d")  # not a list of tuples: a soak watches what grows
 
     def measurement(self, measurement: Measurement) -> None:
         i, b = measurement.time_step, measurement.burst

@@ -1,4 +1,4 @@
-"""The rows of other engines: a failure is told, the absent are named, the points are those of the truth."""
+"""The rows of other engines: a failure is reported, the absent are named, the points are those of the truth."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import pytest
 
 from live.cli import main
 from live.replay.batch.task import Task, perform
-from live.replay.opening import open_material
+from live.replay.opening import open_source
 from live.replay.source import ReplayRequest
 from live.replay.study import still_window
 from live.results import still_phase_of
@@ -40,7 +40,7 @@ def test_one_still_phase_and_one_table_in_report_batch_and_study(tmp_path: Path)
     assert main(["run", "--camera", CAMERA, "--load", "sim:", *words, "--out", str(tmp_path / "run")]) == 0
     session = str(tmp_path / "run" / "session.h5")
     row = perform(Task("again", str(tmp_path), session, overrides=SETTINGS)).values
-    with open_material(ReplayRequest(session, False, None, None, None, None, SETTINGS)) as (material, _):
+    with open_source(ReplayRequest(session, False, None, None, None, None, SETTINGS)) as (material, _):
         assert material.times is not None
         low, high = (material.start.monotonic + limit for limit in still_window(material))
         studied = np.count_nonzero((material.times >= low) & (material.times <= high))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from analysis import self_test as machine
-from analysis.kernel import solve as attempt
+from analysis.kernel import solve
 from analysis.picture.splines import tap_table
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
@@ -31,7 +31,7 @@ def break_taps(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[], None]]:
 
     def spoil() -> None:
         forget()
-        monkeypatch.setattr(attempt, "tap_table", wrong)
+        monkeypatch.setattr(solve, "tap_table", wrong)
 
     yield spoil
     forget()

@@ -1,6 +1,6 @@
-"""A campaign: what is missing is done by workers, and all of it stands in one table.
+"""A campaign: workers replay the missing tests, and one table has the results of all.
 
-The table of a campaign: ``summary.csv`` and ``summary.parquet``, each whole or not there.
+The table is ``summary.csv``, and ``summary.parquet`` with pyarrow; each is written completely or not at all.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from live.replay.batch.row import COLUMNS, BatchRow, Value, failed
 from live.replay.batch.scheduler import BatchProgress, ChunkPlan, Scheduler, cut, sweep_chunks
 from live.replay.batch.task import Task, row_done
 from live.replay.batch.test_list import BatchJob
-from live.replay.batch.workdir import sweep, sweep_whole
+from live.replay.batch.workdir import sweep, sweep_done
 from live.replay.batch.worker_processes import Pool, WorkerProcesses
 from live.setup.compiling import compile_ahead
 
 
 def write_summary(rows: Sequence[BatchRow], out: Path) -> list[Path]:
-    """Write both, in place of those of an earlier call; Parquet where pyarrow is installed.
+    """Write the table, in place of that of an earlier call; Parquet only where pyarrow is installed.
 
     Raises
     ------
     DataError
-        They cannot be written; the earlier ones stay.
+        A file cannot be written; the earlier one stays.
     """
     made = {"summary.csv": as_csv(rows)}
     if (table := as_parquet(rows)) is not None:
@@ -48,7 +48,7 @@ def write_summary(rows: Sequence[BatchRow], out: Path) -> list[Path]:
 
 
 def as_csv(rows: Sequence[BatchRow]) -> bytes:
-    """A line a test, with a heading; what is not known is empty."""
+    """A heading, and a line for each test; unknown values are empty."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(COLUMNS)
@@ -57,7 +57,7 @@ def as_csv(rows: Sequence[BatchRow]) -> bytes:
 
 
 def as_parquet(rows: Sequence[BatchRow]) -> bytes | None:
-    """The same with types; None without pyarrow."""
+    """The table as Parquet with types; None without pyarrow."""
     try:
         import pyarrow
         from pyarrow import parquet
@@ -71,7 +71,7 @@ def as_parquet(rows: Sequence[BatchRow]) -> bytes | None:
 
 
 def _cell(value: Value) -> Any:
-    """No program takes a word for a formula."""
+    """The value as a cell that no spreadsheet reads as a formula."""
     return value.lstrip("=+-@\t ") if isinstance(value, str) else "" if value is None else value
 
 
@@ -85,29 +85,29 @@ def _put(path: Path, content: bytes) -> None:
         raise DataError(f"{path}: cannot be written ({error.strerror}); make room and call again") from error
 
 
-_LOOK_S = 0.1
+_POLL_S = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class CampaignRequest:
-    """What is asked of a campaign.
+    """The settings of a campaign.
 
     Attributes
     ----------
     tests : sequence of BatchJob
     out : Path
-        The folder of a test is made in it.
+        Holds a folder for each test.
     workers : int
     config : str or None
-        A configuration for all; that of a test goes before it.
+        A configuration for all; that of a test replaces it.
     overrides : mapping of "section.key" to value
-        For all; those of a test go before them.
+        For all; those of a test take precedence.
     start_s, end_s : float or None, s
     as_measured : bool
     chunk_s : float or None, s
         Cut longer sessions into chunks of about this length.
     scheduler : str or None
-        Of a Dask cluster that does the work in the place of ``workers`` processes of this machine.
+        Address of a Dask cluster, used instead of ``workers`` processes of this machine.
     """
 
     tests: Sequence[BatchJob]
@@ -124,7 +124,7 @@ class CampaignRequest:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Campaign:
-    """What came out.
+    """The result of a campaign.
 
     Attributes
     ----------
@@ -144,12 +144,12 @@ class Campaign:
 
 
 def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Event) -> Campaign:
-    """Replay what is missing; setting ``stopping`` ends it early, without a table.
+    """Replay the missing tests; setting ``stopping`` ends it early, without a table.
 
     Raises
     ------
     ConfigError
-        The settings cannot be, or a folder holds results of other settings.
+        The settings are not possible, or a folder holds results of other settings.
     DataError
         The table cannot be written.
     """
@@ -174,7 +174,7 @@ def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Ev
 
 
 def _processes(wanted: CampaignRequest) -> WorkerProcesses:
-    """Processes for what is missing at first sight: they load while this one plans."""
+    """Processes for the tests without a folder: they load while this one plans."""
     missing = sum(not (wanted.out / test.name).exists() for test in wanted.tests)
     try:
         return WorkerProcesses(0 if wanted.scheduler else min(wanted.workers, missing))
@@ -187,10 +187,10 @@ def _no_process(error: OSError) -> DataError:
 
 
 def _sweep(out: Path, rows: Mapping[str, BatchRow], tasks: Sequence[Task]) -> None:
-    """Remove what nobody works on and nobody needs."""
+    """Remove staging folders and chunks that no process works on and no test needs."""
     done = {name for name, row in rows.items() if row.is_done}
     sweep(out)
-    sweep_whole(out, done)
+    sweep_done(out, done)
     sweep_chunks(out, done, {task.name: task for task in tasks})
 
 
@@ -202,7 +202,7 @@ def _make(out: Path) -> None:
 
 
 def _planned(wanted: CampaignRequest) -> tuple[dict[str, BatchRow], list[Task]]:
-    """The rows there are, and the tasks that are missing."""
+    """The rows of complete tests, and the tasks for the others."""
     rows: dict[str, BatchRow] = {}
     tasks: list[Task] = []
     for test in wanted.tests:
@@ -254,25 +254,25 @@ def _work(
     stopping: threading.Event,
     processes: WorkerProcesses,
 ) -> None:
-    standing = BatchProgress(len(tasks), time.monotonic)
-    course = Scheduler(tasks, _cuts(tasks, screen), rows, standing, screen)
-    first = course.first()
+    progress = BatchProgress(len(tasks), time.monotonic)
+    scheduler = Scheduler(tasks, _cuts(tasks, screen), rows, progress, screen)
+    first = scheduler.first()
     workers: Pool | Cluster
     if wanted.scheduler is None:
         _compile(processes, screen, stopping)
-        workers = Pool(first, wanted.workers, course.told, course.done, processes)
+        workers = Pool(first, wanted.workers, scheduler.on_progress, scheduler.on_done, processes)
     else:
-        workers = Cluster(first, wanted.scheduler, course.told, course.done, screen)
+        workers = Cluster(first, wanted.scheduler, scheduler.on_progress, scheduler.on_done, screen)
     try:
-        while not workers.wait(_LOOK_S) and not stopping.is_set():
-            screen.status(standing.words())
+        while not workers.wait(_POLL_S) and not stopping.is_set():
+            screen.status(progress.words())
     finally:
         workers.close()
-    screen.say(standing.words())
+    screen.say(progress.words())
 
 
 def _compile(processes: WorkerProcesses, screen: Screen, stopping: threading.Event) -> None:
-    """Have compiled what is missing, before workers need it."""
+    """Compile what is missing, before workers need it."""
     try:
         ready = processes.are_ready()
     except OSError as error:
@@ -284,7 +284,7 @@ def _compile(processes: WorkerProcesses, screen: Screen, stopping: threading.Eve
 
 
 def _cuts(tasks: Sequence[Task], screen: Screen) -> dict[str, ChunkPlan]:
-    """The chunks of those that are to be cut; said where one cannot be."""
+    """The chunks of the tests to be cut; a line on the screen for each that cannot be cut."""
     found = {task.name: cut(task) for task in tasks if task.chunk_s is not None}
     for name, one in found.items():
         if one.why:

@@ -1,7 +1,7 @@
-"""The workers of a Dask cluster that is running already, at the same tasks as ``pool``.
+"""The tasks of a batch on the workers of a running Dask cluster.
 
-Whoever reaches a scheduler has it run any program, here as well as there: docs/scale.md. Dask is the extra
-``cluster``.
+Anyone with access to a scheduler can run any program on its machines and on this one: docs/scale.md. Dask is the
+extra ``cluster``.
 """
 
 from __future__ import annotations
@@ -18,60 +18,62 @@ from typing import Any
 from acquire.errors import ConfigError, DataError
 from acquire.printable import printable
 from live.pipeline.screen import Screen
-from live.replay.batch import worker as there
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress, row_done
-from live.replay.batch.worker_processes import Done, Told
+from live.replay.batch.worker import compile_on_worker, describe_worker, perform_on_worker
+from live.replay.batch.worker_processes import OnDone, OnProgress
 
 log = logging.getLogger(__name__)
-RETRIES = 2  # of a task that raised; one whose worker died is given to another three times by Dask itself
-_ANSWER_S, _STARTS = 10, 3
-_ROOM, _LEAST_ROOM = 4, 200
-"""Tasks a worker, and of all at least, that the scheduler is given; ten thousand at once silence it."""
+RETRIES = 2  # of a task that raised; Dask itself gives one whose worker died to another, three times
+_CONNECT_S, _STARTS = 10, 3
+_PER_WORKER, _MIN_QUEUED = 4, 200
+"""Queued tasks for each worker, and the least in all; with ten thousand at once the scheduler stops responding."""
 
 _GONE_S = 5.0  # without the scheduler
 _QUIET_S = 15.0  # without a task that ends
 
 
 class Cluster:
-    """Tasks given to the scheduler at ``address``; ``told`` is called from a thread, ``done`` from ``wait``.
+    """Tasks on the cluster at ``address``; ``on_progress`` is called from a thread, ``on_done`` from ``wait``.
 
     Parameters
     ----------
     tasks : sequence of Task
     address : str
         tcp://HOST:PORT, or tls://HOST:PORT with Dask's own configuration.
-    told, done : callable
+    on_progress, on_done : callable
     screen : Screen
-        Told what is odd about the workers.
+        OnProgress what is odd about the workers.
 
     Raises
     ------
     ConfigError
-        Dask is not installed, nothing answers there, it has no workers, they do not see the folder of the results,
-        or their program is not ours.
+        Dask is not installed, nothing answers there, it has no workers, they do not have the folder of the results,
+        or their versions are others.
     """
 
-    def __init__(self, tasks: Sequence[Task], address: str, told: Told, done: Done, screen: Screen) -> None:
-        self._told, self._done, self._address, self._screen = told, done, address, screen
+    def __init__(
+        self, tasks: Sequence[Task], address: str, on_progress: OnProgress, on_done: OnDone, screen: Screen
+    ) -> None:
+        self._on_progress, self._on_done, self._address, self._screen = on_progress, on_done, address, screen
         self._topic = f"phasedic-{uuid.uuid4().hex}"
         self._tasks: dict[str, Task] = {}
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._waiting, self._left = deque(tasks), dict[str, Any]()
         self._gone_s = self._quiet_s = 0.0
-        self._room = _LEAST_ROOM
+        self._max_queued = _MIN_QUEUED
         self._client = _connected(address)
         try:
             self._prepare(Path(tasks[0].out if not tasks[0].of else Path(tasks[0].out).parent))
-            self._client.subscribe_topic(self._topic, self._hear)
+            self._client.subscribe_topic(self._topic, self._on_event)
             self._feed()
         except BaseException:
             self._client.close()
             raise
 
     def wait(self, seconds: float) -> bool:
-        """Whether all is done within ``seconds``; raises DataError where the scheduler has gone."""
+        """Whether all is done within ``seconds``; raises DataError where the connection to the scheduler is lost."""
         ended: list[tuple[Task, Any]] = []
         with contextlib.suppress(queue.Empty):
             ended.append(self._ended.get(timeout=seconds))
@@ -79,18 +81,18 @@ class Cluster:
                 ended.append(self._ended.get_nowait())
         rows = self._fetched([future for _, future in ended if future.status == "finished"])
         for task, future in ended:
-            self._take(task, rows.get(future.key) or _given_up(task, future))
+            self._take(task, rows.get(future.key) or _row_without_result(task, future))
         self._feed()
-        self._look(0.0 if ended else seconds)
+        self._check_workers(0.0 if ended else seconds)
         self._gone_s = 0.0 if self._client.status == "running" else self._gone_s + seconds
         if self._gone_s > _GONE_S:
             raise DataError(
-                f"{self._address}: the scheduler has gone; what is whole is kept: start it, and call again"
+                f"{self._address}: the scheduler has ended; complete tests are kept: start it, and call again"
             )
         return not self._left and not self._waiting
 
-    def _look(self, quiet_s: float) -> None:
-        """Tell where nobody is left to work."""
+    def _check_workers(self, quiet_s: float) -> None:
+        """Show a note where there are no workers any more."""
         self._quiet_s = self._quiet_s + quiet_s if quiet_s else 0.0
         if self._quiet_s > _QUIET_S and self._client.status == "running":
             self._quiet_s = 0.0
@@ -98,8 +100,8 @@ class Cluster:
                 self._screen.say(f"note: {self._address} has no workers any more; waiting for some")
 
     def close(self) -> None:
-        """Take back what has not begun, and let go of the scheduler; what a worker has begun it ends."""
-        with contextlib.suppress(Exception):  # it may have gone
+        """Cancel what has not begun, and close the connection; a worker completes a task that it has begun."""
+        with contextlib.suppress(Exception):  # the scheduler may have ended
             if self._left and self._client.status == "running":
                 self._client.cancel(list(self._left.values()), force=True)
         with contextlib.suppress(Exception):
@@ -111,39 +113,39 @@ class Cluster:
         token = out / f".{self._topic}"
         token.touch()
         try:
-            found = self._ask(there.about, str(token))
+            found = self._ask(describe_worker, str(token))
         finally:
             token.unlink(missing_ok=True)
         check(self._address, found)
         for words in advice(found):
             self._screen.say(words)
-        self._room = max(_LEAST_ROOM, _ROOM * len(found))
+        self._max_queued = max(_MIN_QUEUED, _PER_WORKER * len(found))
         self._compile(found)
 
     def _ask(self, function: Any, *arguments: Any) -> dict[str, Any]:
         try:
             return dict(self._client.run(function, *arguments))
-        except Exception as error:  # of a worker, whatever it has in place of our program
+        except Exception as error:  # any error of a worker with another program
             why = printable(f"{type(error).__name__}: {error}")[:200]
             raise ConfigError(
                 f"{self._address}: a worker cannot run phasedic ({why}); install the same version there"
             ) from None
 
     def _compile(self, found: Mapping[str, Mapping[str, Any]]) -> None:
-        """On one worker of each machine, before any task waits for it."""
+        """Compile on one worker of each machine, before any task waits for it."""
         last = {answer["host"]: worker for worker, answer in found.items()}
         self._screen.status(f"compiling on {len(last)} machines, once")
         futures = [
-            self._client.submit(there.compile_there, workers=[worker], pure=False) for worker in last.values()
+            self._client.submit(compile_on_worker, workers=[worker], pure=False) for worker in last.values()
         ]
         self._client.gather(futures, errors="skip")
 
     # -- the tasks ------------------------------------------------------------------------------
 
     def _feed(self) -> None:
-        """Keep the scheduler at work, with no more than it can look through at once."""
-        if self._client.status == "running" and len(self._left) <= self._room // 2:
-            count = min(len(self._waiting), self._room - len(self._left))
+        """Submit tasks, up to the limit of the queue."""
+        if self._client.status == "running" and len(self._left) <= self._max_queued // 2:
+            count = min(len(self._waiting), self._max_queued - len(self._left))
             self._submit([self._waiting.popleft() for _ in range(count)])
 
     def _submit(self, tasks: Sequence[Task]) -> None:
@@ -152,7 +154,7 @@ class Cluster:
         names = [f"{task.folder}-{task.key}" for task in tasks]
         self._tasks |= {task.title: task for task in tasks}
         futures = self._client.map(
-            there.perform_there,
+            perform_on_worker,
             [task.to_json() for task in tasks],
             folder=str(Path.cwd()),
             topic=self._topic,
@@ -164,13 +166,13 @@ class Cluster:
             self._left[task.title] = future
             future.add_done_callback(lambda ended, task=task: self._ended.put((task, ended)))
 
-    def _hear(self, event: tuple[float, Any]) -> None:
+    def _on_event(self, event: tuple[float, Any]) -> None:
         title, *values = event[1]
         if title in self._tasks:
-            self._told(self._tasks[title], TaskProgress(*values))
+            self._on_progress(self._tasks[title], TaskProgress(*values))
 
     def _fetched(self, futures: Sequence[Any]) -> dict[str, BatchRow]:
-        """The rows of many in one go; none where the way to them is gone, for they lie on the disk as well."""
+        """The rows of many tasks at once; none where the connection is lost, since they are on the disk as well."""
         try:
             values = self._client.gather(futures) if futures else []
         except Exception as error:  # of the network, or of a worker that has just died
@@ -180,9 +182,9 @@ class Cluster:
 
     def _take(self, task: Task, row: BatchRow) -> None:
         if self._client.status != "running" and not row.is_done:
-            return  # the scheduler is going, as ``wait`` will tell
+            return  # the connection is lost, and ``wait`` reports it
         if self._left.pop(task.title, None) is not None:
-            self._waiting.extendleft(self._done(task, row))
+            self._waiting.extendleft(self._on_done(task, row))
 
 
 def _connected(address: str) -> Any:
@@ -190,7 +192,7 @@ def _connected(address: str) -> Any:
         from distributed import Client, Security
     except ImportError:
         raise ConfigError("--scheduler needs Dask: pip install 'phasedic[cluster]'") from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is told by ourselves
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # our own messages replace its warnings
     if address.startswith("tls:") and not Security().tls_ca_file:
         raise ConfigError(
             f"--scheduler {address}: no certificate is known here; set DASK_DISTRIBUTED__COMM__TLS__CA_FILE,"
@@ -198,8 +200,8 @@ def _connected(address: str) -> Any:
         )
     for _ in range(_STARTS):
         try:
-            return Client(address, timeout=_ANSWER_S, set_as_default=False)
-        except AssertionError:  # Dask waits ten seconds for a thread of its own, no longer
+            return Client(address, timeout=_CONNECT_S, set_as_default=False)
+        except AssertionError:  # Dask waits at most ten seconds for its own thread
             log.debug("Dask's own thread did not start")
         except (OSError, ValueError, TypeError) as error:
             why = printable(str(error))[:200]
@@ -210,7 +212,7 @@ def _connected(address: str) -> Any:
 
 
 def check(address: str, found: Mapping[str, Mapping[str, Any]]) -> None:
-    """Raises ConfigError where there is nobody, or somebody whose results would not be ours."""
+    """Raises ConfigError where there are no workers, or where their results would differ from ours."""
     if not found:
         raise ConfigError(f"{address}: has no workers; start some with 'dask worker {address} --nthreads 1'")
     ours = deciding_versions()
@@ -227,15 +229,15 @@ def check(address: str, found: Mapping[str, Mapping[str, Any]]) -> None:
                 f"worker {printable(worker)} does {answer['slots']} tasks at once; start it with --nthreads 1, and"
                 " --nworkers for more"
             )
-        if not answer["sees"]:
+        if not answer["has_token"]:
             raise ConfigError(
-                f"worker {printable(worker)} does not see --out: recordings and results must lie on a disk that all"
+                f"worker {printable(worker)} does not find --out: recordings and results must be on a disk that all"
                 " machines have under the same path"
             )
 
 
 def advice(found: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
-    """What makes workers slow, in words."""
+    """Notes on settings that make workers slow."""
     wrong = {
         worker: [name for name, value in answer["threads"].items() if value != "1"]
         for worker, answer in found.items()
@@ -249,10 +251,10 @@ def advice(found: Mapping[str, Mapping[str, Any]]) -> Iterator[str]:
         )
 
 
-def _given_up(task: Task, future: Any) -> BatchRow:
-    """The row of a task that did not come to its end, or whose own row did not come back."""
+def _row_without_result(task: Task, future: Any) -> BatchRow:
+    """The row of a task that failed on the cluster, or whose row did not arrive."""
     if (row := row_done(task)) is not None:
         return row
     error = future.exception() if future.status == "error" else None
-    why = f"{type(error).__name__}: {error}" if error else f"what became of it was not told ({future.status})"
+    why = f"{type(error).__name__}: {error}" if error else f"no result arrived ({future.status})"
     return failed(task.title, task.source, f"the cluster gave it up: {printable(why)[:300]}", 1)

@@ -1,4 +1,4 @@
-"""What a result depends on, as a key: the recording or the pictures, the settings, and the versions."""
+"""The key of a result: a hash of all it depends on (recording or pictures, settings, versions)."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from live.results.folder import installed_versions
 if TYPE_CHECKING:
     from live.replay.batch.task import Task
 
-_ENDS = 1 << 20  # bytes at each end of a recording that stand for it
+_ENDS = 1 << 20  # bytes at each end of a recording that are hashed
 _DECIDING = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless", "machine")
 _FILES = ("measure.mask", "camera.dark", "camera.flat")  # settings that name a file
 
 
 def key_of(task: Task) -> str:
-    """The key of ``task``, hexadecimal; where its files lie does not matter, what they hold does.
+    """The key of ``task``, hexadecimal; it depends on the content of files, not on their paths.
 
     Raises
     ------
@@ -33,7 +33,7 @@ def key_of(task: Task) -> str:
         One of its files cannot be read.
     """
     overrides = {key: _file(value) if key in _FILES else value for key, value in task.overrides.items()}
-    told = {
+    content = {
         "source": _source(task.source),
         "config": _file(task.config),
         "reference": _file(task.reference),
@@ -43,17 +43,17 @@ def key_of(task: Task) -> str:
         "versions": deciding_versions(),
     }
     if task.chunk_s is not None:
-        told["chunk_s"] = task.chunk_s
-    return _hash(json.dumps(told, sort_keys=True, default=str).encode())
+        content["chunk_s"] = task.chunk_s
+    return _hash(json.dumps(content, sort_keys=True, default=str).encode())
 
 
 def key_of_chunk(task: Task) -> str:
-    """The key of a chunk, of that of the whole test, which it has so far."""
+    """The key of a chunk, from that of the whole test, which ``task`` still has."""
     return _hash(json.dumps([task.key, task.numbers, task.run_in]).encode())
 
 
 def longest_first(tasks: Iterable[Task]) -> list[Task]:
-    """Those of large recordings first, so that none of them is left to one worker at the end; pictures last."""
+    """Large recordings first, so that none of them runs alone at the end; pictures last."""
     return sorted(tasks, key=_bytes, reverse=True)
 
 
@@ -63,12 +63,12 @@ def _bytes(task: Task) -> int:
     path = Path(parse_address(with_scheme(task.source)).target).expanduser()
     with contextlib.suppress(OSError):
         return sum(file.stat().st_size for file in _set_of(path))
-    return 0  # gone since; the replay will tell
+    return 0  # removed since; the replay reports it
 
 
 @cache
 def deciding_versions() -> Mapping[str, str]:
-    """Of what the numbers depend on."""
+    """Versions of all that the numbers depend on."""
     found = installed_versions()
     return {name: found[name] for name in _DECIDING}
 
@@ -81,7 +81,7 @@ def _hash(*pieces: bytes) -> str:
 
 
 def is_session(source: str) -> bool:
-    """Whether it is a recording, and no pictures."""
+    """Whether ``source`` is a recording, and not pictures."""
     return parse_address(with_scheme(source)).scheme == "session"
 
 
@@ -98,7 +98,7 @@ def _source(source: str) -> Any:
 
 
 def _set_of(path: Path) -> list[Path]:
-    """A session and the files that it was continued in."""
+    """A session and its further files."""
     return [path, *sorted(path.parent.glob(f"{path.stem}.*{path.suffix}"))]
 
 
@@ -125,7 +125,7 @@ def _ends(file: Path) -> list[Any]:
 
 
 def _file(path: Any) -> str | None:
-    """What the file holds; None without one."""
+    """The hash of the file; None without one."""
     if not path:
         return None
     try:

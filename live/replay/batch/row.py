@@ -1,4 +1,4 @@
-"""A test in one line of the table: settings, figures with their intervals, noise, losses."""
+"""The row of a test in the table: settings, figures with their intervals, noise, losses."""
 
 from __future__ import annotations
 
@@ -29,34 +29,34 @@ COLUMNS: dict[str, type] = {
     "still_instants": int, "strain_noise_measured": float,
     "frames_lost": int, "pictures_left_out": int, "seconds": float,
 }  # fmt: skip
-"""Name of each column, with its kind; a number that is not known is empty."""
-RENEWED = "renewed"  # outcome of a chunk that cannot stand in the place of its part of the whole
+"""Name and type of each column; a number that is not known is empty."""
+RENEWED = "renewed"  # outcome of a chunk that cannot replace its part of the whole
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BatchRow:
-    """One test; ``values`` has all of ``COLUMNS``."""
+    """The row of one test; ``values`` has all of ``COLUMNS``."""
 
     values: Mapping[str, Value]
 
     @classmethod
     def of(cls, values: Mapping[str, Any]) -> BatchRow:
-        """With the columns there are, in their order; what is of another kind is left empty."""
+        """A row with all columns in their order; a value of another type is left empty."""
         return cls({name: _fitting(values.get(name), kind) for name, kind in COLUMNS.items()})
 
     @property
     def is_well(self) -> bool:
-        """Whether nothing is missing."""
+        """Whether the test has the exit code 0."""
         return self.values["exit_code"] == 0
 
     @property
     def is_done(self) -> bool:
-        """Whether there are results."""
+        """Whether the test has results."""
         return self.values["outcome"] != "failed"
 
     @property
     def words(self) -> str:
-        """Name and what went wrong, in a line."""
+        """Name, outcome and error, in a line."""
         return f"{self.values['test']}: {self.values['outcome']}: {self.values['error']}"
 
 
@@ -67,7 +67,7 @@ def failed(name: str, source: str, error: str, exit_code: int) -> BatchRow:
 
 
 def row_of_chunk(name: str, source: str, as_the_whole: bool, seconds: float) -> BatchRow:
-    """The row of a chunk, which comes into no table."""
+    """The row of a chunk, which is in no table."""
     outcome = "done" if as_the_whole else RENEWED
     found = {"test": name, "source": source, "outcome": outcome, "exit_code": 0}
     return BatchRow.of({**found, "seconds": round(seconds, 3)})
@@ -76,16 +76,14 @@ def row_of_chunk(name: str, source: str, as_the_whole: bool, seconds: float) -> 
 def row_of(name: str, source: str, done: Replayed, seconds: float) -> BatchRow:
     """The row of a test that was replayed."""
     history, code = done.run_state.history, done.exit_code
-    said = (
-        "" if code == 0 else "; ".join(done.lines[:1]) if history.told_something else "nothing was measured"
-    )
+    error = "" if code == 0 else "; ".join(done.lines[:1]) if history.has_values else "nothing was measured"
     return BatchRow.of(
         {
             "test": name,
             "source": source,
             "outcome": "done" if code == 0 else "with loss",
             "exit_code": code,
-            "error": said,
+            "error": error,
             **_settings(done.config),
             "burst": done.config.measure.burst or _burst(done),
             **_counts(history),
@@ -107,7 +105,7 @@ def _settings(config: Config) -> dict[str, Any]:
 
 
 def _burst(done: Replayed) -> int | None:
-    """Frames in a burst where nobody said how many."""
+    """Frames in a burst where the configuration has no number."""
     time_steps = len(done.run_state.history.time_steps)
     return round(done.run_state.frame_counts.measured / time_steps) if time_steps else None
 
@@ -126,13 +124,13 @@ def _figures(figures: TensileFigures, config: Config) -> dict[str, float]:
 
 
 def _noise(history: History) -> dict[str, float]:
-    """Typical of the test: of one frame, of one ZOI's strain and of the mean strain, as predicted."""
+    """Medians over the test: noise of one frame, predicted noise of one ZOI's strain and of the mean strain."""
     columns = {"noise_GL": "noise_GL", "strain_noise": "zoi_sigma", "mean_strain_noise": "sigma_eyy"}
     return {name: _median(history, column) for name, column in columns.items()}
 
 
 def _noise_floor(results: Path) -> dict[str, Any]:
-    """The still phase, and the scatter of one ZOI's eyy in it."""
+    """The length of the still phase, and the scatter of one ZOI's eyy in it."""
     with Strain.open(results) as strain:
         still = still_phase_of(strain, ("eyy",))
     floor = still.floors.get("eyy")

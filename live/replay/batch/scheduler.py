@@ -1,11 +1,8 @@
-"""What follows what in a campaign: chunks, then what joins them; a test whole where its chunks cannot stand for it.
+"""The order of the tasks of a campaign, and its progress: a long session is cut into chunks, which a last task joins.
 
-A long session as chunks for several workers: where it is cut, and where what they give waits for the others.
-
-The kernel of a chunk has not seen what came before it; the difference dies away within some instants, which are
-measured before the chunk and thrown away. What waits lies in ``.NAME.KEY.chunks`` and goes once the test is whole.
-
-How far a campaign is, in one line.
+The kernel of a chunk starts without the bursts before it; the difference decays within some time steps, the run-in,
+which is measured before the chunk and not kept. The results of chunks are in ``.NAME.KEY.chunks`` until the test is
+complete. A test is measured whole where a reference is renewed in one of its chunks.
 """
 
 from __future__ import annotations
@@ -26,32 +23,32 @@ from live.pipeline.screen import Screen
 from live.replay.batch.keys import is_session, key_of_chunk
 from live.replay.batch.row import RENEWED, BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress
-from live.replay.batch.workdir import parts, remove
-from live.replay.opening import open_material
+from live.replay.batch.workdir import remove, staging_dirs
+from live.replay.opening import open_source
 
-RUN_IN = 20  # instants; after them 0.0004 sigma is left of a first difference of 0.011
-LEAST = 100  # instants of a chunk, so that the run-in costs a fifth at most
+RUN_IN = 20  # time steps; after them 0.0004 sigma is left of a first difference of 0.011
+MIN_CHUNK = 100  # time steps of a chunk, so that the run-in costs a fifth at most
 _SUFFIX = ".chunks"
 
 
 @dataclass(frozen=True, slots=True)
 class ChunkPlan:
-    """The chunks of a test; without any it is done whole, ``why`` where that is not for its shortness."""
+    """The chunks of a test; without any it is measured whole, and ``why`` is the reason where it is not too short."""
 
     chunks: tuple[Task, ...] = ()
     why: str = ""
 
 
 def cut(task: Task) -> ChunkPlan:
-    """Chunks of about ``task.chunk_s`` of at least ``LEAST`` instants, each with its run-in."""
+    """Chunks of about ``task.chunk_s`` of at least ``MIN_CHUNK`` time steps, each with its run-in."""
     assert task.chunk_s is not None
     if not is_session(task.source):
         return ChunkPlan(why="pictures are not cut")
     try:
-        with open_material(task.request(task.folder)) as (source_of_bursts, _):
-            times = source_of_bursts.times
+        with open_source(task.request(task.folder)) as (source, _):
+            times = source.times
     except PhasedicError:
-        return ChunkPlan()  # the replay will tell
+        return ChunkPlan()  # the replay reports the error
     if times is None:  # --as-measured, which the command refuses beside --chunk
         return ChunkPlan()
     edges = [0, *_edges(times, task.chunk_s), len(times)]
@@ -60,10 +57,10 @@ def cut(task: Task) -> ChunkPlan:
 
 
 def _edges(times: NDArray[np.float64], seconds: float) -> Iterator[int]:
-    """Numbers of the bursts that chunks begin with, but for the first."""
+    """Numbers of the first bursts of the chunks after the first one."""
     begun = 0
     for number in (np.flatnonzero(np.diff((times - times[:1]) // seconds)) + 1).tolist():
-        if number - begun >= LEAST and len(times) - number >= LEAST:
+        if number - begun >= MIN_CHUNK and len(times) - number >= MIN_CHUNK:
             begun = number
             yield number
 
@@ -74,38 +71,38 @@ def _chunk(task: Task, number: int, first: int, stop: int) -> Task:
         task,
         name=f"{number:04d}",
         of=task.name,
-        out=str(_place(task)),
+        out=str(_chunk_folder(task)),
         numbers=(begin, stop),
         run_in=first - begin,
     )
     return dataclasses.replace(chunk, key=key_of_chunk(chunk))
 
 
-def joined(task: Task, found: ChunkPlan) -> Task:
-    """The task that makes one result of all chunks."""
+def join_task(task: Task, found: ChunkPlan) -> Task:
+    """The task that joins the results of all chunks."""
     return dataclasses.replace(task, chunks=[str(chunk.folder) for chunk in found.chunks])
 
 
-def _place(task: Task) -> Path:
+def _chunk_folder(task: Task) -> Path:
     return Path(task.out) / f".{task.name}.{task.key[:12]}{_SUFFIX}"
 
 
 def sweep_chunks(out: Path, done: set[str], missing: Mapping[str, Task]) -> None:
-    """Remove the chunks of tests that are ``done``, and those of other settings of the ``missing``; none at work."""
+    """Remove the chunks of ``done`` tests, and those of ``missing`` tests with other settings; none in use."""
     for path in sorted(out.glob(f".*{_SUFFIX}")):
         name = path.name[1:].removesuffix(_SUFFIX).rpartition(".")[0]
-        outdated = name in done or (name in missing and path != _place(missing[name]))
-        if outdated and all(part.is_stale for part in parts(path)):
+        outdated = name in done or (name in missing and path != _chunk_folder(missing[name]))
+        if outdated and all(part.is_stale for part in staging_dirs(path)):
             remove(path)
 
 
 class BatchProgress:
-    """Counts what workers tell, from any thread.
+    """Joins the progress of all tasks, from any thread.
 
     Parameters
     ----------
     tests : int
-        To be replayed.
+        Number of tests to replay.
     now : callable giving s
     """
 
@@ -118,27 +115,27 @@ class BatchProgress:
         self._lock = threading.Lock()
 
     def expect(self, title: str, share: float = 1.0) -> None:
-        """The task ``title`` is that share of a test."""
+        """Add the task ``title``, which is that share of a test."""
         with self._lock:
             self._shares[title] = share
 
-    def told(self, title: str, progress: TaskProgress) -> None:
-        """How far that task is."""
+    def update(self, title: str, progress: TaskProgress) -> None:
+        """Note the progress of that task."""
         with self._lock:
             self._last[title] = progress
 
     def done(self, title: str) -> None:
-        """It has come to its end."""
+        """Note the end of that task."""
         with self._lock:
             self._done.add(title)
 
     def ended(self) -> None:
-        """A test has."""
+        """Note the end of a test."""
         with self._lock:
             self._ended += 1
 
     def words(self) -> str:
-        """Sessions, instants, ZOIs a second and the time that is left."""
+        """Tests, time steps, ZOIs per second and the remaining time, in a line."""
         with self._lock:
             took = self._now() - self._began
             time_steps = sum(progress.done for progress in self._last.values())
@@ -149,7 +146,7 @@ class BatchProgress:
         return f"{self._ended} of {self._tests} tests  {time_steps} instants{rate}{left}"
 
     def _part(self, title: str) -> float:
-        """How much of a task is done."""
+        """The share of a task that is done."""
         last = self._last.get(title)
         if title in self._done or last is None or not last.expected:
             return float(title in self._done)
@@ -157,17 +154,17 @@ class BatchProgress:
 
 
 class Scheduler:
-    """Told of every task that is done, from any thread.
+    """Gives the tasks that can be done next; its methods are called from any thread.
 
     Parameters
     ----------
     tasks : sequence of Task
-        One a test.
+        One for each test.
     cuts : mapping of name to ChunkPlan
         The tests that are cut.
     rows : dict of name to BatchRow
-        Filled as tests come to their end.
-    standing : BatchProgress
+        Filled as tests end.
+    progress : BatchProgress
     screen : Screen
     """
 
@@ -176,33 +173,33 @@ class Scheduler:
         tasks: Sequence[Task],
         cuts: Mapping[str, ChunkPlan],
         rows: dict[str, BatchRow],
-        standing: BatchProgress,
+        progress: BatchProgress,
         screen: Screen,
     ) -> None:
         self._tests = {task.name: task for task in tasks}
         self._cuts = {name: found for name, found in cuts.items() if found.chunks}
         self._left = {name: {chunk.name for chunk in found.chunks} for name, found in self._cuts.items()}
-        self._rows, self._standing, self._screen = rows, standing, screen
+        self._rows, self._progress, self._screen = rows, progress, screen
         self._lock = threading.Lock()
 
     def first(self) -> list[Task]:
-        """What can be done at once."""
+        """The tasks to begin with."""
         found: list[Task] = []
         for name, task in self._tests.items():
             pieces = self._cuts[name].chunks if name in self._cuts else (task,)
             for piece in pieces:
-                self._standing.expect(piece.title, 1 / len(pieces))
+                self._progress.expect(piece.title, 1 / len(pieces))
             found += pieces
         return found
 
-    def told(self, task: Task, progress: TaskProgress) -> None:
-        """How far a task is."""
-        if not task.chunks:  # its chunks have told all that
-            self._standing.told(task.title, progress)
+    def on_progress(self, task: Task, progress: TaskProgress) -> None:
+        """Note the progress of a task."""
+        if not task.chunks:  # its chunks have reported it
+            self._progress.update(task.title, progress)
 
-    def done(self, task: Task, row: BatchRow) -> Sequence[Task]:
-        """It has come to its end; what can be done now."""
-        self._standing.done(task.title)
+    def on_done(self, task: Task, row: BatchRow) -> Sequence[Task]:
+        """Note the end of a task; the tasks that can be done now."""
+        self._progress.done(task.title)
         if task.of:
             with self._lock:
                 return self._chunk_done(task, row)
@@ -211,14 +208,14 @@ class Scheduler:
 
     def _end(self, name: str, row: BatchRow) -> None:
         self._rows[name] = row
-        self._standing.ended()
+        self._progress.ended()
         if not row.is_well:
             self._screen.say(row.words)
 
     def _chunk_done(self, task: Task, row: BatchRow) -> Sequence[Task]:
         name = task.of
         if name not in self._left:
-            return ()  # it has failed, or is done whole
+            return ()  # the test has failed, or is measured whole
         if row.values["outcome"] == RENEWED:
             return self._whole(name)
         if not row.is_done:
@@ -227,12 +224,12 @@ class Scheduler:
             self._end(name, failed(name, task.source, str(row.values["error"]), code))
             return ()
         self._left[name].discard(task.name)
-        return () if self._left[name] else [joined(self._tests[name], self._cuts[name])]
+        return () if self._left[name] else [join_task(self._tests[name], self._cuts[name])]
 
     def _whole(self, name: str) -> Sequence[Task]:
         del self._left[name]
-        self._screen.say(f"{name}: a reference was renewed in it; it is not cut, but done whole")
+        self._screen.say(f"{name}: a reference was renewed in it; it is not cut, but measured whole")
         for chunk in self._cuts[name].chunks:
-            self._standing.expect(chunk.title, 0)
-        self._standing.expect(name)
+            self._progress.expect(chunk.title, 0)
+        self._progress.expect(name)
         return [self._tests[name]]

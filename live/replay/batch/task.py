@@ -1,4 +1,4 @@
-"""One test of a campaign: replayed into a hidden folder, which takes its name when everything is in it."""
+"""One test of a campaign: replayed into a staging folder, which is renamed when it is complete."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, TextIO
 from acquire.errors import PhasedicError
 from acquire.printable import printable
 from live.pipeline.screen import Screen
-from live.replay.batch import workdir as places
 from live.replay.batch.row import BatchRow, failed, row_of, row_of_chunk
+from live.replay.batch.workdir import make, publish, remove, staging_dir, sweep
 from live.replay.parts import measure_part
 from live.replay.replay import replay
 from live.replay.source import ReplayRequest
@@ -26,13 +26,13 @@ if TYPE_CHECKING:
     from live.pipeline.measurement import TimeStep
 
 log = logging.getLogger(__name__)
-DONE, SAID, FIELDS = "batch.json", "replay.txt", "fields"
-_TELL_EVERY_S = 0.25
+ROW_FILE, LOG_FILE, FIELDS_FILE = "batch.json", "replay.txt", "fields"
+_PROGRESS_EVERY_S = 0.25
 
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What a worker is told; plain values, fit for JSON.
+    """A task for a worker; plain values for JSON.
 
     Attributes
     ----------
@@ -49,13 +49,13 @@ class Task:
     numbers : pair of int or None
         This task is a chunk: the bursts from the first number up to the second are measured.
     run_in : int
-        So many of them are thrown away.
+        Number of them that are measured first and not kept.
     chunks : sequence of str
-        This task joins what lies in these folders, done chunks of all of it.
+        This task joins the chunks in these folders.
     of : str
         The test that this task is a chunk of.
     key : str
-        Of all that the results depend on (``keys``).
+        Hash of all that the results depend on (``keys``).
     """
 
     name: str
@@ -81,17 +81,17 @@ class Task:
 
     @classmethod
     def from_json(cls, line: str) -> Task:
-        """What ``to_json`` gave."""
+        """The task of ``to_json``."""
         return cls(**json.loads(line))
 
     @property
     def title(self) -> str:
-        """Its name among all tasks."""
+        """Its unique name among all tasks."""
         return f"{self.of}#{self.name}" if self.of else self.name
 
     @property
     def folder(self) -> Path:
-        """Where its results lie once they are whole."""
+        """The folder of its complete results."""
         return Path(self.out) / self.name
 
     def request(self, folder: Path) -> ReplayRequest:
@@ -107,108 +107,113 @@ class Task:
             overrides={**self.overrides, **always},
             forces=Path(self.forces) if self.forces else None,
             numbers=range(*self.numbers) if self.numbers else None,
-            parts=[Path(chunk) / FIELDS for chunk in self.chunks],
-            settled=self.folder,
+            parts=[Path(chunk) / FIELDS_FILE for chunk in self.chunks],
+            final_folder=self.folder,
         )
 
 
 @dataclass(frozen=True, slots=True)
 class TaskProgress:
-    """How far a task is: instants done, of how many (None: not known), and ZOIs measured."""
+    """Progress of a task: time steps done, of how many (None: not known), and ZOIs measured."""
 
     done: int
     expected: int | None
     zois: int
 
 
-Tell = Callable[[TaskProgress], object]
+OnProgress = Callable[[TaskProgress], object]
 
 
-class _Telling(Screen):
-    """Keeps the sentences of a replay in a file, and tells its progress."""
+class _LogScreen(Screen):
+    """Writes the lines of a replay to a file, and reports its progress."""
 
-    def __init__(self, stream: TextIO, tell: Tell) -> None:
-        self._stream, self._tell, self._told, self._zois = stream, tell, 0.0, 0
+    def __init__(self, stream: TextIO, on_progress: OnProgress) -> None:
+        self._stream, self._on_progress, self._reported_t, self._zois = stream, on_progress, 0.0, 0
         self.last = TaskProgress(0, None, 0)
 
     def say(self, text: str = "") -> None:
-        """A line of the file."""
+        """Write a line of the file."""
         print(printable(text), file=self._stream, flush=True)
 
     def progress(self, i: TimeStep, done: int, expected: int | None, elapsed_s: float) -> None:
-        """Told to whoever waits, four times a second."""
+        """Report the progress, four times a second."""
         self._zois += i.n_zoi
         self.last = TaskProgress(done, expected, self._zois)
-        if time.monotonic() - self._told >= _TELL_EVERY_S:
-            self._told = time.monotonic()
-            self._tell(self.last)
+        if time.monotonic() - self._reported_t >= _PROGRESS_EVERY_S:
+            self._reported_t = time.monotonic()
+            self._on_progress(self.last)
 
 
-def _nobody(progress: TaskProgress) -> None:
-    """Nobody waits for it."""
+def _no_progress(progress: TaskProgress) -> None:
+    """The callback where no progress is needed."""
 
 
 def row_done(task: Task) -> BatchRow | None:
-    """The row of a task that is whole and was done with the same key; None where it is to be done."""
+    """The row of a complete task with the same key; None where it is to be done."""
     try:
-        stored = json.loads((task.folder / DONE).read_text(encoding="utf-8"))
+        stored = json.loads((task.folder / ROW_FILE).read_text(encoding="utf-8"))
         return BatchRow.of(stored["row"]) if stored["key"] == task.key else None
     except (OSError, ValueError, KeyError, TypeError):
         return None
 
 
-def perform(task: Task, tell: Tell = _nobody) -> BatchRow:
-    """Do ``task``, unless it is done; what goes wrong is a row with its error.
+def perform(task: Task, on_progress: OnProgress = _no_progress) -> BatchRow:
+    """Perform ``task``, unless it is done; an error gives a row with its text.
 
-    The same on a worker of this machine and of a cluster. Whatever ends the process leaves a hidden folder
-    alone, which never counts as done.
+    The same on a worker of this machine and of a cluster. A process that is ended leaves a staging folder, which
+    never counts as done.
     """
     if (row := row_done(task)) is not None:
         return row
-    part = places.part_of(task.folder)
-    places.sweep(task.folder.parent, task.name)
+    staging = staging_dir(task.folder)
+    sweep(task.folder.parent, task.name)
     try:
-        places.make(part)
-        row = _measured(task, part, tell) if task.numbers else _replayed(task, part, tell)
-        (part / DONE).write_text(json.dumps({"key": task.key, "row": row.values}, indent=1), encoding="utf-8")
-        places.settle(part, task.folder)
+        make(staging)
+        row = _measured(task, staging, on_progress) if task.numbers else _replayed(task, staging, on_progress)
+        (staging / ROW_FILE).write_text(
+            json.dumps({"key": task.key, "row": row.values}, indent=1), encoding="utf-8"
+        )
+        publish(staging, task.folder)
         return row
     except PhasedicError as error:
-        return _not_done(task, part, str(error), error.exit_code)
+        return _not_done(task, staging, str(error), error.exit_code)
     except OSError as error:
         words = f"{error.filename or task.folder}: cannot be written ({error.strerror or error}); make room"
-        return _not_done(task, part, words, 4)
+        return _not_done(task, staging, words, 4)
     except Exception as error:
         log.exception("a defect of phasedic; please report it with this traceback")
-        return _not_done(task, part, f"a defect of phasedic: {type(error).__name__}: {error}", 1)
+        return _not_done(task, staging, f"a defect of phasedic: {type(error).__name__}: {error}", 1)
 
 
-def _not_done(task: Task, part: Path, words: str, code: int) -> BatchRow:
-    """Another caller may have been faster; else it has failed."""
-    places.remove(part)
+def _not_done(task: Task, staging: Path, words: str, code: int) -> BatchRow:
+    """The row of another caller that was faster; else that of a failure."""
+    remove(staging)
     return row_done(task) or failed(task.title, task.source, words, code)
 
 
-def _replayed(task: Task, part: Path, tell: Tell) -> BatchRow:
-    with (part / SAID).open("w", encoding="utf-8") as file:
-        screen, began = _Telling(file, tell), time.monotonic()
-        done = replay(task.request(part), screen, threading.Event())
+def _replayed(task: Task, staging: Path, on_progress: OnProgress) -> BatchRow:
+    with (staging / LOG_FILE).open("w", encoding="utf-8") as file:
+        screen, began = _LogScreen(file, on_progress), time.monotonic()
+        done = replay(task.request(staging), screen, threading.Event())
         for line in [*summary_lines(done.run_state, done.config.specimen), *done.lines]:
             screen.say(line)
-    tell(screen.last)
+    on_progress(screen.last)
     before = sum(_seconds(Path(chunk)) for chunk in task.chunks)
     return row_of(task.name, task.source, done, before + time.monotonic() - began)
 
 
 def _seconds(chunk: Path) -> float:
-    return float(json.loads((chunk / DONE).read_text(encoding="utf-8"))["row"]["seconds"])
+    return float(json.loads((chunk / ROW_FILE).read_text(encoding="utf-8"))["row"]["seconds"])
 
 
-def _measured(task: Task, part: Path, tell: Tell) -> BatchRow:
-    """A chunk."""
+def _measured(task: Task, staging: Path, on_progress: OnProgress) -> BatchRow:
+    """Measure a chunk."""
     began = time.monotonic()
-    with (part / SAID).open("w", encoding="utf-8") as said, (part / FIELDS).open("wb") as file:
-        screen = _Telling(said, tell)
-        as_the_whole = measure_part(task.request(part), file, task.run_in, screen)
-    tell(screen.last)
+    with (
+        (staging / LOG_FILE).open("w", encoding="utf-8") as log_file,
+        (staging / FIELDS_FILE).open("wb") as file,
+    ):
+        screen = _LogScreen(log_file, on_progress)
+        as_the_whole = measure_part(task.request(staging), file, task.run_in, screen)
+    on_progress(screen.last)
     return row_of_chunk(task.title, task.source, as_the_whole, time.monotonic() - began)

@@ -1,8 +1,8 @@
-"""Which tests there are: sessions, folders of pictures, or a list of what belongs together.
+"""The tests of a batch: sessions, folders of pictures, or a list file.
 
-A list in CSV has a heading, a list in TOML a table ``[[test]]`` for each: ``source``, and where they differ from
-test to test ``name``, ``config``, ``reference``, ``load`` (all but the name relative to the list), and keys of the
-configuration such as ``specimen.width_mm``.
+A list in CSV has a heading, a list in TOML a table ``[[test]]`` for each test: ``source``, and if needed ``name``,
+``config``, ``reference``, ``load`` (all except the name relative to the list), and keys of the configuration such as
+``specimen.width_mm``.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class BatchJob:
     Attributes
     ----------
     name : str
-        Of the folder of its results; no two are the same.
+        Name of the folder of its results; unique.
     source : str
         A session, or an address of pictures.
     config, reference, forces : str or None
@@ -55,7 +55,7 @@ def find_tests(words: Sequence[str]) -> list[BatchJob]:
     Raises
     ------
     ConfigError
-        There is none, one is no test, or two have one name in a list.
+        There is no test, a path is no test, or two have the same name.
     DataError
         A list cannot be read.
     """
@@ -66,7 +66,7 @@ def find_tests(words: Sequence[str]) -> list[BatchJob]:
             found += [_from_list(path, number, row) for number, row in enumerate(_rows(path), 1)]
         else:
             found += [{"source": source} for source in _sources(word)]
-    given = {row["source"]: row for row in reversed(found)}  # the same twice is one
+    given = {row["source"]: row for row in reversed(found)}  # a source given twice is one test
     rows = [row for row in found if given[row["source"]] is row or "name" in row]
     return _named(rows)
 
@@ -147,7 +147,7 @@ def _toml(text: str) -> list[dict[str, Any]]:
 
 
 def _flat(table: Mapping[str, Any]) -> dict[str, Any]:
-    """``specimen.width_mm = 20`` and a table in it are the same."""
+    """``specimen.width_mm = 20`` and a table ``specimen`` with ``width_mm`` give the same key."""
     found: dict[str, Any] = {}
     for key, value in table.items():
         if isinstance(value, Mapping):
@@ -177,7 +177,7 @@ def _refuse(row: Mapping[Any, Any]) -> bool:
 
 
 def _value(key: str, cell: str) -> Any:
-    """A setting is a number or a list where it reads like one in TOML, else text."""
+    """The value of a setting in TOML where ``cell`` is valid TOML, else text."""
     if "." not in key:
         return cell
     try:
@@ -208,7 +208,7 @@ def _is_path(source: str) -> bool:
 
 
 def _beside(path: Path, word: str) -> str:
-    """Relative to the list; addresses of pictures too."""
+    """A path or an address of pictures relative to the list."""
     address = parse_address(word)
     scheme = f"{address.scheme}:" if address.scheme else ""
     rest = word.removeprefix(scheme)

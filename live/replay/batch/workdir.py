@@ -1,7 +1,7 @@
-"""Where a task works: ``.NAME.HOST.PID.part``, beside the folder that it becomes when it is whole.
+"""The staging folder of a task: ``.NAME.HOST.PID.part``, renamed to the folder of its results when it is complete.
 
-A part of a process that has ended is stale. Of another machine nobody here knows; its parts are swept once the
-task is whole.
+A staging folder of a process that has ended is stale. Processes of other machines cannot be checked; their folders
+are removed when the task is complete.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _SUFFIX = ".part"
 
 @dataclass(frozen=True, slots=True)
 class StagingDir:
-    """A folder in which somebody works, or worked."""
+    """A staging folder, of a process that may have ended."""
 
     path: Path
     name: str
@@ -30,33 +30,33 @@ class StagingDir:
 
     @property
     def is_stale(self) -> bool:
-        """Whether a process of this machine made it that has ended."""
-        return self.host == _host() and not _lives(self.pid)
+        """Whether it is of a process of this machine that has ended."""
+        return self.host == _host() and not _is_running(self.pid)
 
 
-def part_of(folder: Path) -> Path:
-    """Where this process makes ``folder``."""
+def staging_dir(folder: Path) -> Path:
+    """The staging folder of this process for ``folder``."""
     return folder.with_name(f".{folder.name}.{_host()}.{os.getpid()}{_SUFFIX}")
 
 
-def make(part: Path) -> None:
-    """An empty folder; of an earlier process of the same number nothing is left."""
-    remove(part)
-    part.mkdir(parents=True)
+def make(staging: Path) -> None:
+    """Make the folder empty, without files of an earlier process with the same number."""
+    remove(staging)
+    staging.mkdir(parents=True)
 
 
-def settle(part: Path, folder: Path) -> None:
-    """Let ``part`` take its name; raises DataError where somebody has it by now."""
+def publish(staging: Path, folder: Path) -> None:
+    """Rename ``staging`` to ``folder``; raises DataError where that exists by now."""
     try:
-        part.rename(folder)
+        staging.rename(folder)
     except OSError as error:
         raise DataError(
-            f"{folder}: the results cannot take their name ({error.strerror}); nothing is overwritten"
+            f"{folder}: the folder of the results cannot be renamed to this ({error.strerror}); nothing is overwritten"
         ) from error
 
 
-def parts(out: Path) -> Iterator[StagingDir]:
-    """All that lie in ``out``."""
+def staging_dirs(out: Path) -> Iterator[StagingDir]:
+    """All staging folders in ``out``."""
     for path in sorted(out.glob(f".*{_SUFFIX}")):
         words = path.name[1:].removesuffix(_SUFFIX).rsplit(".", 2)
         if len(words) == 3 and words[2].isdecimal() and path.is_dir():
@@ -64,31 +64,31 @@ def parts(out: Path) -> Iterator[StagingDir]:
 
 
 def sweep(out: Path, name: str | None = None) -> int:
-    """Remove stale parts, of one task or of all; how many there were."""
-    stale = [part for part in parts(out) if part.is_stale and name in (None, part.name)]
+    """Remove stale staging folders, of one task or of all; how many there were."""
+    stale = [part for part in staging_dirs(out) if part.is_stale and name in (None, part.name)]
     for part in stale:
         remove(part.path)
     return len(stale)
 
 
-def sweep_whole(out: Path, names: set[str]) -> None:
-    """Remove what is left of tasks that are whole, whoever made it; a process that lives here keeps its own."""
-    for part in parts(out):
+def sweep_done(out: Path, names: set[str]) -> None:
+    """Remove the staging folders of complete tasks, except those of running processes of this machine."""
+    for part in staging_dirs(out):
         if part.name in names and (part.host != _host() or part.is_stale):
             remove(part.path)
 
 
-def remove(part: Path) -> None:
-    """Remove a part where it is there."""
+def remove(staging: Path) -> None:
+    """Remove a folder where it exists."""
     with contextlib.suppress(OSError):
-        shutil.rmtree(part)
+        shutil.rmtree(staging)
 
 
 def _host() -> str:
     return platform.node().replace(".", "-") or "host"
 
 
-def _lives(pid: int) -> bool:
+def _is_running(pid: int) -> bool:
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -99,7 +99,7 @@ def _lives(pid: int) -> bool:
 
 
 def _is_zombie(pid: int) -> bool:
-    """An orphan that nobody has reaped does nothing any more; where there is no /proc nobody can tell."""
+    """Whether the process has ended and was not reaped; False without /proc."""
     try:
         state = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2]
     except OSError:

@@ -1,9 +1,7 @@
-"""Worker processes, as their caller sees them: given a task at a time, killed, ended.
+"""Worker processes of this machine: each performs one task at a time; one that dies is replaced and its task repeated.
 
-Each is a Python of its own with one thread for the numerics (the libraries read that before they are imported). To fork
-them off from one that has loaded everything was tried: as many as there are cores load it in the same time.
-
-Worker processes of this machine, one task at a time each; one that dies is replaced and its task done again.
+Each is a new Python process with one thread for the numerics (the libraries read that setting on import). A fork of a
+process that has loaded all libraries was tried: it is not faster, since as many processes as cores load in parallel.
 """
 
 from __future__ import annotations
@@ -24,23 +22,28 @@ from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress
 from live.replay.batch.worker import ONE_THREAD
 
-# Of glibc: what one task leaves free goes back to the system before the next one.
+# Settings of glibc: memory that one task has freed goes back to the system before the next one.
 _LEAN = {
     "MALLOC_ARENA_MAX": "1", "MALLOC_MMAP_THRESHOLD_": "6000000", "MALLOC_TRIM_THRESHOLD_": "20000000",
 }  # fmt: skip
-_LAST_S = 5.0
+_END_TIMEOUT_S = 5.0
+MAX_DEATHS = 3
 
-Told = Callable[[Task, TaskProgress], object]
+log = logging.getLogger(__name__)
+
+OnProgress = Callable[[Task, TaskProgress], object]
+OnDone = Callable[[Task, BatchRow], Sequence[Task]]
+"""Called with a task that is done and its row; gives the tasks that can be done now."""
 
 
 class WorkerProcesses:
-    """``count`` processes that load their libraries while it is found out what there is to do."""
+    """``count`` processes that load their libraries while the caller plans the tasks."""
 
     def __init__(self, count: int) -> None:
         self._idle = deque(WorkerProcess() for _ in range(count))
 
     def are_ready(self) -> bool:
-        """Whether all loops are compiled on this machine; waits until a worker has looked.
+        """Whether all loops are compiled on this machine; waits for the answer of a worker.
 
         Raises
         ------
@@ -52,7 +55,7 @@ class WorkerProcesses:
         return self._idle[0].is_ready()
 
     def take(self) -> WorkerProcess:
-        """One of them, or a new one where none is left.
+        """An idle process, or a new one.
 
         Raises
         ------
@@ -65,7 +68,7 @@ class WorkerProcesses:
             return WorkerProcess()
 
     def close(self) -> None:
-        """Let go of those that nobody took."""
+        """End the idle processes."""
         while self._idle:
             worker = self._idle.popleft()
             worker.kill()
@@ -88,14 +91,14 @@ class WorkerProcess:
         self.pid = self._process.pid
 
     def is_ready(self) -> bool:
-        """Its first word, whether it finds all loops compiled; False where it died before."""
+        """Its first message: whether all loops are compiled; False where it died before."""
         assert self._process.stdout is not None
         try:
             return bool(json.loads(self._process.stdout.readline()).get("compiled"))
         except (OSError, ValueError):
             return False
 
-    def perform(self, task: Task, told: Told) -> BatchRow | None:
+    def perform(self, task: Task, on_progress: OnProgress) -> BatchRow | None:
         """The row of ``task``; None where the process died over it."""
         assert self._process.stdin is not None
         assert self._process.stdout is not None
@@ -107,48 +110,46 @@ class WorkerProcess:
                 if "row" in message:
                     return BatchRow.of(message["row"])
                 if "progress" in message:
-                    told(task, TaskProgress(**message["progress"]))
-        except (OSError, ValueError):  # half a line is the last word of a process that was killed
+                    on_progress(task, TaskProgress(**message["progress"]))
+        except (OSError, ValueError):  # a process that is killed may write half a line
             pass
         return None
 
     def kill(self) -> None:
-        """At once."""
+        """Kill it now."""
         self._process.kill()
 
     def end(self) -> None:
-        """Let it go; it ends where nothing comes any more."""
+        """Close its streams, which ends it, and wait for that."""
         for stream in (self._process.stdin, self._process.stdout):
             if stream is not None:
                 with contextlib.suppress(OSError):
                     stream.close()
         try:
-            self._process.wait(_LAST_S)
+            self._process.wait(_END_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
 
 
-log = logging.getLogger(__name__)
-MOST_DEATHS = 3
-
-Done = Callable[[Task, BatchRow], Sequence[Task]]
-"""Of a task that is done; gives those that can be done now."""
-
-
 class Pool:
-    """``workers`` processes at work on ``tasks``; ``told`` and ``done`` are called from threads.
+    """Performs ``tasks`` with ``workers`` processes; ``on_progress`` and ``on_done`` are called from threads.
 
-    A task whose worker died three times is a failed row; those of other workers go on untouched. The
-    processes come from ``processes``; whoever made that closes it.
+    A task whose worker died three times gives a failed row; other tasks are not affected. The processes come
+    from ``processes``, which the caller closes.
     """
 
     def __init__(
-        self, tasks: Sequence[Task], workers: int, told: Told, done: Done, processes: WorkerProcesses
+        self,
+        tasks: Sequence[Task],
+        workers: int,
+        on_progress: OnProgress,
+        on_done: OnDone,
+        processes: WorkerProcesses,
     ) -> None:
         self._processes = processes
         self._waiting, self._deaths = deque(tasks), dict.fromkeys((task.title for task in tasks), 0)
-        self._told, self._done = told, done
+        self._on_progress, self._on_done = on_progress, on_done
         self._stopped = threading.Event()
         self._workers: set[WorkerProcess] = set()
         self._lock = threading.Lock()
@@ -164,7 +165,7 @@ class Pool:
         return not any(thread.is_alive() for thread in self._threads)
 
     def close(self) -> None:
-        """End all workers, in the middle of a task too."""
+        """End all workers, also during a task."""
         self._stopped.set()
         with self._lock:
             for worker in self._workers:
@@ -177,12 +178,12 @@ class Pool:
         try:
             while (task := self._next()) is not None:
                 worker = worker or self._new()
-                row = worker.perform(task, self._told) if worker is not None else None
+                row = worker.perform(task, self._on_progress) if worker is not None else None
                 if row is None:
                     self._end(worker)
                     worker, row = None, self._after_death(task)
                 if row is not None:
-                    self._add(self._done(task, row))
+                    self._add(self._on_done(task, row))
         finally:
             self._end(worker)
 
@@ -196,7 +197,7 @@ class Pool:
             self._waiting.extendleft(tasks)
 
     def _new(self) -> WorkerProcess | None:
-        """None where no process can be started."""
+        """A worker; None where no process can be started."""
         try:
             worker = self._processes.take()
         except OSError as error:
@@ -216,13 +217,13 @@ class Pool:
             self._workers.discard(worker)
 
     def _after_death(self, task: Task) -> BatchRow | None:
-        """Once more, as the last of all; None then."""
+        """Queue the task again, last of all, and return None; a failed row after ``MAX_DEATHS``."""
         if self._stopped.is_set():
             return None
         self._deaths[task.title] += 1
-        if self._deaths[task.title] < MOST_DEATHS:
+        if self._deaths[task.title] < MAX_DEATHS:
             with self._lock:
                 self._waiting.append(task)
             return None
-        words = f"its worker died {MOST_DEATHS} times; is there memory enough for --workers?"
+        words = f"its worker died {MAX_DEATHS} times; is there memory enough for --workers?"
         return failed(task.title, task.source, words, 1)

@@ -1,6 +1,6 @@
-"""Is the picture good enough, before the specimen is pulled?
+"""The check of picture and load cell before a test.
 
-``sample`` takes frames of the still specimen, ``check_list`` examines them, ``stillness`` and ``noise_floor``
-measure motion and strain noise, ``verdict`` gives GO or NO-GO with advice. ``quick_check`` repeats it several
-times a second.
+``sample`` takes frames of the still specimen, ``check_list`` computes all figures, ``stillness`` and ``noise_floor``
+those of motion and strain noise. ``verdict`` compares them with limits and gives advice. ``quick_check`` repeats the
+check several times a second.
 """

@@ -1,6 +1,6 @@
-"""All figures of a check, judged inside the region alone: what surrounds the specimen decides nothing.
+"""All figures of a check, and the table of strain noise as text.
 
-The table of the strain noise, in words: ZOIs and orders down, bursts across.
+Only the region counts: the surroundings of the specimen have no influence.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from live.setup.check.noise_floor import (
     ORDERS,
     SIZES,
     GaugeNoise,
-    Predicted,
+    PredictedNoise,
     StrainNoise,
     ZoiFloor,
     noise_floors,
-    predicted,
+    predict_noise,
 )
 from live.setup.check.sample import CheckRegion, CheckSample, FrameStack
 from live.setup.check.stillness import PictureStillness, light, stillness
@@ -50,11 +50,11 @@ class Zois:
     sigma : (R, C) float64
         Predicted strain noise of each for one burst of the test; NaN without pattern.
     contrast : (R, C) float64, GL
-        Standard deviation of the pattern within each, its noise taken out.
+        Standard deviation of the pattern within each, corrected for noise.
     sssig : (R, C) float64, GL^2/px^2
-        Sum of squares of the gradient in each, of x or y the smaller.
+        Sum of squares of the gradient in each, the smaller one of x and y.
     sharpness : (R, C) float64, 1/px
-        rms gradient over contrast: 0.7 over the radius for blobs, more for sharp edges, less out of focus.
+        rms gradient over contrast: 0.7 over the radius for blobs, higher for sharp edges, lower out of focus.
     """
 
     grid: ZoiGrid
@@ -72,35 +72,35 @@ class Zois:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CheckFigures:
-    """What a check has found.
+    """The figures of a check.
 
     Attributes
     ----------
     region : Region
-    shots : FrameStack
+    stack : FrameStack
     noise : float, GL
-        Of one frame, at the ZOIs.
+        Noise of one frame, at the ZOIs.
     exposure : Exposure
     depth : Depth
     radius : float, px
-        Of the speckle.
+        Radius of the speckle.
     zois : Zois
     still : PictureStillness
     floors : tuple of ZoiFloor
     zoi, order, burst : int
-        Of the test.
+        Settings of the test.
     noise_stated : bool
-        Whether it was given; from too few frames it comes from the spectrum of the picture otherwise.
+        Whether the noise was given; else too few frames take it from the spectrum of the picture.
     removed : float or None, GL
-        Standard deviation of what dark and flat frame took out; None without them.
+        Standard deviation of the correction by dark and flat frame; None without them.
     gauges : tuple of GaugeNoise
-        Those of the test, and the mean of all ZOIs along the load.
+        The gauges of the test, and the mean of all ZOIs along the load.
     load : LoadReport or None
     px_per_mm : float or None
     """
 
     region: Region
-    shots: FrameStack
+    stack: FrameStack
     noise: float
     exposure: Exposure
     depth: Depth
@@ -119,12 +119,12 @@ class CheckFigures:
 
     @property
     def automatic(self) -> tuple[str, ...]:
-        """Controls that the camera changes by itself."""
-        return automatic_controls(self.shots.camera.controls)
+        """Controls that the camera changes automatically."""
+        return automatic_controls(self.stack.camera.controls)
 
     @property
     def floor(self) -> ZoiFloor | None:
-        """The floor of the settings of the test; None where it could not be had."""
+        """The noise floor at the settings of the test; None if it was not measured."""
         same = [f for f in self.floors if (f.zoi, f.order) == (self.zoi, self.order) and f.noises]
         return same[0] if same else None
 
@@ -135,82 +135,85 @@ class CheckFigures:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Measured:
-    """What the kernel has to be asked for: the slower part of the figures."""
+class KernelFigures:
+    """The slower figures, which need the kernel."""
 
-    predicted: Predicted
+    predicted: PredictedNoise
     still: PictureStillness
 
     @classmethod
-    def of(cls, bench: CheckSample) -> Measured:
-        """Ask it for everything."""
-        noise = predicted(bench)
-        return cls(noise, stillness(bench, noise.able))
+    def of(cls, sample: CheckSample) -> KernelFigures:
+        """Measure them all."""
+        predicted = predict_noise(sample)
+        return cls(predicted, stillness(sample, predicted.measurable))
 
 
 def examine(
-    shots: FrameStack,
+    stack: FrameStack,
     config: Config,
     load: LoadReport | None = None,
     table: bool = True,
 ) -> CheckFigures:
-    """Judge frames of a still specimen.
+    """All figures from frames of a still specimen.
 
     Parameters
     ----------
-    shots : FrameStack
+    stack : FrameStack
     config : Config
     load : LoadReport, optional
     table : bool
-        Whether all ZOIs, orders and bursts of the table are tried, or those of the test alone.
+        Whether to measure all ZOIs, orders and bursts of the table, or only those of the test.
 
     Raises
     ------
     ConfigError, DataError
-        Region, mask, dark or flat do not fit.
+        Region, mask, dark or flat frame do not fit.
     """
-    bench = CheckSample.of(shots, CheckRegion.of(sought(shots, config), config, shots.camera))
+    sample = CheckSample.of(stack, CheckRegion.of(find_region(stack, config), config, stack.camera))
     m = config.measure
     sizes, orders, bursts = (SIZES, ORDERS, BURSTS) if table else ((), (), ())
-    wanted = (*sizes, m.zoi), (*orders, m.order), (*bursts, bench.burst)
-    return figures_of(bench, Measured.of(bench), noise_floors(bench, *wanted), load)
+    wanted = (*sizes, m.zoi), (*orders, m.order), (*bursts, sample.burst)
+    return figures_of(sample, KernelFigures.of(sample), noise_floors(sample, *wanted), load)
 
 
-def sought(shots: FrameStack, config: Config) -> Region:
-    """The region of a test, looked for in the mean of the frames, or in the first of too few."""
-    picture = correction(config, shots.camera)(shots.mean(0, 1 if shots.few else None))
-    return region_of(config, picture.mean, shots.noise())
+def find_region(stack: FrameStack, config: Config) -> Region:
+    """The region of a test on the mean of the frames, or on the first of too few."""
+    picture = correction(config, stack.camera)(stack.mean(0, 1 if stack.few else None))
+    return region_of(config, picture.mean, stack.noise())
 
 
 def figures_of(
-    bench: CheckSample, measured: Measured, floors: tuple[ZoiFloor, ...] = (), load: LoadReport | None = None
+    sample: CheckSample,
+    measured: KernelFigures,
+    floors: tuple[ZoiFloor, ...] = (),
+    load: LoadReport | None = None,
 ) -> CheckFigures:
-    """All figures: those that are read off the frames, beside what was measured with the kernel."""
-    ground, m, bits = bench.ground, bench.ground.config.measure, bench.shots.camera.bits
-    same = bench.picture.mean is bench.raw
+    """All figures: those of the kernel, and those that follow from the frames directly."""
+    check_region, m, bits = sample.check_region, sample.check_region.config.measure, sample.stack.camera.bits
+    same = sample.picture.mean is sample.raw
     return CheckFigures(
-        region=ground.region,
-        shots=bench.shots,
-        noise=bench.noise,
-        exposure=exposure(bench.pixels, bits),
-        depth=depth(bench.pixels, bits),
-        radius=_radius(bench),
-        zois=_zois(bench, measured.predicted.sigma),
-        still=replace(measured.still, light=light(bench)),
+        region=check_region.region,
+        stack=sample.stack,
+        noise=sample.noise,
+        exposure=exposure(sample.pixels, bits),
+        depth=depth(sample.pixels, bits),
+        radius=_radius(sample),
+        zois=_zois(sample, measured.predicted.sigma),
+        still=replace(measured.still, light=light(sample)),
         floors=floors,
         zoi=m.zoi,
         order=m.order,
-        burst=bench.burst,
+        burst=sample.burst,
         noise_stated=m.noise_GL is not None,
-        removed=None if same else float((bench.picture.mean - bench.raw)[ground.inside].std()),
+        removed=None if same else float((sample.picture.mean - sample.raw)[check_region.inside].std()),
         gauges=measured.predicted.gauges,
         load=load,
-        px_per_mm=ground.config.scale.px_per_mm,
+        px_per_mm=check_region.config.scale.px_per_mm,
     )
 
 
 def automatic_controls(controls: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the controls that are automatic by their name and value."""
+    """Names of the controls that are automatic, judged by name and value."""
     return tuple(name for name, value in controls.items() if _is_automatic(name.lower(), value))
 
 
@@ -219,40 +222,40 @@ def _is_automatic(name: str, value: object) -> bool:
         words = value.lower()
         return "auto" in name and "manual" not in words and "shutter" not in words and words != "disabled"
     named = "auto" in name or "continuous" in name or "dynamic_framerate" in name
-    # 1 is "manual" for the exposure of V4L2, whose menu comes as words; here a number is a switch.
+    # 1 is "manual" for the exposure of V4L2, but that menu has texts; here a number is a switch.
     return named and isinstance(value, int | float) and bool(value)
 
 
 def median(values: Floats) -> float:
-    """Of the finite ones; NaN where there is none."""
+    """Median of the finite values; NaN if there is none."""
     known = values[np.isfinite(values)]
     return float(np.median(known)) if known.size else math.nan
 
 
-def _radius(bench: CheckSample) -> float:
-    at_zois = bench.ground.at_zois[bench.ground.cut]
+def _radius(sample: CheckSample) -> float:
+    at_zois = sample.check_region.at_zois[sample.check_region.cut]
     rows, columns = np.flatnonzero(at_zois.any(axis=1)), np.flatnonzero(at_zois.any(axis=0))
     if not rows.size:
         return math.nan
     cut = slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
-    noise = bench.noise / math.sqrt(bench.picture.n)
-    return speckle_radius(bench.picture.mean[cut], noise, at_zois[cut])
+    noise = sample.noise / math.sqrt(sample.picture.n)
+    return speckle_radius(sample.picture.mean[cut], noise, at_zois[cut])
 
 
-def _zois(bench: CheckSample, sigma: Floats) -> Zois:
-    """Pattern of each ZOI, and what the kernel makes of it."""
-    grid = bench.ground.zois
-    found = zoi_pattern(bench.picture.mean, grid, bench.noise / math.sqrt(bench.picture.n))
+def _zois(sample: CheckSample, sigma: Floats) -> Zois:
+    """The pattern of each ZOI, with its predicted strain noise."""
+    grid = sample.check_region.zois
+    found = zoi_pattern(sample.picture.mean, grid, sample.noise / math.sqrt(sample.picture.n))
     with np.errstate(invalid="ignore", divide="ignore"):
         sharpness = np.sqrt((found.along_x + found.along_y) / (2 * grid.size**2) / found.variance)
     contrast, weaker = np.sqrt(found.variance), np.minimum(found.along_x, found.along_y)
     for values in (contrast, weaker, sharpness):
         values[~grid.active] = np.nan
-    return Zois(bench.ground.grid, sigma, contrast, weaker, sharpness)
+    return Zois(sample.check_region.grid, sigma, contrast, weaker, sharpness)
 
 
 def table_lines(figures: CheckFigures) -> list[str]:
-    """Measured and (predicted) strain noise of one ZOI, um/m; * are the settings of the test."""
+    """The table of measured and (predicted) strain noise of one ZOI, um/m; * marks the settings of the test."""
     bursts = sorted({noise.burst for floor in figures.floors for noise in floor.noises})
     scale = figures.px_per_mm
     unit = "px" if scale is None else "mm"
@@ -267,9 +270,9 @@ def table_lines(figures: CheckFigures) -> list[str]:
 
 def _row(floor: ZoiFloor, bursts: list[int], figures: CheckFigures) -> str:
     factor, digits = (1.0, 0) if figures.px_per_mm is None else (1 / figures.px_per_mm, 2)
-    ours = (floor.zoi, floor.order) == (figures.zoi, figures.order)
+    of_test = (floor.zoi, floor.order) == (figures.zoi, figures.order)
     lengths = f"{floor.l10 * factor:>9.{digits}f} {floor.vsg * factor:>7.{digits}f}"
-    front = f"{'*' if ours else ' '} {floor.zoi:>3} {floor.order:>5} {lengths}  "
+    front = f"{'*' if of_test else ' '} {floor.zoi:>3} {floor.order:>5} {lengths}  "
     if not floor.noises:
         return front + "   does not fit, or has no pattern"
     return front + "".join(f"{_cell(floor.of(n)):>15}" for n in bursts)

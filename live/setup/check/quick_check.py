@@ -1,4 +1,4 @@
-"""The check over and over while lens, light and exposure are turned."""
+"""The check, repeated several times a second while lens, light and exposure are adjusted."""
 
 from __future__ import annotations
 
@@ -11,30 +11,31 @@ from typing import Self
 from acquire.camera import Camera
 from acquire.frame import Frame
 from live.config.loading import Config
-from live.setup.check.check_list import CheckFigures, Measured, examine, figures_of, sought
-from live.setup.check.noise_floor import predicted
-from live.setup.check.sample import FEWEST, CheckRegion, CheckSample, FrameStack, taken
+from live.setup.check.check_list import CheckFigures, KernelFigures, examine, figures_of, find_region
+from live.setup.check.noise_floor import predict_noise
+from live.setup.check.sample import MIN_FRAMES, CheckRegion, CheckSample, FrameStack, stack_of
 from live.setup.check.stillness import stillness
 from live.setup.region import Region
 
-GLANCE = 8  # frames
-TURNS = 8
-"""Glances after which noise and motion are predicted and followed anew; searched, while nothing is found."""
+QUICK_FRAMES = 8
+"""Frames of one quick check."""
+RENEW_EVERY = 8
+"""Quick checks after which noise and motion are measured again, and a specimen not yet found is searched."""
 SEARCH_EVERY = 16
-"""Glances after which the specimen that was found is looked for anew."""
-RIM = 0.02  # of a region: where it is found a little otherwise, the old one stays
+"""Quick checks after which a found specimen is searched again."""
+SAME_REGION = 0.02  # share of a region by which a new one may differ without replacing it
 
 
 class RollingFrames:
-    """The newest frames of a camera, drained by a thread of its own from ``start`` to ``stop``."""
+    """The newest frames of a camera; within the context, a thread takes them."""
 
     def __init__(self, camera: Camera, length: int, address: str) -> None:
         self._camera, self._address = camera, address
-        self._frames: deque[Frame] = deque(maxlen=max(length, FEWEST))
+        self._frames: deque[Frame] = deque(maxlen=max(length, MIN_FRAMES))
         self._lock = threading.Lock()
         self._thread = threading.Thread(target=self._drain, name="check", daemon=True)
         self._failed: Exception | None = None
-        self.seen = 0
+        self.received = 0
 
     def __enter__(self) -> Self:
         self._camera.__enter__()
@@ -51,19 +52,19 @@ class RollingFrames:
         return not self._thread.is_alive()
 
     def newest(self, count: int) -> FrameStack | None:
-        """The newest ``count`` frames; None while there are fewer than a check needs.
+        """The newest ``count`` frames; None while there are too few for a check.
 
         Raises
         ------
         PhasedicError
-            Whatever ended the camera.
+            The error that ended the camera.
         """
         frames = self._newest(count)
-        return None if len(frames) < FEWEST else self._shots(frames)
+        return None if len(frames) < MIN_FRAMES else self._stack(frames)
 
     def last(self, count: int) -> FrameStack:
-        """The same of a camera that has ended, however few of pictures; DataError where it gave too few."""
-        return self._shots(self._newest(count))
+        """The newest frames of a camera that has ended; raises as ``stack_of``."""
+        return self._stack(self._newest(count))
 
     def _newest(self, count: int) -> list[Frame]:
         if self._failed is not None:
@@ -71,12 +72,12 @@ class RollingFrames:
         with self._lock:
             return list(self._frames)[-count:]
 
-    def _shots(self, frames: list[Frame]) -> FrameStack:
+    def _stack(self, frames: list[Frame]) -> FrameStack:
         lost = sum(frame.lost_before for frame in frames[1:])
-        return taken(frames, self._camera.info, lost, self._address)
+        return stack_of(frames, self._camera.info, lost, self._address)
 
     def frame(self) -> Frame | None:
-        """The newest one."""
+        """The newest frame; None before the first."""
         with self._lock:
             return self._frames[-1] if self._frames else None
 
@@ -86,76 +87,78 @@ class RollingFrames:
                 if not frame.damaged:
                     with self._lock:
                         self._frames.append(frame)
-                        self.seen += 1
+                        self.received += 1
         except Exception as error:
             self._failed = error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class QuickCheck:
-    """The figures of some frames, and the best sharpness there was since the specimen was found."""
+    """The figures of some frames, and the highest sharpness since the specimen was found."""
 
     figures: CheckFigures
     peak: float
 
     @property
     def of_peak(self) -> float:
-        """Sharpness as a part of its peak; NaN without pattern."""
+        """Sharpness over its peak; NaN without pattern."""
         return self.figures.sharpness / self.peak if self.peak > 0 else math.nan
 
 
 class QuickChecker:
-    """Judges one set of frames after the other, and holds the peak of the sharpness.
+    """Checks one stack of frames after the other, and holds the peak of the sharpness.
 
-    What is read off the frames (light, contrast, sharpness, radius, flicker) is new at every glance. What
-    takes the kernel takes turns, and so does the search for the specimen: at most one of them at a glance.
+    Light, contrast, sharpness, radius and flicker are new at every check. Figures that need the kernel, and the
+    search for the specimen, take turns: at most one of them at a check.
     """
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        self._ground: CheckRegion | None = None
-        self._measured: Measured | None = None
+        self._check_region: CheckRegion | None = None
+        self._measured: KernelFigures | None = None
         self._peak = 0.0
-        self._glances = 0
+        self._checks = 0
 
-    def glance(self, shots: FrameStack) -> QuickCheck:
-        """The figures without the noises that take long; raises as ``examine``."""
-        turn = self._glances
-        self._glances += 1
-        ground = self._ground_at(shots, turn)
-        bench = CheckSample.of(shots, ground)
-        self._measured = measured = self._renewed(bench, turn)
-        figures = figures_of(bench, measured)
+    def check(self, stack: FrameStack) -> QuickCheck:
+        """The figures without the table of strain noise; raises as ``examine``."""
+        turn = self._checks
+        self._checks += 1
+        check_region = self._region_at(stack, turn)
+        sample = CheckSample.of(stack, check_region)
+        self._measured = measured = self._renewed(sample, turn)
+        figures = figures_of(sample, measured)
         if math.isfinite(figures.sharpness):
             self._peak = max(self._peak, figures.sharpness)
         return QuickCheck(figures, self._peak)
 
-    def last(self, shots: FrameStack) -> CheckFigures:
-        """All figures with the table."""
-        return examine(shots, self._config)
+    def full(self, stack: FrameStack) -> CheckFigures:
+        """All figures with the table of strain noise."""
+        return examine(stack, self._config)
 
-    def _ground_at(self, shots: FrameStack, turn: int) -> CheckRegion:
-        """Laid anew where the specimen is found elsewhere; its rim alone is never quite the same."""
-        now = self._ground
-        due = SEARCH_EVERY if now is not None and now.region.found else TURNS
+    def _region_at(self, stack: FrameStack, turn: int) -> CheckRegion:
+        """The region, renewed if the specimen is found elsewhere; its rim alone varies from search to search."""
+        now = self._check_region
+        due = SEARCH_EVERY if now is not None and now.region.found else RENEW_EVERY
         if now is None or turn % due == 0:
-            region = sought(shots, self._config)
-            if now is None or not _alike(region, now.region, now):
-                now = CheckRegion.of(region, self._config, shots.camera)
-                self._ground, self._measured = now, None
+            region = find_region(stack, self._config)
+            if now is None or not _same_region(region, now.region, now):
+                now = CheckRegion.of(region, self._config, stack.camera)
+                self._check_region, self._measured = now, None
         return now
 
-    def _renewed(self, bench: CheckSample, turn: int) -> Measured:
+    def _renewed(self, sample: CheckSample, turn: int) -> KernelFigures:
         before = self._measured
         if before is None:
-            return Measured.of(bench)
-        if turn % TURNS == 3:
-            return replace(before, predicted=predicted(bench))
-        return replace(before, still=stillness(bench, before.predicted.able)) if turn % TURNS == 6 else before
+            return KernelFigures.of(sample)
+        if turn % RENEW_EVERY == 3:
+            return replace(before, predicted=predict_noise(sample))
+        if turn % RENEW_EVERY == 6:
+            return replace(before, still=stillness(sample, before.predicted.measurable))
+        return before
 
 
-def _alike(one: Region, other: Region, ground: CheckRegion) -> bool:
-    """Whether both are the same place, but for a rim."""
-    size = ground.camera.width, ground.camera.height, ground.config.measure.zoi
+def _same_region(one: Region, other: Region, check_region: CheckRegion) -> bool:
+    """Whether two regions are the same except for a rim."""
+    size = check_region.camera.width, check_region.camera.height, check_region.config.measure.zoi
     first, second = (region.inside(*size) for region in (one, other))
-    return one.found == other.found and bool((first ^ second).sum() <= RIM * (first | second).sum())
+    return one.found == other.found and bool((first ^ second).sum() <= SAME_REGION * (first | second).sum())

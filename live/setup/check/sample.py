@@ -1,7 +1,4 @@
-"""Where a check looks: the region with its ZOIs, laid once for many glances, and frames on it.
-
-A few frames of the still specimen, held for the check, and the region they are judged in.
-"""
+"""The sample of a check: frames of the still specimen, and the region with its ZOIs in which they are judged."""
 
 from __future__ import annotations
 
@@ -30,21 +27,26 @@ from live.setup.region import Region
 if TYPE_CHECKING:
     from analysis import KernelSettings, ZoiGrid
 
-FEWEST = 8  # frames
-MOST_BYTES = 1_500_000_000
-PIXELS_LOOKED_AT = 200_000  # of each frame, for light, bits and noise
+Bools = NDArray[np.bool_]
+Cut = tuple[slice, slice]
+
+MIN_FRAMES = 8
+"""Frames of a check of what changes in time; recorded pictures can be fewer."""
+MAX_BYTES = 1_500_000_000  # of frames
+MAX_PIXELS = 200_000  # of each frame, for light, bits and noise
+MARGIN = 24  # px around the region: the range of the spline
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameStack:
-    """Frames in the order they came.
+    """Frames in their order.
 
     Attributes
     ----------
     frames : (N, H, W) uint8 or uint16, GL
     times : (N,) float64, s
     lost : int
-        Frames that the camera gave between the first and the last and that did not come whole.
+        Lost or damaged frames between the first and the last.
     camera : CameraInfo
     """
 
@@ -58,20 +60,20 @@ class FrameStack:
 
     @property
     def few(self) -> bool:
-        """Whether there are too few of them to tell what changes in time."""
-        return len(self) < FEWEST
+        """Whether there are too few frames for figures of what changes in time."""
+        return len(self) < MIN_FRAMES
 
     @property
-    def said(self) -> str:
-        """How many, in words."""
+    def count_text(self) -> str:
+        """The number of pictures as text."""
         return f"{len(self)} picture{'s' if len(self) > 1 else ''}"
 
     def cut(self, rows: slice, columns: slice) -> FrameStack:
-        """A part of each."""
+        """These rows and columns of each frame."""
         return replace(self, frames=self.frames[:, rows, columns])
 
     def mean(self, first: int = 0, count: int | None = None) -> Burst:
-        """The frames from ``first`` as one burst; its noise and motion are not looked at here."""
+        """The frames from ``first`` as one burst, without its noise and motion."""
         part = self.frames[first:] if count is None else self.frames[first : first + count]
         times = self.times[first : first + len(part)]
         mean = part.sum(axis=0, dtype=np.uint32) / len(part) if len(part) > 1 else part[0]
@@ -90,31 +92,31 @@ class FrameStack:
         )
 
     def pixels(self, inside: NDArray[np.bool_] | None = None) -> NDArray[Any]:
-        """Some of the pixels ``inside`` (H, W) in every frame, (N, P): enough for light, bits and noise."""
+        """Some of the pixels ``inside`` (H, W) of every frame, (N, P): enough for light, bits and noise."""
         where = np.ones(self.frames.shape[1:], bool) if inside is None else inside
         index = np.flatnonzero(where)
-        index = index[:: max(1, len(index) // PIXELS_LOOKED_AT)]
+        index = index[:: max(1, len(index) // MAX_PIXELS)]
         return np.asarray(self.frames.reshape(len(self), -1)[:, index])
 
     def noise(self) -> float | None:
-        """Temporal standard deviation of their mean, GL; None where they tell nothing."""
+        """Temporal standard deviation of the mean of the frames, GL; None if they are too few or all the same."""
         return averaged(None if self.few else temporal_noise(self.pixels()) or None, len(self))
 
 
 def temporal_noise(pixels: NDArray[Any]) -> float:
     """Standard deviation of one frame, GL, from pixels in all frames, (N, P).
 
-    From successive differences, so that a slow drift of the light does not count; 0 where every
-    frame is the same.
+    From successive differences, so that a slow drift of the light does not count; 0 if all frames
+    are the same.
     """
     steps = [b.astype(np.float32) - a for a, b in itertools.pairwise(pixels)]
     return math.sqrt(float(np.mean([np.mean((step - step.mean()) ** 2) for step in steps])) / 2)
 
 
 def take(config: Config, on_event: EventSink = ignore_event) -> FrameStack:
-    """Twice as many frames as the reference has, so that one half can be measured against the other.
+    """Take twice as many frames as the reference, so that one half can be measured against the other.
 
-    A folder that has fewer is judged by what it has. Frames that are lost in between are counted.
+    A folder with fewer pictures gives all of them. Frames lost in between are counted.
 
     Raises
     ------
@@ -127,7 +129,7 @@ def take(config: Config, on_event: EventSink = ignore_event) -> FrameStack:
     lost = 0
     try:
         camera = rig.camera.info
-        n = max(min(2 * reference, MOST_BYTES // (camera.width * camera.height * 2)), FEWEST)
+        n = max(min(2 * reference, MAX_BYTES // (camera.width * camera.height * 2)), MIN_FRAMES)
         with rig.camera:
             for frame in rig.camera:
                 lost += (frame.lost_before if frames else 0) + frame.damaged
@@ -136,29 +138,23 @@ def take(config: Config, on_event: EventSink = ignore_event) -> FrameStack:
                     break
     finally:
         rig.close()
-    return taken(frames, camera, lost, config.camera.address)
+    return stack_of(frames, camera, lost, config.camera.address)
 
 
-def taken(frames: Sequence[Frame], camera: CameraInfo, lost: int, address: str) -> FrameStack:
-    """Whole frames as what is judged: of a camera ``FEWEST`` at least, of pictures one; else DataError."""
-    least = FEWEST if camera.live else 1
-    if len(frames) < least:
+def stack_of(frames: Sequence[Frame], camera: CameraInfo, lost: int, address: str) -> FrameStack:
+    """Whole frames as a stack; DataError for fewer than ``MIN_FRAMES`` of a live camera, or none of pictures."""
+    needed = MIN_FRAMES if camera.live else 1
+    if len(frames) < needed:
         raise DataError(
-            f"{printable(address)}: gave {len(frames)} whole frames, a check needs {least};"
+            f"{printable(address)}: gave {len(frames)} whole frames, a check needs {needed};"
             " look at the camera, or give more pictures"
         )
     return FrameStack(np.stack([f.image for f in frames]), np.array([f.t for f in frames]), lost, camera)
 
 
-Bools = NDArray[np.bool_]
-Cut = tuple[slice, slice]
-
-MARGIN = 24  # px around what is measured: a spline reaches so far
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class CheckRegion:
-    """A region with its ZOIs.
+    """A region with its ZOIs, for any number of samples.
 
     Attributes
     ----------
@@ -168,14 +164,15 @@ class CheckRegion:
     grid : ZoiGrid
         On the whole picture.
     cut : (slice, slice)
-        Rows and columns of the region with a margin; all below is cut to it.
+        Rows and columns of the region with a margin; ``zois`` and ``inside`` are cut to it.
     zois : ZoiGrid
-        The same ZOIs.
+        The same ZOIs on the cut.
     inside : (h, w) bool
         The region.
     at_zois : (H, W) bool
-        The inner halves of its ZOIs, on the whole picture: where light and noise are judged.
+        The inner halves of the ZOIs on the whole picture: the pixels for light and noise.
     correct : callable
+        Corrects the fixed pattern of the sensor in a cut burst.
     """
 
     config: Config
@@ -190,7 +187,7 @@ class CheckRegion:
 
     @classmethod
     def of(cls, region: Region, config: Config, camera: CameraInfo) -> CheckRegion:
-        """Lay it; raises ConfigError or DataError where region, mask, dark or flat do not fit."""
+        """Place the ZOIs; raises ConfigError or DataError if region, mask, dark or flat frame do not fit."""
         inside = region.inside(camera.width, camera.height, config.measure.zoi)
         grid, cut = region.grid(config, camera.width, camera.height), around(inside)
         correct = correction(config, camera, cut)
@@ -200,27 +197,27 @@ class CheckRegion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CheckSample:
-    """Frames on a ground, and how they are measured.
+    """Frames on a region, with the settings of the measurement.
 
     Attributes
     ----------
-    shots : FrameStack
-    ground : CheckRegion
+    stack : FrameStack
+    check_region : CheckRegion
     settings : KernelSettings
     picture : Burst
-        What the pattern is judged by, cut and corrected: all frames, or the first of too few.
+        The picture of the pattern, cut and corrected: the mean of all frames, or the first of too few.
     raw : (h, w) float32, GL
-        The same as it came.
+        The same without correction.
     pixels : (N, P), GL
-        Some at the ZOIs in every frame.
+        Some pixels at the ZOIs of every frame.
     noise : float, GL
-        Of one frame: as stated, as it changes in time, or of too few frames from the spectrum of the picture.
+        Of one frame: as given, from the changes in time, or of too few frames from the spectrum of the picture.
     reference, burst : int
-        Frames in each of the test; one where nothing is given and the pictures are few.
+        Frames in each, for the test; by default one if the pictures are few.
     """
 
-    shots: FrameStack
-    ground: CheckRegion
+    stack: FrameStack
+    check_region: CheckRegion
     settings: KernelSettings
     picture: Burst
     raw: NDArray[np.float32]
@@ -230,36 +227,36 @@ class CheckSample:
     burst: int
 
     @classmethod
-    def of(cls, shots: FrameStack, ground: CheckRegion) -> CheckSample:
-        """Look at the frames once."""
-        m = ground.config.measure
-        raw = shots.cut(*ground.cut).mean(0, 1 if shots.few else None)
-        picture, pixels = ground.correct(raw), shots.pixels(ground.at_zois)
+    def of(cls, stack: FrameStack, check_region: CheckRegion) -> CheckSample:
+        """The sample of these frames."""
+        m = check_region.config.measure
+        raw = stack.cut(*check_region.cut).mean(0, 1 if stack.few else None)
+        picture, pixels = check_region.correct(raw), stack.pixels(check_region.at_zois)
         if m.noise_GL is not None:
             noise = m.noise_GL
         else:
-            noise = noise_of_picture(picture.mean) if shots.few else temporal_noise(pixels)
-        reference = m.reference_burst or (1 if shots.few else DEFAULT_REFERENCE_BURST)
-        burst, settings = m.burst or (1 if shots.few else DEFAULT_BURST), kernel_settings(ground.config)
-        return cls(shots, ground, settings, picture, raw.mean, pixels, noise, reference, burst)
+            noise = noise_of_picture(picture.mean) if stack.few else temporal_noise(pixels)
+        reference = m.reference_burst or (1 if stack.few else DEFAULT_REFERENCE_BURST)
+        burst, settings = m.burst or (1 if stack.few else DEFAULT_BURST), kernel_settings(check_region.config)
+        return cls(stack, check_region, settings, picture, raw.mean, pixels, noise, reference, burst)
 
     @property
     def half(self) -> int:
-        """Frames of the reference here."""
-        return 1 if self.shots.few else len(self.shots) // 2
+        """Frames of the reference of the check."""
+        return 1 if self.stack.few else len(self.stack) // 2
 
     def mean(self, first: int, count: int) -> Burst:
         """A corrected burst, cut to the region."""
-        return self.ground.correct(self.shots.cut(*self.ground.cut).mean(first, count))
+        return self.check_region.correct(self.stack.cut(*self.check_region.cut).mean(first, count))
 
     def halves(self) -> tuple[Burst, Burst]:
-        """The reference here and what is measured against it; of too few frames the first and itself."""
+        """The reference of the check and the burst measured against it; of too few frames the first twice."""
         first = self.mean(0, self.half)
-        return first, first if self.shots.few else self.mean(self.half, self.half)
+        return first, first if self.stack.few else self.mean(self.half, self.half)
 
 
 def around(inside: Bools) -> Cut:
-    """Rows and columns of what is True in (H, W), with a margin; all where nothing is."""
+    """Rows and columns of the True part of (H, W), with a margin; all if nothing is True."""
     if not inside.any():
         return slice(0, inside.shape[0]), slice(0, inside.shape[1])
     spans = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
@@ -268,16 +265,16 @@ def around(inside: Bools) -> Cut:
 
 
 def moved(grid: ZoiGrid, cut: Cut) -> ZoiGrid:
-    """The same ZOIs on a picture that is cut."""
+    """The same ZOIs on a cut picture."""
     from analysis import Roi, ZoiGrid
 
     roi, (rows, columns) = grid.roi, cut
-    place = Roi(roi.x - columns.start, roi.y - rows.start, roi.width, roi.height)
-    return ZoiGrid(place, grid.size, grid.step, grid.active)
+    cut_roi = Roi(roi.x - columns.start, roi.y - rows.start, roi.width, roi.height)
+    return ZoiGrid(cut_roi, grid.size, grid.step, grid.active)
 
 
 def _inner_halves(grid: ZoiGrid, inside: Bools) -> Bools:
-    """(H, W) bool: the middle of each active ZOI, half as wide; the region where there is none."""
+    """(H, W) bool: the middle of each active ZOI, half as wide; the region if there is no ZOI."""
     found = np.zeros(inside.shape, bool)
     half, quarter = grid.size // 2, grid.size // 4
     for row, column in np.argwhere(grid.active):

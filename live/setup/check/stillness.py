@@ -1,4 +1,4 @@
-"""Whether the specimen stands still and the light is steady, frame by frame."""
+"""Motion of the still specimen and steadiness of the light, frame by frame."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from analysis.field import Roi, StrainField
-from analysis.quality.exposure import Steadiness, steadiness
+from analysis.quality.steadiness import Steadiness, steadiness
 from live.pipeline.reference import averaged, prepare
 from live.setup.check.sample import CheckSample, around, moved
 from live.setup.pictures import correction
@@ -19,20 +19,20 @@ from live.setup.pictures import correction
 if TYPE_CHECKING:
     from analysis import ZoiGrid
 
-FIRST = 4  # frames averaged as what motion is measured against
-MOST_ZOIS = 64
+FIRST_FRAMES = 4  # frames averaged as the reference of the motion
+MAX_ZOIS = 64
 
 
 @dataclass(frozen=True, slots=True)
 class PictureStillness:
-    """Motion of the mean of the region, and its light.
+    """Mean motion of the region, and its light.
 
     Attributes
     ----------
     u, v : Steadiness, px
     exx, eyy : Steadiness, dimensionless
     light : Steadiness
-        Of the mean grey level, as a part of itself.
+        Of the mean grey level, relative.
     """
 
     u: Steadiness
@@ -43,79 +43,78 @@ class PictureStillness:
 
     @property
     def drift_px(self) -> float:
-        """How far the region drifted, px."""
+        """Drift of the region, px."""
         return math.hypot(self.u.drift, self.v.drift)
 
     @property
     def worse(self) -> Steadiness:
-        """Of u and v, the one that shakes more."""
+        """Of u and v, the one with more vibration."""
         return max((self.u, self.v), key=lambda s: s.vibration)
 
     @property
     def worse_strain(self) -> Steadiness:
-        """Of exx and eyy, the one that shakes more."""
+        """Of exx and eyy, the one with more vibration."""
         return max((self.exx, self.eyy), key=lambda s: s.vibration)
 
 
-def stillness(bench: CheckSample, able: NDArray[np.bool_]) -> PictureStillness:
-    """Each frame against the mean of the first few, over some dozens of ZOIs about the middle of all that are able.
+def stillness(sample: CheckSample, measurable: NDArray[np.bool_]) -> PictureStillness:
+    """The motion of each frame against the mean of the first few, over some dozens of ZOIs about the middle.
 
     Parameters
     ----------
-    bench : CheckSample
-    able : (R, C) bool
-        ZOIs with a pattern. Without any, and for too few frames, all motion is NaN.
+    sample : CheckSample
+    measurable : (R, C) bool
+        ZOIs with a pattern. Without any, and with too few frames, all motion is NaN.
     """
-    times = bench.shots.times
-    able = able & bench.ground.grid.active
-    fields = (
-        _fields(bench, bench.ground.grid.subset(active=able)) if able.any() and not bench.shots.few else []
-    )
+    times = sample.stack.times
+    measurable = measurable & sample.check_region.grid.active
+    able = measurable.any() and not sample.stack.few
+    fields = _fields(sample, sample.check_region.grid.subset(active=measurable)) if able else []
 
     def series(name: str) -> Steadiness:
         pairs = [field.mean(name) for field in fields] or [(math.nan, math.nan)] * len(times)
         values, sigmas = (np.array(column) for column in zip(*pairs, strict=True))
         known = sigmas[np.isfinite(sigmas)]
-        # The noise of the reference is common to all frames and moves none of them.
-        own = math.sqrt(1 / (1 + 1 / FIRST)) if known.size else math.nan
+        # The noise of the reference is common to all frames and is no motion.
+        own = math.sqrt(1 / (1 + 1 / FIRST_FRAMES)) if known.size else math.nan
         return steadiness(times, values, own * float(np.sqrt(np.mean(known**2))) if known.size else 0.0)
 
-    return PictureStillness(series("u"), series("v"), series("exx"), series("eyy"), light(bench))
+    return PictureStillness(series("u"), series("v"), series("exx"), series("eyy"), light(sample))
 
 
-def light(bench: CheckSample) -> Steadiness:
+def light(sample: CheckSample) -> Steadiness:
     """The mean grey level at the ZOIs in each frame, relative."""
-    levels = bench.pixels.mean(axis=1, dtype=np.float64)
+    levels = sample.pixels.mean(axis=1, dtype=np.float64)
     mean = max(float(levels.mean()), 1e-9)
-    noise = bench.noise / math.sqrt(bench.pixels.shape[1]) / mean
-    return steadiness(bench.shots.times, levels / mean, noise)
+    noise = sample.noise / math.sqrt(sample.pixels.shape[1]) / mean
+    return steadiness(sample.stack.times, levels / mean, noise)
 
 
-def _fields(bench: CheckSample, grid: ZoiGrid) -> list[StrainField]:
-    """Of every frame, on no more of the picture than is needed."""
-    ground, middle = bench.ground, _middle(grid)
-    cut = around(_covered(middle, ground.at_zois.shape))
-    correct = correction(ground.config, ground.camera, cut)
-    shots, grid = bench.shots.cut(*cut), moved(middle, cut)
+def _fields(sample: CheckSample, grid: ZoiGrid) -> list[StrainField]:
+    """The strain field of every frame, on the necessary part of the picture."""
+    check_region, middle = sample.check_region, _middle(grid)
+    cut = around(_covered(middle, check_region.at_zois.shape))
+    correct = correction(check_region.config, check_region.camera, cut)
+    stack, grid = sample.stack.cut(*cut), moved(middle, cut)
     try:
-        kernel, _ = prepare(correct(shots.mean(0, FIRST)), grid, bench.settings, bench.noise)
+        kernel, _ = prepare(correct(stack.mean(0, FIRST_FRAMES)), grid, sample.settings, sample.noise)
     except DataError:
         return []
     fields = [StrainField.from_values(grid, {})]
-    for k in range(len(shots)):
-        frame = correct(shots.mean(k, 1))
-        fields.append(kernel.measure(frame.mean, start=fields[-1], noise=averaged(bench.noise, 1)))
+    for k in range(len(stack)):
+        frame = correct(stack.mean(k, 1))
+        fields.append(kernel.measure(frame.mean, start=fields[-1], noise=averaged(sample.noise, 1)))
     return fields[1:]
 
 
 def _middle(grid: ZoiGrid) -> ZoiGrid:
-    """ZOIs side by side rather than one over the other, the nearest to the middle of all; a grid of these alone."""
-    spread = math.ceil(math.sqrt(grid.n_active / MOST_ZOIS))
+    """A grid of the ZOIs nearest to the middle, side by side rather than overlapping."""
+    spread = math.ceil(math.sqrt(grid.n_active / MAX_ZOIS))
     thin = grid.subset(every=max(1, min(spread, math.ceil(grid.size / grid.step))))
     thin = thin if thin.n_active else grid
     places = np.argwhere(thin.active)
     far = np.hypot(*(places - places.mean(axis=0)).T)
-    near = places[np.argsort(far, kind="stable")[:MOST_ZOIS]]
+    near = places[np.argsort(far, kind="stable")[:MAX_ZOIS]]
     active = np.zeros(grid.shape, bool)
     active[near[:, 0], near[:, 1]] = True
     (top, left), (bottom, right) = near.min(axis=0), near.max(axis=0)
@@ -126,7 +125,7 @@ def _middle(grid: ZoiGrid) -> ZoiGrid:
 
 
 def _covered(grid: ZoiGrid, shape: tuple[int, ...]) -> NDArray[np.bool_]:
-    """(H, W) bool: the pixels of its ZOIs."""
+    """(H, W) bool: the pixels of the active ZOIs."""
     found = np.zeros(shape, bool)
     for row, column in np.argwhere(grid.active):
         top, left = grid.first_y[row], grid.first_x[column]

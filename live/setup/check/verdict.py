@@ -1,6 +1,6 @@
-"""The lines of the check: each figure, whether it is good enough, and what to do.
+"""The lines of a check: each figure, whether it is good enough, and what to change.
 
-What reaches a strain noise that is asked for, or what is missing, in words of the bench.
+``advice`` derives from the table of strain noise what reaches a target.
 """
 
 from __future__ import annotations
@@ -11,17 +11,276 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from analysis.quality.exposure import Steadiness, aliased, mains_of
+from analysis.quality.steadiness import Steadiness, aliased, mains_of
 from live.setup.check.check_list import CheckFigures, median
 from live.setup.check.noise_floor import ZoiFloor
-from live.setup.check.sample import FEWEST
+from live.setup.check.sample import MIN_FRAMES
 
-FULL = 0.95  # of the scale: more light than that saturates
-MOST_BURST = 1000
+MAX_SATURATED, MAX_DARK, MAX_PILED = 1e-4, 0.01, 1e-3
+MIN_LIGHT = 0.3  # of full scale, 99th percentile
+MIN_CONTRAST = 0.05  # of full scale
+# 0.9 is a full width of 3 px, the finest in the iDICs Good Practices Guide: its bias is 0.0003 px.
+RADIUS_PX = (0.9, 6.0)
+MAX_FLICKER, MAX_WITHOUT_PATTERN, MIN_SHARPNESS_RATIO = 0.01, 0.02, 0.7
+MAX_NOISE_PX = 0.05  # of one ZOI in one frame
+MAX_OVER_PREDICTED = 1.5  # measured over predicted noise
+DEFAULT_TARGET = 1e-3
+"""Largest strain noise for GO without a target: half the yield strain of a steel."""
+FULL_LIGHT = 0.95  # of full scale: more light saturates
+MAX_BURST = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class CheckLine:
+    """One figure of the check, whether it is good enough, and what to do if it is not.
+
+    A figure that the pictures do not give (not ``measured``) is neither good nor bad.
+    """
+
+    what: str
+    value: str
+    good: bool = True
+    advice: str = ""
+    measured: bool = True
+
+    def text(self) -> str:
+        """The line as printed."""
+        mark = "ok  " if self.measured else "?   "
+        return f"{mark if self.good else 'LOOK'}  {self.what:<22} {self.value}" + (
+            "" if self.good or not self.advice else f"\n      -> {self.advice}"
+        )
+
+
+def check_lines(
+    figures: CheckFigures, target: float | None = None, max_shift_px: float = 0.05
+) -> list[CheckLine]:
+    """All lines of the check.
+
+    Parameters
+    ----------
+    figures : CheckFigures
+    target : float or None
+        Largest strain noise of one ZOI for the test, dimensionless.
+    max_shift_px : float, px
+        Largest accepted drift and vibration.
+    """
+    return [
+        *_few(figures),
+        CheckLine("region", figures.region.words),
+        *_camera(figures),
+        *_light(figures),
+        *_pattern(figures),
+        *_motion(figures, max_shift_px),
+        *_load(figures),
+        _floor(figures, target),
+        *_gauges(figures),
+    ]
+
+
+def _few(f: CheckFigures) -> Iterator[CheckLine]:
+    if f.stack.few:
+        value = f"{len(f.stack)}, too few for what changes in time; the pattern is that of the first"
+        yield CheckLine("pictures", value)
+
+
+def _not_measured(f: CheckFigures, what: str) -> CheckLine:
+    return CheckLine(
+        what,
+        f"not measured from {f.stack.count_text}: it takes {MIN_FRAMES} of the still specimen",
+        measured=False,
+    )
+
+
+def _camera(f: CheckFigures) -> Iterator[CheckLine]:
+    if f.stack.lost:
+        yield CheckLine("frames lost", f"{f.stack.lost} between {len(f.stack)}", False,
+                   "a lower frame rate, a smaller picture (--crop), another port or a faster machine")  # fmt: skip
+    automatic = ", ".join(f.automatic)
+    yield CheckLine("automatic controls", automatic or "none", not automatic, f"put on manual: {automatic}")
+    yield _bits(f)
+    value = "not visible in a still picture: it shows as strain when the specimen moves (--dark, --flat correct it)"
+    if f.removed is not None:
+        value = f"dark and flat corrected {f.removed:.2f} GL; the rest is not visible in a still picture"
+    yield CheckLine("fixed pattern", value)
+
+
+def _bits(f: CheckFigures) -> CheckLine:
+    d = f.depth
+    value, words = f"{d.changing} of {d.stated} change", ""
+    if d.unused_below:
+        words = (
+            f"the lowest {d.unused_below} never change: choose a format with more real bits, or live with it"
+        )
+    if d.unused_above >= 2:
+        words = f"the highest {d.unused_above} are never used: more light, or give the true depth (files: bits=...)"
+        words += ", else saturation is not found"
+    return CheckLine("bits", value, not words, words)
+
+
+def _light(f: CheckFigures) -> Iterator[CheckLine]:
+    e = f.exposure
+    yield CheckLine("light", f"1 % to 99 % of the pixels from {e.low:.0%} to {e.high:.0%} of full scale",
+               e.high >= MIN_LIGHT, "under-exposed: more light, a longer exposure, or open the aperture")  # fmt: skip
+    yield CheckLine("saturated pixels", f"{e.saturated:.3%}", e.saturated <= MAX_SATURATED,
+               "less exposure or light, no glare")  # fmt: skip
+    if e.dark > MAX_DARK:
+        yield CheckLine("black pixels", f"{e.dark:.1%} at zero", False,
+                   "raise the black level of the camera, or the light: what is cut off is lost")  # fmt: skip
+    if e.piled > MAX_PILED:
+        yield CheckLine("clipped below the top", f"{e.piled:.1%} at one highest level", False,
+                   "saturated before the end of the scale: less light, or give the true depth (bits=...)")  # fmt: skip
+    yield _not_measured(f, "flicker") if f.stack.few else _flicker(f)
+    full = 2**f.stack.camera.bits - 1
+    shown = f"{f.noise:.2f} GL of one frame, {f.noise / full:.2%} of full scale"
+    if f.stack.few:
+        yield CheckLine("noise", f"{shown}, {_noise_source(f)}")
+        yield _not_measured(f, "noise in time")
+    else:
+        yield CheckLine("noise", shown, f.noise > 0, "every frame is the same: is this a live picture?")
+
+
+def _noise_source(f: CheckFigures) -> str:
+    return "as given" if f.noise_stated else "from the spectrum of the picture"
+
+
+def _flicker(f: CheckFigures) -> CheckLine:
+    s = f.still.light
+    value = f"{s.rms:.2%} of the level, drift {s.drift:+.2%}"
+    words = "use a steady lamp, or an exposure of whole periods of the mains"
+    mains = mains_of(s, 2)
+    if mains is not None:
+        value += f": lamps on {mains:.0f} Hz mains ({2 * mains:.0f} Hz, seen at {s.frequency:.1f} Hz)"
+        words = f"a lamp on direct current, or an exposure of a multiple of {500 / mains:.1f} ms"
+    elif s.frequency is not None:
+        value += f", mainly at {s.frequency:.1f} Hz"
+    standing = [m for m in (50.0, 60.0) if s.rate and aliased(2 * m, s.rate) < 0.02 * s.rate]
+    if standing:
+        value += f" (at {s.rate:.3g} fps that of {standing[0]:.0f} Hz mains stands still and is not visible)"
+    return CheckLine("flicker", value, max(s.rms, abs(s.drift)) <= MAX_FLICKER or math.isnan(s.rms), words)
+
+
+def _pattern(f: CheckFigures) -> Iterator[CheckLine]:
+    full, z = 2**f.stack.camera.bits - 1, f.zois
+    contrast = median(z.contrast) / full
+    yield CheckLine("contrast (std)", f"{contrast:.1%} of full scale", contrast > MIN_CONTRAST,
+               "more light, a longer exposure, or a pattern of blacker black and whiter white")  # fmt: skip
+    low, high = RADIUS_PX
+    words = "finer speckle or a wider field of view" if f.radius > high else "coarser speckle, or focus"
+    radius = f"{f.radius:.2f} px" if math.isfinite(f.radius) else "none is visible"
+    yield CheckLine("speckle radius", f"{radius} (best from 1.5 to 4)", low <= f.radius <= high, words)
+    yield _sharpness(f)
+    yield _sssig(f)
+    share, n = z.without_pattern, z.grid.n_active
+    yield CheckLine("ZOIs without pattern", "all" if share == 1 else f"{share:.1%} of {n}",
+               share <= MAX_WITHOUT_PATTERN,
+               "spray a pattern, set focus and exposure" if share == 1 else
+               "restrict them with --roi or --mask, or take larger ZOIs")  # fmt: skip
+
+
+def _sharpness(f: CheckFigures) -> CheckLine:
+    """Sharpness of the whole and of the sides: a softer side means that camera or specimen is tilted."""
+    values = f.zois.sharpness
+    rows, columns = values.shape
+    sides = {
+        "left": values[:, : columns // 2],
+        "right": values[:, (columns + 1) // 2 :],
+        "top": values[: rows // 2],
+        "bottom": values[(rows + 1) // 2 :],
+    }
+    of = {name: m for name, side in sides.items() if math.isfinite(m := median(side))}
+    value = f"{f.sharpness:.3f} 1/px"
+    if not of:
+        return CheckLine(
+            "sharpness", "no pattern is visible", False, "spray a pattern, set focus and exposure"
+        )
+    softest, sharpest = min(of, key=lambda k: of[k]), max(of, key=lambda k: of[k])
+    even = of[softest] >= MIN_SHARPNESS_RATIO * of[sharpest]
+    text = f"{value}, {softest} {of[softest]:.3f}, {sharpest} {of[sharpest]:.3f}"
+    return CheckLine(
+        "sharpness", text, even, f"softer at the {softest}: set the camera square, close the aperture"
+    )
+
+
+def _sssig(f: CheckFigures) -> CheckLine:
+    known = f.zois.sssig[np.isfinite(f.zois.sssig)]
+    if not known.any():
+        return CheckLine("SSSIG of a ZOI", "none", False, "spray a pattern")
+    weak = float(np.percentile(known, 5))
+    px = math.sqrt(2) * f.noise / math.sqrt(max(weak, 1e-9))
+    value = f"median {np.median(known):.3g}, weakest 5 % {weak:.3g} GL^2/px^2 ({px:.4f} px in one frame)"
+    return CheckLine("SSSIG of a ZOI", value, px < MAX_NOISE_PX, "more contrast, larger ZOIs")
+
+
+def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
+    s = f.still
+    if f.stack.few:
+        yield from (_not_measured(f, what) for what in ("drift", "vibration"))
+        return
+    if not math.isfinite(s.drift_px):
+        yield CheckLine("drift", "not measured", f.zois.without_pattern < 1, "no ZOI can be followed")
+        return
+    strain = max((s.exx, s.eyy), key=lambda one: abs(one.drift))
+    yield CheckLine("drift", f"{s.drift_px:.4f} px and {strain.drift * 1e6:+.0f} um/m in {s.u.seconds:.3g} s",
+               s.drift_px <= max_px, "keep specimen and camera still")  # fmt: skip
+    shake = s.worse
+    yield CheckLine("vibration", f"{_vibration(shake, 1, 'px', 4)}, {_vibration(s.worse_strain, 1e6, 'um/m', 0)}",
+               shake.vibration <= max_px, "a stiffer tripod, a quiet floor, no fan on the bench")  # fmt: skip
+
+
+def _vibration(s: Steadiness, unit: float, name: str, digits: int) -> str:
+    """A vibration with its frequency, or its upper limit by the noise."""
+    if not s.vibration > s.noise / 2:
+        return f"less than {s.noise * unit:.{digits}f} {name}"
+    text = f"{s.vibration * unit:.{digits}f} {name} rms"
+    if s.frequency is None:
+        return text
+    mains = mains_of(s, 1)
+    cause = f", as from {mains:.0f} Hz mains" if mains is not None else ""
+    return f"{text}, mainly at {s.frequency:.1f} Hz{cause}"
+
+
+def _load(f: CheckFigures) -> Iterator[CheckLine]:
+    if f.load is not None:
+        value = f"{f.load.rate:.4g} 1/s, noise {f.load.noise_N:.3g} N, mean {f.load.mean_N:.5g} N"
+        yield CheckLine("load cell", value, f.load.ready, "; ".join(f.load.remarks))
+
+
+def _floor(f: CheckFigures, target: float | None) -> CheckLine:
+    what = "strain noise"
+    noise = None if f.floor is None else f.floor.of(f.burst)
+    typical = median(f.zois.sigma)
+    if noise is None and not math.isfinite(typical):
+        words = "a larger region, smaller ZOIs, or a pattern"
+        return CheckLine(what, f"not measured: too few ZOIs of {f.zoi} px", False, words)
+    known = typical if noise is None else noise.known
+    found = f"{known * 1e6:.0f} um/m predicted"
+    if f.stack.few:
+        found += f", noise {_noise_source(f)}"
+    elif noise is not None:
+        found = f"{noise.known * 1e6:.0f} um/m measured, {noise.predicted * 1e6:.0f} predicted"
+    value = f"{found} (one ZOI of {f.zoi} px, burst of {f.burst})"
+    if noise is not None and noise.measured > MAX_OVER_PREDICTED * noise.predicted:
+        return CheckLine(what, value, False, "something moves or flickers: vibration, air, lamp")
+    wanted = DEFAULT_TARGET if target is None else target
+    limit = "asked for" if target is not None else "that are the limit without --target"
+    enough = known <= wanted
+    words = f"more than the {wanted * 1e6:.1f} um/m {limit}: {'' if enough else advice(f, wanted)}"
+    return CheckLine(what, value, enough, words)
+
+
+def _gauges(f: CheckFigures) -> Iterator[CheckLine]:
+    """Noise of the gauges and the mean: a test reports these, not one ZOI."""
+    for gauge in f.gauges:
+        name = f"noise of {gauge.name}" if gauge.name else "noise of the mean"
+        value = f"{gauge.sigma * 1e6:.1f} um/m predicted (burst of {f.burst})"
+        yield CheckLine(name, gauge.reason or value, not gauge.reason, "move it, or take smaller ZOIs")
+
+
+# -- advice on the strain noise -----------------------------------------------------------------
 
 
 def reaching(floors: Sequence[ZoiFloor], target: float) -> list[tuple[ZoiFloor, int]]:
-    """For each ZOI the shortest burst, and the lower order, whose noise is at most ``target``."""
+    """For each size of ZOI the shortest burst, at the lowest order, with a noise of at most ``target``."""
     found: dict[int, tuple[ZoiFloor, int]] = {}
     for floor in floors:
         for noise in floor.noises:
@@ -32,12 +291,12 @@ def reaching(floors: Sequence[ZoiFloor], target: float) -> list[tuple[ZoiFloor, 
 
 
 def advice(figures: CheckFigures, target: float) -> str:
-    """What to change so that one ZOI has at most the strain noise ``target`` (dimensionless)."""
+    """What to change for a strain noise of one ZOI of at most ``target`` (dimensionless)."""
     ways = list(_ways(figures, target))
     if ways:
         return ", or ".join(ways)
     if not figures.floors:
-        return "the table of the whole check says what reaches it"
+        return "the table of phasedic check shows what reaches it"
     return "nothing here reaches it: more contrast, a finer pattern, a closer or quieter camera, more light"
 
 
@@ -58,277 +317,25 @@ def _ways(figures: CheckFigures, target: float) -> Iterator[str]:
         return
     if not any(floor.zoi == figures.zoi for floor, _ in reaching(figures.floors, target)):
         yield from _longer(now, figures.burst, noise.known, target)
-    yield _light_advice(figures, (noise.known / target) ** 2)
+    yield _more_light(figures, (noise.known / target) ** 2)
 
 
 def _longer(floor: ZoiFloor, burst: int, noise: float, target: float) -> Iterator[str]:
-    """A burst that is not in the table; the noise of the reference sets a limit to it."""
+    """A burst beyond the table; the noise of the reference limits its effect."""
     one = noise**2 / (1 / floor.reference + 1 / burst)
     rest = target**2 / one - 1 / floor.reference
-    if rest > 1 / MOST_BURST:
+    if rest > 1 / MAX_BURST:
         yield f"burst {math.ceil(1 / rest)} with ZOI {floor.zoi}"
-    elif 2 * one / target**2 < MOST_BURST:
+    elif 2 * one / target**2 < MAX_BURST:
         both = math.ceil(2 * one / target**2)
         yield f"burst {both} and a reference of {both} with ZOI {floor.zoi}"
 
 
-def _light_advice(figures: CheckFigures, factor: float) -> str:
-    """Shot noise: twice the light, 1.4 times the signal-to-noise."""
-    room = FULL / max(figures.exposure.high, 1e-3)
+def _more_light(figures: CheckFigures, factor: float) -> str:
+    """More light or contrast; with shot noise, twice the light gives 1.4 times the signal-to-noise ratio."""
+    possible = FULL_LIGHT / max(figures.exposure.high, 1e-3)
     times = "twice" if 1.8 < factor < 2.2 else f"{factor:.1f} times"
-    if factor <= room:
+    if factor <= possible:
         return f"{times} the light or exposure"
-    need = math.sqrt(factor / max(room, 1.0))
-    return f"{need:.1f} times the contrast (light helps {room:.1f} times, then it saturates)"
-
-
-MOST_SATURATED, MOST_DARK, MOST_PILED = 1e-4, 0.01, 1e-3
-LEAST_LIGHT = 0.3  # of full scale, 99th percentile
-LEAST_CONTRAST = 0.05  # of full scale
-RADIUS_PX = (
-    0.9,
-    6.0,
-)  # 3 px of full width, the finest that the iDICs guide of good practice has: biased by 0.0003 px
-MOST_FLICKER, MOST_WITHOUT_PATTERN, LEAST_SHARP = 0.01, 0.02, 0.7
-MOST_NOISE_PX = 0.05  # of one ZOI in one frame
-HONEST = 1.5  # measured over predicted noise
-WITHOUT_TARGET = 1e-3
-"""Strain noise above which a check is no GO where no target is given: a steel yields at twice that."""
-
-
-@dataclass(frozen=True, slots=True)
-class CheckLine:
-    """One figure of the check, whether it is good enough, and what to do where it is not.
-
-    What is not ``told`` by the pictures there are is neither good nor bad.
-    """
-
-    what: str
-    value: str
-    good: bool = True
-    advice: str = ""
-    told: bool = True
-
-    def text(self) -> str:
-        """The line for a person."""
-        mark = "ok  " if self.told else "?   "
-        return f"{mark if self.good else 'LOOK'}  {self.what:<22} {self.value}" + (
-            "" if self.good or not self.advice else f"\n      -> {self.advice}"
-        )
-
-
-def judge(figures: CheckFigures, target: float | None = None, most_shift_px: float = 0.05) -> list[CheckLine]:
-    """All lines of the check.
-
-    Parameters
-    ----------
-    figures : CheckFigures
-    target : float or None
-        Strain noise of one ZOI that the test needs, dimensionless.
-    most_shift_px : float, px
-        Drift that is accepted.
-    """
-    return [
-        *_few(figures),
-        CheckLine("region", figures.region.words),
-        *_camera(figures),
-        *_light(figures),
-        *_pattern(figures),
-        *_motion(figures, most_shift_px),
-        *_load(figures),
-        _floor(figures, target),
-        *_gauges(figures),
-    ]
-
-
-def _few(f: CheckFigures) -> Iterator[CheckLine]:
-    if f.shots.few:
-        told = f"{len(f.shots)}, too few for what changes in time; the pattern is that of the first"
-        yield CheckLine("pictures", told)
-
-
-def _untold(f: CheckFigures, what: str) -> CheckLine:
-    return CheckLine(what, f"not told by {f.shots.said}: it takes {FEWEST} of the still specimen", told=False)
-
-
-def _camera(f: CheckFigures) -> Iterator[CheckLine]:
-    if f.shots.lost:
-        yield CheckLine("frames lost", f"{f.shots.lost} between {len(f.shots)}", False,
-                   "a lower frame rate, a smaller picture (--crop), another port or a faster machine")  # fmt: skip
-    automatic = ", ".join(f.automatic)
-    yield CheckLine("automatic controls", automatic or "none", not automatic, f"put on manual: {automatic}")
-    yield _bits(f)
-    told = "not seen from a still picture: it shows as strain once the specimen moves (--dark, --flat take it out)"
-    if f.removed is not None:
-        told = f"dark and flat took out {f.removed:.2f} GL; what is left is not seen from a still picture"
-    yield CheckLine("fixed pattern", told)
-
-
-def _bits(f: CheckFigures) -> CheckLine:
-    d = f.depth
-    value, words = f"{d.changing} of {d.stated} change", ""
-    if d.unused_below:
-        words = (
-            f"the lowest {d.unused_below} never change: choose a format with more real bits, or live with it"
-        )
-    if d.unused_above >= 2:
-        words = f"the highest {d.unused_above} are never used: more light, or say the true depth (files: bits=...)"
-        words += ", else saturation is not seen"
-    return CheckLine("bits", value, not words, words)
-
-
-def _light(f: CheckFigures) -> Iterator[CheckLine]:
-    e = f.exposure
-    yield CheckLine("light", f"1 % to 99 % of the pixels from {e.low:.0%} to {e.high:.0%} of full scale",
-               e.high >= LEAST_LIGHT, "under-exposed: more light, a longer exposure, or open the aperture")  # fmt: skip
-    yield CheckLine("saturated pixels", f"{e.saturated:.3%}", e.saturated <= MOST_SATURATED,
-               "less exposure or light, no glare")  # fmt: skip
-    if e.dark > MOST_DARK:
-        yield CheckLine("black pixels", f"{e.dark:.1%} at zero", False,
-                   "raise the black level of the camera, or the light: what is cut off is lost")  # fmt: skip
-    if e.piled > MOST_PILED:
-        yield CheckLine("clipped below the top", f"{e.piled:.1%} at one highest level", False,
-                   "saturated before the end of the scale: less light, or say the true depth (bits=...)")  # fmt: skip
-    yield _untold(f, "flicker") if f.shots.few else _flicker(f)
-    full = 2**f.shots.camera.bits - 1
-    shown = f"{f.noise:.2f} GL of one frame, {f.noise / full:.2%} of full scale"
-    if f.shots.few:
-        yield CheckLine("noise", f"{shown}, {_noise_from(f)}")
-        yield _untold(f, "noise in time")
-    else:
-        yield CheckLine("noise", shown, f.noise > 0, "every frame is the same: is this a live picture?")
-
-
-def _noise_from(f: CheckFigures) -> str:
-    return "as stated" if f.noise_stated else "as the spectrum of the picture has it"
-
-
-def _flicker(f: CheckFigures) -> CheckLine:
-    s = f.still.light
-    value = f"{s.rms:.2%} of the level, drift {s.drift:+.2%}"
-    words = "use a steady lamp, or an exposure of whole periods of the mains"
-    mains = mains_of(s, 2)
-    if mains is not None:
-        value += f": lamps on {mains:.0f} Hz mains ({2 * mains:.0f} Hz, seen at {s.frequency:.1f} Hz)"
-        words = f"a lamp on direct current, or an exposure of a multiple of {500 / mains:.1f} ms"
-    elif s.frequency is not None:
-        value += f", mainly at {s.frequency:.1f} Hz"
-    standing = [m for m in (50.0, 60.0) if s.rate and aliased(2 * m, s.rate) < 0.02 * s.rate]
-    if standing:
-        value += f" (at {s.rate:.3g} fps that of {standing[0]:.0f} Hz mains stands still and is not seen)"
-    return CheckLine("flicker", value, max(s.rms, abs(s.drift)) <= MOST_FLICKER or math.isnan(s.rms), words)
-
-
-def _pattern(f: CheckFigures) -> Iterator[CheckLine]:
-    full, z = 2**f.shots.camera.bits - 1, f.zois
-    contrast = median(z.contrast) / full
-    yield CheckLine("contrast (std)", f"{contrast:.1%} of full scale", contrast > LEAST_CONTRAST,
-               "more light, a longer exposure, or a pattern of blacker black and whiter white")  # fmt: skip
-    low, high = RADIUS_PX
-    words = "finer speckle or a wider field of view" if f.radius > high else "coarser speckle, or focus"
-    radius = f"{f.radius:.2f} px" if math.isfinite(f.radius) else "none is seen"
-    yield CheckLine("speckle radius", f"{radius} (best from 1.5 to 4)", low <= f.radius <= high, words)
-    yield _sharpness(f)
-    yield _sssig(f)
-    share, n = z.without_pattern, z.grid.n_active
-    yield CheckLine("ZOIs without pattern", "all" if share == 1 else f"{share:.1%} of {n}",
-               share <= MOST_WITHOUT_PATTERN,
-               "spray a pattern, set focus and exposure" if share == 1 else
-               "restrict them with --roi or --mask, or take larger ZOIs")  # fmt: skip
-
-
-def _sharpness(f: CheckFigures) -> CheckLine:
-    """Of the whole, and whether one side of the picture is softer: the camera or the specimen is tilted."""
-    values = f.zois.sharpness
-    rows, columns = values.shape
-    sides = {
-        "left": values[:, : columns // 2],
-        "right": values[:, (columns + 1) // 2 :],
-        "top": values[: rows // 2],
-        "bottom": values[(rows + 1) // 2 :],
-    }
-    of = {name: m for name, side in sides.items() if math.isfinite(m := median(side))}
-    value = f"{f.sharpness:.3f} 1/px"
-    if not of:
-        return CheckLine("sharpness", "no pattern is seen", False, "spray a pattern, set focus and exposure")
-    softest, sharpest = min(of, key=lambda k: of[k]), max(of, key=lambda k: of[k])
-    even = of[softest] >= LEAST_SHARP * of[sharpest]
-    text = f"{value}, {softest} {of[softest]:.3f}, {sharpest} {of[sharpest]:.3f}"
-    return CheckLine(
-        "sharpness", text, even, f"softer at the {softest}: set the camera square, close the aperture"
-    )
-
-
-def _sssig(f: CheckFigures) -> CheckLine:
-    known = f.zois.sssig[np.isfinite(f.zois.sssig)]
-    if not known.any():
-        return CheckLine("SSSIG of a ZOI", "none", False, "spray a pattern")
-    weak = float(np.percentile(known, 5))
-    px = math.sqrt(2) * f.noise / math.sqrt(max(weak, 1e-9))
-    value = f"median {np.median(known):.3g}, weakest 5 % {weak:.3g} GL^2/px^2 ({px:.4f} px in one frame)"
-    return CheckLine("SSSIG of a ZOI", value, px < MOST_NOISE_PX, "more contrast, larger ZOIs")
-
-
-def _motion(f: CheckFigures, most_px: float) -> Iterator[CheckLine]:
-    s = f.still
-    if f.shots.few:
-        yield from (_untold(f, what) for what in ("drift", "vibration"))
-        return
-    if not math.isfinite(s.drift_px):
-        yield CheckLine("drift", "not measured", f.zois.without_pattern < 1, "nothing can be followed")
-        return
-    strain = max((s.exx, s.eyy), key=lambda one: abs(one.drift))
-    yield CheckLine("drift", f"{s.drift_px:.4f} px and {strain.drift * 1e6:+.0f} um/m in {s.u.seconds:.3g} s",
-               s.drift_px <= most_px, "keep specimen and camera still")  # fmt: skip
-    shake = s.worse
-    yield CheckLine("vibration", f"{_seen(shake, 1, 'px', 4)}, {_seen(s.worse_strain, 1e6, 'um/m', 0)}",
-               shake.vibration <= most_px, "a stiffer tripod, a quiet floor, no fan on the bench")  # fmt: skip
-
-
-def _seen(s: Steadiness, unit: float, name: str, digits: int) -> str:
-    """A vibration, or that it is below what noise lets see; with its frequency."""
-    if not s.vibration > s.noise / 2:
-        return f"less than {s.noise * unit:.{digits}f} {name}"
-    text = f"{s.vibration * unit:.{digits}f} {name} rms"
-    if s.frequency is None:
-        return text
-    mains = mains_of(s, 1)
-    told = f", as {mains:.0f} Hz mains would" if mains is not None else ""
-    return f"{text}, mainly at {s.frequency:.1f} Hz{told}"
-
-
-def _load(f: CheckFigures) -> Iterator[CheckLine]:
-    if f.load is not None:
-        value = f"{f.load.rate:.4g} 1/s, noise {f.load.noise_N:.3g} N, mean {f.load.mean_N:.5g} N"
-        yield CheckLine("load cell", value, f.load.ready, "; ".join(f.load.remarks))
-
-
-def _floor(f: CheckFigures, target: float | None) -> CheckLine:
-    what = "strain noise"
-    noise = None if f.floor is None else f.floor.of(f.burst)
-    typical = median(f.zois.sigma)
-    if noise is None and not math.isfinite(typical):
-        words = "a larger region, smaller ZOIs, or a pattern"
-        return CheckLine(what, f"not measured: too few ZOIs of {f.zoi} px", False, words)
-    known = typical if noise is None else noise.known
-    told = f"{known * 1e6:.0f} um/m predicted"
-    if f.shots.few:
-        told += f" from the noise {_noise_from(f)}"
-    elif noise is not None:
-        told = f"{noise.known * 1e6:.0f} um/m measured, {noise.predicted * 1e6:.0f} predicted"
-    value = f"{told} (one ZOI of {f.zoi} px, burst of {f.burst})"
-    if noise is not None and noise.measured > HONEST * noise.predicted:
-        return CheckLine(what, value, False, "something moves or flickers: vibration, air, lamp")
-    wanted = WITHOUT_TARGET if target is None else target
-    asked = "asked for" if target is not None else "that are judged against where no --target is given"
-    enough = known <= wanted
-    words = f"more than the {wanted * 1e6:.1f} um/m {asked}: {'' if enough else advice(f, wanted)}"
-    return CheckLine(what, value, enough, words)
-
-
-def _gauges(f: CheckFigures) -> Iterator[CheckLine]:
-    """What is reported in the end is a gauge or a mean, not one ZOI."""
-    for gauge in f.gauges:
-        name = f"noise of {gauge.name}" if gauge.name else "noise of the mean"
-        value = f"{gauge.sigma * 1e6:.1f} um/m predicted (burst of {f.burst})"
-        yield CheckLine(name, gauge.reason or value, not gauge.reason, "move it, or take smaller ZOIs")
+    need = math.sqrt(factor / max(possible, 1.0))
+    return f"{need:.1f} times the contrast (light helps {possible:.1f} times, then it saturates)"

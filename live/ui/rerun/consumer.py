@@ -43,9 +43,9 @@ class RerunConsumer(Consumer):
             raise DataError(self._view.failed)
         self._view.show(measurement)
 
-    def settled(self, measurement: Measurement) -> None:
+    def matched(self, measurement: Measurement) -> None:
         """Offer a point of the curve."""
-        axial, _ = measurement.time_step.axial(self._run_state.history.axis_by_now)
+        axial, _ = measurement.time_step.axial(self._run_state.history.current_axis)
         self._view.point(axial, measurement.force)
 
     def load(self, sample: LoadSample) -> None:

@@ -24,7 +24,7 @@ from pathlib import Path
 
 from acquire.events import Level
 from acquire.signal_mask import blocked_signals
-from live.pipeline.latency import OUTPUT, yield_to_others
+from live.pipeline.latency import OUTPUT, lower_priority
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
 from live.ui.rerun.wire import Kind, Message, Reader, WireError, encoded
@@ -200,7 +200,7 @@ class Supervisor:
         self._thread.join(seconds + STUCK_S)
 
     def _run(self) -> None:
-        yield_to_others(OUTPUT)
+        lower_priority(OUTPUT)
         while not self._closing.is_set() and not self.failed:
             self._guarded(self._step)
         if self._renderer is not None or not self.starts:

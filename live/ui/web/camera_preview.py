@@ -15,7 +15,7 @@ from acquire.errors import DataError, PhasedicError
 from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
 from acquire.printable import brief, printable
-from live.pipeline.latency import OUTPUT, yield_to_others
+from live.pipeline.latency import OUTPUT, lower_priority
 from live.setup.devices import open_rig
 from live.ui.web.config_draft import ConfigDraft, at_rest
 
@@ -114,7 +114,7 @@ class CameraPreview:
             camera.stop()
 
     def _work(self) -> None:
-        yield_to_others(OUTPUT)
+        lower_priority(OUTPUT)
         while not self._closing.is_set():
             try:
                 self._preview()

@@ -108,7 +108,7 @@ def gauge(session: SetupSession, request: Request) -> None:
     if "points" in request:
         kind = request.get("kind", before.get("kind"))
         table = before | {"kind": kind, **_parameters_at(kind, request["points"])}
-        name = name or _free_name(GAUGE_KINDS[kind].usual, gauges)
+        name = name or _free_name(GAUGE_KINDS[kind].default_name, gauges)
     if not isinstance(name, str) or not isinstance(table, dict | None):
         raise ConfigError("a gauge has a name and a table")
     changes: dict[str, Any] = {}
@@ -125,7 +125,7 @@ def _parameters_at(kind: object, points: object) -> dict[str, Any]:
         raise ConfigError(f"there is no such kind of gauge; there are {', '.join(GAUGE_KINDS)}")
     if not are_points(points, 1, MAX_GAUGE_POINTS):
         raise ConfigError(f"a gauge has 1 to {MAX_GAUGE_POINTS} points, x and y in px")
-    return GAUGE_KINDS[kind].placed([(float(x), float(y)) for x, y in points])
+    return GAUGE_KINDS[kind].from_handles([(float(x), float(y)) for x, y in points])
 
 
 def _free_name(usual: str, taken: Container[str]) -> str:

@@ -69,7 +69,7 @@ class PageConsumer(Consumer):
 
     name = "page"
     policy = Policy.NEWEST
-    patience_s = 5.0
+    timeout_s = 5.0
 
     def __init__(
         self, broadcaster: Broadcaster, config: Config, now: Callable[[], float] = time.monotonic
@@ -110,13 +110,13 @@ class PageConsumer(Consumer):
         """Keep the newest measurement."""
         self._newest, self._fresh = measurement, True
 
-    def settled(self, measurement: Measurement) -> None:
+    def matched(self, measurement: Measurement) -> None:
         """Add a point of the curves."""
         i = measurement.time_step
         if math.isnan(self._t0):
             self._t0 = i.t
         running, first_axis = self._running, self._config.specimen.first_axis
-        axis = first_axis if running is None else running.run_state.history.axis_by_now
+        axis = first_axis if running is None else running.run_state.history.current_axis
         strains = [i.gauges[n].value if n in i.gauges else getattr(i, n, math.nan) for n in self._names]
         stress = i.force / (self._config.specimen.area_m2 or 1.0)
         self.curve.add([i.t - self._t0, stress, i.axial(axis)[0], *strains])

@@ -19,8 +19,8 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from acquire.errors import DeviceError
-from live.config.listen_address import listening
-from live.pipeline.latency import OUTPUT, yield_to_others
+from live.config.listen_address import listening_socket
+from live.pipeline.latency import OUTPUT, lower_priority
 from live.ui.web.authorization import HttpError, RequestGuard
 from live.ui.web.broadcaster import Broadcaster, json_bytes
 
@@ -166,7 +166,7 @@ class _Server(ThreadingHTTPServer):
     def server_bind(self) -> None:
         """Bind the configured port or one of the next."""
         self.socket.close()
-        self.socket = listening(HOST, int(self.server_address[1]), TRIES)
+        self.socket = listening_socket(HOST, int(self.server_address[1]), TRIES)
         self.server_address = self.socket.getsockname()
 
 
@@ -189,7 +189,7 @@ class _Handler(BaseHTTPRequestHandler):
     timeout = _TIMEOUT_S
 
     def setup(self) -> None:
-        yield_to_others(OUTPUT)
+        lower_priority(OUTPUT)
         super().setup()
 
     def log_message(self, format: str, *args: Any) -> None:

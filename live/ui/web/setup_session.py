@@ -25,12 +25,12 @@ from live.config.gauges import gauges_for
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
 from live.config.values import AUTO, GIVEN
-from live.pipeline.latency import OUTPUT, yield_to_others
-from live.pipeline.warm_up import kinds_of
+from live.pipeline.latency import OUTPUT, lower_priority
+from live.pipeline.warm_up import picture_kinds
 from live.results.maps.painting import overlay_cells
 from live.setup.check.check_list import CheckFigures, examine
 from live.setup.check.quick_check import QuickChecker
-from live.setup.check.verdict import CheckLine, judge
+from live.setup.check.verdict import CheckLine, check_lines
 from live.setup.compiling import compile_ahead
 from live.setup.grid import grid_for
 from live.setup.pictures import read_mask
@@ -269,7 +269,7 @@ class SetupSession:
     # -- the check ----------------------------------------------------------------------------
 
     def _work(self) -> None:
-        yield_to_others(OUTPUT)
+        lower_priority(OUTPUT)
         while not self._closing.is_set():
             try:
                 self._evaluate()
@@ -301,7 +301,7 @@ class SetupSession:
         edition, config = self._edition, self.config(Path(self._folder.name))
         if self._checked_for != (edition, config, info):
             self._checked_for, self._checker = (edition, config, info), QuickChecker(config)
-        self._keep_figures(self._checker.glance(frame_stack(frames, info)).figures)
+        self._keep_figures(self._checker.check(frame_stack(frames, info)).figures)
 
     def _compile(self, info: CameraInfo) -> None:
         """Compile in separate processes: the test that follows must load the kernel from its cache."""
@@ -311,7 +311,7 @@ class SetupSession:
             self.refresh()
 
         phase = self.draft.config.measure.estimator == "phase"
-        compile_ahead(kinds_of(info), phase=phase, say=report, stopped=self._closing.is_set)
+        compile_ahead(picture_kinds(info), phase=phase, say=report, stopped=self._closing.is_set)
         self._values["busy"] = ""
 
     def _begin(self, info: CameraInfo) -> None:
@@ -348,7 +348,7 @@ class SetupSession:
         folder, edition = Path(self._folder.name), self._edition
         config = self.config(folder)
         figures = examine(frame_stack(frames, info), config)
-        lines = [*judge(figures, None, config.measure.reference_shift_px), self._gauge_line(folder)]
+        lines = [*check_lines(figures, None, config.measure.reference_shift_px), self._gauge_line(folder)]
         self._keep_figures(figures)
         self._values["checking"] = False
         if edition == self._edition:  # else the region has changed meanwhile

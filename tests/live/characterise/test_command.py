@@ -62,7 +62,7 @@ def test_a_run_takes_up_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert [outcome.name for outcome in again] == ["fig1", "fig3"]
     run(["fig1"], replace(context, quick=False), screen)
     assert calls == ["fig1", "fig3", "fig1"]
-    assert "as it was" in screen.getvalue()
+    assert "stored" in screen.getvalue()
 
 
 def test_progress_is_a_bar_on_a_terminal_only() -> None:

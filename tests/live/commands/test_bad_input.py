@@ -1,7 +1,4 @@
-"""Bad input: a clear message and its exit code, no traceback, nothing lost.
-
-Every command shows an example that its own parser takes, and the shell can complete it.
-"""
+"""The command line: bad input gives a clear message and exit code; help shows valid examples; the shell completes."""
 
 from __future__ import annotations
 
@@ -37,18 +34,18 @@ def shots(tmp_path: Path) -> Path:
     return folder
 
 
-def refused(
-    capsys: pytest.CaptureFixture[str], code: int, says: str, *arguments: str, out: Path | None = None
+def check_refusal(
+    capsys: pytest.CaptureFixture[str], code: int, message: str, *arguments: str, out: Path | None = None
 ) -> None:
     extra = ["--out", str(out)] if out else []
     assert main([*arguments, *extra, "--no-view", "--no-rrd"]) == code
     error = capsys.readouterr().err
-    assert says in error
+    assert message in error
     assert "Traceback" not in error
 
 
 @pytest.mark.parametrize(
-    ("code", "says", "arguments"),
+    ("code", "message", "arguments"),
     [
         (2, "no camera is given", ["run"]),
         (3, "/dev/video77", ["run", "--camera", "/dev/video77"]),
@@ -64,11 +61,11 @@ def refused(
     ],
 )
 def test_arguments(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, code: int, says: str, arguments: list[str]
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, code: int, message: str, arguments: list[str]
 ) -> None:
     if "--section" in arguments:
-        says = "give width,thickness"
-    refused(capsys, code, says, *arguments, out=tmp_path / "out")
+        message = "give width,thickness"
+    check_refusal(capsys, code, message, *arguments, out=tmp_path / "out")
     assert not (tmp_path / "out" / "session.h5").exists()
 
 
@@ -81,10 +78,10 @@ def test_pictures_that_are_cut_off_or_of_another_size_are_left_out(
     (shots / "a_1.png").write_bytes(whole[: len(whole) // 2])
     out = tmp_path / "out"
     assert main(["replay", str(shots), "--zoi", "32", "--out", str(out), "--no-view", "--no-rrd"]) == 5
-    said = capsys.readouterr().out
-    assert "5 pictures: reference 1, measured 2, left out 2" in said
-    assert "a_1.png: not an image, or cut off" in said
-    assert "a_3.png is 128x90 uint8, but" in said
+    output = capsys.readouterr().out
+    assert "5 pictures: reference 1, measured 2, left out 2" in output
+    assert "a_1.png: not an image, or cut off" in output
+    assert "a_3.png is 128x90 uint8, but" in output
     with Strain.open(out / "strain.h5") as strain:
         assert strain.values["frame"].tolist() == [2, 4]
         assert strain.values["lost"].tolist() == [1, 1]
@@ -92,37 +89,41 @@ def test_pictures_that_are_cut_off_or_of_another_size_are_left_out(
 
 def test_a_reference_that_is_cut_off(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
     (shots / "a_0.png").write_bytes(b"no picture")
-    refused(capsys, 4, "a_0.png", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")
+    check_refusal(capsys, 4, "a_0.png", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")
 
 
 def test_a_zoi_larger_than_the_roi(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
     source = f"files:{shots}/*.png"
-    refused(capsys, 2, "ZOI", "replay", source, "--roi", "0,0,40,40", "--zoi", "64", out=tmp_path / "out")
+    check_refusal(
+        capsys, 2, "ZOI", "replay", source, "--roi", "0,0,40,40", "--zoi", "64", out=tmp_path / "out"
+    )
 
 
 def test_a_featureless_reference(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
     cv2.imwrite(str(shots / "a_0.png"), np.full((96, 128), 128, np.uint8))
-    refused(capsys, 4, "pattern", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")
+    check_refusal(capsys, 4, "pattern", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")
 
 
 def test_a_mask_of_another_size(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
     mask = tmp_path / "mask.png"
     cv2.imwrite(str(mask), np.full((10, 10), 255, np.uint8))
     source = f"files:{shots}/*.png"
-    refused(capsys, 4, "mask.png", "replay", source, "--mask", str(mask), "--zoi", "32", out=tmp_path / "out")
+    check_refusal(
+        capsys, 4, "mask.png", "replay", source, "--mask", str(mask), "--zoi", "32", out=tmp_path / "out"
+    )
 
 
 def test_foreign_and_truncated_sessions(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     foreign = tmp_path / "foreign.h5"
     with h5py.File(foreign, "w") as file:
         file["x"] = np.arange(3)
-    refused(capsys, 4, "foreign.h5", "replay", str(foreign), out=tmp_path / "out1")
+    check_refusal(capsys, 4, "foreign.h5", "replay", str(foreign), out=tmp_path / "out1")
     cut = tmp_path / "cut.h5"
     cut.write_bytes(foreign.read_bytes()[:700])
-    refused(capsys, 4, "cut.h5", "replay", str(cut), out=tmp_path / "out2")
+    check_refusal(capsys, 4, "cut.h5", "replay", str(cut), out=tmp_path / "out2")
     text = tmp_path / "text.h5"
     text.write_text("this is no HDF5 file")
-    refused(capsys, 4, "text.h5", "replay", str(text), out=tmp_path / "out3")
+    check_refusal(capsys, 4, "text.h5", "replay", str(text), out=tmp_path / "out3")
 
 
 @pytest.mark.parametrize("name", COMMANDS)
@@ -130,8 +131,8 @@ def test_the_help_ends_with_an_example_that_works(name: str, capsys: pytest.Capt
     with pytest.raises(SystemExit) as ended:
         main([name, "--help"])
     assert ended.value.code == 0
-    said = capsys.readouterr().out
-    assert f"example:\n  {EXAMPLES[name]}\n" in said
+    output = capsys.readouterr().out
+    assert f"example:\n  {EXAMPLES[name]}\n" in output
     words = shlex.split(EXAMPLES[name].partition(" > ")[0])
     assert words[:2] == ["phasedic", name]
     assert parse(words[1:])[1].command == name
@@ -152,11 +153,13 @@ def test_bash_completes(tmp_path: Path, typed: str, found: list[str]) -> None:
     (tmp_path / "shots").mkdir()
     (tmp_path / "phasedic.bash").write_text(script("bash"), encoding="utf-8")
     words = [*shlex.split(typed), *([""] if typed.endswith(" ") else [])]
-    asked = (
+    script_line = (
         f"source ./phasedic.bash; COMP_WORDS=({' '.join(map(shlex.quote, words))}); COMP_CWORD={len(words) - 1};"
         ' _shtab_phasedic; printf "%s\\n" "${COMPREPLY[@]}"'
     )
-    done = subprocess.run(["bash", "-c", asked], cwd=tmp_path, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        ["bash", "-c", script_line], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
     assert done.stderr == ""
     assert set(done.stdout.split()) == set(found)
 
@@ -164,8 +167,8 @@ def test_bash_completes(tmp_path: Path, typed: str, found: list[str]) -> None:
 @pytest.mark.parametrize("shell", SHELLS)
 def test_a_script_names_every_command(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["completion", shell]) == 0
-    said = capsys.readouterr().out
-    assert [name for name in COMMANDS if name not in said] == []
+    output = capsys.readouterr().out
+    assert [name for name in COMMANDS if name not in output] == []
 
 
 def test_the_shells_are_known_to_shtab() -> None:

@@ -33,9 +33,9 @@ def gauges_of_run(rig: Path, out: Path, *arguments: str) -> dict[str, np.ndarray
 
 def test_a_simulated_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rig = made(tmp_path, "--camera", SIM, "--section", "10,2", "--zoi", "32", "--burst", "2")
-    said = capsys.readouterr().out
-    assert "load cell: sim:" in said
-    assert "the specimen was found" in said
+    output = capsys.readouterr().out
+    assert "load cell: sim:" in output
+    assert "the specimen was found" in output
     config = load_config(rig, {})
     assert (config.measure.roi, config.measure.gauges, config.measure.zoi) == ("auto", "auto", 32)
     assert config.specimen.area_m2 == pytest.approx(20e-6)
@@ -132,14 +132,14 @@ def test_devices_are_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("acquire.v4l2.listing.list_cameras", lambda: cameras)
     monkeypatch.setattr("acquire.serial_line.ports.list_serial_ports", lambda: [port])
     monkeypatch.setattr("acquire.serial_line.identify.listen", lambda device: [(9600, b"1 N", finding)])
-    look = init.look
+    take_look = init.first_look
     opened = []
 
     def first_look(config, say):
         opened.append(config.camera.address)
-        return look(load_config(None, {"camera.address": SIM}), say)
+        return take_look(load_config(None, {"camera.address": SIM}), say)
 
-    monkeypatch.setattr(init, "look", first_look)
+    monkeypatch.setattr(init, "first_look", first_look)
     rig = made(tmp_path)
     assert opened == ["/dev/v4l/by-id/usb-Cam?format=Y12"]
     config = load_config(rig, {})

@@ -28,18 +28,18 @@ def interrupted(
 ) -> tuple[int, str, float]:
     """The command gets Ctrl-C with all of its group once it is ``ready``: exit code, words, and seconds since."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder / "cache"), "PYTHONPATH": str(ROOT)}
-    with (folder / "said.txt").open("w+", encoding="utf-8") as said:
+    with (folder / "output.txt").open("w+", encoding="utf-8") as output:
         process = subprocess.Popen(
-            [sys.executable, "-m", "live.cli", *words.split()], cwd=folder, env=environment, stdout=said,
+            [sys.executable, "-m", "live.cli", *words.split()], cwd=folder, env=environment, stdout=output,
             stderr=subprocess.STDOUT, text=True, process_group=0,
         )  # fmt: skip
         while not ready(process):
-            assert process.poll() is None, (folder / "said.txt").read_text(encoding="utf-8")
+            assert process.poll() is None, (folder / "output.txt").read_text(encoding="utf-8")
             time.sleep(0.01)
         os.killpg(process.pid, signal.SIGINT)
         began = time.monotonic()
         code = process.wait(60)
-    return code, (folder / "said.txt").read_text(encoding="utf-8"), time.monotonic() - began
+    return code, (folder / "output.txt").read_text(encoding="utf-8"), time.monotonic() - began
 
 
 @pytest.mark.slow
@@ -55,12 +55,12 @@ def test_while_the_loops_are_compiled(tmp_path: Path, words: str) -> None:
     def compiling(process: subprocess.Popen[str]) -> bool:
         return any("live.setup" in command_of(pid) for pid in children(process.pid))
 
-    code, said, seconds = interrupted(tmp_path, words, compiling)
-    assert code == 130, said
-    assert "interrupted while the loops were compiled" in said
-    assert "Traceback" not in said
-    assert "everything is compiled" not in said
-    assert "could not be kept" not in said
+    code, output, seconds = interrupted(tmp_path, words, compiling)
+    assert code == 130, output
+    assert "interrupted while the loops were compiled" in output
+    assert "Traceback" not in output
+    assert "everything is compiled" not in output
+    assert "could not be kept" not in output
     assert seconds < 20, "it went on compiling"
 
 
@@ -79,9 +79,9 @@ def test_while_workers_load(tmp_path: Path) -> None:
     def loading(process: subprocess.Popen[str]) -> bool:
         return any("live.replay.batch.worker" in command_of(pid) for pid in children(process.pid))
 
-    code, said, seconds = interrupted(tmp_path, "batch run/session.h5 --out out --workers 2", loading)
-    assert code == 130, said
-    assert "Traceback" not in said
+    code, output, seconds = interrupted(tmp_path, "batch run/session.h5 --out out --workers 2", loading)
+    assert code == 130, output
+    assert "Traceback" not in output
     assert seconds < 20, "it compiled first"
 
 

@@ -1,7 +1,4 @@
-"""load-check, identify, load-calibrate and recover, as a person uses them.
-
-The viewer that a page opens looks where the view really is.
-"""
+"""load-check, identify, load-calibrate and recover, as a person uses them; the viewer opens at the port of the view."""
 
 from __future__ import annotations
 
@@ -52,33 +49,33 @@ def bench() -> Iterator[Bench]:
 
 
 def test_load_check_says_ready(bench: Bench) -> None:
-    said: list[str] = []
+    lines: list[str] = []
     arguments = argparse.Namespace(load=f"{bench.server.path}?unit=N&baud=115200", seconds=1.0)
-    assert load_check.command(arguments, said.append) == 0
-    assert said[-1] == "ready" and any(line.startswith("rate") for line in said)
+    assert load_check.command(arguments, lines.append) == 0
+    assert lines[-1] == "ready" and any(line.startswith("rate") for line in lines)
 
 
 def test_load_check_of_a_silent_port_says_not_ready() -> None:
-    said: list[str] = []
+    lines: list[str] = []
     arguments = argparse.Namespace(load="loop://?unit=N&wait=0.2", seconds=0.2)
-    assert load_check.command(arguments, said.append) == 6
-    assert said[-1] == "not ready" and any("nothing came" in line for line in said)
+    assert load_check.command(arguments, lines.append) == 6
+    assert lines[-1] == "not ready" and any("nothing came" in line for line in lines)
 
 
 def test_identify_proposes_an_address_that_works(bench: Bench) -> None:
-    said: list[str] = []
+    lines: list[str] = []
     arguments = argparse.Namespace(device=bench.server.path, ask=False)
-    assert identify.command(arguments, said.append) == 0
-    assert any(line.startswith(f"use  --load '{bench.server.path}?protocol=ascii") for line in said)
+    assert identify.command(arguments, lines.append) == 0
+    assert any(line.startswith(f"use  --load '{bench.server.path}?protocol=ascii") for line in lines)
 
 
 def test_identify_without_asking_sends_nothing_and_gives_up(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(identify_module, "SPEEDS", (9600,))
     monkeypatch.setattr(identify_module.listen, "__kwdefaults__", {**LISTEN, "seconds": 0.2})
-    said: list[str] = []
+    lines: list[str] = []
     arguments = argparse.Namespace(device="loop://", ask=False)
-    assert identify.command(arguments, said.append) == 6
-    assert any("silence" in line for line in said) and "--ask" in said[-1]
+    assert identify.command(arguments, lines.append) == 6
+    assert any("silence" in line for line in lines) and "--ask" in lines[-1]
 
 
 LISTEN = dict(identify_module.listen.__kwdefaults__ or {})
@@ -86,10 +83,10 @@ LISTEN = dict(identify_module.listen.__kwdefaults__ or {})
 
 def calibrate(bench: Bench, folder: Path, accept: str, **known: float | None) -> tuple[int, list[str]]:
     loads = iter([0.0, 100.0, 0.0, 0.0])
-    said: list[str] = []
+    lines: list[str] = []
 
     def answer(question: str) -> str:
-        said.append(question)
+        lines.append(question)
         if question.startswith("accept"):
             return accept
         bench.load_N = next(loads)
@@ -99,13 +96,13 @@ def calibrate(bench: Bench, folder: Path, accept: str, **known: float | None) ->
         load=f"{bench.server.path}?unit=N&wait=1", out=str(folder / "cal.toml"), seconds=0.4,
         **{"mass": None, "force": None, **known},
     )  # fmt: skip
-    return load_calibrate.command(arguments, said.append, answer), said
+    return load_calibrate.command(arguments, lines.append, answer), lines
 
 
 def test_calibrating_with_a_known_force(bench: Bench, tmp_path: Path) -> None:
-    code, said = calibrate(bench, tmp_path, "yes", force=200.0)
+    code, lines = calibrate(bench, tmp_path, "yes", force=200.0)
     found = load(str(tmp_path / "cal.toml"))
-    assert code == 0 and "residual" in " ".join(said)
+    assert code == 0 and "residual" in " ".join(lines)
     assert found.gain == pytest.approx(2.0, rel=0.02) and len(found.points) == 3
 
 
@@ -126,10 +123,10 @@ def test_calibrating_needs_one_known_load(bench: Bench, tmp_path: Path) -> None:
 
 
 def test_recover(tmp_path: Path) -> None:
-    said: list[str] = []
+    lines: list[str] = []
     path = abandoned(tmp_path / "killed.h5")
-    assert recover.command(argparse.Namespace(session=str(path), out=None), said.append) == 0
-    assert "6 frames" in said[0] and (tmp_path / "killed.recovered.h5").exists()
+    assert recover.command(argparse.Namespace(session=str(path), out=None), lines.append) == 0
+    assert "6 frames" in lines[0] and (tmp_path / "killed.recovered.h5").exists()
 
 
 def test_the_port_that_is_told_is_the_one_that_is_served(tmp_path: Path) -> None:

@@ -1,7 +1,4 @@
-"""The configuration: what is read, what is refused, and what the refusal says.
-
-The rig file: what is changed, what is kept, and that a bad change leaves it as it was.
-"""
+"""The configuration and the rig file: accepted and refused values, messages, changes that keep comments."""
 
 from __future__ import annotations
 
@@ -58,8 +55,8 @@ def test_a_withdrawn_key_of_an_older_version_is_left_out(value: Any) -> None:
 
 
 def test_gauges_come_back_and_are_added_to() -> None:
-    said = {"gauges.axial": {"start": [10, 20.5], "end": [10, 90]}}
-    config = load_config(None, said)
+    values = {"gauges.axial": {"start": [10, 20.5], "end": [10, 90]}}
+    config = load_config(None, values)
     assert config.gauges["axial"]["start"] == (10.0, 20.5)
     stored = json.loads(json.dumps(config.as_dict()))
     assert from_dict(stored, {}, "a session") == config
@@ -72,7 +69,7 @@ def test_a_file_sets_only_what_it_says(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "says"),
+    ("text", "message"),
     [
         ("[measure]\nzio = 32\n", "measure.zio (did you mean zoi?)"),
         ("[mesure]\nzoi = 32\n", "[mesure] (did you mean measure?)"),
@@ -103,10 +100,10 @@ def test_a_file_sets_only_what_it_says(tmp_path: Path) -> None:
         ("[measure\n", "not valid TOML"),
     ],
 )
-def test_refusals_name_the_key_and_what_is_allowed(tmp_path: Path, text: str, says: str) -> None:
+def test_refusals_name_the_key_and_what_is_allowed(tmp_path: Path, text: str, message: str) -> None:
     with pytest.raises(ConfigError) as caught:
         load_config(written(tmp_path, text), {})
-    assert says in str(caught.value)
+    assert message in str(caught.value)
     assert "rig.toml" in str(caught.value)
 
 
@@ -148,7 +145,7 @@ def test_any_value_of_a_stored_key_is_taken_or_refused(value: Any) -> None:
 
 def test_a_region_that_nobody_has_looked_for_is_refused() -> None:
     config = load_config(None, {"measure.roi": "auto"})
-    with pytest.raises(ConfigError, match="looked for by run, check and replay"):
+    with pytest.raises(ConfigError, match="found by run, check and replay"):
         grid_for(config, 640, 480, None)
 
 
@@ -173,7 +170,7 @@ def test_lengths_in_mm() -> None:
 
 
 @pytest.mark.parametrize(
-    ("said", "says"),
+    ("values", "message"),
     [
         ({"measure.zoi": "3 mm"}, "measure.zoi = '3 mm' is not possible; allowed: px; for mm the scale"),
         ({"measure.zoi": "3 mm", "scale.mm_per_px": 1}, "a whole number from 8"),
@@ -186,9 +183,9 @@ def test_lengths_in_mm() -> None:
         ({"scale": 3}, "scale must be a section"),
     ],
 )
-def test_lengths_in_mm_that_cannot_be(said: dict[str, Any], says: str) -> None:
-    with pytest.raises(ConfigError, match=re.escape(says)):
-        from_dict(said if "scale" in said else {}, {} if "scale" in said else said, "here")
+def test_lengths_in_mm_that_cannot_be(values: dict[str, Any], message: str) -> None:
+    with pytest.raises(ConfigError, match=re.escape(message)):
+        from_dict(values if "scale" in values else {}, {} if "scale" in values else values, "here")
 
 
 TEXT = """# of the big frame
@@ -244,7 +241,7 @@ def test_a_new_file_is_made(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("changes", "says"),
+    ("changes", "message"),
     [
         ({"measure.zoi": 2}, "measure.zoi = 2 is not possible; allowed: a whole number from 8"),
         ({"measure.zio": 32}, "did you mean zoi?"),
@@ -253,10 +250,10 @@ def test_a_new_file_is_made(tmp_path: Path) -> None:
         ({"nothing.here": 1}, "unknown section"),
     ],
 )
-def test_what_is_not_possible_changes_nothing(rig: Path, changes: dict[str, Any], says: str) -> None:
+def test_what_is_not_possible_changes_nothing(rig: Path, changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ConfigError) as refused:
         write_rig(rig, changes)
-    assert says in str(refused.value)
+    assert message in str(refused.value)
     assert ".part" not in str(refused.value)
     assert rig.read_text() == TEXT
     assert [p.name for p in rig.parent.iterdir()] == ["rig.toml"]

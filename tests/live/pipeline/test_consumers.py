@@ -1,7 +1,4 @@
-"""The outputs: every consumer gets its share, as its policy says; a trouble in one stops that one alone.
-
-The example of a consumer of one's own does what it says.
-"""
+"""Consumers: each gets its data by its policy, and a failure of one stops only that one."""
 
 from __future__ import annotations
 
@@ -19,7 +16,7 @@ from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from examples.second_consumer import main
 from live.pipeline.consumer import Consumer, Policy
-from live.pipeline.consumer_thread import MOST_EVENTS, Outputs
+from live.pipeline.consumer_thread import MAX_EVENTS, Outputs
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.measurement import Measurement
@@ -27,8 +24,8 @@ from tests.live.fakes import frame
 from tests.live.made_up import START, make_loads, make_measurement
 
 
-class Keeper(Consumer):
-    """Keeps the numbers of what comes; waits to be let on, and fails where it is told to."""
+class RecordingConsumer(Consumer):
+    """Notes the numbers of its measurements; may wait, and may fail at one."""
 
     def __init__(self, **how: Any) -> None:
         self.rows: list[int] = []
@@ -62,12 +59,12 @@ def give(out: Outputs, numbers: Sequence[int]) -> None:
 
 @pytest.mark.parametrize("blocks", [True, False])
 def test_every_measurement_is_passed_on_and_kept(blocks: bool) -> None:
-    keeper = Keeper(policy=Policy.WAIT, blocks=blocks)
-    out, event_log = outputs(keeper)
+    taker = RecordingConsumer(policy=Policy.WAIT, blocks=blocks)
+    out, event_log = outputs(taker)
     give(out, range(100))
     out.end()
-    assert keeper.rows == list(range(100))
-    assert keeper.ended
+    assert taker.rows == list(range(100))
+    assert taker.ended
     assert [i.eyy for i in out.history.time_steps] == pytest.approx([1e-3] * 100)
     assert not out.failed
     assert not event_log.events()
@@ -81,19 +78,19 @@ def test_every_measurement_is_passed_on_and_kept(blocks: bool) -> None:
     ids=["newest wins", "bounded"],
 )
 def test_one_that_falls_behind_is_served_as_its_policy_says(policy: Policy, kept: list[int]) -> None:
-    keeper = Keeper(policy=policy, room=2)
-    keeper.go.clear()
-    out, _ = outputs(keeper)
+    taker = RecordingConsumer(policy=policy, queue_size=2)
+    taker.go.clear()
+    out, _ = outputs(taker)
     give(out, [0])
-    assert keeper.busy.wait(10)  # it has the first one in hand
+    assert taker.busy.wait(10)  # it has the first one in hand
     give(out, range(1, 10))  # returns at once
-    keeper.go.set()
+    taker.go.set()
     out.end()
-    assert keeper.rows == kept
-    assert out.reports[0].line() == "consumer: 3 measurements, 7 passed over; kept"
+    assert taker.rows == kept
+    assert out.reports[0].line() == "consumer: 3 measurements, 7 dropped; kept"
 
 
-class Putting(Keeper):
+class Putting(RecordingConsumer):
     """Puts something off, and asks to be asked again."""
 
     asked = 0
@@ -106,31 +103,31 @@ class Putting(Keeper):
 
 
 def test_one_that_puts_things_off_is_asked_when_nothing_comes() -> None:
-    keeper = Putting(policy=Policy.WAIT)
-    out, _ = outputs(keeper)
-    keeper.go.clear()
+    taker = Putting(policy=Policy.WAIT)
+    out, _ = outputs(taker)
+    taker.go.clear()
     out.add(make_measurement(0))
-    keeper.go.set()
-    assert keeper.busy.wait(10)
-    keeper.go.clear()
-    assert keeper.go.wait(10)  # it was asked, although nothing came
+    taker.go.set()
+    assert taker.busy.wait(10)
+    taker.go.clear()
+    assert taker.go.wait(10)  # it was asked, although nothing came
     out.end()
-    assert keeper.rows == [0]
+    assert taker.rows == [0]
 
 
 def test_one_that_waits_holds_the_measurement_up_and_loses_nothing() -> None:
-    keeper = Keeper(policy=Policy.WAIT, room=2)
-    keeper.go.clear()
-    out, _ = outputs(keeper)
+    taker = RecordingConsumer(policy=Policy.WAIT, queue_size=2)
+    taker.go.clear()
+    out, _ = outputs(taker)
     giver = threading.Thread(target=give, args=(out, range(10)))
     giver.start()
-    assert keeper.busy.wait(10)
+    assert taker.busy.wait(10)
     giver.join(0.2)
     assert giver.is_alive()
-    keeper.go.set()
+    taker.go.set()
     giver.join(10)
     out.end()
-    assert keeper.rows == list(range(10))
+    assert taker.rows == list(range(10))
 
 
 @pytest.mark.parametrize("blocks", [True, False])
@@ -139,8 +136,8 @@ def test_one_that_waits_holds_the_measurement_up_and_loses_nothing() -> None:
     [(DataError("strain.h5: the disk is full"), "the disk is full"), (TypeError("oops"), "by a defect")],
 )
 def test_a_failure_stops_one_consumer_alone(error: Exception, says: str, blocks: bool) -> None:
-    broken = Keeper(policy=Policy.WAIT, fails_at=3, error=error, vital=True, blocks=blocks)
-    sound = Keeper(policy=Policy.WAIT)
+    broken = RecordingConsumer(policy=Policy.WAIT, fails_at=3, error=error, critical=True, blocks=blocks)
+    sound = RecordingConsumer(policy=Policy.WAIT)
     out, event_log = outputs(broken, sound)
     give(out, range(200))
     out.end()
@@ -154,7 +151,7 @@ def test_a_failure_stops_one_consumer_alone(error: Exception, says: str, blocks:
 
 
 def test_a_failure_of_one_that_is_not_vital_is_a_warning() -> None:
-    out, event_log = outputs(Keeper(fails_at=0))
+    out, event_log = outputs(RecordingConsumer(fails_at=0))
     give(out, [0])
     out.end()
     assert not out.failed
@@ -162,27 +159,27 @@ def test_a_failure_of_one_that_is_not_vital_is_a_warning() -> None:
 
 
 def test_one_that_waits_and_fails_lets_the_measurement_go_on() -> None:
-    keeper = Keeper(policy=Policy.WAIT, room=1, fails_at=0)
-    keeper.go.clear()
-    out, _ = outputs(keeper)
+    taker = RecordingConsumer(policy=Policy.WAIT, queue_size=1, fails_at=0)
+    taker.go.clear()
+    out, _ = outputs(taker)
     giver = threading.Thread(target=give, args=(out, range(10)))
     giver.start()
-    assert keeper.busy.wait(10)
-    keeper.go.set()
+    assert taker.busy.wait(10)
+    taker.go.set()
     giver.join(10)
     assert not giver.is_alive()
     out.end()
 
 
 def test_one_that_is_stuck_is_left_behind() -> None:
-    keeper = Keeper(patience_s=0.05)
-    keeper.go.clear()
-    out, _ = outputs(keeper)
+    taker = RecordingConsumer(timeout_s=0.05)
+    taker.go.clear()
+    out, _ = outputs(taker)
     give(out, [0])
-    assert keeper.busy.wait(10)
+    assert taker.busy.wait(10)
     out.end()
     assert "left behind" in out.reports[0].line()
-    keeper.go.set()
+    taker.go.set()
 
 
 class Listener(Consumer):
@@ -191,7 +188,7 @@ class Listener(Consumer):
     name = "listener"
 
     def __init__(self) -> None:
-        self.seen: dict[str, list[Any]] = {"frame": [], "settled": [], "load": [], "event": []}
+        self.seen: dict[str, list[Any]] = {"frame": [], "matched": [], "load": [], "event": []}
         self.begun, self.go = threading.Event(), threading.Event()
 
     def begin(self) -> None:
@@ -201,8 +198,8 @@ class Listener(Consumer):
     def frame(self, frame: Any) -> None:
         self.seen["frame"].append(frame.index)
 
-    def settled(self, measurement: Measurement) -> None:
-        self.seen["settled"].append(measurement.force)
+    def matched(self, measurement: Measurement) -> None:
+        self.seen["matched"].append(measurement.force)
 
     def load(self, sample: LoadSample) -> None:
         self.seen["load"].append(sample)
@@ -212,31 +209,28 @@ class Listener(Consumer):
 
 
 def test_each_kind_reaches_those_who_define_it() -> None:
-    listener, keeper = Listener(), Keeper()
+    listener, taker = Listener(), RecordingConsumer()
     loads = make_loads(10.0, lambda t: 100.0 * t)
-    out, event_log = outputs(listener, keeper, loads=loads)
+    out, event_log = outputs(listener, taker, loads=loads)
     assert listener.begun.wait(10)
     assert out.wants_frames
-    assert not outputs(keeper)[0].wants_frames
+    assert not outputs(taker)[0].wants_frames
     give(out, [0, 1])
     for index in range(3):
         out.frame(frame(index))
     sample = LoadSample(START, 5.0, unit="kg")
     out.load(sample)
-    for k in range(MOST_EVENTS + 5):
-        event_log.tell(EventKind.NOTE, "operator", str(k))
+    for k in range(MAX_EVENTS + 5):
+        event_log.emit(EventKind.NOTE, "operator", str(k))
     listener.go.set()
     out.end()
     assert listener.seen["frame"] == [2]  # a camera waits for nobody: the newest wins
-    assert listener.seen["settled"] == pytest.approx([0.0, 10.0], abs=1e-6)
+    assert listener.seen["matched"] == pytest.approx([0.0, 10.0], abs=1e-6)
     assert listener.seen["load"] == [sample]
     assert listener.seen["event"][0] == "5"
-    assert len(listener.seen["event"]) == MOST_EVENTS
+    assert len(listener.seen["event"]) == MAX_EVENTS
     line = out.reports[0].line()
-    assert (
-        line
-        == "listener: 2 measurements; 1 frames, 2 passed over; 1 load samples; 1000 events, 5 passed over"
-    )
+    assert line == "listener: 2 measurements; 1 frames, 2 dropped; 1 load samples; 1000 events, 5 dropped"
 
 
 def test_it_sees_every_measurement_and_stands_in_the_report(

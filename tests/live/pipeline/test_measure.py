@@ -1,15 +1,4 @@
-"""The measuring path by itself: noise handed on, the reference renewed, by itself and on demand.
-
-The axis of the load as it is found while a test runs.
-
-The smear guard: warns once when it begins and says when it ends.
-
-The means of an instant: their bits belong to the values alone.
-
-A measurement waits for its force, but not for ever.
-
-Instants as columns: what goes in comes out, in little memory.
-"""
+"""The measuring path: noise, renewal of the reference, guards, means, force matching, and the history."""
 
 from __future__ import annotations
 
@@ -30,7 +19,6 @@ from analysis import KernelSettings, Roi, ZoiGrid
 from analysis.evaluate import GaugeValue
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
-from live.pipeline import history as module
 from live.pipeline.history import AxisFinder, History
 from live.pipeline.measure import NewReference, SmearGuard, measure
 from live.pipeline.measurement import HOLD_S, ForceMatching, TimeStep, ordered_mean
@@ -135,7 +123,7 @@ def time_steps(count: int) -> list[TimeStep]:
 
 @pytest.mark.parametrize("most", [2000, 50])
 def test_y_until_the_strains_tell(monkeypatch: pytest.MonkeyPatch, most: int) -> None:
-    monkeypatch.setattr(module, "MOST_INSTANTS", most)
+    monkeypatch.setattr("live.pipeline.history.MAX_KEPT", most)
     finder, course = AxisFinder("auto"), time_steps(300)
     told = [finder.add(i) for i in course]
     assert set(told[:100]) == {"y"} and set(told[130:]) == {"x"}
@@ -155,7 +143,7 @@ def test_smear_is_told_when_it_begins_and_ends() -> None:
     guard = SmearGuard(told.append)
     burst = burst_of([frame(0), frame(1)])
     for motion in (math.nan, 0.01, 0.2, 0.3, math.nan, 0.045, 0.06, 0.02, 0.01, 0.07):
-        guard.look(dataclasses.replace(burst, motion_px=motion))
+        guard.check(dataclasses.replace(burst, motion_px=motion))
     assert [event.level for event in told] == ["warning", "info", "warning"]
     assert "0.20 px during a burst of 2" in told[0].text
     assert told[0].data == {"motion_px": 0.2, "n": 2}
@@ -180,26 +168,26 @@ def test_the_mean_of_nothing_is_not_a_number() -> None:
 
 def test_a_measurement_waits_for_its_force() -> None:
     loads = make_loads(0.15, lambda t: 100.0 * t)
-    settling = ForceMatching(loads)
-    settled = [m for k in range(3) for m in settling.add(make_measurement(k))]
-    assert (len(settled), len(settling)) == (2, 1)
+    matching = ForceMatching(loads)
+    matched = [m for k in range(3) for m in matching.add(make_measurement(k))]
+    assert (len(matched), len(matching)) == (2, 1)
     for k in range(16, 40):
         loads.append(LoadSample(START + k / 100, float(k)))
-    settled += settling.add(make_measurement(3))
-    assert len(settling) == 0
-    np.testing.assert_allclose([m.force for m in settled], [0.0, 10.0, 20.0, 30.0], atol=1e-6)
-    assert [m.number for m in settled] == [0, 1, 2, 3]
+    matched += matching.add(make_measurement(3))
+    assert len(matching) == 0
+    np.testing.assert_allclose([m.force for m in matched], [0.0, 10.0, 20.0, 30.0], atol=1e-6)
+    assert [m.number for m in matched] == [0, 1, 2, 3]
 
 
 def test_a_silent_load_cell_holds_measurements_back_only_so_long() -> None:
-    settling, settled = ForceMatching(LoadLog()), []
+    matching, matched = ForceMatching(LoadLog()), []
     for k in range(40):
-        settled += settling.add(make_measurement(k))
-        assert len(settling) <= HOLD_S / 0.1 + 1
-    assert len(settled) == 40 - len(settling) > 10
-    settled += settling.rest()
-    assert len(settled) == 40
-    assert np.isnan([m.force for m in settled]).all()
+        matched += matching.add(make_measurement(k))
+        assert len(matching) <= HOLD_S / 0.1 + 1
+    assert len(matched) == 40 - len(matching) > 10
+    matched += matching.flush()
+    assert len(matched) == 40
+    assert np.isnan([m.force for m in matched]).all()
 
 
 NUMBERS = [one.name for one in fields(TimeStep) if one.name not in ("refused", "gauges")]

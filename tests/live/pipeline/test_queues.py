@@ -1,9 +1,4 @@
-"""Mailbox and buffer: newest wins, bounded, everything counted.
-
-A lost pace is told once, with its cause.
-
-A thread is made nicer alone.
-"""
+"""Queues between threads, the latency monitor, and the priority of threads."""
 
 from __future__ import annotations
 
@@ -14,8 +9,8 @@ import time
 
 import pytest
 
-from live.pipeline import queues as channels
-from live.pipeline.latency import LatencyMonitor, LatencySample, Use, used, yield_to_others
+from live.pipeline import queues
+from live.pipeline.latency import LatencyMonitor, LatencySample, ProcessorUse, lower_priority, processor_use
 from live.pipeline.queues import BoundedQueue, LatestQueue
 
 
@@ -89,7 +84,7 @@ def test_a_reader_who_never_catches_up_goes_on_with_the_newest() -> None:
 
 
 def test_a_slow_reader_is_not_kept_in_the_past(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(channels, "CATCH_UP_S", 0.05)
+    monkeypatch.setattr(queues, "CATCH_UP_S", 0.05)
     box: LatestQueue[int] = LatestQueue(at_first=50)
     for i in range(40):
         box.put(i)
@@ -147,13 +142,13 @@ def told(latency_s: float, *, backlog: float = 0.0, kernel_s: float = 0.01, othe
     """The warnings of some seconds of measurements, ``others`` and ``view`` in cores."""
     now = 0.0
 
-    def use() -> Use:
-        return Use(now, now * (1.0 + others + view), now * 1.0, now * view)
+    def use() -> ProcessorUse:
+        return ProcessorUse(now, now * (1.0 + others + view), now * 1.0, now * view)
 
     pace, warnings = LatencyMonitor(lambda: backlog, use), []
     for k in range(round(seconds * 30)):
         now = k * PERIOD_S
-        if words := pace.look(LatencySample(now, latency_s, kernel_s), PERIOD_S):
+        if words := pace.check(LatencySample(now, latency_s, kernel_s), PERIOD_S):
             warnings.append(words)
     assert pace.p95_s == pytest.approx(latency_s)
     return warnings
@@ -180,15 +175,15 @@ def test_a_lost_pace_is_told_once_with_its_cause(cause: dict[str, float], says: 
 
 
 def test_bursts_that_come_seldom_have_a_latency_and_no_warning() -> None:
-    pace = LatencyMonitor(lambda: 0.0, lambda: Use(0.0, 0.0, 0.0, 0.0))
-    assert [pace.look(LatencySample(2.0 * k, 9.0, 0.01), 2.0) for k in range(20)] == [""] * 20
+    pace = LatencyMonitor(lambda: 0.0, lambda: ProcessorUse(0.0, 0.0, 0.0, 0.0))
+    assert [pace.check(LatencySample(2.0 * k, 9.0, 0.01), 2.0) for k in range(20)] == [""] * 20
     assert pace.p95_s == pytest.approx(9.0)
 
 
 def test_the_bursts_that_waited_for_the_first_result_tell_nothing() -> None:
-    pace = LatencyMonitor(lambda: 0.0, lambda: Use(0.0, 0.0, 0.0, 0.0))
+    pace = LatencyMonitor(lambda: 0.0, lambda: ProcessorUse(0.0, 0.0, 0.0, 0.0))
     late = [max(0.8 - 0.3 * k * PERIOD_S, 0.02) for k in range(150)]
-    assert not any(pace.look(LatencySample(k * PERIOD_S, late[k], 0.01), PERIOD_S) for k in range(150))
+    assert not any(pace.check(LatencySample(k * PERIOD_S, late[k], 0.01), PERIOD_S) for k in range(150))
     assert pace.p95_s < 0.05
 
 
@@ -197,10 +192,10 @@ def test_it_is_told_again_when_it_lasts() -> None:
 
 
 def test_this_machine_says_who_uses_it() -> None:
-    before = used()
+    before = processor_use()
     assert before is not None
     sum(k * k for k in range(2_000_000))
-    after = used()
+    after = processor_use()
     assert after is not None
     assert after.own > before.own
     assert after.all >= before.all > 0
@@ -211,7 +206,7 @@ def test_only_the_calling_thread_becomes_nicer() -> None:
     found: list[int] = []
 
     def work() -> None:
-        yield_to_others(3)
+        lower_priority(3)
         found.append(os.getpriority(os.PRIO_PROCESS, threading.get_native_id()))
 
     before = os.getpriority(os.PRIO_PROCESS, 0)

@@ -1,4 +1,4 @@
-"""Where a test stands is the same wherever it is shown."""
+"""The state of a test is the same in every display."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_the_latency_on_page_and_status_line_is_that_of_the_monitor() -> None:
 def test_the_snapshot_of_a_run() -> None:
     run_state = loaded(800.0, 900.0)
     run_state.frame_counts.add(grabbed=5, lost=2, unrecorded=1)
-    run_state.alarms.put("a", "a: too much")
+    run_state.alarms.set("a", "a: too much")
     i = time_step(eyy=1e-3, sigma_eyy=2e-6)
     run_state.history.add(i)
     now = run_state.snapshot(5.0)

@@ -1,4 +1,4 @@
-"""The measure of strain is a setting; where small strains are false, a warning says so."""
+"""The measure of strain is a setting; where small strains are not valid, a warning names another."""
 
 from __future__ import annotations
 
@@ -83,5 +83,5 @@ def test_the_warning_comes_once_and_only_for_small_strains() -> None:
         told: list[Event] = []
         guard = StrainGuard(measure, told.append)  # type: ignore[arg-type]
         for number, one in enumerate(seen):
-            guard.look(one, number + 1.0)
+            guard.check(one, number + 1.0)
         assert [event.t for event in told] == times

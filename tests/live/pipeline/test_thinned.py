@@ -1,4 +1,4 @@
-"""A bounded history is even, and has the newest."""
+"""A thinned list is bounded and even, and has the newest item."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from hypothesis import strategies as st
 from live.pipeline.history import Thinned
 
 
-@given(most=st.integers(2, 30), count=st.integers(0, 500))
-def test_evenly_thinned_from_the_first_to_the_newest(most: int, count: int) -> None:
-    history: Thinned[int] = Thinned(most)
+@given(size=st.integers(2, 30), count=st.integers(0, 500))
+def test_evenly_thinned_from_the_first_to_the_newest(size: int, count: int) -> None:
+    history: Thinned[int] = Thinned(size)
     for item in range(count):
         history.append(item)
     stride = 2**history.halvings
     assert history.kept == list(range(0, count, stride))
-    assert len(history.kept) <= most and (stride == 1 or len(history.kept) > most // 2 - 1)
+    assert len(history.kept) <= size and (stride == 1 or len(history.kept) > size // 2 - 1)
     items = history.items()
     assert items[-1:] == ([count - 1] if count else []) and len(set(items)) == len(items)
 
 
-@pytest.mark.parametrize("most", [4, 5])
-def test_what_is_kept_stays_until_the_next_halving(most: int) -> None:
-    history: Thinned[int] = Thinned(most)
+@pytest.mark.parametrize("size", [4, 5])
+def test_what_is_kept_stays_until_the_next_halving(size: int) -> None:
+    history: Thinned[int] = Thinned(size)
     before: tuple[int, list[int]] = (0, [])
     for item in range(100):
         history.append(item)

@@ -1,4 +1,4 @@
-"""Forces from a CSV: what is written in the field's many ways is read, the rest refused in words."""
+"""Forces from a CSV: the usual formats are read, others are refused with a message."""
 
 from __future__ import annotations
 

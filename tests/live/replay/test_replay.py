@@ -1,14 +1,8 @@
-"""Reading ahead: the same items in order, bounded, errors in their place, an end that leaves no thread.
-
-What a replay keeps in memory: no picture longer than it is needed.
-
-A session recorded by an earlier version replays to the strain that it replayed to then.
+"""Replay: prefetch, memory, the results of an older recording, and parts of a session.
 
 ``recorded/session.h5`` was recorded by ``phasedic run`` on the simulated rig (sim:woven, 144 x 112 px,
-8 bit, 10 fps, bursts of 2) before the code was laid out in rooms; ``strain.npz`` is what its replay
---as-measured gave then. The last bits belong to a processor, a version of numba and one of the loops.
-
-A part of a session: the same bursts as in the whole, and nothing of the rest is read.
+8 bit, 10 fps, bursts of 2) with an earlier version; ``strain.npz`` is the result of its replay --as-measured
+then. The last bits depend on the processor, the version of numba and that of the loops.
 """
 
 from __future__ import annotations
@@ -36,14 +30,14 @@ from acquire.session import Session
 from analysis import numerics
 from live.cli import main
 from live.pipeline.measure import Tracker
-from live.replay.burst_index import burst_ends, places_of_frames
-from live.replay.source import ahead
+from live.replay.burst_index import burst_ends, index_of_frames
+from live.replay.source import prefetch
 from live.results import Strain
 
 
 def test_the_same_items_in_order() -> None:
-    assert list(ahead(range(100), room=3)) == list(range(100))
-    assert list(ahead([])) == []
+    assert list(prefetch(range(100), queue_size=3)) == list(range(100))
+    assert list(prefetch([])) == []
 
 
 def test_they_are_taken_while_one_is_worked_on_but_no_more_than_there_is_room() -> None:
@@ -56,7 +50,7 @@ def test_they_are_taken_while_one_is_worked_on_but_no_more_than_there_is_room() 
                 waiting.set()
             yield k
 
-    bursts = ahead(items(), room=3)
+    bursts = prefetch(items(), queue_size=3)
     assert next(bursts) == 0
     assert waiting.wait(10), "nothing was read ahead"
     assert max(taken) <= 5
@@ -69,7 +63,7 @@ def test_an_error_comes_after_what_was_well() -> None:
         yield 2
         raise OSError("the disk is gone")
 
-    bursts = ahead(items())
+    bursts = prefetch(items())
     assert [next(bursts), next(bursts)] == [1, 2]
     with pytest.raises(OSError, match="the disk is gone"):
         next(bursts)
@@ -82,7 +76,7 @@ def test_closing_it_ends_the_thread_and_the_source() -> None:
         while True:
             yield 0
 
-    bursts = ahead(items(), room=2)
+    bursts = prefetch(items(), queue_size=2)
     next(bursts)
     bursts.close()
     assert threading.active_count() == before
@@ -264,6 +258,6 @@ def test_times_are_those_of_the_bursts(recorded: Path) -> None:
     if recorded.parent.name != "all":
         pytest.skip("has no frames in a row")
     with Session.open(recorded) as session:
-        places, accumulator = places_of_frames(session, 2, 3), BurstAccumulator(3)
+        places, accumulator = index_of_frames(session, 2, 3), BurstAccumulator(3)
         bursts = [burst for frame in session.frames(3) if (burst := accumulator.add(frame))]
     assert places.t.tolist() == [burst.t for burst in bursts]

@@ -1,4 +1,4 @@
-"""What is asked of a replay is done, or refused in words and with its exit code."""
+"""The options of a replay work, or are refused with a message and an exit code."""
 
 from __future__ import annotations
 

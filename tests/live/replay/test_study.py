@@ -1,4 +1,4 @@
-"""``phasedic study``: noise as predicted, what is shown, and which setting it recommends."""
+"""``phasedic study``: the predicted noise, the strains, and the recommended setting."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ def test_of_a_hole(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     assert small["noise"] > 1.5 * middle["noise"] > 3 * large["noise"]
     assert [row["step"] for row in found] == [6, 8, 16]
     chosen = load_config(out / "measure.toml", {}).measure
-    told = capsys.readouterr().out
-    assert f"take {chosen.zoi} px ZOIs, step {chosen.step}" in told
+    printed = capsys.readouterr().out
+    assert f"take {chosen.zoi} px ZOIs, step {chosen.step}" in printed
     assert chosen.zoi < 64
     assert {path.name for path in (out / "figures").glob("*.svg")} == {"noise.svg", "strain.svg"}
 
@@ -51,8 +51,8 @@ def test_of_a_hole(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
 def test_windows_given_and_missing(session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["study", str(session), "--zoi", "48", "--roi", "all", "--out", str(tmp_path / "a")]
     assert main([*words, "--static", "0,2", "--loaded", "5,5.9"]) == 0
-    told = capsys.readouterr().out
-    assert "of the 1 settings" in told
+    printed = capsys.readouterr().out
+    assert "of the 1 settings" in printed
     assert main(words) == 2
     assert "exists already" in capsys.readouterr().err
     words[-1] = str(tmp_path / "b")

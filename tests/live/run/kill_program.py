@@ -1,4 +1,4 @@
-"""Kills whole runs of phasedic at random moments and looks at what they leave on the disk.
+"""Kills whole runs of phasedic at random moments and checks the files that they leave.
 
 ``python -m tests.live.run.kill_program [--kills 100] [--fps 100] [--replay 5]``
 """

@@ -1,7 +1,4 @@
-"""Alarms: when they come and go, what they do, and how soon.
-
-Everything at once in real time: gauges, alarm, outputs, orders; values against the truth, and replayed.
-"""
+"""Alarms: when they come on and go off, their actions and delay; and a run with all outputs in real time."""
 
 from __future__ import annotations
 
@@ -34,7 +31,7 @@ from tests.live.test_end_to_end import live_run
 
 
 def changes(alarm: Alarm, *values: float) -> list[bool]:
-    return [alarm.on for value in values if alarm.look(value)]
+    return [alarm.on for value in values if alarm.check(value)]
 
 
 def test_on_beyond_the_limit_and_off_when_back_by_the_hysteresis() -> None:
@@ -58,19 +55,19 @@ class Kept:
         self.lines.append(line)
 
 
-class Bench:
-    """A watch with readings and a machine that say what they are told."""
+class WatchSetup:
+    """An alarm watch with given channel values."""
 
     def __init__(self, *alarms: AlarmConfig) -> None:
         self.events: list[Event] = []
-        self.board, self.values, self.now = ActiveAlarms(), dict[str, float](), 100.0
+        self.active, self.values, self.now = ActiveAlarms(), dict[str, float](), 100.0
         self.rung, self.ended, self.sent = 0, list[str](), Kept()
         means = ActionMeans(self._ring, self.ended.append, [self.sent])  # type: ignore[list-item]
         self.watch = AlarmWatch(
             [Alarm(config, actions_of(config, means)) for config in alarms],
             None,
             self._machine,
-            self.board,
+            self.active,
             self.events.append,
             lambda: self.now,  # type: ignore[arg-type]
         )
@@ -81,7 +78,7 @@ class Bench:
     def _machine(self, now: float) -> Mapping[str, float]:
         return self.values
 
-    def look(self, **values: float) -> list[dict[str, Any]]:
+    def check(self, **values: float) -> list[dict[str, Any]]:
         self.values = values
         before = len(self.events)
         self.watch.idle()
@@ -89,15 +86,15 @@ class Bench:
 
 
 def test_what_comes_is_told_stands_on_the_board_and_goes() -> None:
-    bench = Bench(AlarmConfig(channel="silent_s", above=2.0, name="camera", line="HALT", end=True))
-    assert bench.look(silent_s=1.0) == []
-    assert bench.look(silent_s=2.5) == [
+    bench = WatchSetup(AlarmConfig(channel="silent_s", above=2.0, name="camera", line="HALT", end=True))
+    assert bench.check(silent_s=1.0) == []
+    assert bench.check(silent_s=2.5) == [
         {"alarm": "camera", "on": True, "value": 2.5, "line": "HALT", "end": True}
     ]
-    assert bench.look(silent_s=3.0) == []
-    assert bench.board.texts == ("camera: silent_s is 2.5",)
-    assert bench.look(silent_s=0.1) == [{"alarm": "camera", "on": False, "value": 0.1}]
-    assert bench.board.texts == ()
+    assert bench.check(silent_s=3.0) == []
+    assert bench.active.texts == ("camera: silent_s is 2.5",)
+    assert bench.check(silent_s=0.1) == [{"alarm": "camera", "on": False, "value": 0.1}]
+    assert bench.active.texts == ()
     assert [event.level for event in bench.events] == ["warning", "info"]
     assert bench.watch.end() == "1 came"
     assert (bench.rung, bench.ended) == (1, ["ALARM camera: silent_s is 2.5"])
@@ -105,8 +102,8 @@ def test_what_comes_is_told_stands_on_the_board_and_goes() -> None:
 
 
 def test_an_alarm_does_only_what_it_is_asked_for() -> None:
-    bench = Bench(AlarmConfig(channel="silent_s", above=2.0))
-    bench.look(silent_s=3.0)
+    bench = WatchSetup(AlarmConfig(channel="silent_s", above=2.0))
+    bench.check(silent_s=3.0)
     assert (bench.rung, bench.ended, bench.sent.lines) == (1, [], [])
 
 
@@ -116,23 +113,23 @@ def test_every_key_of_an_alarm_is_what_it_looks_at_or_an_action() -> None:
 
 
 def test_an_action_that_fails_keeps_nothing_else_from_being_done() -> None:
-    bench = Bench(AlarmConfig(channel="silent_s", above=2.0, line="HALT", end=True))
+    bench = WatchSetup(AlarmConfig(channel="silent_s", above=2.0, line="HALT", end=True))
     bench.sent.post = lambda line: 1 / 0  # type: ignore[method-assign, assignment, return-value]
-    bench.look(silent_s=3.0)
+    bench.check(silent_s=3.0)
     failed, came = bench.events
     assert failed.level == "error" and "SendLine of an alarm failed: ZeroDivisionError" in failed.text
     assert came.data["on"] is True and bench.ended == [came.text]
 
 
 def test_a_silenced_alarm_comes_again_only_after_it_has_gone() -> None:
-    bench = Bench(AlarmConfig(channel="silent_s", above=2.0))
-    bench.look(silent_s=3.0)
-    assert bench.board.silence() == ("silent_s above 2",)
-    bench.look(silent_s=4.0)
-    assert bench.board.texts == ()
-    bench.look(silent_s=1.0)
-    bench.look(silent_s=3.0)
-    assert len(bench.board.texts) == 1
+    bench = WatchSetup(AlarmConfig(channel="silent_s", above=2.0))
+    bench.check(silent_s=3.0)
+    assert bench.active.silence() == ("silent_s above 2",)
+    bench.check(silent_s=4.0)
+    assert bench.active.texts == ()
+    bench.check(silent_s=1.0)
+    bench.check(silent_s=3.0)
+    assert len(bench.active.texts) == 1
 
 
 def test_the_vital_signs() -> None:
@@ -178,7 +175,7 @@ REAL = "sim:uniform?seconds=4&fps=20&buffers=64&width=224&height=192&bits=12"
 
 
 def test_from_the_stamp_of_the_frame_to_the_action_within_two_measurement_periods(tmp_path: Path) -> None:
-    """In real time; the alarm ends the run, stands in the session, and is silenced by an order."""
+    """In real time; the alarm ends the run, is in the session, and is silenced by a command."""
     alarms = ({"channel": "axial", "above": 0.0005}, {"channel": "force_N", "above": 3000.0, "end": True})
     said: list[str] = []
 
@@ -208,7 +205,7 @@ GAUGES = {
 
 def test_a_test_with_all_that_there_is(tmp_path: Path) -> None:
     folder, again, port, serial = tmp_path / "run", tmp_path / "again", free_port(), PtyPort()
-    orders, listeners, answers = (
+    controls, listeners, answers = (
         ControlPort("0", None, TerminalScreen(quiet=True)),
         list[Listener](),
         list[str](),
@@ -218,7 +215,7 @@ def test_a_test_with_all_that_there_is(tmp_path: Path) -> None:
         if m.number == 3:
             listeners.append(Listener(port))
         if m.number == 20:
-            caller = Caller(orders.open(live))
+            caller = Caller(controls.open(live))
             answers.extend(caller.ask(line) for line in ("note half way", "start", "alarm off"))
             caller.close()
 
@@ -238,7 +235,7 @@ def test_a_test_with_all_that_there_is(tmp_path: Path) -> None:
         }  # fmt: skip
         outcome = live_run(folder, CAMERA, each=order, **more)
         first = json.loads(udp.recv(1000))
-    orders.close()
+    controls.close()
     listeners[0].join(5)
     got = [said for _, said in listeners[0].got]
     assert len(got) > 40 and first["gauge_axial"] is not None

@@ -1,9 +1,4 @@
-"""One grammar of orders, whoever gives them: a line, an answer in a line.
-
-Orders over TCP: the same words, answered in a line.
-
-Tare as an order: never by one key under load in mid-test.
-"""
+"""Commands and their answers: the grammar, the TCP port, and tare, which is never done by one key under load."""
 
 from __future__ import annotations
 
@@ -27,7 +22,7 @@ from live.run.control import (
     UNDO,
     ControlPort,
     ControlRefused,
-    TareControls,
+    TareControl,
     answer,
 )
 from live.ui.terminal.screen import TerminalScreen
@@ -35,7 +30,7 @@ from tests.live.run.test_tcp_lines import WORD, Caller
 
 
 class FakeLive:
-    """Notes what it is asked; refuses what ``refuses`` says."""
+    """Notes its commands; refuses with the reason ``refuses``."""
 
     def __init__(self, refuses: str = "", says: str = "") -> None:
         self.calls: list[Any] = []
@@ -121,7 +116,7 @@ def test_orders_are_carried_out_and_answered() -> None:
     asked = [caller.ask(line) for line in ("pause", "note slipped", "nonsense", "quit")]
     assert asked[:2] == ["ok", "ok"] and asked[2].startswith("no: ") and asked[3] == "ok"
     assert live.calls == [(EventKind.PAUSE, ""), (EventKind.NOTE, "slipped"), ("stop", ENDED)]
-    assert "orders are taken at 127.0.0.1:" in said.getvalue()
+    assert "commands are taken at 127.0.0.1:" in said.getvalue()
     caller.close()
     port.close()
     port.close()
@@ -159,36 +154,36 @@ class FakeCell:
         self.calls.append("undo")
 
 
-class Bench:
-    """Orders on a cell that shows a force; ``measured`` says whether the test is on."""
+class TareSetup:
+    """Tare commands on a cell with a force; ``measured``: whether the test has begun."""
 
     def __init__(
         self, force: float = 800.0, *, measured: bool = True, capacity_N: float | None = None
     ) -> None:
         self.now, self.cell, self.told = 10.0, FakeCell(capacity_N), list[tuple[EventKind, Level, str]]()
         sample = LoadSample(10.0, force)
-        self.orders = TareControls(self.cell, lambda: measured, lambda: sample, self._tell, lambda: self.now)
+        self.orders = TareControl(self.cell, lambda: measured, lambda: sample, self._tell, lambda: self.now)
 
     def _tell(self, kind: EventKind, source: str, text: str, level: Level) -> None:
         self.told.append((kind, level, text))
 
     def refused(self) -> str:
-        """Why an order to tare is not carried out."""
+        """The reason why a tare command is refused."""
         with pytest.raises(ControlRefused) as refused:
-            self.orders.order()
+            self.orders.tare()
         return str(refused.value)
 
 
 def test_under_load_in_mid_test_it_takes_two() -> None:
-    bench = Bench()
+    bench = TareSetup()
     assert "800 N in mid-test" in bench.refused() and bench.cell.calls == [] and not bench.told
     bench.now += 2.9
-    bench.orders.order()
+    bench.orders.tare()
     assert bench.cell.calls == ["tare"] and bench.told[-1][0] is EventKind.TARE
 
 
 def test_a_late_second_order_is_a_first_one() -> None:
-    bench = Bench()
+    bench = TareSetup()
     for _ in range(4):
         bench.refused()
         bench.now += 3.1
@@ -196,49 +191,49 @@ def test_a_late_second_order_is_a_first_one() -> None:
 
 
 def test_a_third_order_asks_again() -> None:
-    bench = Bench()
+    bench = TareSetup()
     bench.refused()
-    bench.orders.order()
+    bench.orders.tare()
     bench.refused()
     assert bench.cell.calls == ["tare"]
 
 
 @pytest.mark.parametrize(("force", "capacity_N"), [(0.0, None), (0.9, 1000.0)])
 def test_without_load_one_order_is_enough(force: float, capacity_N: float | None) -> None:
-    bench = Bench(force, capacity_N=capacity_N)
-    bench.orders.order()
+    bench = TareSetup(force, capacity_N=capacity_N)
+    bench.orders.tare()
     assert bench.cell.calls == ["tare"]
 
 
 def test_before_the_test_one_order_is_enough() -> None:
-    bench = Bench(measured=False)
-    bench.orders.order()
+    bench = TareSetup(measured=False)
+    bench.orders.tare()
     assert bench.cell.calls == ["tare"]
 
 
 def test_a_load_that_is_not_known_is_not_none() -> None:
-    bench = Bench(math.nan)
+    bench = TareSetup(math.nan)
     assert "an unknown load" in bench.refused() and bench.cell.calls == []
 
 
 def test_without_a_load_cell_there_is_nothing_to_tare() -> None:
-    bench = Bench()
+    bench = TareSetup()
     bench.cell = FakeCell(None, "none")
-    bench.orders = TareControls(bench.cell, lambda: False, lambda: None, bench._tell, lambda: bench.now)
+    bench.orders = TareControl(bench.cell, lambda: False, lambda: None, bench._tell, lambda: bench.now)
     assert "no load cell" in bench.refused()
 
 
 def test_forced_and_undone_at_once() -> None:
-    bench = Bench()
-    bench.orders.order(FORCED)
-    bench.orders.order(UNDO)
+    bench = TareSetup()
+    bench.orders.tare(FORCED)
+    bench.orders.tare(UNDO)
     assert bench.cell.calls == ["forced", "undo"]
     assert [kind for kind, *_ in bench.told] == [EventKind.TARE] * 2
 
 
 def test_an_undoing_is_no_confirmation() -> None:
-    bench = Bench()
+    bench = TareSetup()
     bench.refused()
-    bench.orders.order(UNDO)
+    bench.orders.tare(UNDO)
     bench.refused()
     assert bench.cell.calls == ["undo"]

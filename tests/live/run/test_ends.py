@@ -1,7 +1,4 @@
-"""A disk that takes no more: results and recording stop, the program goes on, and what was written is readable.
-
-Signals at any time end a run cleanly; a lost terminal does not end it.
-"""
+"""The end of a run: by a full disk, by a signal or by a lost terminal; what was written is readable."""
 
 from __future__ import annotations
 

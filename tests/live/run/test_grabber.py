@@ -1,10 +1,6 @@
-"""The grab thread: reference first, then bursts; every frame has one fate.
+"""The grab thread: reference first, then bursts; every frame is counted once, also under disturbances.
 
-A reference that cannot be measured is not a still one.
-
-What disturbs a test is counted, and over within a second; what could be recorded is recorded.
-
-At small scale, with the camera from memory; docs/data/disturbances.csv has what the same did at full scale.
+The disturbances are at small scale with the camera from memory; docs/data/disturbances.csv has them at full scale.
 """
 
 from __future__ import annotations
@@ -75,7 +71,7 @@ def test_reference_then_bursts() -> None:
     assert frame_counts.adds_up
 
 
-def test_gaps_and_damage_are_left_out_and_told() -> None:
+def test_gaps_and_damage_are_left_out_and_emit() -> None:
     frames = [frame(i) for i in range(5)] + [frame(8, lost=3), frame(9), frame(10, damaged=True), frame(11)]
     _, bursts, frame_counts, event_log, _ = grabbed(ListCamera(frames), reference=1)
     assert [(b.first_index, b.last_index) for b in bursts] == [(1, 2), (3, 4), (8, 9)]

@@ -1,4 +1,4 @@
-"""The operator's keys: a line is an order, what is refused is told."""
+"""The keys of the operator: each is a command, and a refusal is shown."""
 
 from __future__ import annotations
 
@@ -88,9 +88,9 @@ def test_other_keys_are_answered_with_the_keys_and_arrows_with_nothing() -> None
 
 
 def test_a_true_terminal_gives_single_keys_and_is_put_back_as_it_was() -> None:
-    """In a program of its own, since a terminal has one foreground."""
+    """In its own process, since a terminal has one foreground process."""
     program = (
-        "import sys, termios; from live.run import listen; from live.pipeline import TerminalScreen;"
+        "import sys, termios; from live.run.keyboard import listen; from live.ui.terminal.screen import TerminalScreen;"
         "from tests.live.run.test_control import FakeLive; live = FakeLive();"
         "before = termios.tcgetattr(0); k = listen(live, sys.stdin, TerminalScreen());"
         "during = termios.tcgetattr(0)\n"
@@ -123,7 +123,7 @@ def test_a_true_terminal_gives_single_keys_and_is_put_back_as_it_was() -> None:
 def test_a_terminal_gives_single_keys_again_after_ctrl_z() -> None:
     """The test is the shell: stops the program, has lines itself, and lets it go on."""
     program = (
-        "import sys, time; from live.run import listen; from live.pipeline import TerminalScreen;"
+        "import sys, time; from live.run.keyboard import listen; from live.ui.terminal.screen import TerminalScreen;"
         "from tests.live.run.test_control import FakeLive; live = FakeLive();"
         "k = listen(live, sys.stdin, TerminalScreen())\n"
         "while not live.calls: time.sleep(0.01)\n"
@@ -134,7 +134,7 @@ def test_a_terminal_gives_single_keys_again_after_ctrl_z() -> None:
     if child == 0:
         os.execv(sys.executable, [sys.executable, "-c", program])
     lines = termios.tcgetattr(master)
-    heard(master, b"keys: ")
+    wait_for(master, b"keys: ")
     assert not has_lines(master)
     os.kill(child, signal.SIGSTOP)
     os.waitpid(child, os.WUNTRACED)
@@ -145,7 +145,7 @@ def test_a_terminal_gives_single_keys_again_after_ctrl_z() -> None:
         assert time.monotonic() < until
         time.sleep(0.02)
     os.write(master, b"r")
-    heard(master, b"CALLS new-reference")
+    wait_for(master, b"CALLS new-reference")
     os.waitpid(child, 0)
     os.close(master)
 
@@ -155,8 +155,8 @@ def has_lines(master: int) -> bool:
     return bool(termios.tcgetattr(master)[3] & termios.ICANON)
 
 
-def heard(master: int, words: bytes) -> None:
-    """Wait until a program has said them."""
+def wait_for(master: int, words: bytes) -> None:
+    """Wait for the output ``words``."""
     got, until = b"", time.monotonic() + 30
     while words not in got:
         assert time.monotonic() < until, got

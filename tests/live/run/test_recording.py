@@ -1,7 +1,4 @@
-"""The recorder: takes everything, counts what it cannot write, and never ends a test.
-
-The gate before the recorder: what passes, what is kept, in which order, and that every frame is counted.
-"""
+"""The recorder and the pre-trigger buffer: what is recorded, in which order, and that every frame is counted."""
 
 from __future__ import annotations
 
@@ -139,7 +136,7 @@ class FakeRecorder:
         self.given.append("closed")
 
 
-class Bench:
+class RecordingSetup:
     """A gate with frames of 24 bytes, ten a second."""
 
     def __init__(
@@ -150,9 +147,9 @@ class Bench:
             self.recorder, self.frame_counts, EventLog(), PreTrigger(seconds, most, above_N), on=on
         )
 
-    def frames(self, *indices: int, needed: bool = False) -> None:
+    def frames(self, *indices: int, is_reference: bool = False) -> None:
         for index in indices:
-            self.pre_trigger.frame(frame(index), needed=needed)
+            self.pre_trigger.frame(frame(index), is_reference=is_reference)
 
     def measured(self, first: int, last: int) -> None:
         self.pre_trigger.event(
@@ -172,16 +169,16 @@ class Bench:
 
 
 def test_what_came_a_little_before_goes_first_and_in_order() -> None:
-    bench = Bench()
+    bench = RecordingSetup()
     bench.frames(*range(10))
     bench.pre_trigger.sample(LoadSample(0.9, 5.0))  # the load is recorded all the time
     bench.frames(10)
     assert bench.given == [("load", 5.0)]
-    assert bench.pre_trigger.order(START) == "with 6 before"
+    assert bench.pre_trigger.command(START) == "with 6 before"
     bench.frames(11)
     assert bench.given == [("load", 5.0), 5, 6, 7, 8, 9, 10, 11]
     assert bench.frame_counts.thinned == 5
-    bench.pre_trigger.order(STOP)
+    bench.pre_trigger.command(STOP)
     bench.frames(12, 13)
     bench.pre_trigger.close({})
     assert bench.given[-2:] == [11, "closed"]
@@ -189,32 +186,32 @@ def test_what_came_a_little_before_goes_first_and_in_order() -> None:
 
 
 def test_what_is_kept_is_bounded_in_bytes() -> None:
-    bench = Bench(60, most=24 * 3 + 10)
+    bench = RecordingSetup(60, most=24 * 3 + 10)
     bench.frames(*range(8))
-    bench.pre_trigger.order(START)
+    bench.pre_trigger.command(START)
     assert bench.given == [5, 6, 7] and bench.frame_counts.thinned == 5
 
 
 def test_a_reference_passes_a_shut_gate() -> None:
-    bench = Bench()
+    bench = RecordingSetup()
     bench.frames(0, 1)
-    bench.frames(2, 3, needed=True)
+    bench.frames(2, 3, is_reference=True)
     bench.pre_trigger.event(Event(0.3, EventKind.REFERENCE, "m", "", "info", {"first": 2, "last": 3, "n": 2}))
     bench.frames(4)
-    bench.pre_trigger.order(START)
+    bench.pre_trigger.command(START)
     assert bench.given == [2, 3, ("reference", 2), 4] and bench.frame_counts.thinned == 2
 
 
 def test_measured_bursts_are_told_where_their_frames_are_recorded_whole() -> None:
-    bench = Bench(0.25)
-    bench.frames(0, 1, needed=True)
+    bench = RecordingSetup(0.25)
+    bench.frames(0, 1, is_reference=True)
     bench.frames(*range(2, 9))
     for first in (2, 5, 6):
         bench.measured(first, first + 1)
-    bench.pre_trigger.order(START)
+    bench.pre_trigger.command(START)
     bench.frames(9)
     bench.measured(8, 9)
-    bench.pre_trigger.order(STOP)
+    bench.pre_trigger.command(STOP)
     bench.measured(7, 8)  # after the end, but its frames are there
     bench.frames(10)
     bench.measured(9, 10)
@@ -222,10 +219,10 @@ def test_measured_bursts_are_told_where_their_frames_are_recorded_whole() -> Non
 
 
 def test_with_nothing_kept_no_burst_from_before_is_told() -> None:
-    bench = Bench(most=10)
-    bench.frames(0, needed=True)
+    bench = RecordingSetup(most=10)
+    bench.frames(0, is_reference=True)
     bench.frames(1, 2, 3)
-    bench.pre_trigger.order(START)
+    bench.pre_trigger.command(START)
     bench.given.clear()
     bench.measured(1, 2)
     bench.frames(4, 5)
@@ -235,30 +232,30 @@ def test_with_nothing_kept_no_burst_from_before_is_told() -> None:
 
 
 def test_a_force_opens_it_once() -> None:
-    bench = Bench(above_N=10.0)
+    bench = RecordingSetup(above_N=10.0)
     for force in (9.0, math.nan, -11.0):
         assert not bench.pre_trigger.on
         bench.pre_trigger.sample(LoadSample(0.1, force))
     assert bench.pre_trigger.on and bench.given[-1] == ("load", -11.0)
-    bench.pre_trigger.order(STOP)
+    bench.pre_trigger.command(STOP)
     bench.pre_trigger.sample(LoadSample(0.2, 99.0))
     assert not bench.pre_trigger.on
 
 
 def test_an_order_that_changes_nothing_is_refused() -> None:
-    bench = Bench(on=True)
+    bench = RecordingSetup(on=True)
     with pytest.raises(ControlRefused, match="already"):
-        bench.pre_trigger.order(START)
-    bench.pre_trigger.order(STOP)
+        bench.pre_trigger.command(START)
+    bench.pre_trigger.command(STOP)
     with pytest.raises(ControlRefused, match="not recording"):
-        bench.pre_trigger.order(STOP)
+        bench.pre_trigger.command(STOP)
     bench.recorder.failed = "the disk is full"
     with pytest.raises(ControlRefused, match="disk is full"):
-        bench.pre_trigger.order(START)
+        bench.pre_trigger.command(START)
 
 
 class TellingRecorder(FakeRecorder):
-    """Its own thread tells something while it takes a frame and while it is closed, and is waited for."""
+    """Its thread emits an event while it takes a frame and while it closes, and the caller waits for it."""
 
     pre_trigger: PreTriggerBuffer
 
@@ -283,6 +280,6 @@ def test_a_recorder_that_tells_something_does_not_hold_itself_up() -> None:
     recorder.pre_trigger = PreTriggerBuffer(
         recorder, FrameCounts(), EventLog(), PreTrigger(0.5, 10**6), on=True
     )
-    recorder.pre_trigger.frame(frame(0), needed=False)
+    recorder.pre_trigger.frame(frame(0), is_reference=False)
     recorder.pre_trigger.close({})
     assert recorder.given == [("recorder", None), 0, ("recorder", None), "closed"]

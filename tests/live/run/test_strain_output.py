@@ -1,7 +1,4 @@
-"""Strain out to real clients: a socket, UDP, a second pseudo-terminal; what a client that stalls does not do.
-
-The example of a controller: a PID holds the strain rate of a soft machine through strain out.
-"""
+"""Strain output to real clients (TCP, UDP, serial), also when one stalls; and the controller of the examples."""
 
 from __future__ import annotations
 
@@ -29,7 +26,7 @@ from live.config.loading import load_config
 from live.config.sections import SpecimenConfig
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.run_state import RunState
-from live.run.strain_output import Lines, SerialOut, TcpOut, UdpOut
+from live.run.strain_output import LineFormat, SerialOut, TcpOut, UdpOut
 from tests.live.made_up import START, make_measurement
 from tests.live.run.test_tcp_lines import Caller
 from tests.live.test_end_to_end import SIM, live_run
@@ -46,13 +43,13 @@ def readings(force: float = 800.0) -> ChannelValues:
 
 def test_a_measurement_as_json_and_as_csv() -> None:
     m = make_measurement(2, 1.5e-3)
-    said = json.loads(Lines(readings(), CHANNELS, "json").of(m))
+    said = json.loads(LineFormat(readings(), CHANNELS, "json").of(m))
     assert list(said) == list(CHANNELS)
     assert said["axial"] == pytest.approx(1.5e-3) and said["force_N"] == 800.0
     assert said["stress_MPa"] == pytest.approx(20.0) and said["time_s"] == pytest.approx(0.2)
     assert said["frame"] == 16 and said["latency_s"] is None
     assert 0 < said["lost_share"] < 0.1
-    lines = Lines(readings(), CHANNELS, "csv")
+    lines = LineFormat(readings(), CHANNELS, "csv")
     assert lines.heading == ",".join(CHANNELS)
     row = dict(zip(CHANNELS, lines.of(m).split(","), strict=True))
     assert row["axial"] == "0.0015" and row["frame"] == "16" and row["latency_s"] == "nan"
@@ -66,7 +63,7 @@ def test_the_strain_rate_is_the_slope_of_the_last_second() -> None:
 
 
 def test_to_any_number_of_clients() -> None:
-    out = TcpOut(ListenAddress.parse("0").listen("it"), "", Lines(readings(), ("frame", "axial"), "csv"))
+    out = TcpOut(ListenAddress.parse("0").listen("it"), "", LineFormat(readings(), ("frame", "axial"), "csv"))
     out.begin()
     clients = [Caller(out.port) for _ in range(3)]
     assert {client.lines.readline() for client in clients} == {"frame,axial\n"}
@@ -85,7 +82,7 @@ def test_by_udp() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listener:
         listener.bind(("127.0.0.1", 0))
         listener.settimeout(5)
-        out = UdpOut("127.0.0.1", listener.getsockname()[1], Lines(readings(), ("frame",), "json"))
+        out = UdpOut("127.0.0.1", listener.getsockname()[1], LineFormat(readings(), ("frame",), "json"))
         out.measurement(make_measurement(1))
         assert listener.recv(100) == b'{"frame":8}\n'
     for _ in range(3):
@@ -94,9 +91,9 @@ def test_by_udp() -> None:
 
 
 def test_to_a_serial_port_that_is_pulled_out_and_comes_back(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("live.run.strain_output.AGAIN_S", 0.0)
+    monkeypatch.setattr("live.run.strain_output.REOPEN_S", 0.0)
     port = PtyPort()
-    out = SerialOut(LineSettings(port.path, 115200), Lines(readings(), ("frame", "axial"), "csv"))
+    out = SerialOut(LineSettings(port.path, 115200), LineFormat(readings(), ("frame", "axial"), "csv"))
     out.measurement(make_measurement(1))
     out.measurement(make_measurement(2))
     assert read(port, 3) == ["frame,axial", "8,0.001", "16,0.001"]
@@ -171,7 +168,7 @@ def test_from_the_stamp_of_the_frame_to_the_read_of_the_client(tmp_path: Path) -
         np.percentile(late, 95) < 2 / 20
     )  # of a machine that does other things too; as docs/guide.md has it
     (report,) = [r for r in outcome.outputs.reports if r.name.startswith("strain out")]
-    assert report.words.startswith("2 clients") and not report.failed
+    assert report.summary.startswith("2 clients") and not report.failed
 
 
 def test_the_table_can_be_followed_while_the_test_runs(tmp_path: Path) -> None:

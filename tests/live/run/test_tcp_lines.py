@@ -1,4 +1,4 @@
-"""The server of lines with real sockets: answers, tokens, and clients that stall or misbehave."""
+"""The TCP server of lines with real sockets: answers, tokens, and clients that stall or misbehave."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Caller:
 
 
 def test_each_line_is_answered() -> None:
-    with server(hear=str.upper) as one:
+    with server(answer=str.upper) as one:
         caller = Caller(one.port)
         assert [caller.ask("abc"), caller.ask("d e\r")] == ["ABC", "D E"]
         caller.socket.sendall(b"two\nlines")
@@ -57,25 +57,25 @@ def test_each_line_is_answered() -> None:
 
 
 def test_without_the_token_nothing_is_heard_or_told() -> None:
-    heard: list[str] = []
-    with server(token=WORD, hear=lambda line: heard.append(line) or "ok", greeting="welcome") as one:  # type: ignore[func-returns-value]
+    received: list[str] = []
+    with server(token=WORD, answer=lambda line: received.append(line) or "ok", greeting="welcome") as one:  # type: ignore[func-returns-value]
         wrong, right = Caller(one.port), Caller(one.port)
         assert wrong.ask("quit").startswith("no: ")
         assert wrong.lines.readline() == ""  # let go
         assert right.ask(f"token {WORD}") == "ok"
         assert right.lines.readline() == "welcome\n"
-        assert right.ask("quit") == "ok" and heard == ["quit"]
+        assert right.ask("quit") == "ok" and received == ["quit"]
         wrong.close()
         right.close()
 
 
 def test_a_browser_can_order_nothing() -> None:
-    heard: list[str] = []
-    with server(hear=lambda line: heard.append(line) or "ok") as one:  # type: ignore[func-returns-value]
+    received: list[str] = []
+    with server(answer=lambda line: received.append(line) or "ok") as one:  # type: ignore[func-returns-value]
         caller = Caller(one.port)
         caller.socket.sendall(b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\nquit\n")
         assert caller.lines.readline() == ""
-        assert heard == []
+        assert received == []
         caller.close()
 
 
@@ -85,7 +85,7 @@ def test_a_client_that_stalls_is_skipped_and_counted_and_the_other_gets_all() ->
         assert stalled.lines.readline() == good.lines.readline() == "0\n"
         lines = [f"{number} " + "x" * 2000 for number in range(1, 1000)]
         for line in lines:
-            one.tell(line)
+            one.send(line)
             assert good.lines.readline() == line + "\n"
         good.close()
         got = sum(1 for _ in read_what_is_there(stalled))
@@ -108,8 +108,8 @@ def read_what_is_there(caller: Caller) -> Iterator[str]:
         yield line
 
 
-def test_a_line_without_an_end_is_let_go() -> None:
-    with server(hear=str.upper) as one:
+def test_a_line_without_an_end_is_drop() -> None:
+    with server(answer=str.upper) as one:
         caller = Caller(one.port)
         caller.socket.sendall(b"x" * 20_000)
         with pytest.raises(ConnectionError):
@@ -128,7 +128,7 @@ def test_places_that_cannot_be(text: str) -> None:
 
 def test_beyond_this_machine_only_with_a_token(tmp_path: Path) -> None:
     here, everywhere = ListenAddress.parse("localhost:5000"), ListenAddress.parse("0.0.0.0:5000")
-    assert here.is_here and not everywhere.is_here
+    assert here.is_loopback and not everywhere.is_loopback
     assert read_token(here, None, "it") == ""
     with pytest.raises(ConfigError, match="token_file"):
         read_token(everywhere, None, "it")

@@ -1,7 +1,4 @@
-"""The check before a test: a good picture is ready, a bad one is not, and the reason is told.
-
-Predicted and measured strain noise on simulated frames, for noises, radii and contrasts.
-"""
+"""The check before a test: verdict and advice, and predicted against measured strain noise on simulated frames."""
 
 from __future__ import annotations
 
@@ -22,7 +19,7 @@ from live.config.loading import Config, load_config
 from live.setup.check.check_list import CheckFigures, automatic_controls, examine, table_lines
 from live.setup.check.noise_floor import BURSTS, StrainNoise, ZoiFloor
 from live.setup.check.sample import FrameStack, take
-from live.setup.check.verdict import advice, judge, reaching
+from live.setup.check.verdict import advice, check_lines, reaching
 from live.setup.specimen_drawing import GOOD, POOR
 
 STILL = "sim:uniform?bits=8&fps=50&seconds=20&width=224&height=192&lockstep=yes"
@@ -35,15 +32,15 @@ def checked(capsys: pytest.CaptureFixture[str], more: str, *arguments: str) -> t
 
 
 def test_a_good_picture_is_ready(capsys: pytest.CaptureFixture[str]) -> None:
-    code, said = checked(capsys, "")
-    assert code == 0, said
-    assert "LOOK" not in said
-    assert said.rstrip().endswith("GO: ready")
-    assert "\n*  48     1       105      33" in said
+    code, output = checked(capsys, "")
+    assert code == 0, output
+    assert "LOOK" not in output
+    assert output.rstrip().endswith("GO: ready")
+    assert "\n*  48     1       105      33" in output
 
 
 @pytest.mark.parametrize(
-    ("more", "arguments", "says"),
+    ("more", "arguments", "message"),
     [
         ("&radius=12", (), "LOOK  speckle radius"),
         ("&contrast=3", (), "LOOK  contrast"),
@@ -55,11 +52,11 @@ def test_a_good_picture_is_ready(capsys: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_a_bad_picture_is_not(
-    capsys: pytest.CaptureFixture[str], more: str, arguments: tuple[str, ...], says: str
+    capsys: pytest.CaptureFixture[str], more: str, arguments: tuple[str, ...], message: str
 ) -> None:
-    code, said = checked(capsys, more, *arguments)
-    assert code == 6, said
-    assert says in said
+    code, output = checked(capsys, more, *arguments)
+    assert code == 6, output
+    assert message in output
 
 
 def test_too_short(capsys: pytest.CaptureFixture[str]) -> None:
@@ -70,32 +67,32 @@ def test_too_short(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_a_short_reference_is_checked_with_frames_enough(capsys: pytest.CaptureFixture[str]) -> None:
     code = main(["check", "--camera", STILL, "--zoi", "48", "--reference-burst", "1", "--burst", "1"])
-    said = capsys.readouterr().out
-    assert code == 0, said
-    assert "reference of 1" in said
-    assert re.search(r"strain noise +\d+ um/m measured", said)
+    output = capsys.readouterr().out
+    assert code == 0, output
+    assert "reference of 1" in output
+    assert re.search(r"strain noise +\d+ um/m measured", output)
 
 
 @pytest.mark.parametrize("count", [1, 5])
-def test_a_few_pictures_are_judged_by_what_they_tell(
+def test_a_few_pictures_are_judged_by_what_they_show(
     count: int, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    """Light, bits, pattern and the predicted noise are those of many frames; what changes in time is not told."""
+    """Light, bits, pattern and the predicted noise are those of many frames; what changes in time is not measured."""
     config = load_config(None, {"camera.address": STILL, "measure.zoi": 48, "measure.reference_burst": 16})
     many = take(config)
     whole = examine(many, config)
     for k in range(count):
         cv2.imwrite(str(tmp_path / f"{k}.png"), many.frames[k])
-    stated = ["--camera", f"files:{tmp_path}", "--zoi", "48", "--reference-burst", "16"]
-    assert main(["check", *stated, "--noise", f"{whole.noise:.3f}"]) == 0
-    said = capsys.readouterr().out
-    assert f"pictures               {count}, too few" in said
+    arguments = ["--camera", f"files:{tmp_path}", "--zoi", "48", "--reference-burst", "16"]
+    assert main(["check", *arguments, "--noise", f"{whole.noise:.3f}"]) == 0
+    output = capsys.readouterr().out
+    assert f"pictures               {count}, too few" in output
     for what in ("noise in time", "flicker", "drift", "vibration"):
-        assert re.search(rf"\? +{what} +not told by {count} picture.*: it takes 8", said), what
-    assert "predicted from the noise as stated" in said
-    assert said.rstrip().splitlines()[-1].startswith(f"GO, as far as {count} picture")
-    assert "reference of 16" in said
-    assert main(["check", *stated[:4]]) in (0, 6)
+        assert re.search(rf"\? +{what} +not measured from {count} picture.*: it takes 8", output), what
+    assert "predicted, noise as given" in output
+    assert output.rstrip().splitlines()[-1].startswith(f"GO, as far as {count} picture")
+    assert "reference of 16" in output
+    assert main(["check", *arguments[:4]]) in (0, 6)
     assert "reference of 1\n" in capsys.readouterr().out
     known = {**config_values(tmp_path), "measure.noise_GL": whole.noise}
     few = examine(take(load_config(None, known)), load_config(None, known))
@@ -107,23 +104,23 @@ def test_a_few_pictures_are_judged_by_what_they_tell(
         for noise, more in zip(one.noises, other.noises, strict=True):
             assert noise.predicted == pytest.approx(more.predicted, rel=0.1)
             assert np.isnan(noise.measured)
-    # Without a stated noise the spectrum of the picture tells it.
+    # Without a given noise it comes from the spectrum of the picture.
     spectral = examine(take(load_config(None, config_values(tmp_path))), config)
     assert spectral.noise == pytest.approx(whole.noise, rel=0.2)
 
 
 def test_a_black_picture(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """No figure is made up where there is nothing to see."""
+    """No figure is invented for a black picture."""
     cv2.imwrite(str(tmp_path / "a.png"), np.zeros((200, 300), np.uint8))
     assert main(["check", "--camera", f"files:{tmp_path}", "--zoi", "32"]) == 6
-    said = capsys.readouterr().out
-    assert "nan" not in said
+    output = capsys.readouterr().out
+    assert "nan" not in output
     for what in (
-        "speckle radius         none is seen",
+        "speckle radius         none is visible",
         "sharpness              no pattern",
         "SSSIG of a ZOI         none",
     ):
-        assert f"LOOK  {what}" in said
+        assert f"LOOK  {what}" in output
 
 
 def config_values(folder: Path) -> dict[str, object]:
@@ -134,35 +131,35 @@ def test_the_load_cell_is_listened_to(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("live.commands.check.LISTEN_S", 0.5)
-    _, said = checked(capsys, "", "--load", "sim:?rate=50")
-    assert "load cell" in said
-    assert "1/s, noise" in said
+    _, output = checked(capsys, "", "--load", "sim:?rate=50")
+    assert "load cell" in output
+    assert "1/s, noise" in output
 
 
 def test_the_snapshot_and_the_gauges(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    """ZOIs are green where their noise is low enough, red where it is not; that of the gauges is told."""
+    """ZOIs with a low noise are green, others red; the noise of the gauges is printed."""
     shot = tmp_path / "shot.png"
-    code, said = checked(capsys, "", "--gauges", "auto", "--snapshot", str(shot), "--scale", "0.05")
-    assert code == 0, said
-    assert "l_10% mm" in said
+    code, output = checked(capsys, "", "--gauges", "auto", "--snapshot", str(shot), "--scale", "0.05")
+    assert code == 0, output
+    assert "l_10% mm" in output
     noise = {
-        name: float(re.search(rf"noise of {name} +([0-9.]+) um/m", said)[1])  # type: ignore[index]
+        name: float(re.search(rf"noise of {name} +([0-9.]+) um/m", output)[1])  # type: ignore[index]
         for name in ("the mean", "axial", "transverse", "area")
     }
-    one = float(re.search(r"strain noise +(\d+) um/m measured", said)[1])  # type: ignore[index]
+    one = float(re.search(r"strain noise +(\d+) um/m measured", output)[1])  # type: ignore[index]
     assert noise["the mean"] < one
     assert noise["area"] < one
     drawn = cv2.imread(str(shot))
     assert (drawn == np.array(GOOD)).all(axis=2).sum() > 500
     assert not (drawn == np.array(POOR)).all(axis=2).any()
-    code, said = checked(capsys, "", "--target", "1", "--snapshot", str(tmp_path / "red.png"))
+    code, output = checked(capsys, "", "--target", "1", "--snapshot", str(tmp_path / "red.png"))
     assert code == 6
     assert (cv2.imread(str(tmp_path / "red.png")) == np.array(POOR)).all(axis=2).sum() > 500
     assert main(["check", "--camera", STILL, "--snapshot", str(shot)]) == 2
     assert "nothing is overwritten" in capsys.readouterr().err
 
 
-def test_a_gauge_beside_the_specimen_is_told(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_gauge_beside_the_specimen_is_refused(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     rig = tmp_path / "rig.toml"
     rig.write_text("[gauges.far]\nkind = 'zoi'\nat = [900, 20]\n")
     assert checked(capsys, "", "--config", str(rig))[0] == 2
@@ -220,9 +217,9 @@ def test_the_table_has_every_zoi_order_and_burst() -> None:
 def test_a_reference_of_another_length_than_was_tried() -> None:
     """16 and 16 frames taken, 8 wanted: the figures hold for 8."""
     config = load_config(None, {"camera.address": STILL_FLOOR + "&bits=12&noise=1", "measure.zoi": 32})
-    shots = take(config)
+    stack = take(config)
     short = replace(config, measure=replace(config.measure, reference_burst=8))
-    long, few = (examine(shots, c, table=False).floor for c in (config, short))
+    long, few = (examine(stack, c, table=False).floor for c in (config, short))
     assert long is not None
     assert few is not None
     ratio = few.noises[0].predicted / long.noises[0].predicted
@@ -237,7 +234,7 @@ def floor(zoi: int, *values: float) -> ZoiFloor:
 FLOORS = (floor(32, 800, 560, 400, 290, 220), floor(64, 200, 140, 100, 70, 49), floor(96, 90, 64, 45, 33, 24))
 
 
-def asked(target_um_m: float, high: float) -> str:
+def advice_for(target_um_m: float, high: float) -> str:
     made_up: Any = SimpleNamespace(
         floors=FLOORS, floor=FLOORS[1], zoi=64, order=1, burst=4, exposure=SimpleNamespace(high=high)
     )
@@ -245,7 +242,7 @@ def asked(target_um_m: float, high: float) -> str:
 
 
 @pytest.mark.parametrize(
-    ("target", "high", "says"),
+    ("target", "high", "message"),
     [
         (50, 0.2, "burst 16, or ZOI 96, or 4.0 times the light or exposure"),
         (71, 0.4, "burst 8, or ZOI 96, or twice the light or exposure"),
@@ -253,8 +250,8 @@ def asked(target_um_m: float, high: float) -> str:
         (30, 0.5, "ZOI 96 and burst 16, or burst 80 and a reference of 80 with ZOI 64"),
     ],
 )  # fmt: skip
-def test_what_reaches_a_target(target: float, high: float, says: str) -> None:
-    assert asked(target, high).startswith(says), asked(target, high)
+def test_what_reaches_a_target(target: float, high: float, message: str) -> None:
+    assert advice_for(target, high).startswith(message), advice_for(target, high)
 
 
 def test_the_shortest_burst_of_each_zoi() -> None:
@@ -277,9 +274,9 @@ def taken() -> FrameStack:
     return take(load_config(None, {"camera.address": STILL_FLOOR + "&bits=8&noise=1"}))
 
 
-def said(shots: FrameStack, what: str) -> str:
+def line_text(stack: FrameStack, what: str) -> str:
     config = Config()
-    lines = judge(examine(shots, replace(config, measure=replace(config.measure, zoi=48)), table=False))
+    lines = check_lines(examine(stack, replace(config, measure=replace(config.measure, zoi=48)), table=False))
     return next(line.text() for line in lines if line.what == what)
 
 
@@ -287,7 +284,7 @@ def test_lamps_on_the_mains_are_named(taken: FrameStack) -> None:
     t = np.arange(len(taken)) / 30
     bright = 1 + 0.05 * np.sin(2 * np.pi * 100 * t)
     frames = np.clip(np.rint(taken.frames * bright[:, None, None]), 0, 255).astype(np.uint8)
-    text = said(shots_of(frames, 8), "flicker")
+    text = line_text(shots_of(frames, 8), "flicker")
     assert text.startswith("LOOK")
     assert "lamps on 50 Hz mains (100 Hz, seen at 10.0 Hz)" in text
     assert "multiple of 10.0 ms" in text
@@ -297,7 +294,7 @@ def test_a_shaking_camera_is_seen_with_its_frequency(taken: FrameStack) -> None:
     t = np.arange(len(taken)) / 30
     moved = np.rint(1.0 * np.sin(2 * np.pi * 7.0 * t)).astype(int)
     frames = np.stack([np.roll(f, k, axis=0)[8:-8] for f, k in zip(taken.frames, moved, strict=True)])
-    text = said(shots_of(frames, 8), "vibration")
+    text = line_text(shots_of(frames, 8), "vibration")
     assert text.startswith("LOOK")
     assert "mainly at 7.0 Hz" in text
 
@@ -315,11 +312,11 @@ def test_motion_is_that_of_what_has_a_pattern(taken: FrameStack) -> None:
 
 def test_bits_that_never_change(taken: FrameStack) -> None:
     coarse = (taken.frames.astype(np.uint16) & 0xF0) << 4
-    assert "4 of 12 change" in said(shots_of(coarse, 12), "bits")
+    assert "4 of 12 change" in line_text(shots_of(coarse, 12), "bits")
     deep = taken.frames.astype(np.uint16)
-    text = said(shots_of(deep, 16), "bits")
+    text = line_text(shots_of(deep, 16), "bits")
     assert "the highest 8 are never used" in text
-    assert "saturation is not seen" in text
+    assert "saturation is not found" in text
 
 
 def test_what_surrounds_the_specimen_decides_nothing(taken: FrameStack) -> None:
@@ -331,7 +328,7 @@ def test_what_surrounds_the_specimen_decides_nothing(taken: FrameStack) -> None:
     config = load_config(None, {"measure.zoi": 48})
     found = examine(shots_of(frames, 8), config, table=False)
     assert found.region.found
-    bad = [line.text() for line in judge(found) if not line.good]
+    bad = [line.text() for line in check_lines(found) if not line.good]
     assert bad == []
     assert found.noise == pytest.approx(examine(taken, config, table=False).noise, rel=0.05)
 

@@ -1,11 +1,8 @@
-"""The folder of a run: made anew, never overwritten.
+"""From an installation and a camera to results.
 
-The very first run after installation: nothing is compiled, and yet its bits are those of every later replay.
-
-From a camera alone to results: init, check, run, and all gauges have values.
-
-On the simulated rig, and on two real image sets played as a camera (where PHASEDIC_DATA names them): the
-first picture stands still for a while, each with fresh noise of the sensor, then the specimen is pulled.
+The first run after installation compiles, and its bits are those of every later replay. ``init``, ``check`` and
+``run`` give values of all gauges, on the simulated rig and on two real image sets played as a camera (with
+PHASEDIC_DATA): the first picture stands still for a while, each frame with new sensor noise, then the specimen moves.
 """
 
 from __future__ import annotations
@@ -52,7 +49,7 @@ REPLAY = "replay first/session.h5 --as-measured --no-view --no-rrd --out"
 
 
 def phasedic(words: str, folder: Path, **more: str) -> str:
-    """Run it with a cache that is empty the first time; what it printed."""
+    """Run it with a cache that is empty the first time; returns its output."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(folder / "cache"), **more}
     command = [sys.executable, "-m", "live.cli", *words.split()]
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
@@ -61,7 +58,7 @@ def phasedic(words: str, folder: Path, **more: str) -> str:
 
 
 def results(folder: Path) -> dict[str, np.ndarray]:
-    """Every dataset but what the run alone knows: when, how late, how long."""
+    """Every dataset except times of the run: latency and duration."""
     found: dict[str, np.ndarray] = {}
 
     def keep(name: str, item: object) -> None:
@@ -81,8 +78,8 @@ def test_its_bits_are_those_of_every_replay(tmp_path: Path) -> None:
     first = results(tmp_path / "first")
     assert {"mean/exx", "mean/exx_errors", "strain/exx", "strain/exx_errors"} <= first.keys()
     for threads in ("1", "2"):
-        told = phasedic(f"{REPLAY} again{threads}", tmp_path, NUMBA_NUM_THREADS=threads)
-        assert "compiling" not in told
+        output = phasedic(f"{REPLAY} again{threads}", tmp_path, NUMBA_NUM_THREADS=threads)
+        assert "compiling" not in output
         again = results(tmp_path / f"again{threads}")
         assert first.keys() == again.keys()
         for name, values in first.items():
@@ -92,10 +89,10 @@ def test_its_bits_are_those_of_every_replay(tmp_path: Path) -> None:
 STILL = 16
 
 
-def gone_through(folder: Path, camera: str, *said: str) -> dict[str, np.ndarray]:
-    """The three commands as a person types them; the gauges of the run."""
+def gone_through(folder: Path, camera: str, *arguments: str) -> dict[str, np.ndarray]:
+    """Run the three commands as a person types them; returns the gauges of the run."""
     rig, out = str(folder / "rig.toml"), folder / "run"
-    assert main(["init", rig, "--camera", camera, "--reference-burst", "8", *said]) == 0
+    assert main(["init", rig, "--camera", camera, "--reference-burst", "8", *arguments]) == 0
     assert main(["check", "--config", rig]) == 0  # GO
     assert main(["run", "--config", rig, "--no-view", "--no-rrd", "--out", str(out)]) == 0
     with h5py.File(out / "strain.h5") as file:
@@ -104,7 +101,7 @@ def gone_through(folder: Path, camera: str, *said: str) -> dict[str, np.ndarray]
 
 
 def played(folder: Path, paths: Sequence[Path], noise: float, light: float) -> str:
-    """Pictures as a camera gives them; ``light`` of theirs, so that nothing is saturated."""
+    """Pictures as frames of a camera, scaled by ``light`` so that nothing is saturated."""
     rng = np.random.default_rng(0)
     shots = [paths[0]] * STILL + list(paths[1:])
     (folder / "shots").mkdir()
@@ -140,10 +137,10 @@ def test_the_open_hole(tmp_path: Path, data_dir: Path) -> None:
 @pytest.mark.data
 @pytest.mark.slow
 def test_the_polymer_bar(tmp_path: Path, data_dir: Path) -> None:
-    """To 3 %; each picture has noise of its own that the still ones do not show, so it is said."""
+    """To 3 %; each picture has noise of its own that the still ones do not show, so it is given."""
     paths = sorted((data_dir / "mudic_tension").glob("*.tif"))[:3]
-    said = ["--noise", "6", "--crop", "260,230,330,1340"]
-    found = gone_through(tmp_path, played(tmp_path, paths, 1.0, 0.9), *said)
+    arguments = ["--noise", "6", "--crop", "260,230,330,1340"]
+    found = gone_through(tmp_path, played(tmp_path, paths, 1.0, 0.9), *arguments)
     assert all(np.isfinite(values).all() for values in found.values())
     assert found["axial"][-1] == pytest.approx(0.031, abs=0.002)
     assert found["area"][-1] == pytest.approx(found["axial"][-1], rel=0.03)

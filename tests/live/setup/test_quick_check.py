@@ -1,4 +1,4 @@
-"""The check that goes on: the peak of the sharpness is held, Ctrl-C leaves the last table."""
+"""The repeated check: it holds the peak of the sharpness, and Ctrl-C prints the full table."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from live.cli import main
-from live.commands import check_watch as watching
+from live.commands import check_watch as check_watch
 from live.commands.check_watch import RenewedLines, card, peak_line
 from live.config.loading import load_config
 from live.setup.check.check_list import examine
-from live.setup.check.quick_check import SEARCH_EVERY, TURNS, QuickCheck, QuickChecker
+from live.setup.check.quick_check import RENEW_EVERY, SEARCH_EVERY, QuickCheck, QuickChecker
 from live.setup.check.sample import take
 from live.setup.check.verdict import CheckLine
 from live.setup.region import Region
@@ -32,20 +32,20 @@ SMALL = ["--zoi", "48", "--reference-burst", "8"]
 
 
 def test_the_peak_is_held() -> None:
-    said = {
+    overrides = {
         "camera.address": STILL + "&seconds=5&lockstep=yes",
         "measure.zoi": 48,
         "measure.reference_burst": 8,
     }
-    config = load_config(None, said)
-    sharp, watch, found = take(config), QuickChecker(config), []
+    config = load_config(None, overrides)
+    sharp, checker, found = take(config), QuickChecker(config), []
     for blur in (2.0, 1.0, 0.0, 1.5):
         frames = np.stack([gaussian_filter(f.astype(np.float32), blur) for f in sharp.frames[:8]])
-        glance = watch.glance(replace(sharp, frames=np.round(frames).astype(np.uint8), times=sharp.times[:8]))
-        found.append(glance)
-    values = [glance.figures.sharpness for glance in found]
+        quick = checker.check(replace(sharp, frames=np.round(frames).astype(np.uint8), times=sharp.times[:8]))
+        found.append(quick)
+    values = [quick.figures.sharpness for quick in found]
     assert values[0] < values[1] < values[2] > values[3]
-    assert [glance.of_peak for glance in found[:3]] == [1.0, 1.0, 1.0]
+    assert [quick.of_peak for quick in found[:3]] == [1.0, 1.0, 1.0]
     assert found[3].peak == values[2]
     assert f"{values[3] / values[2]:.0%} of the peak" in peak_line(found[3])
     assert peak_line(found[3]).count("#") == round(30 * values[3] / values[2])
@@ -53,7 +53,7 @@ def test_the_peak_is_held() -> None:
 
 
 class FakeView:
-    """Keeps what it is shown."""
+    """Collects its pictures and cards."""
 
     made: list[FakeView]
 
@@ -73,23 +73,23 @@ class FakeView:
 
 def test_ctrl_c_leaves_the_table(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     FakeView.made = []
-    monkeypatch.setattr(watching, "View", FakeView)
-    glances = []
+    monkeypatch.setattr(check_watch, "View", FakeView)
+    checks = []
 
-    def seen(glance: Any) -> str:
-        glances.append(glance)
-        if len(glances) == 3:
+    def counted_peak_line(quick: Any) -> str:
+        checks.append(quick)
+        if len(checks) == 3:
             threading.Thread(target=os.kill, args=(os.getpid(), signal.SIGINT)).start()
-        return peak_line(glance)
+        return peak_line(quick)
 
-    monkeypatch.setattr(watching, "peak_line", seen)
+    monkeypatch.setattr(check_watch, "peak_line", counted_peak_line)
     before = signal.getsignal(signal.SIGINT)
     assert main(["check", "--watch", "--camera", STILL + "&seconds=100&hold=90", *SMALL]) == 0
     assert signal.getsignal(signal.SIGINT) is before
-    said = capsys.readouterr().out
-    assert "sharpness 0." in said
-    assert "\n*  48     1       105      33" in said
-    assert said.rstrip().endswith("GO: ready")
+    output = capsys.readouterr().out
+    assert "sharpness 0." in output
+    assert "\n*  48     1       105      33" in output
+    assert output.rstrip().endswith("GO: ready")
     (view,) = FakeView.made
     assert view.closed
     assert view.pictures
@@ -105,16 +105,16 @@ def test_a_camera_that_ends(capsys: pytest.CaptureFixture[str]) -> None:
     assert "whole frames, a check needs 8" in capsys.readouterr().err
 
 
-def test_the_work_of_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What takes long takes turns, the picture is averaged once; the figures are those of a check."""
-    said = {
+def test_the_work_of_a_quick_check(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Slow figures take turns, the picture is averaged once; the figures are those of a check."""
+    overrides = {
         "camera.address": STILL + "&seconds=5&lockstep=yes",
         "measure.zoi": 48,
         "measure.reference_burst": 8,
     }
-    config = load_config(None, said)
+    config = load_config(None, overrides)
     sixteen = take(config)
-    shots = replace(sixteen, frames=sixteen.frames[:8], times=sixteen.times[:8])
+    stack = replace(sixteen, frames=sixteen.frames[:8], times=sixteen.times[:8])
     done: list[str] = []
 
     def counted(module: str, name: str, what: str) -> None:
@@ -128,18 +128,18 @@ def test_the_work_of_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
 
     counted("live.setup.check.noise_floor", "prepare", "reference")
     counted("live.setup.check.stillness", "prepare", "reference")
-    counted("live.setup.check.quick_check", "sought", "search")
+    counted("live.setup.check.quick_check", "find_region", "search")
     counted("live.setup.check.check_list", "noise_floors", "table")
-    watch, work, glances = QuickChecker(config), list[list[str]](), list[QuickCheck]()
+    checker, work, checks = QuickChecker(config), list[list[str]](), list[QuickCheck]()
     for _ in range(2 * SEARCH_EVERY):
-        glances.append(watch.glance(shots))
+        checks.append(checker.check(stack))
         work.append(list(done))
         done.clear()
     assert work[0] == ["search", "reference", "reference"]
     assert all(len(one) <= 1 for one in work[1:])
     later = [what for one in work[SEARCH_EVERY:] for what in one]
-    assert (later.count("reference"), later.count("search")) == (2 * SEARCH_EVERY // TURNS, 1)
-    once, last = examine(shots, config, table=False), glances[-1].figures
+    assert (later.count("reference"), later.count("search")) == (2 * SEARCH_EVERY // RENEW_EVERY, 1)
+    once, last = examine(stack, config, table=False), checks[-1].figures
     assert (last.noise, last.exposure, last.radius, last.still, last.gauges) == (
         once.noise, once.exposure, once.radius, once.still, once.gauges,
     )  # fmt: skip
@@ -149,14 +149,14 @@ def test_the_work_of_a_glance(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_the_region_stays_where_only_its_rim_is_found_otherwise(monkeypatch: pytest.MonkeyPatch) -> None:
     config = load_config(None, {"camera.address": STILL + "&seconds=5&lockstep=yes", "measure.zoi": 48})
-    shots = take(config)
+    stack = take(config)
     boxes = iter([(8, 8, 200, 176), (9, 8, 199, 176), (60, 8, 148, 176)])
     monkeypatch.setattr(
-        "live.setup.check.quick_check.sought", lambda *_: Region(next(boxes), None, "found", True)
+        "live.setup.check.quick_check.find_region", lambda *_: Region(next(boxes), None, "found", True)
     )
     monkeypatch.setattr("live.setup.check.quick_check.SEARCH_EVERY", 1)
-    watch = QuickChecker(config)
-    assert [watch.glance(shots).figures.region.box for _ in range(3)] == [
+    checker = QuickChecker(config)
+    assert [checker.check(stack).figures.region.box for _ in range(3)] == [
         (8, 8, 200, 176),
         (8, 8, 200, 176),
         (60, 8, 148, 176),
@@ -167,11 +167,11 @@ def test_pictures_that_are_few_leave_their_table(tmp_path: Path, capsys: pytest.
     config = load_config(None, {"camera.address": STILL + "&seconds=5&lockstep=yes"})
     cv2.imwrite(str(tmp_path / "one.png"), take(config).frames[0])
     assert main(["check", "--watch", "--camera", f"files:{tmp_path}", "--no-view", *SMALL]) == 0
-    assert "GO, as far as 1 picture can tell" in capsys.readouterr().out
+    assert "GO, as far as 1 picture can show" in capsys.readouterr().out
 
 
 class Terminal(io.StringIO):
-    """A stream that says it is one."""
+    """A stream that is a terminal."""
 
     def isatty(self) -> bool:
         return True
@@ -189,7 +189,7 @@ def test_lines_are_renewed_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_card_is_a_table() -> None:
-    glance: Any = type("G", (), {"of_peak": float("nan")})()
-    text = card(glance, [CheckLine("a|b", "1"), CheckLine("c", "2", False)])
+    quick: Any = type("G", (), {"of_peak": float("nan")})()
+    text = card(quick, [CheckLine("a|b", "1"), CheckLine("c", "2", False)])
     assert "| a/b | 1 |" in text
     assert "| **LOOK** | c | 2 |" in text

@@ -1,7 +1,4 @@
-"""The region of a test: found where nothing is given, stored, the same in a replay.
-
-Gauges that place themselves: on the specimen, beside holes, right in any strain.
-"""
+"""The region of a test (found, stored, the same in a replay), and automatic gauges beside holes and at any strain."""
 
 from __future__ import annotations
 
@@ -22,7 +19,7 @@ from live.config.loading import load_config
 from live.results import Strain
 from live.setup.devices import open_rig
 from live.setup.placement import auto_gauges, with_auto_gauges
-from live.setup.region import FirstLook, look, placed_on, region_of
+from live.setup.region import FirstLook, first_look, located_on, region_of
 from tests.live.made_up import make_field
 
 SIM = "sim:hole?seconds=2&fps=20&width=320&height=320&hole=40&lockstep=yes"
@@ -53,8 +50,8 @@ def test_a_run_without_a_region_finds_the_specimen(
         np.testing.assert_array_equal(one.maps("eyy", -1), two.maps("eyy", -1))
     # A replay may look for itself: in the reference, with gauges that are placed anew.
     third = tmp_path / "third"
-    said = ["--roi", "auto", "--gauges", "auto", "--zoi", "48", "--out", str(third), *QUICK[-2:]]
-    assert main(["replay", str(live / "session.h5"), *said]) == 0
+    arguments = ["--roi", "auto", "--gauges", "auto", "--zoi", "48", "--out", str(third), *QUICK[-2:]]
+    assert main(["replay", str(live / "session.h5"), *arguments]) == 0
     assert "the specimen was found" in capsys.readouterr().out
     with h5py.File(third / "strain.h5") as file:
         assert set(file["entry/gauges"]) >= {"axial", "transverse", "area"}
@@ -100,23 +97,23 @@ def test_the_edge_is_followed_to_half_a_zoi(tmp_path: Path) -> None:
     assert region.mask[distance < -16].all()
 
 
-def test_nothing_that_stands_out_is_told() -> None:
-    """Noise alone is no specimen: all but a rim is measured, and a line says so."""
+def test_a_picture_without_specimen() -> None:
+    """Noise alone is no specimen: the picture except a rim is measured, with a message."""
     from acquire.frame import CameraInfo
 
     picture = np.random.default_rng(0).normal(100, 2, (200, 200)).astype(np.float32)
     camera = CameraInfo("none", "none", 200, 200, 8, False, "nominal")
-    said: list[str] = []
-    config, mask = placed_on(
-        load_config(None, {"measure.zoi": 32}), FirstLook(picture, 2.0, camera), said.append
+    messages: list[str] = []
+    config, mask = located_on(
+        load_config(None, {"measure.zoi": 32}), FirstLook(picture, 2.0, camera), messages.append
     )
     assert mask is None
     assert config.measure.roi == "all"
-    assert said[0].startswith("no specimen was found that stands out")
+    assert messages[0].startswith("no specimen was found that stands out")
 
 
-def test_a_camera_that_gives_nothing_at_first_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """It is waited for, and that is said; what is no trouble is not."""
+def test_warnings_of_the_camera_are_printed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its warning is printed, its information is not."""
     from acquire.events import Event, EventKind
 
     def troubled(address: str, load: str, on_event, **how):
@@ -125,10 +122,10 @@ def test_a_camera_that_gives_nothing_at_first_is_told(monkeypatch: pytest.Monkey
         return open_rig(address, load, on_event, **how)
 
     monkeypatch.setattr("live.setup.region.open_rig", troubled)
-    said: list[str] = []
-    seen = look(load_config(None, {"camera.address": SIM}), said.append)
-    assert said == ["no picture for 2.0 s; still waiting"]
-    assert seen.size == (320, 320)
+    messages: list[str] = []
+    first = first_look(load_config(None, {"camera.address": SIM}), messages.append)
+    assert messages == ["no picture for 2.0 s; still waiting"]
+    assert first.size == (320, 320)
 
 
 @pytest.mark.parametrize(
@@ -146,8 +143,8 @@ def test_simulated_specimens(address: str) -> None:
     rig.close()
     assert rig.specimen is not None
     truth = rig.specimen.mask()
-    seen = look(config, print)
-    inside = region_of(config, seen.picture, seen.noise).inside(*seen.size, 32)
+    first = first_look(config, print)
+    inside = region_of(config, first.picture, first.noise).inside(*first.size, 32)
     distance = [cv2.distanceTransform(part.astype(np.uint8), cv2.DIST_L2, 5) for part in (truth, ~truth)]
     assert not inside[distance[1] > 16].any()
     deep = distance[0] > 16 if not truth.all() else truth

@@ -1,7 +1,4 @@
-"""The scale of the picture against pictures whose scale is known; its tilt; what stands in the rig file.
-
-The scale that the test was configured with is that of its report and exports.
-"""
+"""The scale on pictures with a known scale and tilt, and its way into rig file, report and exports."""
 
 from __future__ import annotations
 
@@ -68,9 +65,9 @@ def test_a_board_that_stands_square(board: Board, px_per_mm: float) -> None:
 def test_a_tilted_board_is_warned_of(degrees: float) -> None:
     scale = from_board(seen(CHECKER, 8.0, degrees), CHECKER, stand_off_mm=400)
     assert scale.mm_per_px == pytest.approx(1 / 8.0, abs=2 * scale.sigma)
-    said = re.search(r"about (\d+) degrees", scale.remarks[0])
-    assert said is not None
-    assert float(said[1]) == pytest.approx(degrees, abs=1)
+    degrees_found = re.search(r"about (\d+) degrees", scale.remarks[0])
+    assert degrees_found is not None
+    assert float(degrees_found[1]) == pytest.approx(degrees, abs=1)
 
 
 def test_a_length_that_is_not_known_well() -> None:
@@ -117,8 +114,8 @@ def test_the_rig_file_gets_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     rig.write_text(f"# mine\n[camera]\naddress = 'files:{tmp_path}/board.png'\n")
     arguments = ["--config", str(rig), "--checkerboard", "9x6", "--square", "5", "--stand-off", "400"]
     assert main(["scale", *arguments]) == 0
-    said = capsys.readouterr().out
-    assert "0.1 mm toward the camera at a stand-off of 400 mm feigns a strain of 250 um/m" in said
+    output = capsys.readouterr().out
+    assert "0.1 mm toward the camera at a stand-off of 400 mm gives a false strain of 250 um/m" in output
     found = load_config(rig, {"measure.zoi": "5 mm"})
     assert found.scale.mm_per_px == pytest.approx(0.125, rel=1e-3)
     assert found.measure.zoi == 40
@@ -134,7 +131,7 @@ def test_the_rig_file_gets_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 
 @pytest.mark.parametrize(
-    ("arguments", "code", "says"),
+    ("arguments", "code", "message"),
     [
         ([], 2, "give one of --points"),
         (["--points", "1,2,3,4", "--width", "3"], 2, "not 2 of them"),
@@ -155,10 +152,10 @@ def test_the_rig_file_gets_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     ],
 )  # fmt: skip
 def test_what_cannot_be(
-    capsys: pytest.CaptureFixture[str], arguments: list[str], code: int, says: str
+    capsys: pytest.CaptureFixture[str], arguments: list[str], code: int, message: str
 ) -> None:
     assert main(["scale", *arguments]) == code
-    assert says in capsys.readouterr().err
+    assert message in capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")
@@ -180,7 +177,7 @@ def test_the_report_shows_it(scaled: Path, tmp_path: Path) -> None:
     assert "0.05 mm/px" in (tmp_path / "r.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("said", [None, "0.05", -1, 0, True, math.nan, math.inf, [1]])
-def test_what_is_no_scale_is_none(tmp_path: Path, said: object) -> None:
-    with open_run(make_run(tmp_path, [0.0], config={**CONFIG, "scale": {"mm_per_px": said}})) as run:
+@pytest.mark.parametrize("stored", [None, "0.05", -1, 0, True, math.nan, math.inf, [1]])
+def test_what_is_no_scale_is_none(tmp_path: Path, stored: object) -> None:
+    with open_run(make_run(tmp_path, [0.0], config={**CONFIG, "scale": {"mm_per_px": stored}})) as run:
         assert run.mm_per_px is None

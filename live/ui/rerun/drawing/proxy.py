@@ -22,7 +22,7 @@ import threading
 import time
 from collections.abc import Callable
 
-from live.config.listen_address import listening
+from live.config.listen_address import listening_socket
 
 HOST, TRIES = "127.0.0.1", 50
 STOPPED_S, STOPPED_BYTES = 10.0, 500_000
@@ -156,7 +156,7 @@ def host_allowed(head: bytes) -> bool:
 
 def _listening(first_port: int) -> socket.socket:
     try:
-        return listening(HOST, first_port, TRIES)
+        return listening_socket(HOST, first_port, TRIES)
     except OSError:
         raise OSError(f"no free port from {first_port} on; set another view.port") from None
 

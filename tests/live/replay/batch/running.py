@@ -1,4 +1,4 @@
-"""A campaign and a Dask cluster as processes, and what they leave."""
+"""A campaign and a Dask cluster as processes, for the tests."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 from live.replay.batch import cluster
-from live.replay.batch import worker as there
+from live.replay.batch.worker import NEEDED
 
 ROOT = Path(__file__).parents[4]
 
@@ -80,7 +80,7 @@ HERE = ["--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"]
 PATIENCE_S = 200.0
 """Within pytest-timeout's; only a machine that is stuck takes so long."""
 
-ONE_THREAD = dict.fromkeys(there.NEEDED, "1")
+ONE_THREAD = dict.fromkeys(NEEDED, "1")
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -121,7 +121,7 @@ def running(folder: Path, workers: int = 2, **more: str) -> Iterator[Running]:
         address = address_in(told)
         one = [address, "--nthreads", 1, "--no-nanny", *HERE, "--local-directory", folder]
         made += [dask("worker", *one, **(more or ONE_THREAD)) for _ in range(workers)]
-        with patch.object(cluster, "_ANSWER_S", PATIENCE_S):
+        with patch.object(cluster, "_CONNECT_S", PATIENCE_S):
             with closing(cluster._connected(address)) as client:
                 client.wait_for_workers(workers, timeout=PATIENCE_S) if workers else None
             yield Running(address, scheduler, made)

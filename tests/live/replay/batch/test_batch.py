@@ -1,4 +1,4 @@
-"""``phasedic batch``: what it makes, what it does again, and what is left when something dies."""
+"""``phasedic batch``: its results, what it repeats, and what remains when a process dies."""
 
 from __future__ import annotations
 

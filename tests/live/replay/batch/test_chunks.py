@@ -1,4 +1,4 @@
-"""``phasedic batch --chunk``: one long session by several workers, told as one replay."""
+"""``phasedic batch --chunk``: a long session in chunks by several workers has the results of one replay."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ def test_a_renewed_reference_is_not_cut(
     """The pattern is another one from the middle on: the whole is done, as a replay does it."""
     session = changing(tmp_path)
     assert main(["batch", str(session), *CHUNK, "--out", str(tmp_path / "out")]) == 0
-    assert "a reference was renewed in it; it is not cut, but done whole" in capsys.readouterr().out
+    assert "a reference was renewed in it; it is not cut, but measured whole" in capsys.readouterr().out
     words = ["--no-view", "--no-rrd", "--out", str(tmp_path / "whole")]
     assert main(["replay", str(session), *words]) == 0
     assert "the reference was renewed" in caplog.text

@@ -17,8 +17,8 @@ import pytest
 from acquire.errors import ConfigError
 from live.cli import main
 from live.replay.batch import cluster
-from live.replay.batch import worker as there
 from live.replay.batch.keys import deciding_versions
+from live.replay.batch.worker import NEEDED
 from live.results import Strain
 from tests.live.replay.batch.conftest import SETTINGS
 from tests.live.replay.batch.running import (
@@ -38,7 +38,7 @@ from tests.live.replay.batch.running import (
 
 
 @pytest.fixture(scope="module")
-def standing(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
+def progress(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:
     with running(tmp_path_factory.mktemp("dask")) as made:
         yield made
 
@@ -67,14 +67,14 @@ LOOPBACK = {"0100007F"}
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="listens to /proc")
-def test_twelve_tests_as_by_the_pool(runs: Path, done: Path, standing: Running, tmp_path: Path) -> None:
+def test_twelve_tests_as_by_the_pool(runs: Path, done: Path, progress: Running, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    words = (runs / "*" / "session.h5", *SETTINGS, "--scheduler", standing.address, "--out", out)
+    words = (runs / "*" / "session.h5", *SETTINGS, "--scheduler", progress.address, "--out", out)
     caller = started(*words)
     until(lambda: bool(parts(out)))
-    assert {pid_of(part) for part in parts(out)} <= set(standing.pids)
-    assert listening(standing.scheduler.pid) == LOOPBACK
-    assert all(listening(worker.pid) == LOOPBACK for worker in standing.workers)
+    assert {pid_of(part) for part in parts(out)} <= set(progress.pids)
+    assert listening(progress.scheduler.pid) == LOOPBACK
+    assert all(listening(worker.pid) == LOOPBACK for worker in progress.workers)
     assert listening(caller.pid) <= LOOPBACK
     assert caller.wait(120) == 0
     names = [row["test"] for row in rows(out)]
@@ -90,16 +90,16 @@ def test_twelve_tests_as_by_the_pool(runs: Path, done: Path, standing: Running, 
 
 def test_a_long_one_in_chunks(
     long: Path,
-    standing: Running,
+    progress: Running,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Also with a scheduler that is given no more than two tasks at a time."""
-    monkeypatch.setattr(cluster, "_LEAST_ROOM", 2)
-    monkeypatch.setattr(cluster, "_ROOM", 1)
+    monkeypatch.setattr(cluster, "_MIN_QUEUED", 2)
+    monkeypatch.setattr(cluster, "_PER_WORKER", 1)
     words = ["batch", str(long), "--zoi", "48", "--step", "16", "--chunk", "10", "--out"]
-    assert main([*words, str(tmp_path / "there"), "--scheduler", standing.address]) == 0
+    assert main([*words, str(tmp_path / "there"), "--scheduler", progress.address]) == 0
     told = capsys.readouterr().out
     assert re.search(r"1 of 1 tests  [1-9]\d* instants  [\d,]+ ZOI/s", told)  # as the workers told
     assert main([*words, str(tmp_path / "here"), "--workers", "2"]) == 0
@@ -111,11 +111,11 @@ def test_a_long_one_in_chunks(
     assert "joined of 3 chunks" in (tmp_path / "there" / "long" / "replay.txt").read_text(encoding="utf-8")
 
 
-def test_one_that_fails_stops_no_other(runs: Path, standing: Running, tmp_path: Path) -> None:
+def test_one_that_fails_stops_no_other(runs: Path, progress: Running, tmp_path: Path) -> None:
     (tmp_path / "broken").mkdir()
     (tmp_path / "broken" / "session.h5").write_bytes(b"no session at all" * 100)
     tests = [str(tmp_path / "broken" / "session.h5"), str(runs / "hole-1" / "session.h5")]
-    words = [*SETTINGS, "--scheduler", standing.address, "--out", str(tmp_path / "out")]
+    words = [*SETTINGS, "--scheduler", progress.address, "--out", str(tmp_path / "out")]
     assert main(["batch", *tests, *words]) == 5
     assert [(row["test"], row["outcome"]) for row in rows(tmp_path / "out")] == [
         ("broken", "failed"),
@@ -124,10 +124,10 @@ def test_one_that_fails_stops_no_other(runs: Path, standing: Running, tmp_path: 
 
 
 def test_a_caller_that_is_killed(
-    runs: Path, standing: Running, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    runs: Path, progress: Running, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    words = (runs / "*" / "session.h5", *SETTINGS, "--scheduler", standing.address, "--out", out)
+    words = (runs / "*" / "session.h5", *SETTINGS, "--scheduler", progress.address, "--out", out)
     caller = started(*words)
     until(lambda: bool(parts(out)))
     caller.kill()
@@ -157,7 +157,7 @@ def test_a_worker_and_then_the_scheduler_are_killed(
         until(lambda: len(list(out.glob("*/batch.json"))) >= before + 3)  # the other one goes on
         made.scheduler.kill()
         assert caller.wait(60) == 4
-        assert "the scheduler has gone" in capfd.readouterr().err
+        assert "the scheduler has ended" in capfd.readouterr().err
         left = [worker for worker in made.workers if worker.pid != killed]
         until(lambda: not any(not is_gone(pid_of(part)) for part in parts(out)) or left[0].poll() is not None)
     assert not (out / "summary.csv").exists()
@@ -177,7 +177,7 @@ def test_workers_of_another_kind(runs: Path, tmp_path: Path, capsys: pytest.Capt
         assert main([*words, made.address]) == 2
         assert "has no workers; start some with 'dask worker tcp://127.0.0.1:" in capsys.readouterr().err
         two = ["--no-nanny", "--nthreads", 2, *HERE, "--local-directory", tmp_path]
-        with two_at_once(dask("worker", made.address, *two, **dict.fromkeys(there.NEEDED, "2"))):
+        with two_at_once(dask("worker", made.address, *two, **dict.fromkeys(NEEDED, "2"))):
             until(lambda: main([*words, made.address]) == 2 and "2 tasks at once" in capsys.readouterr().err)
     assert not (tmp_path / "out" / "hole-1").exists()
     assert not list((tmp_path / "out").glob(".*"))
@@ -195,7 +195,7 @@ def two_at_once(worker: subprocess.Popen[bytes]) -> Iterator[None]:
 def test_nobody_is_there(
     runs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cluster, "_ANSWER_S", 1)
+    monkeypatch.setattr(cluster, "_CONNECT_S", 1)
     words = ["batch", str(runs / "hole-1" / "session.h5"), "--out", str(tmp_path / "out"), "--scheduler"]
     assert main([*words, "tcp://127.0.0.1:9"]) == 2
     assert "nothing answers there" in capsys.readouterr().err
@@ -206,7 +206,13 @@ def test_nobody_is_there(
 
 
 def answer(**other: object) -> dict[str, object]:
-    alike = {"slots": 1, "host": "a", "versions": deciding_versions(), "threads": ONE_THREAD, "sees": True}
+    alike = {
+        "slots": 1,
+        "host": "a",
+        "versions": deciding_versions(),
+        "threads": ONE_THREAD,
+        "has_token": True,
+    }
     return alike | other
 
 
@@ -263,7 +269,7 @@ def test_on_a_busy_machine_dask_is_started_again(
 
 
 def test_a_worker_that_does_not_see_the_results_is_refused() -> None:
-    with pytest.raises(ConfigError, match="does not see --out"):
+    with pytest.raises(ConfigError, match="does not find --out"):
         cluster.check("tcp://a:1", {"tcp://b:1": answer(sees=False)})
 
 

@@ -1,7 +1,4 @@
-"""Which tests a campaign has: paths, globs and lists.
-
-Parts of tasks: whose process is gone they are stale, also where nobody has reaped it.
-"""
+"""The tests of a campaign (paths, globs and lists), and stale staging folders."""
 
 from __future__ import annotations
 
@@ -15,7 +12,7 @@ import pytest
 
 from acquire.errors import ConfigError, DataError, PhasedicError
 from live.replay.batch.test_list import find_tests
-from live.replay.batch.workdir import parts, sweep
+from live.replay.batch.workdir import staging_dirs, sweep
 
 
 @pytest.fixture
@@ -103,4 +100,4 @@ def test_the_part_of_a_zombie_is_stale(tmp_path: Path) -> None:
         while state.read_text().rpartition(")")[2].split()[0] != "Z":
             time.sleep(0.01)
         assert sweep(tmp_path) == 1
-    assert not list(parts(tmp_path))
+    assert not list(staging_dirs(tmp_path))

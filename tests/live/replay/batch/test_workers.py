@@ -1,4 +1,4 @@
-"""Workers that load their libraries while the campaign is planned, and the order of what they are given."""
+"""Workers load their libraries while the campaign is planned; the order of their tasks."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Counted(WorkerProcesses):
 @pytest.fixture(autouse=True)
 def counted(monkeypatch: pytest.MonkeyPatch) -> None:
     Counted.made = []
-    monkeypatch.setattr(campaign, "Hands", Counted)
+    monkeypatch.setattr(campaign, "WorkerProcesses", Counted)
 
 
 def wanted(tmp_path: Path, tests: int, **more: object) -> CampaignRequest:

@@ -50,12 +50,12 @@ def test_everything_is_offered() -> None:
     out.add(make_measurement(0))
     out.frame(make_frame(0, START))
     out.load(LoadSample(START, 5.0))
-    event_log.tell(EventKind.NOTE, "operator", "hello")
+    event_log.emit(EventKind.NOTE, "operator", "hello")
     out.end()
     assert {name for name, _ in view.calls} == {"show", "point", "picture", "load", "event"}
     assert [what for name, what in view.calls if name == "point"] == [(0.001, 0.0)]
     assert view.closed
-    assert out.reports[0].words == "all drawn"
+    assert out.reports[0].summary == "all drawn"
 
 
 def test_a_view_that_has_failed_is_reported_once_and_all_else_goes_on() -> None:
@@ -109,7 +109,7 @@ def test_the_large_figures_before_and_after_the_first_measurement(state: str) ->
     writer.idle()
     shown = [what for _, (what,) in view.calls]
     assert [(f.state, f.force_N, f.zois) for f in shown] == ([("ARMED", 800.0, 0)] if state else [])
-    run_state.alarms.put("limit", "limit: too much")
+    run_state.alarms.set("limit", "limit: too much")
     writer.measurement(make_measurement(1, 1e-3, force=500.0))
     _, (last,) = view.calls[-1]
     assert (last.state, last.force_N) == (("ARMED", 800.0) if state else ("REPLAY", 500.0))

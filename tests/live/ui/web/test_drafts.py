@@ -141,7 +141,7 @@ def test_saved_with_its_comments_and_loaded_again(draft: ConfigDraft) -> None:
 
 
 def test_a_second_mask_is_a_file_of_its_own(draft: ConfigDraft) -> None:
-    first, second = np.preview(40, dtype=bool), ~np.preview(40, dtype=bool)
+    first, second = np.eye(40, dtype=bool), ~np.eye(40, dtype=bool)
     draft.save(first)
     before = load_config(draft.path, {}).measure.mask
     draft.save(second)

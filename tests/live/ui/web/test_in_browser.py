@@ -151,7 +151,7 @@ def run(page: Page, program: Program) -> None:
     assert_a_page_without_the_token_is_refused(page, program)
     page.page.keyboard.press("t")
     page.until(lambda: "tare" in page.text("answer"), "an answer to the tare")
-    if "order it again" in page.text("answer"):  # in mid-test, unless the noise is just zero
+    if "repeat the command" in page.text("answer"):  # in mid-test, unless the noise is just zero
         page.page.keyboard.press("t")
     page.until(lambda: "tare ✓" in page.text("answer"), "tared")
     page.page.keyboard.press("n")

@@ -154,7 +154,7 @@ def costs_of(worker: ConsumerThread, m: Measurement) -> list[float]:
     for _ in range(200):
         began = time.thread_time()
         worker.give("measurement", m)
-        worker.give("settled", m)
+        worker.give("matched", m)
         costs.append(time.thread_time() - began)
         time.sleep(0.002)
     return costs

@@ -1,4 +1,4 @@
-"""A rig file proposed from what was found: devices, specimen, ZOIs, gauges."""
+"""A proposed rig file: the devices found, and ZOIs and gauges on the specimen found."""
 
 from __future__ import annotations
 
@@ -17,32 +17,32 @@ from live.config.gauges import GaugeTable
 from live.config.loading import Config
 from live.config.values import AUTO
 from live.setup.placement import with_auto_gauges
-from live.setup.region import FirstLook, Region, is_sought, region_of
+from live.setup.region import FirstLook, Region, is_auto_region, region_of
 
-SIZES = (64, 48, 32, 24, 16)
-ACROSS = 4  # ZOIs side by side on the specimen, at least
-STEP_OF_ZOI = 4
+ZOI_SIZES = (64, 48, 32, 24, 16)  # px
+MIN_ACROSS = 4  # ZOIs side by side on the specimen
+STEPS_PER_ZOI = 4
 SLENDER = 1.5
-"""A specimen so many times as long as wide is pulled along its length."""
+"""Length over width above which the load is along the length."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Proposal:
-    """What a rig file is made of.
+    """The content of a rig file.
 
     Attributes
     ----------
-    seen : FirstLook
+    first_look : FirstLook
     region : Region
     config : Config
-        With ZOIs, axis and gauges on the specimen as it stands there now.
+        With ZOIs, axis and gauges on the specimen in its present place.
     camera, load : str
-        What these devices are, in words.
+        Descriptions of these devices.
     others : tuple of str
-        Addresses of other devices that were found.
+        Addresses of the other cameras found.
     """
 
-    seen: FirstLook
+    first_look: FirstLook
     region: Region
     config: Config
     camera: str
@@ -51,23 +51,23 @@ class Proposal:
 
 
 def propose(
-    seen: FirstLook,
+    first: FirstLook,
     config: Config,
-    said: Iterable[str],
-    words: tuple[str, str] = ("", ""),
+    given: Iterable[str],
+    descriptions: tuple[str, str] = ("", ""),
     others: Iterable[str] = (),
 ) -> Proposal:
-    """Find the specimen in a first look and lay ZOIs and gauges on it.
+    """Find the specimen in a first look and place ZOIs and gauges on it.
 
     Parameters
     ----------
-    seen : FirstLook
+    first : FirstLook
     config : Config
-        What is known; nothing of ``said`` is changed.
-    said : iterable of str
-        Keys that a person has given, as "measure.zoi".
-    words : (str, str)
-        What camera and load cell are.
+        The known values; those of ``given`` do not change.
+    given : iterable of str
+        Keys that the user has given, as "measure.zoi".
+    descriptions : (str, str)
+        Of camera and load cell.
     others : iterable of str
 
     Raises
@@ -75,52 +75,54 @@ def propose(
     ConfigError, DataError
         No ZOI fits, or the mask given does not.
     """
-    given = set(said)
-    whole = is_sought(config)
+    keys, auto_region = set(given), is_auto_region(config)
     region = region_of(
-        _with(config, zoi=SIZES[-1]) if "measure.zoi" not in given else config, seen.picture, seen.noise
+        _with(config, zoi=ZOI_SIZES[-1]) if "measure.zoi" not in keys else config, first.picture, first.noise
     )
-    if "specimen.axis" not in given:
-        config = replace(config, specimen=replace(config.specimen, axis=_axis(region, whole)))
-    if "measure.zoi" not in given:
-        config = _with(config, zoi=_size(region, config, seen))
-    if "measure.step" not in given:
-        config = _with(config, step=max(1, config.measure.zoi // STEP_OF_ZOI))
-    region = region_of(config, seen.picture, seen.noise)
-    if "measure.gauges" not in given:
+    if "specimen.axis" not in keys:
+        config = replace(config, specimen=replace(config.specimen, axis=_axis(region, auto_region)))
+    if "measure.zoi" not in keys:
+        config = _with(config, zoi=_size(region, config, first))
+    if "measure.step" not in keys:
+        config = _with(config, step=max(1, config.measure.zoi // STEPS_PER_ZOI))
+    region = region_of(config, first.picture, first.noise)
+    if "measure.gauges" not in keys:
         config = _with(config, gauges=AUTO)
-    placed = with_auto_gauges(config, region.grid(config, *seen.size))
-    return Proposal(seen, region, placed, *words, tuple(others))
+    placed = with_auto_gauges(config, region.grid(config, *first.size))
+    return Proposal(first, region, placed, *descriptions, tuple(others))
 
 
 def _with(config: Config, **values: int | str) -> Config:
     return replace(config, measure=replace(config.measure, **values))  # type: ignore[arg-type]
 
 
-def _axis(region: Region, whole: bool) -> str:
-    """Along the longer side of a slender specimen, else y."""
-    if not (whole and region.box):
+def _axis(region: Region, auto_region: bool) -> str:
+    """The longer side of a slender specimen, else y."""
+    if not (auto_region and region.box):
         return "y"
     _, _, width, height = region.box
     return "x" if width > SLENDER * height else "y"
 
 
-def _size(region: Region, config: Config, seen: FirstLook) -> int:
+def _size(region: Region, config: Config, first: FirstLook) -> int:
     """The largest ZOI of which four fit side by side across the middle half of the specimen."""
-    width, height = seen.size
-    inside = region.inside(width, height, SIZES[-1])
+    width, height = first.size
+    inside = region.inside(width, height, ZOI_SIZES[-1])
     inside = inside if config.specimen.first_axis == "y" else inside.T
     rows = np.flatnonzero(inside.any(axis=1))
     quarter = len(rows) // 4
     widths = sorted(inside[rows[quarter : len(rows) - quarter]].sum(axis=1))
-    narrow = widths[len(widths) // 2] if widths else 0
-    for zoi in SIZES:
+    middle_width = widths[len(widths) // 2] if widths else 0
+    for zoi in ZOI_SIZES:
         try:
-            if ACROSS * zoi <= narrow and region.grid(_with(config, zoi=zoi), width, height).n_active:
+            if (
+                MIN_ACROSS * zoi <= middle_width
+                and region.grid(_with(config, zoi=zoi), width, height).n_active
+            ):
                 return zoi
         except ConfigError:
             continue
-    return SIZES[-1]
+    return ZOI_SIZES[-1]
 
 
 # -- as TOML ------------------------------------------------------------------------------------
@@ -133,10 +135,10 @@ def rig_text(p: Proposal, path: Path, mask: Path | None = None) -> str:
     ----------
     p : Proposal
     path : Path
-        Where it will stand, for the commands it names.
+        Its path, for the commands in its comments.
     mask : Path, optional
-        The mask of the specimen as it stands there now: with it region and gauges are fixed in px; without,
-        they are found anew at the start of each test.
+        The mask of the specimen in its present place: with it, region and gauges are fixed in px; without,
+        they are found at the start of each test.
     """
     return "\n".join(
         [*_head(path), *_devices(p), *_specimen(p), *_measure(p, mask), *_gauges(p, mask is not None), ""]
@@ -145,16 +147,16 @@ def rig_text(p: Proposal, path: Path, mask: Path | None = None) -> str:
 
 def _head(path: Path) -> Iterator[str]:
     name = " ".join(printable(shlex.quote(str(path))).split())
-    yield f"# The rig, as phasedic init found it on {datetime.datetime.now(datetime.UTC):%Y-%m-%d %H:%M} UTC."
+    yield f"# The rig, found by phasedic init on {datetime.datetime.now(datetime.UTC):%Y-%m-%d %H:%M} UTC."
     yield f"# Next: phasedic check --config {name}, then phasedic run --config {name}"
     yield f"# For lengths in mm: phasedic scale --config {name} --points X1,Y1,X2,Y2 --length MM"
 
 
 def _devices(p: Proposal) -> Iterator[str]:
     yield from ("", "[camera]")
-    yield f"address = {_quoted(p.config.camera.address)}{_remark(p.camera)}"
+    yield f"address = {_quoted(p.config.camera.address)}{_comment(p.camera)}"
     yield from ("", "[load]")
-    yield f"address = {_quoted(p.config.load.address)}{_remark(p.load)}"
+    yield f"address = {_quoted(p.config.load.address)}{_comment(p.load)}"
     for other in p.others:
         yield f"# also found: {_quoted(other)}"
 
@@ -162,29 +164,29 @@ def _devices(p: Proposal) -> Iterator[str]:
 def _specimen(p: Proposal) -> Iterator[str]:
     s = p.config.specimen
     yield from ("", "[specimen]")
-    yield f"axis = {_quoted(s.axis)}{_remark('direction of the load in the picture')}"
+    yield f"axis = {_quoted(s.axis)}{_comment('direction of the load in the picture')}"
     if s.area_m2 is None:
-        yield "# width_mm = 20.0        # the section, for stresses: width and thickness, diameter_mm or area_mm2"
+        yield "# width_mm = 20.0        # for stresses: width and thickness, diameter_mm or area_mm2"
         yield "# thickness_mm = 2.0"
 
 
 def _measure(p: Proposal, mask: Path | None) -> Iterator[str]:
     m, box = p.config.measure, p.region.box
     yield from ("", "[measure]")
-    here = _numbers(box) if box else '"all"'
+    roi = _numbers(box) if box else '"all"'
     if mask is not None:
-        yield f"roi = {here}{_remark('x, y, width, height in px')}"
+        yield f"roi = {roi}{_comment('x, y, width, height in px')}"
         if p.region.mask is not None:
             yield f"mask = {_quoted(str(mask.resolve()))}"
     elif p.region.found:
-        yield f'roi = "auto"{_remark("the specimen, found at the start of each test; given instead:")}'
-        yield f"# roi = {here}{_remark('where it is now: x, y, width, height in px')}"
+        yield f'roi = "auto"{_comment("the specimen, found at the start of each test; or fixed:")}'
+        yield f"# roi = {roi}{_comment('its present place: x, y, width, height in px')}"
     else:
-        yield f"roi = {here}{_remark(p.region.words)}"
-    yield f"zoi = {m.zoi}{_remark('side of a ZOI, px: smaller ones resolve more and are noisier (phasedic check)')}"
-    yield f"step = {m.step}{_remark('from one ZOI to the next, px')}"
+        yield f"roi = {roi}{_comment(p.region.words)}"
+    yield f"zoi = {m.zoi}{_comment('side of a ZOI, px: smaller ones resolve more and are noisier (phasedic check)')}"
+    yield f"step = {m.step}{_comment('from one ZOI to the next, px')}"
     if mask is None:
-        yield f'gauges = "auto"{_remark("axial, transverse and area on the specimen, beside those given below")}'
+        yield f'gauges = "auto"{_comment("axial, transverse and area on the specimen, besides those given below")}'
 
 
 def _gauges(p: Proposal, fixed: bool) -> Iterator[str]:
@@ -192,7 +194,7 @@ def _gauges(p: Proposal, fixed: bool) -> Iterator[str]:
     if not fixed:
         yield from (
             "",
-            '# As they are now; without the # they stay there (x, y in px, or as "10, 20 mm" with a [scale]).',
+            '# Their present places; without the # they are fixed (x, y in px, or as "10, 20 mm" with a [scale]).',
         )
     for name, gauge in p.config.gauges.items():
         yield from ("", *(lead + line for line in _gauge(name, gauge)))
@@ -206,7 +208,7 @@ def _gauge(name: str, g: GaugeTable) -> Iterator[str]:
             yield f"{key} = {_numbers(g[key])}"
 
 
-def _remark(words: str) -> str:
+def _comment(words: str) -> str:
     return f"   # {printable(' '.join(words.split()))}" if words else ""
 
 
@@ -215,5 +217,5 @@ def _numbers(values: Iterable[float]) -> str:
 
 
 def _quoted(text: str) -> str:
-    """A text of JSON is one of TOML, but for the half characters that names of files may hold."""
+    """A TOML string: as in JSON, without the lone surrogates that file names can hold."""
     return json.dumps(text.encode("utf-8", "replace").decode(), ensure_ascii=False)
