@@ -31,8 +31,8 @@ REFERENCE = {
 HIDDEN = ("__pycache__", "*.pyc", "make_*.py", "layers.py", "__init__.py")
 
 
-def lay_out() -> None:
-    """All sources of pages in one folder, the README as its first page."""
+def copy_pages() -> None:
+    """Copy all sources of pages into one folder, the README as its first page."""
     shutil.rmtree(PAGES, ignore_errors=True)
     PAGES.mkdir(parents=True)
     shutil.copy(ROOT / "README.md", PAGES / "index.md")
@@ -51,8 +51,8 @@ def reference() -> str:
 
 
 def main() -> int:
-    """Lay out and build; mkdocs' own exit code."""
-    lay_out()
+    """Copy and build; return the exit code of mkdocs."""
+    copy_pages()
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-f", str(ROOT / "mkdocs.yml")]
     code = subprocess.run(command, cwd=ROOT, check=False).returncode
     if code == 0:
