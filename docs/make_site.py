@@ -28,11 +28,12 @@ REFERENCE = {
     "Recorded sessions": "acquire.session",
 }
 """Heading -> module whose public names are described."""
+
 HIDDEN = ("__pycache__", "*.pyc", "make_*.py", "layers.py", "__init__.py")
 
 
-def copy_pages() -> None:
-    """Copy all sources of pages into one folder, the README as its first page."""
+def lay_out() -> None:
+    """All sources of pages in one folder, the README as its first page."""
     shutil.rmtree(PAGES, ignore_errors=True)
     PAGES.mkdir(parents=True)
     shutil.copy(ROOT / "README.md", PAGES / "index.md")
@@ -51,8 +52,8 @@ def reference() -> str:
 
 
 def main() -> int:
-    """Copy and build; return the exit code of mkdocs."""
-    copy_pages()
+    """Lay out and build; mkdocs' own exit code."""
+    lay_out()
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "-f", str(ROOT / "mkdocs.yml")]
     code = subprocess.run(command, cwd=ROOT, check=False).returncode
     if code == 0:
