@@ -62,7 +62,7 @@ def test_a_run_takes_up_what_it_has(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert [outcome.name for outcome in again] == ["fig1", "fig3"]
     run(["fig1"], replace(context, quick=False), screen)
     assert calls == ["fig1", "fig3", "fig1"]
-    assert "as it was" in screen.getvalue()
+    assert "stored" in screen.getvalue()
 
 
 def test_progress_is_a_bar_on_a_terminal_only() -> None:
@@ -211,7 +211,7 @@ def test_the_verdicts_lie_beside_the_figures(tmp_path: Path) -> None:
 
 def test_the_committed_tables_are_those_of_the_page_how_well() -> None:
     docs = Path(__file__).parents[3] / "docs"
-    text = (docs / "how-well.md").read_text(encoding="utf-8")
+    text = " ".join((docs / "how-well.md").read_text(encoding="utf-8").split())
     rows = (docs / "data" / "characterisation" / "verdicts.csv").read_text(encoding="utf-8").splitlines()[1:]
     counts = [sum(row.startswith(f"{word},") for row in rows) for word in ("better", "equal", "worse")]
     assert f"Of {len(rows)} comparisons" in text

@@ -132,7 +132,7 @@ def test_nothing_is_overwritten(
         (2, "one map at a time", ["--to", "tiff", "--fields", "exx,eyy"]),
         (2, "no measurement between 5 and 6 s; the test has 0 to 1.1 s", ["--from", "5", "--until", "6"]),
         (2, "--mm needs the scale", ["--mm"]),
-        (2, "does nothing without --mm", ["--scale", "0.1"]),
+        (2, "has no effect without --mm", ["--scale", "0.1"]),
         (2, "mm/px is not possible", ["--mm", "--scale", "-1"]),
         (2, "--fps 0 is not possible", ["--fps", "0"]),
         (2, ".mp4 or .webm", ["--to", "mp4", "--out", "film.avi"]),
