@@ -89,11 +89,13 @@ def test_the_guest_is_told_what_to_run_and_nothing_secret(
 ) -> None:
     monkeypatch.setenv("PHASEDIC_DATA", "/some where")
     monkeypatch.setenv("MY_TOKEN", "hidden word")
+    monkeypatch.setenv("OPENBLAS_CORETYPE", "Haswell")
     monkeypatch.setattr(vm, "first_files", lambda kernel: iter(()))
     kernel = vm.GuestKernel(tmp_path, "6.1")
     vm.write_job(tmp_path, kernel, ["python", "-c", "print('hello')"], [Path("/kept")])
     script = (tmp_path / "script").read_text()
     assert "export PHASEDIC_DATA='/some where'" in script
     assert "hidden word" not in script
+    assert "OPENBLAS_CORETYPE" not in script, "the emulated processor is another one"
     assert (tmp_path / "writable").read_text() == "/kept\n"
     assert subprocess.run(["sh", "-n", str(tmp_path / "script")], check=False).returncode == 0

@@ -51,8 +51,9 @@ DEVICES = (
     "g_serial",
     "cdc_acm",
 )
+# Not OPENBLAS_CORETYPE: the host's kind of processor is not that of an emulated machine.
 INHERITED = re.compile(
-    r"PATH|HOME|LANG|LC_\w+|TERM|VIRTUAL_ENV|(PYTHON|PYTEST|PHASEDIC|NUMBA|OMP|OPENBLAS)\w*"
+    r"PATH|HOME|LANG|LC_\w+|TERM|VIRTUAL_ENV|(PYTHON|PYTEST|PHASEDIC|NUMBA|OMP|OPENBLAS(?!_CORETYPE))\w*"
 )
 
 INIT = """#!/bin/busybox sh
