@@ -63,7 +63,7 @@ def test_the_layer_is_named() -> None:
 
 
 def test_the_command_and_the_files_of_a_run_name_it() -> None:
-    code = "from live.results.folder import versions; print(versions()['threads'])\n"
+    code = "from live.results.folder import versions; print(versions()['threads'], flush=True)\n"
     code += "from live.cli import main; main(['devices'])"
     recorded, *shown = run(code)
     assert recorded == "numba's workqueue"
