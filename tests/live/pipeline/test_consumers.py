@@ -20,6 +20,11 @@ from live.pipeline.consumer_thread import MAX_EVENTS, Outputs
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.measurement import Measurement
+from live.results.writer import ResultsConsumer
+from live.run.alarms import AlarmWatch
+from live.run.strain_output import StrainOut
+from live.ui.rerun.consumer import CardWriter, FiguresWriter, RerunConsumer
+from live.ui.web.page_consumer import PageConsumer
 from tests.live.fakes import frame
 from tests.live.made_up import START, make_loads, make_measurement
 
@@ -243,3 +248,18 @@ def test_it_sees_every_measurement_and_stands_in_the_report(
     assert "the last was" in report
     assert len(printed) >= 3
     assert printed[-1].split()[1] in report
+
+
+@pytest.mark.parametrize(
+    "consumer",
+    [ResultsConsumer, AlarmWatch, StrainOut, RerunConsumer, CardWriter, FiguresWriter, PageConsumer],
+)
+def test_our_consumers_set_attributes_of_the_contract_alone(consumer: type[Consumer]) -> None:
+    """One with another name would have no effect: a queue of its default size, say."""
+    own = {name for name, value in vars(consumer).items() if name[0] != "_" and not callable(value)}
+    assert {name for name in own if not isinstance(vars(consumer)[name], property)} <= set(dir(Consumer))
+
+
+def test_the_results_may_wait_for_a_slow_disk() -> None:
+    assert ResultsConsumer.policy is Policy.WAIT
+    assert ResultsConsumer.queue_size >= 64
