@@ -95,7 +95,11 @@ def placement(offset: tuple[float, float] = (0.3, -0.2)) -> Placement:
     for pair, k in PAIR_INDEX.items():
         packed[0, k] = covariance[pair]
     return Placement(
-        affine((4.0, -7.0), BEFORE), np.array([offset]), np.zeros((1, 2), np.int64), packed, np.zeros(1, np.uint8)
+        affine((4.0, -7.0), BEFORE),
+        np.array([offset]),
+        np.zeros((1, 2), np.int64),
+        packed,
+        np.zeros(1, np.uint8),
     )
 
 
@@ -121,7 +125,9 @@ def test_covariances_go_with_the_parameters() -> None:
         step[0, k] = 1e-6
         by_local[:, k] = (made.compose(local + step) - made.compose(local - step))[0] / 2e-6
         moved = [
-            Placement(made.base + s * step, made.offset, made.origins, made.covariance, made.status).compose(local)
+            Placement(made.base + s * step, made.offset, made.origins, made.covariance, made.status).compose(
+                local
+            )
             for s in (1, -1)
         ]
         by_base[:, k] = (moved[0] - moved[1])[0] / 2e-6
