@@ -57,6 +57,8 @@ class LoadConfig:
     lag_s: float = key(number(-10, 10), 0.0,
         "delay of the load stamps behind the frames, s; the summary shows the measured value",
         Option("lag", "S"))
+    zero_N: float = key(number(-1e9, 1e9), 0.0,
+        "force from which forces count, N; the page sets it for one test, where the operator tares before it")
 
 
 @dataclass(frozen=True, slots=True)

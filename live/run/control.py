@@ -29,9 +29,10 @@ from live.run.tcp_lines import LineServer
 
 START, STOP = "start", "stop"
 """Notes of a command of ``EventKind.RECORD``."""
-FORCED, UNDO = "force", "undo"
-"""Notes of a command of ``EventKind.TARE``, which may also have none."""
-CONFIRM_S = 3.0
+FORCED, UNDO, ONCE = "force", "undo", "once"
+"""Notes of a command of ``EventKind.TARE``, which may also have none. ONCE is never the repetition of another."""
+BOUNCE_S, CONFIRM_S = 0.5, 3.0
+"""A command is repeated, as a confirmation, after this time and before that: a key that is held repeats too soon."""
 NO_LOAD = 1e-3  # share of the capacity
 ENDED = "ended by the operator"
 MAX_LENGTH = 500  # of a line
@@ -48,6 +49,7 @@ _COMMANDS = {
     "reference": (EventKind.NEW_REFERENCE, ""),
     "tare": (EventKind.TARE, ""),
     "tare force": (EventKind.TARE, FORCED),
+    "tare once": (EventKind.TARE, ONCE),
     "tare undo": (EventKind.TARE, UNDO),
     "pause": (EventKind.PAUSE, ""),
     "resume": (EventKind.RESUME, ""),
@@ -73,7 +75,7 @@ class TareableCell(Protocol):
 
 
 class TareControl:
-    """Carries out tare commands: at once without load or before the test, else only when given twice in 3 s.
+    """Carries out tare commands: at once without load or before the test, else only when given again after 0.5 to 3 s.
 
     A tare in mid-test moves the zero of every force after it: modulus, stress and yield point then have
     two different zeros. So one key pressed by mistake must not do it, and a tare can be undone.
@@ -102,7 +104,7 @@ class TareControl:
         self._confirm_t = -math.inf  # time of the last request for a confirmation
 
     def tare(self, how: str = "") -> None:
-        """Tare; FORCED: whatever the load does; UNDO: restore the zero before the last tare.
+        """Tare; FORCED: whatever the load does; ONCE: only without a risk; UNDO: restore the zero before the last tare.
 
         Raises
         ------
@@ -112,18 +114,20 @@ class TareControl:
         if self._cell.info.protocol == "none":
             raise ControlRefused("there is no load cell")
         confirm_t, self._confirm_t = self._confirm_t, -math.inf
-        risk = "" if how else self._risk()
+        risk = self._risk() if how in ("", ONCE) else ""
         if how == UNDO:
             self._emit(EventKind.TARE, "operator", "undo the last tare", "info")
             self._cell.undo_tare()
-        elif risk and self._clock() - confirm_t > CONFIRM_S:
-            self._confirm_t = self._clock()
+        elif risk and (how == ONCE or not BOUNCE_S <= self._clock() - confirm_t <= CONFIRM_S):
             text = (
                 f"{risk}: forces before and after a tare have different zeros, and so have modulus and stress"
             )
+            if how == ONCE:
+                raise ControlRefused(f"{text}; confirm it")
+            self._confirm_t = self._clock()
             raise ControlRefused(f"{text}; repeat the command within {CONFIRM_S:g} s to do it")
         else:
-            self._emit(EventKind.TARE, "operator", "tare" + (", forced" if how else ""), "info")
+            self._emit(EventKind.TARE, "operator", "tare" + (", forced" if how == FORCED else ""), "info")
             self._cell.tare(force=how == FORCED)
 
     def _risk(self) -> str:

@@ -93,8 +93,13 @@ class LiveRun:
 
     @property
     def recording(self) -> bool:
-        """Whether frames are recorded."""
-        return self._recording is not None and self._recording.on
+        """Whether frames are recorded; not after the recording has failed, as on a full disk."""
+        return self._recording is not None and self._recording.on and self._recording.failed is None
+
+    @property
+    def live(self) -> bool:
+        """Whether the camera is there now; else its pictures are recorded."""
+        return self._rig.camera.info.live
 
     @property
     def run_state(self) -> RunState:
@@ -286,7 +291,13 @@ def run_live(
     )
     run_state.event_log.names |= device_names(config)
     screen.say(f"opening {config.camera.address}")
-    rig = open_rig(config.camera.address, config.load.address, run_state.event_log, crop=config.camera.crop)
+    rig = open_rig(
+        config.camera.address,
+        config.load.address,
+        run_state.event_log,
+        crop=config.camera.crop,
+        zero_N=config.load.zero_N,
+    )
     try:
         prepared = set_up(config, rig, run_state.event_log, screen, stop)
         for line in announcement(rig, prepared.folder):

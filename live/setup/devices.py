@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from acquire.addresses import parse_address
 from acquire.camera import Camera, CroppedCamera, open_camera
 from acquire.events import EventSink, ignore_event
-from acquire.load_cell import LoadCell, open_load_cell
+from acquire.load_cell import LoadCell, ZeroedLoadCell, open_load_cell
 from acquire.record_mode import Crop
 
 if TYPE_CHECKING:
@@ -41,7 +41,12 @@ class Rig:
 
 
 def open_rig(
-    camera_address: str, load_address: str, on_event: EventSink = ignore_event, *, crop: Crop | None = None
+    camera_address: str,
+    load_address: str,
+    on_event: EventSink = ignore_event,
+    *,
+    crop: Crop | None = None,
+    zero_N: float = 0.0,
 ) -> Rig:
     """Open both devices; raises as ``open_camera`` and ``open_load_cell``.
 
@@ -49,12 +54,14 @@ def open_rig(
     ----------
     crop : (x, y, width, height), px, optional
         The part of the picture to use.
+    zero_N : float, N
+        Force from which forces count.
     """
     specimen = _specimen(camera_address, load_address)
     camera = _open_camera(camera_address, on_event, specimen)
     try:
         camera = camera if crop is None else CroppedCamera(camera, crop)
-        load = _open_load(load_address, on_event, specimen)
+        load = _zeroed_load(load_address, on_event, specimen, zero_N)
     except BaseException:
         camera.close()
         raise
@@ -93,6 +100,14 @@ def _open_load(address: str, on_event: EventSink, specimen: VirtualSpecimen | No
     from hw_mocks.sim_load_cell import open_sim_load
 
     return open_sim_load(parse_address(address), on_event, specimen)
+
+
+def _zeroed_load(
+    address: str, on_event: EventSink, specimen: VirtualSpecimen | None, zero_N: float
+) -> LoadCell:
+    if not zero_N:
+        return _open_load(address, on_event, specimen)
+    return ZeroedLoadCell(lambda sink: _open_load(address, sink, specimen), zero_N, on_event)
 
 
 def open_load(address: str, on_event: EventSink = ignore_event, camera_address: str = "none:") -> LoadCell:

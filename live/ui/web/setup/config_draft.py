@@ -24,13 +24,13 @@ CHANGEABLE = frozenset(
         "measure.mask", "measure.gauges",
         "specimen.width_mm", "specimen.thickness_mm", "specimen.diameter_mm", "specimen.area_mm2",
         "specimen.gauge_length_mm", "specimen.axis", "specimen.standard", "metadata.specimen", "metadata.operator",
-        "metadata.material", "scale.mm_per_px", "scale.sigma_mm_per_px", "scale.date", "scale.method",
+        "metadata.material", "metadata.note", "load.zero_N", "scale.mm_per_px", "scale.sigma_mm_per_px", "scale.date", "scale.method",
     }
 )  # fmt: skip
 """Keys that a page may change, beside gauges."""
 
-TRANSIENT = ("output.", "view.")
-"""Keys of the command line with these beginnings are not saved."""
+TRANSIENT = ("output.", "view.", "load.zero_N")
+"""Keys with these beginnings are of one test, and not saved."""
 
 _SAFE = "/:,@+-_.*~"
 _NUMBERED = re.compile(r"^(.*?)-?(\d{1,6})$")
@@ -79,7 +79,7 @@ class ConfigDraft:
             else:
                 tree[section][key] = value
         self._config = from_dict(tree, {}, "the page")
-        self.changes |= changes
+        self.changes |= {key: value for key, value in changes.items() if not key.startswith(TRANSIENT)}
 
     def save(self, mask: NDArray[np.bool_] | None) -> None:
         """Write the changes into the rig file and ``mask`` into a picture beside it; the old rig file is kept.
@@ -92,7 +92,8 @@ class ConfigDraft:
         if mask is not None:
             self.change_all({"measure.mask": str(self._write_mask(mask))})
         write_rig(self.path, self.changes)
-        self._config = load_config(self.path, self._transient)
+        zero = {"load.zero_N": self._config.load.zero_N}
+        self._config = load_config(self.path, self._transient | zero)
         self.changes = {}
 
     def _write_mask(self, mask: NDArray[np.bool_]) -> Path:
@@ -107,18 +108,19 @@ class ConfigDraft:
         return path
 
 
-def with_setting(address: str, key: str, value: float) -> str:
-    """The address with one setting changed."""
-    settings = dict(parse_address(address).settings) | {key: f"{value:g}"}
+def with_setting(address: str, key: str, value: str) -> str:
+    """The address with one setting changed; an empty value removes it."""
+    changed = dict(parse_address(address).settings) | {key: value}
     body = address.partition("?")[0] if parse_address(address).settings else address
-    return f"{body}?{'&'.join(f'{k}={quote(v, safe=_SAFE)}' for k, v in settings.items())}"
+    settings = "&".join(f"{k}={quote(v, safe=_SAFE)}" for k, v in changed.items() if v)
+    return f"{body}?{settings}" if settings else body
 
 
 def at_rest(address: str) -> str:
     """The address of a rig without load: a simulated test would start by itself."""
     if parse_address(address).scheme != "sim":
         return address
-    for key, value in (("max_strain", 0.0), ("seconds", 3600.0), ("hold", 1.0), ("end", 1.0)):
+    for key, value in (("max_strain", "0"), ("seconds", "3600"), ("hold", "1"), ("end", "1")):
         address = with_setting(address, key, value)
     return address
 
