@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from acquire.addresses import with_setting
 from acquire.bounds import NotAllowed, as_number
 from acquire.errors import ConfigError, DataError
 from analysis.evaluate import GAUGE_KINDS
 from live.setup.scale import Board, from_points
-from live.ui.web.config_draft import with_setting
 from live.ui.web.drawn_region import DrawnRegion, are_points
 from live.ui.web.setup_session import OVERLAYS, SetupSession
 
