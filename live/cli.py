@@ -4,31 +4,54 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import errno
 import logging
 import os
+import signal
 import sys
-from collections.abc import Sequence
+import threading
+from collections.abc import Iterator, Sequence
+from types import FrameType
 from typing import TextIO
 
-from acquire.errors import PhasedicError
+from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.printable import brief, printable
+from acquire.signal_mask import signal_handler
 from live.commands.arguments import Command, parse
 from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.streams import nonblocking_streams
+
+_THREADS = "NUMBA_NUM_THREADS"
+_WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     _replace_closed_streams()
     try:
-        command, arguments = parse(sys.argv[1:] if argv is None else argv)
-        with nonblocking_streams():
-            _set_up_logging(arguments)
-            code = _run(command, arguments)
+        with _ended_by_sigterm():
+            command, arguments = parse(sys.argv[1:] if argv is None else argv)
+            with nonblocking_streams():
+                _set_up_logging(arguments)
+                code = _run(command, arguments)
     except KeyboardInterrupt:  # before or after the command
         code = _interrupted()
     _drop_lost_streams()
     return code
+
+
+@contextlib.contextmanager
+def _ended_by_sigterm() -> Iterator[None]:
+    """SIGTERM ends a command as Ctrl-C does, where the command has no handler of its own."""
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with signal_handler(end, signal.SIGTERM):
+        yield
 
 
 def _replace_closed_streams() -> None:
@@ -84,17 +107,42 @@ class _PrintableFormatter(logging.Formatter):
 def _run(command: Command, arguments: argparse.Namespace) -> int:
     """Run the command; an exception becomes a message and an exit code."""
     try:
+        _check_environment()
         return command(arguments)
     except PhasedicError as error:
-        print(f"phasedic: {printable(brief(error))}", file=sys.stderr)
-        return error.exit_code
+        return _refused(error)
     except KeyboardInterrupt:
         return _interrupted()
     except BrokenPipeError:
         return 0
+    except OSError as error:
+        logging.getLogger("live").debug("the system refused", exc_info=True)
+        return _refused(_system_error(error))
     except Exception:
         logging.getLogger("live").exception("a defect of phasedic; please report it with this traceback")
         return 1
+
+
+def _check_environment() -> None:
+    """Refuse a number of threads that numba would end the program for."""
+    threads = os.environ.get(_THREADS, "1")
+    if not threads.isdecimal() or int(threads) < 1:
+        raise ConfigError(f"{_THREADS}={threads} is not possible; give a whole number from 1, or unset it")
+
+
+def _system_error(error: OSError) -> PhasedicError:
+    """What the system refused, and what to do; the one place for files that no other message covers."""
+    name = error.filename if isinstance(error.filename, str | bytes | os.PathLike) else ""
+    what = f"{os.fsdecode(name)}: " if name else ""
+    why = error.strerror or str(error)
+    if error.errno in _WRONG_PATH:
+        return ConfigError(f"{what[:200]}{why}; give another name")
+    return DataError(f"{what}{why}; check the path, the permissions and the room on the disk")
+
+
+def _refused(error: PhasedicError) -> int:
+    print(f"phasedic: {printable(brief(error))}", file=sys.stderr)
+    return error.exit_code
 
 
 def _interrupted() -> int:

@@ -19,7 +19,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import Registry, parse_address
+from acquire.addresses import Registry, expanded, parse_address
 from acquire.camera.contract import Camera
 from acquire.events import EventSink, ignore_event
 from acquire.frame import CameraInfo, Frame, frozen
@@ -90,7 +90,7 @@ _VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm")
 def with_scheme(text: str) -> str:
     """The address with its scheme, where it is but the name of a folder, a glob or a file: ``files:shots``."""
     address = parse_address(text)
-    path, suffix = Path(address.target).expanduser(), Path(address.target).suffix.lower()
+    path, suffix = expanded(address.target), Path(address.target).suffix.lower()
     if address.scheme and address.scheme in (*CAMERAS.schemes(), "sim"):
         return text
     if suffix in (".h5", ".hdf5"):

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import Address, Options
+from acquire.addresses import Address, Options, expanded
 from acquire.camera import CameraBase
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import EventSink, device_event, ignore_event
@@ -46,7 +46,7 @@ def find_images(target: str) -> list[Path]:
     DataError
         There is none, or one is no regular file.
     """
-    path = Path(target).expanduser()
+    path = expanded(target)
     if path.is_dir():
         found = [item for item in path.iterdir() if item.suffix.lower() in SUFFIXES]
     elif path.exists():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 from acquire.errors import ConfigError
@@ -68,11 +69,15 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic export``."""
     if not 0.1 <= arguments.fps <= 240:
         raise ConfigError(f"--fps {arguments.fps:g} is not possible; give 0.1 to 240")
+    if arguments.limit is not None and not 0 < arguments.limit < math.inf:
+        raise ConfigError(f"--limit {arguments.limit:g} is not possible; give a number above 0")
     screen = TerminalScreen()
     with open_run(arguments.run) as run:
         if arguments.more_gauges:
             add_gauges(run, Path(arguments.more_gauges))
         screen.say(str(export(run, _request(arguments, run), screen)))
+        for note in run.notes:
+            screen.say(f"note: {note}")
     return 0
 
 

@@ -63,6 +63,8 @@ def command(arguments: argparse.Namespace) -> int:
             screen.say(str(out.with_suffix(".csv")))
         else:
             report = make_report(found[0], _request(arguments, found[0]), screen)
+        for note in (note for run in found for note in run.notes):
+            screen.say(f"note: {note}")
     _save(report, out, arguments, screen)
     return 0
 

@@ -15,8 +15,8 @@ class FrameCounts:
     grabbed : int
         Frames the camera handed out.
     recorded, unrecorded, thinned : int
-        Written to the session; not written although they should be (a counted gap); left out by the
-        recording mode (only bursts, every K-th).
+        Written to the session; not written although they should be (a counted gap); left out on purpose: by
+        the recording mode (only bursts, every K-th), or while recording was off.
     reference, measured, skipped, left_out : int
         Part of the reference burst; of a measured burst; of a burst that a newer one replaced or that
         came while measuring was paused; of no complete burst, or damaged.
@@ -66,10 +66,11 @@ class FrameCounts:
 
     def line(self) -> str:
         """One line for a person."""
+        on_purpose = f" and {self.thinned} on purpose" * (self.thinned > 0)
         share = f" ({self.skipped_share:.1%})" * (self.skipped > 0)
         return (
             f"grabbed {self.grabbed} / recorded {self.recorded} / measured {self.measured}"
             f" / skipped {self.skipped}{share} / lost {self.lost}"
-            f"  (reference {self.reference}, left over {self.left_out}, not recorded {self.unrecorded};"
-            f" {'adds up' if self.adds_up else 'DOES NOT ADD UP'})"
+            f"  (reference {self.reference}, left over {self.left_out}, not recorded {self.unrecorded}"
+            f"{on_purpose}; {'adds up' if self.adds_up else 'DOES NOT ADD UP'})"
         )

@@ -34,6 +34,7 @@ _EXTENSIONS = ("Ag", "Agt", "A", "At")
 
 _PLAIN, _PERCENT, _MPA, _GPA, _KN = ("", 1.0), ("%", 0.01), ("MPa", 1e6), ("GPa", 1e9), ("kN", 1e3)
 _STRENGTH_SUFFIXES = dict(zip(_STRENGTHS, ("p0.1", "p0.2", "p1", "eH", "eL", "m"), strict=True))
+LAG_MATTERS_S = 0.005  # and beyond its own uncertainty: to correct a smaller one changes no figure
 _SMALL_KN = 2.0  # below it forces are shown in N
 
 
@@ -137,7 +138,11 @@ def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list
     lag = find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
     if not lag.known:
         return [f"lag of the load behind the frames: not known ({lag.why})"]
-    how = f"{loads.lag_s * 1e3:g} ms corrected" if loads.lag_s else f"not applied; --lag {lag.value:.3f} does"
+    how = "too small to matter"
+    if loads.lag_s:
+        how = f"{loads.lag_s * 1e3:g} ms corrected"
+    elif abs(lag.value) > max(LAG_MATTERS_S, lag.high - lag.value, lag.value - lag.low):
+        how = f"not applied; --lag {lag.value:.3f} does"
     return [f"lag of the load behind the frames: {figure_text(lag, 1e-3, 'ms')} ({CONFIDENCE:.0%}; {how})"]
 
 

@@ -13,8 +13,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from live.config.channels import SYSTEM_CHANNELS
+from live.config.loading import Config
 from live.config.sections import AlarmConfig
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
@@ -100,6 +102,29 @@ ACTIONS: tuple[type[Action], ...] = (RingBell, SendLine, EndRun)
 def actions_of(config: AlarmConfig, means: ActionMeans) -> list[Action]:
     """The actions that ``config`` requests, in the order of ``ACTIONS``."""
     return [kind(config, means) for kind in ACTIONS if not kind.key or getattr(config, kind.key)]
+
+
+def check_alarms(config: Config) -> None:
+    """Refuse alarms on channels that have no value in a test with ``config``.
+
+    Raises
+    ------
+    ConfigError
+        A force without a load cell, a stress without a section, a disk that nothing is written to.
+    """
+    missing = dict.fromkeys(("force_N", "stress_MPa", "load_silent_s"), "a load cell: give --load ADDRESS")
+    if config.load.address != "none:":
+        missing.clear()
+    if config.specimen.area_m2 is None:
+        missing.setdefault("stress_MPa", "the section: give --section W,T")
+    if not config.record.enabled:
+        missing["disk_min"] = "a recording: leave --no-record out"
+    for number, alarm in enumerate(config.alarm, 1):
+        if alarm.channel in missing:
+            raise ConfigError(
+                f"alarm {number} ({alarm.channel}) can never come: it needs {missing[alarm.channel]}, or take the"
+                " alarm out of the configuration"
+            )
 
 
 class Alarm:

@@ -23,6 +23,7 @@ from live.pipeline.latency import LatencyMonitor
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.results.writer import write_results
+from live.run.alarms import check_alarms
 from live.run.burst_queue import TAKING, BurstQueue
 from live.run.control import ControlRefused
 from live.run.grabber import Grabber, GrabPlan
@@ -94,7 +95,8 @@ class LiveRun:
     @property
     def recording(self) -> bool:
         """Whether frames are recorded; not after the recording has failed, as on a full disk."""
-        return self._recording is not None and self._recording.on and self._recording.failed is None
+        recording = self._recording
+        return recording is not None and recording.on and recording.failed is None
 
     @property
     def live(self) -> bool:
@@ -118,8 +120,8 @@ class LiveRun:
     def command(self, kind: EventKind, note: str = "") -> str:
         """Carry out a command of the operator and log it; raises ControlRefused where that is not possible."""
         if kind is EventKind.TARE:
-            self._tares.tare(note)
-        elif kind in (EventKind.PAUSE, EventKind.RESUME):
+            return self._tares.tare(note)
+        if kind in (EventKind.PAUSE, EventKind.RESUME):
             self._pause(kind is EventKind.PAUSE)
         elif kind is EventKind.NEW_REFERENCE:
             self._emit(kind, "a new reference is taken from the next frames")
@@ -285,6 +287,7 @@ def run_live(
     """
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (phasedic devices lists what is there)")
+    check_alarms(config)
     stop, run_state = (
         stop or StopSignal(),
         RunState.new(config.load.max_gap_s, config.load.lag_s, config.specimen),

@@ -77,6 +77,8 @@ def tare_controls(cell: LoadCell, run_state: RunState) -> TareControl:
     def measured() -> bool:
         return bool(run_state.history.time_steps)
 
-    return TareControl(
+    tares = TareControl(
         cell, measured, lambda: run_state.loads.latest, run_state.event_log.emit, time.monotonic
     )
+    run_state.event_log.add_listener(tares.take_event)
+    return tares

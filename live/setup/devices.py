@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from acquire.addresses import parse_address
+from acquire.addresses import parse_address, with_setting
 from acquire.camera import Camera, CroppedCamera, open_camera
 from acquire.events import EventSink, ignore_event
 from acquire.load_cell import LoadCell, ZeroedLoadCell, open_load_cell
@@ -68,6 +68,15 @@ def open_rig(
     return Rig(camera, load, specimen if _simulated(camera_address) else None)
 
 
+def at_rest(address: str) -> str:
+    """The address for a look at the rig before a test: a simulated test would begin by itself."""
+    if not _simulated(address):
+        return address
+    for key, value in (("max_strain", 0.0), ("seconds", 3600.0), ("hold", 1.0), ("end", 1.0)):
+        address = with_setting(address, key, value)
+    return address
+
+
 def _simulated(address: str) -> bool:
     return parse_address(address).scheme == "sim"
 
@@ -113,6 +122,6 @@ def _zeroed_load(
 def open_load(address: str, on_event: EventSink = ignore_event, camera_address: str = "none:") -> LoadCell:
     """Open a load cell alone, also a simulated one; raises as ``open_load_cell``.
 
-    A simulated load cell shares its specimen with a simulated camera at ``camera_address``.
+    A simulated load cell shares its specimen, which is at rest, with a simulated camera at ``camera_address``.
     """
-    return _open_load(address, on_event, _specimen(camera_address, address))
+    return _open_load(address, on_event, _specimen(at_rest(camera_address), at_rest(address)))

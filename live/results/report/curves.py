@@ -92,7 +92,7 @@ def gauge_strains(run: RunFolder) -> Plot | None:
 
 def force(run: RunFolder) -> Plot | None:
     """Force against time, with every reading of the load cell where a session has them; None without force."""
-    samples = run.session.load_samples() if run.session is not None else []
+    samples = run.load_samples
     if samples:
         t = np.array([s.t - run.start_monotonic for s in samples])
         f = np.array([s.force for s in samples])

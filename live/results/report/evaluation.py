@@ -75,7 +75,7 @@ def _intercept(axial: Array, load: Array, figures: TensileFigures) -> float:
 
 def lag_of(run: RunFolder) -> Figure:
     """The lag of the recorded load behind the frames, s, found from the test itself."""
-    samples = run.session.load_samples() if run.session is not None else []
+    samples = run.load_samples
     if not samples:
         return Figure.none("no readings of a load cell were recorded")
     t = np.array([sample.t - run.start_monotonic for sample in samples])

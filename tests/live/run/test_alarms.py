@@ -22,8 +22,10 @@ from live.cli import main
 from live.config.loading import from_dict, load_config
 from live.config.sections import AlarmConfig
 from live.pipeline.run_state import ActiveAlarms, Health
-from live.run.alarms import ACTIONS, ActionMeans, Alarm, AlarmWatch, actions_of
+from live.pipeline.screen import Screen
+from live.run.alarms import ACTIONS, ActionMeans, Alarm, AlarmWatch, actions_of, check_alarms
 from live.run.control import ControlPort, answer
+from live.run.live_run import run_live
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.run.test_strain_output import Listener, free_port, read
 from tests.live.run.test_tcp_lines import Caller
@@ -43,6 +45,30 @@ def test_on_beyond_the_limit_and_off_when_back_by_the_hysteresis() -> None:
 
 def test_without_hysteresis_the_limit_itself_is_off() -> None:
     assert changes(Alarm(AlarmConfig(channel="x", above=1.0)), 1.0, 1.1, 1.0, 0.9) == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("channel", "settings", "needs"),
+    [
+        ("force_N", {}, "a load cell"),
+        ("load_silent_s", {}, "a load cell"),
+        ("stress_MPa", {"specimen.area_mm2": 40.0}, "a load cell"),
+        ("stress_MPa", {"load.address": "sim:"}, "the section"),
+        ("disk_min", {"record.enabled": False}, "a recording"),
+        ("force_N", {"load.address": "sim:"}, ""),
+        ("stress_MPa", {"load.address": "sim:", "specimen.area_mm2": 40.0}, ""),
+        ("axial", {}, ""),
+        ("disk_min", {}, ""),
+    ],
+)
+def test_an_alarm_that_can_never_come_is_refused(channel: str, settings: dict[str, Any], needs: str) -> None:
+    alarm = [{"channel": "silent_s", "above": 1.0}, {"channel": channel, "above": 1.0}]
+    config = load_config(None, {"camera.address": "sim:?fsp=3", "alarm": alarm, **settings})
+    if not needs:
+        check_alarms(config)
+        return
+    with pytest.raises(ConfigError, match=rf"alarm 2 \({channel}\) can never come: it needs {needs}"):
+        run_live(config, Screen())  # before the camera is opened, which has an unknown setting
 
 
 class Kept:

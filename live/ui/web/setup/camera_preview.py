@@ -15,8 +15,8 @@ from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
 from acquire.printable import brief, printable
 from live.pipeline.latency import OUTPUT, lower_priority
-from live.setup.devices import open_rig
-from live.ui.web.setup.config_draft import ConfigDraft, at_rest
+from live.setup.devices import at_rest, open_rig
+from live.ui.web.setup.config_draft import ConfigDraft
 
 log = logging.getLogger(__name__)
 

@@ -7,12 +7,10 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import write_picture
 from live.config.loading import Config, from_dict, load_config, settings_in
@@ -32,7 +30,6 @@ CHANGEABLE = frozenset(
 TRANSIENT = ("output.", "view.", "load.zero_N")
 """Keys with these beginnings are of one test, and not saved."""
 
-_SAFE = "/:,@+-_.*~"
 _NUMBERED = re.compile(r"^(.*?)-?(\d{1,6})$")
 
 
@@ -106,23 +103,6 @@ class ConfigDraft:
         except DataError as error:
             raise ConfigError(str(error)) from None
         return path
-
-
-def with_setting(address: str, key: str, value: str) -> str:
-    """The address with one setting changed; an empty value removes it."""
-    changed = dict(parse_address(address).settings) | {key: value}
-    body = address.partition("?")[0] if parse_address(address).settings else address
-    settings = "&".join(f"{k}={quote(v, safe=_SAFE)}" for k, v in changed.items() if v)
-    return f"{body}?{settings}" if settings else body
-
-
-def at_rest(address: str) -> str:
-    """The address of a rig without load: a simulated test would start by itself."""
-    if parse_address(address).scheme != "sim":
-        return address
-    for key, value in (("max_strain", "0"), ("seconds", "3600"), ("hold", "1"), ("end", "1")):
-        address = with_setting(address, key, value)
-    return address
 
 
 def next_name(name: str) -> str:

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from acquire.addresses import with_setting
 from acquire.bounds import NotAllowed, as_number
 from acquire.errors import ConfigError
 from analysis.evaluate import GAUGE_KINDS
 from live.setup.scale import Board, from_points
-from live.ui.web.setup.config_draft import with_setting
 from live.ui.web.setup.drawn_region import are_points
 from live.ui.web.setup.setup_session import OVERLAYS, SetupSession
 
@@ -63,7 +63,7 @@ def camera(session: SetupSession, request: Request) -> None:
     if key not in keys:
         raise ConfigError(f"a number for one of {', '.join(keys) or 'the settings of an open camera'}")
     number = _number(str(key), value)
-    session.preview.reopen(with_setting(session.draft.config.camera.address, str(key), f"{number:g}"))
+    session.preview.reopen(with_setting(session.draft.config.camera.address, str(key), number))
 
 
 def option(session: SetupSession, request: Request) -> None:

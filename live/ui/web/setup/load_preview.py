@@ -19,7 +19,7 @@ from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.printable import brief, printable
 from live.pipeline.latency import OUTPUT, lower_priority
 from live.setup.devices import open_load
-from live.ui.web.setup.config_draft import ConfigDraft, at_rest
+from live.ui.web.setup.config_draft import ConfigDraft
 
 log = logging.getLogger(__name__)
 
@@ -163,16 +163,14 @@ class LoadPreview:
                 self._reopen.wait(RETRY_S)
 
     def _read(self) -> None:
-        address, camera = self.address, self._draft.config.camera.address
+        address = self.address
         with self._lock:
             self._samples.clear()
         self.info, self._fault, self._opened_t = None, "", self._clock()
         if address == NONE:
             self._reopen.wait()
             return
-        camera = at_rest(camera) if camera else NONE
-        address = address if parse_address(camera).scheme == "sim" else at_rest(address)
-        cell = open_load(address, self._on_event, camera)
+        cell = open_load(address, self._on_event, self._draft.config.camera.address or NONE)
         self._cell, self.info = cell, cell.info
         with cell:
             self._take(cell)

@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquire.addresses import with_setting
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Frame, frozen
 from live.config.loading import load_config
+from live.setup.devices import at_rest
 from live.setup.pictures import read_mask
 from live.setup.scale import from_board
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.config_draft import ConfigDraft, at_rest, next_name, with_setting
+from live.ui.web.config_draft import ConfigDraft, next_name
 from live.ui.web.draft_changes import CHANGES
 from live.ui.web.drawn_region import DrawnRegion
 from live.ui.web.setup_session import SetupSession
