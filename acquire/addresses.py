@@ -90,7 +90,7 @@ def with_setting(address: str, key: str, value: float | str) -> str:
     changed = dict(parse_address(address).settings)
     body = address.partition("?")[0] if changed else address
     changed[key] = value if isinstance(value, str) else f"{value:g}"
-    settings = "&".join(f"{k}={quote(v, safe=_SAFE)}" for k, v in changed.items() if v)
+    settings = "&".join(f"{k}={quote(v, safe=_SAFE)}" for k, v in changed.items() if v or k != key)
     return f"{body}?{settings}" if settings else body
 
 

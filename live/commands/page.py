@@ -17,9 +17,9 @@ from live.commands.signals import signals
 from live.config.loading import load_config
 from live.pipeline.screen import Screen
 from live.ui.terminal.screen import TerminalScreen
-from live.ui.web.config_draft import ConfigDraft
 from live.ui.web.page_controller import PageController
 from live.ui.web.server import DEFAULT_PORT
+from live.ui.web.setup.config_draft import ConfigDraft
 
 RIG = "rig.toml"
 
@@ -69,8 +69,7 @@ def serve(controller: PageController, screen: Screen, interrupted: threading.Eve
             interrupted.set()
             return
         report = outcome.folder / "report.html"
-        if not report.exists():
-            write_report(outcome.folder, screen)
-        controller.reported(report if report.exists() else None)
+        why = "" if report.exists() else write_report(outcome.folder, screen)
+        controller.reported(report if report.exists() else None, why)
         if not controller.after():
             return

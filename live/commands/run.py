@@ -68,7 +68,7 @@ def run_and_show_page(config: Config, screen: Screen) -> Outcome:
 
 def run_with_page(controller: PageController, config: Config, screen: Screen) -> Outcome:
     """One test, shown on the page until its end."""
-    from live.ui.web.page_controller import run_result
+    from live.ui.web.run_result import run_result
 
     controller.viewer = _open_viewer
     outcome = run_attended(config, screen, [controller.begin(config)], controller.attach)

@@ -97,7 +97,9 @@ class CameraPreview:
         try:
             error = self._opened.get(timeout=OPEN_S)
         except queue.Empty:
-            error = DeviceError(f"{brief(address)}: not open within {OPEN_S:g} s; look at its cable and power")
+            error = DeviceError(
+                f"{brief(address)}: not open within {OPEN_S:g} s; look at its cable and power"
+            )
         if error is not None:
             self._draft.change_all({"camera.address": before})
             raise error

@@ -22,7 +22,8 @@ CHANGEABLE = frozenset(
         "measure.mask", "measure.gauges",
         "specimen.width_mm", "specimen.thickness_mm", "specimen.diameter_mm", "specimen.area_mm2",
         "specimen.gauge_length_mm", "specimen.axis", "specimen.standard", "metadata.specimen", "metadata.operator",
-        "metadata.material", "metadata.note", "load.zero_N", "scale.mm_per_px", "scale.sigma_mm_per_px", "scale.date", "scale.method",
+        "metadata.material", "metadata.note", "load.zero_N", "scale.mm_per_px",
+        "scale.sigma_mm_per_px", "scale.date", "scale.method",
     }
 )  # fmt: skip
 """Keys that a page may change, beside gauges."""

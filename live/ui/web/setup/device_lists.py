@@ -54,7 +54,8 @@ class DeviceLists:
 
     def state(self, camera: str) -> dict[str, Any]:
         """The lists as the page shows them; formats are those of the camera at the address ``camera``."""
-        same = [one for one in self._cameras if _device(one) & {parse_address(camera).target}]
+        target = parse_address(camera).target if camera else ""
+        same = [one for one in self._cameras if target in _device(one)]
         lines = (line for one in same for line in one.details)
         return {
             "cameras": [_shown(one) for one in self._cameras],

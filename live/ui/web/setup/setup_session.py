@@ -69,7 +69,9 @@ class SetupSession:
         self._lock = threading.Lock()
         self.devices = DeviceLists(lambda: Path(draft.config.output.dir or "runs"))
         self.load = LoadPreview(draft)
-        self.preview = CameraPreview(draft, self._opened, self._show, lambda info: self.check.frames_needed(info))
+        self.preview = CameraPreview(
+            draft, self._opened, self._show, lambda info: self.check.frames_needed(info)
+        )
         self.region = SpecimenRegion(draft, drawn, lambda: self.check.discard())
         self.check = SpecimenCheck(
             draft, self.preview, self.load, self.region, Path(self._folder.name), self.refresh

@@ -1,4 +1,4 @@
-"""The check of the still specimen during set-up: a thread judges the newest frames, and on request runs the whole check."""
+"""The check of the still specimen during set-up: a thread judges the newest frames; the whole check on request."""
 
 from __future__ import annotations
 

@@ -139,7 +139,9 @@ class SpecimenRegion:
         height, width = drawn.mask.shape
         box = replace(config, measure=replace(config.measure, roi=roi, mask=None))
         placed = auto_gauges(grid_for(box, width, height, drawn.mask), config.specimen.first_axis)
-        self.set_gauges({f"gauges.{name}": table for name, table in placed.items()} | {"measure.gauges": GIVEN})
+        self.set_gauges(
+            {f"gauges.{name}": table for name, table in placed.items()} | {"measure.gauges": GIVEN}
+        )
 
     # -- for the check, the test and the rig file ---------------------------------------------------
 
