@@ -26,6 +26,7 @@ class ZeroedLoadCell:
 
     def __init__(self, opener: Callable[[EventSink], LoadCell], zero_N: float, on_event: EventSink) -> None:
         self._zero_N, self._before, self._on_event = zero_N, list[float](), on_event
+        self._undoing = False
         self._cell = opener(self._event)
         settings = {**self._cell.info.settings, "zero_N": zero_N}
         self.info: LoadCellInfo = dataclasses.replace(self._cell.info, settings=settings)
@@ -45,10 +46,12 @@ class ZeroedLoadCell:
 
     def tare(self, *, force: bool = False) -> None:
         """Make the present load zero."""
+        self._undoing = False
         self._cell.tare(force=force)
 
     def undo_tare(self) -> None:
         """Restore the zero before the last tare."""
+        self._undoing = True
         self._cell.undo_tare()
 
     def stop(self) -> None:
@@ -67,7 +70,7 @@ class ZeroedLoadCell:
 
     def _tared(self, event: Event) -> Event:
         old = self._zero_N
-        if event.data.get("undo"):
+        if event.data.get("undo", self._undoing):
             self._zero_N = self._before.pop() if self._before else old
         else:
             self._before.append(old)

@@ -11,7 +11,15 @@ from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import LoadAxis, load_axis, principal_direction
 from analysis.evaluate.figure import CONFIDENCE, Figure
 from analysis.evaluate.floor import MIN_STILL_INSTANTS, NoiseFloor, evenly, noise_floor, still_phase
-from analysis.evaluate.gauge_kinds import GAUGE_KINDS, AreaGauge, LineGauge, TransverseGauge, ZoiGauge
+from analysis.evaluate.gauge_kinds import (
+    GAUGE_KINDS,
+    AreaGauge,
+    CircleGauge,
+    LineGauge,
+    StripGauge,
+    TransverseGauge,
+    ZoiGauge,
+)
 from analysis.evaluate.gauges import Gauge, GaugeValue, Parameter, inside_polygon
 from analysis.evaluate.lag import Track, find_lag
 from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
@@ -23,6 +31,7 @@ __all__ = [
     "MIN_STILL_INSTANTS",
     "STANDARDS",
     "AreaGauge",
+    "CircleGauge",
     "Band",
     "Curve",
     "Figure",
@@ -39,6 +48,7 @@ __all__ = [
     "TensileFigures",
     "TensileOptions",
     "Track",
+    "StripGauge",
     "TransverseGauge",
     "ZeroBy",
     "ZoiGauge",

@@ -1,10 +1,11 @@
-"""The kinds of virtual gauges: a point, an area, an extensometer along a line or across a strip.
+"""The kinds of virtual gauges: a point, an area, a circle, a strip, an extensometer along a line or across a box.
 
 A new kind is a class here and its name in ``GAUGE_KINDS``; configuration, report, view and page take it from there.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
@@ -43,6 +44,8 @@ _BOX = Parameter("box", "x, y, width, height of an area or transverse gauge")
 _CORNERS = Parameter("corners", "x, y of the corners of an area")
 _START, _END = Parameter("point", "x, y of one end of a line"), Parameter("point", "x, y of the other")
 _RADIUS = Parameter("length", "ZOIs this far around an end of a line (half a ZOI)", 0.1, 1e5)
+_CENTRE = Parameter("point", "x, y of the centre of a circle")
+_WIDTH = Parameter("length", "width of a strip (one ZOI)", 0.1, 1e5)
 _ALONG = Parameter(
     "choice",
     "direction of a transverse gauge (across the load)",
@@ -148,6 +151,102 @@ class AreaGauge(Gauge):
 
 
 @dataclass(frozen=True, slots=True)
+class CircleGauge(Gauge):
+    """Mean value of the ZOIs whose centres lie in a circle.
+
+    Attributes
+    ----------
+    centre : (x, y), px
+    radius_px : float, px
+    value : str
+        One of ``analysis.field.VALUES``.
+    """
+
+    centre: Point = field(metadata=_CENTRE.metadata)
+    radius_px: float = field(metadata=_RADIUS.metadata)
+    value: str = field(default="eyy", metadata=_VALUE.metadata)
+    kind, label, default_name, gesture = "circle", "Circle", "circle", "line"
+    hint = "Drag from the centre of a circle to its rim: its mean strain."
+
+    def __post_init__(self) -> None:
+        check_value(self.name, self.value)
+        if not self.radius_px > 0:
+            raise ValueError(f"gauge {self.name}: the radius must be positive, got {self.radius_px}")
+
+    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        return (zois_near(grid, self.centre, self.radius_px),)
+
+    def measure(self, field: StrainField) -> GaugeValue:
+        return read_area(self.zois(field.grid)[0], field, self.value)
+
+    def outline(self, zoi: float) -> tuple[Line, ...]:
+        return (circle(self.centre, self.radius_px),)
+
+    def handles(self) -> tuple[Point, ...]:
+        return self.centre, (self.centre[0] + self.radius_px, self.centre[1])
+
+    @classmethod
+    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
+        radius = max(round(math.dist(handles[0], handles[-1]), 1), 0.1)
+        return {"centre": near_px(handles[0]), "radius_px": radius}
+
+
+@dataclass(frozen=True, slots=True)
+class StripGauge(Gauge):
+    """Mean value of the ZOIs whose centres lie in a strip along a line, at any angle.
+
+    Attributes
+    ----------
+    start, end : (x, y), px
+    width_px : float or None, px
+        Of the strip; None: the side of a ZOI.
+    value : str
+        One of ``analysis.field.VALUES``.
+    """
+
+    start: Point = field(metadata=_START.metadata)
+    end: Point = field(metadata=_END.metadata)
+    width_px: float | None = field(default=None, metadata=_WIDTH.metadata)
+    value: str = field(default="eyy", metadata=_VALUE.metadata)
+    kind, label, default_name, gesture = "strip", "Strip", "strip", "line"
+    hint = "Drag from one end of a strip to the other: its mean strain."
+
+    def __post_init__(self) -> None:
+        check_value(self.name, self.value)
+        if self.start == self.end:
+            raise ValueError(f"gauge {self.name}: the two ends of a strip are one point, {self.start}")
+        if self.width_px is not None and not self.width_px > 0:
+            raise ValueError(f"gauge {self.name}: the width must be positive, got {self.width_px}")
+
+    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        return (zois_inside(grid, self._corners(grid.size)),)
+
+    def measure(self, field: StrainField) -> GaugeValue:
+        return read_area(self.zois(field.grid)[0], field, self.value)
+
+    def outline(self, zoi: float) -> tuple[Line, ...]:
+        return (closed(self._corners(zoi)),)
+
+    def handles(self) -> tuple[Point, ...]:
+        return self.start, self.end
+
+    @classmethod
+    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
+        return {"start": near_px(handles[0]), "end": near_px(handles[-1])}
+
+    def _corners(self, zoi: float) -> Line:
+        (x0, y0), (x1, y1) = self.start, self.end
+        half = (self.width_px or zoi) / 2 / math.dist(self.start, self.end)
+        across, down = (y0 - y1) * half, (x1 - x0) * half
+        return (
+            (x0 + across, y0 + down),
+            (x1 + across, y1 + down),
+            (x1 - across, y1 - down),
+            (x0 - across, y0 - down),
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class LineGauge(Gauge):
     """An extensometer: (L - L0)/L0 between two points.
 
@@ -241,6 +340,7 @@ class TransverseGauge(Gauge):
 
 
 GAUGE_KINDS: Mapping[str, type[Gauge]] = {
-    kind.kind: kind for kind in (LineGauge, TransverseGauge, AreaGauge, ZoiGauge)
+    kind.kind: kind
+    for kind in (LineGauge, TransverseGauge, AreaGauge, ZoiGauge, CircleGauge, StripGauge)
 }
 """By their names in a configuration, in the order of the buttons on a page."""

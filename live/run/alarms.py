@@ -28,6 +28,9 @@ log = logging.getLogger(__name__)
 
 EVERY_S = 0.2
 """The channels of the machine are checked at this interval."""
+_STRAINS = ("axial", "exx", "eyy", "exy", "largest")
+_UNITS = {"_N": "N", "_MPa": "MPa", "_s": "s", "_min": "min", "_GL": "GL", "": ""}
+_LABELS = {"silent_s": "no frame for", "load_silent_s": "no force for", "disk_min": "disk full in"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +130,16 @@ def check_alarms(config: Config) -> None:
             )
 
 
+def in_words(channel: str, value: float, limit: float) -> str:
+    """A channel at its value beyond its limit, for a person: ``axial 4450 um/m, limit 4000``."""
+    plain = channel.removeprefix("sigma_")
+    if plain in _STRAINS or plain.startswith("gauge_"):
+        return f"{channel.replace('_', ' ')} {value * 1e6:.0f} um/m, limit {limit * 1e6:.0f}"
+    suffix = next((one for one in _UNITS if plain.endswith(one)), "")
+    label = _LABELS.get(channel, channel.removesuffix(suffix).replace("_", " "))
+    return f"{label} {value:.6g} {_UNITS[suffix]}".rstrip() + f", limit {limit:.6g}"
+
+
 class Alarm:
     """One alarm: on beyond its limit, off when the value is back by the hysteresis.
 
@@ -162,7 +175,9 @@ class Alarm:
 
     def message(self, value: float) -> str:
         """Its text at ``value``."""
-        return f"{self.name}: {self.config.channel} is {value:.6g}"
+        c = self.config
+        named = f"{c.name}: " if c.name else ""
+        return named + in_words(c.channel, value, self._limit)
 
 
 class AlarmWatch(Consumer):

@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 from analysis import Roi, Status, StrainField, ZoiGrid
-from analysis.evaluate import GAUGE_KINDS, AreaGauge, Gauge, LineGauge, TransverseGauge, ZoiGauge
+from analysis.evaluate import (
+    GAUGE_KINDS,
+    AreaGauge,
+    CircleGauge,
+    Gauge,
+    LineGauge,
+    StripGauge,
+    TransverseGauge,
+    ZoiGauge,
+)
 from tests.accuracy.gauges import line, point, ratio
 from tests.accuracy.truth import Speckle, affine
 
@@ -130,6 +139,19 @@ def test_sigma_is_the_scatter() -> None:
     for name, part in zip(kinds, np.split(z, np.cumsum([len(some) for some in kinds.values()])[:-1], axis=1),
                           strict=True):  # fmt: skip
         assert np.sqrt(np.mean(part**2)) == pytest.approx(1, abs=0.15), name
+
+
+def test_the_zois_of_a_circle_and_of_a_strip() -> None:
+    x, y = np.meshgrid(GRID.x, GRID.y)
+    circle = CircleGauge("g", (96.0, 80.0), 40.0).zois(GRID)[0]
+    assert np.array_equal(circle, GRID.active & (np.hypot(x - 96, y - 80) <= 40)) and circle.sum() > 8
+    # Along the diagonal: the distance from the line, and the place along it, decide.
+    strip = StripGauge("g", (40.0, 40.0), (120.0, 120.0), 30.0).zois(GRID)[0]
+    off, along = (x - y) / math.sqrt(2), (x + y) / math.sqrt(2)
+    inside = (np.abs(off) < 15) & (along > 40 * math.sqrt(2)) & (along < 120 * math.sqrt(2))
+    assert np.array_equal(strip, GRID.active & inside) and strip.sum() > 5
+    whole = StripGauge("g", (40.0, 80.0), (120.0, 80.0)).outline(32)[0]
+    assert np.ptp([corner[1] for corner in whole]) == 32, "as wide as a ZOI"
 
 
 @pytest.mark.parametrize("kind", GAUGE_KINDS.values(), ids=GAUGE_KINDS)

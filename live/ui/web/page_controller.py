@@ -18,7 +18,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.errors import PhasedicError
 from acquire.printable import brief, printable
 from analysis.evaluate import GAUGE_KINDS
 from live.config.loading import Config
@@ -296,7 +296,7 @@ class PageController:
             return {"answer": f"no: the changes are {', '.join(CHANGES)}"}
         try:
             change(session, request)
-        except (ConfigError, DataError) as error:
+        except PhasedicError as error:
             return {"answer": f"no: {printable(brief(error))}"}
         session.refresh()
         return {"answer": "ok"}

@@ -118,13 +118,31 @@ def test_what_comes_is_told_stands_on_the_board_and_goes() -> None:
         {"alarm": "camera", "on": True, "value": 2.5, "line": "HALT", "end": True}
     ]
     assert bench.check(silent_s=3.0) == []
-    assert bench.active.texts == ("camera: silent_s is 2.5",)
+    assert bench.active.texts == ("camera: no frame for 2.5 s, limit 2",)
     assert bench.check(silent_s=0.1) == [{"alarm": "camera", "on": False, "value": 0.1}]
     assert bench.active.texts == ()
     assert [event.level for event in bench.events] == ["warning", "info"]
     assert bench.watch.end() == "1 came"
-    assert (bench.rung, bench.ended) == (1, ["ALARM camera: silent_s is 2.5"])
+    assert (bench.rung, bench.ended) == (1, ["ALARM camera: no frame for 2.5 s, limit 2"])
     assert bench.sent.lines == ["HALT"]
+
+
+@pytest.mark.parametrize(
+    ("config", "value", "words"),
+    [
+        (AlarmConfig(channel="axial", above=0.004), 0.00445, "axial 4450 um/m, limit 4000"),
+        (AlarmConfig(channel="gauge_tip", below=-0.001), -0.002, "gauge tip -2000 um/m, limit -1000"),
+        (
+            AlarmConfig(channel="force_N", above=3000.0, name="grips"),
+            3120.5,
+            "grips: force 3120.5 N, limit 3000",
+        ),
+        (AlarmConfig(channel="disk_min", below=5.0), 4.5, "disk full in 4.5 min, limit 5"),
+        (AlarmConfig(channel="lost_share", above=0.1), 0.25, "lost share 0.25, limit 0.1"),
+    ],
+)
+def test_its_message_has_value_unit_and_limit(config: AlarmConfig, value: float, words: str) -> None:
+    assert Alarm(config).message(value) == words
 
 
 def test_an_alarm_does_only_what_it_is_asked_for() -> None:

@@ -18,6 +18,7 @@ from acquire.load_sample import LoadCellInfo, LoadSample
 from live.run.control import (
     ENDED,
     FORCED,
+    ONCE,
     START,
     STOP,
     UNDO,
@@ -209,9 +210,33 @@ def test_a_late_second_order_is_a_first_one() -> None:
 def test_a_third_order_asks_again() -> None:
     bench = TareSetup()
     bench.refused()
+    bench.now += 1.0
     bench.controls.tare()
     bench.refused()
     assert bench.cell.calls == ["tare"]
+
+
+def test_a_key_that_is_held_or_bounces_is_no_confirmation() -> None:
+    bench = TareSetup()
+    for _ in range(40):
+        bench.refused()
+        bench.now += 0.1
+    assert bench.cell.calls == []
+    bench.now += 0.5
+    bench.controls.tare()
+    assert bench.cell.calls == ["tare"]
+
+
+def test_a_tare_once_is_never_the_confirmation_of_another() -> None:
+    bench = TareSetup()
+    for _ in range(3):
+        with pytest.raises(ControlRefused, match=r"800 N in mid-test: .*; confirm it$"):
+            bench.controls.tare(ONCE)
+        bench.now += 1.0
+    assert bench.cell.calls == []
+    free = TareSetup(0.0)
+    free.controls.tare(ONCE)
+    assert free.cell.calls == ["tare"]
 
 
 @pytest.mark.parametrize(("force", "capacity_N"), [(0.0, None), (0.9, 1000.0)])

@@ -35,8 +35,8 @@ const heads = (head) => el("tr", {}, ...head.map((text) => el("th", { text: t(te
 // One line for a figure: its name, its value with unit, its interval; or why it is not known.
 function row(one) {
   if (one.head) return heads(one.head);
-  const name = el("th", { text: t(one.name), scope: "row" });
-  if (one.text == null) return el("tr", { class: "unknown" }, name, el("td", { text: t(one.why), colSpan: 2 }));
+  const name = el("th", { text: one.name.includes(" ") ? t(one.name) : one.name, scope: "row" });
+  if (one.text == null) return el("tr", { class: "unknown" }, name, el("td", { text: t(one.why), title: t(one.why), colSpan: 2 }));
   return el("tr", {}, name, el("td", { text: one.text }), el("td", { text: one.interval }));
 }
 

@@ -24,6 +24,7 @@ const handlers = {
     $("failed").hidden = !value.words;
     put($("whyfailed"), t(value.words));
     if (!changed) return;
+    if (!value.words) put($("answer"), "");
     pause();
     if (value.stage === "run") beginRun(value);
     if (value.stage === "setup") beginSetup(value);

@@ -48,7 +48,8 @@ export async function post(path, value) {
 
 export function showAnswer(answer, what) {
   const refused = answer.startsWith("no");
-  put($("answer"), refused ? t(answer.replace(/^no: /, "")) : DONE.replace("{}", what));
+  const [, words] = /^(?:no|ok): (.*)$/s.exec(answer) ?? [];
+  put($("answer"), words ? t(words) : DONE.replace("{}", what));
   $("answer").classList.toggle("no", refused);
 }
 

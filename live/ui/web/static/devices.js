@@ -3,7 +3,7 @@ import { $, change, el, fill, put } from "./base.js";
 import { fixed, withSigma } from "./numbers.js";
 import { t } from "./words.js";
 
-const OTHER = "another address …";
+const OTHER = "another address …", LABELS = { simulated: "simulated", session: "recorded session", none: "none", other: OTHER };
 let shown = {};
 
 for (const [select, kind] of [["cameras", "address"], ["loads", "load"]]) {
@@ -56,7 +56,7 @@ function offer(select, found, address) {
   if (select === document.activeElement) return;
   const known = found.some((one) => one.address === address) ? found : [{ address, name: "", trouble: "" }, ...found];
   fill(select, [...known, { address: "", name: OTHER }], (one) => {
-    const name = one.name ? t(one.name) : "", trouble = one.trouble ? ` (${t(one.trouble)})` : "";
+    const name = Object.values(LABELS).includes(one.name) ? t(one.name) : one.name, trouble = one.trouble ? ` (${t(one.trouble)})` : "";
     return el("option", { value: one.address, text: `${one.address} ${name}${trouble}`.trim() });
   });
   select.value = address;

@@ -36,15 +36,16 @@ export function drawGauges(svg, gauges, width, height, handles) {
   svg.dataset.mark = mark;
   svg.setAttribute("viewBox", `-0.5 -0.5 ${width} ${height}`);
   const size = Math.max(width, height) / 38, focused = document.activeElement?.dataset?.handle;
-  const all = Object.entries(gauges), places = namePlaces(all, size, width, height), parts = [];
+  const all = Object.entries(gauges), places = namePlaces(all, size, width, height), parts = [], names = [], dots = [];
   all.forEach(([name, gauge], k) => {
     const colour = colourOf(k), [x, y] = places[k];
     const text = make("text", { class: "gaugename", x, y, "font-size": size, fill: colour });
     text.textContent = name;
-    parts.push(...outline(gauge, colour), text);
-    if (handles) gauge.handles.forEach((p, i) => parts.push(make("circle", { class: "handle", cx: p[0], cy: p[1], r: size / 3, fill: colour, tabindex: 0, role: "button", "data-handle": `${name} ${i}`, "aria-label": `${name} ${i + 1}` })));
+    parts.push(...outline(gauge, colour));
+    names.push(text);
+    if (handles) gauge.handles.forEach((p, i) => dots.push(make("circle", { class: "handle", cx: p[0], cy: p[1], r: size / 3, fill: colour, tabindex: 0, role: "button", "data-handle": `${name} ${i}`, "aria-label": `${name} ${i + 1}` })));
   });
-  svg.replaceChildren(...parts);
+  svg.replaceChildren(...parts, ...names, ...dots);
   if (focused) svg.querySelector(`[data-handle="${CSS.escape(focused)}"]`)?.focus();
 }
 

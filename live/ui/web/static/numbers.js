@@ -19,7 +19,7 @@ export function withSigma(value, sigma, { factor, digits }) {
   if (value == null) return [DASH, ""];
   if (!(sigma > 0)) return [signed(value * factor, digits), ""];
   const two = Number((sigma * factor).toPrecision(2)), place = Math.floor(Math.log10(two)) - 1;
-  const step = 10 ** Math.max(place, 0), decimals = Math.max(-place, 0);
+  const step = 10 ** place, decimals = Math.max(-place, 0);
   return [signed(Math.round((value * factor) / step) * step, decimals), (Math.round(two / step) * step).toFixed(decimals)];
 }
 
