@@ -109,10 +109,7 @@ def _scale_of(painted: Painted) -> dict[str, Any]:
     """The colours of a map: ends, unit and histogram, strains without unit; or the legend of statuses."""
     scale, values = painted.scale, painted.values
     if scale is None or values is None:
-        legend = [
-            {"name": one.name, "text": one.text, "count": one.count, "colour": f"rgb{one.rgb}"}
-            for one in painted.legend
-        ]
+        legend = [{"text": one.text, "count": one.count, "colour": f"rgb{one.rgb}"} for one in painted.legend]
         return {"legend": legend}
     strain = scale.unit in (MICROSTRAIN.name, PERCENT.name)
     factor = scale.factor if strain else 1.0

@@ -29,6 +29,8 @@ RETRY_S, OPEN_S = 1.0, 20.0
 """Delay before the camera is opened again; time limit for opening it."""
 REDRAW_S = 0.2  # between pictures of a recording that stands still
 
+Answers = queue.SimpleQueue[PhasedicError | None]
+
 
 class CameraPreview:
     """Reads the camera of ``draft``, and opens it again where it fails.
@@ -67,7 +69,7 @@ class CameraPreview:
         self._first: list[Frame] = []  # of a recording
         self._whole = False  # all frames that are needed of the recording are read
         self._collected: deque[Frame] | None = None
-        self._opened: queue.SimpleQueue[PhasedicError | None] = queue.SimpleQueue()
+        self._opened: Answers = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._closing, self._reopen = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._work, name="page-camera", daemon=True)
@@ -142,28 +144,30 @@ class CameraPreview:
     def _work(self) -> None:
         lower_priority(OUTPUT)
         while not self._closing.is_set():
+            self._reopen.clear()
+            asked = self._opened  # an answer is for who asked before the camera was opened
             try:
-                self._preview()
+                self._preview(asked)
             except PhasedicError as error:
-                self._failed(error)
+                self._failed(error, asked)
             except Exception as error:
                 log.exception("the preview of the camera failed")
-                self._failed(DeviceError(f"the camera failed: {error!r}"))
+                self._failed(DeviceError(f"the camera failed: {error!r}"), asked)
             if self.trouble and not self._reopen.is_set():
                 self._closing.wait(RETRY_S)
 
-    def _failed(self, error: PhasedicError) -> None:
+    def _failed(self, error: PhasedicError, asked: Answers) -> None:
         self.trouble = printable(brief(error))
-        self._opened.put(error)
+        asked.put(error)
 
-    def _preview(self) -> None:
-        self._reopen.clear()
+    def _preview(self, asked: Answers) -> None:
         config = self._draft.config.camera
         if not config.address:
             raise DataError("no camera is chosen: choose one under Devices")
         rig = open_rig(at_rest(config.address), "none:", self._on_event, crop=config.crop)
         try:
             self._camera_opened(rig.camera)
+            asked.put(None)
             with rig.camera:
                 self._drain(rig.camera)
         finally:
@@ -176,7 +180,6 @@ class CameraPreview:
             self._recent.clear()
             self._first, self._whole, self._collected = [], False, None
         self._on_open(camera.info)
-        self._opened.put(None)
 
     @property
     def _over(self) -> bool:

@@ -23,7 +23,7 @@ export function beginMap(stage) {
 for (const id of ["component", "range", "limit"]) {
   $(id).addEventListener("change", () => {
     $("limit").hidden = $("range").value !== "fixed";
-    const limit = Number($("limit").value) / factor();
+    const limit = Number($("limit").value) / strainUnit().factor;
     if ($("range").value === "fixed" && !(limit > 0)) { $("limit").focus(); return; }
     post("/map", { of: $("component").value, range: $("range").value, limit });
   });
@@ -52,12 +52,12 @@ function showLegend() {
   for (const [id, now] of [["component", picture.of], ["range", picture.range]]) if ($(id) !== document.activeElement) $(id).value = now;
   $("limit").hidden = $("range").value !== "fixed";
   const scaled = picture.high != null, unit = picture.strain ? strainUnit().name : (picture.unit ?? "");
-  if ($("limit") !== document.activeElement && scaled && picture.range === "fixed") $("limit").value = short(picture.high * factor()).replace("−", "-");
+  if ($("limit") !== document.activeElement && scaled && picture.range === "fixed" && picture.strain) $("limit").value = short(picture.high * factor()).replace("−", "-");
   $("ramp").closest(".legend").classList.toggle("status", Boolean(picture.legend));
   fill($("statuses"), picture.legend ?? [], (one) => {
     const key = el("i", { class: "key" });
     key.style.background = one.colour;
-    return el("li", {}, key, `${one.count} ${t(one.name)}`);
+    return el("li", {}, key, `${one.count} ${t(one.text)}`);
   });
   const at = (share) => (scaled ? `${short((picture.low + share * (picture.high - picture.low)) * factor())}` : "");
   put($("low"), at(0));

@@ -118,7 +118,8 @@ class Page:
         return str(self.page.get_attribute("body", "data-stage"))
 
     def press(self, key: str) -> None:
-        """Press a key when the commands no longer pause after a change of the stage."""
+        """Press a key when that is neither a bounce nor too soon after a change of the stage."""
+        self.page.wait_for_timeout(350)
         self.until(lambda: not self.page.locator("body.pausing").count(), "the pause is over")
         self.page.keyboard.press(key)
 

@@ -171,6 +171,7 @@ def test_devices_by_hand(start: Start) -> None:
         assert len(page.text("answer")) > 10 and "defect" not in page.text("answer")
         page.until(lambda: page.page.input_value("#cameraaddress") == "sim:hole", "the camera stays")
         page.page.evaluate("() => { document.getElementById('answer').className = ''; }")
+        page.page.wait_for_timeout(350)  # sooner another Enter is a bounce
     assert page.text("setupforce") == "none"
     page.page.select_option("#loads", "sim:")
     page.until(lambda: " N" in page.text("setupforce"), "a load cell from the list")
@@ -200,7 +201,7 @@ def test_gauges(start: Start) -> None:
     page.until(lambda: page.page.locator("#gauges li").count() == 4, "undone")
     page.page.click("[data-tool=zoi]")
     for k in range(10):
-        page.click((100.0 + 2 * k, 80.0))
+        page.click((80.0 + 7 * k, 65.0))
         page.until(lambda k=k: page.page.locator("#gauges li").count() == 5 + k, "a point")  # type: ignore[misc]
     overlap = """() => { const boxes = [...document.querySelectorAll("#drawing .gaugename")].map(e => e.getBBox());
         return boxes.some((a, i) => boxes.some((b, k) => k > i && a.x < b.x + b.width && b.x < a.x + a.width
