@@ -340,7 +340,6 @@ class TransverseGauge(Gauge):
 
 
 GAUGE_KINDS: Mapping[str, type[Gauge]] = {
-    kind.kind: kind
-    for kind in (LineGauge, TransverseGauge, AreaGauge, ZoiGauge, CircleGauge, StripGauge)
+    kind.kind: kind for kind in (LineGauge, TransverseGauge, AreaGauge, ZoiGauge, CircleGauge, StripGauge)
 }
 """By their names in a configuration, in the order of the buttons on a page."""
