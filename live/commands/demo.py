@@ -189,9 +189,7 @@ def compare(outcome: Outcome, collector: MeansCollector, config: Config, say: Ca
     say(f"  E  {rows['E'].text}, true {specimen.E / 1e9:g} GPa")
     say(f"  nu {rows['nu'].text}, true {specimen.nu:g}")
     if agreed and not figures.E.known:
-        say(
-            f"exit code {LOSS}: E was not measured ({figures.E.why}); on a busy machine, end other programs or give --fps 5"
-        )
+        say(f"exit code {LOSS}: E was not measured ({figures.E.why}); end other programs, or give --fps 5")
         return LOSS
     return 0 if agreed else 1
 
