@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis import PICTURE_KINDS
 from live.commands.exit_codes import LOSS
 from live.commands.options import add_measure, add_options, configured
 from live.commands.run import print_outcome, run_attended
@@ -24,6 +25,7 @@ from live.pipeline.consumer import Consumer
 from live.pipeline.measurement import Measurement
 from live.results.figures import evaluate, tensile_table
 from live.run.outcome import Outcome
+from live.setup.compiling import compile_ahead
 from live.ui.terminal.screen import TerminalScreen
 
 if TYPE_CHECKING:
@@ -51,6 +53,8 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic demo``; the code of the run, 1 if the strain differs from the truth, 5 if E was not measured."""
     screen = TerminalScreen()
     config = configured(arguments, _defaults(arguments))
+    # All that the next commands need too: 8-bit pictures, and a batch.
+    compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
     collector = MeansCollector()
     outcome = run_attended(config, screen, [collector])
     print_outcome(outcome, screen, verbose=arguments.verbose)
