@@ -7,18 +7,15 @@ import contextlib
 import errno
 import logging
 import os
-import signal
 import sys
-import threading
-from collections.abc import Iterator, Sequence
-from types import FrameType
+from collections.abc import Sequence
 from typing import TextIO
 
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.printable import brief, printable
-from acquire.signal_mask import signal_handler
 from live.commands.arguments import Command, parse
 from live.commands.exit_codes import EXIT_INTERRUPTED
+from live.commands.signals import ended_by_sigterm
 from live.commands.streams import nonblocking_streams
 
 _THREADS = "NUMBA_NUM_THREADS"
@@ -29,7 +26,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     _replace_closed_streams()
     try:
-        with _ended_by_sigterm():
+        with ended_by_sigterm():
             command, arguments = parse(sys.argv[1:] if argv is None else argv)
             with nonblocking_streams():
                 _set_up_logging(arguments)
@@ -38,20 +35,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         code = _interrupted()
     _drop_lost_streams()
     return code
-
-
-@contextlib.contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """SIGTERM ends a command as Ctrl-C does, where the command has no handler of its own."""
-
-    def end(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    with signal_handler(end, signal.SIGTERM):
-        yield
 
 
 def _replace_closed_streams() -> None:

@@ -52,6 +52,13 @@ def probe(path: Path, package: str, timeout_s: float | None = None, *, words: Se
         raise DataError(refusal or f"{path} is damaged: the HDF5 library fails on it ({done.returncode})")
 
 
+def reason(error: Exception) -> str:
+    """HDF5's own words, shortened to the part a person can use."""
+    text = " ".join(str(error).split())
+    _, _, words = text.partition("error message = '")
+    return words.partition("'")[0] or text[:200]
+
+
 log = logging.getLogger(__name__)
 
 

@@ -287,14 +287,14 @@ class _reading:
             raise damaged(self._path, self._what, error, self._advice) from error
 
 
-ADVICE = ": 'phasedic recover' saves what can be read"
-NOTHING = ", and nothing of it can be saved"
+ADVICE = "; the file is damaged: 'phasedic recover' saves what can be read"
+NOTHING = "; the file is damaged, and nothing of it can be saved"
 
 
 def damaged(path: Path, what: str, error: BaseException, advice: str = ADVICE) -> DataError:
     """The error of a file whose bytes are not what they were."""
     reason = " ".join(str(error).split())[:160]
-    return DataError(f"{path}: {what} ({reason}); the file is damaged{advice}")
+    return DataError(f"{path}: {what} ({reason}){advice}")
 
 
 def _open_file(path: Path, probed: bool, salvage: bool) -> tuple[h5py.File, str | None]:

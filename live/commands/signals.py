@@ -30,6 +30,20 @@ def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[No
 
 
 @contextlib.contextmanager
+def ended_by_sigterm() -> Iterator[None]:
+    """SIGTERM ends a command as Ctrl-C does, where the command has no handler of its own."""
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with signal_handler(end, signal.SIGTERM):
+        yield
+
+
+@contextlib.contextmanager
 def interrupts() -> Iterator[threading.Event]:
     """An event that the first Ctrl-C or SIGTERM sets; the second one ends the program, where nothing can be lost."""
     stop = threading.Event()

@@ -189,7 +189,8 @@ def _run(
     lines = [*_account(source, run_state), speed]
     left_out = source.count.left_out if source.count else 0
     cut_off = [e.text for e in event_log.events("warning") if "missing" in e.data and not stopping.is_set()]
-    lines = [*cut_off, *lines]
+    stopped = [f"{report.name} stopped: {report.failed}" for report in outputs.reports if report.failed]
+    lines = [*cut_off, *stopped, *lines]
     lossy = outputs.failed or not run_state.history.has_values or left_out > 0 or cut_off
     code = 130 if stopping.is_set() else 5 if lossy else 0
     return Replayed(folder, run_state, config, code, tuple(lines), left_out)

@@ -189,7 +189,7 @@ def test_results_do_not_need_the_recording(
     with h5py.File(path) as file:
         name, numbers = ("frames/image", (0, 1)) if part == "one picture" else ("events", (0,))
         chunks = [file[f"entry/{name}"].id.get_chunk_info(number) for number in numbers]
-    places = [slice(chunk.byte_offset, chunk.byte_offset + chunk.size) for chunk in chunks]
+    places = [slice(chunk.byte_offset, chunk.byte_offset + 11) for chunk in chunks]
     for at in [slice(0, 48)] if part == "the whole" else places:
         content[at] = bytes(b ^ 0xFF for b in content[at])
     path.write_bytes(content)
