@@ -34,7 +34,7 @@ from live.replay.parts import StoredResults
 from live.replay.pictures import picture_of, picture_source, write_names
 from live.replay.session import session_path
 from live.replay.source import ReplayRequest, ReplaySource, Work, check_window, prefetch
-from live.results.folder import make_folder
+from live.results.folder import check_folder, make_folder
 from live.results.writer import write_results
 from live.setup.devices import open_rig
 from live.setup.pictures import with_mask
@@ -146,6 +146,7 @@ def _run(
     event_log: EventLog,
     consumers: Compose,
 ) -> Replayed:
+    check_folder(config.output.dir)
     ready = prepare_replay(source, config, request.source, screen, stopping.is_set)
     stored = StoredResults.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements

@@ -123,6 +123,23 @@ def test_an_empty_word_is_refused(capsys: pytest.CaptureFixture[str], words: tup
     assert code == 2 and "is empty; give a value, or leave it out" in said
 
 
+@pytest.mark.parametrize("command", [("run", "--camera", "sim:?fsp=1"), ("demo",), ("replay", "SHOTS")])
+def test_a_folder_that_is_taken_is_refused_first(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    """Before a camera is opened or anything is compiled."""
+    import cv2
+
+    cv2.imwrite(str(tmp_path / "a.png"), np.zeros((64, 64), np.uint8))
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "strain.h5").touch()
+    (tmp_path / "file").touch()
+    words = [word.replace("SHOTS", f"files:{tmp_path}/a.png") for word in command]
+    for out, why in (("out", "already holds strain.h5"), ("file/below", "cannot be made (Not a directory)")):
+        code, said = refused(capsys, *words, "--out", str(tmp_path / out))
+        assert code == 2 and why in said
+
+
 @pytest.mark.parametrize(
     ("typed", "meant"), [("rnu", "run"), ("reprot", "report"), ("chekc", "check"), ("qqqqqq", "")]
 )
