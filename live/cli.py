@@ -18,7 +18,8 @@ from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.signals import ended_by_sigterm
 from live.commands.streams import nonblocking_streams
 
-_THREADS = "NUMBA_NUM_THREADS"
+_LEAST = {"NUMBA_NUM_THREADS": 1, "SOURCE_DATE_EPOCH": 0}
+"""Whole numbers in the environment for which numba ends the program where they are none."""
 _WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
 
 
@@ -107,10 +108,12 @@ def _run(command: Command, arguments: argparse.Namespace) -> int:
 
 
 def _check_environment() -> None:
-    """Refuse a number of threads that numba would end the program for."""
-    threads = os.environ.get(_THREADS, "1")
-    if not threads.isdecimal() or int(threads) < 1:
-        raise ConfigError(f"{_THREADS}={threads} is not possible; give a whole number from 1, or unset it")
+    for name, least in _LEAST.items():
+        value = os.environ.get(name, "1")
+        if not (value.isascii() and value.isdecimal() and int(value) >= least):
+            raise ConfigError(
+                f"{name}={value} is not possible; give a whole number from {least}, or unset the variable"
+            )
 
 
 def _system_error(error: OSError) -> PhasedicError:

@@ -149,13 +149,19 @@ def test_a_mistyped_command(capsys: pytest.CaptureFixture[str], typed: str, mean
     assert (f"(did you mean {meant}?)" in said) is bool(meant)
 
 
-@pytest.mark.parametrize("threads", ["0", "-1", "two", ""])
-def test_a_number_of_threads_that_ends_numba(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, threads: str
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("NUMBA_NUM_THREADS", value) for value in ("0", "-1", "two", "")),
+        *(("SOURCE_DATE_EPOCH", value) for value in ("x", "-1", "1.5", "")),
+    ],
+)
+def test_an_environment_that_ends_numba(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str, value: str
 ) -> None:
-    monkeypatch.setenv("NUMBA_NUM_THREADS", threads)
+    monkeypatch.setenv(name, value)
     code, said = refused(capsys, "devices")
-    assert code == 2 and f"NUMBA_NUM_THREADS={threads} is not possible" in said
+    assert code == 2 and f"{name}={value} is not possible" in said
 
 
 @pytest.mark.parametrize("limit", ["0", "nan", "-1", "inf"])
@@ -276,6 +282,17 @@ def test_options_without_effect_are_not_accepted(
 ) -> None:
     code, said = refused(capsys, name, "--camera", "sim:?fsp=1", option)
     assert code == 2 and "unrecognized arguments" in said
+
+
+@pytest.mark.parametrize(
+    ("to", "option"),
+    [("npz", "--layout=wide"), ("csv", "--fps=5"), ("vtk", "--limit=1"), ("mat", "--no-picture")],
+)
+def test_options_of_another_format_are_not_accepted(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, to: str, option: str
+) -> None:
+    code, said = refused(capsys, "export", str(make_run(tmp_path)), "--to", to, option)
+    assert code == 2 and f"{option.partition('=')[0]} has no effect with --to {to}" in said
 
 
 @pytest.mark.parametrize("name", COMMANDS)

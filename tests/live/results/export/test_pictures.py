@@ -149,7 +149,7 @@ def test_nothing_is_overwritten(
         (2, "--mm needs the scale", ["--mm"]),
         (2, "has no effect without --mm", ["--scale", "0.1"]),
         (2, "mm/px is not possible", ["--mm", "--scale", "-1"]),
-        (2, "--fps 0 is not possible", ["--fps", "0"]),
+        (2, "--fps 0 is not possible", ["--to", "gif", "--fps", "0"]),
         (2, ".mp4 or .webm", ["--to", "mp4", "--out", "film.avi"]),
     ],
 )
