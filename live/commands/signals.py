@@ -45,7 +45,7 @@ def ended_by_sigterm() -> Iterator[None]:
 
 @contextlib.contextmanager
 def interrupts() -> Iterator[threading.Event]:
-    """An event that the first Ctrl-C or SIGTERM sets; the second one ends the program, where nothing can be lost."""
+    """An event that the first Ctrl-C sets; the second one ends the program, where nothing can be lost."""
     stop = threading.Event()
 
     def handle(number: int, frame: FrameType | None) -> None:
@@ -53,5 +53,5 @@ def interrupts() -> Iterator[threading.Event]:
             raise KeyboardInterrupt
         stop.set()
 
-    with signal_handler(handle, signal.SIGINT, signal.SIGTERM):
+    with signal_handler(handle, signal.SIGINT):
         yield stop

@@ -15,6 +15,7 @@ from live import cli
 from live.cli import main
 from live.commands import arguments as arguments_module
 from live.commands.arguments import COMMANDS
+from live.commands.signals import ended_by_sigterm, interrupts
 from live.results.report import saving
 from live.results.report.svg import Plot, PlotLine
 from live.ui.terminal.screen import TerminalScreen
@@ -250,6 +251,16 @@ def test_sigterm_ends_a_command_without_a_handler_of_its_own(capsys: pytest.Capt
         assert main(["devices"]) == 130
     assert capsys.readouterr().err == "phasedic: interrupted\n"
     assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_sigterm_is_no_ctrl_c() -> None:
+    """Ctrl-C ends ``check --watch`` with a full check; SIGTERM ends it."""
+    with ended_by_sigterm(), interrupts() as stop:
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        assert not stop.is_set()
+        signal.raise_signal(signal.SIGINT)
+        assert stop.is_set()
 
 
 @pytest.mark.parametrize("name", ["run", "replay", "check"])
