@@ -70,6 +70,8 @@ def compile_ahead(
                 if over or interrupted.is_set() or stopped():
                     raise Interrupted(_INTERRUPTED)
                 say(progress_text(share_compiled(kinds, began_file, phase=phase), time.monotonic() - began))
+    except KeyboardInterrupt:  # from the handler of a command that has no other
+        raise Interrupted(_INTERRUPTED) from None
     finally:
         for process in processes:
             if process.poll() is None:

@@ -123,6 +123,14 @@ def test_whoever_handles_a_signal_hears_of_it(
         signal.signal(number, before)
 
 
+def test_ctrl_c_in_a_command_without_a_handler(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As ``demo`` and ``warm-up``: it says what is kept."""
+    never_ending(monkeypatch)
+    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(Interrupted, match="what is compiled is kept"):
+        compile_ahead(("uint8",))
+
+
 def test_it_was_stopped_before(monkeypatch: pytest.MonkeyPatch) -> None:
     never_ending(monkeypatch)
     with pytest.raises(Interrupted):
