@@ -62,7 +62,8 @@ def command(arguments: argparse.Namespace) -> int:
     print_outcome(outcome, screen, verbose=arguments.verbose)
     if outcome.rig.specimen is None or not collector.measurements:
         return outcome.exit_code
-    return outcome.exit_code or compare(outcome, collector, config, screen.say)
+    code = compare(outcome, collector, config, screen.say)
+    return outcome.exit_code or code
 
 
 def _defaults(arguments: argparse.Namespace) -> dict[str, Any]:
