@@ -194,7 +194,7 @@ def test_a_folder_whose_name_reads_as_settings(capsys: pytest.CaptureFixture[str
     run = make_run(tmp_path / "a&b?c=d")
     code, said = refused(capsys, "replay", f"{run}/session.h5", "--from", "99")
     assert "unknown setting" not in said and "no such session" not in said
-    assert code == 4 and "of the burst of frames 0 to 7 only 2 of 8 are recorded" in said
+    assert code == 4 and f"{run}/session.h5: of the burst of frames 0 to 7 only 2 of 8 are recorded" in said
 
 
 @pytest.mark.parametrize("part", ["the whole", "one picture", "the events"])
