@@ -7,21 +7,19 @@ import contextlib
 import errno
 import logging
 import os
-import signal
 import sys
-import threading
-from collections.abc import Iterator, Sequence
-from types import FrameType
+from collections.abc import Sequence
 from typing import TextIO
 
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.printable import brief, printable
-from acquire.signal_mask import signal_handler
 from live.commands.arguments import Command, parse
 from live.commands.exit_codes import EXIT_INTERRUPTED
+from live.commands.signals import ended_by_sigterm
 from live.commands.streams import nonblocking_streams
 
-_THREADS = "NUMBA_NUM_THREADS"
+_LEAST = {"NUMBA_NUM_THREADS": 1, "SOURCE_DATE_EPOCH": 0}
+"""Whole numbers in the environment for which numba ends the program where they are none."""
 _WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
 
 
@@ -29,7 +27,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     _replace_closed_streams()
     try:
-        with _ended_by_sigterm():
+        with ended_by_sigterm():
             command, arguments = parse(sys.argv[1:] if argv is None else argv)
             with nonblocking_streams():
                 _set_up_logging(arguments)
@@ -38,20 +36,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         code = _interrupted()
     _drop_lost_streams()
     return code
-
-
-@contextlib.contextmanager
-def _ended_by_sigterm() -> Iterator[None]:
-    """SIGTERM ends a command as Ctrl-C does, where the command has no handler of its own."""
-
-    def end(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    with signal_handler(end, signal.SIGTERM):
-        yield
 
 
 def _replace_closed_streams() -> None:
@@ -124,10 +108,12 @@ def _run(command: Command, arguments: argparse.Namespace) -> int:
 
 
 def _check_environment() -> None:
-    """Refuse a number of threads that numba would end the program for."""
-    threads = os.environ.get(_THREADS, "1")
-    if not threads.isdecimal() or int(threads) < 1:
-        raise ConfigError(f"{_THREADS}={threads} is not possible; give a whole number from 1, or unset it")
+    for name, least in _LEAST.items():
+        value = os.environ.get(name, "1")
+        if not (value.isascii() and value.isdecimal() and int(value) >= least):
+            raise ConfigError(
+                f"{name}={value} is not possible; give a whole number from {least}, or unset the variable"
+            )
 
 
 def _system_error(error: OSError) -> PhasedicError:

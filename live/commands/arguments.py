@@ -26,7 +26,7 @@ EXAMPLES = {
     "replay": "phasedic replay 'shots/*.tif' --zoi 32 --step 8 --load forces.csv --section 20,2 --out out",
     "batch": "phasedic batch 'runs/*/session.h5' --zoi 32 --step 8 --section 20,2 --workers 4 --out asked-again",
     "study": "phasedic study runs/20261122T081747Z/session.h5 --zoi 24,32,48,64,96 --order 1,2 --roi all",
-    "map": "phasedic map out/strain.h5 eyy.png --field eyy --over shots/0000.tif",
+    "map": "phasedic map out eyy.png --field eyy --over shots/0000.tif",
     "show": "phasedic show runs/20261122T081747Z --from 2 --to 10",
     "export": "phasedic export runs/20261122T081747Z --to vtk --fields u,v,eyy --mm --scale 0.02 --y-up",
     "report": "phasedic report runs/20261122T081747Z --field eyy --pdf",

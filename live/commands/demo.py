@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis import PICTURE_KINDS
 from live.commands.exit_codes import LOSS
 from live.commands.options import add_measure, add_options, configured
 from live.commands.run import print_outcome, run_attended
@@ -23,7 +24,9 @@ from live.config.loading import Config
 from live.pipeline.consumer import Consumer
 from live.pipeline.measurement import Measurement
 from live.results.figures import evaluate, tensile_table
+from live.results.folder import check_folder
 from live.run.outcome import Outcome
+from live.setup.compiling import compile_ahead
 from live.ui.terminal.screen import TerminalScreen
 
 if TYPE_CHECKING:
@@ -51,12 +54,16 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic demo``; the code of the run, 1 if the strain differs from the truth, 5 if E was not measured."""
     screen = TerminalScreen()
     config = configured(arguments, _defaults(arguments))
+    check_folder(config.output.dir)
+    # All that the next commands need too: 8-bit pictures, and a batch.
+    compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
     collector = MeansCollector()
     outcome = run_attended(config, screen, [collector])
     print_outcome(outcome, screen, verbose=arguments.verbose)
     if outcome.rig.specimen is None or not collector.measurements:
         return outcome.exit_code
-    return outcome.exit_code or compare(outcome, collector, config, screen.say)
+    code = compare(outcome, collector, config, screen.say)
+    return outcome.exit_code or code
 
 
 def _defaults(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -186,12 +193,10 @@ def compare(outcome: Outcome, collector: MeansCollector, config: Config, say: Ca
     _say_force(outcome, specimen, say)
     figures = evaluate(outcome.run_state.history, outcome.run_state.loads, config.specimen)
     rows = tensile_table(figures, stresses=True)
-    say(f"  E  {rows['E'].text}, true {specimen.E / 1e9:g} GPa")
-    say(f"  nu {rows['nu'].text}, true {specimen.nu:g}")
+    say(f"  E  {rows['E'].text}, true {specimen.E / 1e9:g} GPa".replace("+-", "±"))
+    say(f"  nu {rows['nu'].text}, true {specimen.nu:g}".replace("+-", "±"))
     if agreed and not figures.E.known:
-        say(
-            f"exit code {LOSS}: E was not measured ({figures.E.why}); on a busy machine, end other programs or give --fps 5"
-        )
+        say(f"exit code {LOSS}: E was not measured ({figures.E.why}); end other programs, or give --fps 5")
         return LOSS
     return 0 if agreed else 1
 

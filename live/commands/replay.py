@@ -45,7 +45,13 @@ def command(arguments: argparse.Namespace) -> int:
     with signals(stopping.set, screen.say):
         done = replay(request, screen, stopping, standard_consumers(screen))
     say_summary(
-        screen, done.run_state, done.config.specimen, done.folder, done.lines, verbose=arguments.verbose
+        screen,
+        done.run_state,
+        done.config.specimen,
+        done.folder,
+        done.lines,
+        verbose=arguments.verbose,
+        with_report=done.config.output.report,
     )
     if done.config.output.report:
         from live.commands.report import write_report

@@ -17,6 +17,7 @@ from live.commands.signals import signals
 from live.config.loading import Config
 from live.pipeline.consumer import Consumer
 from live.pipeline.screen import Screen
+from live.results.folder import check_folder
 from live.run.alarms import check_alarms
 from live.run.control import ControlPort
 from live.run.keyboard import listen
@@ -50,6 +51,7 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
     screen, config = TerminalScreen(), configured(arguments)
     check_alarms(config)
+    check_folder(config.output.dir)
     with located(config, screen.say) as config:
         outcome = run_and_show_page(config, screen) if arguments.page else run_attended(config, screen)
     if not arguments.page:
@@ -129,8 +131,11 @@ def print_outcome(outcome: Outcome, screen: Screen, *, verbose: bool = False) ->
     rrd = folder / "view.rrd"
     if verbose and rrd.exists():
         lines.append(f"open the recorded view with: {rerun_command()} {rrd}")
-    say_summary(screen, run_state, outcome.config.specimen, folder, lines, verbose=verbose)
-    if outcome.config.output.report:
+    report = outcome.config.output.report
+    say_summary(
+        screen, run_state, outcome.config.specimen, folder, lines, verbose=verbose, with_report=report
+    )
+    if report:
         from live.commands.report import write_report
 
         write_report(folder, screen)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import DataError
-from acquire.hdf5 import FlushTimer, PictureStack, RowTable, abandon_file
+from acquire.hdf5 import FlushTimer, PictureStack, RowTable, abandon_file, reason
 from analysis.evaluate import load_axis
 from live.results import layout
 from live.results.quantities import quantity_of
@@ -142,7 +142,7 @@ class StrainWriter:
 
     def _trouble(self, error: Exception) -> DataError:
         return DataError(
-            f"{self._path}: cannot be written ({error}); make room on the disk or choose another --out. "
+            f"{self._path}: cannot be written ({reason(error)}); make room on the disk or choose another --out. "
             f"The {self._flushed} rows before are safe"
         )
 

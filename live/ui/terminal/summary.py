@@ -28,13 +28,15 @@ def say_summary(
     lines: Sequence[str],
     *,
     verbose: bool = False,
+    with_report: bool = False,
 ) -> None:
-    """Print the figures of a test, then ``lines``, then where the files are."""
+    """Print the figures of a test, then ``lines``, then where the files are; ``with_report``: one will be made."""
     screen.say()
     if verbose:
         shown = [*summary_lines(run_state, specimen), *lines, *file_lines(folder)]
     else:
-        shown = [*brief_lines(run_state, specimen), *lines, _files(folder)]
+        following = "" if with_report else f"; next: phasedic report {shlex.quote(str(folder))}"
+        shown = [*brief_lines(run_state, specimen), *lines, _files(folder) + following]
     for line in shown:
         screen.say(line)
 
@@ -92,10 +94,7 @@ def trouble_lines(
 
 
 def _files(folder: Path) -> str:
-    """Where the files are, and the command that makes a report of them."""
+    """Where the files are."""
     files = [path for path in sorted(folder.iterdir()) if path.is_file() and path.stat().st_size]
     total = sum(path.stat().st_size for path in files) / 1e6
-    return (
-        f"files: {folder} ({', '.join(path.name for path in files)}; {total:,.0f} MB);"
-        f" next: phasedic report {shlex.quote(str(folder))}"
-    )
+    return f"files: {folder} ({', '.join(path.name for path in files)}; {total:,.0f} MB)"

@@ -71,6 +71,13 @@ def test_an_alarm_that_can_never_come_is_refused(channel: str, settings: dict[st
         run_live(config, Screen())  # before the camera is opened, which has an unknown setting
 
 
+def test_a_device_that_never_sends_is_silent_since_the_start() -> None:
+    health = Health(began_t=10.0)
+    assert health.channels(12.5)["load_silent_s"] == health.channels(12.5)["silent_s"] == 2.5
+    health.loaded(12.0, 1.0)
+    assert health.channels(12.5)["load_silent_s"] == 0.5
+
+
 class Kept:
     """A strain output that keeps what it is left."""
 
