@@ -29,10 +29,10 @@ const REPEATED = ["ArrowLeft", "ArrowRight", "ArrowUp", "ArrowDown", "Tab", "Bac
 const isTyping = (target) => target.closest?.("input:not([type=range]):not([type=checkbox]), select, textarea");
 const lastDown = new Map();
 document.addEventListener("keydown", (event) => {
-  const before = lastDown.get(event.key) ?? -Infinity, typed = isTyping(event.target) && event.key !== "Enter";
-  lastDown.set(event.key, event.timeStamp);
+  const before = lastDown.get(event.key), typed = isTyping(event.target) && event.key !== "Enter";
+  lastDown.set(event.key, event);
   if (typed || REPEATED.includes(event.key) || event.key === "z") return;
-  if (event.repeat || event.timeStamp - before < BOUNCE_MS) {
+  if (event.repeat || (before?.target === event.target && event.timeStamp - before.timeStamp < BOUNCE_MS)) {
     event.preventDefault();
     event.stopImmediatePropagation();
   }
