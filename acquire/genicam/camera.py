@@ -20,9 +20,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from acquire.addresses import Address, Options
+from acquire.addresses import Address
 from acquire.camera import CameraBase, FrameCounter, StallWatch, longest_pause_s, mid_exposure
-from acquire.camera.timing import DEAD, STAMPS
+from acquire.camera.timing import DEAD
 from acquire.device_clock import DeviceClock
 from acquire.errors import DataError, DeviceError, PhasedicError
 from acquire.events import EventSink, Level, RateLimiter, device_event
@@ -31,7 +31,8 @@ from acquire.genicam.device import GenicamDevice, Received
 from acquire.genicam.finding import name_of
 from acquire.genicam.formats import decode
 from acquire.genicam.library import Aravis, GenicamError, load_aravis
-from acquire.genicam.setup import GenicamSettings, GenicamSetup, set_up
+from acquire.genicam.settings import GenicamSettings, genicam_settings
+from acquire.genicam.setup import GenicamSetup, set_up
 from acquire.genicam.trigger import SoftwareTrigger
 from acquire.opening_thread import Opening
 
@@ -289,33 +290,3 @@ def open_genicam(address: Address, on_event: EventSink) -> GenicamCamera:
         See ``acquire.camera.open_camera``.
     """
     return GenicamCamera(address.text, address.target, genicam_settings(address), on_event)
-
-
-def genicam_settings(address: Address) -> GenicamSettings:
-    """The settings of the address.
-
-    Raises
-    ------
-    ConfigError
-        An impossible value. Unknown keys are taken for features, and refused once the camera is open.
-    """
-    options = Options(address)
-    stamp = options.choice("stamp", STAMPS, "")
-    return GenicamSettings(
-        format=options.text("format"),
-        x=options.integer("x", minimum=0),
-        y=options.integer("y", minimum=0),
-        width=options.integer("width", minimum=1, maximum=65535),
-        height=options.integer("height", minimum=1, maximum=65535),
-        fps=options.number("fps", minimum=1e-3, maximum=1e5),
-        exposure_us=options.number("exposure_us", minimum=0.1),
-        gain=options.number("gain"),
-        trigger=options.text("trigger", "no"),
-        bits=options.integer("bits", minimum=8, maximum=16),
-        white=options.integer("white", minimum=1, maximum=65535),
-        packet_size=options.integer("packet_size", minimum=576, maximum=16384),
-        buffers=options.integer("buffers", 16, minimum=2, maximum=1000),
-        stall_s=options.number("stall_s", minimum=0.1),
-        stamp=next(one for one in STAMPS if one == stamp),
-        features=options.rest(),
-    )

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 from acquire.bounds import NotAllowed, as_number
-from acquire.camera.timing import StampOf
 from acquire.errors import ConfigError, DeviceError
 from acquire.frame import CameraSetting
 from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
 from acquire.genicam.formats import FORMATS, MonoFormat, preferred
 from acquire.genicam.library import GenicamError
-
-NO_TRIGGER, SOFTWARE = "no", "Software"
+from acquire.genicam.settings import KEYS, NO_TRIGGER, GenicamSettings
 
 # Set to "Off", so that nothing changes by itself during a test.
 AUTOMATIC = (
@@ -34,63 +32,6 @@ SHOWN = (
 )
 RESULTING_RATES = ("ResultingFrameRate", "AcquisitionResultingFrameRate", "ResultingFrameRateAbs")
 SMALL_PACKETS = 1500
-
-
-@dataclass(frozen=True, slots=True)
-class GenicamSettings:
-    """What an address asks of a GenICam camera; None: whatever it has.
-
-    Attributes
-    ----------
-    format : str or None
-        Name of a pixel format; None: the best monochrome one there is.
-    x, y, width, height : int or None, px
-        The region of the sensor.
-    fps : float or None, 1/s
-        With a software trigger the rate of the triggers.
-    exposure_us : float or None, us
-    gain : float or None
-        In the camera's own unit.
-    trigger : str
-        "no", "Software", or a line of the camera.
-    bits, white : int or None
-        Significant bits of a sample, and the grey level of saturation, where the camera does not have them right.
-    packet_size : int or None, bytes
-        None: the largest that passes.
-    buffers : int
-    stall_s : float or None, s
-    stamp : "start" | "end" | ""
-        What of the exposure its stamps mark; "": not known.
-    features : mapping of str to str
-        Any feature by its name.
-    """
-
-    format: str | None = None
-    x: int | None = None
-    y: int | None = None
-    width: int | None = None
-    height: int | None = None
-    fps: float | None = None
-    exposure_us: float | None = None
-    gain: float | None = None
-    trigger: str = NO_TRIGGER
-    bits: int | None = None
-    white: int | None = None
-    packet_size: int | None = None
-    buffers: int = 16
-    stall_s: float | None = None
-    stamp: StampOf = ""
-    features: Mapping[str, str] = field(default_factory=dict)
-
-    @property
-    def waits_for_trigger(self) -> bool:
-        """Whether pauses are the trigger's own."""
-        return self.trigger not in (NO_TRIGGER, SOFTWARE)
-
-    @property
-    def fires_triggers(self) -> bool:
-        """Whether this program triggers each picture."""
-        return self.trigger == SOFTWARE
 
 
 @dataclass(frozen=True, slots=True)
@@ -392,10 +333,3 @@ def _warnings(device: GenicamDevice, settings: GenicamSettings, fps: float | Non
             f"packets of {size} bytes: larger ones did not pass; set the MTU of the network card to 9000 "
             "(docs/machine-vision.md)"
         )
-
-
-KEYS = (
-    *("format", "fps", "exposure_us", "gain", "x", "y", "width", "height", "trigger", "bits", "white"),
-    *("packet_size", "buffers", "stall_s", "stamp"),
-)
-"""The settings of an address that are no features, for messages."""

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from tests.genicam.packing import PACK, picture
 
-FIRST = 65001
+FIRST = 65401  # the number of the first frame
 PIXEL_FORMATS = {
     "Mono8": 0x01080001,
     "Mono10": 0x01100003,
