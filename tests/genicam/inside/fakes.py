@@ -7,12 +7,15 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 from acquire.camera.opening import open_camera
 from acquire.events import Event
 from acquire.frame import Frame
+
+ROOT = Path(__file__).parents[3]
 
 
 class FakeCameraProcess:
@@ -25,7 +28,7 @@ class FakeCameraProcess:
     def plug(self) -> None:
         """Start it, and wait until it answers."""
         words = [sys.executable, "-m", "tests.genicam.fake_camera", *self._options]
-        self._process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True)
+        self._process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=ROOT)
         assert self._process.stdout is not None
         assert self._process.stdout.readline() == "ready\n"
 
