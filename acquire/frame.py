@@ -149,6 +149,7 @@ class CameraInfo:
         False: the source waits for its reader (files, a session, the simulator in lock step).
     clock : "device" | "host" | "nominal"
     fps : float or None, 1/s
+        None where it is not known, or where something outside triggers the frames.
     exposure_s : float or None, s
     pixel_format : str
         As the driver names it, or the file format.
