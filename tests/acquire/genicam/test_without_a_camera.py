@@ -8,9 +8,10 @@ import pytest
 
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DeviceError
-from acquire.genicam import library, listing
+from acquire.genicam import library
 from acquire.genicam.finding import name_of
 from acquire.genicam.library import CALLS, load_aravis
+from acquire.genicam.listing import list_cameras
 from acquire.genicam.settings import genicam_settings
 
 
@@ -63,4 +64,4 @@ def test_a_missing_library_is_named_and_lists_nothing(monkeypatch: pytest.Monkey
     load_aravis.cache_clear()
     with pytest.raises(DeviceError, match=r"aravis-0\.10 is here, .*sudo apt install libaravis-0\.8-0"):
         load_aravis()
-    assert listing.list_cameras() == []
+    assert list_cameras() == []
