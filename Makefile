@@ -1,10 +1,10 @@
-# make demo | test | lint | docs | bench | accuracy | v4l2-test | bare-test ; each sets up its own .venv first.
+# make demo | test | lint | docs | bench | accuracy | v4l2-test | genicam-test | bare-test ; each sets up its own .venv first.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test lint format docs bench accuracy v4l2-test bare-test clean
+.PHONY: demo test lint format docs bench accuracy v4l2-test genicam-test bare-test clean
 .DEFAULT_GOAL := demo
 
 $(VENV)/base: pyproject.toml
@@ -52,6 +52,9 @@ accuracy: $(VENV)/test
 
 v4l2-test: $(VENV)/test
 	@$(BIN)/python tests/v4l2/vm.py --tests
+
+genicam-test: $(VENV)/test
+	@$(BIN)/python -m tests.genicam.namespace --tests
 
 # In a bare Debian made on the spot: make bare-test SUITE=trixie ONLY=demo
 SUITE ?= forky

@@ -15,11 +15,12 @@ from typing import Any, Self
 
 from acquire.addresses import Address
 from acquire.closing import Closing
+from acquire.device_clock import DeviceClock
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.protocols.base import Reading
-from acquire.serial_line.clock import ArrivalRate, ArrivalTimes, DeviceClock
+from acquire.serial_line.clock import ArrivalRate, ArrivalTimes
 from acquire.serial_line.link import FloodGuard, Link, LinkContext, LoadWatch, Opener
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling

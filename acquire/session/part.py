@@ -186,6 +186,7 @@ class SessionPart(Closing):
             bits=self.camera.bits,
             raw_t=row["raw_monotonic_s"],
             damaged=bool(row["damaged"]),
+            white_level=self.camera.white_level,
         )
 
     def burst(self, number: int) -> Burst:

@@ -66,6 +66,7 @@ CAMERA_FIELDS = {
     "pixel_format": JsonField(str),
     "controls": JsonField(dict),
     "warnings": JsonField(list),
+    "white_level": JsonField(int, 1, 65_535, missing=True),
 }
 LOAD_FIELDS = {
     "address": JsonField(str),

@@ -7,7 +7,6 @@ one for each consumer that may block. The measuring thread takes the newest burs
 from __future__ import annotations
 
 import json
-import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -38,7 +37,6 @@ from live.setup.devices import Rig, open_rig
 _ARMED = "; nothing is recorded until the command start"
 _SILENT_S = 1.0
 _HINT_AFTER = 3  # times the frames of a reference
-_GRACE_S = 5.0  # a timed run without frames ends this much later
 INTERRUPTED = "interrupted"
 """The reason to stop that gives exit code 130."""
 
@@ -71,10 +69,8 @@ class LiveRun:
         self._prepared, self._run_state, self._outputs = prepared, run_state, outputs
         self._recording, self._screen, self._stop = recording, screen, stop
         self._rig = prepared.rig
-        seconds = prepared.config.output.seconds
-        self._deadline = math.inf if seconds is None else time.monotonic() + seconds + _GRACE_S
-        plan = GrabPlan.of(prepared.config, prepared.bursts)
-        self.grabber = Grabber(self._rig.camera, plan, run_state, self._take, self._take_burst)
+        self._plan = GrabPlan.of(prepared.config, prepared.bursts)
+        self.grabber = Grabber(self._rig.camera, self._plan, run_state, self._take, self._take_burst)
         run_state.health.began_t, self._hinted = time.monotonic(), False
         self._has_recorded = self.recording
         self._burst_queue = BurstQueue(self.grabber, run_state.frame_counts, self._idle)
@@ -180,7 +176,7 @@ class LiveRun:
     def __exit__(self, *_: object) -> None:
         """End all threads and close the devices, whatever happened before."""
         self._rig.camera.stop()
-        self._rig.load.stop()
+        self._load.stop()
         self.grabber.bursts.close()
         self.grabber.join()
         self._burst_queue.count_skipped()
@@ -217,12 +213,14 @@ class LiveRun:
 
     def _idle(self, words: str) -> None:
         """Called between bursts; ends a timed run whose camera gives no frames."""
+        now = time.monotonic()
+        silent = not now - self._run_state.health.frame_t < _SILENT_S
         if words or self.paused:
-            silent = not time.monotonic() - self._run_state.health.frame_t < _SILENT_S
             self._show(words if silent or not self._has_measured else "")
         if words == TAKING:
             self._hint_once()
-        if time.monotonic() > self._deadline and not self._stop.requested:
+        over = now - self.grabber.begun_t > self._plan.seconds
+        if silent and over and self._rig.camera.info.live and not self._stop.requested:
             self.stop("the time is over")
 
     def _hint_once(self) -> None:

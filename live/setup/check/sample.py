@@ -81,7 +81,7 @@ class FrameStack:
             mean=frozen(mean.astype(np.float32)),
             n=len(part),
             noise=math.nan,
-            clipped=frozen(part.max(axis=0) >= 2**self.camera.bits - 1),
+            clipped=frozen(part.max(axis=0) >= self.camera.saturation),
             bits=self.camera.bits,
             t=float(times.mean()),
             duration=float(times[-1] - times[0]),

@@ -127,9 +127,9 @@ def _light(f: CheckFigures) -> Iterator[CheckLine]:
                    "raise the black level of the camera, or the light: what is cut off is lost")  # fmt: skip
     if e.piled > MAX_PILED:
         yield CheckLine("clipped below the top", f"{e.piled:.1%} at one highest level", False,
-                   "saturated before the end of the scale: less light, or give the true depth (bits=...)")  # fmt: skip
+                   "less light; where this is where the camera saturates, give it (bits=... or white=...)")  # fmt: skip
     yield _not_measured(f, "flicker") if f.stack.few else _flicker(f)
-    full = 2**f.stack.camera.bits - 1
+    full = f.stack.camera.saturation
     shown = f"{f.noise:.2f} GL of one frame, {f.noise / full:.2%} of full scale"
     if f.stack.few:
         yield CheckLine("noise", f"{shown}, {_noise_source(f)}")
@@ -159,7 +159,7 @@ def _flicker(f: CheckFigures) -> CheckLine:
 
 
 def _pattern(f: CheckFigures) -> Iterator[CheckLine]:
-    full, z = 2**f.stack.camera.bits - 1, f.zois
+    full, z = f.stack.camera.saturation, f.zois
     contrast = median(z.contrast) / full
     yield CheckLine("contrast (std)", f"{contrast:.1%} of full scale", contrast > MIN_CONTRAST,
                "more light, a longer exposure, or a pattern of blacker black and whiter white")  # fmt: skip

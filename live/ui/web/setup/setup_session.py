@@ -175,7 +175,7 @@ class SetupSession:
             if self.overlays["quality"] and figures is not None:
                 overlay_cells(picture, scale, figures.zois.grid, quality_colours(figures))
             if self.overlays["saturated"]:
-                mark_saturated(picture, scale, frame.image, frame.bits)
+                mark_saturated(picture, scale, frame.image, frame.saturation)
             self.picture = as_jpeg(picture)
             self._shown += 1
         self.refresh()
