@@ -9,16 +9,22 @@ from analysis.field.motion import Motion
 from analysis.field.status import Status
 from analysis.field.strain_field import StrainField
 from analysis.field.uncertainty import (
+    CLASSES_AN_OCTAVE,
     PAIR_INDEX,
     VALUES,
     Measure,
     StrainTensor,
+    WeightedSum,
     combination,
+    fixed_sums,
     products,
+    strain_tensor,
+    variance_classes,
     variance_of_sum,
 )
 
 __all__ = [
+    "CLASSES_AN_OCTAVE",
     "PAIR_INDEX",
     "VALUES",
     "WINDOWS",
@@ -28,10 +34,14 @@ __all__ = [
     "Status",
     "StrainField",
     "StrainTensor",
+    "WeightedSum",
     "Window",
     "ZoiGrid",
     "combination",
+    "fixed_sums",
     "products",
     "profile",
+    "strain_tensor",
+    "variance_classes",
     "variance_of_sum",
 ]
