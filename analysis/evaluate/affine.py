@@ -95,7 +95,9 @@ def _solved(places: Places, area: bytes, classes: bytes) -> _Solved:
     """Design (3, 3, R, C) and weights (2, 3, 3, R, C) of all ZOIs of an area, and their sigmas (2, 1, 1, R, C)."""
     inside = np.frombuffer(area, np.bool_).reshape(places.shape)
     rows, columns = np.nonzero(inside)
-    y, x = (places.step * (np.arange(n) - at.mean()) for n, at in zip(places.shape, (rows, columns), strict=True))
+    y, x = (
+        places.step * (np.arange(n) - at.mean()) for n, at in zip(places.shape, (rows, columns), strict=True)
+    )
     x, y = np.meshgrid(x, y)
     one, nothing = np.ones(places.shape), np.zeros(places.shape)
     design = np.array([[one, nothing, nothing], [x, one, nothing], [y, nothing, one]]) * inside

@@ -165,7 +165,9 @@ def not_uniform(loading: Loading, line: FittedLine) -> str:
     if not np.isfinite(misfit).any() or np.nanmedian(misfit) < _UNEVEN_SIGMA:
         return ""
     noise_free = np.sqrt(np.maximum(1 - 1 / np.maximum(misfit, 1) ** 2, 0))
-    share = float(np.nanmedian(uneven * noise_free) / np.nanmedian(np.abs(loading.elastic[half] - line.strain0)))
+    share = float(
+        np.nanmedian(uneven * noise_free) / np.nanmedian(np.abs(loading.elastic[half] - line.strain0))
+    )
     return f"the strain varies by {share:.0%} over the region" if share > _UNEVEN_SHARE else ""
 
 

@@ -73,4 +73,3 @@ def _sigma_along(field: StrainField, direction: Floats) -> Floats:
         field.covariance[PAIR_INDEX[pair]].astype(np.float64) for pair in ((_U, _U), (_U, _V), (_V, _V))
     )
     return np.asarray(np.sqrt(np.maximum(nx * nx * uu + 2 * nx * ny * uv + ny * ny * vv, 0)))
-

@@ -146,8 +146,8 @@ def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> Tensil
     TensileFigures
         E and nu carry a remark in ``why`` where the strain is not uniform over the area that they are from.
     """
-    names = {"strain": curve.source, "elastic_strain": curve.elastic_source or curve.source}
-    return replace(_evaluated(curve, options or TensileOptions()), **names)
+    found = _evaluated(curve, options or TensileOptions())
+    return replace(found, strain=curve.source, elastic_strain=curve.elastic_source or curve.source)
 
 
 def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:

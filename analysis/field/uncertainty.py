@@ -96,7 +96,7 @@ def variance_classes(variances: NDArray[Any]) -> NDArray[np.int8]:
     if not known.any():
         return np.zeros(variances.shape, np.int8)
     over = np.where(known, variances, np.median(variances[known])) / np.median(variances[known])
-    return np.clip(np.round(CLASSES_AN_OCTAVE * np.log2(over)), -127, 127).astype(np.int8)
+    return np.asarray(np.clip(np.round(CLASSES_AN_OCTAVE * np.log2(over)), -127, 127), np.int8)
 
 
 def variance_of_sum(sigma: Floats, name: str, grid: ZoiGrid, window: Window) -> float:
@@ -136,7 +136,9 @@ def fixed_sums(values: Floats) -> Floats:
     return np.array([math.fsum([*row, *rest]) for row, rest in zip(parts, values[:, whole:], strict=True)])
 
 
-def strain_tensor(measure: Measure, du_dx: Floats, du_dy: Floats, dv_dx: Floats, dv_dy: Floats) -> StrainTensor:
+def strain_tensor(
+    measure: Measure, du_dx: Floats, du_dy: Floats, dv_dx: Floats, dv_dy: Floats
+) -> StrainTensor:
     """The strain of displacement gradients, each of one shape, in a measure (``StrainField.strain``)."""
     if measure == "small":
         return StrainTensor(measure, du_dx, dv_dy, (du_dy + dv_dx) / 2)

@@ -111,7 +111,7 @@ class MeanNoise:
         return math.sqrt(made / expected) if expected > 0 and math.isfinite(made) else 1.0
 
     def _variance(self, shares: Floats, which: NDArray[np.intp]) -> float:
-        """Variance of the sum of ``shares`` (B, 6) of the affine parameters of the ZOIs ``which``, for noise of 1 GL."""
+        """Variance of the sum of ``shares`` (B, 6) of the parameters of the ZOIs ``which``, for noise of 1 GL."""
         size, origins = self.grid.size, np.ascontiguousarray(self.origins[which])
         corner = origins.min(axis=0)
         out = np.zeros(origins.max(axis=0) - corner + size)

@@ -9,7 +9,7 @@ import math
 from collections import deque
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -116,7 +116,7 @@ def extension_along(gauges: Container[str], axis: str) -> str:
     return AXIAL if AXIAL in gauges else f"extension_{axis}"
 
 
-def region_strains(field: StrainField) -> dict[str, float]:
+def region_strains(field: StrainField) -> dict[str, Any]:
     """The strains of a ``TimeStep`` by their names; NaN where no ZOI has a value."""
     area = AreaStrain.of(field)
     names = ("exx", "eyy", "exy")

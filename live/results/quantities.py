@@ -81,8 +81,12 @@ _INSTANTS = (
     Quantity(
         "true_stress", "Pa", "stress times one plus the axial engineering strain; volume taken as constant"
     ),
-    Quantity("extension_x", UNITLESS, "(L - L0)/L0 between strips at the left and the right end of the region"),
-    Quantity("extension_y", UNITLESS, "(L - L0)/L0 between strips at the upper and the lower end of the region"),
+    Quantity(
+        "extension_x", UNITLESS, "(L - L0)/L0 between strips at the left and the right end of the region"
+    ),
+    Quantity(
+        "extension_y", UNITLESS, "(L - L0)/L0 between strips at the upper and the lower end of the region"
+    ),
     Quantity("uneven_exx", UNITLESS, "variation of exx over the region, rms, up to the second degree"),
     Quantity("uneven_eyy", UNITLESS, "variation of eyy over the region, rms, up to the second degree"),
     Quantity("misfit", UNITLESS, "that variation over what noise makes of it; about 1 in a uniform strain"),

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import lru_cache
 
 import cv2
@@ -17,8 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis import KernelSettings, PhaseKernel, Roi, ZoiGrid
-from analysis.evaluate import AreaStrain, Curve, TensileFigures, TensileOptions, evaluate_test, extension_of
-from analysis.evaluate.standards import Interval, free
 from analysis.field import StrainField
 from hw_mocks.scene import Exposer, Scene, Sensor
 from hw_mocks.specimen import VirtualSpecimen
@@ -32,12 +29,16 @@ STRAINS = ("exx", "eyy", "exy")
 
 
 @lru_cache(maxsize=2)
-def pictures(kind: Kind, instants: int) -> tuple[VirtualSpecimen, Floats, NDArray[np.float32], list[NDArray[np.float32]]]:
+def pictures(
+    kind: Kind, instants: int
+) -> tuple[VirtualSpecimen, Floats, NDArray[np.float32], list[NDArray[np.float32]]]:
     """The specimen, the instants (s), the reference and the averaged bursts of the elastic part."""
     specimen = VirtualSpecimen(kind=kind, height=SHAPE[0], width=SHAPE[1], nominal=True)
     times = np.linspace(specimen.programme.hold_s, specimen.yield_s, instants)
     scene, exposer = Scene(specimen), Exposer(Sensor(), SHAPE, 1)
-    taken = [burst(scene.render(float(t)), exposer, n) for t, n in [(0.0, REFERENCE), *((t, BURST) for t in times)]]
+    taken = [
+        burst(scene.render(float(t)), exposer, n) for t, n in [(0.0, REFERENCE), *((t, BURST) for t in times)]
+    ]
     return specimen, times, taken[0], taken[1:]
 
 
@@ -72,7 +73,10 @@ def limit(kind: Kind, instants: int, grid: ZoiGrid) -> Floats:
     """Cramer-Rao limit of exx, eyy, exy of one affine fit over the pixels that the ZOIs cover, (3,)."""
     specimen = pictures(kind, instants)[0]
     level = Scene(specimen).render(0.0).astype(float)
-    sensor, rows, columns = Sensor(), *(slice(int(at[0]), int(at[-1]) + grid.size) for at in (grid.first_y, grid.first_x))
+    sensor, rows, columns = (
+        Sensor(),
+        *(slice(int(at[0]), int(at[-1]) + grid.size) for at in (grid.first_y, grid.first_x)),
+    )
     fy, fx = (sensor.top * derivative(level, axis)[rows, columns] for axis in (0, 1))
     y, x = np.mgrid[rows, columns].astype(float)
     x, y = x - x.mean(), y - y.mean()
