@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.evaluate.affine import AffineWeights, Classes, Places, affine_weights
+from analysis.evaluate.affine import AffineWeights, Places, affine_weights
 from analysis.evaluate.unevenness import strain_shapes, variation
-from analysis.field import PAIR_INDEX, StrainField, combination, fixed_sums, strain_tensor, variance_classes
+from analysis.field import PAIR_INDEX, StrainField, combination, fixed_sums, strain_tensor
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -51,8 +51,8 @@ class AreaStrain:
         valid = area & field.ok
         if not valid.any():
             return None
-        weights = affine_weights(Places.of(field.grid, field.window), area, valid, _classes(field))
-        products = _affine(field, valid)[:, None] * weights.weights.reshape(2, 3, -1)
+        weights = affine_weights(Places.of(field.grid, field.window), area, valid)
+        products = _affine(field, valid)[:, None] * weights.weights.reshape(3, -1)
         return cls(field, area, valid, weights, fixed_sums(products.reshape(6, -1)).reshape(2, 3))
 
     def value(self, name: str) -> float:
@@ -77,7 +77,7 @@ class AreaStrain:
         places = Places.of(self.field.grid, self.field.window)
 
         def made(measurable: Bools) -> tuple[Floats, Floats]:
-            return _sum_of(name, affine_weights(places, self.area, measurable, _classes(self.field)))
+            return _sum_of(name, affine_weights(places, self.area, measurable))
 
         return self.field.sums.ratio(name, self.area, made)
 
@@ -113,11 +113,6 @@ class Unevenness:
     misfit: float
 
 
-def _classes(field: StrainField) -> Classes:
-    """Of the pattern of the reference, where that is known; else of this field."""
-    return variance_classes(field.covariance[_DISPLACEMENTS]) if field.sums is None else field.sums.classes
-
-
 def _affine(field: StrainField, valid: Bools) -> Floats:
     """Displacement and gradients, one after the other, of u and of v, (2, 3 N); zero where not valid."""
     half = len(field.parameters) // 2
@@ -131,6 +126,6 @@ def _sum_of(name: str, weights: AffineWeights) -> tuple[Floats, Floats]:
     shares, noise = np.zeros((2, 3, *shape)), np.zeros((2, *shape))
     for parameter, share in combination(name).items():
         component, mode = divmod(parameter, 3)
-        shares[component] += share * weights.weights[component, mode]
-        noise[component] += share**2 * weights.noise[component, mode]
+        shares[component] += share * weights.weights[mode]
+        noise[component] += share**2 * weights.noise[mode]
     return shares.reshape(6, *shape), noise

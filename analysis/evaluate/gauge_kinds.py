@@ -31,6 +31,7 @@ from analysis.evaluate.gauges import (
     near_px,
     read_area,
     read_ends,
+    read_strips,
     zois_inside,
     zois_near,
 )
@@ -260,11 +261,15 @@ class StripsGauge(TransverseGauge):
         ends = ends_of(self.box, self.along, max(_STRIP, grid.step / side))
         return tuple(zois_inside(grid, corners_of(box)) for box in ends)
 
+    def measure(self, field: StrainField) -> GaugeValue:
+        return read_strips(self.zois(field.grid), field, self.along)
+
 
 def extension_of(field: StrainField, along: Literal["x", "y"]) -> GaugeValue:
     """(L - L0)/L0 between strips at the two ends of all active ZOIs of a field; ``StripsGauge``."""
     grid = field.grid
-    return read_ends(_strips(Places.of(grid, field.window), grid.roi, grid.active.tobytes(), along), field)
+    strips = _strips(Places.of(grid, field.window), grid.roi, grid.active.tobytes(), along)
+    return read_strips(strips, field, along)
 
 
 @lru_cache(maxsize=8)

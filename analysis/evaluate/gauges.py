@@ -188,6 +188,19 @@ def read_ends(chosen: Sequence[Mask], field: StrainField) -> GaugeValue:
     return GaugeValue(found.strain, found.sigma)
 
 
+def read_strips(chosen: Sequence[Mask], field: StrainField, along: str) -> GaugeValue:
+    """``read_ends`` of two strips, each where the other has values too: their mean places lie on a line along the axis."""
+    for number, end in enumerate(chosen, 1):
+        if missing := _missing(end, field):
+            return GaugeValue(math.nan, math.nan, f"end {number}: {missing}")
+    side = 1 if along == "x" else 0
+    first, second = ((end & field.ok).any(axis=side, keepdims=True) for end in chosen)
+    both = first & second & field.ok
+    if not both.any():
+        return GaugeValue(math.nan, math.nan, "the two ends do not face each other; move or widen the gauge")
+    return read_ends([end & both for end in chosen], field)
+
+
 def _missing(chosen: Mask, field: StrainField) -> str:
     """Why there is no value; empty where enough of the ZOIs have one."""
     total = int(chosen.sum())

@@ -9,7 +9,6 @@ from analysis.field.motion import Motion
 from analysis.field.status import Status
 from analysis.field.strain_field import StrainField
 from analysis.field.uncertainty import (
-    CLASSES_AN_OCTAVE,
     PAIR_INDEX,
     VALUES,
     Measure,
@@ -19,12 +18,10 @@ from analysis.field.uncertainty import (
     fixed_sums,
     products,
     strain_tensor,
-    variance_classes,
     variance_of_sum,
 )
 
 __all__ = [
-    "CLASSES_AN_OCTAVE",
     "PAIR_INDEX",
     "VALUES",
     "WINDOWS",
@@ -42,6 +39,5 @@ __all__ = [
     "products",
     "profile",
     "strain_tensor",
-    "variance_classes",
     "variance_of_sum",
 ]

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,6 @@ from analysis.field.grid import Window, ZoiGrid, overlap
 Floats = NDArray[np.float64]
 Measure = Literal["small", "engineering", "green", "hencky"]
 U, DU_DX, DU_DY, V, DV_DX, DV_DY = range(6)
-CLASSES_AN_OCTAVE = 8
-"""Classes of variances from one value to twice that."""
 PARTIAL_SUMS = 64
 """Sums that run side by side in ``fixed_sum``."""
 _PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]
@@ -70,16 +68,7 @@ variances of u and v, (2, R, C)."""
 
 
 class Sums(Protocol):
-    """The noise of means, more exactly than from the overlap of windows.
-
-    Attributes
-    ----------
-    classes : (2, R, C) int8
-        ``variance_classes`` of u and v for the pattern of the reference.
-    """
-
-    @property
-    def classes(self) -> NDArray[np.int8]: ...
+    """The noise of means, more exactly than from the overlap of windows."""
 
     def factor(self, name: str, where: NDArray[np.bool_]) -> float:
         """Standard deviation of the mean of ``name`` over a gauge (R, C), over that of ``variance_of_sum``."""
@@ -88,15 +77,6 @@ class Sums(Protocol):
     def ratio(self, name: str, area: NDArray[np.bool_], made: WeightedSum) -> float:
         """Standard deviation of the affine ``name`` of an area (R, C), over that of the overlap of windows."""
         ...
-
-
-def variance_classes(variances: NDArray[Any]) -> NDArray[np.int8]:
-    """Variances of u and v, (2, R, C), by their logarithm over the median; the noise of a frame does not change it."""
-    known = np.isfinite(variances) & (variances > 0)
-    if not known.any():
-        return np.zeros(variances.shape, np.int8)
-    over = np.where(known, variances, np.median(variances[known])) / np.median(variances[known])
-    return np.asarray(np.clip(np.round(CLASSES_AN_OCTAVE * np.log2(over)), -127, 127), np.int8)
 
 
 def variance_of_sum(sigma: Floats, name: str, grid: ZoiGrid, window: Window) -> float:

@@ -48,8 +48,6 @@ class MeanNoise:
     inverse : (>= A, P, P) float32
         (J' w J)^-1 of each ZOI.
     unit_covariance : (21, R, C) float32
-    classes : (2, R, C) int8
-        Of the variances of u and v (``analysis.field.variance_classes``).
     """
 
     grid: ZoiGrid
@@ -61,7 +59,6 @@ class MeanNoise:
     images: NDArray[np.float32]
     inverse: NDArray[np.float32]
     unit_covariance: NDArray[np.float32]
-    classes: NDArray[np.int8]
     _factors: dict[tuple[str, bytes], float] = field(default_factory=dict, repr=False)
 
     def factor(self, name: str, where: NDArray[np.bool_]) -> float:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.field import Roi, Status, StrainField, ZoiGrid, profile, variance_classes
+from analysis.field import Roi, Status, StrainField, ZoiGrid, profile
 from analysis.fit.kernel_args import StopArgs
 from analysis.follow.renewal import Placement, place
 from analysis.kernel.images import Noise, NoiseModel, as_model, check_fit, clipped_pixels
@@ -246,7 +246,7 @@ def _sums(
 
     return MeanNoise(
         grid, settings.window, settings.order, prepared.status == Status.OK, index, prepared.origins,
-        prepared.images, prepared.inverse, unit_covariance, variance_classes(unit_covariance[[0, 15]]),
+        prepared.images, prepared.inverse, unit_covariance,
     )  # fmt: skip
 
 

@@ -63,11 +63,14 @@ class TensileRow:
     unit : str
     figure : Figure
         In that unit, or why it is not known.
+    remarked : bool
+        The text shows the remark of a figure that is known.
     """
 
     name: str
     unit: str
     figure: Figure
+    remarked: bool = False
 
     @property
     def column(self) -> str:
@@ -82,7 +85,7 @@ class TensileRow:
     @property
     def text(self) -> str:
         """Value, interval and unit for a person, and a remark; forces below 2 kN in N."""
-        remark = f" ({self.figure.why})" if self.figure.known and self.figure.why else ""
+        remark = f" ({self.figure.why})" if self.remarked and self.figure.known and self.figure.why else ""
         if self.unit == "kN" and abs(self.figure.value) < _SMALL_KN:
             return figure_text(self.figure, 1e-3, "N") + remark
         return figure_text(self.figure, 1.0, self.unit) + remark
@@ -103,7 +106,7 @@ def tensile_table(figures: TensileFigures, *, stresses: bool) -> dict[str, Tensi
     names |= {key: (letter + end, strength) for key, end in _STRENGTH_SUFFIXES.items()}
     names |= {key: (key, _PERCENT) for key in _EXTENSIONS}
     return {
-        key: TensileRow(name, unit, getattr(figures, key).over(one))
+        key: TensileRow(name, unit, getattr(figures, key).over(one), key in ("E", "nu"))
         for key, (name, (unit, one)) in names.items()
     }
 
@@ -152,6 +155,8 @@ def tare_line(history: History, loads: LoadLog) -> list[str]:
 
 def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
     """The angle from the axis of the load to the largest strain; nothing where it is not known."""
+    if not history.time_steps:
+        return []
     load = history.axis(specimen.axis)
     words = axis_text(load)
     stays = load.found and load.axis != specimen.first_axis and history.gauge("axial") is not None

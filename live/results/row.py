@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from numpy.typing import NDArray
 
+from analysis.evaluate import AreaStrain
 from live.pipeline.measurement import AXIAL, extension_along, strains_along
 
 if TYPE_CHECKING:
@@ -113,7 +114,8 @@ def _values(
         "time_s": burst.t - info.start_monotonic,
         "force_N": time_step.force,
     }
-    values |= {name: getattr(time_step, name) for name in (*STRAINS, *EXTENSIONS, *UNEVEN)}
+    values |= _strains(measurement, info.strain_measure)
+    values |= {name: getattr(time_step, name) for name in (*EXTENSIONS, *UNEVEN)}
     values |= {f"sigma_{name}": getattr(time_step, f"sigma_{name}") for name in STRAINS}
     values |= {
         "n_valid": time_step.n_valid,
@@ -138,6 +140,14 @@ def _values(
     if info.lagged:
         values["force_raw_N"] = time_step.force_raw
     return values
+
+
+def _strains(measurement: Measurement, measure: StrainMeasure) -> dict[str, float]:
+    """Of the region, in ``measure``: those of the time step, where its field has that measure."""
+    if measurement.field.measure == measure:
+        return {name: getattr(measurement.time_step, name) for name in STRAINS}
+    area = AreaStrain.of(replace(measurement.field, measure=measure))
+    return {name: math.nan if area is None else area.value(name) for name in STRAINS}
 
 
 def _stretch(measurement: Measurement, measure: StrainMeasure, axis: str) -> float:
