@@ -248,7 +248,7 @@ def picture_times(address: Address) -> dict[str, float]:
     times = {path.name: stamps[k] if stamps else k / settings.fps for k, path in enumerate(paths)}
     if len(times) < len(paths) or any(_count(path) > 1 for path in paths):
         raise ConfigError(
-            f"{address.text}: pictures are not told apart by their names; give times in their place"
+            f"{address.text}: two pictures share a name, or one has several pages; give times in place of names"
         )
     return times
 

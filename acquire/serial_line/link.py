@@ -210,11 +210,9 @@ class Link:
         if self._short == 1:
             self._report("error", f"lost ({error}); {self._last_words()}; trying to reach it again")
         elif self._short == 2:
-            text = (
-                f"lost again at once ({error}): something on the other side hangs up; it is tried again ever"
-            )
+            text = f"lost again at once ({error}): the other side hangs up; phasedic tries again ever"
             self._report(
-                "error", f"{text} more seldom (up to every {SELDOM_S:g} s), and told of when it stays"
+                "error", f"{text} less often (up to every {SELDOM_S:g} s), with an event when it stays"
             )
         self._missed = True
 

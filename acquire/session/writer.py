@@ -185,7 +185,7 @@ class SessionWriter(Closing):
         """Store the final counts."""
         text = to_json(frame_counts).encode()
         if len(text) > layout.LEDGER_BYTES:
-            raise ValueError(f"a ledger of {len(text)} bytes; there is room for {layout.LEDGER_BYTES}")
+            raise ValueError(f"a ledger of {len(text)} bytes; at most {layout.LEDGER_BYTES} fit")
         with self._guarded():
             self._frame_counts[0] = text
         self._written(0)
@@ -279,7 +279,7 @@ class SessionWriter(Closing):
         try:
             yield file
         except (OSError, RuntimeError) as error:
-            if keep_rows:  # a disk that is full for a picture may still have room for the rows before it
+            if keep_rows:  # a disk that is full for a picture may still take the rows before it
                 with suppress(OSError, RuntimeError):
                     self._bring(file)
             # Datasets may now differ in length; going on would put rows beside the wrong frames.

@@ -219,7 +219,7 @@ class V4L2Camera(CameraBase):
         counted = self._counter.counts_itself
         lost = self._counter.count(stamp.sequence, raw_t, self._setup.mode.fps)
         if counted and not self._counter.counts_itself:
-            self._report("the driver does not number its frames; losses are told from their stamps alone")
+            self._report("the driver does not number its frames; losses are counted from their stamps alone")
         if stamp.damaged:
             self._report(
                 f"frame {self._counter.index} is damaged: recorded, not measured", frame=self._counter.index
