@@ -285,6 +285,6 @@ def _strips(places: Places, roi: Roi, active: bytes, along: Literal["x", "y"]) -
 
 
 GAUGE_KINDS: Mapping[str, type[Gauge]] = {
-    kind.kind: kind for kind in (LineGauge, StripsGauge, TransverseGauge, AreaGauge, ZoiGauge)
+    kind.kind: kind for kind in (LineGauge, TransverseGauge, AreaGauge, ZoiGauge, StripsGauge)
 }
 """By their names in a configuration, in the order of the buttons on a page."""

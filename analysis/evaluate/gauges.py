@@ -189,7 +189,7 @@ def read_ends(chosen: Sequence[Mask], field: StrainField) -> GaugeValue:
 
 
 def read_strips(chosen: Sequence[Mask], field: StrainField, along: str) -> GaugeValue:
-    """``read_ends`` of two strips, each where the other has values too: their mean places lie on a line along the axis."""
+    """``read_ends`` of two strips, each where the other has values too, so that their line is not tilted."""
     for number, end in enumerate(chosen, 1):
         if missing := _missing(end, field):
             return GaugeValue(math.nan, math.nan, f"end {number}: {missing}")
