@@ -210,7 +210,8 @@ def _missing(chosen: Mask, field: StrainField) -> str:
             f"no ZOI is there; their centres reach from {grid.x[0]:g}, {grid.y[0]:g} to {grid.x[-1]:g},"
             f" {grid.y[-1]:g} px"
         )
-    lost = Counter(Status(int(s)) for s in field.status[chosen] if s != Status.OK)
+    status = field.status[chosen]
+    lost = Counter(Status(s) for s in status[status != Status.OK].tolist())
     if total - lost.total() >= max(MIN_SHARE * total, 1):
         return ""
     words = ", ".join(f"{n} {status.name}" for status, n in lost.most_common())
