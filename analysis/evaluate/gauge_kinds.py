@@ -7,9 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, Literal
 
+import numpy as np
+
+from analysis.evaluate.affine import Places
 from analysis.evaluate.gauges import (
     Box,
     Gauge,
@@ -24,13 +28,15 @@ from analysis.evaluate.gauges import (
     circle,
     closed,
     corners_of,
+    ends_of,
     near_px,
     read_area,
     read_ends,
+    read_strips,
     zois_inside,
     zois_near,
 )
-from analysis.field import StrainField, ZoiGrid
+from analysis.field import Roi, StrainField, ZoiGrid
 
 _VALUE = Parameter(
     "choice",
@@ -38,9 +44,11 @@ _VALUE = Parameter(
     choices=("exx", "eyy", "exy", "gamma_xy"),
     by_axis={"x": "exx", "y": "eyy"},
 )
-_STATISTIC = Parameter("choice", "of an area", choices=("mean", "largest", "smallest"))
+_STATISTIC = Parameter(
+    "choice", "of an area: affine fit, or of its ZOIs", choices=("affine", "mean", "largest", "smallest")
+)
 _AT = Parameter("point", "x, y of a zoi")
-_BOX = Parameter("box", "x, y, width, height of an area or transverse gauge")
+_BOX = Parameter("box", "x, y, width, height of an area, extension or transverse gauge")
 _CORNERS = Parameter("corners", "x, y of the corners of an area")
 _START, _END = Parameter("point", "x, y of one end of a line"), Parameter("point", "x, y of the other")
 _RADIUS = Parameter("length", "ZOIs this far around an end of a line (half a ZOI)", 0.1, 1e5)
@@ -48,10 +56,12 @@ _CENTRE = Parameter("point", "x, y of the centre of a circle")
 _WIDTH = Parameter("length", "width of a strip (one ZOI)", 0.1, 1e5)
 _ALONG = Parameter(
     "choice",
-    "direction of a transverse gauge (across the load)",
+    "direction of an extension (along the load) or transverse gauge (across it)",
     choices=("x", "y"),
     by_axis={"x": "y", "y": "x"},
 )
+_ALONG_LOAD = replace(_ALONG, by_axis={"x": "x", "y": "y"})
+_STRIP = 1 / 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +104,7 @@ class ZoiGauge(Gauge):
 
 @dataclass(frozen=True, slots=True)
 class AreaGauge(Gauge):
-    """Mean, largest or smallest value of the ZOIs whose centres lie in a box or polygon.
+    """The strain of the ZOIs whose centres lie in a box or polygon, by their affine field; or of single ZOIs.
 
     Of the largest and the smallest, sigma is that of the ZOI which has it: right for a peak that stands
     out of the noise. In a flat field noise alone lifts the largest of n values above the mean, by 2 to 3
@@ -107,14 +117,14 @@ class AreaGauge(Gauge):
         At least three, in place of the box.
     value : str
         One of ``analysis.field.VALUES``.
-    statistic : "mean", "largest" or "smallest"
-        By sign, not by magnitude.
+    statistic : "affine", "mean", "largest" or "smallest"
+        By ``AreaStrain``; else of the values of the ZOIs, by sign, not by magnitude.
     """
 
     box: Box | None = field(default=None, metadata=_BOX.metadata)
     corners: tuple[Point, ...] | None = field(default=None, metadata=_CORNERS.metadata)
     value: str = field(default="eyy", metadata=_VALUE.metadata)
-    statistic: Statistic = field(default="mean", metadata=_STATISTIC.metadata)
+    statistic: Statistic = field(default="affine", metadata=_STATISTIC.metadata)
     kind, label, default_name, gesture = "area", "Area", "area", "box"
     hint = "Drag a rectangle: its mean strain."
 
@@ -316,14 +326,7 @@ class TransverseGauge(Gauge):
             raise ValueError(f"gauge {self.name}: along is x or y, got {self.along!r}")
 
     def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
-        x, y, width, height = self.box
-        if self.along == "x":
-            third = width / 3
-            boxes = (x, y, third, height), (x + 2 * third, y, third, height)
-        else:
-            third = height / 3
-            boxes = (x, y, width, third), (x, y + 2 * third, width, third)
-        return tuple(zois_inside(grid, corners_of(box)) for box in boxes)
+        return tuple(zois_inside(grid, corners_of(box)) for box in ends_of(self.box, self.along, 1 / 3))
 
     def measure(self, field: StrainField) -> GaugeValue:
         return read_ends(self.zois(field.grid), field)
@@ -339,7 +342,49 @@ class TransverseGauge(Gauge):
         return {"box": box_between(handles[0], handles[-1])}
 
 
+@dataclass(frozen=True, slots=True)
+class ExtensionGauge(TransverseGauge):
+    """An extensometer along a strip: (L - L0)/L0 between the first and the last sixth of a box.
+
+    Each end is as wide as the box, as the definition of extension has it, and right in any field: a neck or a band
+    between the ends counts as it does for a clip-on extensometer. In a uniform field its noise is a quarter above
+    that of all ZOIs.
+    """
+
+    along: Literal["x", "y"] = field(default="y", metadata=_ALONG_LOAD.metadata)
+    kind, label, default_name, gesture = "extension", "Extension", "extension", "box"
+    hint = "Drag a rectangle: extension between its two ends."
+
+    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        side = self.box[2 if self.along == "x" else 3]
+        ends = ends_of(self.box, self.along, max(_STRIP, grid.step / side))
+        return tuple(zois_inside(grid, corners_of(box)) for box in ends)
+
+    def measure(self, field: StrainField) -> GaugeValue:
+        return read_strips(self.zois(field.grid), field, self.along)
+
+
+def extension_of(field: StrainField, along: Literal["x", "y"]) -> GaugeValue:
+    """(L - L0)/L0 between strips at the two ends of all active ZOIs of a field; ``ExtensionGauge``."""
+    grid = field.grid
+    strips = _strips(Places.of(grid, field.window), grid.roi, grid.active.tobytes(), along)
+    return read_strips(strips, field, along)
+
+
+@lru_cache(maxsize=8)
+def _strips(places: Places, roi: Roi, active: bytes, along: Literal["x", "y"]) -> tuple[Mask, ...]:
+    inside = np.frombuffer(active, np.bool_).reshape(places.shape)
+    grid = ZoiGrid(roi, places.size, places.step, inside)
+    rows, columns = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
+    if not rows.size:
+        return inside, inside
+    x, y = grid.x[columns[0]] - grid.step / 2, grid.y[rows[0]] - grid.step / 2
+    width, height = (float(np.ptp(found) + 1) * grid.step for found in (columns, rows))
+    return ExtensionGauge("", (float(x), float(y), width, height), along).zois(grid)
+
+
 GAUGE_KINDS: Mapping[str, type[Gauge]] = {
-    kind.kind: kind for kind in (LineGauge, TransverseGauge, AreaGauge, ZoiGauge, CircleGauge, StripGauge)
+    kind.kind: kind
+    for kind in (LineGauge, TransverseGauge, AreaGauge, ZoiGauge, CircleGauge, StripGauge, ExtensionGauge)
 }
 """By their names in a configuration, in the order of the buttons on a page."""

@@ -31,6 +31,7 @@ from analysis.field import PAIR_INDEX, WINDOWS, Measure, StrainField, Window
 from live.config.gauges import gauges_for
 from live.config.loading import from_dict, load_config
 from live.config.sections import SpecimenConfig
+from live.pipeline.history import curve_of
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.results.pictures import Image, Pictures, of_images, of_session
 from live.results.reader import Strain
@@ -191,8 +192,9 @@ class RunFolder(Closing):
     @cached_property
     def load_axis(self) -> LoadAxis:
         """The axis of the load, as given or as found from the means."""
-        exx, eyy, exy = (np.asarray(self.strain.values[name], np.float64) for name in ("exx", "eyy", "exy"))
-        return load_axis(exx, eyy, exy, self.specimen.axis)
+        names = ("exx", "eyy", "exy", "sigma_exx", "sigma_eyy")
+        exx, eyy, exy, *sigmas = (np.asarray(self.strain.values[name], np.float64) for name in names)
+        return load_axis(exx, eyy, exy, self.specimen.axis, np.fmax(*sigmas))
 
     @property
     def axial(self) -> str:
@@ -220,18 +222,23 @@ class RunFolder(Closing):
 
     @property
     def axial_strain(self) -> NDArray[np.float64]:
-        """Strain along the load, (T,): of the gauge ``axial`` where there is one, else the mean."""
-        return self._strain(strains_along(self.gauges, self.load_axis.axis)[0])
+        """Strain along the load, (T,): of the gauge ``axial`` where there is one, else of the region."""
+        return self._known(strains_along(self.gauges, self.load_axis.axis)[0])
 
     @property
     def transverse_strain(self) -> NDArray[np.float64]:
-        """Strain across the load, (T,): of the gauge ``transverse`` where there is one, else the mean."""
-        return self._strain(strains_along(self.gauges, self.load_axis.axis)[1])
+        """Strain across the load, (T,): of the gauge ``transverse`` where there is one, else of the region."""
+        return self._known(strains_along(self.gauges, self.load_axis.axis)[1])
 
-    def _strain(self, name: str) -> NDArray[np.float64]:
+    def _known(self, name: str) -> NDArray[np.float64]:
+        found = self._strain(name)
+        return np.full(self.strain.n, np.nan) if found is None else found
+
+    def _strain(self, name: str) -> NDArray[np.float64] | None:
         if name in (AXIAL, TRANSVERSE):
             return self.gauges[name].value
-        return np.asarray(self.strain.values[name], np.float64)
+        found = self.strain.values.get(name)
+        return None if found is None else np.asarray(found, np.float64)
 
     def field(self, row: int) -> StrainField:
         """The strain field of one instant, as ``strain.h5`` holds it.
@@ -261,10 +268,10 @@ class RunFolder(Closing):
 
     @property
     def curve(self) -> Curve:
-        """Stress over axial strain, for evaluation; force (N) where the section is not known."""
+        """Stress over extension, for evaluation; force (N) where the section is not known."""
         load = self.force_one_zero if self.stress is None else self.stress
         times = np.asarray(self.strain.time_s, np.float64)
-        return Curve(times, self.axial_strain, load, self.transverse_strain)
+        return curve_of(self._strain, self.gauges, self.load_axis.axis, times, load)
 
     @cached_property
     def events(self) -> list[Event]:

@@ -109,7 +109,7 @@ def test_a_gauge_beside_the_grid_names_where_the_grid_is() -> None:
     [
         (lambda: ZoiGauge("a", (0, 0), "ezz"), "gauge a: unknown value 'ezz'; known: u, v"),
         (lambda: AreaGauge("a", corners=((0, 0), (1, 1))), "at least 3 corners"),
-        (lambda: AreaGauge("a", (0, 0, 9, 9), statistic="median"), "known: mean, largest"),  # type: ignore[arg-type]
+        (lambda: AreaGauge("a", (0, 0, 9, 9), statistic="median"), "known: affine, mean, largest"),  # type: ignore[arg-type]
         (lambda: LineGauge("a", (3, 3), (3, 3)), "one point"),
         (lambda: LineGauge("a", (3, 3), (3, 9), 0), "radius must be positive"),
         (lambda: TransverseGauge("a", (0, 0, 0, 5)), "must be positive"),

@@ -94,7 +94,7 @@ def test_the_report_shows_every_gauge_with_its_band(gauged: Path) -> None:
 def test_the_curve_is_that_of_the_gauge_axial(gauged: Path, run_dir: Path) -> None:
     with open_run(gauged) as run, open_run(run_dir) as plain:
         np.testing.assert_array_equal(EvaluatedCurve.of(run).axial, run.strain.values["gauge_axial"])
-        np.testing.assert_array_equal(EvaluatedCurve.of(plain).axial, plain.strain.values["eyy"])
+        np.testing.assert_array_equal(EvaluatedCurve.of(plain).axial, plain.strain.values["extension_y"])
 
 
 def test_the_lag_is_told_or_why_not(gauged: Path, tmp_path: Path) -> None:
