@@ -1,18 +1,18 @@
-# make demo | test | lint | docs | bench | accuracy | mutants | newest | lowest | v4l2-test | bare-test ; each sets up
-# its own .venv first.
+# make demo | test | lint | docs | bench | accuracy | mutants | newest | lowest | v4l2-test | genicam-test | bare-test ;
+# each sets up its own .venv first.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test lint format docs bench accuracy mutants newest lowest constraints v4l2-test bare-test clean
+.PHONY: demo test lint format docs bench accuracy mutants newest lowest constraints v4l2-test genicam-test bare-test clean
 .DEFAULT_GOAL := demo
 
 $(VENV)/base: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "phasedic needs Python 3.11 or newer; make PYTHON=python3.12 ... picks another")'
 	@echo "Setting up $(VENV) (once; about 300 MB are fetched) ..."
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable .
+	@$(BIN)/python -m pip install --disable-pip-version-check --constraint constraints.txt --editable .
 	@touch $@
 
 $(VENV)/test: $(VENV)/base
@@ -76,6 +76,9 @@ constraints:
 
 v4l2-test: $(VENV)/test
 	@$(BIN)/python tests/v4l2/vm.py --tests
+
+genicam-test: $(VENV)/test
+	@$(BIN)/python -m tests.genicam.namespace --tests
 
 # In a bare Debian made on the spot: make bare-test SUITE=trixie ONLY=demo
 SUITE ?= forky

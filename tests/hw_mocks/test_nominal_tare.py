@@ -35,6 +35,11 @@ def test_forces_fall_by_what_the_event_states_and_rise_when_it_is_undone() -> No
     cell.close()
 
 
+def steps(events: list[Event]) -> list[float]:
+    """By how much each tare made the forces fall, N."""
+    return [event.data["step_N"] for event in events if event.kind is EventKind.TARE]
+
+
 def test_each_tare_is_undone_by_itself() -> None:
     events: list[Event] = []
     address = parse_address("sim:?lockstep=yes&seconds=4&hold=0&noise_N=0&rate=50")
@@ -44,9 +49,9 @@ def test_each_tare_is_undone_by_itself() -> None:
         for _ in range(20):
             next(stream)
         cell.tare()
-    first, second = (event.data["step_N"] for event in events)
+    first, second = steps(events)
     assert first > 0 and second > 0
     for _ in range(3):
         cell.undo_tare()
-    assert [event.data["step_N"] for event in events[2:]] == pytest.approx([-second, -first])
+    assert steps(events)[2:] == pytest.approx([-second, -first])
     cell.close()

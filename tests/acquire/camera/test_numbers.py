@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from acquire.v4l2.faults import FrameCounter
+from acquire.camera.timing import FrameCounter
 
 
 @pytest.mark.parametrize(
