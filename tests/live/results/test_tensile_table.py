@@ -22,7 +22,7 @@ from live.results.report.evaluation import EvaluatedCurve as RunCurve
 from live.results.report.report import tensile
 from live.results.run_folder import open_run
 from live.results.summary import summary_lines
-from live.ui.web.page_controller import run_result
+from live.ui.web.run_result import run_result
 from tests.analysis.curves import noisy, ramberg_osgood
 from tests.live.made_run import CONFIG, PULLED, make_run
 from tests.live.results.test_figures import AREA_M2, FLAT, kept
