@@ -11,7 +11,7 @@ from acquire.bounds import NotAllowed, as_number
 from acquire.errors import ConfigError, DeviceError
 from acquire.frame import CameraSetting
 from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
-from acquire.genicam.formats import FORMATS, MonoFormat, preferred
+from acquire.genicam.formats import FORMATS, MonoFormat, preferred, readable
 from acquire.genicam.library import GenicamError
 from acquire.genicam.settings import KEYS, NO_TRIGGER, GenicamSettings
 
@@ -46,6 +46,7 @@ class GenicamSetup:
     bits, white : int, int or None
     controls : mapping of str to JSON value
     settings : tuple of CameraSetting
+    formats : tuple of str
     warnings : tuple of str
     """
 
@@ -61,6 +62,7 @@ class GenicamSetup:
     white: int | None
     controls: dict[str, Any]
     settings: tuple[CameraSetting, ...]
+    formats: tuple[str, ...]
     warnings: tuple[str, ...]
 
     @property
@@ -151,7 +153,7 @@ def _same(got: str, asked: str) -> bool:
 
 def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> MonoFormat:
     offered = device.choices("PixelFormat")
-    usable = [name for name in FORMATS if name in offered]
+    usable = readable(offered)
     if not usable:
         raise DeviceError(
             f"{where}: offers {', '.join(offered) or 'nothing'}, none of them grey levels we can read"
@@ -263,6 +265,7 @@ def _in_force(
         white=_white(device, settings, bits),
         controls=dict(_shown(device, settings)),
         settings=tuple(_changeable(device, exposure_us, gain, fps)),
+        formats=tuple(readable(device.choices("PixelFormat"))),
         warnings=tuple(_warnings(device, settings, fps)),
     )
 

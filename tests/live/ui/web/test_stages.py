@@ -161,7 +161,7 @@ def test_devices_by_hand(start: Start) -> None:
     page.until(lambda: page.page.locator("#cameras option[value='sim:hole']").count() == 1, "the list")
     page.page.fill("#rate", "7")
     page.page.press("#rate", "Tab")
-    page.until(lambda: ", 7 fps" in page.text("camera"), "another rate, and nothing restarts")
+    page.until(lambda: ", 7 1/s" in page.text("camera"), "another rate, and nothing restarts")
     page.page.select_option("#cameras", "sim:hole")
     page.until(lambda: "640 × 512" in page.text("camera"), "another camera")
     for address in ("sim:?width=wide", "files:/no/such/folder", "nonsense:1", "/dev/video99"):
