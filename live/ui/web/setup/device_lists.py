@@ -77,8 +77,8 @@ class DeviceLists:
         recorded = [CameraListing(address, "recorded session") for address in self._sessions()]
         simulated = [CameraListing("sim:", "simulated"), CameraListing("sim:hole", "simulated")]
         self._cameras = [*self._list_cameras(), *recorded, *simulated]
-        ports = [_port(one) for one in self._list_ports()]
-        self._loads = [*ports, {"address": "sim:", "name": "simulated"}, {"address": "none:", "name": "none"}]
+        others = [*recorded, CameraListing("sim:", "simulated"), CameraListing("none:", "none")]
+        self._loads = [*(_port(one) for one in self._list_ports()), *map(_shown, others)]
         self._finding = ""
 
     def _sessions(self) -> Iterator[str]:

@@ -6,16 +6,22 @@ import { t } from "./words.js";
 const OTHER = "another address …", LABELS = { simulated: "simulated", session: "recorded session", none: "none", other: OTHER };
 let shown = {};
 
-for (const [select, kind] of [["cameras", "address"], ["loads", "load"]]) {
-  $(select).addEventListener("change", (event) => {
-    if (event.target.value) change({ do: kind, value: event.target.value });
-    else $(kind === "load" ? "loadaddress" : "cameraaddress").focus();
-    event.target.blur();
-  });
+// A choice with the mouse acts at once; with the keyboard on Enter or when the focus leaves, not on the way there.
+function onChoice(select, act) {
+  let isTyped = false, isPending = false;
+  const finish = () => { if (isPending) act(select.value); isPending = false; };
+  select.addEventListener("pointerdown", () => { isTyped = false; });
+  select.addEventListener("keydown", (event) => { isTyped = true; if (event.key === "Escape") isPending = false; if (event.key === "Enter" && isPending) { event.preventDefault(); finish(); } });
+  select.addEventListener("change", () => { isPending = true; if (!isTyped) { finish(); select.blur(); } });
+  select.addEventListener("blur", finish);
+}
+
+for (const [select, kind, other] of [["cameras", "address", "cameraaddress"], ["loads", "load", "loadaddress"]]) {
+  onChoice($(select), (value) => { if (value) change({ do: kind, value }); else $(other).focus(); });
 }
 $("cameraform").addEventListener("submit", (event) => { event.preventDefault(); change({ do: "address", value: $("cameraaddress").value.trim() }); document.activeElement.blur(); });
 $("loadform").addEventListener("submit", (event) => { event.preventDefault(); change({ do: "load", value: $("loadaddress").value.trim() }); document.activeElement.blur(); });
-$("format").addEventListener("change", (event) => { change({ do: "option", key: "format", value: event.target.value }); event.target.blur(); });
+onChoice($("format"), (value) => change({ do: "option", key: "format", value }));
 $("rate").addEventListener("change", (event) => { change({ do: "option", key: "fps", value: event.target.value }); event.target.blur(); });
 $("identify").addEventListener("click", () => change({ do: "identify", port: $("loadaddress").value.split("?")[0] }));
 $("tab-devices").addEventListener("click", () => { if (!shown.cameras?.length) change({ do: "devices" }); });

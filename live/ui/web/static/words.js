@@ -33,27 +33,27 @@ function translated(text) {
   return found.get(text);
 }
 
-// A whole text, then one after a name, then one that a long pattern fits, then both sides of a separator, then any
-// pattern.
+// A whole text, then one after a name, then one that a long pattern fits, then both sides of a separator, then one
+// that a short pattern fits with all its parts, then one after any words, such as the name of a camera.
 function lookedUp(text) {
-  return catalogue[text]?.[chosen] ?? named(text) ?? filled(text, false) ?? separated(text) ?? filled(text, true);
+  return catalogue[text]?.[chosen] ?? named(text, isName) ?? filled(text, false) ?? separated(text) ?? filled(text, true)
+    ?? named(text, () => true);
 }
 
 function filled(text, weak) {
   for (const { key, form } of patterns.filter((one) => one.weak === weak)) {
-    const parts = form.exec(text);
-    if (!parts) continue;
-    let k = 0;
-    return catalogue[key][chosen].replace(/\{\}/g, () => part(parts[++k]));
+    const parts = form.exec(text)?.slice(1);
+    if (!parts || (weak && parts.some((one) => !isName(one.replace(/[\d.]+/g, "").trim()) && translated(one) == null))) continue;
+    return catalogue[key][chosen].replace(/\{\}/g, () => part(parts.shift()));
   }
   return null;
 }
 
 const isName = (text) => !text.includes(" ") || /[/:]/.test(text);
 
-function named(text) {
+function named(text, isName) {
   const at = text.indexOf(": "), left = text.slice(0, Math.max(at, 0));
-  return at > 0 && isName(left) ? joined(part(left), ": ", translated(text.slice(at + 2))) : null;
+  return at > 0 && isName(left) && !(left in catalogue) ? joined(left, ": ", translated(text.slice(at + 2))) : null;
 }
 
 function separated(text) {

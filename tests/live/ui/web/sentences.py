@@ -62,8 +62,6 @@ UNSEEN = {"ValueError", "AssertionError", "TypeError", "compile", "Parameter"}
 NAMES = re.compile(
     r"\b(px|mm|ms|us|um|Hz|GL|MB|fps|rms|GPa|MPa|TOML|CSV|TIFF|RFC|ZOIs?|[\w.]+=\S*|\w+[._]\S*|\[\[?\w+\]\]?)"
 )
-    r"\b(px|mm|ms|us|um|Hz|GL|MB|fps|rms|GPa|MPa|TOML|CSV|TIFF|RFC|ZOIs?|[\w.]+=\S*|\w+[._]\S*|\[\[?\w+\]\]?)"
-)
 # In the listing of ``phasedic devices`` and the lines of ``phasedic load-check``, in files, or compared with.
 NOT_SHOWN = {
     "stays the same when replugged: {}",
@@ -229,12 +227,15 @@ class Translator:
 
     def _named(self, text: str) -> bool | None:
         name, colon, rest = text.partition(": ")
-        return True if colon and is_name(name) and self._covers(rest) else None
+        is_known = name.replace(UNKNOWN, "{}") in self._known
+        return True if colon and is_name(name) and not is_known and self._covers(rest) else None
 
     def _filled(self, text: str, weak: bool) -> bool | None:
         for form, is_weak in self._patterns:
             if is_weak == weak and (parts := form.fullmatch(text)):
-                return all(map(self._covers, parts.groups()))
+                covered = all(map(self._covers, parts.groups()))
+                if covered or not weak:
+                    return covered
         return None
 
     def _separated(self, text: str) -> bool | None:
