@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from analysis.compiled.loops import helper
 from analysis.field import Window, ZoiGrid, combination, profile, variance_of_sum
 from analysis.fit.sensitivity import columns, parameter_scale
+from analysis.fit.shapes import CHANNELS
 
 Floats = NDArray[np.float64]
 
-CHANNELS, MONOMIALS = 4, ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-"""f_x, f_y, f and 1, each times 1, x, y, x^2, xy, y^2."""
+MONOMIALS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+"""1, x, y, x^2, xy, y^2, with which a channel is multiplied."""
 MAX_CACHED = 64
 """Gauges whose factors are remembered."""
 
@@ -42,8 +43,8 @@ class MeanNoise:
         Flat places of the active ZOIs on the grid.
     origins : (A, 2) int64
         First row and column of each.
-    images : (>= 3, H, W) float32
-        f_x, f_y and f of the filtered reference.
+    images : (7, H, W) float32
+        See ``PreparedReference.images``.
     inverse : (>= A, P, P) float32
         (J' w J)^-1 of each ZOI.
     unit_covariance : (21, R, C) float32
@@ -96,9 +97,9 @@ class MeanNoise:
         return float(np.cumsum(np.cumsum(out**2, axis=1)[:, -1])[-1])
 
     def _weights(self, name: str, which: NDArray[np.intp]) -> Floats:
-        """The row of the inverse that makes ``name``, by channel and monomial, (B, 4, 6)."""
-        half = self.inverse.shape[1] // 2 - 3
+        """The row of the inverse that makes ``name``, by channel and monomial, (B, 7, 6)."""
         units = parameter_scale(self.order, self.grid.size)
+        half = len(units) // 2
         row = np.zeros((len(which), self.inverse.shape[1]))
         for parameter, share in combination(name).items():
             at = parameter % 3 + (half if parameter > 2 else 0)
@@ -140,4 +141,7 @@ def scatter(
                 value = images[at + x] * (x0 + xi * (x1 + xi * a[0, 3]))
                 value += images[samples + at + x] * (y0 + xi * (y1 + xi * a[1, 3]))
                 value += images[2 * samples + at + x] * (f0 + xi * a[2, 1])
+                value += images[4 * samples + at + x] * a[4, 0]
+                value += images[5 * samples + at + x] * a[5, 0]
+                value += images[6 * samples + at + x] * a[6, 0]
                 to[x] += line[y] * line[x] * (value + d0 + xi * a[3, 1])

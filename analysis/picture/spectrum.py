@@ -35,6 +35,8 @@ class Pattern:
         Standard deviation of the noise in the reference, as given or as its spectrum shows.
     left_gradient : float, 1/px^2
         Mean square of a filtered gradient over the variance of the noise, where there is only noise.
+    own_noise : (3,) float64
+        What the noise of a pixel puts into f, f_xx and f_yy of that pixel, shares of it.
     """
 
     level: NDArray[np.float32]
@@ -43,6 +45,7 @@ class Pattern:
     mean: float
     noise: float
     left_gradient: float
+    own_noise: NDArray[np.float64]
 
 
 def filtered_pattern(image: NDArray[np.float32], noise: float | None, degree: int) -> Pattern:
@@ -89,7 +92,29 @@ def filtered_pattern(image: NDArray[np.float32], noise: float | None, degree: in
         mean=mean,
         noise=float(np.sqrt(variance)),
         left_gradient=float(np.mean(np.abs(response * along_x) ** 2)),
+        own_noise=_at_no_lag(response, kx, ky),
     )
+
+
+def _at_no_lag(
+    response: NDArray[np.float32], kx: NDArray[np.floating], ky: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """The filters of f, f_xx and f_yy (``second_differences``) in space, at the pixel itself, (3,)."""
+    bends = (2 * np.cos(2 * np.pi * k) - 2 for k in (kx, ky))
+    return np.array([np.mean(response), *(np.mean(response * bend) for bend in bends)], np.float64)
+
+
+def second_differences(level: NDArray[np.float32]) -> NDArray[np.float32]:
+    """f_xx, f_yy and f_xy of an image (H, W) by differences of neighbouring pixels, (3, H, W), GL/px^2.
+
+    At high frequencies they fall behind the derivatives, as the spectrum of a real blur does behind its series.
+    """
+    f = np.pad(level, 1, mode="edge")
+    twice = 2 * level
+    along_x = f[1:-1, 2:] + f[1:-1, :-2] - twice
+    along_y = f[2:, 1:-1] + f[:-2, 1:-1] - twice
+    across = (f[2:, 2:] + f[:-2, :-2] - f[2:, :-2] - f[:-2, 2:]) / 4
+    return np.stack([along_x, along_y, across])
 
 
 def radial_spectrum(image: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
