@@ -16,7 +16,7 @@ from analysis.picture.splines import TAPS, Box
 
 Floats = NDArray[np.float64]
 
-IMAGES = 7
+IMAGES = 4
 """Of a reference (``PreparedReference.images``)."""
 NUISANCES = 9
 """Columns of J beside those of the displacement; f_xx and f_yy are the last but two and one."""
@@ -234,7 +234,7 @@ class ReferenceImages(NamedTuple):
     Attributes
     ----------
     plain : flat float32, ``samples`` of each, ``pitch`` a row
-        See ``PreparedReference.images``.
+        f_x, f_y (GL/px), f of the filtered reference, (not read,) and its f_xx, f_yy, f_xy (GL/px^2).
     by_level : flat float32, or empty
         The same times the grey level, the level itself in the fourth place, for a noise that grows with it;
         empty: not wanted.

@@ -60,7 +60,9 @@ class NoiseBias(NamedTuple):
 
     def at(self, reference: Floats, current: Floats) -> NDArray[np.float32]:
         """For variances a pixel of the two images at each ZOI, (A,) GL^2."""
-        return np.asarray(reference[:, None] * self.reference + current[:, None] * self.current, np.float32)
+        parts = ((reference, self.reference), (current, self.current))
+        first, second = (variance.astype(np.float32)[:, None] * each for variance, each in parts)
+        return np.asarray(first + second)
 
 
 def _solved(inverse: NDArray[np.float32], moments: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -76,20 +76,21 @@ def add_difference_columns(
 ) -> None:  # fmt: skip
     """Add ``count`` rows of a ZOI to the column sums of the difference d = g - raw, ``out`` (16, line).
 
-    In this order: w P_j d f_x and w P_j d f_y (j = 0 .. 3), w P_j d f and w P_j d (j = 0, 1), w d f_xx, w d f_yy,
-    w d f_xy, w d^2.
+    In this order: w P_j d f_x and w P_j d f_y (j = 0 .. 3), w P_j d f and w P_j d (j = 0, 1), w d times the sum of f
+    left and right, the sum above and below, the difference of the corners, and w d^2. Differences in place of second
+    derivatives in images of their own, which would be three more to read: 20 % slower.
 
     Parameters
     ----------
     images : flat float32
-        f_x, f_y, f, raw, f_xx, f_yy, f_xy, each of ``samples`` values with ``width`` a row; the rows start ``at``
-        a place in each.
+        f_x, f_y, f, raw, each of ``samples`` values with ``width`` a row; the rows start ``at`` a place in each, and
+        f goes on around them by a pixel.
     g : flat float32 with ``line`` samples a row, in whole vectors
     first : which of the rows of the ZOI is the first
     rows : (4, >= size) float32, w(y) P_j(y)
     """
     fy, f, raw = samples, np.uintp(2) * samples, np.uintp(3) * samples
-    fxx, fyy, fxy = np.uintp(4) * samples, np.uintp(5) * samples, np.uintp(6) * samples
+    one = np.uintp(1)
     for n in range(0, np.intp(line), LANES):
         k = np.uintp(n)
         x0 = load(out, k)
@@ -110,8 +111,20 @@ def add_difference_columns(
         energy = load(out, k + np.uintp(15) * line)
         i = at + k
         j = k
+        here = i + f
+        # Of f in the row above, in this one and in the one below: its value, and sum and difference of both neighbours.
+        above = load(images, here - width)
+        value = load(images, here)
+        slope_above = load(images, here - width + one) - load(images, here - width - one)
+        left, right = load(images, here - one), load(images, here + one)
+        beside, slope = left + right, right - left
         for row in range(first, first + count):
             y = np.uintp(row)
+            here += width
+            below = load(images, here)
+            left = load(images, here - one)
+            right = load(images, here + one)
+            slope_below = right - left
             w0 = spread(rows[0, y])
             w1 = spread(rows[1, y])
             w2 = spread(rows[2, y])
@@ -127,15 +140,20 @@ def add_difference_columns(
             y1 += w1 * t
             y2 += w2 * t
             y3 += w3 * t
-            t = d * load(images, i + f)
+            t = d * value
             f0 += w0 * t
             f1 += w1 * t
             t = w0 * d
             d0 += t
             d1 += w1 * d
-            xx += t * load(images, i + fxx)
-            yy += t * load(images, i + fyy)
-            xy += t * load(images, i + fxy)
+            xx += t * beside
+            yy += t * (above + below)
+            xy += t * (slope_below - slope_above)
+            beside = left + right
+            above = value
+            value = below
+            slope_above = slope
+            slope = slope_below
             energy += t * d
             i += width
             j += line
@@ -172,6 +190,9 @@ def difference_moments(columns: Any, rows: Any, line: int, out: Any) -> Any:
             for i in range(degrees - j):
                 out[channel, j, i] = dot(columns, place, rows, np.uintp(i) * length, line)
             place += across
+    for channel in (4, 5):
+        out[channel, 0, 0] -= 2 * out[2, 0, 0]
+    out[6, 0, 0] /= 4
     return dot(columns, place, rows, np.uintp(0), line)
 
 

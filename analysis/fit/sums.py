@@ -43,7 +43,7 @@ class MeanNoise:
         Flat places of the active ZOIs on the grid.
     origins : (A, 2) int64
         First row and column of each.
-    images : (7, H, W) float32
+    images : (4, H, W) float32
         See ``PreparedReference.images``.
     inverse : (>= A, P, P) float32
         (J' w J)^-1 of each ZOI.
@@ -118,6 +118,13 @@ def unit_variance(name: str, covariance: NDArray[np.float32]) -> Floats:
 
 
 @helper
+def blurred(f: Any, i: int, pitch: int, along_x: Any, along_y: Any, across: Any) -> Any:
+    """The second differences of an image at one pixel (``images.second_differences``), each with its factor."""
+    out = along_x * (f[i - 1] + f[i + 1] - 2 * f[i]) + along_y * (f[i - pitch] + f[i + pitch] - 2 * f[i])
+    return out + across * (f[i + pitch + 1] + f[i - pitch - 1] - f[i + pitch - 1] - f[i - pitch + 1]) / 4
+
+
+@helper
 def scatter(
     images: Any, samples: int, pitch: int, origins: Any, weights: Any, line: Any, along: Any, corner: Any, out: Any
 ) -> None:  # fmt: skip
@@ -138,10 +145,8 @@ def scatter(
             d0 = a[3, 0] + eta * a[3, 2]
             for x in range(size):
                 xi = along[x]
-                value = images[at + x] * (x0 + xi * (x1 + xi * a[0, 3]))
+                value = blurred(images, 2 * samples + at + x, pitch, a[4, 0], a[5, 0], a[6, 0])
+                value += images[at + x] * (x0 + xi * (x1 + xi * a[0, 3]))
                 value += images[samples + at + x] * (y0 + xi * (y1 + xi * a[1, 3]))
                 value += images[2 * samples + at + x] * (f0 + xi * a[2, 1])
-                value += images[4 * samples + at + x] * a[4, 0]
-                value += images[5 * samples + at + x] * a[5, 0]
-                value += images[6 * samples + at + x] * a[6, 0]
                 to[x] += line[y] * line[x] * (value + d0 + xi * a[3, 1])

@@ -12,9 +12,9 @@ from analysis.field import Status, profile
 from analysis.fit.kernel_args import NormalArgs, ReferenceImages, WindowRows
 from analysis.fit.noise_bias import NoiseBias
 from analysis.fit.validity import CLIPPED_SHARE, has_pattern
-from analysis.kernel.images import NoiseModel, padded
+from analysis.kernel.images import NoiseModel, continue_rim, padded, second_differences
 from analysis.kernel.settings import KernelSettings
-from analysis.picture.spectrum import Pattern, filtered_pattern, second_differences
+from analysis.picture.spectrum import Pattern, filtered_pattern
 
 if TYPE_CHECKING:
     from analysis.fit.shapes import Shapes
@@ -32,9 +32,9 @@ class PreparedReference:
     ----------
     shape : (H, W)
     pattern : Pattern
-    images : (7, H + 1, pitch) float32
-        Gradients and level of the filtered reference, f_x, f_y, f, the reference less its mean, and second
-        differences f_xx, f_yy, f_xy; zero beyond H rows of W, since loops read whole vectors.
+    images : (4, H + 1, pitch) float32
+        Gradients and level of the filtered reference, f_x, f_y, f, and the reference less its mean, with padding
+        beyond H rows of W, since loops read whole vectors; f goes on by a pixel beyond its edges.
     origins : (A, 2) int64
         First row and column of each ZOI.
     inverse : (A + 1, P, P) float32
@@ -101,11 +101,12 @@ def prepare_reference(
     std = None if noise is None else float(np.sqrt(noise.variance(mean)))
     pattern = filtered_pattern(image, std, settings.interpolant)
     line = profile(settings.window, size)
-    plain = pattern.grad_x, pattern.grad_y, pattern.level, image - np.float32(mean)
-    images = padded(*plain, *second_differences(pattern.level))
+    images = padded(pattern.grad_x, pattern.grad_y, pattern.level, image - np.float32(mean))
+    continue_rim(images, 2, image.shape)
     pattern = _within(pattern, images, image.shape)
-    by_level = _by_level(images, pattern, mean, noise)
-    out, shapes = _fits(images, by_level, origins, line, settings.order)
+    channels = np.concatenate([images, second_differences(images)])
+    by_level = _by_level(channels, pattern, mean, noise)
+    out, shapes = _fits(channels, by_level, origins, line, settings.order)
     energy = out.energy
     status = _measurable(pattern, out.covariance, energy)
     if clipped is not None and clipped.any():

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from analysis.field import PAIR_INDEX
 from analysis.fit.kernel_args import PictureArgs, StopArgs
+from analysis.kernel.images import second_differences
 from analysis.kernel.prepared import PreparedReference
 
 BAND = 0.30
@@ -80,13 +81,13 @@ def make_sensors(ready: PreparedReference, line: NDArray[np.float64], size: int)
     line : (n,)
         The least-squares weight along one axis.
     """
-    basis = _basis(line)
+    basis, channels = _basis(line), np.concatenate([ready.images, second_differences(ready.images)])
     count = len(ready.origins)
     weights = np.zeros((count, 7, size, size), np.float32)
     covariance = np.zeros((count, 21), np.float32)
     for first in range(0, count, CHUNK):
         part = slice(first, min(first + CHUNK, count))
-        level, modes = _zois(ready, ready.origins[part], size)
+        level, modes = _zois(channels, ready.origins[part], size)
         weights[part] = _sensors_of(basis, level, modes, ready.pattern.noise)
     flat = weights[:, :6].reshape(count, 6, -1)
     for (i, j), k in PAIR_INDEX.items():
@@ -119,11 +120,11 @@ def _basis(line: NDArray[np.float64]) -> _Basis:
 
 
 def _zois(
-    ready: PreparedReference, origins: NDArray[np.int64], size: int
+    channels: NDArray[np.float32], origins: NDArray[np.int64], size: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Filtered level (B, n, n) of some ZOIs, and its changes by the six modes and by blur (B, 9, n, n)."""
     x = (np.arange(size) - (size - 1) / 2).astype(np.float32)
-    fx, fy, level, _, *blurred = (zois_of(image, origins, size) for image in ready.images)
+    fx, fy, level, _, *blurred = (zois_of(image, origins, size) for image in channels)
     modes = [g * b for g in (fx, fy) for b in (np.float32(1), x, x[:, None])]
     return level, np.stack([*modes, *blurred], axis=1)
 

@@ -99,22 +99,9 @@ def filtered_pattern(image: NDArray[np.float32], noise: float | None, degree: in
 def _at_no_lag(
     response: NDArray[np.float32], kx: NDArray[np.floating], ky: NDArray[np.floating]
 ) -> NDArray[np.float64]:
-    """The filters of f, f_xx and f_yy (``second_differences``) in space, at the pixel itself, (3,)."""
+    """The filters of f, f_xx and f_yy (differences of pixels) in space, at the pixel itself, (3,)."""
     bends = (2 * np.cos(2 * np.pi * k) - 2 for k in (kx, ky))
     return np.array([np.mean(response), *(np.mean(response * bend) for bend in bends)], np.float64)
-
-
-def second_differences(level: NDArray[np.float32]) -> NDArray[np.float32]:
-    """f_xx, f_yy and f_xy of an image (H, W) by differences of neighbouring pixels, (3, H, W), GL/px^2.
-
-    At high frequencies they fall behind the derivatives, as the spectrum of a real blur does behind its series.
-    """
-    f = np.pad(level, 1, mode="edge")
-    twice = 2 * level
-    along_x = f[1:-1, 2:] + f[1:-1, :-2] - twice
-    along_y = f[2:, 1:-1] + f[:-2, 1:-1] - twice
-    across = (f[2:, 2:] + f[:-2, :-2] - f[2:, :-2] - f[:-2, 2:]) / 4
-    return np.stack([along_x, along_y, across])
 
 
 def radial_spectrum(image: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

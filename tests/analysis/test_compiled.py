@@ -37,6 +37,7 @@ from analysis.fit.shapes import (
     product_moments,
     shapes_of,
 )
+from analysis.kernel.images import second_differences
 
 PARTS = 64
 
@@ -234,7 +235,7 @@ def test_whole_vectors(size: int, rounded: int) -> None:
 
 @pytest.mark.parametrize("size", [9, 32, 57])
 def test_moments_of_the_difference(size: int) -> None:
-    images = RNG.normal(size=(CHANNELS, HEIGHT, PITCH)).astype(np.float32)
+    images = RNG.normal(size=(4, HEIGHT, PITCH)).astype(np.float32)
     top, left, line = 5, 7, whole(size)
     g = np.full((size, line), 1e3, np.float32)  # what lies beyond the ZOI must not count
     g[:, :size] = RNG.normal(size=(size, size))
@@ -243,7 +244,8 @@ def test_moments_of_the_difference(size: int) -> None:
     energy = of_the_difference(
         images.ravel(), HEIGHT * PITCH, top * PITCH + left, PITCH, g.ravel(), line, size, shapes.rows, columns, out
     )  # fmt: skip
-    fx, fy, f, raw, *second = images[:, top : top + size, left : left + size].astype(float)
+    second = second_differences(images)[:, top : top + size, left : left + size].astype(float)
+    fx, fy, f, raw = images[:, top : top + size, left : left + size].astype(float)
     d, rows = g[:, :size] - raw, shapes.rows[:, :size].astype(float)
     assert energy == pytest.approx(rows[0] @ d**2 @ rows[0], rel=1e-5)
     for channel, (image, degrees) in enumerate(zip((fx, fy, f, 1.0, *second), DEGREES_OF, strict=True)):
