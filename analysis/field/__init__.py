@@ -13,8 +13,11 @@ from analysis.field.uncertainty import (
     VALUES,
     Measure,
     StrainTensor,
+    WeightedSum,
     combination,
+    fixed_sums,
     products,
+    strain_tensor,
     variance_of_sum,
 )
 
@@ -28,10 +31,13 @@ __all__ = [
     "Status",
     "StrainField",
     "StrainTensor",
+    "WeightedSum",
     "Window",
     "ZoiGrid",
     "combination",
+    "fixed_sums",
     "products",
     "profile",
+    "strain_tensor",
     "variance_of_sum",
 ]
