@@ -1,4 +1,4 @@
-"""How much less sharp a picture is than its reference: a width in px from the variance that its blur has grown by."""
+"""How much less sharp a picture is than its reference: a width in px, from the variance that its blur has grown by."""
 
 from __future__ import annotations
 
@@ -6,30 +6,25 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.field.strain_field import StrainField
-from analysis.field.uncertainty import fixed_sum, variance_of_sum
+from analysis.field.uncertainty import Floats, fixed_sum, variance_of_sum
 
 
 class Blur(NamedTuple):
     """Standard deviation of the blur since the reference along one axis, and its standard uncertainty, px.
 
-    Negative where the picture is sharper than its reference: the width by which that one is blurred. NaN where it is
-    not known.
+    Negative where the picture is sharper: the width by which the reference is blurred against it. NaN where it is not
+    known.
     """
 
     px: float
     sigma: float
 
-    @classmethod
-    def of_variance(cls, variance: float, sigma: float) -> Blur:
-        """From a variance and its standard uncertainty, px^2: half of what that makes either way."""
-        low, high = _signed_root(variance - sigma), _signed_root(variance + sigma)
-        return cls(_signed_root(variance), (high - low) / 2)
-
     @property
     def text(self) -> str:
-        """The change of sharpness in words, "less sharp by 0.41 +- 0.02 px"; empty where it is not known."""
+        """In words, "less sharp by 0.41 +- 0.02 px"; empty where it is not known."""
         if not math.isfinite(self.px):
             return ""
         return f"{'less sharp' if self.px >= 0 else 'sharper'} by {abs(self.px):.2f} +- {self.sigma:.2f} px"
@@ -42,10 +37,22 @@ def mean_blur(field: StrainField) -> Blur:
         return Blur(math.nan, math.nan)
     variance, sigma = field.blur.astype(np.float64)
     mean = fixed_sum(variance[field.ok]) / count
-    # The weight of the blur in a window is even like that of a displacement: the same correlation of neighbours.
+    # The blur weighs the pixels of a window evenly, as a displacement does: neighbours correlate alike.
     of_sum = variance_of_sum(np.where(field.ok, sigma, 0.0), "u", field.grid, field.window)
-    return Blur.of_variance(mean, math.sqrt(max(of_sum, 0.0)) / count)
+    px, uncertainty = widths(np.array([mean]), np.array([math.sqrt(max(of_sum, 0.0)) / count]))
+    return Blur(float(px[0]), float(uncertainty[0]))
 
 
-def _signed_root(variance: float) -> float:
-    return math.copysign(math.sqrt(abs(variance)), variance)
+def blur_maps(field: StrainField) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Blur of each ZOI and its standard uncertainty, (R, C) px, as of ``Blur``."""
+    nothing = np.full((2, *field.grid.shape), np.nan)
+    px, sigma = widths(*(nothing if field.blur is None else field.blur.astype(np.float64)))
+    return px.astype(np.float32), sigma.astype(np.float32)
+
+
+def widths(variance: Floats, sigma: Floats) -> tuple[Floats, Floats]:
+    """Signed roots of variances, px, and half of what their standard uncertainty either way makes of them."""
+    px, low, high = (
+        np.copysign(np.sqrt(np.abs(v)), v) for v in (variance, variance - sigma, variance + sigma)
+    )
+    return px, (high - low) / 2

@@ -182,8 +182,9 @@ def _solve(fit: Any, z: int, m: Any, step: Any, energy: Any, solved: Any) -> Any
     for i in range(len(m)):
         left -= solved[i] * m[i]
     share = min(left, fit.expected[z]) / fit.expected[z]
+    reference, current = f4(share * fit.noise[0, z]), f4(share * fit.noise[1, z])
     for i in range(len(m)):
-        step[i] = solved[i] + share * fit.bias[z, i]
+        step[i] = solved[i] + (reference * fit.bias_reference[z, i] + current * fit.bias_current[z, i])
     return left
 
 

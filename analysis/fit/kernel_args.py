@@ -79,8 +79,10 @@ class FitArgs(NamedTuple):
         Sums of w f_x^2 and w f_y^2.
     units : (modes,) float64
         Of the parameters, in px (``sensitivity.parameter_scale``).
-    bias : (A, P) float32
-        What the noise of the images adds to each fit on average, with opposite sign (``noise_bias``).
+    bias_reference, bias_current : (A, P) float32
+        See ``NoiseBias``.
+    noise : (2, A) float64, GL^2
+        Variance a pixel of the reference and of the image.
     expected : (A,) float64, GL^2
         The weighted sum of squares that this noise leaves.
     """
@@ -98,7 +100,9 @@ class FitArgs(NamedTuple):
     cross: NDArray[np.float32]
     squares: Floats
     units: Floats
-    bias: NDArray[np.float32]
+    bias_reference: NDArray[np.float32]
+    bias_current: NDArray[np.float32]
+    noise: Floats
     expected: Floats
 
 

@@ -58,12 +58,6 @@ class NoiseBias(NamedTuple):
             of_current[:, at] = -taken[:, modes].sum(axis=1) / size
         return cls(_solved(inverse, of_reference), _solved(inverse, of_current))
 
-    def at(self, reference: Floats, current: Floats) -> NDArray[np.float32]:
-        """For variances a pixel of the two images at each ZOI, (A,) GL^2."""
-        parts = ((reference, self.reference), (current, self.current))
-        first, second = (variance.astype(np.float32)[:, None] * each for variance, each in parts)
-        return np.asarray(first + second)
-
 
 def _solved(inverse: NDArray[np.float32], moments: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(np.einsum("apq,aq->ap", inverse, moments))
