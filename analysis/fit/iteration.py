@@ -181,10 +181,11 @@ def _solve(fit: Any, z: int, m: Any, step: Any, energy: Any, solved: Any) -> Any
     left = energy
     for i in range(len(m)):
         left -= solved[i] * m[i]
-    share = min(left, fit.expected[z]) / fit.expected[z]
-    reference, current = f4(share * fit.noise[0, z]), f4(share * fit.noise[1, z])
+    if left < 0:  # by rounding
+        left = 0.0
+    share = f4(min(left, fit.expected[z]) / fit.expected[z] * fit.noise[z])
     for i in range(len(m)):
-        step[i] = solved[i] + (reference * fit.bias_reference[z, i] + current * fit.bias_current[z, i])
+        step[i] = solved[i] + share * fit.bias[z, i]
     return left
 
 

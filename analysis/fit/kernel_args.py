@@ -79,12 +79,12 @@ class FitArgs(NamedTuple):
         Sums of w f_x^2 and w f_y^2.
     units : (modes,) float64
         Of the parameters, in px (``sensitivity.parameter_scale``).
-    bias_reference, bias_current : (A, P) float32
-        See ``NoiseBias``.
-    noise : (2, A) float64, GL^2
-        Variance a pixel of the reference and of the image.
+    bias : (A, P) float32
+        See ``noise_bias``.
+    noise : (A,) float64, GL^2
+        Variance a pixel of the reference.
     expected : (A,) float64, GL^2
-        The weighted sum of squares that this noise leaves.
+        The weighted sum of squares that the noise of both images leaves.
     """
 
     images: NDArray[np.float32]
@@ -100,8 +100,7 @@ class FitArgs(NamedTuple):
     cross: NDArray[np.float32]
     squares: Floats
     units: Floats
-    bias_reference: NDArray[np.float32]
-    bias_current: NDArray[np.float32]
+    bias: NDArray[np.float32]
     noise: Floats
     expected: Floats
 

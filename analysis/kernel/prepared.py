@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from analysis.field import Status, profile
 from analysis.fit.kernel_args import NormalArgs, ReferenceImages, WindowRows
-from analysis.fit.noise_bias import NoiseBias
+from analysis.fit.noise_bias import noise_bias
 from analysis.fit.validity import CLIPPED_SHARE, has_pattern
 from analysis.kernel.images import NoiseModel, continue_rim, padded, second_differences
 from analysis.kernel.settings import KernelSettings
@@ -56,7 +56,8 @@ class PreparedReference:
         OK, NO_PATTERN or CLIPPED.
     blur : (A,) float32, px^4 per GL^2
         Variance of the blur for noise of variance 1 GL^2.
-    bias : NoiseBias
+    bias : (A, P) float32
+        See ``noise_bias``.
     """
 
     shape: tuple[int, int]
@@ -75,7 +76,7 @@ class PreparedReference:
     level: NDArray[np.float64]
     status: NDArray[np.uint8]
     blur: NDArray[np.float32]
-    bias: NoiseBias
+    bias: NDArray[np.float32]
 
 
 def prepare_reference(
@@ -130,7 +131,7 @@ def prepare_reference(
         level=energy[:, 3].astype(np.float64) + mean,
         status=status,
         blur=out.blur,
-        bias=NoiseBias.of(out.inverse[:-1], out.taken, pattern.own_noise, float(line.sum() ** 2), size),
+        bias=noise_bias(out.inverse[:-1], out.taken, pattern.own_noise, float(line.sum() ** 2), size),
     )
 
 
