@@ -354,7 +354,7 @@ BEYOND = "**beyond**"
 
 
 def blurred(quick: bool) -> Lines:
-    """Pictures that became less sharp, 1 GL of noise: limits of the mean exx 30 um/m + 3 sigma, smeared 60 um/m
+    """Pictures that became less sharp, 1 GL of noise: limits of the mean exx 30 (smear: 60) um/m + 3 sigma
 
     Smear: motion along x during the exposure. Scatter of exx over the predicted at most 1.3 where it is blur.
     """

@@ -91,7 +91,7 @@ def sharpness_case(before: Array, after: Array, size: int, estimator: str, *, sm
     ok = field.ok
     scatter = float(np.sqrt(np.mean(field.exx[ok] ** 2) / np.mean(field.sigma_exx[ok] ** 2)))
     if smear:
-        good = max(abs(exx), abs(eyy)) <= SMEARED_LIMIT
+        good = abs(exx) <= SMEARED_LIMIT + 3 * s_xx and abs(eyy) <= SMEARED_LIMIT + 3 * s_yy
     else:
         good = abs(exx) <= BLURRED_LIMIT + 3 * s_xx and scatter <= SCATTER_LIMIT
     return Case((exx, eyy), (s_xx, s_yy), scatter, mean_blur(field).px, float(ok.mean()), good)
