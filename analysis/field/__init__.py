@@ -1,9 +1,10 @@
 """Measured fields on a grid, with their uncertainty.
 
 ``grid`` places the ZOIs and weighs their pixels, ``strain_field`` is the result with its ``status``,
-``uncertainty`` has sigmas of values and means, ``motion`` predicts the next field.
+``uncertainty`` has sigmas of values and means, ``motion`` predicts the next field, ``blocks`` are what is missing.
 """
 
+from analysis.field.blocks import area_share, in_blocks
 from analysis.field.grid import WINDOWS, Roi, Window, ZoiGrid, profile
 from analysis.field.motion import Motion
 from analysis.field.status import Status
@@ -30,7 +31,9 @@ __all__ = [
     "StrainTensor",
     "Window",
     "ZoiGrid",
+    "area_share",
     "combination",
+    "in_blocks",
     "products",
     "profile",
     "variance_of_sum",
