@@ -1,8 +1,8 @@
 """Affine motions between two pictures from matched features: starts where no search finds the pattern again.
 
-A large rotation or strain hides the pattern from a correlation, but not from SIFT keypoints (D. G. Lowe, Int. J. Comput.
-Vis. 60 (2004) 91-110, doi:10.1023/B:VISI.0000029664.99615.94). The motions that many matches share are found by RANSAC
-(M. A. Fischler, R. C. Bolles, Commun. ACM 24 (1981) 381-395, doi:10.1145/358669.358692).
+A large rotation or strain hides the pattern from a correlation, but not from SIFT keypoints (D. G. Lowe, Int. J.
+Comput. Vis. 60 (2004) 91-110, doi:10.1023/B:VISI.0000029664.99615.94). The motions that many matches share are found
+by RANSAC (M. A. Fischler, R. C. Bolles, Commun. ACM 24 (1981) 381-395, doi:10.1145/358669.358692).
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ def _matches(reference: Image, deformed: Image, region: Roi) -> tuple[Image, Ima
     """Places (N, 2) of features of the region, and of those in the deformed image that are like them and no others."""
     import cv2
 
-    sift = cv2.SIFT_create(nfeatures=MAX_FEATURES)
+    sift = cv2.SIFT.create(nfeatures=MAX_FEATURES)
     inside = np.zeros(reference.shape, np.uint8)
     inside[region.y : region.y + region.height, region.x : region.x + region.width] = 1
     points, described = sift.detectAndCompute(_bytes(reference), inside)
@@ -90,4 +90,4 @@ def _matches(reference: Image, deformed: Image, region: Roi) -> tuple[Image, Ima
 def _bytes(image: Image) -> NDArray[np.uint8]:
     """The grey levels between the 1st and the 99th percentile as 0 .. 255."""
     low, high = np.percentile(image[::4, ::4], (1, 99))
-    return np.clip((image - low) * (255 / max(high - low, 1e-9)), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip((image - low) * (255 / max(high - low, 1e-9)), 0, 255), np.uint8)

@@ -26,7 +26,9 @@ NEAR = 0.75
 """Sides of a tile from its centre within which a ZOI may repeat with it."""
 
 
-def side_peaks(image: Image, region: Roi, x: Floats, y: Floats) -> Iterator[tuple[tuple[int, int], NDArray[np.bool_]]]:
+def side_peaks(
+    image: Image, region: Roi, x: Floats, y: Floats
+) -> Iterator[tuple[tuple[int, int], NDArray[np.bool_]]]:
     """Displacements (x, y) at which tiles of a region look like themselves, px, each with the points near such tiles.
 
     Parameters
@@ -73,5 +75,7 @@ def _peaks(tile: Image) -> list[tuple[int, int]]:
     share /= max(float(share[0, reach]), 1e-12)
     found = (share >= maximum_filter(share, 3)) & (share > PEAK) & (np.hypot(down, across) >= SHORTEST_PX)
     found &= (down > 0) | (across > 0)
-    places = sorted(zip(across[found].tolist(), down[found].tolist(), strict=True), key=lambda p: math.hypot(*p))
+    places = sorted(
+        zip(across[found].tolist(), down[found].tolist(), strict=True), key=lambda p: math.hypot(*p)
+    )
     return places[:MAX_PEAKS]

@@ -45,8 +45,8 @@ class Neighbours(NamedTuple):
     ) -> tuple[Floats, NDArray[np.uint8]]:
         """For each ZOI of ``which`` (L,) the mean of what its neighbours predict there, (L, modes), and their number.
 
-        Of a neighbour's shape u, du_dx, du_dy, v, dv_dx, dv_dy count, moved by the step to the ZOI. ``lenders`` (A,) are
-        the neighbours that count; NaN where there is none.
+        Of a neighbour's shape u, du_dx, du_dy, v, dv_dx, dv_dy count, moved by the step to the ZOI. ``lenders`` (A,)
+        are the neighbours that count; NaN where there is none.
         """
         reference, step = solution.reference, solution.reference.grid.step
         good = np.append(lenders, False)  # the last for "none"

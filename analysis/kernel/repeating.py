@@ -31,7 +31,7 @@ DOUBT = 2.0
 
 
 def periods(reference: ReferencePicture) -> Floats:
-    """The smallest displacement at which each ZOI measures its own reference, px, (A,); infinite where there is none."""
+    """The smallest displacement at which each ZOI measures its own reference, px, (A,); infinite: none."""
     from analysis.follow.repetition import side_peaks
 
     prepared = reference.prepared
@@ -49,7 +49,7 @@ def periods(reference: ReferencePicture) -> Floats:
 
 
 def _self_match(solution: Solution, which: NDArray[np.intp], place: Floats) -> Floats:
-    """How far away ZOIs measure the picture that they come from, begun at ``place`` (x, y), px; infinite where they do not."""
+    """How far away ZOIs measure their own picture, begun at ``place`` (x, y), px; infinite where they do not."""
     at = [0, solution.reference.modes // 2]
     guess = np.zeros((len(which), solution.reference.modes))
     guess[:, at] = place
@@ -102,7 +102,7 @@ def _displacements(solution: Solution) -> list[int]:
 
 
 def _outward(solution: Solution, neighbours: Neighbours, settled: Bools, among: Bools) -> Bools:
-    """From settled ZOIs outward, round by round, those of ``among`` that fit where their settled neighbours expect them."""
+    """Settle ZOIs of ``among`` that fit where settled neighbours expect them, round by round; (A,), all settled."""
     settled, pending = settled.copy(), among & ~settled
     while True:
         which = np.flatnonzero(pending)
@@ -128,9 +128,8 @@ def _brought(solution: Solution, which: NDArray[np.intp], guess: Floats) -> Bool
 def _is_at(solution: Solution, which: NDArray[np.intp], guess: Floats) -> Bools:
     at = _displacements(solution)
     distance = np.hypot(*(solution.found.p[which][:, at] - guess[:, at]).T)
-    return (solution.status[which] == Status.OK) & (
-        distance <= ALLOWED_PERIODS * solution.reference.period[which]
-    )
+    near = distance <= ALLOWED_PERIODS * solution.reference.period[which]
+    return np.asarray(near & (solution.status[which] == Status.OK))
 
 
 def _as_expected(solution: Solution, neighbours: Neighbours, settled: Bools, expected: Floats) -> Bools:
@@ -154,7 +153,7 @@ def _as_expected(solution: Solution, neighbours: Neighbours, settled: Bools, exp
 
 
 def _is_expected(solution: Solution, expected: Floats) -> bool:
-    """Whether the ZOIs that do not repeat are where they are expected, most of them; True where there are hardly any."""
+    """Whether most ZOIs that do not repeat are where they are expected; True where there are hardly any."""
     repeats = np.isfinite(solution.reference.period)
     known = (solution.reference.prepared.status == Status.OK) & np.isfinite(expected[:, 0])
     anchors = known & ~repeats

@@ -1,6 +1,6 @@
 """Lost ZOIs of an image tried again: without extrapolation, from their neighbours, by a search, by features.
 
-Each way is tried for what the one before has left without a value, so where nothing is lost none costs anything. A worse
+Each way is tried for what the one before has left without a value: where nothing is lost, none costs anything. A worse
 outcome never replaces a better one.
 """
 
@@ -96,8 +96,8 @@ def _lost(solution: Solution) -> Bools:
 
 
 def _share_lost(solution: Solution) -> float:
-    able = np.count_nonzero(solution.reference.prepared.status == Status.OK)
-    return np.count_nonzero(_lost(solution)) / max(able, 1)
+    able = int(np.count_nonzero(solution.reference.prepared.status == Status.OK))
+    return int(np.count_nonzero(_lost(solution))) / max(able, 1)
 
 
 def _retry(solution: Solution, guess: Floats) -> None:
