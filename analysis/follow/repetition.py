@@ -18,11 +18,11 @@ TILE = 160
 REACH = 0.4
 """Longest displacement, in sides of a tile: beyond it too little of the tile overlaps."""
 SHORTEST_PX = 3.0
-PEAK = 0.4
+PEAK = 0.5
 """Least autocorrelation, of that without displacement."""
 MAX_PEAKS = 4
 """The nearest ones of a tile; longer ones are sums of them."""
-NEAR = 0.75
+NEAR = 0.6
 """Sides of a tile from its centre within which a ZOI may repeat with it."""
 
 

@@ -26,6 +26,8 @@ STRAYS = 0.02
 """Share of ZOIs that may lie farther off for the others to be trusted."""
 MIN_ANCHORS = 0.02
 """ZOIs that do not repeat, of those that do, from which on all wait for them."""
+ALIKE = 0.4
+"""Least correlation, without noise, of a ZOI with a place where it is fitted."""
 DOUBT = 2.0
 """A ZOI repeats where it would be valid elsewhere if the fit left so many times less: noise differs between images."""
 
@@ -34,21 +36,32 @@ def periods(reference: ReferencePicture) -> Floats:
     """The smallest displacement at which each ZOI measures its own reference, px, (A,); infinite: none."""
     from analysis.follow.repetition import side_peaks
 
-    prepared = reference.prepared
+    prepared, solution = reference.prepared, None
     out = np.full(len(reference.index), np.inf)
     y, x = (prepared.origins + (reference.grid.size - 1) / 2).T
-    solution = None
     for peak, near in side_peaks(prepared.pattern.level, reference.region, x, y):
-        which = np.flatnonzero(near & (prepared.status == Status.OK))
-        if solution is None:
-            nowhere = np.full((len(out), reference.modes), np.nan)
-            solution = Solution(reference, reference.image, reference.noise_model, nowhere)
-        for place in (np.array(peak, np.float64), -np.array(peak, np.float64)):
-            out[which] = np.minimum(out[which], _self_match(solution, which, place))
+        for place in (np.array(peak), -np.array(peak)):
+            which = _alike(reference, np.flatnonzero(near & (prepared.status == Status.OK)), place)
+            if len(which) and solution is None:
+                nowhere = np.full((len(out), reference.modes), np.nan)
+                solution = Solution(reference, reference.image, reference.noise_model, nowhere)
+            if solution is not None:
+                out[which] = np.minimum(out[which], _self_match(solution, which, place))
     return out
 
 
-def _self_match(solution: Solution, which: NDArray[np.intp], place: Floats) -> Floats:
+def _alike(reference: ReferencePicture, which: NDArray[np.intp], place: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Those of some ZOIs that look like ``place`` (x, y) px away."""
+    from analysis.follow.hill_climb import climb
+
+    level, score = np.ascontiguousarray(reference.prepared.pattern.level), np.empty(len(which))
+    places = np.tile(place.astype(np.int64), (len(which), 1, 1))
+    found = np.empty((len(which), 2), np.int64)
+    climb(level, level, reference.prepared.origins[which], reference.grid.size, places, 0, found, score)
+    return which[score > ALIKE]
+
+
+def _self_match(solution: Solution, which: NDArray[np.intp], place: NDArray[np.intp]) -> Floats:
     """How far away ZOIs measure their own picture, begun at ``place`` (x, y), px; infinite where they do not."""
     at = [0, solution.reference.modes // 2]
     guess = np.zeros((len(which), solution.reference.modes))
@@ -166,14 +179,15 @@ def _is_expected(solution: Solution, expected: Floats) -> bool:
 
 def _fit_near(solution: Solution, which: NDArray[np.intp], expected: Floats) -> None:
     """Fit some ZOIs at the best whole pixel uphill from where they are expected."""
-    from analysis.follow.hill_climb import climb
+    from analysis.follow.hill_climb import MAX_MOVES, climb
 
     reference, at = solution.reference, _displacements(solution)
     offset = np.float32(reference.prepared.pattern.mean)
     guess, found = expected[which], np.zeros((len(which), 2), np.int64)
     climb(
         reference.image - offset, solution.image.astype(np.float32) - offset, reference.prepared.origins[which],
-        reference.grid.size, np.rint(guess[:, None, at]).astype(np.int64), found, np.zeros(len(which)),
+        reference.grid.size, np.rint(guess[:, None, at]).astype(np.int64), MAX_MOVES,
+        found, np.zeros(len(which)),
     )  # fmt: skip
     guess[:, at] = found
     _brought(solution, which, guess)
