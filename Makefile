@@ -1,17 +1,17 @@
-# make demo | test | lint | docs | bench | accuracy | v4l2-test | bare-test ; each sets up its own .venv first.
+# make demo | test | lint | docs | bench | accuracy | v4l2-test | genicam-test | bare-test ; each sets up its own .venv first.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test lint format docs bench accuracy v4l2-test bare-test clean
+.PHONY: demo test lint format docs bench accuracy v4l2-test genicam-test bare-test clean
 .DEFAULT_GOAL := demo
 
 $(VENV)/base: pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "phasedic needs Python 3.11 or newer; make PYTHON=python3.12 ... picks another")'
 	@echo "Setting up $(VENV) (once; about 300 MB are fetched) ..."
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@$(BIN)/python -m pip install --disable-pip-version-check --editable .
 	@touch $@
 
 $(VENV)/test: $(VENV)/base
@@ -52,6 +52,9 @@ accuracy: $(VENV)/test
 
 v4l2-test: $(VENV)/test
 	@$(BIN)/python tests/v4l2/vm.py --tests
+
+genicam-test: $(VENV)/test
+	@$(BIN)/python -m tests.genicam.namespace --tests
 
 # In a bare Debian made on the spot: make bare-test SUITE=trixie ONLY=demo
 SUITE ?= forky

@@ -19,8 +19,8 @@ def printable(text: object) -> str:
     return _HARMFUL.sub(_escaped, str(text))
 
 
-# A device or file by its address at the beginning of a sentence, with its settings.
-_ADDRESS = re.compile(r"^([^\s?]+)\?[A-Za-z_]\w*=\S*(?=: |$)")
+# A device or file by its address at the beginning of a sentence, with its settings; a path goes on after them.
+_ADDRESS = re.compile(r"^([^\s?]+)\?[A-Za-z_]\w*=[^\s/]*(?=: |$)")
 
 
 def brief(text: object) -> str:
@@ -40,3 +40,8 @@ def _escaped(found: re.Match[str]) -> str:
     if 0xDC80 <= code <= 0xDCFF:  # a byte that Python could not decode
         code -= 0xDC00
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+
+
+def share_text(share: float) -> str:
+    """What marks a value whose area lost a block: "of 83 % of the area"; empty where it stands for all of it."""
+    return "" if share == 1 else f"of {100 * share:.0f} % of the area"

@@ -23,6 +23,13 @@ def pytest_collection_finish(session: pytest.Session) -> None:
         compile_ahead(PICTURE_KINDS, phase=True)
 
 
+@pytest.fixture(autouse=True)
+def no_cameras_of_the_network(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tests ask no network for cameras, but for their own (``make genicam-test``)."""
+    if not os.environ.get("PHASEDIC_IN_NAMESPACE"):
+        monkeypatch.setattr("acquire.genicam.listing.list_cameras", list)
+
+
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
     """The image sets named by PHASEDIC_DATA; the test is skipped without them."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.field import PAIR_INDEX, StrainField, Window, profile
+from analysis.field import PAIR_INDEX, StrainField, variance_of_sum
 
 Floats = NDArray[np.float64]
 _U, _V = 0, 3  # among the affine parameters
@@ -56,8 +56,8 @@ def extension(field: StrainField, ends: Ends) -> Extension:
     moved = np.array([_sum(weights * field.u[used]), _sum(weights * field.v[used])])
     now = float(np.hypot(*(before + moved)))
     strain = float(moved @ (2 * before + moved)) / (now + length) / length
-    spread = weights * _sigma_along(field, (before + moved) / now)[used]
-    variance = _sum(np.outer(spread, spread) * _correlation(field, used))
+    spread = np.where(used, share * _sigma_along(field, (before + moved) / now), 0.0)
+    variance = variance_of_sum(spread, "u", field.grid, field.window)
     return Extension(strain, math.sqrt(max(variance, 0.0)) / length, length)
 
 
@@ -73,24 +73,3 @@ def _sigma_along(field: StrainField, direction: Floats) -> Floats:
         field.covariance[PAIR_INDEX[pair]].astype(np.float64) for pair in ((_U, _U), (_U, _V), (_V, _V))
     )
     return np.asarray(np.sqrt(np.maximum(nx * nx * uu + 2 * nx * ny * uv + ny * ny * vv, 0)))
-
-
-def _correlation(field: StrainField, used: NDArray[np.bool_]) -> Floats:
-    """Correlation of the displacements of the ZOIs ``used``, (N, N).
-
-    White noise under separable windows: the overlap of two windows along x times that along y.
-    """
-    rows, columns = np.nonzero(used)
-    overlap = _overlap(field.window, field.grid.size)
-
-    def along(number: NDArray[np.intp]) -> Floats:
-        lag = np.abs(np.subtract.outer(number, number)) * field.grid.step
-        return np.asarray(overlap[np.minimum(lag, field.grid.size)])
-
-    return np.asarray(along(rows) * along(columns))
-
-
-def _overlap(window: Window, size: int) -> Floats:
-    """Overlap of two windows k px apart over that of one with itself, k = 0 .. size."""
-    line = profile(window, size)
-    return np.append(np.correlate(line, line, mode="full")[size - 1 :] / (line @ line), 0.0)

@@ -1,14 +1,19 @@
-"""The kinds of virtual gauges: a point, an area, an extensometer along a line or across a strip.
+"""The kinds of virtual gauges: a point, an area, a circle, a strip, an extensometer along a line or across a box.
 
 A new kind is a class here and its name in ``GAUGE_KINDS``; configuration, report, view and page take it from there.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any, Literal
 
+import numpy as np
+
+from analysis.evaluate.affine import Places
 from analysis.evaluate.gauges import (
     Box,
     Gauge,
@@ -23,13 +28,15 @@ from analysis.evaluate.gauges import (
     circle,
     closed,
     corners_of,
+    ends_of,
     near_px,
     read_area,
     read_ends,
+    read_strips,
     zois_inside,
     zois_near,
 )
-from analysis.field import StrainField, ZoiGrid
+from analysis.field import Roi, StrainField, ZoiGrid
 
 _VALUE = Parameter(
     "choice",
@@ -37,18 +44,24 @@ _VALUE = Parameter(
     choices=("exx", "eyy", "exy", "gamma_xy"),
     by_axis={"x": "exx", "y": "eyy"},
 )
-_STATISTIC = Parameter("choice", "of an area", choices=("mean", "largest", "smallest"))
+_STATISTIC = Parameter(
+    "choice", "of an area: affine fit, or of its ZOIs", choices=("affine", "mean", "largest", "smallest")
+)
 _AT = Parameter("point", "x, y of a zoi")
-_BOX = Parameter("box", "x, y, width, height of an area or transverse gauge")
+_BOX = Parameter("box", "x, y, width, height of an area, extension or transverse gauge")
 _CORNERS = Parameter("corners", "x, y of the corners of an area")
 _START, _END = Parameter("point", "x, y of one end of a line"), Parameter("point", "x, y of the other")
 _RADIUS = Parameter("length", "ZOIs this far around an end of a line (half a ZOI)", 0.1, 1e5)
+_CENTRE = Parameter("point", "x, y of the centre of a circle")
+_WIDTH = Parameter("length", "width of a strip (one ZOI)", 0.1, 1e5)
 _ALONG = Parameter(
     "choice",
-    "direction of a transverse gauge (across the load)",
+    "direction of an extension (along the load) or transverse gauge (across it)",
     choices=("x", "y"),
     by_axis={"x": "y", "y": "x"},
 )
+_ALONG_LOAD = replace(_ALONG, by_axis={"x": "x", "y": "y"})
+_STRIP = 1 / 6
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +104,7 @@ class ZoiGauge(Gauge):
 
 @dataclass(frozen=True, slots=True)
 class AreaGauge(Gauge):
-    """Mean, largest or smallest value of the ZOIs whose centres lie in a box or polygon.
+    """The strain of the ZOIs whose centres lie in a box or polygon, by their affine field; or of single ZOIs.
 
     Of the largest and the smallest, sigma is that of the ZOI which has it: right for a peak that stands
     out of the noise. In a flat field noise alone lifts the largest of n values above the mean, by 2 to 3
@@ -104,14 +117,14 @@ class AreaGauge(Gauge):
         At least three, in place of the box.
     value : str
         One of ``analysis.field.VALUES``.
-    statistic : "mean", "largest" or "smallest"
-        By sign, not by magnitude.
+    statistic : "affine", "mean", "largest" or "smallest"
+        By ``AreaStrain``; else of the values of the ZOIs, by sign, not by magnitude.
     """
 
     box: Box | None = field(default=None, metadata=_BOX.metadata)
     corners: tuple[Point, ...] | None = field(default=None, metadata=_CORNERS.metadata)
     value: str = field(default="eyy", metadata=_VALUE.metadata)
-    statistic: Statistic = field(default="mean", metadata=_STATISTIC.metadata)
+    statistic: Statistic = field(default="affine", metadata=_STATISTIC.metadata)
     kind, label, default_name, gesture = "area", "Area", "area", "box"
     hint = "Drag a rectangle: its mean strain."
 
@@ -145,6 +158,102 @@ class AreaGauge(Gauge):
 
     def _polygon(self) -> Line:
         return self.corners or corners_of(self.box or (0, 0, 0, 0))
+
+
+@dataclass(frozen=True, slots=True)
+class CircleGauge(Gauge):
+    """Mean value of the ZOIs whose centres lie in a circle.
+
+    Attributes
+    ----------
+    centre : (x, y), px
+    radius_px : float, px
+    value : str
+        One of ``analysis.field.VALUES``.
+    """
+
+    centre: Point = field(metadata=_CENTRE.metadata)
+    radius_px: float = field(metadata=_RADIUS.metadata)
+    value: str = field(default="eyy", metadata=_VALUE.metadata)
+    kind, label, default_name, gesture = "circle", "Circle", "circle", "line"
+    hint = "Drag from the centre of a circle to its rim: its mean strain."
+
+    def __post_init__(self) -> None:
+        check_value(self.name, self.value)
+        if not self.radius_px > 0:
+            raise ValueError(f"gauge {self.name}: the radius must be positive, got {self.radius_px}")
+
+    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        return (zois_near(grid, self.centre, self.radius_px),)
+
+    def measure(self, field: StrainField) -> GaugeValue:
+        return read_area(self.zois(field.grid)[0], field, self.value)
+
+    def outline(self, zoi: float) -> tuple[Line, ...]:
+        return (circle(self.centre, self.radius_px),)
+
+    def handles(self) -> tuple[Point, ...]:
+        return self.centre, (self.centre[0] + self.radius_px, self.centre[1])
+
+    @classmethod
+    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
+        radius = max(round(math.dist(handles[0], handles[-1]), 1), 0.1)
+        return {"centre": near_px(handles[0]), "radius_px": radius}
+
+
+@dataclass(frozen=True, slots=True)
+class StripGauge(Gauge):
+    """Mean value of the ZOIs whose centres lie in a strip along a line, at any angle.
+
+    Attributes
+    ----------
+    start, end : (x, y), px
+    width_px : float or None, px
+        Of the strip; None: the side of a ZOI.
+    value : str
+        One of ``analysis.field.VALUES``.
+    """
+
+    start: Point = field(metadata=_START.metadata)
+    end: Point = field(metadata=_END.metadata)
+    width_px: float | None = field(default=None, metadata=_WIDTH.metadata)
+    value: str = field(default="eyy", metadata=_VALUE.metadata)
+    kind, label, default_name, gesture = "strip", "Strip", "strip", "line"
+    hint = "Drag from one end of a strip to the other: its mean strain."
+
+    def __post_init__(self) -> None:
+        check_value(self.name, self.value)
+        if self.start == self.end:
+            raise ValueError(f"gauge {self.name}: the two ends of a strip are one point, {self.start}")
+        if self.width_px is not None and not self.width_px > 0:
+            raise ValueError(f"gauge {self.name}: the width must be positive, got {self.width_px}")
+
+    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        return (zois_inside(grid, self._corners(grid.size)),)
+
+    def measure(self, field: StrainField) -> GaugeValue:
+        return read_area(self.zois(field.grid)[0], field, self.value)
+
+    def outline(self, zoi: float) -> tuple[Line, ...]:
+        return (closed(self._corners(zoi)),)
+
+    def handles(self) -> tuple[Point, ...]:
+        return self.start, self.end
+
+    @classmethod
+    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
+        return {"start": near_px(handles[0]), "end": near_px(handles[-1])}
+
+    def _corners(self, zoi: float) -> Line:
+        (x0, y0), (x1, y1) = self.start, self.end
+        half = (self.width_px or zoi) / 2 / math.dist(self.start, self.end)
+        across, down = (y0 - y1) * half, (x1 - x0) * half
+        return (
+            (x0 + across, y0 + down),
+            (x1 + across, y1 + down),
+            (x1 - across, y1 - down),
+            (x0 - across, y0 - down),
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,14 +326,7 @@ class TransverseGauge(Gauge):
             raise ValueError(f"gauge {self.name}: along is x or y, got {self.along!r}")
 
     def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
-        x, y, width, height = self.box
-        if self.along == "x":
-            third = width / 3
-            boxes = (x, y, third, height), (x + 2 * third, y, third, height)
-        else:
-            third = height / 3
-            boxes = (x, y, width, third), (x, y + 2 * third, width, third)
-        return tuple(zois_inside(grid, corners_of(box)) for box in boxes)
+        return tuple(zois_inside(grid, corners_of(box)) for box in ends_of(self.box, self.along, 1 / 3))
 
     def measure(self, field: StrainField) -> GaugeValue:
         return read_ends(self.zois(field.grid), field)
@@ -240,7 +342,49 @@ class TransverseGauge(Gauge):
         return {"box": box_between(handles[0], handles[-1])}
 
 
+@dataclass(frozen=True, slots=True)
+class ExtensionGauge(TransverseGauge):
+    """An extensometer along a strip: (L - L0)/L0 between the first and the last sixth of a box.
+
+    Each end is as wide as the box, as the definition of extension has it, and right in any field: a neck or a band
+    between the ends counts as it does for a clip-on extensometer. In a uniform field its noise is a quarter above
+    that of all ZOIs.
+    """
+
+    along: Literal["x", "y"] = field(default="y", metadata=_ALONG_LOAD.metadata)
+    kind, label, default_name, gesture = "extension", "Extension", "extension", "box"
+    hint = "Drag a rectangle: extension between its two ends."
+
+    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        side = self.box[2 if self.along == "x" else 3]
+        ends = ends_of(self.box, self.along, max(_STRIP, grid.step / side))
+        return tuple(zois_inside(grid, corners_of(box)) for box in ends)
+
+    def measure(self, field: StrainField) -> GaugeValue:
+        return read_strips(self.zois(field.grid), field, self.along)
+
+
+def extension_of(field: StrainField, along: Literal["x", "y"]) -> GaugeValue:
+    """(L - L0)/L0 between strips at the two ends of all active ZOIs of a field; ``ExtensionGauge``."""
+    grid = field.grid
+    strips = _strips(Places.of(grid, field.window), grid.roi, grid.active.tobytes(), along)
+    return read_strips(strips, field, along)
+
+
+@lru_cache(maxsize=8)
+def _strips(places: Places, roi: Roi, active: bytes, along: Literal["x", "y"]) -> tuple[Mask, ...]:
+    inside = np.frombuffer(active, np.bool_).reshape(places.shape)
+    grid = ZoiGrid(roi, places.size, places.step, inside)
+    rows, columns = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
+    if not rows.size:
+        return inside, inside
+    x, y = grid.x[columns[0]] - grid.step / 2, grid.y[rows[0]] - grid.step / 2
+    width, height = (float(np.ptp(found) + 1) * grid.step for found in (columns, rows))
+    return ExtensionGauge("", (float(x), float(y), width, height), along).zois(grid)
+
+
 GAUGE_KINDS: Mapping[str, type[Gauge]] = {
-    kind.kind: kind for kind in (LineGauge, TransverseGauge, AreaGauge, ZoiGauge)
+    kind.kind: kind
+    for kind in (LineGauge, TransverseGauge, AreaGauge, ZoiGauge, CircleGauge, StripGauge, ExtensionGauge)
 }
 """By their names in a configuration, in the order of the buttons on a page."""

@@ -11,21 +11,22 @@ import math
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.evaluate.area import GRADIENTS, AreaStrain
 from analysis.evaluate.extension import Ends, extension
-from analysis.field import VALUES, Status, StrainField, ZoiGrid
+from analysis.field import VALUES, Status, StrainField, ZoiGrid, area_share
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 Line = tuple[Point, ...]
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float64]
-Statistic = Literal["mean", "largest", "smallest"]
+Statistic = Literal["affine", "mean", "largest", "smallest"]
 
 MIN_SHARE = 0.5
 """A gauge has a value as long as this share of the ZOIs of an area, or of each of its ends, has one."""
@@ -72,11 +73,14 @@ class GaugeValue:
         Strain, or the unit of the gauge's value; NaN where there is none.
     reason : str
         Why there is none; empty where there is one.
+    share : float
+        Of its area that the value stands for, at either end (``analysis.field.area_share``).
     """
 
     value: float
     sigma: float
     reason: str = ""
+    share: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +154,11 @@ class Gauge(ABC):
                 raise ValueError(f"a gauge of kind {cls.kind!r} needs {key!r}")
         return cls(name, **(by_axis | given))
 
+    def read(self, field: StrainField) -> GaugeValue:
+        """Its value with the share of its area that the value stands for."""
+        share = min(area_share(field, mask) for mask in self.zois(field.grid))
+        return replace(self.measure(field), share=share)
+
     def zois(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         """The active ZOIs that it takes, (R, C) bool: one mask, or one for each of its two ends."""
         return tuple(mask & grid.active for mask in self.select(grid))
@@ -158,11 +167,14 @@ class Gauge(ABC):
 # -- what kinds are made of ------------------------------------------------------------------------
 
 
-def read_area(chosen: Mask, field: StrainField, value: str, statistic: Statistic = "mean") -> GaugeValue:
-    """Mean, largest or smallest value of some ZOIs."""
+def read_area(chosen: Mask, field: StrainField, value: str, statistic: Statistic = "affine") -> GaugeValue:
+    """A value of the affine field of some ZOIs, or their mean, largest or smallest value; of u and v the mean."""
     if missing := _missing(chosen, field):
         return GaugeValue(math.nan, math.nan, missing)
-    if statistic == "mean":
+    found = AreaStrain.of(field, chosen) if statistic == "affine" and value in GRADIENTS else None
+    if found is not None:
+        return GaugeValue(found.value(value), found.sigma(value))
+    if statistic in ("affine", "mean"):
         return GaugeValue(*field.mean(value, chosen))
     sign = 1 if statistic == "largest" else -1
     values = np.where(chosen & field.ok, sign * field.value(value), -np.inf)
@@ -184,6 +196,19 @@ def read_ends(chosen: Sequence[Mask], field: StrainField) -> GaugeValue:
     return GaugeValue(found.strain, found.sigma)
 
 
+def read_strips(chosen: Sequence[Mask], field: StrainField, along: str) -> GaugeValue:
+    """``read_ends`` of two strips, each where the other has values too, so that their line is not tilted."""
+    for number, end in enumerate(chosen, 1):
+        if missing := _missing(end, field):
+            return GaugeValue(math.nan, math.nan, f"end {number}: {missing}")
+    side = 1 if along == "x" else 0
+    first, second = ((end & field.ok).any(axis=side, keepdims=True) for end in chosen)
+    both = first & second & field.ok
+    if not both.any():
+        return GaugeValue(math.nan, math.nan, "the two ends do not face each other; move or widen the gauge")
+    return read_ends([end & both for end in chosen], field)
+
+
 def _missing(chosen: Mask, field: StrainField) -> str:
     """Why there is no value; empty where enough of the ZOIs have one."""
     total = int(chosen.sum())
@@ -193,7 +218,8 @@ def _missing(chosen: Mask, field: StrainField) -> str:
             f"no ZOI is there; their centres reach from {grid.x[0]:g}, {grid.y[0]:g} to {grid.x[-1]:g},"
             f" {grid.y[-1]:g} px"
         )
-    lost = Counter(Status(int(s)) for s in field.status[chosen] if s != Status.OK)
+    status = field.status[chosen]
+    lost = Counter(Status(s) for s in status[status != Status.OK].tolist())
     if total - lost.total() >= max(MIN_SHARE * total, 1):
         return ""
     words = ", ".join(f"{n} {status.name}" for status, n in lost.most_common())
@@ -238,6 +264,16 @@ def corners_of(box: Box) -> tuple[Point, ...]:
     """Of x, y, width, height."""
     x, y, width, height = box
     return (x, y), (x + width, y), (x + width, y + height), (x, y + height)
+
+
+def ends_of(box: Box, along: str, share: float) -> tuple[Box, Box]:
+    """The first and the last ``share`` of a box along x or y."""
+    x, y, width, height = box
+    if along == "x":
+        end = share * width
+        return (x, y, end, height), (x + width - end, y, end, height)
+    end = share * height
+    return (x, y, width, end), (x, y + height - end, width, end)
 
 
 def closed(corners: Line) -> Line:

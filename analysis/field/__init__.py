@@ -14,8 +14,11 @@ from analysis.field.uncertainty import (
     VALUES,
     Measure,
     StrainTensor,
+    WeightedSum,
     combination,
+    fixed_sums,
     products,
+    strain_tensor,
     variance_of_sum,
 )
 
@@ -29,12 +32,15 @@ __all__ = [
     "Status",
     "StrainField",
     "StrainTensor",
+    "WeightedSum",
     "Window",
     "ZoiGrid",
     "area_share",
     "combination",
+    "fixed_sums",
     "in_blocks",
     "products",
     "profile",
+    "strain_tensor",
     "variance_of_sum",
 ]

@@ -38,7 +38,7 @@ class PhaseKernel:
     Parameters
     ----------
     reference : (H, W) uint8, uint16 or float32, GL
-        A frame or the mean of a burst.
+        A frame or the mean of a burst; the kernel keeps a copy.
     grid : ZoiGrid
     settings : KernelSettings, optional
     noise : float (GL, std of the reference as given) or NoiseModel, optional
@@ -76,6 +76,11 @@ class PhaseKernel:
         made = ReferencePicture.first(image, grid, settings or KernelSettings(), noise, clipped)
         self.reference = replace(made, period=periods(made))
         check_machine(self.settings, grid.size)
+
+    @property
+    def period(self) -> Floats:
+        """Smallest displacement at which a ZOI looks like itself, (R, C), px; infinite: none, NaN: not active."""
+        return np.asarray(self.reference.spread(self.reference.period[:, None])[0])
 
     @property
     def grid(self) -> ZoiGrid:

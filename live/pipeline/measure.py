@@ -19,7 +19,7 @@ from acquire.events import Event, EventKind, EventSink, Level, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
 from live.pipeline.measurement import Measurement
-from live.pipeline.reference import Correction, averaged, unchanged
+from live.pipeline.reference import Correction, averaged, repetition_text, unchanged
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
@@ -222,11 +222,13 @@ def measure(
         One for each burst, in order.
     """
     tracker, guard = Tracker(kernel, noise_GL, renew_at, on_event), StrainGuard(strain, on_event)
-    number = 0
+    number, repeats = 0, repetition_text(kernel.period)
     for item in bursts:
         if isinstance(item, NewReference):
             tracker.renew_on_demand(correct(item.burst))
             continue
+        if number == 0 and repeats:
+            on_event(Event(item.t, EventKind.MEASUREMENT, "pattern", repeats, "warning"))
         began = timer()
         field = replace(tracker.measure(correct(item)), measure=strain)
         took = timer() - began

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from acquire.load_cell import LoadLog
-from acquire.printable import brief
+from acquire.printable import brief, share_text
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
 from live.pipeline.run_state import RunState
@@ -61,9 +61,11 @@ def summary_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     last, strains = history.time_steps[int(valid[-1])], history.column("largest")[valid]
     largest = strains[np.argmax(np.abs(strains))]
     refused = f" ({last.refused})" if last.refused else ""
+    part = share_text(last.least_share)
     lines = [
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} um/m;"
+        f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} um/m"
+        f"{f' {part}' if part else ''};"
         f" largest of any ZOI {largest * 1e6:+.0f} um/m",
         noise_line(history),
     ]
@@ -107,6 +109,8 @@ class StatusCard:
             f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
             f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, mean **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
         ]
+        if part := share_text(i.least_share):
+            lines.append(f"strain **{part}**")
         figures = evaluate(history, self._loads, self._specimen)
         lines += [
             line.replace("  ", ", ").replace("+-", "±") for line in elastic_lines(figures, self._specimen)

@@ -122,18 +122,22 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
     return [
         _head(run, content.curve),
         section("Specimen and rig", facts(_rig(run, pictures))),
-        section("Curves", plots(content.figures), _about_curves(content.curve)),
+        section("Curves", plots(content.figures), _about_parts(run), _about_curves(content.curve)),
         section("Figures of the test", *figure_table(run, content.curve)),
         section("Virtual gauges", gauges(run)),
         section("Lag and latency", times(run)),
         section("Maps", *(maps(run, name, chosen, pictures, side) for name in fields)),
         section("Noise floor", *_noise_section(content)),
         section("Status of the ZOIs", statuses(run, max(chosen), pictures, min(side, 480))),
-        section("Frame counts and events", frame_counts(run), events(run)),
+        section("Frame counts and events", frame_counts(run), events(run), *_unreadable(run)),
         section("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
         section("Definitions", definitions(run)),
         section("Versions and files", version_table(run), content.files),
     ]
+
+
+def _unreadable(run: RunFolder) -> list[Html]:
+    return [paragraph(note, "warning") for note in run.notes]
 
 
 def _head(run: RunFolder, curve: EvaluatedCurve) -> Html:
@@ -200,6 +204,11 @@ def plots(figures: tuple[Plot, ...]) -> Html:
         for figure in figures
     ]
     return element("div", joined(found), class_="plots")
+
+
+def _about_parts(run: RunFolder) -> Html:
+    words = curves.parts(run)
+    return paragraph(words, "warning") if words else Html("")
 
 
 def _about_curves(curve: EvaluatedCurve) -> Html:

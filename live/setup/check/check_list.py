@@ -89,6 +89,8 @@ class CheckFigures:
     floors : tuple of ZoiFloor
     zoi, order, burst : int
         Settings of the test.
+    repetition : str
+        What repeats in the pattern, and what that allows; empty where nothing does.
     noise_stated : bool
         Whether the noise was given; else too few frames take it from the spectrum of the picture.
     removed : float or None, GL
@@ -111,6 +113,7 @@ class CheckFigures:
     zoi: int
     order: int
     burst: int
+    repetition: str = ""
     noise_stated: bool = False
     removed: float | None = None
     gauges: tuple[GaugeNoise, ...] = ()
@@ -189,14 +192,14 @@ def figures_of(
     load: LoadReport | None = None,
 ) -> CheckFigures:
     """All figures: those of the kernel, and those that follow from the frames directly."""
-    check_region, m, bits = sample.check_region, sample.check_region.config.measure, sample.stack.camera.bits
+    check_region, m, camera = sample.check_region, sample.check_region.config.measure, sample.stack.camera
     same = sample.picture.mean is sample.raw
     return CheckFigures(
         region=check_region.region,
         stack=sample.stack,
         noise=sample.noise,
-        exposure=exposure(sample.pixels, bits),
-        depth=depth(sample.pixels, bits),
+        exposure=exposure(sample.pixels, camera.saturation),
+        depth=depth(sample.pixels, camera.bits),
         radius=_radius(sample),
         zois=_zois(sample, measured.predicted.sigma),
         still=replace(measured.still, light=light(sample)),
@@ -204,6 +207,7 @@ def figures_of(
         zoi=m.zoi,
         order=m.order,
         burst=sample.burst,
+        repetition=measured.predicted.repetition,
         noise_stated=m.noise_GL is not None,
         removed=None if same else float((sample.picture.mean - sample.raw)[check_region.inside].std()),
         gauges=measured.predicted.gauges,
@@ -220,7 +224,12 @@ def automatic_controls(controls: Mapping[str, Any]) -> tuple[str, ...]:
 def _is_automatic(name: str, value: object) -> bool:
     if isinstance(value, str):
         words = value.lower()
-        return "auto" in name and "manual" not in words and "shutter" not in words and words != "disabled"
+        return (
+            "auto" in name
+            and "manual" not in words
+            and "shutter" not in words
+            and words not in ("disabled", "off")
+        )
     named = "auto" in name or "continuous" in name or "dynamic_framerate" in name
     # 1 is "manual" for the exposure of V4L2, but that menu has texts; here a number is a switch.
     return named and isinstance(value, int | float) and bool(value)

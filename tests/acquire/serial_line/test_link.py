@@ -8,8 +8,9 @@ import time
 import pytest
 
 from acquire.errors import DeviceError
+from acquire.opening_thread import Opening
 from acquire.serial_line import link as link_module
-from acquire.serial_line.link import Link, LinkContext, Opening, close_port
+from acquire.serial_line.link import Link, LinkContext, close_port
 from acquire.serial_line.ports import LineSettings
 from tests.acquire.serial_line.fake_port import FakePort, FakeTime
 
@@ -85,11 +86,11 @@ def test_closing_waits_for_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_port_that_opens_when_nobody_waits_any_more_is_closed() -> None:
     go, port = threading.Event(), FakePort(FakeTime(), [])
 
-    def open_late(line: LineSettings) -> FakePort:
+    def open_late() -> FakePort:
         go.wait(5)
         return port
 
-    opening = Opening(open_late, lambda: LINE)
+    opening = Opening(open_late, close_port)
     assert not opening.done(0.01)
     opening.abandon()
     go.set()

@@ -96,6 +96,31 @@ def test_a_camera_that_dies_is_told_and_kept() -> None:
     assert event_log.events("error")[0].text == "list: is gone; plug it in again"
 
 
+@pytest.mark.parametrize(("live", "missing"), [(True, 69), (False, 0)])
+def test_a_gap_that_is_open_at_the_end_is_counted(
+    monkeypatch: pytest.MonkeyPatch, live: bool, missing: int
+) -> None:
+    """The last frame came 7 s before the end, of a camera with 10 frames a second."""
+    now = [100.0]
+    monkeypatch.setattr("live.run.grabber.time.monotonic", lambda: now[0])
+    camera = ListCamera((frame(i) for i in range(4)), live=live)
+    camera.info = replace(camera.info, fps=10.0)
+    run_state = RunState.new(0.5)
+
+    def take(one: Frame) -> None:
+        now[0] += 7.0 if one.index == 3 else 0.1
+
+    grabber = Grabber(camera, GrabPlan(1, 1), run_state, take)
+    grabber.start()
+    while not grabber.bursts.finished:
+        grabber.bursts.get(1.0)
+    grabber.join()
+    assert run_state.frame_counts.lost == missing
+    assert run_state.frame_counts.loss is live
+    texts = [event.text for event in run_state.event_log.events("warning")]
+    assert texts == (["69 frames were lost at the end: none came for the last 7.0 s"] if live else [])
+
+
 def test_a_live_source_never_waits() -> None:
     """Nobody takes the bursts: all but the newest are skipped, and counted."""
     camera = ListCamera((frame(i) for i in range(21)), live=True)

@@ -21,6 +21,7 @@ from acquire.serial_line.ports import LineSettings
 from examples.strain_rate import main
 from hw_mocks.indicator_server import PtyPort
 from hw_mocks.machine import ELASTIC_SHARE, Machine
+from live.config.channels import DEFAULT_CHANNELS
 from live.config.listen_address import ListenAddress
 from live.config.loading import load_config
 from live.config.sections import SpecimenConfig
@@ -53,6 +54,13 @@ def test_a_measurement_as_json_and_as_csv() -> None:
     assert lines.heading == ",".join(CHANNELS)
     row = dict(zip(CHANNELS, lines.of(m).split(","), strict=True))
     assert row["axial"] == "0.0015" and row["frame"] == "16" and row["latency_s"] == "nan"
+
+
+def test_the_channels_without_a_choice_are_those_of_the_guide() -> None:
+    guide = (Path(__file__).parents[3] / "docs" / "guide.md").read_text(encoding="utf-8")
+    listed = ", ".join(f"`{name}`" for name in DEFAULT_CHANNELS)
+    assert "strain_rate" in DEFAULT_CHANNELS
+    assert f"{listed} and all gauges" in " ".join(guide.split())
 
 
 def test_the_strain_rate_is_the_slope_of_the_last_second() -> None:

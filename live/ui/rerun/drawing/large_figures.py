@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
+from acquire.printable import share_text
 from live.pipeline.snapshot import Snapshot
 from live.ui.rerun.drawing.shapes import BACKGROUND
 
@@ -25,7 +26,7 @@ WHITE, GREY, RED, GREEN, AMBER = (
 )
 _CELLS = ((14, 370), (400, 506), (920, 346), (1280, 306))  # left edge and width
 _LABEL_Y, _VALUE_Y, _LINE_Y = 28, 116, 157  # base lines
-_STATES = {"REC": RED, "ARMED": AMBER, "REPLAY": GREY}
+_STATES = {"REC": RED, "ARMED": AMBER, "NOT RECORDING": AMBER, "REPLAY": GREY}
 
 
 def paint(snapshot: Snapshot) -> NDArray[np.uint8]:
@@ -66,7 +67,9 @@ def _line(s: Snapshot) -> str:
     if not s.zois:
         return "nothing measured yet"
     lost = s.zois - s.valid
-    return f"{s.valid} of {s.zois} ZOIs" + (f", {lost} LOST" if lost else "")
+    part = share_text(s.area_share)
+    words = f"{s.valid} of {s.zois} ZOIs" + (f", {lost} LOST" if lost else "")
+    return f"{words}; strain {part}" if part else words
 
 
 def _write(
