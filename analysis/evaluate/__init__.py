@@ -10,19 +10,10 @@ from analysis.evaluate.area import AreaStrain, Unevenness
 from analysis.evaluate.curve import Curve, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import LoadAxis, load_axis, principal_direction
+from analysis.evaluate.extensometers import ExtensionGauge, LineGauge, TransverseGauge, extension_of
 from analysis.evaluate.figure import CONFIDENCE, Figure
 from analysis.evaluate.floor import MIN_STILL_INSTANTS, NoiseFloor, evenly, noise_floor, still_phase
-from analysis.evaluate.gauge_kinds import (
-    GAUGE_KINDS,
-    AreaGauge,
-    CircleGauge,
-    ExtensionGauge,
-    LineGauge,
-    StripGauge,
-    TransverseGauge,
-    ZoiGauge,
-    extension_of,
-)
+from analysis.evaluate.gauge_kinds import GAUGE_KINDS, AreaGauge, CircleGauge, StripGauge, ZoiGauge
 from analysis.evaluate.gauges import Gauge, GaugeValue, Parameter, inside_polygon
 from analysis.evaluate.lag import Track, find_lag
 from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free

@@ -18,8 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.evaluate.area import GRADIENTS, AreaStrain
-from analysis.evaluate.extension import Ends, extension
-from analysis.field import VALUES, Status, StrainField, ZoiGrid, area_share
+from analysis.field import PAIR_INDEX, VALUES, Status, StrainField, ZoiGrid, area_share, variance_of_sum
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -31,6 +30,7 @@ Statistic = Literal["affine", "mean", "largest", "smallest"]
 MIN_SHARE = 0.5
 """A gauge has a value as long as this share of the ZOIs of an area, or of each of its ends, has one."""
 _ROUND = 24  # corners of a circle that is drawn
+_U, _V = 0, 3  # among the affine parameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,3 +297,64 @@ def box_between(one: Point, other: Point) -> Box:
     (x0, x1), (y0, y1) = (sorted((round(one[k]), round(other[k]))) for k in (0, 1))
     x0, y0 = max(x0, 0), max(y0, 0)
     return float(x0), float(y0), float(max(x1 - x0, 1)), float(max(y1 - y0, 1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ends:
+    """The ZOIs of the two ends, (R, C) bool each; all of them have a value, and none is empty."""
+
+    first: NDArray[np.bool_]
+    second: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Extension:
+    """(L - L0)/L0 with its standard uncertainty, and L0 in px (0 where the ends lie upon each other)."""
+
+    strain: float
+    sigma: float
+    length: float
+
+
+def extension(field: StrainField, ends: Ends) -> Extension:
+    """The strain between the mean places of two ends.
+
+    Parameters
+    ----------
+    field : StrainField
+    ends : Ends
+
+    Returns
+    -------
+    Extension
+        sigma is that of the displacement difference along the line, reference noise included.
+    """
+    share = ends.second / ends.second.sum() - ends.first / ends.first.sum()
+    used = share != 0
+    weights = share[used]
+    x, y = np.meshgrid(field.grid.x, field.grid.y)
+    before = np.array([_sum(weights * x[used]), _sum(weights * y[used])])
+    length = float(np.hypot(*before))
+    if length == 0:
+        return Extension(math.nan, math.nan, 0.0)
+    # The difference of the lengths loses no digits where the extension is small.
+    moved = np.array([_sum(weights * field.u[used]), _sum(weights * field.v[used])])
+    now = float(np.hypot(*(before + moved)))
+    strain = float(moved @ (2 * before + moved)) / (now + length) / length
+    spread = np.where(used, share * _sigma_along(field, (before + moved) / now), 0.0)
+    variance = variance_of_sum(spread, "u", field.grid, field.window)
+    return Extension(strain, math.sqrt(max(variance, 0.0)) / length, length)
+
+
+def _sum(values: Floats) -> float:
+    """The sum, in the order of the values: the same bits wherever they lie in memory."""
+    return float(np.cumsum(values)[-1]) if values.size else 0.0
+
+
+def _sigma_along(field: StrainField, direction: Floats) -> Floats:
+    """Standard uncertainty of the displacement along a unit vector, (R, C), px."""
+    nx, ny = direction
+    uu, uv, vv = (
+        field.covariance[PAIR_INDEX[pair]].astype(np.float64) for pair in ((_U, _U), (_U, _V), (_V, _V))
+    )
+    return np.asarray(np.sqrt(np.maximum(nx * nx * uu + 2 * nx * ny * uv + ny * ny * vv, 0)))

@@ -1,7 +1,7 @@
 """The folder of a finished run: results, recording and settings together.
 
 with open_run("runs/20261122T081747Z") as run:
-    run.strain.values["eyy"], run.stress, run.events
+    run.strain.values["eyy"], run.stress
 
 ``add_gauges`` adds virtual gauges afterwards; it reads them from the stored maps.
 """
@@ -341,8 +341,8 @@ def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
     """Add the ``[gauges.NAME]`` of a TOML file to ``run`` while it is open; its files stay as they are.
 
     Values are those that a replay with this file would give, and so are the uncertainties of extensometers and single
-    ZOIs. That of a mean over an area includes only the overlap of the windows, which is low on dense grids (by 6 % at a
-    step of a quarter of a ZOI, by a third at most). A gauge replaces an existing one of the same name.
+    ZOIs. That of an area includes only the overlap of the windows (6 % low at a step of a quarter of a ZOI, a third at
+    most). A gauge replaces an existing one of the same name.
 
     Raises
     ------
@@ -366,8 +366,7 @@ def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
 
 def _read(run: RunFolder, gauges: tuple[Gauge, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Values and sigmas, (T, number of gauges) each."""
-    shape = (run.strain.n, len(gauges))
-    values, sigmas = np.full(shape, np.nan), np.full(shape, np.nan)
+    values, sigmas = np.full((2, run.strain.n, len(gauges)), np.nan)
     for row in range(run.strain.n):
         field = run.field(row)
         for k, gauge in enumerate(gauges):

@@ -225,6 +225,7 @@ def test_alarms_come_back_from_a_file_as_they_were() -> None:
 REAL = "sim:uniform?seconds=4&fps=20&buffers=64&width=224&height=192&bits=12"
 
 
+@pytest.mark.timed
 def test_from_the_stamp_of_the_frame_to_the_action_within_two_measurement_periods(tmp_path: Path) -> None:
     """In real time; the alarm ends the run, is in the session, and is silenced by a command."""
     alarms = ({"channel": "axial", "above": 0.0005}, {"channel": "force_N", "above": 3000.0, "end": True})
@@ -254,6 +255,7 @@ GAUGES = {
 }
 
 
+@pytest.mark.timed
 def test_a_test_with_all_that_there_is(tmp_path: Path) -> None:
     folder, again, port, serial = tmp_path / "run", tmp_path / "again", free_port(), PtyPort()
     controls, listeners, answers = (

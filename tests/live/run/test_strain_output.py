@@ -156,6 +156,7 @@ def free_port() -> int:
         return int(one.getsockname()[1])
 
 
+@pytest.mark.timed
 def test_from_the_stamp_of_the_frame_to_the_read_of_the_client(tmp_path: Path) -> None:
     """In real time, with a client that reads, and one that does not: the first feels nothing of the second."""
     port, listeners, stamps = free_port(), list[Any](), dict[int, float]()
@@ -179,6 +180,7 @@ def test_from_the_stamp_of_the_frame_to_the_read_of_the_client(tmp_path: Path) -
     assert report.summary.startswith("2 clients") and not report.failed
 
 
+@pytest.mark.timed
 def test_the_table_can_be_followed_while_the_test_runs(tmp_path: Path) -> None:
     """Without a load to wait for, a row appears within one measurement."""
     rows: list[int] = []
@@ -200,6 +202,7 @@ def test_the_table_can_be_followed_while_the_test_runs(tmp_path: Path) -> None:
 RATE, UNTIL = 5e-4, 4e-3
 
 
+@pytest.mark.timed
 def test_the_strain_rate_is_held_through_yield(tmp_path: Path) -> None:
     """Within the 20 % of ISO 6892-1 over a second, where the machine alone would be 40 % off."""
     outcome = main(str(tmp_path / "run"), RATE, UNTIL)

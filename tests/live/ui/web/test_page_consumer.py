@@ -172,6 +172,7 @@ def costs_of(worker: ConsumerThread, m: Measurement) -> list[float]:
     return costs
 
 
+@pytest.mark.timed
 def test_eight_frozen_pages_cost_the_measuring_thread_under_a_millisecond(worker: ConsumerThread) -> None:
     """In thread time: other busy programs do not count."""
     assert np.percentile(costs_of(worker, measurement()), 95) < 1e-3
