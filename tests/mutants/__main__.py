@@ -121,7 +121,7 @@ def read_list(path: Path, words: Sequence[str] = (), folder: str = "") -> list[M
     return [Mutant(m.what, m.file, m.old, m.new, (folder,)) if folder else m for m in chosen]
 
 
-def copy_code(to: Path, source: Path = ROOT) -> Path:
+def copy_code(to: Path, source: Path) -> Path:
     """A copy of the code, with the times of its files: what is compiled beside them stays valid."""
     to.mkdir()
     for name in COPIED:
@@ -200,7 +200,7 @@ def main(words: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 2
     with tempfile.TemporaryDirectory(prefix="mutants") as room:
-        clean = copy_code(Path(room) / "clean")
+        clean = copy_code(Path(room) / "clean", ROOT)
         code, output = run_tests(clean, sorted({one for mutant in mutants for one in mutant.tests}))
         if code != PASSED:
             print(f"{output[-4000:]}\nthe tests fail without any mutant; mend them first", file=sys.stderr)
