@@ -19,9 +19,9 @@ import numpy as np
 from analysis import KernelSettings, NoiseModel, PhaseKernel
 from analysis.evaluate.deconvolution import effect
 from analysis.field.grid import profile
+from tests.accuracy import finding, rejection
 from tests.accuracy import gauges as virtual
 from tests.accuracy import means as dense
-from tests.accuracy import rejection
 from tests.accuracy.limit import NAMES, gaussian, l10, noise_limit
 from tests.accuracy.real import star, star_field, wave
 from tests.accuracy.runs import SHAPE, errors, grid, level, measure
@@ -349,8 +349,25 @@ def sample14(quick: bool) -> Lines:
         )  # fmt: skip
 
 
+def found_again(quick: bool) -> Lines:
+    """Patterns that are hard to find again: large steps, blocks that leap, periods, unrelated pictures
+
+    8 bit, noise 1 GL, one step from nothing or in a sequence. Right: within 0.2 px; the worst picture of a sequence.
+    A run fails where fewer are right than the limit, or where any valid ZOI is wrong.
+    """
+    yield from _table("case", "ZOIs", "right %", "limit %", "valid and wrong")
+    for case in finding.cases(quick):
+        found = case.found
+        yield _row(case.name, found.zois, f"{100 * found.right:.1f}", f"{100 * case.least:g}", found.wrong)
+        if not case.holds:
+            BEYOND.append(case.name)
+
+
+BEYOND: list[str] = []
+"""Cases beyond their limits, which fail a run."""
 SECTIONS = (
     shift, noise, resolution, strain, star_image, sample14, illumination, uncertainty, gauges, means, rejected,
+    found_again,
 )  # fmt: skip
 
 
@@ -396,6 +413,8 @@ def main() -> None:
         PAGE.parent.mkdir(parents=True, exist_ok=True)
         PAGE.write_text("\n".join(lines) + "\n", encoding="utf-8")
         print(f"written: {PAGE}")
+    if BEYOND:
+        raise SystemExit(f"beyond their limits: {'; '.join(BEYOND)}")
 
 
 if __name__ == "__main__":

@@ -179,3 +179,33 @@ def leaping(leap_px: float, size: int, step: int) -> Found:
     stays = whole & (np.abs(here[0] + u) < SHAPE[1] / 2 - 0.75 * size)
     right = field.ok & (np.abs(field.u - u) < RIGHT_PX) & (np.abs(field.v) < RIGHT_PX)
     return Found(int(stays.sum()), float(right[stays].mean()), found.wrong)
+
+
+@dataclass(frozen=True)
+class Case:
+    """What was found in a case, and the share that must be right; none may be wrong."""
+
+    name: str
+    found: Found
+    least: float
+
+    @property
+    def holds(self) -> bool:
+        """Whether it is within its limits."""
+        return self.found.right >= self.least and self.found.wrong == 0
+
+
+def cases(quick: bool) -> Iterator[Case]:
+    """Every case; ``quick`` takes one size of ZOI."""
+    for size in (48,) if quick else (32, 48, 64):
+        for name, (motion, least) in JUMPS.items():
+            yield Case(f"{name}, ZOI {size}", jump(motion, size, size // 2), least)
+        for leap_px in (10.0, 27.0, 60.0):
+            yield Case(
+                f"a block leaps by {leap_px:g} px, ZOI {size}", leaping(leap_px, size, size // 2), 0.99
+            )
+    for name, motion, found in periods():
+        yield Case(f"{name} of 9 px, {motion}, ZOI 48", found, 0.95)
+    zois, number = grid(32, 8), 1 if quick else 20
+    accepted = unrelated(32, 8, number)
+    yield Case("unrelated pictures, ZOI 32", Found(2 * number * zois.n_active, 0.0, accepted), 0.0)
