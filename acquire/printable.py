@@ -40,3 +40,8 @@ def _escaped(found: re.Match[str]) -> str:
     if 0xDC80 <= code <= 0xDCFF:  # a byte that Python could not decode
         code -= 0xDC00
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+
+
+def share_text(share: float) -> str:
+    """What marks a value whose area lost a block: "of 83 % of the area"; empty where it stands for all of it."""
+    return "" if share == 1 else f"of {100 * share:.0f} % of the area"

@@ -20,7 +20,7 @@ from acquire.frame import Burst
 from acquire.load_cell import LoadLog
 from analysis.field import Blur
 from live.pipeline.measurement import Measurement, TimeStep
-from live.pipeline.reference import Correction, averaged, unchanged
+from live.pipeline.reference import Correction, averaged, repetition_text, unchanged
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
@@ -255,11 +255,13 @@ def measure(
     """
     tracker, guard = Tracker(kernel, noise_GL, renew_at, on_event), StrainGuard(strain, on_event)
     sharpness = BlurGuard(on_event)
-    number = 0
+    number, repeats = 0, repetition_text(kernel.period)
     for item in bursts:
         if isinstance(item, NewReference):
             tracker.renew_on_demand(correct(item.burst))
             continue
+        if number == 0 and repeats:
+            on_event(Event(item.t, EventKind.MEASUREMENT, "pattern", repeats, "warning"))
         began = timer()
         field = replace(tracker.measure(correct(item)), measure=strain)
         took = timer() - began

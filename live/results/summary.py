@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from acquire.load_cell import LoadLog
-from acquire.printable import brief
+from acquire.printable import brief, share_text
 from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
@@ -70,9 +70,11 @@ def summary_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     last, strains = history.time_steps[int(valid[-1])], history.column("largest")[valid]
     largest = strains[np.argmax(np.abs(strains))]
     refused = f" ({last.refused})" if last.refused else ""
+    part = share_text(last.least_share)
     lines = [
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} um/m;"
+        f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} um/m"
+        f"{f' {part}' if part else ''};"
         f" largest of any ZOI {largest * 1e6:+.0f} um/m",
         noise_line(history),
     ]
@@ -119,6 +121,8 @@ class StatusCard:
         ]
         blur = Blur(i.blur, i.sigma_blur).text
         lines += [f"{blur} since the reference".replace("+-", "±")] * bool(blur)
+        if part := share_text(i.least_share):
+            lines.append(f"strain **{part}**")
         figures = evaluate(history, self._loads, self._specimen)
         lines += [
             line.replace("  ", ", ").replace("+-", "±") for line in elastic_lines(figures, self._specimen)

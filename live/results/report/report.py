@@ -122,7 +122,7 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
     return [
         _head(run, content.curve),
         section("Specimen and rig", facts(_rig(run, pictures))),
-        section("Curves", plots(content.figures), _about_curves(content.curve)),
+        section("Curves", plots(content.figures), _about_parts(run), _about_curves(content.curve)),
         section("Figures of the test", *figure_table(run, content.curve)),
         section("Virtual gauges", gauges(run)),
         section("Lag and latency", times(run)),
@@ -205,6 +205,11 @@ def plots(figures: tuple[Plot, ...]) -> Html:
         for figure in figures
     ]
     return element("div", joined(found), class_="plots")
+
+
+def _about_parts(run: RunFolder) -> Html:
+    words = curves.parts(run)
+    return paragraph(words, "warning") if words else Html("")
 
 
 def _about_curves(curve: EvaluatedCurve) -> Html:

@@ -267,7 +267,13 @@ def axial_length_mm(config: Config) -> float | None:
 
 def _gauges(step: TimeStep) -> list[dict[str, Any]]:
     return [
-        {"name": name, "value": gauge.value, "sigma": gauge.sigma, "reason": gauge.reason}
+        {
+            "name": name,
+            "value": gauge.value,
+            "sigma": gauge.sigma,
+            "reason": gauge.reason,
+            "share": gauge.share,
+        }
         for name, gauge in step.gauges.items()
     ]
 
@@ -282,5 +288,6 @@ def _measured(s: Snapshot) -> dict[str, Any]:
         "valid": s.valid,
         "zois": s.zois,
         "refused": i.refused,
+        "share": s.area_share,
         "kernel_s": i.measure_s,
     }

@@ -111,6 +111,25 @@ def test_a_blank_picture_does_not_end_the_measurement(speckle: Speckle) -> None:
     assert "was not renewed" in told[0].text
 
 
+def test_a_pattern_that_repeats_is_an_event_at_the_first_burst(speckle: Speckle) -> None:
+    told: list[Event] = []
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    k = 2 * np.pi / 8
+    for image, words in (
+        (120 + 40 * (np.sin(k * x) + np.sin(k * y)), ["every 8.0 px"]),
+        (picture(speckle), []),
+    ):
+        kernel, noise = prepare(burst(image, 0), GRID, KernelSettings(), 1.0)
+        told.clear()
+        list(
+            measure(
+                [burst(image, 1), burst(image, 2)], kernel, LoadLog(), noise_GL=noise, on_event=told.append
+            )
+        )
+        assert len(told) == len(words) and all(word in told[0].text for word in words)
+        assert all(event.level == "warning" and event.t == 1.0 for event in told)
+
+
 def time_steps(count: int) -> list[TimeStep]:
     """Still for a third, then pulled along x."""
     one, rng = make_measurement(0).time_step, np.random.default_rng(1)

@@ -80,15 +80,17 @@ function showStrains(value) {
 
 const CELLS = ["ZOIs", "frames/s", "latency", "recorded", "skipped", "lost", "kernel", "disk"];
 function showStrip(value) {
+  const share = value.share ?? 1, part = share < 1 ? ` (${fixed(100 * share)} %)` : "";
   const l = value.ledger ?? {}, lost = (l.lost ?? 0) + (l.unrecorded ?? 0), ms = (s) => (s == null ? "–" : `${fixed(s * 1e3)} ms`);
   const values = [
-    value.zois == null ? "–" : `${value.valid} / ${value.zois}`, fixed(value.fps, 0), ms(value.late_s),
+    value.zois == null ? "–" : `${value.valid} / ${value.zois}${part}`, fixed(value.fps, 0), ms(value.late_s),
     String(l.recorded ?? "–"), String(l.skipped ?? "–"), String(lost), ms(value.kernel_s), value.disk_min == null ? "–" : disk(value.disk_min),
   ];
   const box = $("strip");
   fill(box, CELLS, (name) => el("div", {}, el("dt", { t: name }), el("dd")));
   values.forEach((text, i) => put(box.children[i].lastChild, text));
   box.children[5].lastChild.classList.toggle("bad", lost > 0);
+  box.children[0].lastChild.classList.toggle("bad", share < 1);
 }
 
 const disk = (minutes) => (minutes > 600 ? `${fixed(minutes / 60)} h` : `${fixed(minutes)} min`);

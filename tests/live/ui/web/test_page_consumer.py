@@ -96,7 +96,7 @@ def test_the_state_of_a_run(config: Config) -> None:
     assert isinstance(state, dict)
     assert state["force_N"] == -400 and state["peak_N"] == 500 and state["stress_Pa"] == pytest.approx(-1e7)
     assert state["axial"] == {"name": "axial", "value": 0.001, "sigma": 2e-6}
-    assert state["gauges"][1] == {"name": "b", "value": None, "sigma": None, "reason": "lost"}
+    assert state["gauges"][1] == {"name": "b", "value": None, "sigma": None, "reason": "lost", "share": 1.0}
     assert state["events"][0]["level"] == "error" and "\x1b" not in state["events"][0]["text"]
 
 
