@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 # Control characters of both kinds (but for line feed and tab), halves of surrogate pairs, marks that turn the
@@ -44,4 +45,4 @@ def _escaped(found: re.Match[str]) -> str:
 
 def share_text(share: float) -> str:
     """What marks a value whose area lost a block: "of 83 % of the area"; empty where it stands for all of it."""
-    return "" if share == 1 else f"of {100 * share:.0f} % of the area"
+    return "" if share == 1 else f"of {math.floor(100 * share)} % of the area"

@@ -24,7 +24,7 @@ ALLOWED = (1.05 + 4 * np.sqrt(2 / PIXELS)) * EXPECTED
 def verdict(left: float, *, gain: float = 1.0, noise_known: bool = True, **changed: int) -> Status:
     """The status of one ZOI that leaves a variance of ``left`` GL^2 where the noise has EXPECTED."""
     found = OutArgs.starting(np.zeros((1, 6)))
-    found.left[:], found.bending[:], found.nuisance[:] = left, 0, (gain, 0)
+    found.left[:], found.bending[:], found.nuisance[:] = left, 0, (gain, 0, 0)
     found.state[:], found.iterations[:] = changed.get("state", CONVERGED), changed.get("iterations", 3)
     known = ReferenceArgs(np.full(1, SIGNAL), np.full(1, PIXELS), np.full((1, 2), 1e-6), np.full(1, 1e-3))
     rule = VerdictArgs(noise_known, np.array([1.0, 1.0]), 32 / 6, 0.05, 4.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -66,6 +67,7 @@ def test_each_value_has_the_share_of_its_own_area() -> None:
 def test_the_share_in_words() -> None:
     assert share_text(1.0) == ""
     assert share_text(0.834) == "of 83 % of the area"
+    assert share_text(0.9995) == "of 99 % of the area"
 
 
 def test_it_is_kept_in_the_history() -> None:
@@ -87,7 +89,7 @@ def test_status_line_card_summary_and_view_are_marked(lost: bool) -> None:
     now = run_state.snapshot(0.0, step)
     card = StatusCard(run_state.specimen, run_state.loads).written(now, run_state.history)
     summary = "\n".join(summary_lines(run_state, run_state.specimen))
-    mean, least = (f"of {100 * share_of(GRID, gauge):.0f} % of the area" for gauge in (None, HALF))
+    mean, least = (f"of {math.floor(100 * share_of(GRID, gauge))} % of the area" for gauge in (None, HALF))
     assert (mean in status_line(now, 300)) == lost
     assert (least in card) == (least in summary) == lost
     assert (paint(now).tobytes() != paint(replace(now, area_share=1.0)).tobytes()) == lost
@@ -95,7 +97,7 @@ def test_status_line_card_summary_and_view_are_marked(lost: bool) -> None:
 
 def test_only_the_gauge_over_the_block_is_marked() -> None:
     half, far = gauge_texts(measured(0, lost=True).time_step)
-    assert half.endswith(f"of {100 * share_of(GRID, HALF):.0f} % of the area")
+    assert half.endswith(f"of {math.floor(100 * share_of(GRID, HALF))} % of the area")
     assert "area" not in far
 
 

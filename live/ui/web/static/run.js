@@ -61,9 +61,12 @@ function rate(value) {
   return `${fixed(value / 10 ** power, 1)}·10${digits}`;
 }
 
+// A value whose area lost a block stands for a part of it.
+const withPart = (text, part) => (part ? `${text} ${t(part)}` : text);
+
 function showStrains(value) {
   const unit = strainUnit(), axial = value.axial, [text, sigma] = withSigma(axial?.value, axial?.sigma, unit);
-  put($("axialname"), axial?.name ?? "");
+  put($("axialname"), withPart(axial?.name ?? "", value.part));
   put($("axial"), text);
   put($("axialsigma"), sigma ? `± ${sigma} ${unit.name}` : "");
   const gauges = (value.gauges ?? []).map((one, k) => ({ ...one, k })), list = $("others");
@@ -73,24 +76,23 @@ function showStrains(value) {
     const [key, name, number] = list.children[i].children;
     key.style.background = colourOf(one.k);
     put(name, one.name);
-    put(number, one.reason || one.value == null ? t("lost") : strainText(one.value, one.sigma));
+    put(number, one.reason || one.value == null ? t("lost") : withPart(strainText(one.value, one.sigma), one.part));
     number.title = one.reason ? t(one.reason) : "";
   });
 }
 
 const CELLS = ["ZOIs", "frames/s", "latency", "recorded", "skipped", "lost", "kernel", "disk"];
 function showStrip(value) {
-  const share = value.share ?? 1, part = share < 1 ? ` (${fixed(100 * share)} %)` : "";
   const l = value.ledger ?? {}, lost = (l.lost ?? 0) + (l.unrecorded ?? 0), ms = (s) => (s == null ? "–" : `${fixed(s * 1e3)} ms`);
   const values = [
-    value.zois == null ? "–" : `${value.valid} / ${value.zois}${part}`, fixed(value.fps, 0), ms(value.late_s),
+    value.zois == null ? "–" : `${value.valid} / ${value.zois}`, fixed(value.fps, 0), ms(value.late_s),
     String(l.recorded ?? "–"), String(l.skipped ?? "–"), String(lost), ms(value.kernel_s), value.disk_min == null ? "–" : disk(value.disk_min),
   ];
   const box = $("strip");
   fill(box, CELLS, (name) => el("div", {}, el("dt", { t: name }), el("dd")));
   values.forEach((text, i) => put(box.children[i].lastChild, text));
   box.children[5].lastChild.classList.toggle("bad", lost > 0);
-  box.children[0].lastChild.classList.toggle("bad", share < 1);
+  box.children[0].lastChild.classList.toggle("bad", Boolean(value.part));
 }
 
 const disk = (minutes) => (minutes > 600 ? `${fixed(minutes / 60)} h` : `${fixed(minutes)} min`);
