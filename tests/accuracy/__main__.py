@@ -371,7 +371,7 @@ def blurred(quick: bool) -> Lines:
 
 
 def reference_noise(quick: bool) -> Lines:
-    """Single frames with 2 GL of noise as reference and picture: bias of the mean exx and eyy, limit 0.3 sigma
+    """Single frames with 2 GL of noise as reference and picture: the worse bias of mean exx and eyy, limit 0.3 sigma
 
     25 pairs: the limit is widened by twice the standard error of the bias.
     """
