@@ -72,7 +72,9 @@ def preferred(offered: list[str]) -> str | None:
     return next((name for name in FORMATS if name in offered), None)
 
 
-def decode(data: bytes | memoryview, pixel_format: MonoFormat, width: int, height: int) -> NDArray[Any]:
+def decode(
+    data: bytes | memoryview, pixel_format: MonoFormat, width: int, height: int, padding: int = 0
+) -> NDArray[Any]:
     """A picture of its own memory from the bytes of a camera.
 
     Parameters
@@ -80,6 +82,8 @@ def decode(data: bytes | memoryview, pixel_format: MonoFormat, width: int, heigh
     data : buffer of bytes
     pixel_format : MonoFormat
     width, height : int, px
+    padding : int, bytes
+        After each row; a row then begins with a byte of its own.
 
     Returns
     -------
@@ -90,12 +94,14 @@ def decode(data: bytes | memoryview, pixel_format: MonoFormat, width: int, heigh
     DataError
         Too few bytes.
     """
-    pixels = width * height
-    needed = pixel_format.size(pixels)
+    rows, pixels = (height, width) if padding else (1, width * height)
+    length = pixel_format.size(pixels)
+    starts = range(0, rows * (length + padding), length + padding)
     samples = np.frombuffer(data, np.uint8)
-    if samples.size < needed:
-        raise DataError(f"{samples.size} bytes instead of {needed}")
-    return frozen(_unpacked(samples[:needed], pixel_format, pixels).reshape(height, width))
+    if samples.size < starts[-1] + length:
+        raise DataError(f"{samples.size} bytes instead of {starts[-1] + length}")
+    found = [_unpacked(samples[start : start + length], pixel_format, pixels) for start in starts]
+    return frozen((np.stack(found) if padding else found[0]).reshape(height, width))
 
 
 def _unpacked(samples: NDArray[np.uint8], pixel_format: MonoFormat, pixels: int) -> NDArray[Any]:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import pytest
 
-from acquire.genicam.device import GenicamDevice, Received
+from acquire.genicam.device import GenicamDevice, Received, Take
 from tests.genicam.fake_camera import FIRST, PIXEL_FORMATS
 from tests.genicam.inside.fakes import FakeCameraProcess, FrameWatch
 from tests.genicam.packing import bits_of, picture
@@ -44,7 +42,7 @@ def test_stamps_are_those_of_the_camera_on_our_clock(monkeypatch: pytest.MonkeyP
     """The distance from a stamp of the camera to ours only ever shrinks: by arrivals that were less late."""
     fetch, stamps = GenicamDevice.fetch, {}
 
-    def noted(device: GenicamDevice, timeout_s: float, take: Callable[[memoryview], Any]) -> Received | None:
+    def noted(device: GenicamDevice, timeout_s: float, take: Take) -> Received | None:
         if (received := fetch(device, timeout_s, take)) is not None:
             stamps[received.number] = received.stamp_ns * 1e-9
         return received
