@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
@@ -96,12 +97,25 @@ def decode(
     """
     rows, pixels = (height, width) if padding else (1, width * height)
     length = pixel_format.size(pixels)
-    starts = range(0, rows * (length + padding), length + padding)
+    needed = rows * (length + padding) - padding
     samples = np.frombuffer(data, np.uint8)
-    if samples.size < starts[-1] + length:
-        raise DataError(f"{samples.size} bytes instead of {starts[-1] + length}")
-    found = [_unpacked(samples[start : start + length], pixel_format, pixels) for start in starts]
-    return frozen((np.stack(found) if padding else found[0]).reshape(height, width))
+    if samples.size < needed:
+        raise DataError(f"{samples.size} bytes instead of {needed}")
+    return frozen(
+        _unpacked_rows(samples[:needed], pixel_format, pixels, length + padding).reshape(height, width)
+    )
+
+
+def _unpacked_rows(
+    samples: NDArray[np.uint8], pixel_format: MonoFormat, pixels: int, pitch: int
+) -> NDArray[Any]:
+    """Grey levels of rows of so many pixels that begin ``pitch`` bytes after one another."""
+    length = pixel_format.size(pixels)
+    count = (samples.size - length) // pitch + 1
+    rows = as_strided(samples, (count, length), (pitch, 1))
+    if pixel_format.size(2 * pixels) == 2 * length:  # no row ends within a byte
+        return _unpacked(rows.reshape(-1), pixel_format, count * pixels)
+    return np.stack([_unpacked(row, pixel_format, pixels) for row in rows])
 
 
 def _unpacked(samples: NDArray[np.uint8], pixel_format: MonoFormat, pixels: int) -> NDArray[Any]:
