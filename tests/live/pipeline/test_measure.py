@@ -178,7 +178,7 @@ def test_a_change_of_sharpness_is_told_once_and_when_it_ends() -> None:
     for blur, sigma in changes:
         guard.check(replace(step, blur=blur, sigma_blur=sigma))
     assert [event.level for event in told] == ["warning", "info", "warning"]
-    assert "less sharp by 0.62 +- 0.02 px" in told[0].text and "sharper by 0.70 +- 0.02 px" in told[2].text
+    assert "less sharp by 0.62 ± 0.02 px" in told[0].text and "sharper by 0.70 ± 0.02 px" in told[2].text
     assert told[0].data == {"blur_px": 0.62, "sigma_blur_px": 0.02}
 
 
