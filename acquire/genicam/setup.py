@@ -32,7 +32,7 @@ SHOWN = (
     *AUTOMATIC,
 )
 RESULTING_RATES = ("ResultingFrameRate", "AcquisitionResultingFrameRate", "ResultingFrameRateAbs")
-SMALL_PACKETS = 1500
+SMALL_PACKETS, TEST_PACKET = 1500, "GevSCPSFireTestPacket"
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +225,7 @@ def _set_packets(device: GenicamDevice, settings: GenicamSettings, where: str) -
     if not device.is_gige:
         return
     if settings.packet_size is None:
-        if device.has("GevSCPSFireTestPacket"):
+        if device.has(TEST_PACKET):
             device.ask("arv_camera_gv_auto_packet_size")
         return
     device.ask("arv_camera_gv_set_packet_size_adjustment", NO_ADJUSTMENT)
@@ -319,7 +319,10 @@ def _warnings(device: GenicamDevice, settings: GenicamSettings, fps: float | Non
     if settings.fps is not None and fps is not None and fps < 0.99 * settings.fps:
         yield f"the camera gives {fps:g} frames a second, not {settings.fps:g}: exposure, size or line limit it"
     if device.is_gige and (size := device.ask("arv_camera_gv_get_packet_size")) < SMALL_PACKETS:
+        larger = (
+            "larger ones did not pass" if device.has(TEST_PACKET) else "it cannot try larger ones by itself"
+        )
         yield (
-            f"packets of {size} bytes: larger ones did not pass; set the MTU of the network card to 9000 "
+            f"packets of {size} bytes: {larger}; set the MTU of the network card to 9000, then packet_size=8000 "
             "(docs/machine-vision.md)"
         )
