@@ -222,7 +222,7 @@ def test_all_flushed_frames_are_readable(tmp_path: Path, limit: int) -> None:
 
 
 def test_a_folder_that_may_not_be_written(tmp_path: Path) -> None:
-    with pytest.raises(DataError, match="choose a folder that exists and is writable"):
+    with pytest.raises(DataError, match="choose a folder that exists, is writable and has room"):
         writer(Path("/proc/session.h5"))
 
 
