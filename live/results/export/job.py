@@ -152,7 +152,7 @@ def chosen_rows(strain: Strain, start_s: float | None, end_s: float | None) -> t
     if rows:
         return rows
     if not len(t):
-        raise ConfigError(f"{strain.path}: holds no measurement, there is nothing to export")
+        raise DataError(f"{strain.path}: holds no measurement, there is nothing to export")
     raise ConfigError(
         f"--from, --until: no measurement between {low:g} and {high:g} s; the test has {t[0]:.6g} to {t[-1]:.6g} s"
     )
