@@ -33,6 +33,7 @@ CAMERAS: Registry[Camera] = Registry(
     {
         "": "acquire.v4l2.camera:open_v4l2",
         "genicam": "acquire.genicam.camera:open_genicam",
+        "pylon": "acquire.pylon.camera:PylonCamera",
         "opencv": "acquire.opencv.webcam:open_opencv",
         "video": "acquire.opencv.video:open_video",
         "files": "acquire.opencv.images:open_files",
@@ -40,7 +41,11 @@ CAMERAS: Registry[Camera] = Registry(
     },
     lists_group="phasedic.camera_lists",
     elsewhere=["sim"],
-    lists={"": "acquire.v4l2.listing:list_cameras", "genicam": "acquire.genicam.listing:list_cameras"},
+    lists={
+        "": "acquire.v4l2.listing:list_cameras",
+        "genicam": "acquire.genicam.listing:list_cameras",
+        "pylon": "acquire.pylon.camera:list_cameras",
+    },
 )
 
 

@@ -91,8 +91,9 @@ def _not_measured(f: CheckFigures, what: str) -> CheckLine:
 
 
 def _camera(f: CheckFigures) -> Iterator[CheckLine]:
+    yield from (CheckLine("camera", warning, measured=False) for warning in f.stack.camera.warnings)
     if f.stack.lost:
-        yield CheckLine("frames lost", f"{f.stack.lost} between {len(f.stack)}", False,
+        yield CheckLine("frames lost", f"{f.stack.lost} between the {len(f.stack)} looked at", False,
                    "a lower frame rate, a smaller picture (--crop), another port or a faster machine")  # fmt: skip
     automatic = ", ".join(f.automatic)
     yield CheckLine("automatic controls", automatic or "none", not automatic, f"put on manual: {automatic}")
@@ -167,6 +168,9 @@ def _pattern(f: CheckFigures) -> Iterator[CheckLine]:
     words = "finer speckle or a wider field of view" if f.radius > high else "coarser speckle, or focus"
     radius = f"{f.radius:.2f} px" if math.isfinite(f.radius) else "none is visible"
     yield CheckLine("speckle radius", f"{radius} (from {low:g} to {high:g})", low <= f.radius <= high, words)
+    if f.repetition:
+        words = "a random pattern; else more pictures a second: displacements may be wrong by a period"
+        yield CheckLine("repetition", f.repetition, False, words)
     yield _sharpness(f)
     yield _sssig(f)
     share, n = z.without_pattern, z.grid.n_active

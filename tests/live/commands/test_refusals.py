@@ -250,7 +250,7 @@ def test_the_specimens_of_the_demo_are_those_of_the_simulator() -> None:
 
 def test_the_simulated_camera_is_among_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
     code, said = refused(capsys, "run", "--camera", "firewire:0")
-    assert code == 2 and "known: /dev/..., files:, genicam:, opencv:, session:, video:, sim:" in said
+    assert code == 2 and "known: /dev/..., files:, genicam:, opencv:, pylon:, session:, video:, sim:" in said
 
 
 @pytest.mark.parametrize("limit", ["0", "nan", "-1", "inf"])
