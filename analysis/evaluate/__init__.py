@@ -6,7 +6,7 @@ evaluates a test: a ``curve`` by one of the ``standards``, its ``elastic`` line 
 a test and the noise floor in it. ``deconvolution`` removes the blur of the ZOI from a map.
 """
 
-from analysis.evaluate.area import AreaStrain, Unevenness
+from analysis.evaluate.area.strain import AreaStrain, Unevenness
 from analysis.evaluate.curve import Curve, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import LoadAxis, load_axis, principal_direction

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.evaluate import AreaGauge, AreaStrain, ExtensionGauge, extension_of, load_axis
-from analysis.evaluate.affine import Places, affine_weights, covariance_of
+from analysis.evaluate.area.affine import Places, affine_weights, covariance_of
 from analysis.field import Roi, StrainField, ZoiGrid, profile
 
 GRADIENT = {"du_dx": -3e-4, "du_dy": 2e-4, "dv_dx": -1e-4, "dv_dy": 1e-3}

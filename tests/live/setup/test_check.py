@@ -151,7 +151,7 @@ def test_the_snapshot_and_the_gauges(capsys: pytest.CaptureFixture[str], tmp_pat
     assert "l_10% mm" in output
     noise = {
         name: float(re.search(rf"noise of {name} +([0-9.]+) um/m", output)[1])  # type: ignore[index]
-        for name in ("the mean", "axial", "transverse", "area")
+        for name in ("the mean", "extension", "width", "area")
     }
     one = float(re.search(r"strain noise +(\d+) um/m measured", output)[1])  # type: ignore[index]
     assert noise["the mean"] < one

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.evaluate.affine import AffineWeights, Places, affine_weights
-from analysis.evaluate.unevenness import strain_shapes, variation
+from analysis.evaluate.area.affine import AffineWeights, Places, affine_weights
+from analysis.evaluate.area.unevenness import strain_shapes, variation
 from analysis.field import PAIR_INDEX, StrainField, combination, fixed_sums, strain_tensor
 
 Floats = NDArray[np.float64]
