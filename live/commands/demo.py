@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from analysis import PICTURE_KINDS
 from analysis.evaluate import AreaStrain
-from analysis.field import Status, StrainField
+from analysis.field import Status, StrainField, Sums
 from live.commands.exit_codes import LOSS
 from live.commands.options import add_measure, add_options, configured
 from live.commands.run import print_outcome, run_attended
@@ -87,9 +87,10 @@ def _defaults(arguments: argparse.Namespace) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeasuredMeans:
-    """The means of a measurement for the comparison; ``times`` (n,) are those of its frames, s."""
+    """The strains of a measurement for the comparison; ``times`` (n,) are those of its frames, s."""
 
     times: Array
+    pattern: Sums | None
     valid: NDArray[np.bool_]
     mean: tuple[float, float, float]
     sigma: tuple[float, float, float]
@@ -119,6 +120,7 @@ class MeansCollector(Consumer):
         self.measurements.append(
             MeasuredMeans(
                 times,
+                m.field.sums,
                 m.field.ok,
                 _strains(replace(m.field, measure="small")),
                 (i.sigma_exx, i.sigma_eyy, i.sigma_exy),
@@ -155,15 +157,17 @@ class ZoiTruth:
         _, du_dx, du_dy, _, dv_dx, dv_dy = self._parameters(t)
         return du_dx, dv_dy, (du_dy + dv_dx) / 2
 
-    def region(self, t: float, valid: NDArray[np.bool_]) -> tuple[float, float, float]:
-        """(exx, eyy, exy) that the ``valid`` ZOIs (R, C) give together, as the region of a measurement."""
+    def region(
+        self, t: float, valid: NDArray[np.bool_], pattern: Sums | None = None
+    ) -> tuple[float, float, float]:
+        """(exx, eyy, exy) that the ``valid`` ZOIs (R, C) give together, as the region of a measurement.
+
+        They weigh as in the measurement, by their ``pattern``: in a field that is not uniform the strain depends on it.
+        """
         names = ("u", "du_dx", "du_dy", "v", "dv_dx", "dv_dy")
         status = np.where(valid, Status.OK, Status.LOST)
-        return _strains(
-            StrainField.from_values(
-                self._grid, dict(zip(names, self._parameters(t), strict=True)), status=status
-            )
-        )
+        values = dict(zip(names, self._parameters(t), strict=True))
+        return _strains(replace(StrainField.from_values(self._grid, values, status=status), sums=pattern))
 
     def _parameters(self, t: float) -> tuple[Array, Array, Array, Array, Array, Array]:
         u, v = self._specimen.displacement(self._x, self._y, t)
@@ -202,7 +206,7 @@ def compare(outcome: Outcome, collector: MeansCollector, config: Config, say: Ca
     for m in collector.measurements:
         times = np.array([specimen.elapsed(t) for t in m.times])
         elapsed = middle_of(specimen, times)
-        true = np.array(truth.region(elapsed, m.valid))
+        true = np.array(truth.region(elapsed, m.valid, m.pattern))
         error, sigma = np.array(m.mean) - true, np.array(m.sigma)
         if times[-1] <= specimen.yield_s:
             ratios.append([np.abs(error) / (RELATIVE * np.abs(true) + k * sigma) for k in (3, 5)])

@@ -1,22 +1,33 @@
-"""Weights of the generalised least squares of an affine field to the displacements and gradients of ZOIs.
+"""Weights of an affine field through the displacements and gradients of ZOIs, as one fit over their pixels has them.
 
-White pixel noise on a pattern without direction makes of each ZOI three moments of one noise under its window:
-displacement, change along x, change along y. Their covariance between two ZOIs is a product of one correlation along
-x and one along y, so that it is never laid out: conjugate gradients solve the normal equations with small matrices
-(M. R. Hestenes, E. Stiefel, J. Res. NBS 49 (1952) 409-436). The weights are the same for u and v, and follow from the
-grid alone.
+The six values of a ZOI, times the normal matrix of its fit, are sums over its pixels: of the gradient of its pattern
+times what the picture has moved there, times the window, times 1, x and y. Such sums are added so that each pixel of
+the area counts alike. How follows from the windows: it is the generalised least squares of an affine field to the
+ZOIs of a pattern that is everywhere the same, whose covariance is a product of one correlation along x and one along
+y, so that it is never laid out: conjugate gradients solve the normal equations with small matrices (M. R. Hestenes,
+E. Stiefel, J. Res. NBS 49 (1952) 409-436).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.field import Window, ZoiGrid, profile
+from analysis.field import (
+    PAIR_INDEX,
+    VALUES,
+    StrainField,
+    Window,
+    ZoiGrid,
+    combination,
+    fixed_sum,
+    fixed_sums,
+    profile,
+)
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -24,6 +35,9 @@ Bools = NDArray[np.bool_]
 UNCORRELATED = 0.05
 """Share of the variance of a value that its neighbours do not have: the pattern differs from place to place."""
 _RESIDUAL, _STEPS = 1e-5, 200  # where the conjugate gradients end
+_HALF = 0.5  # of the ZOIs of an area: with fewer, pixels no longer count alike, and each ZOI counts by its own fit
+_DISPLACEMENTS = [PAIR_INDEX[0, 0], PAIR_INDEX[3, 3]]  # variances of u and v among the 21 pairs
+_KEPT = 8  # sets of valid ZOIs whose inverse is remembered
 
 
 class Places(NamedTuple):
@@ -41,56 +55,172 @@ class Places(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class AffineWeights:
-    """What makes an affine field of the values of ZOIs.
+class AffineFit:
+    """How an affine field follows from the n ZOIs of an area, whichever of them are valid.
 
     Attributes
     ----------
-    x, y : (R, C) float64, px
-        Places of the ZOIs about the middle of the area.
-    weights : (3, 3, R, C) float64
-        Of displacement, change along x and along y (second axis), for the three of the field (first axis); zero
-        where a ZOI is not valid.
-    noise : (3, R, C) float64
-        What the variance of the displacement of each ZOI, px^2, adds to the variance of the three.
+    at : (n,) intp
+        Flat places of the ZOIs on the grid.
+    x, y : (n,) float64, px
+        Their places about the middle of the area.
+    sums : (6, 6, n) float64
+        Weights of the six affine values of a ZOI (second axis) in six sums (first axis).
+    normal : (6, 6, n) float64
+        What the six parameters of an affine field (second axis) make of these sums.
+    measurable : (n,) bool
+        ZOIs that have a pattern.
+    unit : (2, n) float64
+        Variances of u and v of each ZOI where that of the noise is 1.
     """
 
+    at: NDArray[np.intp]
     x: Floats
     y: Floats
-    weights: Floats
-    noise: Floats
+    sums: Floats
+    normal: Floats
+    measurable: Bools
+    unit: Floats
+    _inverses: dict[bytes, Floats] = field(default_factory=dict, repr=False)
+    _patterns: dict[str, float] = field(default_factory=dict, repr=False)
+    _variances: dict[tuple[str, bytes], float] = field(default_factory=dict, repr=False)
+
+    def inverse(self, valid: Bools) -> Floats:
+        """Parameters of the affine field from the sums over the ``valid`` ZOIs (n,), (6, 6)."""
+        key = valid.tobytes()
+        if key not in self._inverses:
+            if len(self._inverses) >= _KEPT:
+                self._inverses.clear()
+            normal = fixed_sums(np.where(valid, self.normal, 0.0).reshape(36, -1)).reshape(6, 6)
+            self._inverses[key] = np.asarray(np.linalg.inv(normal), np.float64)
+        return self._inverses[key]
+
+    def fitted(self, values: Floats, valid: Bools) -> Floats:
+        """The six parameters of the affine field of ``values`` (6, n), finite, of the ``valid`` ZOIs (n,)."""
+        products = self.sums.reshape(6, -1) * np.where(valid, values, 0.0).ravel()
+        return np.asarray(np.sum(self.inverse(valid) * fixed_sums(products), axis=1))
+
+    def variance(self, name: str, strain: StrainField, valid: Bools) -> float:
+        """Variance of a value of the affine field of the ``valid`` ZOIs (n,) of ``strain``."""
+        q = np.zeros(6)
+        for parameter, share in combination(name).items():
+            q[parameter] = share
+        row = np.sum(q[:, None] * self.inverse(valid), axis=0)
+        of_each = sum(
+            share * np.sum(row[:, None] * self.normal[:, k], axis=0) for k, share in enumerate(q) if share
+        )
+        variances = strain.covariance[_DISPLACEMENTS].reshape(2, -1)[:, self.at].astype(np.float64)
+        of_both = np.sum((q**2).reshape(2, 3), axis=1)[:, None]
+        noise = of_each * np.sum(of_both * variances / self.unit, axis=0) / np.sum(q**2) ** 2
+        return self._unit_variance(name, q, strain, valid) * fixed_sum(np.where(valid, noise, 0.0))
+
+    def _unit_variance(self, name: str, q: Floats, strain: StrainField, valid: Bools) -> float:
+        """Variance of a value for noise of 1: by the pattern where no ZOI is lost, and what windows make of a loss."""
+        key = name, valid.tobytes()
+        if key not in self._variances:
+            if len(self._variances) >= _KEPT * len(VALUES):
+                self._variances.clear()
+            places = Places.of(strain.grid, strain.window)
+            weights = [self._weights(q, chosen) for chosen in (valid, self.measurable)]
+            ours, whole = (_noise_of_windows(places, self.at, one) for one in weights)
+            self._variances[key] = self._by_pattern(name, strain, weights[1], whole) * ours / whole
+        return self._variances[key]
+
+    def _by_pattern(self, name: str, strain: StrainField, weights: Floats, otherwise: float) -> float:
+        if name not in self._patterns:
+            pattern = strain.sums
+            self._patterns[name] = otherwise if pattern is None else pattern.variance(self.at, weights)
+        return self._patterns[name]
+
+    def _weights(self, q: Floats, valid: Bools) -> Floats:
+        row = np.sum(q[:, None] * self.inverse(valid), axis=0)
+        return np.where(valid, np.sum(row[:, None, None] * self.sums, axis=0), 0.0)
 
 
-def affine_weights(places: Places, area: Bools, valid: Bools) -> AffineWeights:
-    """The weights of the ``valid`` ZOIs (R, C) of an ``area`` (R, C), at least one.
+def affine_fit(strain: StrainField, area: Bools, valid: Bools) -> AffineFit:
+    """How the affine field of an ``area`` (R, C) follows from its ``valid`` ZOIs (R, C), at least one."""
+    places, whole = Places.of(strain.grid, strain.window), bool(valid.sum() >= _HALF * area.sum())
+    if strain.sums is None:
+        return _of_windows(places, area.tobytes(), whole)
+    pattern = strain.sums
 
-    They are those of the whole area, without the ZOIs that are not valid, normalised: exact for affine fields
-    whichever ZOIs are valid. The pattern of a ZOI does not count: weighted by it, the pixels of neighbours no longer
-    count alike, and the strain of a region of 4,400 ZOIs of 32 px scattered 1.3 times as much (November 2026).
-    """
-    return _weights(places, area.tobytes(), (area & valid).tobytes())
+    def made() -> AffineFit:
+        at = np.flatnonzero(area)
+        return _fit(places, at, pattern.information(at), pattern.unit_variances(at), whole)
+
+    return pattern.kept(("affine", area.tobytes(), whole), made)
 
 
 @lru_cache(maxsize=12)
-def _weights(places: Places, area: bytes, valid: bytes) -> AffineWeights:
-    solved, model = _solved(places, area), covariance_of(places)
-    kept = solved.weights * np.frombuffer(valid, np.bool_).reshape(places.shape)
-    normal = np.einsum("ajyx,bjyx->ab", kept, solved.design)
-    weights = np.einsum("ab,bjyx->ajyx", np.linalg.inv(normal), kept)
-    noise = np.sum(weights * model.times(weights), axis=1) / model.displacement
-    return AffineWeights(solved.x, solved.y, weights, noise)
+def _of_windows(places: Places, area: bytes, whole: bool) -> AffineFit:
+    """Where the patterns of the ZOIs are not known: all alike."""
+    at = np.flatnonzero(np.frombuffer(area, np.bool_))
+    information = np.repeat(np.diag(np.tile(_even(places), 2))[:, :, None], len(at), axis=2)
+    return _fit(places, at, information, np.ones((2, len(at))), whole)
+
+
+def _noise_of_windows(places: Places, at: NDArray[np.intp], weights: Floats) -> float:
+    """Variance of a sum of the values of ZOIs by ``weights`` (6, n), where a displacement has the variance 1."""
+    model, flat = covariance_of(places), np.zeros((6, places.shape[0] * places.shape[1]))
+    flat[:, at] = weights
+    maps = flat.reshape(2, 3, *places.shape)
+    return float(np.sum(maps * model.times(maps)) / model.displacement)
+
+
+def _fit(places: Places, at: NDArray[np.intp], information: Floats, unit: Floats, whole: bool) -> AffineFit:
+    """From the normal matrices (6, 6, n) of the ZOIs at ``at``; ``whole``: so that each pixel counts alike."""
+    inside = np.zeros(places.shape[0] * places.shape[1], np.bool_)
+    inside[at] = True
+    solved = _solved(places, inside.tobytes())
+    x, y = (values.ravel()[at] for values in (solved.x, solved.y))
+    shares = solved.weights.reshape(3, 3, -1)[:, :, at] / _even(places)[:, None]
+    sums = _weighted(shares, information) if whole else _plain(x, y, information)
+    return AffineFit(at, x, y, sums, _of_affine(x, y, sums), information[0, 0] > 0, unit)
+
+
+def _weighted(shares: Floats, information: Floats) -> Floats:
+    """Sums over pixels in which each counts alike: ``shares`` (3, 3, n) of those of the ZOIs, for u and for v."""
+    out = np.empty_like(information)
+    for part in (slice(0, 3), slice(3, 6)):
+        rows = information[part]
+        out[part] = sum(shares[:, i, None] * rows[None, i] for i in range(3))
+    return out
+
+
+def _plain(x: Floats, y: Floats, information: Floats) -> Floats:
+    """Least squares of an affine field, each ZOI by its normal matrix."""
+    out = information.copy()
+    for first in (0, 3):
+        out[first + 1] += x * information[first]
+        out[first + 2] += y * information[first]
+    return out
+
+
+def _of_affine(x: Floats, y: Floats, sums: Floats) -> Floats:
+    out = sums.copy()
+    for first in (0, 3):
+        out[:, first + 1] += x * sums[:, first]
+        out[:, first + 2] += y * sums[:, first]
+    return out
+
+
+def _even(places: Places) -> Floats:
+    """Normal matrix of a pattern without direction, up to a factor: of displacement, change along x and y, (3,)."""
+    line = profile(places.window, places.size)
+    x = np.arange(places.size) - (places.size - 1) / 2
+    mass, square = float(line.sum()), float(line @ x**2)
+    return np.array([mass * mass, mass * square, mass * square])
 
 
 class _Solved(NamedTuple):
     x: Floats
     y: Floats
-    design: Floats
     weights: Floats
 
 
 @lru_cache(maxsize=12)
 def _solved(places: Places, area: bytes) -> _Solved:
-    """Design and weights (3, 3, R, C) of all ZOIs of an area."""
+    """Weights (3, 3, R, C) of displacement, change along x and along y of all ZOIs of an area."""
     inside = np.frombuffer(area, np.bool_).reshape(places.shape)
     rows, columns = np.nonzero(inside)
     y, x = (
@@ -99,7 +229,7 @@ def _solved(places: Places, area: bytes) -> _Solved:
     x, y = np.meshgrid(x, y)
     one, nothing = np.ones(places.shape), np.zeros(places.shape)
     design = np.array([[one, nothing, nothing], [x, one, nothing], [y, nothing, one]]) * inside
-    return _Solved(x, y, design, covariance_of(places).solve(design, inside))
+    return _Solved(x, y, covariance_of(places).solve(design, inside))
 
 
 @dataclass(frozen=True, eq=False)

@@ -188,7 +188,10 @@ def test_extension_and_area_have_all_zois_of_the_specimen() -> None:
 
 def test_the_automatic_extension_is_that_of_the_region() -> None:
     grid = grid_on(strip((160, 290, 40)))
-    field, (gauge,) = make_field(grid, 1e-3), gauges_for({"e": auto_gauges(grid, "y")["extension"]}, "y", grid)
+    field, (gauge,) = (
+        make_field(grid, 1e-3),
+        gauges_for({"e": auto_gauges(grid, "y")["extension"]}, "y", grid),
+    )
     assert gauge.measure(field) == extension_of(field, "y")
 
 
