@@ -28,6 +28,11 @@ def brief(text: object) -> str:
     return _ADDRESS.sub(r"\1", str(text))
 
 
+def counted(n: int, noun: str) -> str:
+    """As "1 frame" or "3 frames"."""
+    return f"{n} {noun}{'' if n == 1 else 's'}"
+
+
 def duration(seconds: float) -> str:
     """As 1:23 or 1:02:03."""
     minutes, rest = divmod(max(0, round(seconds)), 60)

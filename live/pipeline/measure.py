@@ -139,7 +139,7 @@ class SmearGuard:
 class StrainGuard:
     """Checks each field of small strains, and warns once where another measure is more exact.
 
-    A rotation by r changes small strains by r^2/2 (3 degrees: 1400 um/m); they differ from the other measures
+    A rotation by r changes small strains by r^2/2 (3 degrees: 1400 µm/m); they differ from the other measures
     by about e^2/2 at a strain e.
 
     Parameters
@@ -162,7 +162,7 @@ class StrainGuard:
             self._warned = True
             text = (
                 f"turned by {math.degrees(turned):.1f} degrees, strained by {strained:.1%}: small strains are off by"
-                f" about {(turned**2 + strained**2) / 2 * 1e6:.0f} um/m; measure with --strain engineering"
+                f" about {(turned**2 + strained**2) / 2 * 1e6:.0f} µm/m; measure with --strain engineering"
             )
             data = {"rotation": turned, "strain": strained}
             self._on_event(Event(t, EventKind.MEASUREMENT, "strain", text, "warning", data))

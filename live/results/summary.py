@@ -26,7 +26,7 @@ def noise_line(history: History) -> str:
     one = np.nanmedian(history.column("zoi_sigma")) * 1e6
     mean = np.nanmedian(history.column("sigma_eyy")) * 1e6
     return (
-        f"noise: {picture}strain of one ZOI {one:.3g} um/m, of the mean {mean:.2g} um/m (predicted, 1 sigma)"
+        f"noise: {picture}strain of one ZOI {one:.3g} µm/m, of the mean {mean:.2g} µm/m (predicted, 1 sigma)"
     )
 
 
@@ -63,8 +63,8 @@ def summary_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     refused = f" ({last.refused})" if last.refused else ""
     lines = [
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} um/m;"
-        f" largest of any ZOI {largest * 1e6:+.0f} um/m",
+        f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m;"
+        f" largest of any ZOI {largest * 1e6:+.0f} µm/m",
         noise_line(history),
     ]
     lines += latency_lines(history)
@@ -108,9 +108,7 @@ class StatusCard:
             f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, mean **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
         ]
         figures = evaluate(history, self._loads, self._specimen)
-        lines += [
-            line.replace("  ", ", ").replace("+-", "±") for line in elastic_lines(figures, self._specimen)
-        ]
+        lines += [line.replace("  ", ", ") for line in elastic_lines(figures, self._specimen)]
         lines.append(
             f"recorded {frames['recorded']}, measured {frames['measured']}, skipped {frames['skipped']},"
             f" lost {f'**{lost}**' if lost else 0}"

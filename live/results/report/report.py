@@ -157,7 +157,7 @@ def _head(run: RunFolder, curve: EvaluatedCurve) -> Html:
 def tensile(curve: EvaluatedCurve) -> dict[str, str]:
     """E, nu and the strengths by name, each with its uncertainty; without those that are not known."""
     rows = headline(curve.figures, stresses=curve.is_stress)
-    return {row.name: row.text.replace("+-", "±") for row in rows if row.figure.known}
+    return {row.name: row.text for row in rows if row.figure.known}
 
 
 def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
@@ -225,7 +225,7 @@ def _about_curves(curve: EvaluatedCurve) -> Html:
 def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
     """The figures as text, how they were found, and why others are not known."""
     lines = figure_lines(curve.figures, run.specimen) if curve.has_load else []
-    return [paragraph(line.strip().replace("+-", "±").replace("  ", ", ")) for line in lines]
+    return [paragraph(line.strip().replace("  ", ", ")) for line in lines]
 
 
 def _noise_section(content: _Content) -> list[Html]:

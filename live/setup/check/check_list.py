@@ -267,7 +267,7 @@ def table_lines(figures: CheckFigures) -> list[str]:
     head = f"  ZOI order {f'l_10% {unit}':>9} {f'VSG {unit}':>7}  " + "".join(f"{n:>15}" for n in bursts)
     reference = figures.floors[0].reference if figures.floors else 0
     return [
-        f"strain noise of one ZOI, um/m: measured (predicted) for bursts of so many frames, reference of {reference}",
+        f"strain noise of one ZOI, µm/m: measured (predicted) for bursts of so many frames, reference of {reference}",
         head,
         *(_row(floor, bursts, figures) for floor in figures.floors),
     ]

@@ -25,9 +25,9 @@ _TERMINAL_EVERY_S, _FILE_EVERY_S = 0.25, 5.0
 _UNKNOWN_WIDTH, _FILE_WIDTH = 119, 1000
 
 
-def say(text: str = "") -> None:
+def print_line(text: str = "") -> None:
     """Print a line on standard output, control characters escaped; for commands without a status line."""
-    TerminalScreen().say(text)
+    TerminalScreen().print(text)
 
 
 class TerminalScreen(Screen):
@@ -44,7 +44,7 @@ class TerminalScreen(Screen):
         self._width = 0
         self._prompt: str | None = None
 
-    def say(self, text: str = "") -> None:
+    def print(self, text: str = "") -> None:
         """Print a line that stays."""
         if not self._quiet:
             self._write(" " * self._width + "\r" * (self._width > 0) + printable(text) + "\n")
@@ -103,7 +103,7 @@ class TerminalScreen(Screen):
         if elapsed_s > 0:
             rate = f"  {done * i.n_zoi / elapsed_s:.0f} ZOI/s"
         self.status(
-            f"{done}{of} bursts{_force(i)}  {GAP.join(gauge_texts(i))} um/m  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}"
+            f"{done}{of} bursts{_force(i)}  {GAP.join(gauge_texts(i))} µm/m  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}"
         )
 
     def _write(self, text: str) -> None:

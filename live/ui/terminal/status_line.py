@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 
 GAP = "  "
 MAX_GAUGES = 4
+LARGE_SIGMA = 10e-6  # from here on without a decimal
 Item = tuple[int, str]
 """Rank and text; a line that is too long loses the items with the highest rank first."""
 
@@ -43,7 +44,7 @@ def _strain(i: TimeStep | None) -> list[Item]:
     if i is None:
         return []
     items = [(5 if number == 0 else 10, text) for number, text in enumerate(gauge_texts(i))]
-    items[-1] = items[-1][0], f"{items[-1][1]} um/m"
+    items[-1] = items[-1][0], f"{items[-1][1]} µm/m"
     return [*items, (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
 
 
@@ -66,14 +67,20 @@ def force_text(value: float) -> str:
     return "" if math.isnan(value) else f"{value:.1f} N"
 
 
+def strain_text(value: float, sigma: float) -> str:
+    """A strain and its sigma in µm/m, thousands apart; the unit stands once at the end of a line."""
+    digits = 1 if sigma < LARGE_SIGMA else 0
+    return f"{value * 1e6:+z,.0f} ± {sigma * 1e6:,.{digits}f}"
+
+
 def gauge_texts(i: TimeStep) -> list[str]:
-    """The virtual gauges with their sigmas in um/m, or the means where there are none."""
+    """The virtual gauges with their sigmas in µm/m, or the means where there are none."""
     if not i.gauges:
         return [
-            f"{name} {getattr(i, name) * 1e6:+.0f} +- {getattr(i, f'sigma_{name}') * 1e6:.0f}"
+            f"{name} {strain_text(getattr(i, name), getattr(i, f'sigma_{name}'))}"
             for name in ("eyy", "exx", "exy")
         ]
     return [
-        f"{name} lost" if gauge.reason else f"{name} {gauge.value * 1e6:+.0f} +- {gauge.sigma * 1e6:.0f}"
+        f"{name} lost" if gauge.reason else f"{name} {strain_text(gauge.value, gauge.sigma)}"
         for name, gauge in list(i.gauges.items())[:MAX_GAUGES]
     ]

@@ -75,7 +75,7 @@ def _write(
     """Write text of ``height`` px on a base line, smaller where it would be wider than ``width``."""
     cv2 = load_cv2()
     font, thick = cv2.FONT_HERSHEY_SIMPLEX, max(2, height // 12)
-    text = text.encode("ascii", "replace").decode()
+    text = text.replace("µ", "u").encode("ascii", "replace").decode()
     scale = cv2.getFontScaleFromHeight(font, height, thick)
     (wide, _), _ = cv2.getTextSize(text, font, scale, thick)
     if wide > width:
