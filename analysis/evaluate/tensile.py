@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.evaluate.curve import Curve, Loading, first_crossing, noise, reading
+from analysis.evaluate.curve import Curve, Floats, Loading, first_crossing, noise, reading
 from analysis.evaluate.elastic import (
     MIN_POINTS,
     FittedLine,
@@ -21,8 +21,10 @@ from analysis.evaluate.elastic import (
     line_through,
     not_uniform,
     poisson,
+    poisson_between,
 )
 from analysis.evaluate.figure import Figure
+from analysis.evaluate.flow import anisotropy, hardening
 from analysis.evaluate.standards import STANDARDS, Band, Standard
 from analysis.evaluate.strengths import (
     Yield,
@@ -36,6 +38,7 @@ from analysis.evaluate.strengths import (
 ZeroBy = Literal["raw", "toe", "preload"]
 
 _ROUNDS = 8
+_PARTS, _IN_PART = 10, 5  # of a strain rate held against a standard, and the points that each needs
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,6 +99,8 @@ class TensileFigures:
     Rm : Figure, Pa
     Agt, Ag, At, A : Figure
         Total and plastic strain at the highest stress, and at break; not in percent.
+    r, n : Figure
+        Plastic anisotropy and strain hardening; ``why`` has the interval.
     rate_elastic, rate_plastic : Figure, 1/s
         Strain rate over ``span``, and over the second half of the strain from there to the highest
         stress; ``why`` holds it against the standard.
@@ -122,6 +127,8 @@ class TensileFigures:
     Ag: Figure
     At: Figure
     A: Figure
+    r: Figure
+    n: Figure
     rate_elastic: Figure
     rate_plastic: Figure
     seconds: Figure
@@ -223,11 +230,12 @@ def _with_line(
     region = replace(loading, strain=loading.elastic, noise_strain=noise(loading.elastic))
     slope = line_through(region, line.first, line.last) or line
     remark = not_uniform(loading, slope)
+    nu = _poisson(loading, slope, options.standard)
     figures = TensileFigures(
         E=slope.modulus.remarked(remark),
         E_chord=chord(region, slope),
         r2=slope.r2,
-        nu=poisson(loading, slope).remarked(remark),
+        nu=nu.remarked(remark),
         Rp01=rp01,
         Rp02=rp02,
         Rp1=rp1,
@@ -238,6 +246,8 @@ def _with_line(
         Ag=_plastic(agt, ends[0], line),
         At=at,
         A=_plastic(at, ends[1], line),
+        r=anisotropy(loading, slope, nu),
+        n=hardening(loading, slope),
         rate_elastic=_rate(loading, line.first, line.last, options.standard.rates_elastic),
         rate_plastic=_rate(loading, _midway(loading, line), loading.top + 1, options.standard.rates_plastic),
         seconds=_seconds(loading, options.standard),
@@ -248,9 +258,17 @@ def _with_line(
     return figures if options.standard.flow else _without_flow(figures)
 
 
+def _poisson(loading: Loading, line: FittedLine, standard: Standard) -> Figure:
+    if standard.poisson is None:
+        return poisson(loading, line)
+    return poisson_between(loading, *standard.poisson)
+
+
 def _without_flow(figures: TensileFigures) -> TensileFigures:
     none = Figure.none(f"not a figure of {figures.standard}")
-    return replace(figures, Rp01=none, Rp02=none, Rp1=none, ReH=none, ReL=none, Ag=none, A=none)
+    return replace(
+        figures, Rp01=none, Rp02=none, Rp1=none, ReH=none, ReL=none, Ag=none, A=none, r=none, n=none
+    )
 
 
 def _without_line(loading: Loading, options: TensileOptions, why: str) -> TensileFigures:
@@ -304,7 +322,15 @@ def _rate(loading: Loading, first: int, last: int, bands: tuple[Band, ...]) -> F
     slope = float(dt @ de) / stt
     rest = de - slope * dt
     found = Figure.about(slope, math.sqrt(float(rest @ rest) / (len(t) - 2) / stt), len(t) - 2)
-    return replace(found, why=_against(slope, bands))
+    return replace(found, why=_against(slope, _rates(t, strain), bands))
+
+
+def _rates(t: Floats, strain: Floats) -> list[float]:
+    """The rates of the tenths of a part; none of few points."""
+    if len(t) < _PARTS * _IN_PART:
+        return []
+    parts = zip(np.array_split(t, _PARTS), np.array_split(strain, _PARTS), strict=True)
+    return [float(np.polyfit(one - one.mean(), values, 1)[0]) for one, values in parts]
 
 
 def _midway(loading: Loading, line: FittedLine) -> int:
@@ -316,12 +342,15 @@ def _midway(loading: Loading, line: FittedLine) -> int:
     return first + int(np.argmax(loading.course[first:] >= half))
 
 
-def _against(rate: float, bands: tuple[Band, ...]) -> str:
+def _against(rate: float, parts: list[float], bands: tuple[Band, ...]) -> str:
+    """Which of the bands a rate is in, and whether the parts have kept to it."""
     if not bands:
         return ""
     inside = [band for band in bands if band.low <= rate <= band.high]
     if inside:
-        return f"within {inside[0].name}"
+        kept = all(inside[0].low <= one <= inside[0].high for one in parts)
+        tenths = "" if kept else f" on average, its tenths at {min(parts):.2g} to {max(parts):.2g} 1/s"
+        return f"within {inside[0].name}{tenths}"
     allowed = ", ".join(f"{band.name} {band.low:.2g} to {band.high:.2g} 1/s" for band in bands)
     return f"outside the standard ({allowed})"
 
