@@ -89,6 +89,8 @@ class CheckFigures:
     floors : tuple of ZoiFloor
     zoi, order, burst : int
         Settings of the test.
+    repetition : str
+        What repeats in the pattern, and what that allows; empty where nothing does.
     noise_stated : bool
         Whether the noise was given; else too few frames take it from the spectrum of the picture.
     removed : float or None, GL
@@ -111,6 +113,7 @@ class CheckFigures:
     zoi: int
     order: int
     burst: int
+    repetition: str = ""
     noise_stated: bool = False
     removed: float | None = None
     gauges: tuple[GaugeNoise, ...] = ()
@@ -204,6 +207,7 @@ def figures_of(
         zoi=m.zoi,
         order=m.order,
         burst=sample.burst,
+        repetition=measured.predicted.repetition,
         noise_stated=m.noise_GL is not None,
         removed=None if same else float((sample.picture.mean - sample.raw)[check_region.inside].std()),
         gauges=measured.predicted.gauges,

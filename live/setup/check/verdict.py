@@ -167,6 +167,9 @@ def _pattern(f: CheckFigures) -> Iterator[CheckLine]:
     words = "finer speckle or a wider field of view" if f.radius > high else "coarser speckle, or focus"
     radius = f"{f.radius:.2f} px" if math.isfinite(f.radius) else "none is visible"
     yield CheckLine("speckle radius", f"{radius} (from {low:g} to {high:g})", low <= f.radius <= high, words)
+    if f.repetition:
+        words = "a random pattern; else more pictures a second: displacements may be wrong by a period"
+        yield CheckLine("repetition", f.repetition, False, words)
     yield _sharpness(f)
     yield _sssig(f)
     share, n = z.without_pattern, z.grid.n_active

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TextIO
 
-from acquire.printable import duration, printable
+from acquire.printable import duration, printable, share_text
 from live.pipeline.screen import Screen
 from live.ui.terminal.status_line import GAP, force_text, gauge_texts, status_line
 
@@ -102,9 +102,8 @@ class TerminalScreen(Screen):
             of, left = f" of {expected}", f"  {duration(elapsed_s / done * (expected - done))} left"
         if elapsed_s > 0:
             rate = f"  {done * i.n_zoi / elapsed_s:.0f} ZOI/s"
-        self.status(
-            f"{done}{of} bursts{_force(i)}  {GAP.join(gauge_texts(i))} µm/m  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}"
-        )
+        strains = f"{GAP.join(gauge_texts(i))} µm/m  {share_text(i.area_share)}".rstrip()
+        self.status(f"{done}{of} bursts{_force(i)}  {strains}  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}")
 
     def _write(self, text: str) -> None:
         encoding = getattr(self._stream, "encoding", None) or "utf-8"

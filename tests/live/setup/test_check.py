@@ -340,6 +340,16 @@ def test_what_surrounds_the_specimen_decides_nothing(taken: FrameStack) -> None:
     assert found.noise == pytest.approx(examine(taken, config, table=False).noise, rel=0.05)
 
 
+def test_a_pattern_that_repeats_is_named_with_its_period() -> None:
+    rng = np.random.default_rng(0)
+    k = 2 * np.pi / 9
+    y, x = np.mgrid[:240, :320]
+    grid = 120 + 40 * (np.sin(k * x) + np.sin(k * y))
+    frames = np.rint(grid + rng.normal(0, 1, (16, *grid.shape))).astype(np.uint8)
+    text = line_text(shots_of(frames, 8), "repetition")
+    assert text.startswith("LOOK") and "repeats every 9.0 px" in text and "move by 3.6 px" in text
+
+
 def test_automatic_controls_by_name_and_value() -> None:
     controls = {
         "auto_exposure": "Aperture Priority Mode",
