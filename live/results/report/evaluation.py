@@ -23,7 +23,7 @@ class EvaluatedCurve:
     Attributes
     ----------
     axial, transverse : (T,) float64
-        Strains of the gauges of these names, else mean strains.
+        Extension of the test, and the strain across: of the gauges of these names, else of the region.
     load : (T,) float64
         Stress, Pa, or force, N, where the section is not known; NaN where no force is known.
     is_stress : bool

@@ -31,11 +31,20 @@ def run_result(run_state: RunState, specimen: SpecimenConfig, folder: Path, word
     return {
         "folder": str(folder),
         "words": words,
-        "figures": [] if figures is None else [_figure(row) for row in _rows(figures, specimen)],
+        "figures": [] if figures is None else _figures(figures, specimen),
         "lines": [] if figures is None else list(_lines(run_state, specimen, figures)),
         "ledger": run_state.frame_counts.line(),
         "troubles": troubles if measured else [*troubles, why_nothing(run_state)],
     }
+
+
+def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str, Any]]:
+    found = [_figure(row) for row in _rows(figures, specimen)]
+    if figures.E.known and figures.elastic_strain:
+        found.append(
+            {"name": "strain of E and nu", "text": figures.elastic_strain, "interval": "", "words": True}
+        )
+    return found
 
 
 def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> list[TensileRow]:
