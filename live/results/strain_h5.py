@@ -200,7 +200,7 @@ def _add_mean(entry: Any, info: ResultsInfo) -> None:
         "NXdata",
         signal="eyy",
         axes=["time_s"],
-        title="Strains of the region, means of other values",
+        title="Strains of the region",
     )
     mean.attrs["auxiliary_signals"] = ["exx", "exy"]
     mean.attrs["load_axis"] = np.array("x" if info.axis == "x" else "y", "S1")

@@ -71,7 +71,8 @@ def summary_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     part = share_text(last.least_share)
     lines = [
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        f"last strain of the region: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
+        "last strain of the region:"
+        f" exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
         f"{f' {part}' if part else ''};"
         f" largest of any ZOI {largest * 1e6:+.0f} µm/m",
         noise_line(history),

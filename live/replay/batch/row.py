@@ -131,7 +131,7 @@ def _figures(figures: TensileFigures, config: Config) -> dict[str, Any]:
 
 
 def _noise(history: History) -> dict[str, float]:
-    """Medians over the test: noise of one frame, predicted noise of one ZOI's strain and of the strain of the region."""
+    """Medians over the test: noise of one frame, predicted noise of the strain of one ZOI and of the region."""
     columns = {"noise_GL": "noise_GL", "strain_noise": "zoi_sigma", "mean_strain_noise": "sigma_eyy"}
     return {name: _median(history, column) for name, column in columns.items()}
 
