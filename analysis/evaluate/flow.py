@@ -1,23 +1,28 @@
-"""Plastic flow of a sheet metal: r-value (ISO 10113:2020) and n-value (ISO 10275:2020), by regression.
+"""Plastic flow of a sheet metal: r-value (ISO 10113:2020), n-value (ISO 10275:2020), and where it necks.
 
-Both are slopes over true plastic strains of the uniform part, up to the highest stress; volume is kept.
+r and n are slopes by regression over true plastic strains of the uniform part, up to the highest stress; volume is
+kept.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
 from analysis.evaluate.curve import Floats, Loading
 from analysis.evaluate.elastic import MIN_POINTS, FittedLine
 from analysis.evaluate.figure import Figure, quantile
+from analysis.field import StrainField
 
 R_BETWEEN, N_BETWEEN, N_EARLY = (0.02, 0.2), (0.1, 0.2), (0.02, 0.1)
 """Plastic strains (engineering) that the slopes are taken between, or up to the highest stress where that is earlier;
 that of n begins early where the highest stress comes before 12 %."""
 _REACH = 1.2  # of the beginning of an interval: plastic strain that must be reached
+_SECTIONS = 5  # across the load, that a neck is sought among
+_CLEAR_SIGMA, _CLEAR_SHARE, _CLEAR_STRAIN = 5.0, 1.0, 1e-3  # of a neck, beyond the growth elsewhere
 _LEAST = 0.04  # plastic strain that n needs
 
 
@@ -101,6 +106,58 @@ def hardening(loading: Loading, line: FittedLine) -> Figure:
         return Figure.none(_few(int(np.count_nonzero(used)), low, min(high, reached)))
     slope, sigma, n = _slope(np.log(part.along[used]), np.log(part.stress[used]))
     return Figure.about(slope, sigma, n - 2, _over(low, min(high, reached)))
+
+
+@dataclass(frozen=True, slots=True)
+class Neck:
+    """Where strain grows after the highest stress while the rest of the specimen rests.
+
+    Attributes
+    ----------
+    x, y : float, px
+        Middle of the neck on the reference picture.
+    growth : float
+        Of the strain along the load there, in the section that grows most.
+    elsewhere : float
+        Median growth over the sections.
+    """
+
+    x: float
+    y: float
+    growth: float
+    elsewhere: float
+
+
+def neck(before: StrainField, after: StrainField, axis: Literal["x", "y"]) -> Neck | None:
+    """The neck between two fields after the highest stress; None where the strain grows evenly, or hardly.
+
+    Parameters
+    ----------
+    before, after : StrainField
+        On one grid.
+    axis : "x" or "y"
+        Of the load.
+    """
+    name, across = ("exx", 0) if axis == "x" else ("eyy", 1)
+    both = before.ok & after.ok
+    count = both.sum(axis=across)
+    known = count >= max(1, 0.5 * count.max())
+    if np.count_nonzero(known) < _SECTIONS:
+        return None
+    growth = np.where(both, after.value(name) - before.value(name), 0.0).sum(axis=across)
+    variance = np.where(both, after.sigma(name) ** 2 + before.sigma(name) ** 2, 0.0).sum(axis=across)
+    mean, sigma = growth[known] / count[known], np.sqrt(variance[known]) / count[known]
+    k, elsewhere = int(np.argmax(mean)), float(np.median(mean))
+    if mean[k] - elsewhere < max(_CLEAR_SIGMA * sigma[k], _CLEAR_SHARE * abs(elsewhere), _CLEAR_STRAIN):
+        return None
+    rows, columns = np.nonzero(
+        both
+        & (np.arange(both.shape[1 - across]) == np.flatnonzero(known)[k]).reshape(
+            (1, -1) if across == 0 else (-1, 1)
+        )
+    )
+    grid = before.grid
+    return Neck(float(grid.x[columns].mean()), float(grid.y[rows].mean()), float(mean[k]), elsewhere)
 
 
 def _slope(x: Floats, y: Floats) -> tuple[float, float, int]:

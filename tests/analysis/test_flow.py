@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.evaluate import STANDARDS, Curve, TensileOptions, evaluate_test
+from analysis.evaluate import STANDARDS, Curve, TensileOptions, evaluate_test, neck
+from analysis.field import Roi, StrainField, ZoiGrid
 from hw_mocks.machine import FlowCurve, PowerLaw
 
 NOISE, NOISE_PA = 2e-6, 2e4
@@ -70,3 +71,22 @@ def test_poissons_ratio_of_plastics_is_taken_from_0_3_percent_on() -> None:
         TensileOptions(STANDARDS["iso527"]),
     )
     assert "the strain reaches 0.27 %" in short.nu.why
+
+
+def strained(rows: dict[int, float], *, sigma: float = 1e-4) -> StrainField:
+    """eyy of 12 sections of a specimen, 0.2 where ``rows`` has none."""
+    zois = ZoiGrid.cover(Roi(10, 20, 32 + 8 * 7, 32 + 8 * 11), 32, 8)
+    strain = np.full((12, 1), 0.2)
+    for row, value in rows.items():
+        strain[row] = value
+    return StrainField.from_values(zois, {"dv_dy": strain}, sigma)
+
+
+def test_a_neck_is_found_where_strain_grows_while_the_rest_rests() -> None:
+    before = strained({})
+    found = neck(before, strained({7: 0.35, 8: 0.41, 9: 0.33}), "y")
+    assert found is not None and found.growth == pytest.approx(0.21)
+    assert (found.x, found.y) == (10 + 15.5 + 4 * 7, 20 + 15.5 + 8 * 8) and abs(found.elsewhere) < 1e-12
+    assert neck(before, strained(dict.fromkeys(range(12), 0.25)), "y") is None, "an even strain is no neck"
+    assert neck(before, strained({8: 0.201}, sigma=1e-2), "y") is None, "nor is noise"
+    assert neck(before, strained({8: 0.41}), "x") is None

@@ -13,7 +13,7 @@ from live.pipeline.screen import Screen
 from live.results.figures import axis_text, figure_lines, headline, sharpness_line
 from live.results.noise_floor import StillPhase, still_phase_of
 from live.results.report import curves
-from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
+from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
 from live.results.report.maps import MapPictures, map_pictures, maps, statuses
 from live.results.report.page import (
     Html,
@@ -232,8 +232,8 @@ def _about_curves(curve: EvaluatedCurve) -> Html:
 
 def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
     """The figures as text, how they were found, and why others are not known."""
-    lines = figure_lines(curve.figures, run.specimen) if curve.has_load else []
-    return [paragraph(line.strip().replace("  ", ", ")) for line in lines]
+    lines = [*figure_lines(curve.figures, run.specimen), neck_line(run, curve)] if curve.has_load else []
+    return [paragraph(line.strip().replace("  ", ", ")) for line in lines if line]
 
 
 def _sharpness_section(run: RunFolder) -> list[Html]:
