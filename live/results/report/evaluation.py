@@ -125,8 +125,8 @@ def neck_line(run: RunFolder, curve: EvaluatedCurve) -> str:
     scale, (begin, end) = run.mm_per_px, (run.strain.time_s[row] for row in (top, last))
     mm = f" ({found.x * scale:.1f}, {found.y * scale:.1f} mm)" if scale else ""
     return (
-        f"neck at x, y = {found.x:.0f}, {found.y:.0f} px{mm}: from the highest force at {begin:.4g} s to {end:.4g} s the"
-        f" strain there grew by {100 * found.growth:.2g} %, elsewhere by {100 * found.elsewhere:.2g} %"
+        f"neck at x, y = {found.x:.0f}, {found.y:.0f} px{mm}: from the highest force at {begin:.4g} s to {end:.4g} s"
+        f" the strain there grew by {100 * found.growth:.2g} %, elsewhere by {100 * found.elsewhere:.2g} %"
     )
 
 
