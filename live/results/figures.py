@@ -87,12 +87,21 @@ class TensileRow:
         return max(self.figure.high - self.figure.value, self.figure.value - self.figure.low)
 
     @property
-    def text(self) -> str:
-        """Value, interval and unit for a person, and a remark; forces below 2 kN in N."""
-        remark = f" ({self.figure.why})" if self.remarked and self.figure.known and self.figure.why else ""
+    def remark(self) -> str:
+        """What must be shown with the figure; mostly nothing."""
+        return self.figure.why if self.remarked and self.figure.known else ""
+
+    @property
+    def number(self) -> str:
+        """Value, interval and unit for a person; forces below 2 kN in N."""
         if self.unit == "kN" and abs(self.figure.value) < _SMALL_KN:
-            return figure_text(self.figure, 1e-3, "N") + remark
-        return figure_text(self.figure, 1.0, self.unit) + remark
+            return figure_text(self.figure, 1e-3, "N")
+        return figure_text(self.figure, 1.0, self.unit)
+
+    @property
+    def text(self) -> str:
+        """The number and the remark."""
+        return self.number + (f" ({self.remark})" if self.remark else "")
 
 
 def tensile_table(figures: TensileFigures, *, stresses: bool) -> dict[str, TensileRow]:
