@@ -91,8 +91,9 @@ def _not_measured(f: CheckFigures, what: str) -> CheckLine:
 
 
 def _camera(f: CheckFigures) -> Iterator[CheckLine]:
+    yield from (CheckLine("camera", warning, measured=False) for warning in f.stack.camera.warnings)
     if f.stack.lost:
-        yield CheckLine("frames lost", f"{f.stack.lost} between {len(f.stack)}", False,
+        yield CheckLine("frames lost", f"{f.stack.lost} between the {len(f.stack)} looked at", False,
                    "a lower frame rate, a smaller picture (--crop), another port or a faster machine")  # fmt: skip
     automatic = ", ".join(f.automatic)
     yield CheckLine("automatic controls", automatic or "none", not automatic, f"put on manual: {automatic}")

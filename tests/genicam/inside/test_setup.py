@@ -88,7 +88,9 @@ def test_what_is_not_possible_is_refused_with_what_is(
 def test_small_packets_are_warned_of(fake: FakeCameraProcess) -> None:
     for size, few in ((1400, True), (4000, False)):
         with contextlib.closing(open_camera(f"genicam:127.0.0.1?{SMALL}&packet_size={size}")) as camera:
-            assert any(f"packets of {size} bytes" in text for text in camera.info.warnings) == few
+            warned = [text for text in camera.info.warnings if f"packets of {size} bytes" in text]
+            assert bool(warned) == few
+            assert all("packet_size=8000" in text for text in warned)
             assert camera.info.controls["GevSCPSPacketSize"] == str(size)
 
 
