@@ -121,15 +121,20 @@ class AffineFit:
             if len(self._variances) >= _KEPT * len(VALUES):
                 self._variances.clear()
             places = Places.of(strain.grid, strain.window)
-            weights = [self._weights(q, chosen) for chosen in (valid, self.measurable)]
-            ours, whole = (_noise_of_windows(places, self.at, one) for one in weights)
-            self._variances[key] = self._by_pattern(name, strain, weights[1], whole) * ours / whole
+            noise = _noise_of_windows(places, self.at, self._weights(q, valid))
+            self._variances[key] = noise * self._beyond_windows(name, q, strain)
         return self._variances[key]
 
-    def _by_pattern(self, name: str, strain: StrainField, weights: Floats, otherwise: float) -> float:
+    def _beyond_windows(self, name: str, q: Floats, strain: StrainField) -> float:
+        """Variance of a value of all ZOIs with a pattern, over what follows from their windows alone."""
+        pattern = strain.sums
+        if pattern is None:
+            return 1.0
         if name not in self._patterns:
-            pattern = strain.sums
-            self._patterns[name] = otherwise if pattern is None else pattern.variance(self.at, weights)
+            weights = self._weights(q, self.measurable)
+            places = Places.of(strain.grid, strain.window)
+            made = pattern.variance(self.at, weights)
+            self._patterns[name] = made / _noise_of_windows(places, self.at, weights)
         return self._patterns[name]
 
     def _weights(self, q: Floats, valid: Bools) -> Floats:
