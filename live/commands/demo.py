@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -23,12 +24,14 @@ from live.commands.exit_codes import LOSS
 from live.commands.options import add_measure, add_options, configured
 from live.commands.run import print_outcome, run_attended
 from live.config.loading import Config
+from live.config.values import AUTO
 from live.pipeline.consumer import Consumer
 from live.pipeline.measurement import Measurement
 from live.results.figures import evaluate, tensile_table
 from live.results.folder import check_folder
 from live.run.outcome import Outcome
 from live.setup.compiling import compile_ahead
+from live.setup.region import located
 from live.ui.terminal.screen import TerminalScreen
 
 if TYPE_CHECKING:
@@ -60,7 +63,9 @@ def command(arguments: argparse.Namespace) -> int:
     # All that the next commands need too: 8-bit pictures, and a batch.
     compile_ahead(PICTURE_KINDS, phase=True, show=screen.status)
     collector = MeansCollector()
-    outcome = run_attended(config, screen, [collector])
+    # The whole picture is specimen: it is only looked at where gauges are to be placed.
+    with located(config, screen.print) if config.measure.gauges == AUTO else nullcontext(config) as config:
+        outcome = run_attended(config, screen, [collector])
     print_outcome(outcome, screen, verbose=arguments.verbose)
     if outcome.rig.specimen is None or not collector.measurements:
         return outcome.exit_code
