@@ -224,7 +224,8 @@ def compare(
     _print_force(outcome, specimen, print_line)
     figures = evaluate(outcome.run_state.history, outcome.run_state.loads, config.specimen)
     rows = tensile_table(figures, stresses=True)
-    print_line(f"  E  {rows['E'].text} by {figures.elastic_strain}, true {specimen.E / 1e9:g} GPa")
+    by = f" by {figures.elastic_strain}" if figures.E.known else ""
+    print_line(f"  E  {rows['E'].text}{by}, true {specimen.E / 1e9:g} GPa")
     print_line(f"  nu {rows['nu'].text}, true {specimen.nu:g}")
     if agreed and not figures.E.known and not outcome.exit_code:
         print_line(
