@@ -73,6 +73,7 @@ def command_of(pid: int) -> str:
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_while_workers_load(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "session.h5").write_bytes(b"nothing of a session")

@@ -55,6 +55,7 @@ sys.exit(main(["batch", *sys.argv[2:]]))
 """
 
 
+@pytest.mark.slow
 def test_a_full_disk_is_a_line_of_each_test(runs: Path, tmp_path: Path) -> None:
     """The limit on the size of files stands in for the disk."""
     words = [str(runs / f"hole-{n}" / "session.h5") for n in (1, 2)]
@@ -148,6 +149,7 @@ def test_one_that_fails_stops_no_other(
     assert "1 as they are, 1 to replay" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed(runs: Path, done: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     caller = started(runs / "[hu]*" / "session.h5", *SETTINGS, "--workers", 2, "--out", out)
@@ -163,6 +165,7 @@ def test_a_worker_that_is_killed(runs: Path, done: Path, tmp_path: Path) -> None
         )
 
 
+@pytest.mark.slow
 def test_a_caller_that_is_killed(runs: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     words = (runs / "hole-*" / "session.h5", *SETTINGS, "--workers", 2, "--out", out)
@@ -193,6 +196,7 @@ def test_interrupted(runs: Path, tmp_path: Path) -> None:
     assert not (out / "summary.csv").exists()
 
 
+@pytest.mark.slow
 def test_one_that_always_kills_its_worker(runs: Path, tmp_path: Path) -> None:
     out, over = tmp_path / "out", threading.Event()
 

@@ -9,27 +9,12 @@ from typing import Any
 
 import pytest
 
-from live.setup.compiling import compile_ahead
-from tests.live.ui.web.browser import FLAGS, Page, Program, chromium
+from tests.live.ui.web.browser import Page, Program
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 CAMERA = "sim:uniform?width=256&height=192&fps=15&hold=4&end=1&buffers=64&seconds={seconds}"
 OPTIONS = ["--zoi", "32", "--section", "20,2", "--scale", "0.1", "--no-view", "--no-rrd", "--page-port", "0"]
 Start = Callable[..., Page]
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    path = chromium()
-    compile_ahead(("uint16", "float32"))
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as driver:
-        opened = driver.chromium.launch(
-            executable_path=path, headless=True, chromium_sandbox=False, args=FLAGS
-        )
-        yield opened
-        opened.close()
 
 
 @pytest.fixture
