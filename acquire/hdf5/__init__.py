@@ -19,12 +19,13 @@ from acquire.hdf5.declared import (
     stored_rows,
 )
 from acquire.hdf5.disk import DiskSync, FlushTimer, forecast, free_bytes, network_share
-from acquire.hdf5.pictures import PictureReader, PictureStack, compile_loops
+from acquire.hdf5.pictures import COMPRESSED, PictureReader, PictureStack, compile_loops
 from acquire.hdf5.tables import (
     NO_UNIT,
     GrowingDataset,
     RowTable,
     as_text,
+    new_file,
     new_group,
     new_json,
     set_attributes,
@@ -32,6 +33,7 @@ from acquire.hdf5.tables import (
 )
 
 __all__ = [
+    "COMPRESSED",
     "NO_UNIT",
     "Declared",
     "DiskSync",
@@ -51,6 +53,7 @@ __all__ = [
     "forecast",
     "free_bytes",
     "network_share",
+    "new_file",
     "new_group",
     "new_json",
     "open_dataset",

@@ -32,6 +32,7 @@ from acquire.hdf5 import (
     RowTable,
     abandon_file,
     free_bytes,
+    new_file,
     reason,
     to_json,
 )
@@ -290,7 +291,7 @@ class SessionWriter(Closing):
 
 def _create(path: Path) -> h5py.File:
     try:
-        return h5py.File(path, "x", libver=("v110", "v110"))
+        return new_file(path)
     except FileExistsError as error:
         raise DataError(f"{path} exists already and is not overwritten; choose another name") from error
     except OSError as error:

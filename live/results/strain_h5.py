@@ -9,14 +9,15 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.hdf5 import FlushTimer, PictureStack, RowTable, abandon_file, reason
+from acquire.hdf5 import COMPRESSED, FlushTimer, PictureStack, RowTable, abandon_file, new_file, reason
 from analysis.evaluate import load_axis
 from live.results import layout
 from live.results.quantities import quantity_of
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
     from analysis.field import ZoiGrid
     from live.results.row import ResultsInfo
 
+VALUE_BITS, SIGMA_BITS = 9, 9
+"""Binary digits kept: of a value below its standard uncertainty; of an uncertainty."""
 FLUSH_S = 0.25  # a row of a live test waits for its flush no longer than this
 _WORDS = {
     "u": "displacement along x (right)",
@@ -109,8 +112,8 @@ class StrainWriter:
 
     def _append(self, row: StrainRow) -> None:
         values = self._values.row(row.values)
-        for name, stack in self._maps.items():
-            stack.append(row.maps[name])
+        for name, stored in rounded(row.maps).items():
+            self._maps[name].append(stored)
         self._values.hold(values)
 
     def _flush(self) -> None:
@@ -149,15 +152,35 @@ class StrainWriter:
         )
 
 
+def rounded(maps: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """The maps without the digits that are noise, which no compression makes smaller.
+
+    A value keeps the binary digits down to 1/512 of its standard uncertainty (so it changes by 1/1024 of it at
+    most), a standard uncertainty and the residual keep nine significant ones (0.2 %). Values without an
+    uncertainty stay as they are.
+    """
+    stored = dict(maps)
+    for name in layout.PLAIN_MAPS:
+        sigma = maps[f"sigma_{name}"]
+        stored[name] = _to_digit(maps[name], np.frexp(sigma)[1] - 1 - VALUE_BITS, sigma)
+    for name in (*(f"sigma_{name}" for name in layout.PLAIN_MAPS), "residual"):
+        stored[name] = _to_digit(maps[name], np.frexp(maps[name])[1] - SIGMA_BITS, maps[name])
+    return stored
+
+
+def _to_digit(values: NDArray[Any], digit: NDArray[Any], scale: NDArray[Any]) -> NDArray[Any]:
+    """Round to multiples of 2**digit, where ``scale``, from which the digit is, is a number above 0."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        multiple = np.ldexp(np.rint(np.ldexp(values, -digit)), digit)
+        return np.where(np.isfinite(multiple) & (scale > 0) & np.isfinite(scale), multiple, values)
+
+
 def _value_names(info: ResultsInfo) -> tuple[str, ...]:
     return layout.column_names(info.gauges, info.extras)
 
 
 def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
-    import h5py
-
-    # These bounds give the format that survives SIGKILL; older ones promise nothing.
-    file = h5py.File(path, "x", libver=("v110", "v110"))
+    file = new_file(path)
     file.attrs.update(
         NX_class="NXroot",
         default="entry",
@@ -251,7 +274,7 @@ def _add_map(strain: Any, name: str, shape: tuple[int, int]) -> None:
     kind = layout.map_declared(name, shape).dtype
     dataset = strain.create_dataset(
         name, (0, *shape), kind, maxshape=(None, *shape), chunks=(1, *shape), fillvalue=_fill(kind),
-        fletcher32=True,
+        fletcher32=True, **COMPRESSED,
     )  # fmt: skip
     plain = name.removeprefix("sigma_")
     unit = "px" if plain in ("u", "v") else ""
