@@ -46,6 +46,8 @@ lint: $(VENV)/dev
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
+	@$(BIN)/mypy --platform win32
+	@$(BIN)/mypy --platform darwin
 
 format: $(VENV)/dev
 	@$(BIN)/ruff check --fix-only --quiet .

@@ -12,6 +12,7 @@ import fcntl
 import mmap
 import os
 import select
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -285,6 +286,7 @@ class Kernel:
 
     def open(self, path: str) -> int:
         """A descriptor of the node."""
+        assert sys.platform == "linux"
         return os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
 
     def close(self, fd: int) -> None:
@@ -293,6 +295,7 @@ class Kernel:
 
     def ioctl(self, fd: int, request: int, argument: Any) -> None:
         """One request; again when a signal interrupts it."""
+        assert sys.platform == "linux"
         while True:
             try:
                 fcntl.ioctl(fd, request, argument)
@@ -302,10 +305,12 @@ class Kernel:
 
     def mmap(self, fd: int, length: int, offset: int) -> Any:
         """A buffer of the driver, readable."""
+        assert sys.platform == "linux"
         return mmap.mmap(fd, length, mmap.MAP_SHARED, mmap.PROT_READ | mmap.PROT_WRITE, offset=offset)
 
     def poll(self, fd: int, timeout_s: float) -> bool:
         """Whether there is something to fetch (a picture or an error)."""
+        assert sys.platform == "linux"
         poller = select.poll()
         poller.register(fd, select.POLLIN)
         return bool(poller.poll(timeout_s * 1000))
