@@ -4,7 +4,15 @@
 and forecasts the free space, ``declared`` checks what a file holds.
 """
 
-from acquire.hdf5.damage import PaddedFile, abandon_file, check_size, probe, read_superblock, reason
+from acquire.hdf5.damage import (
+    PaddedFile,
+    abandon_file,
+    check_size,
+    create_file,
+    probe,
+    read_superblock,
+    reason,
+)
 from acquire.hdf5.declared import (
     Declared,
     JsonField,
@@ -25,7 +33,6 @@ from acquire.hdf5.tables import (
     GrowingDataset,
     RowTable,
     as_text,
-    new_file,
     new_group,
     new_json,
     set_attributes,
@@ -50,10 +57,10 @@ __all__ = [
     "check_object",
     "check_size",
     "compile_loops",
+    "create_file",
     "forecast",
     "free_bytes",
     "network_share",
-    "new_file",
     "new_group",
     "new_json",
     "open_dataset",

@@ -10,35 +10,11 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
-
-CACHE_BYTES, METADATA_BYTES = 32 << 10, 2 << 20
-"""Of values of each dataset, and of the structure of a file, that HDF5 keeps in memory."""
-
-
-def new_file(path: Path) -> h5py.File:
-    """A new file in the format that survives a kill; its caches do not grow with it.
-
-    By default HDF5 keeps up to 1 MiB of each dataset, and 32 MiB of a file's structure: a file with some hundred
-    columns then takes more memory for an hour.
-
-    Raises
-    ------
-    OSError
-        The file exists, or cannot be made.
-    """
-    # Older formats promise nothing after a kill.
-    file = h5py.File(path, "x", libver=("v110", "v110"), rdcc_nbytes=CACHE_BYTES)
-    cache = file.id.get_mdc_config()
-    cache.max_size = METADATA_BYTES
-    cache.flash_incr_mode = 0  # or it grows for one large piece
-    file.id.set_mdc_config(cache)
-    return file
 
 
 class GrowingDataset:

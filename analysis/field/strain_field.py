@@ -106,6 +106,9 @@ class StrainField:
         What ``exx``, ``eyy``, ``exy`` and their means are; the uncertainties are those of the small strains.
     sums : Sums, optional
         Makes the uncertainty of means right where neighbours nearly cancel (gradients on dense grids).
+    blur : (2, R, C) float32, px^2, optional
+        Growth of the variance of the blur since the last reference, mean of x and y, negative where the picture
+        is sharper; and its standard uncertainty.
     """
 
     grid: ZoiGrid
@@ -121,10 +124,11 @@ class StrainField:
     motion: Motion | None = None
     measure: Measure = "small"
     sums: Sums | None = None
+    blur: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         for name in ("parameters", "covariance", "covariance_reference", "residual", "status",
-                     "iterations", "gain"):  # fmt: skip
+                     "iterations", "gain", "blur"):  # fmt: skip
             array = getattr(self, name)
             if array is not None:
                 array.flags.writeable = False

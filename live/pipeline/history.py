@@ -27,7 +27,7 @@ _GROWTH = 1.1  # of the time steps from one search for the axis to the next
 _COUNTS = ("n_valid", "n_zoi")
 SHORT = (
     "sigma_exx", "sigma_eyy", "sigma_exy", "sigma_extension_x", "sigma_extension_y", "zoi_sigma", "u", "v", "noise_GL",
-    "measure_s", "latency_s", "misfit",
+    "measure_s", "latency_s", "misfit", "blur", "sigma_blur",
 )  # fmt: skip
 """Numbers of which nobody needs more than seven digits."""
 _TYPES = {
@@ -40,7 +40,7 @@ _TYPES = {
 class TimeSeries(Sequence[TimeStep]):
     """A list that one thread appends to and any thread reads: numbers as columns, each text once.
 
-    About 160 bytes for each time step and 17 more for each gauge; of ``sigma`` and the like seven digits.
+    About 170 bytes for each time step and 21 more for each gauge; of ``sigma`` and the like seven digits.
     """
 
     def __init__(self) -> None:
@@ -127,6 +127,7 @@ class _GaugeColumn:
         nothing = [math.nan] * since
         self.since = since
         self.values, self._sigmas = array("d", nothing), array("f", nothing)
+        self._shares = array("f", nothing)
         self._reasons, self._missing = _TextColumn(), array("b", [1] * since)
         for _ in range(since):
             self._reasons.append("")
@@ -135,11 +136,14 @@ class _GaugeColumn:
         stored = value or GaugeValue(math.nan, math.nan)
         self.values.append(stored.value)
         self._sigmas.append(stored.sigma)
+        self._shares.append(stored.share)
         self._reasons.append(stored.reason)
         self._missing.append(value is None)
 
     def at(self, i: int) -> GaugeValue | None:
-        return None if self._missing[i] else GaugeValue(self.values[i], self._sigmas[i], self._reasons[i])
+        if self._missing[i]:
+            return None
+        return GaugeValue(self.values[i], self._sigmas[i], self._reasons[i], self._shares[i])
 
 
 def _copied(kept: array[Any], count: int) -> Array:

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.hdf5 import COMPRESSED, FlushTimer, PictureStack, RowTable, abandon_file, new_file, reason
+from acquire.hdf5 import COMPRESSED, FlushTimer, PictureStack, RowTable, abandon_file, create_file, reason
+from acquire.printable import counted
 from analysis.evaluate import load_axis
 from live.results import layout
 from live.results.quantities import quantity_of
@@ -43,7 +44,9 @@ _WORDS = {
     "residual": "residual chi^2 (about 1 when all is well)",
     "status": "status of the ZOI (0 = ok)",
     "iterations": "iterations",
+    "blur": "blur since the reference, negative: sharper",
 }
+_MAPS = (*layout.MAPS, *layout.ADDED_MAPS)
 
 
 class StrainWriter:
@@ -77,9 +80,9 @@ class StrainWriter:
         self._path, self.failed, self._axis = path, False, info.axis
         self._flushed = 0  # rows
         self._timer = FlushTimer(flush_s, now)
-        self._file = self._guard(lambda: _create(path, grid, info))
+        self._file = self._guard(lambda: create_file(path, lambda file: _declare(file, grid, info)))
         entry = self._file["entry"]
-        self._maps = {n: PictureStack(entry["strain"][n]) for n in layout.MAPS}
+        self._maps = {n: PictureStack(entry["strain"][n]) for n in _MAPS}
         self._values = RowTable(entry["mean"], _value_names(info))
 
     def write(self, row: StrainRow) -> None:
@@ -146,9 +149,9 @@ class StrainWriter:
             raise self._trouble(error) from error
 
     def _trouble(self, error: Exception) -> DataError:
+        kept = f"; {counted(self._flushed, 'row')} before stay readable" if self._flushed else ""
         return DataError(
-            f"{self._path}: cannot be written ({reason(error)}); make room on the disk or choose another --out. "
-            f"The {self._flushed} rows before are safe"
+            f"{self._path}: cannot be written ({reason(error)}){kept}; make room on the disk or choose another --out"
         )
 
 
@@ -160,10 +163,10 @@ def rounded(maps: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
     uncertainty stay as they are.
     """
     stored = dict(maps)
-    for name in layout.PLAIN_MAPS:
+    for name in (*layout.PLAIN_MAPS, "blur"):
         sigma = maps[f"sigma_{name}"]
         stored[name] = _to_digit(maps[name], np.frexp(sigma)[1] - 1 - VALUE_BITS, sigma)
-    for name in (*(f"sigma_{name}" for name in layout.PLAIN_MAPS), "residual"):
+    for name in (*(f"sigma_{name}" for name in (*layout.PLAIN_MAPS, "blur")), "residual"):
         stored[name] = _to_digit(maps[name], np.frexp(maps[name])[1] - SIGMA_BITS, maps[name])
     return stored
 
@@ -179,8 +182,8 @@ def _value_names(info: ResultsInfo) -> tuple[str, ...]:
     return layout.column_names(info.gauges, info.extras)
 
 
-def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
-    file = new_file(path)
+def _declare(file: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
+    """Everything but the rows."""
     file.attrs.update(
         NX_class="NXroot",
         default="entry",
@@ -198,9 +201,6 @@ def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
     _add_mean(entry, info)
     _add_gauges(entry, info)
     _add_notes(entry, info)
-    file.flush()
-    file.swmr_mode = True
-    return file
 
 
 def _slice_of(row: int) -> Any:
@@ -240,7 +240,7 @@ def _add_gauges(entry: Any, info: ResultsInfo) -> None:
     group = _group(entry, "gauges", "NXdata", signal=first, axes=["time_s"], title="Virtual gauges")
     group["time_s"] = entry["mean/time_s"]
     for name, described in info.gauges.items():
-        column, sigma = gauge_columns(name)
+        column, sigma, _ = gauge_columns(name)
         group[name], group[f"sigma_{name}"] = entry["mean"][column], entry["mean"][sigma]
         group[f"{name}{layout.ERRORS}"] = entry["mean"][sigma]
         entry["mean"][column].attrs.update(uncertainties=sigma, gauge=json.dumps(described))
@@ -256,9 +256,9 @@ def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
         title=f"Strain maps, {info.strain_measure} strain",
         default_slice=_slice_of(0),
     )
-    for name in layout.MAPS:
+    for name in _MAPS:
         _add_map(strain, name, grid.shape)
-    for name in layout.PLAIN_MAPS:
+    for name in (*layout.PLAIN_MAPS, "blur"):
         strain[f"{name}{layout.ERRORS}"] = strain[f"sigma_{name}"]
     for name, values in (("x", grid.x), ("y", grid.y)):
         strain[name] = np.asarray(values, np.float64)
@@ -277,7 +277,7 @@ def _add_map(strain: Any, name: str, shape: tuple[int, int]) -> None:
         fletcher32=True, **COMPRESSED,
     )  # fmt: skip
     plain = name.removeprefix("sigma_")
-    unit = "px" if plain in ("u", "v") else ""
+    unit = quantity_of(plain).unit
     words = _WORDS[plain] if plain == name else f"standard uncertainty of {_WORDS[plain]}"
     dataset.attrs.update(units=unit, long_name=f"{words} ({unit})" if unit else words, interpretation="image")
     if name == "status":

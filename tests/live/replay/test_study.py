@@ -11,6 +11,7 @@ from acquire.errors import ConfigError
 from live.cli import main
 from live.config.loading import load_config
 from live.replay.study import StudyResult, StudySetting, recommended
+from live.results.report import saving
 
 SIZE = "lockstep=yes&seconds=6&fps=10&width=320&height=288&bits=12&hole=24&hold=2&end=1"
 PLAIN = ["--reference-burst", "6", "--burst", "2", "--zoi", "32", "--step", "16", "--no-view", "--no-rrd"]
@@ -52,13 +53,32 @@ def test_windows_given_and_missing(session: Path, tmp_path: Path, capsys: pytest
     words = ["study", str(session), "--zoi", "48", "--roi", "all", "--out", str(tmp_path / "a")]
     assert main([*words, "--static", "0,2", "--loaded", "5,5.9"]) == 0
     printed = capsys.readouterr().out
-    assert "of the 1 settings" in printed
+    assert (
+        "\n1 setting on " in f"\n{printed}" and "it alone shows at least 95% of the largest strain" in printed
+    )
     assert main(words) == 2
     assert "exists already" in capsys.readouterr().err
     words[-1] = str(tmp_path / "b")
     assert main([*words, "--loaded", "100,101"]) == 4
     assert "0 bursts from 100 to 101 s, 2 are needed; give --loaded" in capsys.readouterr().err
     assert not (tmp_path / "b").exists()
+
+
+def test_a_browser_that_does_not_work_costs_the_png_alone(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It lost table and recommendation of a whole study."""
+    browser = tmp_path / "chromium"
+    browser.write_text("#!/bin/sh\necho no display here >&2\nexit 1\n")
+    browser.chmod(0o755)
+    monkeypatch.setattr(saving, "find_browser", lambda: str(browser))
+    out = tmp_path / "study"
+    assert main(["study", str(session), "--zoi", "48,64", "--roi", "all", "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert f"SVG and CSV without PNG: {browser} failed on noise.svg (no display here)" in printed
+    assert "px ZOIs, step" in printed and "Traceback" not in printed
+    assert len(rows(out)) == 2 and (out / "measure.toml").exists()
+    assert {path.suffix for path in (out / "figures").iterdir()} == {".svg", ".csv"}
 
 
 def test_without_a_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

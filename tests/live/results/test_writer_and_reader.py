@@ -21,6 +21,7 @@ import pytest
 from acquire.errors import DataError
 from acquire.hdf5 import damage as child
 from analysis import Roi, ZoiGrid
+from live.pipeline.measurement import Measurement
 from live.results import Results, ResultsInfo, Strain
 from live.results.layout import MAPS, PLAIN_MAPS
 from live.results.row import StrainRow, maps_of
@@ -77,7 +78,7 @@ def noisy_row(side: int) -> StrainRow:
     rng = np.random.default_rng(5)
     row = StrainRow.of(make_measurement(1, 1e-3), INFO)
     maps = dict(row.maps)
-    for name in PLAIN_MAPS:
+    for name in (*PLAIN_MAPS, "blur"):
         sigma = 1e-4 * rng.normal(1, 0.05, (side, side)).astype(np.float32)
         maps[f"sigma_{name}"], maps[name] = sigma, (2e-3 + sigma * rng.normal(size=sigma.shape)).astype("f4")
     maps["residual"] = rng.normal(1, 0.1, (side, side)).astype(np.float32)
@@ -111,6 +112,42 @@ def test_the_maps_take_half_of_their_bytes(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "strain.h5") as file:
         stored = sum(file["entry/strain"][name].id.get_chunk_info(2).size for name in MAPS)
     assert 0.2 < stored / sum(row.maps[name].nbytes for name in MAPS) < 0.5
+
+
+def blurred(number: int) -> Measurement:
+    """With a blur of 0.5 px that is known to 0.1 px^2 in each ZOI."""
+    m = make_measurement(number)
+    blur = np.stack([np.where(m.field.ok, value, np.nan) for value in (0.25, 0.1)]).astype(np.float32)
+    return dataclasses.replace(
+        m,
+        field=dataclasses.replace(m.field, blur=blur),
+        time_step=dataclasses.replace(m.time_step, blur=0.5, sigma_blur=0.02),
+    )
+
+
+def test_the_blur_comes_back_and_files_without_it_open(tmp_path: Path) -> None:
+    with open_results(tmp_path) as results:
+        results.add(blurred(0))
+    path = tmp_path / "strain.h5"
+    with Strain.open(path) as strain:
+        ok = strain.maps("status", 0) == 0
+        assert (
+            strain.maps("blur", 0)[ok] == pytest.approx(0.5) and np.isnan(strain.maps("blur", 0)[~ok]).all()
+        )
+        assert strain.maps("sigma_blur", 0)[ok] == pytest.approx((math.sqrt(0.35) - math.sqrt(0.15)) / 2)
+        assert (strain.values["blur_px"][0], strain.values["sigma_blur_px"][0]) == (0.5, 0.02)
+    with h5py.File(path, "r+") as file:
+        for name in (
+            "strain/blur",
+            "strain/sigma_blur",
+            "strain/blur_errors",
+            "mean/blur_px",
+            "mean/sigma_blur_px",
+        ):
+            del file["entry"][name]
+    with Strain.open(path) as strain:
+        assert "blur" not in strain.names and "blur_px" not in strain.values
+        assert np.isfinite(strain.maps("eyy", 0)[ok]).all()
 
 
 def test_the_table_has_the_columns_scripts_rely_on(tmp_path: Path) -> None:

@@ -203,7 +203,7 @@ def test_the_scale_from_a_board(browser: Any, tmp_path: Path, start: Callable[..
         page.page.fill(f"#scale [name={name}]", str(value))
     page.page.click("#scale button")
     page.until(lambda: page.text("scale").startswith("9.00 px/mm"), "the scale is shown")
-    assert page.text("answer") == "board ✓" and not page.errors
+    assert page.text("answer") == "done ✓" and not page.errors
 
 
 def test_a_page_that_is_killed_changes_nothing(browser: Any, start: Callable[..., Program]) -> None:
