@@ -40,7 +40,7 @@ _TYPES = {
 class TimeSeries(Sequence[TimeStep]):
     """A list that one thread appends to and any thread reads: numbers as columns, each text once.
 
-    About 170 bytes for each time step and 21 more for each gauge; of ``sigma`` and the like seven digits.
+    About 170 bytes for each time step and 25 more for each gauge; of ``sigma`` and the like seven digits.
     """
 
     def __init__(self) -> None:
@@ -126,7 +126,7 @@ class _GaugeColumn:
     def __init__(self, since: int) -> None:
         nothing = [math.nan] * since
         self.since = since
-        self.values, self._sigmas = array("d", nothing), array("f", nothing)
+        self.values, self._sigmas = array("d", nothing), array("d", nothing)
         self._shares = array("f", nothing)
         self._reasons, self._missing = _TextColumn(), array("b", [1] * since)
         for _ in range(since):

@@ -252,8 +252,7 @@ def as_kept(time_step: TimeStep) -> TimeStep:
     """With seven digits of the uncertainties and of what is for information."""
     short = {name: float(np.float32(getattr(time_step, name))) for name in SHORT}
     gauges = {
-        name: replace(gauge, sigma=float(np.float32(gauge.sigma)), share=float(np.float32(gauge.share)))
-        for name, gauge in time_step.gauges.items()
+        name: replace(gauge, share=float(np.float32(gauge.share))) for name, gauge in time_step.gauges.items()
     }
     return replace(time_step, **short, gauges=gauges)
 
