@@ -65,10 +65,12 @@ class AreaStrain:
 
     def sigma(self, name: str) -> float:
         """Standard uncertainty of ``value`` (of the small strain), the noise of the reference included."""
-        _, noise = _sum_of(name, self.weights)
+        shares, noise = _sum_of(name, self.weights)
         here = np.where(self.valid, self.field.covariance[_DISPLACEMENTS], 0).reshape(2, -1)
         variance = math.fsum(fixed_sums(noise.reshape(2, -1) * here))
-        return math.sqrt(max(variance, 0.0)) * self._beyond_overlap(name)
+        own = math.sqrt(max(variance, 0.0)) * self._beyond_overlap(name)
+        common = self.field.common
+        return own if common is None else math.hypot(own, math.sqrt(common.variance_of_sum(shares)))
 
     def _beyond_overlap(self, name: str) -> float:
         """Noise that the pattern of the ZOIs makes, over that which follows from their overlap."""

@@ -4,8 +4,10 @@
 ``uncertainty`` has sigmas of values and means, ``motion`` predicts the next field.
 """
 
+from analysis.field.common import CommonError
 from analysis.field.grid import WINDOWS, Roi, Window, ZoiGrid, profile
 from analysis.field.motion import Motion
+from analysis.field.part import Block, part_of
 from analysis.field.status import Status
 from analysis.field.strain_field import StrainField
 from analysis.field.uncertainty import (
@@ -25,6 +27,8 @@ __all__ = [
     "PAIR_INDEX",
     "VALUES",
     "WINDOWS",
+    "Block",
+    "CommonError",
     "Measure",
     "Motion",
     "Roi",
@@ -36,6 +40,7 @@ __all__ = [
     "ZoiGrid",
     "combination",
     "fixed_sums",
+    "part_of",
     "products",
     "profile",
     "strain_tensor",

@@ -14,6 +14,7 @@ from live.config.values import (
     LISTEN_ADDRESS,
     NAMES,
     RECORD_MODE,
+    RECTANGLE,
     REGION,
     STRAINS,
     TEXT,
@@ -120,6 +121,14 @@ class ScaleConfig:
     def px_per_mm(self) -> float | None:
         """None if the scale is not known."""
         return None if self.mm_per_px is None else 1 / self.mm_per_px
+
+
+@dataclass(frozen=True, slots=True)
+class PlateConfig:
+    """[plate.NAME]: a plate that moves with the specimen and is not loaded (docs/optics.md)."""
+
+    box: tuple[float, float, float, float] | None = key(RECTANGLE, None,
+        "x, y, width, height of the pattern on the plate, px")
 
 
 @dataclass(frozen=True, slots=True)

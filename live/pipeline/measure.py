@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -18,13 +18,16 @@ from acquire.burst import LIMIT_PX
 from acquire.events import Event, EventKind, EventSink, Level, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
-from live.pipeline.measurement import Measurement
+from analysis.field import part_of
+from analysis.optics import ASSUMED_TILT, SCALE, PlateFit, choose_model, trouble
+from live.pipeline.measurement import Measurement, PlateReading
 from live.pipeline.reference import Correction, averaged, unchanged
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
     from analysis.evaluate import Gauge
     from analysis.field import Measure, StrainField
+    from analysis.optics import Model
 
 
 MAX_ROTATION, MAX_STRAIN = math.radians(0.5), 0.02
@@ -168,6 +171,64 @@ class StrainGuard:
             self._on_event(Event(t, EventKind.MEASUREMENT, "strain", text, "warning", data))
 
 
+class PlateCorrection:
+    """Removes the apparent motion of plates from each field; an error event where that stops.
+
+    The model is chosen at the first burst. Where a plate is lost the last motion is removed until it is found
+    again; where a plate is not rigid, to the end.
+
+    Parameters
+    ----------
+    fit : PlateFit
+    focal_px : float, px
+        Distance of the camera over the size of a pixel on the specimen.
+    on_event : callable taking an Event
+    """
+
+    def __init__(self, fit: PlateFit, focal_px: float, on_event: EventSink) -> None:
+        self._fit, self._focal_px, self._on_event = fit, focal_px, on_event
+        self._model: Model | None = None
+        self._last = fit.nothing()
+        self._loaded, self._trouble = "", ""
+
+    def apply(self, whole: StrainField, burst: Burst, measure: Measure) -> tuple[StrainField, PlateReading]:
+        """The field of the specimen, corrected, and what the plates measured; ``whole`` has both."""
+        words, not_rigid = trouble(self._fit, whole)
+        self._loaded = self._loaded or (words if not_rigid else "")
+        words = self._loaded or words
+        self._report(words, burst)
+        if not words:
+            self._model = self._model or self._choose(whole, burst)
+            self._last = self._fit.motion(whole, self._model)
+        motion, covariance = self._last
+        layout = self._fit.layout
+        raw = replace(part_of(whole, layout.here, layout.specimen), measure=measure)
+        field = replace(motion.removed_from(raw), common=self._fit.error(raw, covariance))
+        sigma = math.sqrt(float(covariance[SCALE, SCALE]))
+        return field, PlateReading(whole, raw, motion, sigma, not words)
+
+    def _choose(self, whole: StrainField, burst: Burst) -> Model:
+        chosen = choose_model(self._fit, whole, self._focal_px)
+        text = (
+            f"plates {', '.join(self._fit.layout.plates)}: {chosen.model} is corrected; in the mean strain that leaves"
+            f" {chosen.noise * 1e6:.1f} um/m by noise of one burst and {chosen.unseen * 1e6:.1f} um/m by a tilt of"
+            f" {math.degrees(ASSUMED_TILT):.1g} degrees"
+        )
+        data = {"model": chosen.model, "noise": chosen.noise, "unseen": chosen.unseen}
+        self._on_event(Event(burst.t, EventKind.MEASUREMENT, "plates", text, "info", data))
+        return chosen.model
+
+    def _report(self, words: str, burst: Burst) -> None:
+        if bool(words) is bool(self._trouble):
+            return
+        text, level = "the plates are measured again, and the correction goes on", "info"
+        if words:
+            level = "error"
+            text = f"{words}; the correction by plates has stopped: motion off the plane reads as strain from here on"
+        self._trouble = words
+        self._on_event(Event(burst.t, EventKind.MEASUREMENT, "plates", text, cast(Level, level)))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class NewReference:
     """A command among the bursts: this burst becomes the reference; results stay composed."""
@@ -186,6 +247,7 @@ def measure(
     noise_GL: float | None = None,
     correct: Correction = unchanged,
     gauges: Sequence[Gauge] = (),
+    plates: PlateCorrection | None = None,
     renew_at: float = 1.0,
     strain: Measure = "small",
     on_event: EventSink = ignore_event,
@@ -206,6 +268,8 @@ def measure(
         Removes the fixed pattern of the sensor from a burst.
     gauges : sequence of Gauge
         Read on every field.
+    plates : PlateCorrection, optional
+        Corrects every field; ``kernel`` then measures the ZOIs of its plates too.
     renew_at : float
         The reference is renewed when more than this share of the ZOIs is lost from one burst to
         the next, and renewing finds most of them again; 1 for never.
@@ -228,8 +292,12 @@ def measure(
             tracker.renew_on_demand(correct(item.burst))
             continue
         began = timer()
-        field = replace(tracker.measure(correct(item)), measure=strain)
+        whole, reading = tracker.measure(correct(item)), None
+        if plates is None:
+            field = replace(whole, measure=strain)
+        else:
+            field, reading = plates.apply(whole, item, strain)
         took = timer() - began
         guard.check(field, item.t)
-        yield Measurement.of(number, item, field, loads.force_at(item.t), took, gauges)
+        yield Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, reading)
         number += 1

@@ -16,6 +16,7 @@ import numpy as np
 from acquire.frame import Burst
 from analysis.evaluate import AreaStrain, Gauge, GaugeValue, extension_of
 from analysis.field import StrainField
+from analysis.optics import ApparentMotion
 
 AXIAL, TRANSVERSE = "axial", "transverse"
 """Gauges of these names are the strain along and across the load."""
@@ -63,6 +64,10 @@ class TimeStep:
         Variation of the strain over the region (``analysis.evaluate.Unevenness``).
     misfit : float
         That variation over what noise makes of it.
+    raw_exx, raw_eyy, raw_exy : float
+        Strains of the region before the motion of plates was removed; NaN without plates.
+    corrected : float
+        1 where plates were measured, 0 where the correction has stopped; NaN without plates.
     """
 
     t: float
@@ -93,6 +98,10 @@ class TimeStep:
     uneven_exx: float = math.nan
     uneven_eyy: float = math.nan
     misfit: float = math.nan
+    raw_exx: float = math.nan
+    raw_eyy: float = math.nan
+    raw_exy: float = math.nan
+    corrected: float = math.nan
 
     def axial(self, axis: str) -> tuple[float, float]:
         """Strain along the load, which runs along ``axis`` ("x" or "y"), and its standard uncertainty."""
@@ -161,6 +170,40 @@ def ordered_mean(values: np.ndarray) -> float:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class PlateReading:
+    """What plates measured of the camera's part in one burst.
+
+    Attributes
+    ----------
+    whole : StrainField
+        As measured, of specimen and plates.
+    raw : StrainField
+        As measured, of the specimen.
+    motion : ApparentMotion
+        What was removed.
+    sigma_scale : float
+        Standard uncertainty of its scale.
+    corrected : bool
+        False: the plates could not be used, and the last motion was removed.
+    """
+
+    whole: StrainField
+    raw: StrainField
+    motion: ApparentMotion
+    sigma_scale: float
+    corrected: bool
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Those of a ``TimeStep``."""
+        area = AreaStrain.of(self.raw)
+        raw = {
+            f"raw_{name}": math.nan if area is None else area.value(name) for name in ("exx", "eyy", "exy")
+        }
+        return raw | {"corrected": float(self.corrected)}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
     """A burst, its strain field, and the means of that with the force at its time.
 
@@ -171,24 +214,34 @@ class Measurement:
     burst : Burst
     field : StrainField
     time_step : TimeStep
+    plates : PlateReading or None
+        Where there are plates, and ``field`` is corrected by them.
     """
 
     number: int
     burst: Burst
     field: StrainField
     time_step: TimeStep
+    plates: PlateReading | None = None
 
     @classmethod
     def of(
         cls, number: int, burst: Burst, field: StrainField, force: float, measure_s: float = 0.0,
-        gauges: Sequence[Gauge] = (),
+        gauges: Sequence[Gauge] = (), plates: PlateReading | None = None,
     ) -> Measurement:  # fmt: skip
         """Compute the means and the values of ``gauges``.
 
         ``force`` (N) is NaN where it is not known, ``measure_s`` (s) the time of the kernel.
         """
         values = {gauge.name: gauge.measure(field) for gauge in gauges}
-        return cls(number, burst, field, replace(time_step_of(burst, field, force, measure_s), gauges=values))
+        numbers: dict[str, Any] = {} if plates is None else plates.numbers
+        step = replace(time_step_of(burst, field, force, measure_s), gauges=values, **numbers)
+        return cls(number, burst, field, step, plates)
+
+    @property
+    def as_measured(self) -> StrainField:
+        """The field of the kernel, of specimen and plates."""
+        return self.field if self.plates is None else self.plates.whole
 
     @property
     def t(self) -> float:
