@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from analysis import Roi, ZoiGrid
 from analysis.evaluate import AreaStrain, LineGauge
 from analysis.field import PAIR_INDEX, Block, CommonError, Status, StrainField, part_of, profile
-from analysis.optics import ApparentMotion, Model, PlateFit, PlateLayout, choose_model, trouble, without_plates
+from analysis.optics import (
+    ApparentMotion,
+    Model,
+    PlateFit,
+    PlateLayout,
+    choose_model,
+    trouble,
+    without_plates,
+)
 from hw_mocks.optics import Optics, PlaneMotion
 from hw_mocks.specimen import VirtualSpecimen
 
@@ -116,7 +124,7 @@ def noisy(fit: PlateFit, rng: np.random.Generator) -> StrainField:
             return np.array([rows[:, x : x + grid.size] @ w for x in grid.first_x]).T
 
         values += [across(down, even), across(down, odd), across(lean, even)]
-    sigma = float((even @ even))
+    sigma = float(even @ even)
     return StrainField.from_values(grid, dict(zip(NAMES, values, strict=True)), sigma)
 
 
