@@ -223,6 +223,8 @@ class SpecimenConfig:
         "area of the section, mm^2; takes precedence over width, thickness and diameter")
     gauge_length_mm: float | None = key(number(1e-3, 1e6), None,
         "gauge length, mm; reported with the extensions")
+    nu: float | None = key(number(0, 0.5), None,
+        "Poisson's ratio, where it is known: a warning where strains of an elastic test do not fit it")
     axis: str = key(choice(AUTO, "x", "y"), AUTO,
         "direction of the load in the picture; auto: the direction of the largest strain, y until it is clear",
         Option("axis"))

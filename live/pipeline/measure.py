@@ -20,7 +20,7 @@ from acquire.frame import Burst
 from acquire.load_cell import LoadLog
 from analysis.field import part_of
 from analysis.optics import ASSUMED_TILT, SCALE, PlateFit, choose_model, trouble
-from live.pipeline.measurement import Measurement, PlateReading
+from live.pipeline.measurement import Measurement, PlateReading, TimeStep
 from live.pipeline.reference import Correction, averaged, unchanged
 
 if TYPE_CHECKING:
@@ -30,6 +30,8 @@ if TYPE_CHECKING:
     from analysis.optics import Model
 
 
+MAX_ELASTIC, FALSE_STRAIN, NU_DOUBT = 1e-3, 2e-5, 0.02
+"""Of the check by Poisson's ratio: largest strain, smallest false strain, and doubt about nu, which adds to it."""
 MAX_ROTATION, MAX_STRAIN = math.radians(0.5), 0.02
 """Limits of small strains, rad and 1: the error is then 40 um/m by the rotation and 200 um/m by the strain."""
 
@@ -229,6 +231,50 @@ class PlateCorrection:
         self._on_event(Event(burst.t, EventKind.MEASUREMENT, "plates", text, cast(Level, level)))
 
 
+class DilatationGuard:
+    """Checks the strains of a uniaxial elastic test for motion off the plane, and warns once.
+
+    Motion along the optical axis adds the same strain d to both: across + nu axial = (1 + nu) d. Only below
+    ``MAX_ELASTIC``, since plastic flow changes the ratio.
+
+    Parameters
+    ----------
+    nu : float or None
+        Poisson's ratio; None: nothing is checked.
+    stand_off_mm : float or None, mm
+        For the message.
+    on_event : callable taking an Event
+    """
+
+    def __init__(self, nu: float | None, stand_off_mm: float | None, on_event: EventSink) -> None:
+        self._nu, self._stand_off_mm, self._on_event = nu, stand_off_mm, on_event
+        self._warned = False
+
+    def check(self, step: TimeStep) -> None:
+        """Check the strains of the region at one time."""
+        if self._warned or self._nu is None:
+            return
+        strains = (step.exx, step.sigma_exx), (step.eyy, step.sigma_eyy)
+        (across, sigma_across), (axial, sigma_axial) = sorted(strains, key=lambda one: abs(one[0]))
+        if not abs(axial) < MAX_ELASTIC:
+            return
+        false = (across + self._nu * axial) / (1 + self._nu)
+        sigma = math.hypot(sigma_across, self._nu * sigma_axial) / (1 + self._nu)
+        if abs(false) > FALSE_STRAIN + NU_DOUBT * abs(axial) + 4 * sigma:
+            self._warned = True
+            data = {"strain": false, "sigma": sigma}
+            text = self._text(false, self._nu)
+            self._on_event(Event(step.t, EventKind.MEASUREMENT, "strain", text, "warning", data))
+
+    def _text(self, false: float, nu: float) -> str:
+        way = "towards" if false > 0 else "away from"
+        far = "" if self._stand_off_mm is None else f" by {abs(false) * self._stand_off_mm:.2f} mm"
+        return (
+            f"the strains along and across do not fit nu = {nu:g}: {false * 1e6:+.0f} um/m in both is as from"
+            f" motion{far} {way} the camera, and no strain; E is off by it too (docs/optics.md)"
+        )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class NewReference:
     """A command among the bursts: this burst becomes the reference; results stay composed."""
@@ -250,6 +296,7 @@ def measure(
     plates: PlateCorrection | None = None,
     renew_at: float = 1.0,
     strain: Measure = "small",
+    dilatation: DilatationGuard | None = None,
     on_event: EventSink = ignore_event,
     timer: Timer = lambda: 0.0,
 ) -> Iterator[Measurement]:
@@ -275,6 +322,7 @@ def measure(
         the next, and renewing finds most of them again; 1 for never.
     strain : "small", "engineering", "green" or "hencky"
         The measure of strain of the fields and means.
+    dilatation : DilatationGuard, optional
     on_event : callable taking an Event
         Called when the reference is renewed.
     timer : callable
@@ -299,5 +347,8 @@ def measure(
             field, reading = plates.apply(whole, item, strain)
         took = timer() - began
         guard.check(field, item.t)
-        yield Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, reading)
+        found = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, reading)
+        if dilatation is not None:
+            dilatation.check(found.time_step)
+        yield found
         number += 1

@@ -16,7 +16,7 @@ from acquire.load_cell import LoadLog
 from analysis.optics import PlateFit
 from live.config.gauges import gauges_for
 from live.config.loading import Config
-from live.pipeline.measure import NewReference, PlateCorrection, measure
+from live.pipeline.measure import DilatationGuard, NewReference, PlateCorrection, measure
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, prepare
 from live.pipeline.warm_up import picture_kinds
@@ -123,7 +123,8 @@ class PreparedKernel:
         self, bursts: Iterable[Burst | NewReference], loads: LoadLog, on_event: EventSink
     ) -> Iterator[Measurement]:
         """The measurement of each burst (``live.pipeline.measure.measure``)."""
-        settings, plates = self.plan.config.measure, self.plan.plates
+        config, plates = self.plan.config, self.plan.plates
+        settings, stand_off = config.measure, config.scale.stand_off_mm
         return measure(
             bursts,
             self.kernel,
@@ -134,6 +135,7 @@ class PreparedKernel:
             plates=None if plates is None else PlateCorrection(plates, self.plan.focal_px, on_event),
             renew_at=settings.renew_at,
             strain=cast(Any, settings.strain),
+            dilatation=DilatationGuard(config.specimen.nu, stand_off, on_event),
             on_event=on_event,
             timer=self.timer,
         )
