@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from acquire.bounds import NotAllowed, as_number
+from acquire.bounds import NotAllowed, as_number, same_value
+from acquire.camera.timing import Bounded, exposure_and_gain
 from acquire.errors import ConfigError, DeviceError
 from acquire.frame import CameraSetting
 from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
-from acquire.genicam.formats import FORMATS, MonoFormat, preferred
+from acquire.genicam.formats import FORMATS, MonoFormat, preferred, readable
 from acquire.genicam.library import GenicamError
 from acquire.genicam.settings import KEYS, NO_TRIGGER, GenicamSettings
 
@@ -31,7 +32,7 @@ SHOWN = (
     *AUTOMATIC,
 )
 RESULTING_RATES = ("ResultingFrameRate", "AcquisitionResultingFrameRate", "ResultingFrameRateAbs")
-SMALL_PACKETS = 1500
+SMALL_PACKETS, TEST_PACKET = 1500, "GevSCPSFireTestPacket"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +47,7 @@ class GenicamSetup:
     bits, white : int, int or None
     controls : mapping of str to JSON value
     settings : tuple of CameraSetting
+    formats : tuple of str
     warnings : tuple of str
     """
 
@@ -61,6 +63,7 @@ class GenicamSetup:
     white: int | None
     controls: dict[str, Any]
     settings: tuple[CameraSetting, ...]
+    formats: tuple[str, ...]
     warnings: tuple[str, ...]
 
     @property
@@ -138,20 +141,13 @@ def _set_feature(device: GenicamDevice, feature: str, value: str, where: str) ->
         device.set_text(feature, value)
     except GenicamError as error:
         raise ConfigError(f"{where}: {feature}={value}: the camera refuses it ({error})") from error
-    if kind != "Command" and not _same(got := device.text(feature), value):
+    if kind != "Command" and not same_value(got := device.text(feature), value):
         raise ConfigError(f"{where}: {feature}={value}: the camera makes it {got}; ask for that")
-
-
-def _same(got: str, asked: str) -> bool:
-    try:
-        return abs(float(got) - float(asked)) <= 1e-4 * abs(float(asked))
-    except ValueError:
-        return got.lower() == asked.lower()
 
 
 def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> MonoFormat:
     offered = device.choices("PixelFormat")
-    usable = [name for name in FORMATS if name in offered]
+    usable = readable(offered)
     if not usable:
         raise DeviceError(
             f"{where}: offers {', '.join(offered) or 'nothing'}, none of them grey levels we can read"
@@ -229,7 +225,7 @@ def _set_packets(device: GenicamDevice, settings: GenicamSettings, where: str) -
     if not device.is_gige:
         return
     if settings.packet_size is None:
-        if device.has("GevSCPSFireTestPacket"):
+        if device.has(TEST_PACKET):
             device.ask("arv_camera_gv_auto_packet_size")
         return
     device.ask("arv_camera_gv_set_packet_size_adjustment", NO_ADJUSTMENT)
@@ -262,7 +258,10 @@ def _in_force(
         bits=bits,
         white=_white(device, settings, bits),
         controls=dict(_shown(device, settings)),
-        settings=tuple(_changeable(device, exposure_us, gain, fps)),
+        settings=exposure_and_gain(
+            _bounded(device, "exposure_time", exposure_us), _bounded(device, "gain", gain), fps
+        ),
+        formats=tuple(readable(device.choices("PixelFormat"))),
         warnings=tuple(_warnings(device, settings, fps)),
     )
 
@@ -307,29 +306,23 @@ def _shown(device: GenicamDevice, settings: GenicamSettings) -> Iterator[tuple[s
                 yield feature, device.text(feature)
 
 
-def _changeable(
-    device: GenicamDevice, exposure_us: float | None, gain: float | None, fps: float | None
-) -> Iterator[CameraSetting]:
-    """Exposure, within one picture, and gain."""
-    if exposure_us:
-        low, high = device.bounds_of("exposure_time")
-        high = max(exposure_us, min(high, 1e6 / fps if fps else high))
-        yield CameraSetting("exposure_us", exposure_us, min(max(low, 1.0), exposure_us), high, log=True)
-    if gain is not None:
-        low, high = device.bounds_of("gain")
-        yield CameraSetting("gain", gain, min(low, gain), max(high, gain))
+def _bounded(device: GenicamDevice, what: str, value: float | None) -> Bounded | None:
+    return None if value is None else (value, *device.bounds_of(what))
 
 
 def _warnings(device: GenicamDevice, settings: GenicamSettings, fps: float | None) -> Iterator[str]:
     automatic = [name for name in AUTOMATIC if device.has(name) and device.text(name) != "Off"]
     if automatic:
         yield f"the camera goes on changing by itself: {', '.join(automatic)}; grey levels may drift"
-    if device.has("Gamma") and not _same(device.text("Gamma"), "1"):
+    if device.has("Gamma") and not same_value(device.text("Gamma"), "1"):
         yield f"Gamma is {device.text('Gamma')}: grey levels are not proportional to light; give Gamma=1"
     if settings.fps is not None and fps is not None and fps < 0.99 * settings.fps:
         yield f"the camera gives {fps:g} frames a second, not {settings.fps:g}: exposure, size or line limit it"
     if device.is_gige and (size := device.ask("arv_camera_gv_get_packet_size")) < SMALL_PACKETS:
+        larger = (
+            "larger ones did not pass" if device.has(TEST_PACKET) else "it cannot try larger ones by itself"
+        )
         yield (
-            f"packets of {size} bytes: larger ones did not pass; set the MTU of the network card to 9000 "
+            f"packets of {size} bytes: {larger}; set the MTU of the network card to 9000, then packet_size=8000 "
             "(docs/machine-vision.md)"
         )

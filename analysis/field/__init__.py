@@ -1,9 +1,11 @@
 """Measured fields on a grid, with their uncertainty.
 
 ``grid`` places the ZOIs and weighs their pixels, ``strain_field`` is the result with its ``status``,
-``uncertainty`` has sigmas of values and means, ``motion`` predicts the next field.
+``uncertainty`` has sigmas of values and means, ``motion`` predicts the next field, ``blocks`` are what is missing.
 """
 
+from analysis.field.blocks import area_share, in_blocks
+from analysis.field.blur import Blur, blur_maps, mean_blur
 from analysis.field.common import CommonError
 from analysis.field.grid import WINDOWS, Roi, Window, ZoiGrid, profile
 from analysis.field.motion import Motion
@@ -28,6 +30,7 @@ __all__ = [
     "VALUES",
     "WINDOWS",
     "Block",
+    "Blur",
     "CommonError",
     "Measure",
     "Motion",
@@ -38,8 +41,12 @@ __all__ = [
     "WeightedSum",
     "Window",
     "ZoiGrid",
+    "area_share",
+    "blur_maps",
     "combination",
     "fixed_sums",
+    "in_blocks",
+    "mean_blur",
     "part_of",
     "products",
     "profile",

@@ -76,13 +76,14 @@ def part_of(field: StrainField, block: Block, grid: ZoiGrid | None = None) -> St
     own, at = grid or block.of(field.grid), (..., block.rows, block.columns)
     status = np.where(own.active, field.status[at], np.uint8(Status.NOT_MEASURED))
     off = ~own.active
-    arrays = {name: getattr(field, name)[at].copy() for name in _ARRAYS}
-    for name in _VALUES:
+    found = {name: getattr(field, name) for name in _ARRAYS}
+    arrays = {name: values[at].copy() for name, values in found.items() if values is not None}
+    for name in arrays.keys() & _VALUES:
         arrays[name][..., off] = np.nan
     sums = None if field.sums is None else PartSums(field.sums, field.grid.shape, block)
     common = None if field.common is None else field.common.part(block.rows, block.columns)
     return replace(field, grid=own, status=status, motion=None, sums=sums, common=common, **arrays)
 
 
-_VALUES = ("parameters", "covariance", "covariance_reference", "residual")
+_VALUES = {"parameters", "covariance", "covariance_reference", "residual", "blur"}
 _ARRAYS = (*_VALUES, "iterations", "gain")

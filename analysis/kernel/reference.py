@@ -71,6 +71,8 @@ class ReferencePicture:
         Of u and v if nothing else were sought, for a noise of 1 GL.
     sums : MeanNoise or None
         Of the sensor form.
+    period : (A,) float64, px
+        Smallest displacement at which a ZOI looks like itself (``repeating.periods``); infinite: none.
     """
 
     grid: ZoiGrid
@@ -88,6 +90,7 @@ class ReferencePicture:
     unit_sigma: Floats
     share_variance: Floats
     sums: MeanNoise | None
+    period: Floats
 
     @classmethod
     def first(
@@ -124,7 +127,8 @@ class ReferencePicture:
         prepared = prepare_reference(image, placement.origins, size, settings, model, saturated)
         gone = placement.status != Status.OK
         prepared = replace(prepared, status=np.where(gone, placement.status, prepared.status))
-        return _laid_out(image, self.grid, settings, model, prepared, placement)
+        made = _laid_out(image, self.grid, settings, model, prepared, placement)
+        return replace(made, period=self.period)
 
     @property
     def modes(self) -> int:
@@ -193,6 +197,21 @@ class ReferencePicture:
         origins, deformed = self.prepared.origins, image.astype(np.float32)
         return self.all_modes(search(self.image, deformed, offset, self.region, origins, self.grid.size))
 
+    def searched_near(self, image: NDArray[Any], which: NDArray[np.intp], reach: float) -> Floats:
+        """The same for some ZOIs (B,) that are not farther than ``reach`` px from where they were, (B, modes)."""
+        from analysis.follow.search import search
+
+        origins, size = self.prepared.origins[which], self.grid.size
+        first, last = origins.min(axis=0), origins.max(axis=0) + size
+        top, left = np.maximum(first - int(reach), 0)
+        bottom, right = last + int(reach)
+        part = np.s_[top:bottom, left:right]
+        box = Roi(int(first[1] - left), int(first[0] - top), *(int(n) for n in (last - first)[::-1]))
+        offset = np.float32(self.prepared.pattern.mean)
+        deformed = np.ascontiguousarray(image[part], np.float32)
+        reference = np.ascontiguousarray(self.image[part])
+        return self.all_modes(search(reference, deformed, offset, box, origins - (top, left), size))
+
     def spread(self, values: NDArray[Any], empty: float = np.nan) -> NDArray[Any]:
         """(A, K) onto the grid: (K, R, C); where all ZOIs are active, the same memory."""
         return _spread(values, self.index, self.grid.shape, empty)
@@ -232,6 +251,7 @@ def _laid_out(
         unit_sigma=np.stack([lengths.min(1), slopes.min(1), lengths.max(1)]),
         share_variance=1 / np.maximum(prepared.weight * sharpness * prepared.energy, 1e-12),
         sums=None if sensors is not None else _sums(grid, settings, index, prepared, unit_covariance),
+        period=np.full(len(index), np.inf),
     )
 
 

@@ -47,6 +47,9 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
     residual, first, whole = np.empty((3, len(ok)), np.float32)
     weigh(ok, found.left, reference.prepared.freedom, gain, *noise, residual, first, whole)
     covariance_reference, covariance = _covariances(solution, ok, noise, first, whole)
+    variance = np.where(ok, reference.prepared.blur * whole, np.float32(np.nan))
+    sigma_blur = np.sqrt(np.maximum(variance, 0))  # rounding may leave a little less than nothing
+    blur = np.stack([np.where(ok, found.nuisance[:, 2], np.nan), sigma_blur]).astype(np.float32)
     values = reference.total(found.p)
     if not ok.all():
         values = np.where(ok[:, None], values, np.nan)
@@ -63,6 +66,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         window=reference.settings.window,
         motion=None if expected is None else _motion(solution, values, expected),
         sums=reference.sums,
+        blur=reference.spread(blur.T),
     )
 
 

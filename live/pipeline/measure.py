@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from acquire.burst import LIMIT_PX
 from acquire.events import Event, EventKind, EventSink, Level, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
-from analysis.field import part_of
+from analysis.field import Blur, part_of
 from analysis.optics import ASSUMED_TILT, SCALE, PlateFit, choose_model, trouble
 from live.pipeline.measurement import Measurement, PlateReading, TimeStep
-from live.pipeline.reference import Correction, averaged, unchanged
+from live.pipeline.reference import Correction, averaged, repetition_text, unchanged
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
@@ -34,6 +33,8 @@ MAX_ELASTIC, FALSE_STRAIN, NU_DOUBT = 1e-3, 2e-5, 0.02
 """Of the check by Poisson's ratio: largest strain, smallest false strain, and doubt about nu, which adds to it."""
 MAX_ROTATION, MAX_STRAIN = math.radians(0.5), 0.02
 """Limits of small strains, rad and 1: the error is then 40 um/m by the rotation and 200 um/m by the strain."""
+MAX_BLUR_PX, CERTAIN, CALM = 0.5, 3.0, 0.8
+"""A blur beyond this gives an event, by so many of its sigmas; below this share of it the picture is well again."""
 
 
 class Tracker:
@@ -106,45 +107,10 @@ def _renewal(burst: Burst, *, automatic: bool) -> Event:
     return Event(burst.t, EventKind.REFERENCE, "measurement", text, level, data | {"renewed": True})
 
 
-class SmearGuard:
-    """Checks the motion during each measured burst; an event when smear begins and when it ends.
-
-    Motion v during T multiplies the contrast at wave number k by |sinc(k v T / 2)|: negligible up to
-    0.05 px. The motion is estimated with each burst (``acquire.burst.accumulate``).
-
-    Parameters
-    ----------
-    on_event : callable taking an Event
-    limit_px : float, px
-    """
-
-    def __init__(self, on_event: EventSink, limit_px: float = LIMIT_PX) -> None:
-        self._on_event, self._limit = on_event, limit_px
-        self._smeared = False
-
-    def check(self, burst: Burst) -> None:
-        """Check a burst; one whose motion is not known changes nothing."""
-        smeared = burst.motion_px > self._limit
-        # Hysteresis: a motion near the limit does not repeat the events.
-        calm = burst.motion_px < 0.8 * self._limit
-        if smeared and not self._smeared:
-            text = (
-                f"the picture moves {burst.motion_px:.2f} px during a burst of {burst.n}; take shorter bursts"
-            )
-            self._emit(burst, text, "warning")
-        elif calm and self._smeared:
-            self._emit(burst, "the picture stands still enough again during a burst", "info")
-        self._smeared = smeared or (self._smeared and not calm)
-
-    def _emit(self, burst: Burst, text: str, level: Level) -> None:
-        data = {"motion_px": burst.motion_px, "n": burst.n}
-        self._on_event(Event(burst.t, EventKind.MEASUREMENT, "burst", text, level, data))
-
-
 class StrainGuard:
     """Checks each field of small strains, and warns once where another measure is more exact.
 
-    A rotation by r changes small strains by r^2/2 (3 degrees: 1400 um/m); they differ from the other measures
+    A rotation by r changes small strains by r^2/2 (3 degrees: 1400 µm/m); they differ from the other measures
     by about e^2/2 at a strain e.
 
     Parameters
@@ -167,7 +133,7 @@ class StrainGuard:
             self._warned = True
             text = (
                 f"turned by {math.degrees(turned):.1f} degrees, strained by {strained:.1%}: small strains are off by"
-                f" about {(turned**2 + strained**2) / 2 * 1e6:.0f} um/m; measure with --strain engineering"
+                f" about {(turned**2 + strained**2) / 2 * 1e6:.0f} µm/m; measure with --strain engineering"
             )
             data = {"rotation": turned, "strain": strained}
             self._on_event(Event(t, EventKind.MEASUREMENT, "strain", text, "warning", data))
@@ -282,6 +248,35 @@ class NewReference:
     burst: Burst
 
 
+class BlurGuard:
+    """Checks the sharpness of each measurement; an event when the limit is passed, either way, and when it ends.
+
+    Parameters
+    ----------
+    on_event : callable taking an Event
+    limit_px : float, px
+    """
+
+    def __init__(self, on_event: EventSink, limit_px: float = MAX_BLUR_PX) -> None:
+        self._on_event, self._limit = on_event, limit_px
+        self._changed = False
+
+    def check(self, step: TimeStep) -> None:
+        """Check one time step; one whose blur is not known changes nothing."""
+        blur, size = Blur(step.blur, step.sigma_blur), abs(step.blur)
+        if not self._changed and size - CERTAIN * blur.sigma > self._limit:
+            self._changed = True
+            text = f"the picture is {blur.text} since the reference: look at focus, distance and exposure"
+            self._emit(step, text, "warning")
+        elif self._changed and size < CALM * self._limit:
+            self._changed = False
+            self._emit(step, "the picture is as sharp as the reference again", "info")
+
+    def _emit(self, step: TimeStep, text: str, level: Level) -> None:
+        data = {"blur_px": step.blur, "sigma_blur_px": step.sigma_blur}
+        self._on_event(Event(step.t, EventKind.MEASUREMENT, "sharpness", text, level, data))
+
+
 Timer = Callable[[], float]
 
 
@@ -324,7 +319,7 @@ def measure(
         The measure of strain of the fields and means.
     dilatation : DilatationGuard, optional
     on_event : callable taking an Event
-        Called when the reference is renewed.
+        Called when the reference is renewed, and where a guard warns.
     timer : callable
         Gives seconds; only for ``Measurement.measure_s``.
 
@@ -334,11 +329,14 @@ def measure(
         One for each burst, in order.
     """
     tracker, guard = Tracker(kernel, noise_GL, renew_at, on_event), StrainGuard(strain, on_event)
-    number = 0
+    sharpness = BlurGuard(on_event)
+    number, repeats = 0, repetition_text(kernel.period)
     for item in bursts:
         if isinstance(item, NewReference):
             tracker.renew_on_demand(correct(item.burst))
             continue
+        if number == 0 and repeats:
+            on_event(Event(item.t, EventKind.MEASUREMENT, "pattern", repeats, "warning"))
         began = timer()
         whole, reading = tracker.measure(correct(item)), None
         if plates is None:
@@ -347,8 +345,9 @@ def measure(
             field, reading = plates.apply(whole, item, strain)
         took = timer() - began
         guard.check(field, item.t)
-        found = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, reading)
+        measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, reading)
+        sharpness.check(measurement.time_step)
         if dilatation is not None:
-            dilatation.check(found.time_step)
-        yield found
+            dilatation.check(measurement.time_step)
+        yield measurement
         number += 1

@@ -15,7 +15,7 @@ import numpy as np
 
 from acquire.frame import Burst
 from analysis.evaluate import AreaStrain, Gauge, GaugeValue, extension_of
-from analysis.field import StrainField
+from analysis.field import StrainField, area_share, mean_blur
 from analysis.optics import ApparentMotion
 
 AXIAL, TRANSVERSE = "axial", "transverse"
@@ -68,6 +68,10 @@ class TimeStep:
         Strains of the region before the motion of plates was removed; NaN without plates.
     corrected : float
         1 where plates were measured, 0 where the correction has stopped; NaN without plates.
+    blur, sigma_blur : float, px
+        Of the picture since its reference (``analysis.field.Blur``); negative: sharper.
+    area_share : float
+        Of the region that its strains stand for, where a block of ZOIs was lost (``analysis.field.area_share``).
     """
 
     t: float
@@ -102,6 +106,14 @@ class TimeStep:
     raw_eyy: float = math.nan
     raw_exy: float = math.nan
     corrected: float = math.nan
+    blur: float = math.nan
+    sigma_blur: float = math.nan
+    area_share: float = 1.0
+
+    @property
+    def least_share(self) -> float:
+        """The smallest share of an area that the strains of the region and of the gauges stand for."""
+        return min(self.area_share, *(gauge.share for gauge in self.gauges.values() if not gauge.reason), 1.0)
 
     def axial(self, axis: str) -> tuple[float, float]:
         """Strain along the load, which runs along ``axis`` ("x" or "y"), and its standard uncertainty."""
@@ -145,6 +157,7 @@ def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: floa
     """The strains of ``field``, measured from ``burst``."""
     valid = field.ok
     values = np.concatenate([field.exx[valid], field.eyy[valid]])
+    blur = mean_blur(field)
     return TimeStep(
         t=burst.t,
         force=force,
@@ -158,6 +171,9 @@ def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: floa
         refused=", ".join(f"{n} {status.name}" for status, n in field.refused.items()),
         noise_GL=burst.noise,
         measure_s=measure_s,
+        blur=blur.px,
+        sigma_blur=blur.sigma,
+        area_share=area_share(field),
     )
 
 
@@ -233,7 +249,7 @@ class Measurement:
 
         ``force`` (N) is NaN where it is not known, ``measure_s`` (s) the time of the kernel.
         """
-        values = {gauge.name: gauge.measure(field) for gauge in gauges}
+        values = {gauge.name: gauge.read(field) for gauge in gauges}
         numbers: dict[str, Any] = {} if plates is None else plates.numbers
         step = replace(time_step_of(burst, field, force, measure_s), gauges=values, **numbers)
         return cls(number, burst, field, step, plates)

@@ -23,6 +23,7 @@ from analysis.evaluate import (
     find_lag,
     free,
 )
+from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
 
@@ -38,13 +39,13 @@ _SMALL_KN = 2.0  # below it forces are shown in N
 
 
 def value_text(value: float, sigma: float, unit: str) -> str:
-    """``value +- sigma unit``, rounded to two digits of the uncertainty."""
+    """``value ± sigma unit``, rounded to two digits of the uncertainty."""
     if not math.isfinite(value):
         return "not known"
     if not math.isfinite(sigma) or sigma <= 0:
         return f"{value:.4g} {unit}".rstrip()
     digits = max(0, min(6, 1 - math.floor(math.log10(sigma))))
-    return f"{value:.{digits}f} +- {sigma:.{digits}f} {unit}".rstrip()
+    return f"{value:.{digits}f} ± {sigma:.{digits}f} {unit}".rstrip()
 
 
 def figure_text(figure: Figure, unit_is: float = 1.0, unit: str = "") -> str:
@@ -158,6 +159,15 @@ def tare_line(history: History, loads: LoadLog) -> list[str]:
     ]
 
 
+def sharpness_line(blur: Sequence[float], sigma: Sequence[float]) -> list[str]:
+    """How the sharpness of the picture changed, from its blur and sigma over time, px; nothing where not known."""
+    known = [one for one in map(Blur, blur, sigma) if one.text]
+    if not known:
+        return []
+    largest = max(known, key=lambda one: abs(one.px))
+    return [f"sharpness since the reference: {largest.text} at most, {known[-1].text} in the last picture"]
+
+
 def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
     """The angle from the axis of the load to the largest strain; nothing where it is not known."""
     if not history.time_steps:
@@ -188,7 +198,7 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
     rows = _rows(figures, specimen)
     hint = "" if specimen.area_m2 else " (give [specimen] width_mm and thickness_mm for E)"
     of = f" of {figures.elastic_strain}" if figures.elastic_strain else ""
-    words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, +-: {CONFIDENCE:.0%} interval)"
+    words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, ±: {CONFIDENCE:.0%} interval)"
     return [_text(rows, "E") + hint + words, _known_texts(rows, _STRENGTHS)]
 
 

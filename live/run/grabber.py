@@ -19,6 +19,7 @@ from acquire.camera import Camera, missing_at_end
 from acquire.errors import PhasedicError
 from acquire.events import EventKind, RateLimiter
 from acquire.frame import Burst, CameraInfo, Frame
+from acquire.printable import counted
 from live.config.loading import Config
 from live.pipeline.queues import LatestQueue
 from live.pipeline.reference import ReferenceBurst, ReferenceTaker
@@ -81,6 +82,8 @@ class Grabber:
         The error that ended the camera.
     begun_t, arrived_t : float, s
         When the first and the last frame arrived, monotonic; before the first when it was started.
+    time_is_over : bool
+        The frames of ``plan.seconds`` have come.
     """
 
     def __init__(
@@ -105,7 +108,7 @@ class Grabber:
         self.fps = 0.0
         self._taker: ReferenceTaker | None = ReferenceTaker(plan.reference_burst)
         self._accumulator = BurstAccumulator(plan.burst)
-        self._unassigned = 0
+        self._unassigned, self.time_is_over = 0, False
         self._limiter, self._unreported = RateLimiter(), 0
         self.begun_t = self.arrived_t = math.nan
         self._first_t: float | None = None
@@ -140,7 +143,8 @@ class Grabber:
         try:
             for frame in self._camera:
                 self._take(frame)
-                if frame.t - (self._first_t or 0.0) >= self._plan.seconds:
+                self.time_is_over = frame.t - (self._first_t or 0.0) >= self._plan.seconds
+                if self.time_is_over:
                     break
         except PhasedicError as error:
             self._ended_by(error, str(error))
@@ -161,7 +165,7 @@ class Grabber:
         missing = missing_at_end(self._camera.info, silent_s)
         if missing:
             self._frame_counts.add(lost=missing)
-            text = f"{missing} frames were lost at the end: none came for the last {silent_s:.1f} s"
+            text = f"{counted(missing, 'frame')} lost at the end: none came for the last {silent_s:.1f} s"
             data = {"count": missing, "where": "end"}
             self._event_log.emit(EventKind.LOST, self._camera.info.address, text, "warning", data)
 
@@ -190,7 +194,7 @@ class Grabber:
         self._unreported += frame.lost_before
         if not self._limiter.due(frame.t):
             return
-        text = f"{self._unreported} frames were lost, the last before frame {frame.index}"
+        text = f"{counted(self._unreported, 'frame')} lost, the last before frame {frame.index}"
         data = {"count": self._unreported, "before": frame.index}
         self._event_log.emit(EventKind.LOST, self._camera.info.address, text, "warning", data)
         self._unreported = 0

@@ -10,7 +10,7 @@ import numpy as np
 from acquire.errors import DataError
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
-from live.results.figures import axis_text, figure_lines, headline
+from live.results.figures import axis_text, figure_lines, headline, sharpness_line
 from live.results.noise_floor import StillPhase, still_phase_of
 from live.results.report import curves
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
@@ -122,12 +122,13 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
     return [
         _head(run, content.curve),
         section("Specimen and rig", facts(_rig(run, pictures))),
-        section("Curves", plots(content.figures), _about_curves(content.curve)),
+        section("Curves", plots(content.figures), _about_parts(run), _about_curves(content.curve)),
         section("Figures of the test", *figure_table(run, content.curve)),
         section("Virtual gauges", gauges(run)),
         section("Lag and latency", times(run)),
         section("Maps", *(maps(run, name, chosen, pictures, side) for name in fields)),
         section("Noise floor", *_noise_section(content)),
+        *_sharpness_section(run),
         section("Status of the ZOIs", statuses(run, max(chosen), pictures, min(side, 480))),
         section("Frame counts and events", frame_counts(run), events(run), *_unreadable(run)),
         section("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
@@ -157,7 +158,7 @@ def _head(run: RunFolder, curve: EvaluatedCurve) -> Html:
 def tensile(curve: EvaluatedCurve) -> dict[str, str]:
     """E, nu and the strengths by name, each with its uncertainty; without those that are not known."""
     rows = headline(curve.figures, stresses=curve.is_stress)
-    return {row.name: row.text.replace("+-", "±") for row in rows if row.figure.known}
+    return {row.name: row.text for row in rows if row.figure.known}
 
 
 def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
@@ -206,6 +207,11 @@ def plots(figures: tuple[Plot, ...]) -> Html:
     return element("div", joined(found), class_="plots")
 
 
+def _about_parts(run: RunFolder) -> Html:
+    words = curves.parts(run)
+    return paragraph(words, "warning") if words else Html("")
+
+
 def _about_curves(curve: EvaluatedCurve) -> Html:
     if not curve.has_load:
         return paragraph("No force is known at any instant, so there is no stress-strain curve.", "dim")
@@ -225,7 +231,16 @@ def _about_curves(curve: EvaluatedCurve) -> Html:
 def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
     """The figures as text, how they were found, and why others are not known."""
     lines = figure_lines(curve.figures, run.specimen) if curve.has_load else []
-    return [paragraph(line.strip().replace("+-", "±").replace("  ", ", ")) for line in lines]
+    return [paragraph(line.strip().replace("  ", ", ")) for line in lines]
+
+
+def _sharpness_section(run: RunFolder) -> list[Html]:
+    """Nothing for results of earlier versions, which do not have the blur."""
+    values = run.strain.values
+    if "blur_px" not in values:
+        return []
+    lines = sharpness_line(values["blur_px"].tolist(), values["sigma_blur_px"].tolist())
+    return [section("Sharpness", *(paragraph(line.replace("+-", "±")) for line in lines))] * bool(lines)
 
 
 def _noise_section(content: _Content) -> list[Html]:

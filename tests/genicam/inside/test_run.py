@@ -148,4 +148,5 @@ def test_from_the_devices_to_the_report(
         assert "saturated pixels" in capsys.readouterr().out
         run = ["run", "--config", "rig.toml", "--seconds", "3", "--burst", "2", "--reference-burst", "4"]
         assert main([*run, "--no-view", "--no-rrd", "--out", "run", "--report"]) in (0, 5)
+        assert "the test ends: the time is over" in capsys.readouterr().out
     assert "GV01" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
