@@ -223,6 +223,13 @@ class SpecimenConfig:
         "area of the section, mm^2; takes precedence over width, thickness and diameter")
     gauge_length_mm: float | None = key(number(1e-3, 1e6), None,
         "gauge length, mm; reported with the extensions")
+    force_error_percent: float | None = key(number(0, 100), None,
+        "limit of error of the load cell, % (its class): in the interval of E")
+    section_error_percent: float | None = key(number(0, 100), None,
+        "limit of error of the area of the section, %: in the interval of E")
+    strain_error_um_m: float | None = key(number(0, 1e5), None,
+        "limit of error of the strain that comes with the load over the elastic interval, um/m: motion off the plane"
+        " (0.1 mm at 500 mm: 200), lens, alignment; in the interval of E")
     nu: float | None = key(number(0, 0.5), None,
         "Poisson's ratio, where it is known: a warning where strains of an elastic test do not fit it")
     axis: str = key(choice(AUTO, "x", "y"), AUTO,
