@@ -43,13 +43,15 @@ function lookedUp(text) {
 function filled(text, weak) {
   for (const { key, form } of patterns.filter((one) => one.weak === weak)) {
     const parts = form.exec(text)?.slice(1);
-    if (!parts || (weak && parts.some((one) => !isName(one.replace(/[\d.]+/g, "").trim()) && translated(one) == null))) continue;
+    if (!parts || (weak && parts.some((one) => !areNames(one) && translated(one) == null))) continue;
     return catalogue[key][chosen].replace(/\{\}/g, () => part(parts.shift()));
   }
   return null;
 }
 
 const isName = (text) => !text.includes(" ") || /[/:]/.test(text);
+
+const areNames = (text) => text.split(", ").every((one) => isName(one.replace(/[\d.]+/g, "").trim()));
 
 function named(text, isName) {
   const at = text.indexOf(": "), left = text.slice(0, Math.max(at, 0));

@@ -58,8 +58,8 @@ def fits(page: Page, stage: str) -> None:
     for width, height in SIZES:
         page.page.set_viewport_size({"width": width, "height": height})
         page.page.evaluate(DRAWN)
-        assert page.page.evaluate(OUTSIDE) == [], f"{stage} at {width}"
-        assert page.page.evaluate(CUT) == [], f"{stage} at {width}"
+        outside, cut = page.page.evaluate(OUTSIDE), page.page.evaluate(CUT)
+        assert not outside and not cut, f"{stage} at {width}: outside {outside}, cut {cut}"
     page.page.set_viewport_size({"width": 1280, "height": 800})
 
 
@@ -68,7 +68,7 @@ def readable(page: Page, stage: str) -> None:
     for _ in range(2):
         seen, faint = page.page.evaluate(FAINT, CONTRAST)
         theme = page.page.get_attribute("html", "data-theme")
-        assert seen > 10 and faint == [], f"{stage}, {theme}"
+        assert seen > 10 and not faint, f"{stage}, {theme}: {faint}"
         page.page.evaluate("() => document.getElementById('theme').click()")
 
 

@@ -35,13 +35,14 @@ MODULES = (
 WHOLE = (
     "acquire/addresses.py", "acquire/bounds.py", "acquire/record_mode.py", "acquire/camera/*.py",
     "acquire/files/*.py", "acquire/genicam/*.py", "acquire/hdf5/d*.py", "acquire/load_cell/c*.py",
-    "acquire/opencv/*.py", "acquire/protocols/*.py", "acquire/serial_line/*.py", "acquire/session/[!lr]*.py",
-    "acquire/session/reader.py", "acquire/v4l2/*.py", "analysis/evaluate/[!ls]*.py", "hw_mocks/faults.py",
-    "hw_mocks/sim_*.py", "hw_mocks/specimen.py", "live/config/gauges.py", "live/config/loading.py",
-    "live/config/rig_file.py", "live/config/values.py", "live/pipeline/consumer_thread.py",
-    "live/pipeline/frame_counts.py", "live/pipeline/measure.py", "live/run/grabber.py",
-    "live/run/load_thread.py", "live/run/measuring.py", "live/run/pre_trigger.py", "live/run/recorder.py",
-    "live/setup/devices.py", "live/setup/grid.py", "live/setup/scale.py",
+    "acquire/opencv/*.py", "acquire/pylon/*.py", "acquire/protocols/*.py", "acquire/serial_line/*.py",
+    "acquire/session/[!lr]*.py", "acquire/session/reader.py", "acquire/v4l2/*.py",
+    "analysis/evaluate/[!ls]*.py", "analysis/field/blur.py", "hw_mocks/faults.py", "hw_mocks/sim_*.py",
+    "hw_mocks/specimen.py", "live/config/gauges.py", "live/config/loading.py", "live/config/rig_file.py",
+    "live/config/values.py", "live/pipeline/consumer_thread.py", "live/pipeline/frame_counts.py",
+    "live/pipeline/measure.py", "live/run/grabber.py", "live/run/load_thread.py", "live/run/measuring.py",
+    "live/run/pre_trigger.py", "live/run/recorder.py", "live/setup/devices.py", "live/setup/grid.py",
+    "live/setup/scale.py",
 )  # fmt: skip
 # Calls whose texts are shown, and the places of these texts.
 SHOWN = {
