@@ -37,6 +37,15 @@ class CommonError:
         made = np.einsum("kirc,irc->k", self.shapes, weights)
         return float(made @ self.covariance @ made)
 
+    def beside(self, other: CommonError | None) -> CommonError:
+        """Both errors, which have nothing to do with each other."""
+        if other is None:
+            return self
+        k, n = len(self.covariance), len(self.covariance) + len(other.covariance)
+        covariance = np.zeros((n, n))
+        covariance[:k, :k], covariance[k:, k:] = self.covariance, other.covariance
+        return CommonError(np.concatenate([self.shapes, other.shapes]), covariance)
+
     def part(self, rows: slice, columns: slice) -> CommonError:
         """That of some rows and columns of ZOIs."""
         return CommonError(self.shapes[:, :, rows, columns], self.covariance)

@@ -42,6 +42,9 @@ class CameraConfig:
     crop: tuple[int, int, int, int] | None = key(BOX, None,
         "x, y, width, height of the part of the picture to use, px; its corner is the origin of all coordinates",
         Option("crop", "X,Y,W,H", expert=True))
+    readout_ms: float | None = key(number(0, 10_000), None,
+        "time of a rolling shutter from the first line of the picture to the last, ms: the strain that motion shows"
+        " by it is removed")
     dark: str | None = key(TEXT, None,
         "dark frame (TIFF), subtracted from every burst", Option("dark", "FILE", expert=True))
     flat: str | None = key(TEXT, None,

@@ -18,7 +18,7 @@ from acquire.events import Event, EventKind, EventSink, Level, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
 from analysis.field import Blur, part_of
-from analysis.optics import ASSUMED_TILT, SCALE, PlateFit, choose_model, trouble
+from analysis.optics import ASSUMED_TILT, SCALE, PlateFit, ShutterCorrection, choose_model, trouble
 from live.pipeline.measurement import Measurement, PlateReading, TimeStep
 from live.pipeline.reference import Correction, averaged, repetition_text, unchanged
 
@@ -171,9 +171,9 @@ class PlateCorrection:
         motion, covariance = self._last
         layout = self._fit.layout
         raw = replace(part_of(whole, layout.here, layout.specimen), measure=measure)
-        field = replace(motion.removed_from(raw), common=self._fit.error(raw, covariance))
+        field = replace(motion.removed_from(raw), common=self._fit.error(raw, covariance).beside(raw.common))
         sigma = math.sqrt(float(covariance[SCALE, SCALE]))
-        return field, PlateReading(whole, raw, motion, sigma, not words)
+        return field, PlateReading(raw, motion, sigma, not words)
 
     def _choose(self, whole: StrainField, burst: Burst) -> Model:
         chosen = choose_model(self._fit, whole, self._focal_px)
@@ -288,6 +288,7 @@ def measure(
     noise_GL: float | None = None,
     correct: Correction = unchanged,
     gauges: Sequence[Gauge] = (),
+    shutter: ShutterCorrection | None = None,
     plates: PlateCorrection | None = None,
     renew_at: float = 1.0,
     strain: Measure = "small",
@@ -310,6 +311,8 @@ def measure(
         Removes the fixed pattern of the sensor from a burst.
     gauges : sequence of Gauge
         Read on every field.
+    shutter : ShutterCorrection, optional
+        Corrects every field, before the plates.
     plates : PlateCorrection, optional
         Corrects every field; ``kernel`` then measures the ZOIs of its plates too.
     renew_at : float
@@ -339,13 +342,15 @@ def measure(
             on_event(Event(item.t, EventKind.MEASUREMENT, "pattern", repeats, "warning"))
         began = timer()
         whole, reading = tracker.measure(correct(item)), None
+        upright = whole if shutter is None else shutter.apply(whole, item.t)
         if plates is None:
-            field = replace(whole, measure=strain)
+            field = replace(upright, measure=strain)
         else:
-            field, reading = plates.apply(whole, item, strain)
+            field, reading = plates.apply(upright, item, strain)
         took = timer() - began
         guard.check(field, item.t)
         measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, reading)
+        measurement = replace(measurement, as_measured=whole)
         sharpness.check(measurement.time_step)
         if dilatation is not None:
             dilatation.check(measurement.time_step)

@@ -191,10 +191,8 @@ class PlateReading:
 
     Attributes
     ----------
-    whole : StrainField
-        As measured, of specimen and plates.
     raw : StrainField
-        As measured, of the specimen.
+        Of the specimen, before the correction.
     motion : ApparentMotion
         What was removed.
     sigma_scale : float
@@ -203,7 +201,6 @@ class PlateReading:
         False: the plates could not be used, and the last motion was removed.
     """
 
-    whole: StrainField
     raw: StrainField
     motion: ApparentMotion
     sigma_scale: float
@@ -232,6 +229,8 @@ class Measurement:
     time_step : TimeStep
     plates : PlateReading or None
         Where there are plates, and ``field`` is corrected by them.
+    as_measured : StrainField or None
+        What the kernel gave, of specimen and plates, before any correction.
     """
 
     number: int
@@ -239,6 +238,7 @@ class Measurement:
     field: StrainField
     time_step: TimeStep
     plates: PlateReading | None = None
+    as_measured: StrainField | None = None
 
     @classmethod
     def of(
@@ -253,11 +253,6 @@ class Measurement:
         numbers: dict[str, Any] = {} if plates is None else plates.numbers
         step = replace(time_step_of(burst, field, force, measure_s), gauges=values, **numbers)
         return cls(number, burst, field, step, plates)
-
-    @property
-    def as_measured(self) -> StrainField:
-        """The field of the kernel, of specimen and plates."""
-        return self.field if self.plates is None else self.plates.whole
 
     @property
     def t(self) -> float:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acquire.events import EventSink
 from acquire.frame import Burst, CameraInfo
 from acquire.load_cell import LoadLog
-from analysis.optics import PlateFit
+from analysis.optics import PlateFit, ShutterCorrection
 from live.config.gauges import gauges_for
 from live.config.loading import Config
 from live.pipeline.measure import DilatationGuard, NewReference, PlateCorrection, measure
@@ -46,7 +46,7 @@ class MeasurePlan:
     settings : KernelSettings
     correct : callable
         Corrects the fixed pattern of the sensor in a burst.
-    width : int, px
+    width, height : int, px
         Of the picture.
     """
 
@@ -58,6 +58,7 @@ class MeasurePlan:
     settings: KernelSettings
     correct: Correction
     width: int
+    height: int
 
     @classmethod
     def of(cls, config: Config, camera: CameraInfo, mask: NDArray[np.bool_] | None) -> MeasurePlan:
@@ -74,7 +75,13 @@ class MeasurePlan:
         middle = ((camera.width - 1) / 2, (camera.height - 1) / 2)
         plates = None if layout is None else PlateFit(layout, middle)
         settings, correct = kernel_settings(config), correction(config, camera)
-        return cls(config, mask, grid, gauges, plates, settings, correct, camera.width)
+        return cls(config, mask, grid, gauges, plates, settings, correct, camera.width, camera.height)
+
+    @property
+    def shutter(self) -> ShutterCorrection | None:
+        """A new correction of the rolling shutter; None without its readout time."""
+        readout_ms = self.config.camera.readout_ms
+        return None if not readout_ms else ShutterCorrection(1e-3 * readout_ms, self.height)
 
     @property
     def focal_px(self) -> float:
@@ -134,6 +141,7 @@ class PreparedKernel:
             noise_GL=self.noise_GL,
             correct=self.plan.correct,
             gauges=self.plan.gauges,
+            shutter=self.plan.shutter,
             plates=None if plates is None else PlateCorrection(plates, self.plan.focal_px, on_event),
             renew_at=settings.renew_at,
             strain=cast(Any, settings.strain),
