@@ -123,6 +123,11 @@ class StoredResults:
         """The field of the next burst."""
         return self._fields.popleft()
 
+    @property
+    def period(self) -> NDArray[np.float64]:
+        """Where the pattern of the reference repeats; see ``PhaseKernel.period``."""
+        return self._ready.kernel.period
+
     def renewed(self, *_: object, **__: object) -> PhaseKernel:
         """Always raises: no part has a renewed reference."""
         raise ValueError("no reference was renewed")
