@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,10 @@ from numpy.typing import NDArray
 from analysis.field.grid import Roi, ZoiGrid
 from analysis.field.status import Status
 from analysis.field.strain_field import StrainField
-from analysis.field.uncertainty import Floats, Sums, WeightedSum
+from analysis.field.uncertainty import Floats, Sums
 
 Bools = NDArray[np.bool_]
+Item = TypeVar("Item")
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +40,7 @@ class Block:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PartSums:
-    """``Sums`` of the whole grid for one block of it."""
+    """``Sums`` of the whole grid, of ``shape``, for one block of it."""
 
     whole: Sums
     shape: tuple[int, int]
@@ -46,21 +48,31 @@ class PartSums:
 
     def factor(self, name: str, where: Bools) -> float:
         """See ``Sums``."""
-        return self.whole.factor(name, self._spread(where))
+        everywhere = np.zeros(self.shape, np.bool_)
+        everywhere[self.block.at] = where
+        return self.whole.factor(name, everywhere)
 
-    def ratio(self, name: str, area: Bools, made: WeightedSum) -> float:
+    def information(self, at: NDArray[np.intp]) -> Floats:
         """See ``Sums``."""
+        return self.whole.information(self._flat(at))
 
-        def spread(measurable: Bools) -> tuple[Floats, Floats]:
-            weights, noise = made(measurable[self.block.at])
-            return self._spread(weights), self._spread(noise)
+    def variance(self, at: NDArray[np.intp], weights: Floats) -> float:
+        """See ``Sums``."""
+        return self.whole.variance(self._flat(at), weights)
 
-        return self.whole.ratio(name, self._spread(area), spread)
+    def unit_variances(self, at: NDArray[np.intp]) -> Floats:
+        """See ``Sums``."""
+        return self.whole.unit_variances(self._flat(at))
 
-    def _spread(self, values: NDArray[Any]) -> NDArray[Any]:
-        out = np.zeros((*values.shape[:-2], *self.shape), values.dtype)
-        out[..., self.block.rows, self.block.columns] = values
-        return out
+    def kept(self, key: Hashable, make: Callable[[], Item]) -> Item:
+        """See ``Sums``."""
+        rows, columns = self.block.rows, self.block.columns
+        return self.whole.kept((rows.start, rows.stop, columns.start, columns.stop, key), make)
+
+    def _flat(self, at: NDArray[np.intp]) -> NDArray[np.intp]:
+        """Flat places in the block as those on the whole grid."""
+        every = np.arange(self.shape[0] * self.shape[1]).reshape(self.shape)
+        return np.asarray(every[self.block.at].ravel()[at])
 
 
 def part_of(field: StrainField, block: Block, grid: ZoiGrid | None = None) -> StrainField:

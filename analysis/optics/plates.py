@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.evaluate import AreaStrain
-from analysis.evaluate.affine import Places, covariance_of
+from analysis.evaluate.area.affine import Places, covariance_of
 from analysis.field import CommonError, StrainField, fixed_sums, part_of
 from analysis.optics.layout import PlateLayout
 from analysis.optics.plane import KEYSTONE, MODELS, STRETCH, ApparentMotion, Model, affine_values, shapes
@@ -135,15 +135,13 @@ class PlateFit:
 
 def _beyond_overlap(plate: StrainField, weights: Floats, noise: Floats) -> Floats:
     """Noise of each parameter that the pattern makes, over that of the overlap of windows, (K,)."""
-    sums, count = plate.sums, len(weights)
-    if sums is None:
+    count, at = len(weights), np.arange(plate.grid.active.size)
+    if plate.sums is None:
         return np.ones(count)
-
-    def ratio(k: int) -> float:
-        name = f"plate {count} {k} {plate.ok.tobytes().hex()}"
-        return sums.ratio(name, plate.grid.active, lambda able: (weights[k] * able, noise[k, k] * able))
-
-    return np.array([ratio(k) for k in range(count)])
+    unit = np.where(plate.ok.ravel(), plate.sums.unit_variances(at), 0.0)
+    made = [plate.sums.variance(at, weights[k].reshape(6, -1)) for k in range(count)]
+    expected = [float(np.sum(noise[k, k].reshape(2, -1) * unit)) for k in range(count)]
+    return np.asarray(np.sqrt(np.array(made) / np.array(expected)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -199,7 +199,9 @@ def curve_of(
     if axial == AXIAL:
         return Curve(t, _known(elastic, t), stress, strain(transverse), source=f"gauge {AXIAL}")
     if extension is None or not np.isfinite(extension).any():
-        return Curve(t, _known(elastic, t), stress, strain(transverse), source=f"mean {axial}")
+        # Files of before November 2026 have no extension, and means of the gradients.
+        words = f"mean {axial}" if extension is None else f"{axial} of the region"
+        return Curve(t, _known(elastic, t), stress, strain(transverse), source=words)
     return Curve(
         t, extension, stress, strain(transverse), elastic, strain(f"uneven_{axial}"), strain("misfit"),
         f"extension between strips along {axis}", f"{axial} of the region",

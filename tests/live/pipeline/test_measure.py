@@ -20,7 +20,7 @@ from analysis import KernelSettings, Roi, ZoiGrid
 from analysis.evaluate import GaugeValue
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
-from live.pipeline.history import AxisFinder, History
+from live.pipeline.history import AxisFinder, History, curve_of
 from live.pipeline.measure import BlurGuard, NewReference, measure
 from live.pipeline.measurement import HOLD_S, ForceMatching, TimeStep, ordered_mean
 from live.pipeline.reference import averaged, frame_noise, motion_between, prepare
@@ -290,3 +290,11 @@ def test_little_memory() -> None:
     grown = tracemalloc.get_traced_memory()[0] / 20_000
     tracemalloc.stop()
     assert grown < 360, "bytes an instant with two gauges"
+
+
+def test_the_means_of_an_old_file_are_not_called_strains_of_the_region() -> None:
+    """Before the extension had columns, exx and eyy were means of the gradients."""
+    values = {"exx": np.zeros(3), "eyy": np.arange(3.0)}
+    for old, words in ((True, "mean eyy"), (False, "eyy of the region")):
+        held = values if old else values | {"extension_y": np.full(3, np.nan)}
+        assert curve_of(held.get, (), "y", np.arange(3.0), np.zeros(3)).source == words

@@ -193,4 +193,6 @@ class SpecimenCheck:
             names = ", ".join(self._region.ready(self._folder).gauges)
         except PhasedicError as error:
             return CheckLine("gauges", str(error), False, "move it onto the region")
-        return CheckLine("gauges", f"placed: {names}" if names else "none: the mean strain is reported")
+        return CheckLine(
+            "gauges", f"placed: {names}" if names else "none: the strain of the region is reported"
+        )

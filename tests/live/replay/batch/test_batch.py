@@ -115,7 +115,7 @@ def test_again_only_what_is_missing(runs: Path, done: Path, capsys: pytest.Captu
     assert "12 done before, 0 to replay" in capsys.readouterr().out
     shutil.rmtree(done / "hole-3")
     assert batch(*words) == 0
-    assert "11 as they are, 1 to replay" in capsys.readouterr().out
+    assert "11 done before, 1 to replay" in capsys.readouterr().out
     after = {path: path.stat().st_mtime_ns for path in done.glob("*/strain.h5")}
     assert {path for path in before if before[path] != after[path]} == {done / "hole-3" / "strain.h5"}
 
@@ -146,7 +146,7 @@ def test_one_that_fails_stops_no_other(
     assert not (tmp_path / "out" / "broken").exists()
     shutil.copy(runs / "hole-2" / "session.h5", tmp_path / "broken" / "session.h5")
     assert batch(*words) == 0
-    assert "1 as they are, 1 to replay" in capsys.readouterr().out
+    assert "1 done before, 1 to replay" in capsys.readouterr().out
 
 
 def test_a_worker_that_is_killed(runs: Path, done: Path, tmp_path: Path) -> None:

@@ -79,7 +79,7 @@ NOT_SHOWN = {
     "raw grey levels, {} bits",
     "{} samples in {} s, {} with a value",
     "rate     {} 1/s, jitter {} ms, longest gap {} ms",
-    "force    mean {}, from {} to {} N",
+    "force    mean {} N, from {} to {} N",
     " ({} of the capacity)",
     "noise    {} N (one reading), {} different values, step {} N",
     "moved    {} N (means of a tenth of the time)",
