@@ -1,7 +1,7 @@
 """The apparent motion of the camera, measured on plates that move with the specimen and are not loaded.
 
 Reference-sample compensation: B. Pan, L. Yu, D. Wu, Experimental Mechanics 53 (2013) 1751-1761. The fit is the
-generalised least squares of ``analysis.evaluate.affine``, with the shapes of ``plane``.
+generalised least squares of ``analysis.evaluate.area.affine``, with the shapes of ``plane``.
 """
 
 from __future__ import annotations
