@@ -64,10 +64,6 @@ class TimeStep:
         Variation of the strain over the region (``analysis.evaluate.Unevenness``).
     misfit : float
         That variation over what noise makes of it.
-    raw_exx, raw_eyy, raw_exy : float
-        Strains of the region before the motion of plates was removed; NaN without plates.
-    corrected : float
-        1 where plates were measured, 0 where the correction has stopped; NaN without plates.
     blur, sigma_blur : float, px
         Of the picture since its reference (``analysis.field.Blur``); negative: sharper.
     area_share : float
@@ -102,10 +98,6 @@ class TimeStep:
     uneven_exx: float = math.nan
     uneven_eyy: float = math.nan
     misfit: float = math.nan
-    raw_exx: float = math.nan
-    raw_eyy: float = math.nan
-    raw_exy: float = math.nan
-    corrected: float = math.nan
     blur: float = math.nan
     sigma_blur: float = math.nan
     area_share: float = 1.0
@@ -206,14 +198,10 @@ class PlateReading:
     sigma_scale: float
     corrected: bool
 
-    @property
-    def numbers(self) -> dict[str, float]:
-        """Those of a ``TimeStep``."""
+    def raw_strain(self, name: str) -> float:
+        """A strain of the region before the correction; NaN where no ZOI has a value."""
         area = AreaStrain.of(self.raw)
-        raw = {
-            f"raw_{name}": math.nan if area is None else area.value(name) for name in ("exx", "eyy", "exy")
-        }
-        return raw | {"corrected": float(self.corrected)}
+        return math.nan if area is None else area.value(name)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -250,8 +238,7 @@ class Measurement:
         ``force`` (N) is NaN where it is not known, ``measure_s`` (s) the time of the kernel.
         """
         values = {gauge.name: gauge.read(field) for gauge in gauges}
-        numbers: dict[str, Any] = {} if plates is None else plates.numbers
-        step = replace(time_step_of(burst, field, force, measure_s), gauges=values, **numbers)
+        step = replace(time_step_of(burst, field, force, measure_s), gauges=values)
         return cls(number, burst, field, step, plates)
 
     @property

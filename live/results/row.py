@@ -159,11 +159,12 @@ def _values(
 
 
 def _plates(measurement: Measurement) -> dict[str, float]:
-    step, read = measurement.time_step, measurement.plates
-    values = {name: getattr(step, name) for name in (*RAW, "corrected")}
-    motion = [math.nan] * len(NAMES) if read is None else read.motion.parameters.tolist()
-    values |= {f"plate_{name}": value for name, value in zip(NAMES, motion, strict=True)}
-    return values | {"sigma_plate_scale": math.nan if read is None else read.sigma_scale}
+    read = measurement.plates
+    if read is None:
+        return dict.fromkeys(PLATES, math.nan)
+    values = [*(read.raw_strain(name) for name in STRAINS), float(read.corrected)]
+    values += [*read.motion.parameters.tolist(), read.sigma_scale]
+    return dict(zip(PLATES, values, strict=True))
 
 
 def _strains(measurement: Measurement, measure: StrainMeasure) -> dict[str, float]:

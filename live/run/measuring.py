@@ -13,8 +13,9 @@ from acquire.burst import LIMIT_PX
 from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind, EventSink, Level
 from acquire.frame import Burst
+from acquire.system import lower_priority
 from live.pipeline.consumer_thread import Outputs
-from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample, lower_priority
+from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import ReferenceBurst, motion_between
 from live.pipeline.run_state import RunState

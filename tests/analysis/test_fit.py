@@ -165,8 +165,8 @@ def scatter_over_predicted(
 @pytest.mark.parametrize(
     ("size", "step", "count", "order", "noise"),
     [
-        (32, 4, 17, 1, NOISE_GL), (32, 8, 13, 1, NOISE_GL), (32, 8, 13, 1, None), (32, 16, 7, 1, NOISE_GL),
-        (48, 12, 9, 2, NOISE_GL),
+        pytest.param(32, 4, 17, 1, NOISE_GL, marks=pytest.mark.slow), (32, 8, 13, 1, NOISE_GL), (32, 8, 13, 1, None),
+        pytest.param(32, 16, 7, 1, NOISE_GL, marks=pytest.mark.slow), (48, 12, 9, 2, NOISE_GL),
     ],
 )  # fmt: skip
 def test_means_scatter_as_predicted(

@@ -201,7 +201,7 @@ def recorded(folder: Path, count: int) -> Path:
     return shots
 
 
-@pytest.mark.parametrize("count", [3, 12])
+@pytest.mark.parametrize("count", [3, pytest.param(12, marks=pytest.mark.slow)])
 def test_recorded_pictures_are_checked_too(tmp_path: Path, count: int) -> None:
     rig = tmp_path / "rig.toml"
     rig.write_text(
