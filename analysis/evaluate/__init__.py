@@ -9,7 +9,7 @@ still phase of a test and the noise floor in it. ``deconvolution`` removes the b
 from analysis.evaluate.area.strain import AreaStrain, Unevenness
 from analysis.evaluate.curve import Curve, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
-from analysis.evaluate.elastic import LoadAxis, load_axis, principal_direction
+from analysis.evaluate.elastic import ErrorLimits, LoadAxis, load_axis, principal_direction
 from analysis.evaluate.extensometers import ExtensionGauge, LineGauge, TransverseGauge, extension_of
 from analysis.evaluate.figure import CONFIDENCE, Figure
 from analysis.evaluate.floor import MIN_STILL_INSTANTS, NoiseFloor, evenly, noise_floor, still_phase
@@ -30,6 +30,7 @@ __all__ = [
     "Band",
     "CircleGauge",
     "Curve",
+    "ErrorLimits",
     "ExtensionGauge",
     "Figure",
     "Gauge",

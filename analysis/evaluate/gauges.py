@@ -349,6 +349,10 @@ def extension(field: StrainField, ends: Ends) -> Extension:
     strain = float(moved @ (2 * before + moved)) / (now + length) / length
     spread = np.where(used, share * _sigma_along(field, (before + moved) / now), 0.0)
     variance = variance_of_sum(spread, "u", field.grid, field.window)
+    if field.common is not None:
+        along = np.zeros((6, *field.grid.shape))
+        along[_U], along[_V] = np.multiply.outer((before + moved) / now, share)
+        variance += field.common.variance_of_sum(along)
     return Extension(strain, math.sqrt(max(variance, 0.0)) / length, length)
 
 

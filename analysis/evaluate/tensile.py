@@ -7,12 +7,14 @@ strain is an option that the result names.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
-from typing import Literal
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal
 
 from analysis.evaluate.curve import Curve, Loading, first_crossing, noise, reading
 from analysis.evaluate.elastic import (
     MIN_POINTS,
+    ErrorLimits,
     FittedLine,
     between,
     chord,
@@ -50,11 +52,14 @@ class TensileOptions:
         Strain counts as measured, from where the elastic line has no stress (toe compensation), or from
         where the stress first reaches ``preload``.
     preload : float, Pa
+    limits : ErrorLimits
+        Of what E is uncertain by beyond the scatter.
     """
 
     standard: Standard = STANDARDS["iso6892"]
     zero: ZeroBy = "raw"
     preload: float = 0.0
+    limits: ErrorLimits = field(default_factory=ErrorLimits)
 
     def __post_init__(self) -> None:
         if self.zero not in ("raw", "toe", "preload"):
@@ -107,6 +112,8 @@ class TensileFigures:
     span : Span or None
     zero : StrainZero
     standard : str
+    budget : mapping of str to float
+        Relative standard uncertainties that the interval of E is made of, by their causes; empty without E.
     strain, elastic_strain : str
         What the strain of the curve is, and that of E and nu, in words.
     """
@@ -135,6 +142,7 @@ class TensileFigures:
     standard: str
     strain: str = ""
     elastic_strain: str = ""
+    budget: Mapping[str, float] = field(default_factory=dict)
 
 
 def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> TensileFigures:
@@ -230,10 +238,13 @@ def _with_line(
     region = replace(loading, strain=loading.elastic, noise_strain=noise(loading.elastic))
     slope = line_through(region, line.first, line.last) or line
     remark = not_uniform(loading, slope)
+    strained = float(loading.course[line.last - 1] - loading.course[line.first])
+    shares = options.limits.shares(strained)
     nu = _poisson(loading, slope, options.standard)
     figures = TensileFigures(
-        E=slope.modulus.remarked(remark),
-        E_chord=chord(region, slope),
+        E=slope.modulus(math.hypot(*shares.values())).remarked(remark),
+        E_chord=chord(region, slope, math.hypot(*shares.values())),
+        budget={"scatter": slope.sigma / slope.slope, **shares},
         r2=slope.r2,
         nu=nu.remarked(remark),
         Rp01=rp01,
@@ -286,13 +297,14 @@ def _without_line(loading: Loading, options: TensileOptions, why: str) -> Tensil
 
 
 def _nothing(why: str, options: TensileOptions) -> TensileFigures:
-    texts = {
+    texts: dict[str, Any] = {
         "span": None,
         "zero": StrainZero(0.0, "as measured"),
         "standard": options.standard.name,
         "r2": math.nan,
         "strain": "",
         "elastic_strain": "",
+        "budget": {},
     }
     names = [f.name for f in fields(TensileFigures) if f.name not in texts]
     return TensileFigures(**dict.fromkeys(names, Figure.none(why)), **texts)  # type: ignore[arg-type]

@@ -6,8 +6,10 @@
 
 from analysis.field.blocks import area_share, in_blocks
 from analysis.field.blur import Blur, blur_maps, mean_blur
+from analysis.field.common import CommonError
 from analysis.field.grid import WINDOWS, Roi, Window, ZoiGrid, profile
 from analysis.field.motion import Motion
+from analysis.field.part import Block, part_of
 from analysis.field.status import Status
 from analysis.field.strain_field import StrainField
 from analysis.field.uncertainty import (
@@ -28,7 +30,9 @@ __all__ = [
     "PAIR_INDEX",
     "VALUES",
     "WINDOWS",
+    "Block",
     "Blur",
+    "CommonError",
     "Measure",
     "Motion",
     "Roi",
@@ -45,6 +49,7 @@ __all__ = [
     "fixed_sums",
     "in_blocks",
     "mean_blur",
+    "part_of",
     "products",
     "profile",
     "strain_tensor",

@@ -16,6 +16,7 @@ import numpy as np
 from acquire.frame import Burst
 from analysis.evaluate import AreaStrain, Gauge, GaugeValue, extension_of
 from analysis.field import StrainField, area_share, mean_blur
+from analysis.optics import ApparentMotion
 
 AXIAL, TRANSVERSE = "axial", "transverse"
 """Gauges of these names are the strain along and across the load."""
@@ -177,6 +178,33 @@ def ordered_mean(values: np.ndarray) -> float:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class PlateReading:
+    """What plates measured of the camera's part in one burst.
+
+    Attributes
+    ----------
+    raw : StrainField
+        Of the specimen, before the correction.
+    motion : ApparentMotion
+        What was removed.
+    sigma_scale : float
+        Standard uncertainty of its scale.
+    corrected : bool
+        False: the plates could not be used, and the last motion was removed.
+    """
+
+    raw: StrainField
+    motion: ApparentMotion
+    sigma_scale: float
+    corrected: bool
+
+    def raw_strain(self, name: str) -> float:
+        """A strain of the region before the correction; NaN where no ZOI has a value."""
+        area = AreaStrain.of(self.raw)
+        return math.nan if area is None else area.value(name)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Measurement:
     """A burst, its strain field, and the means of that with the force at its time.
 
@@ -187,24 +215,31 @@ class Measurement:
     burst : Burst
     field : StrainField
     time_step : TimeStep
+    plates : PlateReading or None
+        Where there are plates, and ``field`` is corrected by them.
+    as_measured : StrainField or None
+        What the kernel gave, of specimen and plates, before any correction.
     """
 
     number: int
     burst: Burst
     field: StrainField
     time_step: TimeStep
+    plates: PlateReading | None = None
+    as_measured: StrainField | None = None
 
     @classmethod
     def of(
         cls, number: int, burst: Burst, field: StrainField, force: float, measure_s: float = 0.0,
-        gauges: Sequence[Gauge] = (),
+        gauges: Sequence[Gauge] = (), plates: PlateReading | None = None,
     ) -> Measurement:  # fmt: skip
         """Compute the means and the values of ``gauges``.
 
         ``force`` (N) is NaN where it is not known, ``measure_s`` (s) the time of the kernel.
         """
         values = {gauge.name: gauge.read(field) for gauge in gauges}
-        return cls(number, burst, field, replace(time_step_of(burst, field, force, measure_s), gauges=values))
+        step = replace(time_step_of(burst, field, force, measure_s), gauges=values)
+        return cls(number, burst, field, step, plates)
 
     @property
     def t(self) -> float:

@@ -13,6 +13,7 @@ from acquire.load_cell import LoadLog
 from analysis.evaluate import (
     CONFIDENCE,
     STANDARDS,
+    ErrorLimits,
     Figure,
     Interval,
     LoadAxis,
@@ -139,9 +140,61 @@ def evaluate(history: History, loads: LoadLog, specimen: SpecimenConfig) -> Tens
 def tensile_options(specimen: SpecimenConfig) -> TensileOptions:
     """The options of the evaluation from the configuration; a preload (MPa) is ignored without a section."""
     standard = STANDARDS.get(specimen.standard) or free(Interval("strain", *specimen.modulus_between))
+    limits = ErrorLimits(
+        _times(specimen.force_error_percent, 0.01),
+        _times(specimen.section_error_percent, 0.01) if specimen.area_m2 else None,
+        _times(specimen.strain_error_um_m, 1e-6),
+    )
     if specimen.zero == "preload" and specimen.area_m2 is not None:
-        return TensileOptions(standard, "preload", specimen.preload_MPa * 1e6)
-    return TensileOptions(standard, "toe" if specimen.zero == "toe" else "raw")
+        return TensileOptions(standard, "preload", specimen.preload_MPa * 1e6, limits)
+    return TensileOptions(standard, "toe" if specimen.zero == "toe" else "raw", limits=limits)
+
+
+def _times(value: float | None, unit: float) -> float | None:
+    return None if value is None else unit * value
+
+
+@dataclass(frozen=True, slots=True)
+class BudgetRow:
+    """One cause of the uncertainty of E, or all together: standard uncertainties, and the key that states it.
+
+    Attributes
+    ----------
+    cause : str
+    strain : float
+        At the end of the elastic interval; NaN where it is not stated.
+    modulus : float, Pa (N of a force)
+    key : str
+    """
+
+    cause: str
+    strain: float
+    modulus: float
+    key: str = ""
+
+
+_CAUSES = {
+    "load cell": "specimen.force_error_percent",
+    "section": "specimen.section_error_percent",
+    "strain": "specimen.strain_error_um_m",
+}
+
+
+def budget_rows(figures: TensileFigures, *, stresses: bool) -> list[BudgetRow]:
+    """The budget of E, the combined uncertainty last; empty where E is not known.
+
+    ``stresses``: the section is known.
+    """
+    if figures.span is None or not figures.budget:
+        return []
+    strain, E = figures.span.strain[1], figures.E.value
+    causes = [cause for cause in ("scatter", *_CAUSES) if stresses or cause != "section"]
+    shares = {**dict.fromkeys(causes, math.nan), **figures.budget}
+    rows = [
+        BudgetRow(cause, share * strain, share * E, _CAUSES.get(cause, "")) for cause, share in shares.items()
+    ]
+    combined = math.hypot(*figures.budget.values())
+    return [*rows, BudgetRow("combined", combined * strain, combined * E)]
 
 
 def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
@@ -210,7 +263,9 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
     rows = _rows(figures, specimen)
     hint = "" if specimen.area_m2 else " (give [specimen] width_mm and thickness_mm for E)"
     of = f" of {figures.elastic_strain}" if figures.elastic_strain else ""
-    words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, ±: {CONFIDENCE:.0%} interval)"
+    stated = [cause for cause in figures.budget if cause in _CAUSES]
+    beyond = f", of E with limits of {', '.join(stated)}" if stated else ""
+    words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, ±: {CONFIDENCE:.0%} interval{beyond})"
     return [_text(rows, "E") + hint + words, _known_texts(rows, _STRENGTHS)]
 
 

@@ -98,6 +98,23 @@ _INSTANTS = (
     ),
     Quantity("force_raw", "N", "force as stamped, not corrected for the lag of the load"),
     Quantity("zero", "N", "sum of the tares before, subtracted from the force"),
+    *(
+        Quantity(f"raw_{e}", UNITLESS, f"{e} of the region before the correction by plates")
+        for e in ("exx", "eyy", "exy")
+    ),
+    Quantity(
+        "corrected", UNITLESS, "1 where the plates were measured, 0 where their last motion was removed"
+    ),
+    Quantity("plate_shift_x", UNITLESS, "motion of the plates along x over half the diagonal of all ZOIs"),
+    Quantity("plate_shift_y", UNITLESS, "the same along y"),
+    Quantity("plate_scale", UNITLESS, "change of scale of the plates"),
+    Quantity("plate_turn", UNITLESS, "rotation of the plates, rad, clockwise"),
+    Quantity(
+        "plate_keystone_x", UNITLESS, "change of their scale along x over half the diagonal of all ZOIs"
+    ),
+    Quantity("plate_keystone_y", UNITLESS, "the same along y"),
+    Quantity("plate_stretch", UNITLESS, "half the difference of their strains along x and y"),
+    Quantity("plate_shear", UNITLESS, "their shear strain"),
     Quantity("n_valid", UNITLESS, "ZOIs with a value"),
     Quantity("n_zoi", UNITLESS, "ZOIs to measure"),
     Quantity("noise", "GL", "temporal standard deviation of one frame; nan for a burst of one"),

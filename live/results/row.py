@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.evaluate import AreaStrain
 from analysis.field import blur_maps
+from analysis.optics import NAMES
 from live.pipeline.measurement import AXIAL, extension_along, strains_along
 
 if TYPE_CHECKING:
@@ -23,6 +24,9 @@ STRAINS = ("exx", "eyy", "exy")
 EXTENSIONS = ("extension_x", "extension_y", "sigma_extension_x", "sigma_extension_y")
 BLUR = ("blur", "sigma_blur")
 UNEVEN = ("uneven_exx", "uneven_eyy", "misfit")
+RAW = ("raw_exx", "raw_eyy", "raw_exy")
+PLATES = (*RAW, "corrected", *(f"plate_{name}" for name in NAMES), "sigma_plate_scale")
+"""Columns of a test with plates: strains as measured, whether the plates were good, and their motion."""
 GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
 
 
@@ -46,6 +50,8 @@ class ResultsInfo:
         The virtual gauges, each as it was described.
     axis : "x", "y" or "auto"
         Of the load; auto: found from the means, y until then.
+    plates : bool
+        Plates correct the strains; rows have the strains as measured and the motion of the plates too.
     lagged : bool
         The force is corrected for a lag of the load; rows have the force as stamped too.
     """
@@ -61,12 +67,14 @@ class ResultsInfo:
     gauges: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     axis: str = "y"
     lagged: bool = False
+    plates: bool = False
 
     @property
     def extras(self) -> tuple[str, ...]:
         """The columns that only some tests have, without those of gauges."""
         stress = ("stress_Pa", "true_strain", "true_stress_Pa") if self.area_m2 is not None else ()
-        return (*stress, *(("force_raw_N",) if self.lagged else ()))
+        plates = PLATES if self.plates else ()
+        return (*stress, *(("force_raw_N",) if self.lagged else ()), *plates)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -145,7 +153,18 @@ def _values(
         values |= {"true_strain": math.log(stretch), "true_stress_Pa": stress * stretch}
     if info.lagged:
         values["force_raw_N"] = time_step.force_raw
+    if info.plates:
+        values |= _plates(measurement)
     return values
+
+
+def _plates(measurement: Measurement) -> dict[str, float]:
+    read = measurement.plates
+    if read is None:
+        return dict.fromkeys(PLATES, math.nan)
+    values = [*(read.raw_strain(name) for name in STRAINS), float(read.corrected)]
+    values += [*read.motion.parameters.tolist(), read.sigma_scale]
+    return dict(zip(PLATES, values, strict=True))
 
 
 def _strains(measurement: Measurement, measure: StrainMeasure) -> dict[str, float]:

@@ -27,6 +27,7 @@ ANALYSIS = {
     "analysis.picture": "analysis.field analysis.compiled",
     "analysis.follow": "analysis.field analysis.compiled",
     "analysis.evaluate": "analysis.field",
+    "analysis.optics": "analysis.field analysis.evaluate",
     "analysis.paper_estimator": "analysis.field",
     "analysis.quality": "analysis.field analysis.picture",
     "analysis.fit": "analysis.field analysis.compiled analysis.picture",

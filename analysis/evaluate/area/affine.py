@@ -114,6 +114,13 @@ class AffineFit:
         noise = of_each * np.sum(of_both * variances / self.unit, axis=0) / np.sum(q**2) ** 2
         return self._unit_variance(name, q, strain, valid) * fixed_sum(np.where(valid, noise, 0.0))
 
+    def weights(self, name: str, valid: Bools) -> Floats:
+        """A value of the affine field of the ``valid`` ZOIs (n,) as a sum of their six values, (6, n)."""
+        q = np.zeros(6)
+        for parameter, share in combination(name).items():
+            q[parameter] = share
+        return self._weights(q, valid)
+
     def _unit_variance(self, name: str, q: Floats, strain: StrainField, valid: Bools) -> float:
         """Variance of a value for noise of 1: by the pattern where no ZOI is lost, and what windows make of a loss."""
         key = name, valid.tobytes()

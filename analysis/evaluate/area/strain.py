@@ -66,7 +66,12 @@ class AreaStrain:
 
     def sigma(self, name: str) -> float:
         """Standard uncertainty of ``value`` (of the small strain), the noise of the reference included."""
-        variance = self.fit.variance(name, self.field, self.valid.ravel()[self.fit.at])
+        valid = self.valid.ravel()[self.fit.at]
+        variance, common = self.fit.variance(name, self.field, valid), self.field.common
+        if common is not None:
+            shares = np.zeros((6, self.valid.size))
+            shares[:, self.fit.at] = self.fit.weights(name, valid)
+            variance += common.variance_of_sum(shares.reshape(6, *self.valid.shape))
         return math.sqrt(variance) if variance > 0 else 0.0
 
     def unevenness(self) -> Unevenness:

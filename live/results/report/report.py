@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from acquire.errors import DataError
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
-from live.results.figures import axis_text, figure_lines, headline, sharpness_line
+from live.results.figures import axis_text, budget_rows, figure_lines, headline, sharpness_line
 from live.results.noise_floor import StillPhase, still_phase_of
 from live.results.report import curves
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
@@ -124,6 +125,7 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
         section("Specimen and rig", facts(_rig(run, pictures))),
         section("Curves", plots(content.figures), _about_parts(run), _about_curves(content.curve)),
         section("Figures of the test", *figure_table(run, content.curve)),
+        section("Budget of E", *budget_table(run, content.curve)),
         section("Virtual gauges", gauges(run)),
         section("Lag and latency", times(run)),
         section("Maps", *(maps(run, name, chosen, pictures, side) for name in fields)),
@@ -243,6 +245,30 @@ def _sharpness_section(run: RunFolder) -> list[Html]:
         return []
     lines = sharpness_line(values["blur_px"].tolist(), values["sigma_blur_px"].tolist())
     return [section("Sharpness", *(paragraph(line.replace("+-", "±")) for line in lines))] * bool(lines)
+
+
+def budget_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
+    """What the interval of E is made of, and what is not stated."""
+    rows = budget_rows(curve.figures, stresses=curve.is_stress)
+    if not rows:
+        return [paragraph("E is not known, so it has no budget.", "open")]
+    unit, one = ("GPa", 1e9) if curve.is_stress else ("kN", 1e3)
+    cells = [
+        (row.cause, f"{row.strain * 1e6:.3g}", f"{row.modulus / one:.3g}")
+        if math.isfinite(row.modulus)
+        else (row.cause, f"not stated: {row.key}", "")
+        for row in rows
+    ]
+    words = (
+        "Standard uncertainties, of the strain at the end of the elastic interval and of E, combined as the GUM"
+        " (JCGM 100:2008) has it; stated limits of error are taken as even distributions."
+    )
+    plates = (
+        "Motion off the plane is removed by plates; their noise is in the scatter."
+        if run.section("plate")
+        else ("Motion off the plane, the lens and a rolling shutter are in no row but strain.")
+    )
+    return [paragraph(f"{words} {plates}"), table(("", "µm/m", unit), cells, (1, 2))]
 
 
 def _noise_section(content: _Content) -> list[Html]:

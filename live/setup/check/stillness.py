@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 FIRST_FRAMES = 4  # frames averaged as the reference of the motion
 MAX_ZOIS = 64
+DRIFT_OVER_NOISE = 1.5
+"""A drift is clear beyond this times the noise of one frame: 3 to 5 of its standard deviations from 30 frames on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +47,13 @@ class PictureStillness:
     def drift_px(self) -> float:
         """Drift of the region, px."""
         return math.hypot(self.u.drift, self.v.drift)
+
+    @property
+    def dilatation(self) -> float:
+        """Drift that exx and eyy have in common, as from a changing distance; 0 where they differ or are noise."""
+        both, half = (self.exx.drift + self.eyy.drift) / 2, abs(self.exx.drift - self.eyy.drift) / 2
+        clear = abs(both) > max(2 * half, DRIFT_OVER_NOISE * max(self.exx.noise, self.eyy.noise))
+        return both if clear else 0.0
 
     @property
     def worse(self) -> Steadiness:

@@ -21,6 +21,7 @@ MAX_SATURATED, MAX_DARK, MAX_PILED = 1e-4, 0.01, 1e-3
 MIN_LIGHT = 0.3  # of full scale, 99th percentile
 MIN_CONTRAST = 0.05  # of full scale
 MAX_FLICKER, MAX_WITHOUT_PATTERN, MIN_SHARPNESS_RATIO = 0.01, 0.02, 0.7
+MAX_DILATATION = 5e-5  # common drift of exx and eyy
 MAX_NOISE_PX = 0.05  # of one ZOI in one frame
 MAX_OVER_PREDICTED = 1.5  # measured over predicted noise
 DEFAULT_TARGET = 1e-3
@@ -225,6 +226,10 @@ def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
     strain = max((s.exx, s.eyy), key=lambda one: abs(one.drift))
     yield CheckLine("drift", f"{s.drift_px:.4f} px and {strain.drift * 1e6:+.0f} µm/m in {s.u.seconds:.3g} s",
                s.drift_px <= max_px, "keep specimen and camera still")  # fmt: skip
+    if s.dilatation:
+        yield CheckLine("distance", f"exx and eyy drift alike, {s.dilatation * 1e6:+.0f} um/m: it changes by"
+                   f" {abs(s.dilatation):.1e} of the stand-off", abs(s.dilatation) < MAX_DILATATION,
+                   "warm up the camera, clamp grips and tripod, or hang plates (docs/optics.md)")  # fmt: skip
     shake = s.worse
     yield CheckLine("vibration", f"{_vibration(shake, 1, 'px', 4)}, {_vibration(s.worse_strain, 1e6, 'µm/m', 0)}",
                shake.vibration <= max_px, "a stiffer tripod, a quiet floor, no fan on the bench")  # fmt: skip

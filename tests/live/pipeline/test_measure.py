@@ -21,9 +21,10 @@ from analysis.evaluate import GaugeValue
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.pipeline.history import SHORT, AxisFinder, History, curve_of
-from live.pipeline.measure import BlurGuard, NewReference, SmearGuard, measure
+from live.pipeline.measure import BlurGuard, NewReference, measure
 from live.pipeline.measurement import HOLD_S, ForceMatching, TimeStep, ordered_mean
 from live.pipeline.reference import averaged, frame_noise, motion_between, prepare
+from live.run.measuring import SmearGuard
 from tests.live.fakes import frame
 from tests.live.made_up import START, make_loads, make_measurement
 
