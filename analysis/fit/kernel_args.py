@@ -129,6 +129,8 @@ class OutArgs(NamedTuple):
         Weighted sum of squared differences after the fit.
     bending : (A,) float64, px^2
         What the fit leaves of a displacement that bends or jumps (``shapes.bent``).
+    cubic : (A, 2) float64, px^2
+        The part of it of third degree, of u and of v.
     nuisance : (A, 2) float64
         Gain, and offset in GL.
     state, iterations : (A,) uint8
@@ -137,6 +139,7 @@ class OutArgs(NamedTuple):
     p: Floats
     left: Floats
     bending: Floats
+    cubic: Floats
     nuisance: Floats
     state: NDArray[np.uint8]
     iterations: NDArray[np.uint8]
@@ -146,7 +149,7 @@ class OutArgs(NamedTuple):
         """Arrays for the results of ZOIs that start from ``guess`` (A, modes), which is copied."""
         count = len(guess)
         return cls(
-            guess.copy(), np.empty(count), np.empty(count), np.empty((count, 2)),
+            guess.copy(), np.empty(count), np.empty(count), np.empty((count, 2)), np.empty((count, 2)),
             np.empty(count, np.uint8), np.empty(count, np.uint8),
         )  # fmt: skip
 
@@ -154,7 +157,7 @@ class OutArgs(NamedTuple):
     def unmeasured(cls, count: int, modes: int) -> OutArgs:
         """Of ZOIs that were not iterated: NaN."""
         empty = cls.starting(np.full((count, modes), np.nan))
-        for array in (empty.left, empty.bending, empty.nuisance):
+        for array in (empty.left, empty.bending, empty.cubic, empty.nuisance):
             array[:] = np.nan
         empty.state[:] = empty.iterations[:] = 0
         return empty
@@ -162,13 +165,13 @@ class OutArgs(NamedTuple):
     def put(self, places: NDArray[np.intp], other: OutArgs) -> None:
         """Copy what ``other`` holds of the ZOIs ``places``."""
         self.p[places], self.left[places], self.bending[places] = other.p, other.left, other.bending
-        self.nuisance[places] = other.nuisance
+        self.cubic[places], self.nuisance[places] = other.cubic, other.nuisance
         self.state[places], self.iterations[places] = other.state, other.iterations
 
     def at(self, places: NDArray[np.intp]) -> OutArgs:
         """Those of some ZOIs."""
         return OutArgs(
-            self.p[places], self.left[places], self.bending[places], self.nuisance[places],
+            self.p[places], self.left[places], self.bending[places], self.cubic[places], self.nuisance[places],
             self.state[places], self.iterations[places],
         )  # fmt: skip
 
@@ -193,6 +196,37 @@ class ReferenceArgs(NamedTuple):
     unit: Floats
     centre: Floats
 
+    def at(self, places: NDArray[np.intp] | slice) -> ReferenceArgs:
+        """That of some ZOIs."""
+        return ReferenceArgs(self.signal[places], self.pixels[places], self.unit[places], self.centre[places])
+
+
+class PooledError(NamedTuple):
+    """What the fits of one picture leave in common (``pooling.pooled``).
+
+    Attributes
+    ----------
+    ratio : (A,)
+        Variance that a ZOI of this contrast leaves, over that expected from the noise as stated.
+    scatter : float
+        Standard deviation of what a single ZOI leaves over that.
+    colour : (2,)
+        Variance of u and of v over that of white noise of the same variance a pixel.
+    """
+
+    ratio: Floats
+    scatter: float
+    colour: Floats
+
+    @classmethod
+    def none(cls, count: int) -> PooledError:
+        """Of ``count`` ZOIs that leave what is expected."""
+        return cls(np.ones(count), 0.0, np.ones(2))
+
+    def at(self, places: NDArray[np.intp] | slice) -> PooledError:
+        """That of some ZOIs."""
+        return self._replace(ratio=self.ratio[places])
+
 
 class VerdictArgs(NamedTuple):
     """What holds for the verdict of every ZOI.
@@ -201,7 +235,7 @@ class VerdictArgs(NamedTuple):
     ----------
     noise_known : bool
         Whether the expected variance stands on noise that was given.
-    noise : (2,)
+    noise : (3,)
         ``shapes.Shapes.noise``.
     lever : float, px
         Width of the window that makes a displacement of a strain.

@@ -241,9 +241,9 @@ class Shapes:
         Window times P0 .. P3.
     mix : (4, 4) float64
         P_i = sum over k of mix[i, k] xi^k.
-    noise : (2,) float64
-        Sum over the five shapes, and over their squares, of the variance of a share in units of
-        that of u.
+    noise : (3,) float64
+        Sum over the five shapes, and over their squares, of the variance of a share in units of that of u; the
+        median of the sum over the four of third degree.
     """
 
     powers: NDArray[np.float32]
@@ -266,8 +266,14 @@ def shapes_of(line: NDArray[np.float64], length: int) -> Shapes:
         powers=np.pad(np.stack([line * xi**k for k in range(PRODUCT_ROWS)]), padding).astype(np.float32),
         rows=np.pad(line * along_x, padding).astype(np.float32),
         mix=mix,
-        noise=np.array([each.sum(), np.sum(each**2)]),
+        noise=np.array([each.sum(), np.sum(each**2), _median_of_squares(each[1:])]),
     )
+
+
+def _median_of_squares(variances: NDArray[np.float64]) -> float:
+    """Median of a sum of squares of normal values: of chi^2 with the same mean and variance (Wilson-Hilferty)."""
+    freedom = float(variances.sum() ** 2 / np.sum(variances**2))
+    return float(variances.sum()) * (1 - 2 / (9 * freedom)) ** 3
 
 
 def _orthonormal(x: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -321,16 +327,20 @@ def shares(s: Any, component: int, out: Any) -> None:
 
 
 @inlined
-def bent(s: Any, cross: Any, z: int, step: Any, unit_x: Any, unit_y: Any, fitted: Any) -> Any:
+def bent(s: Any, cross: Any, z: int, step: Any, unit_x: Any, unit_y: Any, fitted: Any, cubic: Any) -> Any:
     """Sum of the squared shares, px^2, of what is left of the difference after a linear fit of ZOI ``z``.
 
     ``s`` (10,) are the sums with the whole difference, ``step`` (P,) is the fit, ``unit_x`` and ``unit_y`` the
-    sums of w f_x^2 and w f_y^2; ``fitted`` float32, 10 in whole vectors, is for use here.
+    sums of w f_x^2 and w f_y^2; ``fitted`` float32, 10 in whole vectors, is for use here. ``cubic`` (2,), written,
+    are the parts of u and of v in the four shapes of third degree.
     """
     width = 2 * N_SHAPES
     weighted_rows(cross, np.uintp(z * len(step) * width), step, width, fitted)
     of_u = of_v = 0.0
-    for i in range(N_SHAPES):
+    for i in range(1, N_SHAPES):
         of_u += (s[i] - fitted[i]) ** 2
         of_v += (s[N_SHAPES + i] - fitted[N_SHAPES + i]) ** 2
-    return of_u / unit_x**2 + of_v / unit_y**2
+    cubic[0] = of_u / unit_x**2
+    cubic[1] = of_v / unit_y**2
+    second_u, second_v = s[0] - fitted[0], s[N_SHAPES] - fitted[N_SHAPES]
+    return cubic[0] + cubic[1] + second_u**2 / unit_x**2 + second_v**2 / unit_y**2

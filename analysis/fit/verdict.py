@@ -10,7 +10,7 @@ from typing import Any
 
 from analysis.compiled.loops import helper
 from analysis.field import Status
-from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, ReferenceArgs, VerdictArgs
+from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, PooledError, ReferenceArgs, VerdictArgs
 from analysis.fit.validity import (
     BENDING_CHANCE,
     BENDING_SHARE,
@@ -34,8 +34,8 @@ NO_PATTERN = int(Status.NO_PATTERN)
 
 @helper
 def judge(
-    found: OutArgs, left: Any, expected: Any, known: ReferenceArgs, rule: VerdictArgs, out: Any
-) -> None:
+    found: OutArgs, left: Any, expected: Any, common: PooledError, known: ReferenceArgs, rule: VerdictArgs, out: Any
+) -> None:  # fmt: skip
     """Write a status for each measured ZOI.
 
     Parameters
@@ -43,7 +43,9 @@ def judge(
     found : OutArgs
         Of the iteration.
     left, expected : (A,), GL^2
-        Variance a pixel that the fit leaves, and expected from the noise of both images.
+        Variance a pixel that the fit leaves, and expected from the noise of both images as stated.
+    common : PooledError
+        A ZOI that leaves no more than its like is not refused for it.
     known : ReferenceArgs
     rule : VerdictArgs
     out : (A,) uint8, written
@@ -53,22 +55,24 @@ def judge(
         chance = NOISE_FACTOR + CHANCE * math.sqrt(2 / max(known.pixels[z], 1.0))
         if not rule.noise_known:
             chance = max(chance, UNKNOWN_NOISE_FACTOR)
-        allowed = chance * expected[z]
+        error = common.ratio[z] * expected[z]
+        usual = error * (NOISE_FACTOR + CHANCE * max(common.scatter, math.sqrt(2 / max(known.pixels[z], 1.0))))
         pattern = known.signal[z] * min(gain, 1.0) ** 2
+        allowed = max(chance * expected[z], min(usual, LOST_SHARE * pattern))
         if found.state[z] == LEFT_IMAGE:
             out[z] = OUTSIDE
         elif not left[z] <= allowed + LOST_SHARE * pattern:
             out[z] = LOST
         elif found.state[z] != CONVERGED or _slow(found, z, known, expected[z]):
             out[z] = NOT_CONVERGED
-        elif _is_empty(left[z] / expected[z]) and _sigma(known, z, expected[z]) > EMPTY_SIGMA:
+        elif _is_empty(left[z], min(expected[z], error)) and _sigma(known, z, expected[z]) > EMPTY_SIGMA:
             out[z] = NO_PATTERN
         elif not (MIN_GAIN < gain < MAX_GAIN and left[z] <= allowed + MODEL_SHARE * pattern):
             out[z] = POOR_MATCH
         else:
-            by_noise = NOISE_FACTOR * expected[z] if rule.noise_known else allowed
+            by_noise = NOISE_FACTOR * max(expected[z], error) if rule.noise_known else allowed
             misfit = _used(left[z], by_noise, allowed + MODEL_SHARE * pattern - by_noise)
-            bent = _bent(found, z, known, max(expected[z], left[z]), rule)
+            bent = _bent(found, z, known, max(expected[z], left[z]), common.colour, rule)
             doubt = (misfit + bent) * _beyond(known, z, rule.far)
             out[z] = OK if doubt <= 1 else POOR_MATCH if misfit > bent else UNEVEN
 
@@ -80,8 +84,8 @@ def _sigma(known: Any, z: int, variance: Any) -> Any:
 
 
 @helper
-def _is_empty(left: Any) -> Any:
-    return EMPTY_SHARES[0] < left < EMPTY_SHARES[1]
+def _is_empty(left: Any, expected: Any) -> Any:
+    return EMPTY_SHARES[0] < left / expected < EMPTY_SHARES[1]
 
 
 @helper
@@ -98,13 +102,14 @@ def _used(value: Any, by_noise: Any, margin: Any) -> Any:
 
 
 @helper
-def _bent(found: Any, z: int, known: Any, variance: Any, rule: Any) -> Any:
+def _bent(found: Any, z: int, known: Any, variance: Any, colour: Any, rule: Any) -> Any:
     """How far the displacement bends or jumps, in shares of what is allowed; beyond 1 the centre is wrong.
 
     The displacement that the strain makes over the width of the window allows for more: where a
     specimen necks the strain is steep, but small beside itself; across a crack it is not.
     """
-    of_u, of_v = variance * known.unit[z, 0], variance * known.unit[z, 1]
+    of_u = variance * known.unit[z, 0] * max(1.0, colour[0])
+    of_v = variance * known.unit[z, 1] * max(1.0, colour[1])
     spread = math.sqrt(2 * rule.noise[1] * (of_u**2 + of_v**2))
     allowed = rule.limit**2 + (BENDING_SHARE * stretch_of(found.p, z, rule.lever)) ** 2
     return _used(found.bending[z], (of_u + of_v) * rule.noise[0], BENDING_CHANCE * spread + allowed)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from analysis.field import Roi, Status, StrainField, ZoiGrid, profile
 from analysis.fit.kernel_args import StopArgs
 from analysis.follow.renewal import Placement, place
-from analysis.kernel.images import Noise, NoiseModel, as_model, check_fit, clipped_pixels
+from analysis.kernel.images import Noise, NoiseModel, as_model, check_fit, clipped_pixels, rounding_variance
 from analysis.kernel.prepared import PatternError, PreparedReference, prepare_reference
 from analysis.kernel.quadrature import Sensors, make_sensors
 from analysis.kernel.settings import KernelSettings
@@ -71,6 +71,8 @@ class ReferencePicture:
         Of u and v if nothing else were sought, for a noise of 1 GL.
     sums : MeanNoise or None
         Of the sensor form.
+    rounding : float, GL^2
+        Variance that rounding to whole grey levels leaves.
     """
 
     grid: ZoiGrid
@@ -88,6 +90,7 @@ class ReferencePicture:
     unit_sigma: Floats
     share_variance: Floats
     sums: MeanNoise | None
+    rounding: float
 
     @classmethod
     def first(
@@ -232,6 +235,7 @@ def _laid_out(
         unit_sigma=np.stack([lengths.min(1), slopes.min(1), lengths.max(1)]),
         share_variance=1 / np.maximum(prepared.weight * sharpness * prepared.energy, 1e-12),
         sums=None if sensors is not None else _sums(grid, settings, index, prepared, unit_covariance),
+        rounding=rounding_variance(image),
     )
 
 

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Status, profile
-from analysis.fit.kernel_args import LEFT_IMAGE, FitArgs, OutArgs, PictureArgs, ReferenceArgs, VerdictArgs
+from analysis.fit.kernel_args import LEFT_IMAGE, FitArgs, OutArgs, PictureArgs, PooledError, ReferenceArgs, VerdictArgs
 from analysis.fit.validity import CENTRE_VARIANCE, CLIPPED_SHARE
-from analysis.kernel.images import NoiseModel
+from analysis.kernel.images import NoiseModel, rounding_variance
 from analysis.kernel.quadrature import Sensors
 from analysis.kernel.reference import SPILL_PX, Places, ReferencePicture
 from analysis.picture.splines import Box, prefilter_taps, tap_table
@@ -41,6 +41,8 @@ class Solution:
     status : (A,) uint8
     tolerance : StopArgs
         Where the iteration may stop.
+    common : PooledError or None
+        What the fits leave in common; None: of too few ZOIs to be taken.
     """
 
     def __init__(
@@ -51,6 +53,8 @@ class Solution:
         self.image = image
         self.noise = noise
         self.guess = guess
+        self.rounding = reference.rounding + rounding_variance(image)
+        self.common: PooledError | None = None
         self.picture = self._picture(reference.reached(guess))
         self.table = tap_table(reference.settings.interpolant)
         self.tolerance = reference.tolerance(self._current_std())
@@ -146,28 +150,44 @@ class Solution:
             guess, self.tolerance.at(which),
         )  # fmt: skip
         seen = self._iterated(which, values, max_iterations=1)
-        return OutArgs(values, seen.left, seen.bending, seen.nuisance, state, iterations)
+        return seen._replace(p=values, state=state, iterations=iterations)
 
     def _verdicts(self, which: Places, found: OutArgs) -> NDArray[np.uint8]:
         from analysis.fit.verdict import judge
 
         reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
-        freedom = ready.freedom[which]
-        known = ReferenceArgs(
-            ready.signal[which], freedom * reference.sharpness, reference.share_variance[which],
-            reference.unit_sigma[2, which],
-        )  # fmt: skip
+        known, expected = self._known(), self.expected(which, found.nuisance[:, 0])
         noise_known = self.noise is not None and reference.noise_model is not None
         far = CENTRE_VARIANCE[settings.order - 1]
         rule = VerdictArgs(noise_known, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far)
-        status = np.empty(len(freedom), np.uint8)
-        judge(found, found.left / freedom, self._expected(which, found.nuisance[:, 0]), known, rule, status)
+        left = self._left(which, found)
+        if self.common is None:
+            self.common = self.pooled(which, found)
+        common = PooledError.none(len(known.signal)) if self.common is None else self.common
+        status = np.empty(len(expected), np.uint8)
+        judge(found, left, expected, common.at(which), known.at(which), rule, status)
         return status
 
-    def _expected(self, which: Places, gain: Floats) -> Floats:
+    def pooled(self, which: Places, found: OutArgs) -> PooledError | None:
+        """What the fits ``found`` of the ZOIs ``which`` leave in common."""
+        from analysis.fit.pooling import pooled
+
+        left, expected = self._left(which, found), self.expected(which, found.nuisance[:, 0])
+        return pooled(found, left, expected, self._known(), which, self.reference.prepared.shapes.noise)
+
+    def _known(self) -> ReferenceArgs:
+        reference, ready = self.reference, self.reference.prepared
+        pixels = ready.freedom * reference.sharpness
+        return ReferenceArgs(ready.signal, pixels, reference.share_variance, reference.unit_sigma[2])
+
+    def _left(self, which: Places, found: OutArgs) -> Floats:
+        """Variance a pixel that the fit leaves, GL^2; rounding leaves something where the images are equal, too."""
+        return np.maximum(found.left / self.reference.prepared.freedom[which], self.rounding)
+
+    def expected(self, which: Places, gain: Floats) -> Floats:
         """Variance a pixel that noise alone leaves in the difference of the images, GL^2."""
         reference, current = self.variances(which, gain)
-        return np.asarray(np.minimum(gain**2, 25.0) * reference + current)
+        return np.asarray(np.maximum(np.minimum(gain**2, 25.0) * reference + current, self.rounding))
 
     def variances(self, which: Places, gain: Floats) -> tuple[Floats, Floats]:
         """Variance a pixel of the reference and of the image at some ZOIs, GL^2; the reference's where not known."""
