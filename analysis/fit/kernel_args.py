@@ -189,16 +189,21 @@ class ReferenceArgs(NamedTuple):
         Variance of u and of v from noise of 1 GL, of a ZOI without anything else to find.
     centre : (A,), px per GL
         Standard deviation of the worse of u and v from noise of 1 GL, as it is found.
+    white : (2,)
+        ``pooling.white_cubic``.
     """
 
     signal: Floats
     pixels: Floats
     unit: Floats
     centre: Floats
+    white: Floats
 
     def at(self, places: NDArray[np.intp] | slice) -> ReferenceArgs:
         """That of some ZOIs."""
-        return ReferenceArgs(self.signal[places], self.pixels[places], self.unit[places], self.centre[places])
+        return ReferenceArgs(
+            self.signal[places], self.pixels[places], self.unit[places], self.centre[places], self.white
+        )
 
 
 class PooledError(NamedTuple):
@@ -235,7 +240,7 @@ class VerdictArgs(NamedTuple):
     ----------
     noise_known : bool
         Whether the expected variance stands on noise that was given.
-    noise : (3,)
+    noise : (2,)
         ``shapes.Shapes.noise``.
     lever : float, px
         Width of the window that makes a displacement of a strain.

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.fit.assembly import MIN_NOISE_GAIN
-from analysis.fit.kernel_args import CONVERGED, OutArgs, PooledError, ReferenceArgs
+from analysis.fit.kernel_args import CONVERGED, FitArgs, OutArgs, PooledError, ReferenceArgs
+from analysis.fit.sensitivity import columns
 from analysis.fit.validity import EMPTY_SIGMA, LOST_SHARE
 
 Floats = NDArray[np.float64]
@@ -27,11 +28,13 @@ GROUP, MAX_GROUPS = 50, 8
 """ZOIs of like contrast whose median counts, at least, and number of such groups at most."""
 WHITE = 64
 """ZOIs with white noise that the ratio of the shapes is averaged with: of few it is known to some 10 % alone."""
+SAMPLE = 50
+"""ZOIs whose answer to white noise is computed."""
 MAD = 1.4826
 
 
 def pooled(
-    found: OutArgs, left: Floats, expected: Floats, known: ReferenceArgs, places: Places, noise: Floats
+    found: OutArgs, left: Floats, expected: Floats, known: ReferenceArgs, places: Places
 ) -> PooledError | None:
     """The common error of the ZOIs that were fitted, at the contrasts of all; None where too few explain their pattern.
 
@@ -44,8 +47,6 @@ def pooled(
     known : ReferenceArgs
         Of all A.
     places : which of the A
-    noise : (3,)
-        ``shapes.Shapes.noise``.
     """
     own, gain = known.at(places), found.nuisance[:, 0]
     with np.errstate(invalid="ignore"):
@@ -62,7 +63,7 @@ def pooled(
     scatter = MAD * float(np.median(np.abs(ratio / _by_contrast(contrast, ratio, contrast) - 1)))
     error = expected * trend[places] / np.maximum(gain, MIN_NOISE_GAIN) ** 2
     shares = found.cubic[matched] / (error[:, None] * own.unit)[matched]
-    colour = np.median(shares, axis=0) / noise[2]
+    colour = np.median(shares, axis=0) / known.white
     return PooledError(trend, scatter, (count * colour + WHITE) / (count + WHITE))
 
 
@@ -72,3 +73,50 @@ def _by_contrast(signal: Floats, ratio: Floats, where: Floats) -> Floats:
     groups = np.array_split(order, max(1, min(MAX_GROUPS, len(order) // GROUP)))
     contrast = [float(np.median(signal[group])) for group in groups]
     return np.interp(where, contrast, [float(np.median(ratio[group])) for group in groups])
+
+
+def white_cubic(fit: FitArgs, unit: Floats, able: NDArray[np.bool_]) -> Floats:
+    """Median over ZOIs of ``OutArgs.cubic`` from white noise, of u and of v, over their variance, (2,).
+
+    Parameters
+    ----------
+    fit : FitArgs
+        Of all A ZOIs.
+    unit : (A, 2), px^2 per GL^2
+        Variance of u and of v from noise of 1 GL, of a ZOI without anything else to find.
+    able : (A,) bool
+        ZOIs with a pattern.
+    """
+    which = np.flatnonzero(able)
+    sample = which[:: max(1, len(which) // SAMPLE)]
+    if len(sample) == 0:
+        return np.ones(2)
+    return np.median([_white_cubic(fit, z) / unit[z] for z in sample], axis=0)
+
+
+def _white_cubic(fit: FitArgs, z: int) -> Floats:
+    """The same of one ZOI, px^2 per GL^2."""
+    size, (top, left) = fit.size, fit.origins[z]
+    pixels = top * fit.pitch + left + np.add.outer(np.arange(size) * fit.pitch, np.arange(size))
+    channels = [fit.images[pixels + k * fit.samples] for k in range(3)] + [np.ones((size, size))]
+    line = fit.rows[0, :size].astype(np.float64)
+    window = np.outer(line, line).ravel()
+    xi = (np.arange(size) - (size - 1) / 2) / (size / 2)
+    modes = np.stack(
+        [(channels[k] * np.outer(xi**py, xi**px)).ravel() for k, px, py in columns(fit.order)]
+    ) * window
+    legendre = fit.mix @ xi ** np.arange(4)[:, None]
+    inverse = fit.inverse[z].astype(np.float64)
+    out = np.empty(2)
+    for k in (0, 1):
+        shapes = np.stack([(channels[k] * np.outer(legendre[j], legendre[3 - j])).ravel() for j in range(4)])
+        taken = (shapes @ modes.T) @ inverse @ modes
+        weights = (shapes * window - taken) / fit.squares[z, k]
+        out[k] = _median_of_squares(np.linalg.eigvalsh(weights @ weights.T))
+    return out
+
+
+def _median_of_squares(variances: Floats) -> float:
+    """Median of a sum of squares of normal values: of chi^2 with the same mean and variance (Wilson-Hilferty)."""
+    freedom = float(variances.sum() ** 2 / np.sum(variances**2))
+    return float(variances.sum()) * (1 - 2 / (9 * freedom)) ** 3

@@ -241,9 +241,9 @@ class Shapes:
         Window times P0 .. P3.
     mix : (4, 4) float64
         P_i = sum over k of mix[i, k] xi^k.
-    noise : (3,) float64
-        Sum over the five shapes, and over their squares, of the variance of a share in units of that of u; the
-        median of the sum over the four of third degree.
+    noise : (2,) float64
+        Sum over the five shapes, and over their squares, of the variance of a share in units of
+        that of u.
     """
 
     powers: NDArray[np.float32]
@@ -266,14 +266,8 @@ def shapes_of(line: NDArray[np.float64], length: int) -> Shapes:
         powers=np.pad(np.stack([line * xi**k for k in range(PRODUCT_ROWS)]), padding).astype(np.float32),
         rows=np.pad(line * along_x, padding).astype(np.float32),
         mix=mix,
-        noise=np.array([each.sum(), np.sum(each**2), _median_of_squares(each[1:])]),
+        noise=np.array([each.sum(), np.sum(each**2)]),
     )
-
-
-def _median_of_squares(variances: NDArray[np.float64]) -> float:
-    """Median of a sum of squares of normal values: of chi^2 with the same mean and variance (Wilson-Hilferty)."""
-    freedom = float(variances.sum() ** 2 / np.sum(variances**2))
-    return float(variances.sum()) * (1 - 2 / (9 * freedom)) ** 3
 
 
 def _orthonormal(x: NDArray[np.float64], weight: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Roi, Status, StrainField, ZoiGrid, profile
-from analysis.fit.kernel_args import StopArgs
+from analysis.fit.kernel_args import FitArgs, StopArgs
 from analysis.follow.renewal import Placement, place
 from analysis.kernel.images import Noise, NoiseModel, as_model, check_fit, clipped_pixels, rounding_variance
 from analysis.kernel.prepared import PatternError, PreparedReference, prepare_reference
 from analysis.kernel.quadrature import Sensors, make_sensors
 from analysis.kernel.settings import KernelSettings
+from analysis.picture.impulses import without_impulses
 from analysis.picture.splines import Box
 
 if TYPE_CHECKING:
@@ -73,6 +74,10 @@ class ReferencePicture:
         Of the sensor form.
     rounding : float, GL^2
         Variance that rounding to whole grey levels leaves.
+    white : (2,) float64
+        ``pooling.white_cubic``.
+    cleaned : bool
+        Whether it had wild pixels, which were replaced; later pictures are then cleaned, too.
     """
 
     grid: ZoiGrid
@@ -91,6 +96,8 @@ class ReferencePicture:
     share_variance: Floats
     sums: MeanNoise | None
     rounding: float
+    white: Floats
+    cleaned: bool
 
     @classmethod
     def first(
@@ -108,9 +115,11 @@ class ReferencePicture:
         origins = np.stack([grid.first_y[rows], grid.first_x[columns]], axis=1).astype(np.int64)
         model = None if noise is None else as_model(noise)
         saturated = clipped_pixels(image, clipped, model)
-        prepared = prepare_reference(image, origins, grid.size, settings, model, saturated)
+        cleaned = without_impulses(image)
+        whole = image if cleaned is None else cleaned
+        prepared = prepare_reference(whole, origins, grid.size, settings, model, saturated)
         _check_pattern(prepared.status)
-        return _laid_out(image, grid, settings, model, prepared)
+        return _laid_out(whole, grid, settings, model, prepared, cleaned is not None)
 
     def renewed(
         self,
@@ -124,10 +133,12 @@ class ReferencePicture:
         model = None if noise is None else as_model(noise)
         placement = place(field, self.index, self.modes, self.prepared.shape)
         saturated = clipped_pixels(image, clipped, model)
-        prepared = prepare_reference(image, placement.origins, size, settings, model, saturated)
+        cleaned = without_impulses(image)
+        whole = image if cleaned is None else cleaned
+        prepared = prepare_reference(whole, placement.origins, size, settings, model, saturated)
         gone = placement.status != Status.OK
         prepared = replace(prepared, status=np.where(gone, placement.status, prepared.status))
-        return _laid_out(image, self.grid, settings, model, prepared, placement)
+        return _laid_out(whole, self.grid, settings, model, prepared, cleaned is not None, placement)
 
     @property
     def modes(self) -> int:
@@ -144,6 +155,10 @@ class ReferencePicture:
     def noise(self) -> float:
         """Standard deviation of the noise, GL, as given or as estimated."""
         return self.prepared.pattern.noise
+
+    def fit(self, which: Places = ALL) -> FitArgs:
+        """The linear fit of some ZOIs."""
+        return _fit(self.prepared, which, self.grid.size, self.settings.order, self.spacing)
 
     def tolerance(self, current: float) -> StopArgs:
         """When the iteration may stop, for a noise of ``current`` GL in the deformed image."""
@@ -207,6 +222,7 @@ def _laid_out(
     settings: KernelSettings,
     model: NoiseModel | None,
     prepared: PreparedReference,
+    cleaned: bool,
     placement: Placement | None = None,
 ) -> ReferencePicture:
     """What every frame needs of a prepared picture, once."""
@@ -219,6 +235,7 @@ def _laid_out(
     index = np.flatnonzero(grid.active)
     lengths, slopes = (np.sqrt(np.maximum(prepared.covariance[:, k].astype(np.float64), 0)) for k in _AFFINE)
     unit_covariance = np.ascontiguousarray(_spread(prepared.covariance, index, grid.shape, 0))
+    share_variance = 1 / np.maximum(prepared.weight * sharpness * prepared.energy, 1e-12)
     return ReferencePicture(
         grid=grid,
         settings=settings,
@@ -233,10 +250,31 @@ def _laid_out(
         sharpness=sharpness,
         unit_covariance=unit_covariance,
         unit_sigma=np.stack([lengths.min(1), slopes.min(1), lengths.max(1)]),
-        share_variance=1 / np.maximum(prepared.weight * sharpness * prepared.energy, 1e-12),
+        share_variance=share_variance,
         sums=None if sensors is not None else _sums(grid, settings, index, prepared, unit_covariance),
         rounding=rounding_variance(image),
+        white=_white(prepared, grid, settings.order, share_variance),
+        cleaned=cleaned,
     )
+
+
+def _fit(ready: PreparedReference, which: Places, size: int, order: int, spacing: int) -> FitArgs:
+    from analysis.fit.sensitivity import parameter_scale
+
+    padded = which if isinstance(which, slice) else np.append(which, -1)
+    return FitArgs(
+        ready.images.ravel(), ready.images[0].size, ready.images.shape[2],
+        ready.origins[which], size, spacing, order, ready.shapes.rows, ready.shapes.mix,
+        ready.inverse[padded], ready.cross[padded],
+        ready.weight * ready.energy[which], parameter_scale(order, size),
+    )  # fmt: skip
+
+
+def _white(prepared: PreparedReference, grid: ZoiGrid, order: int, unit: Floats) -> Floats:
+    from analysis.fit.pooling import white_cubic
+
+    fit = _fit(prepared, ALL, grid.size, order, grid.step)
+    return white_cubic(fit, unit, prepared.status == Status.OK)
 
 
 def _sums(

@@ -21,6 +21,10 @@ from analysis.picture.splines import Box, prefilter_taps, tap_table
 
 Floats = NDArray[np.float64]
 
+DISTURBED_RATIO, DISTURBED_SHARE = 2.0, 0.02
+"""Of what is left over what the noise explains, and of the ZOIs that are refused: from here on wild pixels of the
+image are looked for."""
+
 
 class Solution:
     """Parameters and verdict of every active ZOI of one image, as they come.
@@ -50,22 +54,48 @@ class Solution:
     ) -> None:
         prepared = reference.prepared
         self.reference = reference
-        self.image = image
         self.noise = noise
         self.guess = guess
         self.rounding = reference.rounding + rounding_variance(image)
         self.common: PooledError | None = None
-        self.picture = self._picture(reference.reached(guess))
+        self._take(self._cleaned(image) if reference.cleaned else image)
         self.table = tap_table(reference.settings.interpolant)
         self.tolerance = reference.tolerance(self._current_std())
         able = prepared.status == Status.OK
         known = np.isfinite(guess.sum()) or np.isfinite(guess @ np.ones(guess.shape[1]))  # as a rule all
         which = np.flatnonzero(able & known)
+        self._solve(which, able & ~known)
+        if not reference.cleaned and self._is_disturbed(which):
+            cleaned = self._cleaned(image)
+            if cleaned is not image:
+                self._take(cleaned)
+                self._solve(which, able & ~known)
+
+    def _take(self, image: NDArray[Any]) -> None:
+        """Measure in ``image``."""
+        self.image = image
+        self.common = None
+        self.picture = self._picture(self.reference.reached(self.guess))
+
+    def _cleaned(self, image: NDArray[Any]) -> NDArray[Any]:
+        from analysis.picture.impulses import without_impulses
+
+        cleaned = without_impulses(image)
+        return image if cleaned is None else cleaned
+
+    def _is_disturbed(self, which: NDArray[np.intp]) -> bool:
+        """Whether the image leaves much more than its noise, or many ZOIs are refused: it may have wild pixels."""
+        refused = np.count_nonzero(self.status[which] != Status.OK)
+        much = self.common is not None and float(np.median(self.common.ratio)) > DISTURBED_RATIO
+        return much or refused > DISTURBED_SHARE * len(which)
+
+    def _solve(self, which: NDArray[np.intp], unknown: NDArray[np.bool_]) -> None:
+        guess = self.guess
         if len(which) == len(guess):  # as a rule: no copies
             self.found, self.status = self.solved(which, guess)
             return
         self.found = OutArgs.unmeasured(*guess.shape)
-        self.status = np.where(able & ~known, np.uint8(Status.LOST), prepared.status)
+        self.status = np.where(unknown, np.uint8(Status.LOST), self.reference.prepared.status)
         if len(which):
             self.keep(which, *self.solved(which, guess[which]))
 
@@ -125,20 +155,8 @@ class Solution:
         out, stop = OutArgs.starting(guess), self.tolerance.at(which)
         if max_iterations is not None:
             stop = stop.after(max_iterations)
-        track(self.picture, self.table, self._fit(which), stop, out)
+        track(self.picture, self.table, self.reference.fit(which), stop, out)
         return out
-
-    def _fit(self, which: Places) -> FitArgs:
-        from analysis.fit.sensitivity import parameter_scale
-
-        ready, grid, order = self.reference.prepared, self.reference.grid, self.reference.settings.order
-        padded = which if isinstance(which, slice) else np.append(which, -1)
-        return FitArgs(
-            ready.images.ravel(), ready.images[0].size, ready.images.shape[2],
-            ready.origins[which], grid.size, self.reference.spacing, order, ready.shapes.rows, ready.shapes.mix,
-            ready.inverse[padded], ready.cross[padded],
-            ready.weight * ready.energy[which], parameter_scale(order, grid.size),
-        )  # fmt: skip
 
     def _by_phases(self, sensors: Sensors, which: Places, guess: Floats) -> OutArgs:
         """The same by phases alone; one step of the spectral fit gives gain and residual."""
@@ -173,12 +191,14 @@ class Solution:
         from analysis.fit.pooling import pooled
 
         left, expected = self._left(which, found), self.expected(which, found.nuisance[:, 0])
-        return pooled(found, left, expected, self._known(), which, self.reference.prepared.shapes.noise)
+        return pooled(found, left, expected, self._known(), which)
 
     def _known(self) -> ReferenceArgs:
         reference, ready = self.reference, self.reference.prepared
         pixels = ready.freedom * reference.sharpness
-        return ReferenceArgs(ready.signal, pixels, reference.share_variance, reference.unit_sigma[2])
+        return ReferenceArgs(
+            ready.signal, pixels, reference.share_variance, reference.unit_sigma[2], reference.white
+        )
 
     def _left(self, which: Places, found: OutArgs) -> Floats:
         """Variance a pixel that the fit leaves, GL^2; rounding leaves something where the images are equal, too."""
