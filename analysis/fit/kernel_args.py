@@ -213,6 +213,8 @@ class PooledError(NamedTuple):
     ----------
     ratio : (A,)
         Variance that a ZOI of this contrast leaves, over that expected from the noise as stated.
+    forgiven : (A,)
+        The same where it is the common state of the picture; 1 where that is as stated.
     scatter : float
         Standard deviation of what a single ZOI leaves over that.
     colour : (2,)
@@ -220,17 +222,18 @@ class PooledError(NamedTuple):
     """
 
     ratio: Floats
+    forgiven: Floats
     scatter: float
     colour: Floats
 
     @classmethod
     def none(cls, count: int) -> PooledError:
         """Of ``count`` ZOIs that leave what is expected."""
-        return cls(np.ones(count), 0.0, np.ones(2))
+        return cls(np.ones(count), np.ones(count), 0.0, np.ones(2))
 
     def at(self, places: NDArray[np.intp] | slice) -> PooledError:
         """That of some ZOIs."""
-        return self._replace(ratio=self.ratio[places])
+        return self._replace(ratio=self.ratio[places], forgiven=self.forgiven[places])
 
 
 class VerdictArgs(NamedTuple):

@@ -30,6 +30,11 @@ WHITE = 64
 """ZOIs with white noise that the ratio of the shapes is averaged with: of few it is known to some 10 % alone."""
 SAMPLE = 50
 """ZOIs whose answer to white noise is computed."""
+LOWEST, LOWEST_DEVIATION = 5, 0.84
+"""One ZOI in so many leaves less than its group by these standard deviations; if these few ..."""
+AS_STATED = 1.1
+"""... leave no more than this of what the noise as stated explains, what the others leave more is their own: blur or
+glare on a part of the picture."""
 MAD = 1.4826
 
 
@@ -57,22 +62,33 @@ def pooled(
     count = np.count_nonzero(matched)
     if count < MIN_POOLED or count < MIN_MATCHED * np.count_nonzero(tried):
         return None
-    ratio = left[matched] / expected[matched]
-    contrast = own.signal[matched]
-    trend = _by_contrast(contrast, ratio, known.signal)
-    scatter = MAD * float(np.median(np.abs(ratio / _by_contrast(contrast, ratio, contrast) - 1)))
+    ratio, contrast = left[matched] / expected[matched], own.signal[matched]
+    spread = np.sqrt(2 / np.maximum(own.pixels[matched], 1))
+    groups = _alike(contrast)
+    middle = [float(np.median(contrast[group])) for group in groups]
+    usual = [float(np.median(ratio[group])) for group in groups]
+    lowest = [_lowest(ratio[group], spread[group]) for group in groups]
+    trend = np.interp(known.signal, middle, usual)
+    common = [min(most, 1.0) if low < AS_STATED else most for low, most in zip(lowest, usual, strict=True)]
+    scatter = MAD * float(np.median(np.abs(ratio / np.interp(contrast, middle, usual) - 1)))
     error = expected * trend[places] / np.maximum(gain, MIN_NOISE_GAIN) ** 2
     shares = found.cubic[matched] / (error[:, None] * own.unit)[matched]
     colour = np.median(shares, axis=0) / known.white
-    return PooledError(trend, scatter, (count * colour + WHITE) / (count + WHITE))
+    return PooledError(
+        trend, np.interp(known.signal, middle, common), scatter, (count * colour + WHITE) / (count + WHITE)
+    )
 
 
-def _by_contrast(signal: Floats, ratio: Floats, where: Floats) -> Floats:
-    """Median of a ratio (N,) in groups of like contrast (N,), between them linear, at the contrasts ``where``."""
-    order = np.argsort(signal, kind="stable")
-    groups = np.array_split(order, max(1, min(MAX_GROUPS, len(order) // GROUP)))
-    contrast = [float(np.median(signal[group])) for group in groups]
-    return np.interp(where, contrast, [float(np.median(ratio[group])) for group in groups])
+def _alike(contrast: Floats) -> list[NDArray[np.intp]]:
+    """Groups of ZOIs of like contrast (N,)."""
+    order = np.argsort(contrast, kind="stable")
+    return np.array_split(order, max(1, min(MAX_GROUPS, len(order) // GROUP)))
+
+
+def _lowest(ratio: Floats, spread: Floats) -> float:
+    """The common ratio of (N,) ZOIs, as their lowest show it: where many are spoilt these are not."""
+    at = len(ratio) // LOWEST
+    return float(np.partition(ratio / (1 - LOWEST_DEVIATION * spread), at)[at])
 
 
 def white_cubic(fit: FitArgs, unit: Floats, able: NDArray[np.bool_]) -> Floats:

@@ -52,13 +52,16 @@ def judge(
     """
     for z in range(len(out)):
         gain = found.nuisance[z, 0]
-        chance = NOISE_FACTOR + CHANCE * math.sqrt(2 / max(known.pixels[z], 1.0))
+        spread = math.sqrt(2 / max(known.pixels[z], 1.0))
+        chance = NOISE_FACTOR + CHANCE * spread
         if not rule.noise_known:
             chance = max(chance, UNKNOWN_NOISE_FACTOR)
-        error = common.ratio[z] * expected[z]
-        usual = error * (NOISE_FACTOR + CHANCE * max(common.scatter, math.sqrt(2 / max(known.pixels[z], 1.0))))
         pattern = known.signal[z] * min(gain, 1.0) ** 2
-        allowed = max(chance * expected[z], min(usual, LOST_SHARE * pattern))
+        error, allowed, colour = common.forgiven[z] * expected[z], chance * expected[z], 1.0
+        if common.forgiven[z] > 1:
+            usual = error * (NOISE_FACTOR + CHANCE * max(common.scatter, spread))
+            allowed = max(allowed, min(usual, LOST_SHARE * pattern))
+            colour = max(common.colour[0], common.colour[1], 1.0)
         if found.state[z] == LEFT_IMAGE:
             out[z] = OUTSIDE
         elif not left[z] <= allowed + LOST_SHARE * pattern:
@@ -72,7 +75,7 @@ def judge(
         else:
             by_noise = NOISE_FACTOR * max(expected[z], error) if rule.noise_known else allowed
             misfit = _used(left[z], by_noise, allowed + MODEL_SHARE * pattern - by_noise)
-            bent = _bent(found, z, known, max(expected[z], left[z]), common.colour, rule)
+            bent = _bent(found, z, known, colour * max(expected[z], left[z]), rule)
             doubt = (misfit + bent) * _beyond(known, z, rule.far)
             out[z] = OK if doubt <= 1 else POOR_MATCH if misfit > bent else UNEVEN
 
@@ -102,14 +105,13 @@ def _used(value: Any, by_noise: Any, margin: Any) -> Any:
 
 
 @helper
-def _bent(found: Any, z: int, known: Any, variance: Any, colour: Any, rule: Any) -> Any:
+def _bent(found: Any, z: int, known: Any, variance: Any, rule: Any) -> Any:
     """How far the displacement bends or jumps, in shares of what is allowed; beyond 1 the centre is wrong.
 
     The displacement that the strain makes over the width of the window allows for more: where a
     specimen necks the strain is steep, but small beside itself; across a crack it is not.
     """
-    of_u = variance * known.unit[z, 0] * max(1.0, colour[0])
-    of_v = variance * known.unit[z, 1] * max(1.0, colour[1])
+    of_u, of_v = variance * known.unit[z, 0], variance * known.unit[z, 1]
     spread = math.sqrt(2 * rule.noise[1] * (of_u**2 + of_v**2))
     allowed = rule.limit**2 + (BENDING_SHARE * stretch_of(found.p, z, rule.lever)) ** 2
     return _used(found.bending[z], (of_u + of_v) * rule.noise[0], BENDING_CHANCE * spread + allowed)
