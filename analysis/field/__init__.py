@@ -15,6 +15,7 @@ from analysis.field.uncertainty import (
     StrainTensor,
     combination,
     products,
+    stretched,
     variance_of_sum,
 )
 
@@ -33,5 +34,6 @@ __all__ = [
     "combination",
     "products",
     "profile",
+    "stretched",
     "variance_of_sum",
 ]

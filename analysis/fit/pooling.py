@@ -26,8 +26,8 @@ MIN_MATCHED = 0.5
 """Share of the ZOIs that must explain their pattern: of an unrelated picture no common error is taken."""
 GROUP, MAX_GROUPS = 50, 8
 """ZOIs of like contrast whose median counts, at least, and number of such groups at most."""
-WHITE = 64
-"""ZOIs with white noise that the ratio of the shapes is averaged with: of few it is known to some 10 % alone."""
+COLOUR_SPREAD = 1.5
+"""Standard deviation of the logarithm of the ratio that the shapes of one ZOI show; half as many count as overlap."""
 SAMPLE = 50
 """ZOIs whose answer to white noise is computed."""
 LOWEST, LOWEST_DEVIATION = 5, 0.84
@@ -74,9 +74,14 @@ def pooled(
     error = expected * trend[places] / np.maximum(gain, MIN_NOISE_GAIN) ** 2
     shares = found.cubic[matched] / (error[:, None] * own.unit)[matched]
     colour = np.median(shares, axis=0) / known.white
-    return PooledError(
-        trend, np.interp(known.signal, middle, common), scatter, (count * colour + WHITE) / (count + WHITE)
-    )
+    return PooledError(trend, np.interp(known.signal, middle, common), scatter, _shrunk(colour, count))
+
+
+def _shrunk(colour: Floats, count: int) -> Floats:
+    """A ratio that ``count`` ZOIs show, with its logarithm nearer to 0 the less certain it is (James and Stein)."""
+    chance = COLOUR_SPREAD**2 / count
+    size = np.log(np.maximum(colour, 1e-6))
+    return np.exp(size * np.maximum(0, 1 - chance / np.maximum(size**2, 1e-12)))
 
 
 def _alike(contrast: Floats) -> list[NDArray[np.intp]]:

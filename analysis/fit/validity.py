@@ -24,6 +24,8 @@ CHANCE = 4.0
 """... deviations of such a variance more ..."""
 UNKNOWN_NOISE_FACTOR = 5.0
 """(in place of both where nobody gave the noise: its guess from the spectrum misses coloured noise) ..."""
+POOLED_NOISE_FACTOR = 2.5
+"""(or this, where the ZOIs together show that it does not) ..."""
 MODEL_SHARE = 0.002
 """... plus this share of the variance of the pattern, for what no noise explains."""
 LOST_SHARE = 0.5
@@ -33,6 +35,8 @@ BENDING_CHANCE = 5.0
 BENDING_SHARE = 0.15
 """... beyond the squares of a limit in px and of this share of the displacement that the strain makes in
 the ZOI, which a crack exceeds."""
+COLOURED = 1.5
+"""Variance of u or v over that of white noise from which on bending is allowed as much more noise."""
 CENTRE_VARIANCE = (4.0, 16.0)
 """The shares of the two limits above that a ZOI uses up are added and must not exceed 1: cracks, blur and glare often
 show a little in both (of 645,000 good simulated ZOIs 10 are lost so, of 295 wrong ones that pass both limits 157

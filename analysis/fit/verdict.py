@@ -15,6 +15,7 @@ from analysis.fit.validity import (
     BENDING_CHANCE,
     BENDING_SHARE,
     CHANCE,
+    COLOURED,
     EMPTY_SHARES,
     EMPTY_SIGMA,
     LOST_SHARE,
@@ -23,6 +24,7 @@ from analysis.fit.validity import (
     MIN_GAIN,
     MODEL_SHARE,
     NOISE_FACTOR,
+    POOLED_NOISE_FACTOR,
     SLOW_SIGMA,
     UNKNOWN_NOISE_FACTOR,
 )
@@ -50,18 +52,20 @@ def judge(
     rule : VerdictArgs
     out : (A,) uint8, written
     """
+    colour = max(common.colour[0], common.colour[1])
+    if colour < COLOURED:
+        colour = 1.0
     for z in range(len(out)):
         gain = found.nuisance[z, 0]
         spread = math.sqrt(2 / max(known.pixels[z], 1.0))
         chance = NOISE_FACTOR + CHANCE * spread
         if not rule.noise_known:
-            chance = max(chance, UNKNOWN_NOISE_FACTOR)
+            chance = max(chance, UNKNOWN_NOISE_FACTOR if common.scatter == 0 else POOLED_NOISE_FACTOR)
         pattern = known.signal[z] * min(gain, 1.0) ** 2
-        error, allowed, colour = common.forgiven[z] * expected[z], chance * expected[z], 1.0
+        error, allowed = common.forgiven[z] * expected[z], chance * expected[z]
         if common.forgiven[z] > 1:
             usual = error * (NOISE_FACTOR + CHANCE * max(common.scatter, spread))
             allowed = max(allowed, min(usual, LOST_SHARE * pattern))
-            colour = max(common.colour[0], common.colour[1], 1.0)
         if found.state[z] == LEFT_IMAGE:
             out[z] = OUTSIDE
         elif not left[z] <= allowed + LOST_SHARE * pattern:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.field import Motion, Status, StrainField
+from analysis.field import Motion, Status, StrainField, stretched
 from analysis.follow.renewal import UNSHARED, Placement
 from analysis.kernel.solve import Solution
 
@@ -53,10 +53,12 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
     noise = _noise_parts(solution, ok)
     residual, first, whole = np.empty((3, len(ok)), np.float32)
     weigh(ok, found.left, reference.prepared.freedom, gain, noise.reference, noise.current, residual, first, whole)
-    covariance_reference, covariance = _covariances(solution, ok, noise, first, whole)
+    parts = _covariances(solution, ok, noise, first, whole)
     values = reference.total(found.p)
     if not ok.all():
         values = np.where(ok[:, None], values, np.nan)
+    gradients = reference.spread(values[:, reference.affine])
+    covariance_reference, covariance = (stretched(part, gradients) for part in parts)
     return StrainField(
         grid=reference.grid,
         parameters=reference.spread(values),
