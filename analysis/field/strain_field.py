@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.field.grid import Window, ZoiGrid
 from analysis.field.motion import Motion
+from analysis.field.picture_error import PictureError
 from analysis.field.status import Status
 from analysis.field.uncertainty import (
     PAIR_INDEX,
@@ -107,6 +108,8 @@ class StrainField:
         What ``exx``, ``eyy``, ``exy`` and their means are; the uncertainties are those of the small strains.
     sums : Sums, optional
         Makes the uncertainty of means right where neighbours nearly cancel (gradients on dense grids).
+    picture : PictureError, optional
+        What the picture leaves beyond its noise; it is part of the uncertainties.
     """
 
     grid: ZoiGrid
@@ -122,6 +125,7 @@ class StrainField:
     motion: Motion | None = None
     measure: Measure = "small"
     sums: Sums | None = None
+    picture: PictureError | None = None
 
     def __post_init__(self) -> None:
         for name in ("parameters", "covariance", "covariance_reference", "residual", "status",

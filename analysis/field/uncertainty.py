@@ -79,7 +79,9 @@ def stretched(covariance: NDArray[np.float32], parameters: Floats) -> NDArray[np
     gradients = parameters[[DU_DX, DU_DY, DV_DX, DV_DY]]
     if not np.nanmax(np.abs(gradients), initial=0) > STRETCH:
         return covariance
-    f = np.asarray(gradients + np.array([1, 0, 0, 1])[:, None, None], np.float32).reshape(2, 2, *gradients.shape[1:])
+    f = np.asarray(gradients + np.array([1, 0, 0, 1])[:, None, None], np.float32).reshape(
+        2, 2, *gradients.shape[1:]
+    )
     out = np.empty_like(covariance)
     for pair, (i, j) in enumerate(_PAIRS):
         (row, first), (column, second) = divmod(i, 3), divmod(j, 3)

@@ -190,7 +190,9 @@ class ReferenceArgs(NamedTuple):
     centre : (A,), px per GL
         Standard deviation of the worse of u and v from noise of 1 GL, as it is found.
     white : (2,)
-        ``pooling.white_cubic``.
+        ``white_noise.white_cubic`` of the kernel.
+    independent : float
+        ZOIs that a ZOI counts for, since neighbours share pixels; at most 1.
     """
 
     signal: Floats
@@ -198,12 +200,14 @@ class ReferenceArgs(NamedTuple):
     unit: Floats
     centre: Floats
     white: Floats
+    independent: float
 
     def at(self, places: NDArray[np.intp] | slice) -> ReferenceArgs:
         """That of some ZOIs."""
-        return ReferenceArgs(
-            self.signal[places], self.pixels[places], self.unit[places], self.centre[places], self.white
-        )
+        return self._replace(
+            signal=self.signal[places], pixels=self.pixels[places], unit=self.unit[places],
+            centre=self.centre[places],
+        )  # fmt: skip
 
 
 class PooledError(NamedTuple):

@@ -24,7 +24,7 @@ CHANCE = 4.0
 """... deviations of such a variance more ..."""
 UNKNOWN_NOISE_FACTOR = 5.0
 """(in place of both where nobody gave the noise: its guess from the spectrum misses coloured noise) ..."""
-POOLED_NOISE_FACTOR = 2.5
+POOLED_NOISE_FACTOR = 3.5
 """(or this, where the ZOIs together show that it does not) ..."""
 MODEL_SHARE = 0.002
 """... plus this share of the variance of the pattern, for what no noise explains."""

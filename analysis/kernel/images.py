@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.field import ZoiGrid
 from analysis.picture.splines import LINE
 
-
 ROUNDING_SAMPLE = 8192
 """Pixels that show the step between the grey levels of an image."""
 

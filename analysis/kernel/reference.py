@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Roi, Status, StrainField, ZoiGrid, profile
-from analysis.fit.kernel_args import FitArgs, StopArgs
+from analysis.fit.kernel_args import StopArgs
 from analysis.follow.renewal import Placement, place
 from analysis.kernel.images import Noise, NoiseModel, as_model, check_fit, clipped_pixels, rounding_variance
 from analysis.kernel.prepared import PatternError, PreparedReference, prepare_reference
 from analysis.kernel.quadrature import Sensors, make_sensors
 from analysis.kernel.settings import KernelSettings
+from analysis.kernel.white_noise import white_cubic
 from analysis.picture.impulses import without_impulses
 from analysis.picture.splines import Box
 
@@ -75,7 +76,7 @@ class ReferencePicture:
     rounding : float, GL^2
         Variance that rounding to whole grey levels leaves.
     white : (2,) float64
-        ``pooling.white_cubic``.
+        ``white_noise.white_cubic``.
     cleaned : bool
         Whether it had wild pixels, which were replaced; later pictures are then cleaned, too.
     """
@@ -155,10 +156,6 @@ class ReferencePicture:
     def noise(self) -> float:
         """Standard deviation of the noise, GL, as given or as estimated."""
         return self.prepared.pattern.noise
-
-    def fit(self, which: Places = ALL) -> FitArgs:
-        """The linear fit of some ZOIs."""
-        return _fit(self.prepared, which, self.grid.size, self.settings.order, self.spacing)
 
     def tolerance(self, current: float) -> StopArgs:
         """When the iteration may stop, for a noise of ``current`` GL in the deformed image."""
@@ -253,28 +250,9 @@ def _laid_out(
         share_variance=share_variance,
         sums=None if sensors is not None else _sums(grid, settings, index, prepared, unit_covariance),
         rounding=rounding_variance(image),
-        white=_white(prepared, grid, settings.order, share_variance),
+        white=white_cubic(prepared, grid.size, settings.order, share_variance),
         cleaned=cleaned,
     )
-
-
-def _fit(ready: PreparedReference, which: Places, size: int, order: int, spacing: int) -> FitArgs:
-    from analysis.fit.sensitivity import parameter_scale
-
-    padded = which if isinstance(which, slice) else np.append(which, -1)
-    return FitArgs(
-        ready.images.ravel(), ready.images[0].size, ready.images.shape[2],
-        ready.origins[which], size, spacing, order, ready.shapes.rows, ready.shapes.mix,
-        ready.inverse[padded], ready.cross[padded],
-        ready.weight * ready.energy[which], parameter_scale(order, size),
-    )  # fmt: skip
-
-
-def _white(prepared: PreparedReference, grid: ZoiGrid, order: int, unit: Floats) -> Floats:
-    from analysis.fit.pooling import white_cubic
-
-    fit = _fit(prepared, ALL, grid.size, order, grid.step)
-    return white_cubic(fit, unit, prepared.status == Status.OK)
 
 
 def _sums(

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Motion, Status, StrainField, stretched
+from analysis.field.picture_error import LIMIT, PictureError
 from analysis.follow.renewal import UNSHARED, Placement
+from analysis.kernel.error_cause import error_cause
 from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]
@@ -28,12 +31,14 @@ class PredictedMotion(NamedTuple):
 class _Noise(NamedTuple):
     """Variances a pixel of the reference and of the image at each ZOI, (A,), GL^2, and their share of u and of v.
 
-    ``colour`` (2,) is the variance of u and of v over that of white noise.
+    ``colour`` (2,) is the variance of u and of v over that of white noise; ``over`` the standard deviation of both
+    images over that as given, NaN where it was not found.
     """
 
     reference: Floats
     current: Floats
     colour: Floats
+    over: float
 
 
 def field_of(solution: Solution, expected: PredictedMotion | None = None) -> StrainField:
@@ -52,7 +57,17 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
     gain = found.nuisance[:, 0]
     noise = _noise_parts(solution, ok)
     residual, first, whole = np.empty((3, len(ok)), np.float32)
-    weigh(ok, found.left, reference.prepared.freedom, gain, noise.reference, noise.current, residual, first, whole)
+    weigh(
+        ok,
+        found.left,
+        reference.prepared.freedom,
+        gain,
+        noise.reference,
+        noise.current,
+        residual,
+        first,
+        whole,
+    )
     parts = _covariances(solution, ok, noise, first, whole)
     values = reference.total(found.p)
     if not ok.all():
@@ -72,7 +87,15 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         window=reference.settings.window,
         motion=None if expected is None else _motion(solution, values, expected),
         sums=reference.sums,
+        picture=_picture_error(solution, ok, noise),
     )
+
+
+def _picture_error(solution: Solution, ok: NDArray[np.bool_], noise: _Noise) -> PictureError | None:
+    if np.isnan(noise.over):
+        return None
+    error = PictureError(noise.over, (float(noise.colour[0]), float(noise.colour[1])))
+    return replace(error, cause=error_cause(solution, ok)) if error.factor > LIMIT else error
 
 
 def _motion(solution: Solution, values: Floats, expected: PredictedMotion) -> Motion:
@@ -89,12 +112,16 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     common = solution.pooled(which := np.flatnonzero(ok), solution.found.at(which))
     if common is not None:
         whole = common.ratio * solution.expected(np.s_[:], gain)
-        return _Noise(*_parted(whole, reference * gain**2, gain, solution), common.colour)
+        return _Noise(
+            *_parted(whole, reference * gain**2, gain, solution),
+            common.colour,
+            float(np.sqrt(np.median(common.ratio[ok]))),
+        )
     if solution.noise is not None or not ok.any():
-        return _Noise(reference, current, white)
+        return _Noise(reference, current, white, float("nan"))
     found = float(np.median((solution.found.left / solution.reference.prepared.freedom)[ok]))
     whole = np.full(len(ok), found)
-    return _Noise(*_parted(whole, reference, np.ones(len(ok)), solution), white)
+    return _Noise(*_parted(whole, reference, np.ones(len(ok)), solution), white, float("nan"))
 
 
 def _parted(whole: Floats, reference: Floats, gain: Floats, solution: Solution) -> tuple[Floats, Floats]:

@@ -12,7 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Status, profile
-from analysis.fit.kernel_args import LEFT_IMAGE, FitArgs, OutArgs, PictureArgs, PooledError, ReferenceArgs, VerdictArgs
+from analysis.fit.kernel_args import (
+    LEFT_IMAGE,
+    FitArgs,
+    OutArgs,
+    PictureArgs,
+    PooledError,
+    ReferenceArgs,
+    VerdictArgs,
+)
 from analysis.fit.validity import CENTRE_VARIANCE, CLIPPED_SHARE
 from analysis.kernel.images import NoiseModel, rounding_variance
 from analysis.kernel.quadrature import Sensors
@@ -87,7 +95,7 @@ class Solution:
         """Whether the image leaves much more than its noise, or many ZOIs are refused: it may have wild pixels."""
         refused = np.count_nonzero(self.status[which] != Status.OK)
         much = self.common is not None and float(np.median(self.common.ratio)) > DISTURBED_RATIO
-        return much or refused > DISTURBED_SHARE * len(which)
+        return much or bool(refused > DISTURBED_SHARE * len(which))
 
     def _solve(self, which: NDArray[np.intp], unknown: NDArray[np.bool_]) -> None:
         guess = self.guess
@@ -155,8 +163,20 @@ class Solution:
         out, stop = OutArgs.starting(guess), self.tolerance.at(which)
         if max_iterations is not None:
             stop = stop.after(max_iterations)
-        track(self.picture, self.table, self.reference.fit(which), stop, out)
+        track(self.picture, self.table, self._fit(which), stop, out)
         return out
+
+    def _fit(self, which: Places) -> FitArgs:
+        from analysis.fit.sensitivity import parameter_scale
+
+        ready, grid, order = self.reference.prepared, self.reference.grid, self.reference.settings.order
+        padded = which if isinstance(which, slice) else np.append(which, -1)
+        return FitArgs(
+            ready.images.ravel(), ready.images[0].size, ready.images.shape[2],
+            ready.origins[which], grid.size, self.reference.spacing, order, ready.shapes.rows, ready.shapes.mix,
+            ready.inverse[padded], ready.cross[padded],
+            ready.weight * ready.energy[which], parameter_scale(order, grid.size),
+        )  # fmt: skip
 
     def _by_phases(self, sensors: Sensors, which: Places, guess: Floats) -> OutArgs:
         """The same by phases alone; one step of the spectral fit gives gain and residual."""
@@ -175,9 +195,10 @@ class Solution:
 
         reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
         known, expected = self._known(), self.expected(which, found.nuisance[:, 0])
-        noise_known = self.noise is not None and reference.noise_model is not None
         far = CENTRE_VARIANCE[settings.order - 1]
-        rule = VerdictArgs(noise_known, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far)
+        rule = VerdictArgs(
+            self._is_given, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far
+        )
         left = self._left(which, found)
         if self.common is None:
             self.common = self.pooled(which, found)
@@ -191,13 +212,23 @@ class Solution:
         from analysis.fit.pooling import pooled
 
         left, expected = self._left(which, found), self.expected(which, found.nuisance[:, 0])
-        return pooled(found, left, expected, self._known(), which)
+        return pooled(found, left, expected, self._known(), which, self._is_given)
+
+    @property
+    def _is_given(self) -> bool:
+        """Whether the noise of both images was given."""
+        return self.noise is not None and self.reference.noise_model is not None
 
     def _known(self) -> ReferenceArgs:
         reference, ready = self.reference, self.reference.prepared
         pixels = ready.freedom * reference.sharpness
         return ReferenceArgs(
-            ready.signal, pixels, reference.share_variance, reference.unit_sigma[2], reference.white
+            ready.signal,
+            pixels,
+            reference.share_variance,
+            reference.unit_sigma[2],
+            reference.white,
+            min(1.0, (2 * reference.grid.step / reference.grid.size) ** 2),
         )
 
     def _left(self, which: Places, found: OutArgs) -> Floats:

@@ -46,9 +46,7 @@ def without_impulses(image: NDArray[Any]) -> NDArray[Any] | None:
     return out
 
 
-def _above_second(
-    pixels: Pixels, rows: NDArray[np.intp], columns: NDArray[np.intp]
-) -> tuple[Pixels, Pixels]:
+def _above_second(pixels: Pixels, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> tuple[Pixels, Pixels]:
     """The sorted neighbours of inner pixels (N, 8), and how far each lies beyond all but one of them (N,)."""
     around = [pixels[rows + i, columns + j] for i in range(3) for j in range(3) if (i, j) != (1, 1)]
     neighbours = np.sort(np.stack(around, axis=1), axis=1)
@@ -59,6 +57,8 @@ def _above_second(
 def _usual_height(pixels: Pixels) -> float:
     """Median height of the tops and bottoms of the pattern over their second neighbour, GL, in some rows."""
     height, width = pixels.shape
-    grid = np.meshgrid(np.arange(0, height - 2, 1 + height // SAMPLE_ROWS), np.arange(width - 2), indexing="ij")
+    grid = np.meshgrid(
+        np.arange(0, height - 2, 1 + height // SAMPLE_ROWS), np.arange(width - 2), indexing="ij"
+    )
     _, above = _above_second(pixels, grid[0].ravel(), grid[1].ravel())
     return float(np.median(above[above > 0])) if (above > 0).any() else 0.0

@@ -8,7 +8,7 @@ light do to them. Needs PHASEDIC_DATA.
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -17,7 +17,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.burst import BurstAccumulator
+from acquire.camera.opening import open_camera
+from acquire.frame import Burst
 from analysis import PhaseKernel, Roi, StrainField, ZoiGrid
+from live.pipeline.measure import Tracker
+from live.pipeline.reference import frame_noise
 from tests.accuracy.truth import Speckle, affine
 
 Array = NDArray[np.float64]
@@ -223,14 +228,9 @@ def film(kind: str, folder: Path) -> Path:
 
 def film_measured(kind: str) -> tuple[float, float, float, int]:
     """Share kept in the last picture, mean eyy less truth and its sigma, and renewals of the reference."""
-    from live.pipeline.measure import Tracker
-    from live.pipeline.reference import frame_noise
-
-    from acquire.camera.opening import open_camera
-
     events: list[object] = []
     with tempfile.TemporaryDirectory() as folder:
-        bursts = [b for b in _bursts(f"video:{film(kind, Path(folder))}?gray=luma", open_camera)]
+        bursts = list(_bursts(f"video:{film(kind, Path(folder))}?gray=luma"))
     grid = grid_of(FILM_SHAPE)
     noise = frame_noise(bursts[0], None)
     tracker = Tracker(PhaseKernel(bursts[0].mean, grid, noise=noise), noise, 0.1, events.append)
@@ -240,9 +240,7 @@ def film_measured(kind: str) -> tuple[float, float, float, int]:
     return float(field.ok.mean()), mean - FILM_STRAIN, sigma, len(events)
 
 
-def _bursts(address, open_camera):
-    from acquire.burst import BurstAccumulator
-
+def _bursts(address: str) -> Iterator[Burst]:
     for frame in open_camera(address):
         burst = BurstAccumulator(1).add(frame)
         assert burst is not None
