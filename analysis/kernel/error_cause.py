@@ -7,18 +7,16 @@ to 0.17; correlation of neighbours up to 0.05 for noise, else 0.15 and more.
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field.picture_error import Cause
 from analysis.kernel.solve import Solution
+from analysis.picture.blocks import BLOCKS, blockiness
 
 SAMPLE = 30
 """ZOIs that are looked at."""
-BLOCK_PX = 8
-BLOCKS, LINES, LAPLACIAN, NEIGHBOURS = 1.3, 8.0, 0.3, 0.12
+LINES, LAPLACIAN, NEIGHBOURS = 8.0, 0.3, 0.12
 Pixels = NDArray[np.float64]
 
 
@@ -38,16 +36,6 @@ def error_cause(solution: Solution, ok: NDArray[np.bool_]) -> Cause:
         return "blur"
     beside = (np.mean(left[:, 1:] * left[:, :-1]) + np.mean(left[:, :, 1:] * left[:, :, :-1])) / 2
     return "noise" if abs(beside) < NEIGHBOURS * variance else "filter"
-
-
-def blockiness(image: NDArray[Any]) -> float:
-    """Third differences of an image (H, W) across the borders of blocks of 8 px over those elsewhere; about 1."""
-    worst = 1.0
-    for axis in (0, 1):
-        steps = np.abs(np.diff(image.astype(np.float32), n=3, axis=axis)).mean(axis=1 - axis)
-        means = [float(steps[k::BLOCK_PX].mean()) for k in range(BLOCK_PX) if len(steps) > k]
-        worst = max(worst, max(means) / max(float(np.median(means)), 1e-6))
-    return worst
 
 
 def _crop(axis: int) -> tuple[slice, ...]:

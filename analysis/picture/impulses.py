@@ -15,7 +15,7 @@ Pixels = NDArray[np.float32]
 
 OVER_PATTERN = 8.0
 """How often the usual height of a top (the pixel over its second neighbour) a wild pixel exceeds ..."""
-OVER_NEIGHBOURS = 2.5
+OVER_NEIGHBOURS = 2.0
 """... and how often what its neighbours differ by, the highest and the lowest left out."""
 SHARES = 1e-4, 0.03
 """Of all pixels: fewer do no harm (real pictures have 2e-5), more are the pattern."""

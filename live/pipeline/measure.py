@@ -18,6 +18,7 @@ from acquire.burst import LIMIT_PX
 from acquire.events import Event, EventKind, EventSink, Level, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
+from analysis.field.picture_error import LIMIT, PictureError
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, averaged, unchanged
 
@@ -168,6 +169,56 @@ class StrainGuard:
             self._on_event(Event(t, EventKind.MEASUREMENT, "strain", text, "warning", data))
 
 
+CAUSES = {
+    "noise": "more noise than the reference or --noise has; more light",
+    "compression": "the blocks of a compressed picture; record uncompressed",
+    "bands": "bands or lines; a steady lamp, or an exposure of whole periods of the mains",
+    "blur": "another sharpness than the reference; focus, motion, distance",
+    "filter": "the filters of a camera (denoising, sharpening) or of a format; switch them off",
+}
+"""What an error of the picture looks like (``PictureError.cause``), and what to do."""
+
+
+class PictureGuard:
+    """Checks what each picture leaves beyond its noise; an event when it exceeds the limit, and when that ends.
+
+    Parameters
+    ----------
+    on_event : callable taking an Event
+    """
+
+    def __init__(self, on_event: EventSink) -> None:
+        self._on_event, self._cause = on_event, ""
+
+    def check(self, field: StrainField, t: float) -> None:
+        """Check a field, measured at ``t`` (s); one of too few ZOIs changes nothing."""
+        error = field.picture
+        if error is None or not field.ok.any():
+            return
+        if error.cause and error.cause != self._cause:
+            self._emit(t, picture_words(field), "warning", error)
+            self._cause = error.cause
+        elif self._cause and error.factor < 0.85 * LIMIT:
+            self._emit(t, "the picture leaves what its noise explains again", "info", error)
+            self._cause = ""
+
+    def _emit(self, t: float, text: str, level: Level, error: PictureError) -> None:
+        data = {"cause": error.cause, "factor": error.factor, "over_noise": error.over_noise}
+        self._on_event(Event(t, EventKind.MEASUREMENT, "picture", text, level, data))
+
+
+def picture_words(field: StrainField) -> str:
+    """What the picture of a field has become and what that costs, in words; "" where its noise explains it."""
+    error = field.picture
+    if error is None or not error.cause:
+        return ""
+    sigma = float(np.nanmedian(np.hypot(field.sigma_exx, field.sigma_eyy))) / math.sqrt(2) * 1e6
+    return (
+        f"the picture shows {CAUSES[error.cause]}: strain of a ZOI is uncertain by {sigma:.0f} um/m"
+        f" in place of {sigma / error.factor:.0f}"
+    )
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class NewReference:
     """A command among the bursts: this burst becomes the reference; results stay composed."""
@@ -221,7 +272,8 @@ def measure(
     Measurement
         One for each burst, in order.
     """
-    tracker, guard = Tracker(kernel, noise_GL, renew_at, on_event), StrainGuard(strain, on_event)
+    tracker = Tracker(kernel, noise_GL, renew_at, on_event)
+    guards = StrainGuard(strain, on_event), PictureGuard(on_event)
     number = 0
     for item in bursts:
         if isinstance(item, NewReference):
@@ -230,6 +282,7 @@ def measure(
         began = timer()
         field = replace(tracker.measure(correct(item)), measure=strain)
         took = timer() - began
-        guard.check(field, item.t)
+        for guard in guards:
+            guard.check(field, item.t)
         yield Measurement.of(number, item, field, loads.force_at(item.t), took, gauges)
         number += 1

@@ -20,6 +20,7 @@ from acquire.frame import Burst
 from analysis.field import StrainField
 from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.gauges import gauges_for
+from live.pipeline.measure import picture_words
 from live.pipeline.reference import averaged, prepare
 from live.setup.check.sample import CheckSample
 from live.setup.placement import with_auto_gauges
@@ -210,10 +211,13 @@ class PredictedNoise:
         Of each ZOI, mean of exx and eyy; NaN without pattern.
     gauges : tuple of GaugeNoise
         The gauges of the test, and the mean of all ZOIs along the load; empty without pattern.
+    picture : str
+        What the picture shows beyond its noise, in words; "": nothing.
     """
 
     sigma: NDArray[np.float64]
     gauges: tuple[GaugeNoise, ...]
+    picture: str = ""
 
     @property
     def measurable(self) -> NDArray[np.bool_]:
@@ -230,9 +234,8 @@ def predict_noise(sample: CheckSample) -> PredictedNoise:
     factor = math.sqrt((1 / sample.reference + 1 / sample.burst) / (2 / sample.half))
     both = np.sqrt((field.sigma_exx**2 + field.sigma_eyy**2) / 2)
     sigma = np.where(field.ok, factor * both, np.nan)
-    return PredictedNoise(
-        sigma, tuple(_gauges(sample.check_region.config, replace(field, grid=grid), factor))
-    )
+    gauges = tuple(_gauges(sample.check_region.config, replace(field, grid=grid), factor))
+    return PredictedNoise(sigma, gauges, picture_words(field))
 
 
 def _half_on_half(sample: CheckSample) -> StrainField | None:
