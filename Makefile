@@ -1,25 +1,26 @@
-# make demo | test | lint | docs | bench | accuracy | v4l2-test | bare-test ; each sets up its own .venv first.
+# make demo | test | lint | docs | bench | accuracy | mutants | newest | lowest | v4l2-test | genicam-test | bare-test ;
+# each sets up its own .venv first.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test lint format docs bench accuracy v4l2-test bare-test clean
+.PHONY: demo test lint format docs bench accuracy mutants newest lowest constraints v4l2-test genicam-test bare-test clean
 .DEFAULT_GOAL := demo
 
-$(VENV)/base: pyproject.toml
+$(VENV)/base: pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "phasedic needs Python 3.11 or newer; make PYTHON=python3.12 ... picks another")'
 	@echo "Setting up $(VENV) (once; about 300 MB are fetched) ..."
 	@$(PYTHON) -m venv $(VENV)
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable .
+	@$(BIN)/python -m pip install --disable-pip-version-check --constraint constraints.txt --editable .
 	@touch $@
 
 $(VENV)/test: $(VENV)/base
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[test]'
 	@touch $@
 
 $(VENV)/dev: $(VENV)/test
-	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[test,dev]'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[test,dev]'
 	@touch $@
 
 $(VENV)/docs: $(VENV)/base
@@ -50,8 +51,34 @@ bench: $(VENV)/test
 accuracy: $(VENV)/test
 	@$(BIN)/python -m tests.accuracy
 
+mutants: $(VENV)/test
+	@$(BIN)/python -m tests.mutants
+
+# The tests with the newest libraries there are, and with the lowest that pyproject.toml names, each in its own
+# environment with a cache of its own for compiled loops.
+newest lowest: export NUMBA_CACHE_DIR = $(CURDIR)/$(VENV)-$@/numba
+newest:
+	@rm -rf $(VENV)-$@ && $(PYTHON) -m venv $(VENV)-$@
+	@$(VENV)-$@/bin/python -m pip install --quiet --disable-pip-version-check --editable '.[test]'
+	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest
+
+lowest:
+	@rm -rf $(VENV)-$@ && $(PYTHON) -m venv $(VENV)-$@
+	@$(VENV)-$@/bin/python -m pip install --quiet --disable-pip-version-check uv
+	@$(VENV)-$@/bin/uv pip install --quiet --python $(VENV)-$@/bin/python --resolution lowest-direct --editable '.[test]'
+	@PATH="$(CURDIR)/$(VENV)-$@/bin:$$PATH" python -m pytest
+
+# After make newest has passed: its versions are those of demo and test from then on.
+constraints:
+	@$(VENV)-newest/bin/python -m pip install --quiet --disable-pip-version-check '.[test,dev]'
+	@{ head -n 2 constraints.txt; $(VENV)-newest/bin/python -m pip freeze --all --exclude pip --exclude phasedic; } > constraints.new
+	@mv constraints.new constraints.txt
+
 v4l2-test: $(VENV)/test
 	@$(BIN)/python tests/v4l2/vm.py --tests
+
+genicam-test: $(VENV)/test
+	@$(BIN)/python -m tests.genicam.namespace --tests
 
 # In a bare Debian made on the spot: make bare-test SUITE=trixie ONLY=demo
 SUITE ?= forky
@@ -60,4 +87,4 @@ bare-test:
 	@$(PYTHON) tests/bare/machine.py --suite $(SUITE) -- make $(ONLY)
 
 clean:
-	rm -rf $(VENV) .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) $(VENV)-newest $(VENV)-lowest .pytest_cache .mypy_cache .ruff_cache

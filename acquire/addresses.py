@@ -14,8 +14,9 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from importlib.metadata import entry_points
+from pathlib import Path
 from typing import Any, Generic, TypeVar, overload
-from urllib.parse import unquote
+from urllib.parse import quote, unquote
 
 from acquire.bounds import NotAllowed, as_integer, as_number
 from acquire.errors import ConfigError
@@ -25,6 +26,7 @@ from acquire.events import EventSink, ignore_event
 _SETTINGS = re.compile(r"\?((?:[A-Za-z_]\w*=[^&?]*)(?:&[A-Za-z_]\w*=[^&?]*)*)$")
 _SCHEME = re.compile(r"^([A-Za-z][\w+.-]+):")
 
+_SAFE = "/:,@+-_.*~"  # in the value of a setting
 TRUE_WORDS, FALSE_WORDS = ("1", "yes", "true", "on"), ("0", "no", "false", "off")
 
 
@@ -50,7 +52,7 @@ class Address:
 
 
 def parse_address(text: str) -> Address:
-    """Take an address apart.
+    """Take an address apart; what is the name of an existing file or folder has no settings.
 
     Raises
     ------
@@ -60,6 +62,8 @@ def parse_address(text: str) -> Address:
     if not text.strip():
         raise ConfigError("an address is empty; give for example sim:, /dev/video0 or files:shots/*.tif")
     found = _SETTINGS.search(text)
+    if found and _is_there(text):
+        found = None
     body = text[: found.start()] if found else text
     pairs = [pair.partition("=") for pair in found[1].split("&")] if found else []
     settings = tuple((key, unquote(value)) for key, _, value in pairs)
@@ -69,6 +73,39 @@ def parse_address(text: str) -> Address:
     if not scheme:
         return Address(text, "", body, settings)
     return Address(text, scheme[1].lower(), body[scheme.end() :], settings)
+
+
+def _is_there(text: str) -> bool:
+    """Whether the address, without its scheme, is the name of a file or folder."""
+    scheme = _SCHEME.match(text)
+    names = (text, text[scheme.end() :]) if scheme else (text,)
+    try:
+        return any(Path(name).exists() for name in names)
+    except (OSError, ValueError):
+        return False
+
+
+def with_setting(address: str, key: str, value: float | str) -> str:
+    """The address with one setting changed; an empty text removes it."""
+    changed = dict(parse_address(address).settings)
+    body = address.partition("?")[0] if changed else address
+    changed[key] = value if isinstance(value, str) else f"{value:g}"
+    settings = "&".join(f"{k}={quote(v, safe=_SAFE)}" for k, v in changed.items() if v or k != key)
+    return f"{body}?{settings}" if settings else body
+
+
+def expanded(path: str) -> Path:
+    """The path with ``~`` replaced by the home folder.
+
+    Raises
+    ------
+    ConfigError
+        There is no such user.
+    """
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        raise ConfigError(f"{path}: there is no such user, so no home folder; give the whole path") from None
 
 
 class Options:

@@ -35,11 +35,13 @@ class Frame:
     lost_before : int
         Frames known to be lost between the frame handed out before and this one.
     bits : int
-        Significant bits of a sample; saturation is at ``2**bits - 1``.
+        Significant bits of a sample.
     raw_t : float, s
         The stamp as it came.
     damaged : bool
         The device marked the content as not whole (recorded, never measured).
+    white_level : int or None, GL
+        Where a sample is saturated; None: at ``2**bits - 1``.
     """
 
     image: NDArray[Any]
@@ -50,6 +52,17 @@ class Frame:
     bits: int
     raw_t: float
     damaged: bool = False
+    white_level: int | None = None
+
+    @property
+    def saturation(self) -> int:
+        """The grey level from which on a sample is saturated."""
+        return saturation(self.bits, self.white_level)
+
+
+def saturation(bits: int, white_level: int | None) -> int:
+    """The grey level from which on a sample is saturated: the white level, else the highest of its bits."""
+    return white_level or 2**bits - 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,6 +149,7 @@ class CameraInfo:
         False: the source waits for its reader (files, a session, the simulator in lock step).
     clock : "device" | "host" | "nominal"
     fps : float or None, 1/s
+        None where it is not known, or where something outside triggers the frames.
     exposure_s : float or None, s
     pixel_format : str
         As the driver names it, or the file format.
@@ -145,6 +159,10 @@ class CameraInfo:
         What a person should know before trusting the picture.
     settings : tuple of CameraSetting
         What of the address can be changed in a live picture, with its bounds; in no file.
+    white_level : int or None, GL
+        Where a sample is saturated; None: at ``2**bits - 1``.
+    pause_s : float or None, s
+        Longest time without a frame that is no fault; None: five frame periods and the exposure. In no file.
     """
 
     address: str
@@ -160,6 +178,13 @@ class CameraInfo:
     controls: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     settings: tuple[CameraSetting, ...] = ()
+    white_level: int | None = None
+    pause_s: float | None = None
+
+    @property
+    def saturation(self) -> int:
+        """The grey level from which on a sample is saturated: full scale."""
+        return saturation(self.bits, self.white_level)
 
 
 def frozen(image: NDArray[Any]) -> NDArray[Any]:

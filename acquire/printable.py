@@ -19,8 +19,8 @@ def printable(text: object) -> str:
     return _HARMFUL.sub(_escaped, str(text))
 
 
-# A device or file by its address at the beginning of a sentence, with its settings.
-_ADDRESS = re.compile(r"^([^\s?]+)\?[A-Za-z_]\w*=\S*(?=: |$)")
+# A device or file by its address at the beginning of a sentence, with its settings; a path goes on after them.
+_ADDRESS = re.compile(r"^([^\s?]+)\?[A-Za-z_]\w*=[^\s/]*(?=: |$)")
 
 
 def brief(text: object) -> str:

@@ -19,7 +19,7 @@ import numpy as np
 from acquire.addresses import Address, Options
 from acquire.closing import Closing
 from acquire.errors import ConfigError
-from acquire.events import Event, EventKind, EventSink
+from acquire.events import Event, EventKind, EventSink, device_event
 from acquire.load_cell import LoadCell, open_load_cell
 from acquire.load_sample import LoadCellInfo, LoadSample
 from hw_mocks.faults import SERIAL_FAULTS, FaultPlan, parse_faults
@@ -32,7 +32,9 @@ from hw_mocks.specimen import SPECIMEN_KEYS, VirtualSpecimen, take_specimen
 log = logging.getLogger(__name__)
 STYLES: tuple[Style, ...] = ("millis", "plain", "label", "openscale")
 # Settings of the product's serial reader that make sense here too.
-PASSED_ON = ("sign", "capacity", "max_step", "timeout", "wait", "tare", "mode", "decimal")
+PASSED_ON = (
+    "sign", "capacity", "max_step", "timeout", "wait", "tare", "mode", "decimal", "gain", "zero", "calibration",
+)  # fmt: skip
 TIMED = {"millis": "1", "column": "2"}
 WARNING = "simulated: no load cell and no specimen"
 
@@ -48,6 +50,8 @@ class SimLoadSettings:
         Of the lines of ``ascii``.
     rate : float, 1/s
     noise_N, resolution_N, capacity_N : float, N
+    weight_N : float, N
+        A weight on the cell, besides the force on the specimen.
     seed : int
     faults : FaultPlan
     passed_on : mapping of str to str
@@ -60,6 +64,7 @@ class SimLoadSettings:
     noise_N: float = 1.0
     resolution_N: float = 0.1
     capacity_N: float = 10_000.0
+    weight_N: float = 0.0
     seed: int = 0
     faults: FaultPlan = field(default_factory=FaultPlan)
     passed_on: dict[str, str] = field(default_factory=dict)
@@ -87,7 +92,7 @@ class SimLoadCell(Closing):
         self._specimen, self._address = specimen, address
         self.noise_N = float(np.hypot(settings.noise_N, settings.resolution_N / np.sqrt(12)))
         sensing = Sensing(
-            lambda t: float(specimen.force(specimen.elapsed(t))),
+            lambda t: float(specimen.force(specimen.elapsed(t))) + settings.weight_N,
             specimen.elapsed,
             settings.rate,
             settings.noise_N,
@@ -155,7 +160,7 @@ class NominalLoadCell(Closing):
 
     def _sample(self, t: float) -> LoadSample:
         s = self._settings
-        force = float(self._specimen.force(t)) + s.noise_N * float(self._rng.standard_normal())
+        force = float(self._specimen.force(t)) + s.weight_N + s.noise_N * float(self._rng.standard_normal())
         self._last = round(force / s.resolution_N) * s.resolution_N
         text = f"{self._last - self._offset:.6g} N"
         start = self._specimen.clock.start or 0.0
@@ -170,6 +175,8 @@ class NominalLoadCell(Closing):
         """As before the last tare, if there was one."""
         if self._before:
             self._move(self._before.pop(), "the last tare is undone")
+        else:
+            device_event(self._on_event, self.info.address, "there is no tare to undo", tared=False)
 
     def _move(self, offset: float, text: str) -> None:
         data = {"offset_N": offset, "step_N": offset - self._offset}
@@ -227,10 +234,9 @@ def _renamed(on_event: EventSink, address: str) -> Callable[[Event], None]:
 def open_sim_load(address: Address, on_event: EventSink, specimen: VirtualSpecimen) -> LoadCell:
     """Open ``sim:?key=value...`` on the specimen of the test.
 
-    Keys: rate, noise_N, resolution_N, range_N, protocol (all of ``INDICATORS``), line (of ascii: millis, plain, label,
-    openscale), seed, faults, lockstep, and of the serial reader sign, capacity, max_step, timeout,
-    wait, tare, mode, decimal. Those of the specimen belong to the camera's address where
-    the camera is simulated too.
+    Keys: rate, noise_N, resolution_N, range_N, weight_N, protocol (all of ``INDICATORS``), line (of ascii: millis,
+    plain, label, openscale), seed, faults, lockstep, and of the serial reader ``PASSED_ON``. Those of the
+    specimen belong to the camera's address where the camera is simulated too.
 
     Raises
     ------
@@ -259,6 +265,7 @@ def _take_load(options: Options) -> SimLoadSettings:
         noise_N=options.number("noise_N", 1.0, minimum=0),
         resolution_N=options.number("resolution_N", 0.1, minimum=1e-6),
         capacity_N=options.number("range_N", 10_000.0, minimum=1e-3),
+        weight_N=options.number("weight_N", 0.0),
         seed=options.integer("seed", 0, minimum=0),
         faults=parse_faults(options.text("faults", ""), SERIAL_FAULTS, options.address.text),
         passed_on=passed_on,

@@ -4,27 +4,34 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import errno
 import logging
 import os
 import sys
 from collections.abc import Sequence
 from typing import TextIO
 
-from acquire.errors import PhasedicError
+from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.printable import brief, printable
 from live.commands.arguments import Command, parse
 from live.commands.exit_codes import EXIT_INTERRUPTED
+from live.commands.signals import ended_by_sigterm
 from live.commands.streams import nonblocking_streams
+
+_LEAST = {"NUMBA_NUM_THREADS": 1, "SOURCE_DATE_EPOCH": 0}
+"""Whole numbers in the environment for which numba ends the program where they are none."""
+_WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point; returns the exit code."""
     _replace_closed_streams()
     try:
-        command, arguments = parse(sys.argv[1:] if argv is None else argv)
-        with nonblocking_streams():
-            _set_up_logging(arguments)
-            code = _run(command, arguments)
+        with ended_by_sigterm():
+            command, arguments = parse(sys.argv[1:] if argv is None else argv)
+            with nonblocking_streams():
+                _set_up_logging(arguments)
+                code = _run(command, arguments)
     except KeyboardInterrupt:  # before or after the command
         code = _interrupted()
     _drop_lost_streams()
@@ -84,17 +91,44 @@ class _PrintableFormatter(logging.Formatter):
 def _run(command: Command, arguments: argparse.Namespace) -> int:
     """Run the command; an exception becomes a message and an exit code."""
     try:
+        _check_environment()
         return command(arguments)
     except PhasedicError as error:
-        print(f"phasedic: {printable(brief(error))}", file=sys.stderr)
-        return error.exit_code
+        return _refused(error)
     except KeyboardInterrupt:
         return _interrupted()
     except BrokenPipeError:
         return 0
+    except OSError as error:
+        logging.getLogger("live").debug("the system refused", exc_info=True)
+        return _refused(_system_error(error))
     except Exception:
         logging.getLogger("live").exception("a defect of phasedic; please report it with this traceback")
         return 1
+
+
+def _check_environment() -> None:
+    for name, least in _LEAST.items():
+        value = os.environ.get(name, "1")
+        if not (value.isascii() and value.isdecimal() and int(value) >= least):
+            raise ConfigError(
+                f"{name}={value} is not possible; give a whole number from {least}, or unset the variable"
+            )
+
+
+def _system_error(error: OSError) -> PhasedicError:
+    """What the system refused, and what to do; the one place for files that no other message covers."""
+    name = error.filename if isinstance(error.filename, str | bytes | os.PathLike) else ""
+    what = f"{os.fsdecode(name)}: " if name else ""
+    why = error.strerror or str(error)
+    if error.errno in _WRONG_PATH:
+        return ConfigError(f"{what[:200]}{why}; give another name")
+    return DataError(f"{what}{why}; check the path, the permissions and the room on the disk")
+
+
+def _refused(error: PhasedicError) -> int:
+    print(f"phasedic: {printable(brief(error))}", file=sys.stderr)
+    return error.exit_code
 
 
 def _interrupted() -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class Clock:
-    """A clock that goes when it is told to."""
+    """A clock that a test moves by hand."""
 
     def __init__(self) -> None:
         self.now_s = 0.0

@@ -167,7 +167,7 @@ class BurstAccumulator:
     def _single(self, frame: Frame) -> Burst:
         """A burst of one is the frame itself: nothing is averaged, nothing copied."""
         burst = Burst(
-            mean=frame.image, n=1, noise=math.nan, clipped=frozen(frame.image >= 2**frame.bits - 1),
+            mean=frame.image, n=1, noise=math.nan, clipped=frozen(frame.image >= frame.saturation),
             bits=frame.bits, t=frame.t, duration=0.0, first_index=frame.index, last_index=frame.index,
             lost=self._lost, clock=frame.clock,
         )  # fmt: skip
@@ -240,7 +240,7 @@ class _Sums:
                 self._total,
                 self.mean.reshape(-1),
                 self.clipped.reshape(-1),
-                2**self._like.bits - 1,
+                self._like.saturation,
                 first,
                 n,
             )

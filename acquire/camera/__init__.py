@@ -1,4 +1,4 @@
-"""What a camera is (``contract``), and what opens any of them by its address (``opening``)."""
+"""What a camera is (``contract``), what opens any of them (``opening``), and what drivers share (``timing``)."""
 
 from acquire.camera.contract import Camera, CameraBase
 from acquire.camera.opening import (
@@ -8,9 +8,16 @@ from acquire.camera.opening import (
     FailureGuard,
     RepeatGuard,
     list_cameras,
-    missing_between,
     open_camera,
     with_scheme,
+)
+from acquire.camera.timing import (
+    FrameCounter,
+    StallWatch,
+    longest_pause_s,
+    mid_exposure,
+    missing_at_end,
+    missing_between,
 )
 
 __all__ = [
@@ -20,8 +27,13 @@ __all__ = [
     "CameraListing",
     "CroppedCamera",
     "FailureGuard",
+    "FrameCounter",
     "RepeatGuard",
+    "StallWatch",
     "list_cameras",
+    "longest_pause_s",
+    "mid_exposure",
+    "missing_at_end",
     "missing_between",
     "open_camera",
     "with_scheme",

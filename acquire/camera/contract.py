@@ -30,7 +30,7 @@ class Camera(Protocol):
       ``stop()``. A fault that the device can recover from is an event and a wait, never an
       exception; ``DeviceError`` or ``DataError`` is raised only when nothing more can come.
     - ``stop()`` may be called from any thread, before or during the iteration, which then
-      ends within half a second.
+      ends within half a second, also where the device is dead: who may block waits in a thread of its own.
     """
 
     @property

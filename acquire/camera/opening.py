@@ -1,7 +1,7 @@
 """Opening the camera of an address, listing the cameras, and what their drivers share.
 
-``RepeatGuard``, ``FailureGuard`` and ``missing_between`` find faults that drivers hide: repeated pictures, dead
-handles, lost frames. They get pictures and times, touch no device and read no clock. ``CroppedCamera`` is a part
+``RepeatGuard`` and ``FailureGuard`` find faults that drivers hide: repeated pictures, dead handles. They get
+pictures and times, touch no device and read no clock. ``CroppedCamera`` is a part
 of a camera's picture as a camera of its own: nothing else is measured or stored, and all coordinates
 downstream (ROI, mask, results) count from the corner of that part.
 """
@@ -19,7 +19,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import Registry, parse_address
+from acquire.addresses import Registry, expanded, parse_address
 from acquire.camera.contract import Camera
 from acquire.events import EventSink, ignore_event
 from acquire.frame import CameraInfo, Frame, frozen
@@ -32,13 +32,14 @@ CAMERAS: Registry[Camera] = Registry(
     "phasedic.cameras",
     {
         "": "acquire.v4l2.camera:open_v4l2",
+        "genicam": "acquire.genicam.camera:open_genicam",
         "opencv": "acquire.opencv.webcam:open_opencv",
         "video": "acquire.opencv.video:open_video",
         "files": "acquire.opencv.images:open_files",
         "session": "acquire.session.devices:open_session_camera",
     },
     lists_group="phasedic.camera_lists",
-    lists={"": "acquire.v4l2.listing:list_cameras"},
+    lists={"": "acquire.v4l2.listing:list_cameras", "genicam": "acquire.genicam.listing:list_cameras"},
 )
 
 
@@ -90,7 +91,7 @@ _VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm")
 def with_scheme(text: str) -> str:
     """The address with its scheme, where it is but the name of a folder, a glob or a file: ``files:shots``."""
     address = parse_address(text)
-    path, suffix = Path(address.target).expanduser(), Path(address.target).suffix.lower()
+    path, suffix = expanded(address.target), Path(address.target).suffix.lower()
     if address.scheme and address.scheme in (*CAMERAS.schemes(), "sim"):
         return text
     if suffix in (".h5", ".hdf5"):
@@ -170,20 +171,6 @@ class FailureGuard:
         if took_s < self._instant_s:
             return "the device is gone or dead (its reads fail at once)"
         return f"no picture within {took_s:.1f} s"
-
-
-def missing_between(earlier_t: float, later_t: float, fps: float | None) -> int:
-    """How many frames a steady camera must have lost between two stamps, by their distance.
-
-    Parameters
-    ----------
-    earlier_t, later_t : float, s
-    fps : float or None, 1/s
-        None or 0: unknown, and 0 is returned.
-    """
-    if not fps:
-        return 0
-    return max(0, round((later_t - earlier_t) * fps) - 1)
 
 
 class CroppedCamera:

@@ -4,7 +4,7 @@
 and forecasts the free space, ``declared`` checks what a file holds.
 """
 
-from acquire.hdf5.damage import abandon_file, check_size, probe, read_superblock
+from acquire.hdf5.damage import PaddedFile, abandon_file, check_size, probe, read_superblock, reason
 from acquire.hdf5.declared import (
     Declared,
     JsonField,
@@ -38,6 +38,7 @@ __all__ = [
     "FlushTimer",
     "GrowingDataset",
     "JsonField",
+    "PaddedFile",
     "PictureReader",
     "PictureStack",
     "RowTable",
@@ -60,6 +61,7 @@ __all__ = [
     "read_object",
     "read_scalar",
     "read_superblock",
+    "reason",
     "set_attributes",
     "stored_rows",
     "to_json",

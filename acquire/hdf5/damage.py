@@ -10,12 +10,15 @@
 
 from __future__ import annotations
 
+import io
 import logging
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import h5py
 
@@ -24,8 +27,8 @@ from acquire.errors import DataError
 PROBE_S = 30.0  # HDF5 retries a bad checksum of an unfinished file for ever
 
 
-def probe(path: Path, package: str, timeout_s: float | None = None) -> None:
-    """Read ``path`` by ``python -m package path`` first.
+def probe(path: Path, package: str, timeout_s: float | None = None, *, words: Sequence[str] = ()) -> None:
+    """Read ``path`` by ``python -m package path``, with more ``words``, first.
 
     Parameters
     ----------
@@ -37,7 +40,7 @@ def probe(path: Path, package: str, timeout_s: float | None = None) -> None:
     DataError
         The child crashed, did not end in time, or refused the file itself.
     """
-    command = [sys.executable, "-m", package, str(path)]
+    command = [sys.executable, "-m", package, str(path), *words]
     try:
         done = subprocess.run(
             command, capture_output=True, text=True, timeout=timeout_s or PROBE_S, check=False
@@ -47,6 +50,13 @@ def probe(path: Path, package: str, timeout_s: float | None = None) -> None:
     if done.returncode != 0:
         refusal = done.stdout.strip() if done.returncode == DataError.exit_code else ""
         raise DataError(refusal or f"{path} is damaged: the HDF5 library fails on it ({done.returncode})")
+
+
+def reason(error: Exception) -> str:
+    """HDF5's own words, shortened to the part a person can use."""
+    text = " ".join(str(error).split())
+    _, _, words = text.partition("error message = '")
+    return words.partition("'")[0] or text[:200]
 
 
 log = logging.getLogger(__name__)
@@ -108,6 +118,48 @@ def read_superblock(path: Path) -> Superblock:
     if begin[8] not in (2, 3) or begin[9] != 8:
         return Superblock(False, 0)
     return Superblock(begin[11] != 0, int.from_bytes(begin[28:36], "little"))
+
+
+class PaddedFile(io.RawIOBase):
+    """A file that has lost its end, as if zeros stood there: HDF5 opens none that is shorter than it was.
+
+    Parameters
+    ----------
+    path : Path
+    size : int, bytes
+        What it had.
+    """
+
+    def __init__(self, path: Path, size: int) -> None:
+        self._file = path.open("rb", buffering=0)
+        self._size, self._at = size, 0
+
+    def readable(self) -> bool:
+        """Always."""
+        return True
+
+    def seekable(self) -> bool:
+        """Always."""
+        return True
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """As of a file of the whole size."""
+        self._at = offset + {os.SEEK_SET: 0, os.SEEK_CUR: self._at, os.SEEK_END: self._size}[whence]
+        return self._at
+
+    def readinto(self, buffer: Any) -> int:
+        """Bytes of the file, and zeros beyond its end."""
+        wanted = memoryview(buffer)[: max(self._size - self._at, 0)]
+        self._file.seek(self._at)
+        there = self._file.readinto(wanted) or 0
+        wanted[there:] = bytes(len(wanted) - there)
+        self._at += len(wanted)
+        return len(wanted)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+        super().close()
 
 
 def check_size(path: Path, block: Superblock) -> None:

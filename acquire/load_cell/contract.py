@@ -29,8 +29,9 @@ class LoadCell(Protocol):
       an exception: a test goes on without its load.
     - ``stop()`` may be called from any thread; the iteration then ends within half a second.
     - ``tare()`` makes the present load zero, in the device where its protocol can, else here; may be
-      called from any thread while iterating. Unless forced it is refused, in an event, where the load
-      is not known to be still. Its event has the amount by which forces fall from then on (``step_N``).
+      called from any thread while iterating. Unless forced it is refused, in a DEVICE event with
+      ``tared=False``, where the load is not known to be still. Its event (TARE) has the amount by which
+      forces fall from then on (``step_N``).
     - ``undo_tare()`` restores the zero before that; its event has the same.
     """
 

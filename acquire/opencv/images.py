@@ -3,6 +3,7 @@
 Pictures are read when they are asked for, in natural order (2 before 10), pages of a multi-page
 TIFF one after the other. Nobody stamped them: ``clock`` is "nominal", or times come from a CSV. A picture
 that cannot be read, or is not like the first, is a damaged frame and an event; the others come all the same.
+``white=4080`` is the grey level of saturation, where that is not the highest of the bits.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import Address, Options
+from acquire.addresses import Address, Options, expanded
 from acquire.camera import CameraBase
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import EventSink, device_event, ignore_event
@@ -46,7 +47,7 @@ def find_images(target: str) -> list[Path]:
     DataError
         There is none, or one is no regular file.
     """
-    path = Path(target).expanduser()
+    path = expanded(target)
     if path.is_dir():
         found = [item for item in path.iterdir() if item.suffix.lower() in SUFFIXES]
     elif path.exists():
@@ -93,6 +94,8 @@ class FileSettings:
     gray : str or None
     bits : int or None
         Significant bits; None: those of the file's samples.
+    white : int or None, GL
+        Where a sample is saturated; None: at the highest of its bits.
     stamps : str or None
         CSV with the time of each picture.
     """
@@ -100,6 +103,7 @@ class FileSettings:
     fps: float = 1.0
     gray: str | None = None
     bits: int | None = None
+    white: int | None = None
     stamps: str | None = None
 
 
@@ -138,6 +142,7 @@ class ImageFiles(CameraBase):
             pixel_format=paths[0].suffix.lstrip(".").upper(),
             controls={"files": len(paths), "gray": settings.gray, "stamps": settings.stamps},
             warnings=tuple(self._warnings(first)),
+            white_level=settings.white,
         )
 
     def __iter__(self) -> Iterator[Frame]:
@@ -163,7 +168,7 @@ class ImageFiles(CameraBase):
             self._leave_out(path, t, str(error))
             black = frozen(np.zeros(self._shape, self._dtype))
             return Frame(black, index, t, "nominal", 0, self._bits, t, damaged=True)
-        return Frame(image, index, t, "nominal", 0, self._bits, t)
+        return Frame(image, index, t, "nominal", 0, self._bits, t, white_level=self._settings.white)
 
     def _leave_out(self, path: Path, t: float, why: str) -> None:
         self._left_out += 1
@@ -248,13 +253,13 @@ def picture_times(address: Address) -> dict[str, float]:
     times = {path.name: stamps[k] if stamps else k / settings.fps for k, path in enumerate(paths)}
     if len(times) < len(paths) or any(_count(path) > 1 for path in paths):
         raise ConfigError(
-            f"{address.text}: pictures are not told apart by their names; give times in their place"
+            f"{address.text}: two pictures share a name, or one has several pages; give times in place of names"
         )
     return times
 
 
 def open_files(address: Address, on_event: EventSink) -> ImageFiles:
-    """Open ``files:folder|glob|name?fps=&gray=&bits=&stamps=``.
+    """Open ``files:folder|glob|name?fps=&gray=&bits=&white=&stamps=``.
 
     Raises
     ------
@@ -273,6 +278,7 @@ def _settings(address: Address) -> FileSettings:
         fps=options.number("fps", 1.0, minimum=1e-6, maximum=1e6),
         gray=gray,
         bits=options.integer("bits", minimum=1, maximum=16),
+        white=options.integer("white", minimum=1, maximum=65535),
         stamps=options.text("stamps"),
     )
     options.done()

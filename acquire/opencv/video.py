@@ -11,7 +11,7 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from acquire.addresses import Address, Options
+from acquire.addresses import Address, Options, expanded
 from acquire.camera import CameraBase
 from acquire.cv2_loader import load_cv2
 from acquire.errors import DataError
@@ -82,7 +82,7 @@ class VideoFile(CameraBase):
     def _report_if_short(self, count: int) -> None:
         if count < self._promised:
             text = f"{self._path}: ends after {count} of {self._promised} frames; it may be cut off"
-            device_event(self._on_event, self._address, text)
+            device_event(self._on_event, self._address, text, missing=self._promised - count)
 
     def _release(self) -> None:
         self._capture.release()
@@ -103,4 +103,4 @@ def open_video(address: Address, on_event: EventSink) -> VideoFile:
     options = Options(address)
     gray = options.choice("gray", GRAYS, "luma")
     options.done()
-    return VideoFile(address.text, Path(address.target).expanduser(), gray, on_event)
+    return VideoFile(address.text, expanded(address.target), gray, on_event)

@@ -15,11 +15,12 @@ from typing import Any, Self
 
 from acquire.addresses import Address
 from acquire.closing import Closing
+from acquire.device_clock import DeviceClock
 from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.protocols.base import Reading
-from acquire.serial_line.clock import ArrivalRate, ArrivalTimes, DeviceClock
+from acquire.serial_line.clock import ArrivalRate, ArrivalTimes
 from acquire.serial_line.link import FloodGuard, Link, LinkContext, LoadWatch, Opener
 from acquire.serial_line.ports import open_port
 from acquire.serial_line.scaling import Scaling
@@ -294,7 +295,7 @@ class SerialCell(Closing):
         zero = self._scaling.zero
         why_not = zero.why_not(self._clock())
         if why_not and not force:
-            self._report("warning", f"not tared: {why_not}; hold the load still, or force the tare")
+            self._refuse(f"not tared: {why_not}; hold the load still, or force the tare")
             return False
         load, data = zero.load(), {"forced": bool(why_not), "undo": False}
         wanted = self._settings.tare
@@ -306,7 +307,7 @@ class SerialCell(Closing):
             self._event(EventKind.TARE, "info", text, offset_N=None, step_N=_known(step), **data)
             return True
         if math.isnan(load):
-            self._report("warning", "nothing to tare: there was no valid sample yet")
+            self._refuse("nothing to tare: there was no valid sample yet")
             return False
         step = zero.take()
         text = f"tared: {load:.6g} N is zero now"
@@ -317,12 +318,15 @@ class SerialCell(Closing):
         zero = self._scaling.zero
         step = zero.undo()
         if step is None:
-            self._report("warning", "there is no tare to undo")
+            self._refuse("there is no tare to undo")
             return False
         text = f"the last tare is undone: forces rise by {-step:.6g} N"
         data = {"offset_N": zero.offset, "step_N": step, "forced": False, "undo": True}
         self._event(EventKind.TARE, "info", text, **data)
         return True
+
+    def _refuse(self, text: str) -> None:
+        self._event(EventKind.DEVICE, "warning", text, tared=False)
 
     def _report(self, level: str, text: str) -> None:
         self._event(EventKind.DEVICE, level, text)

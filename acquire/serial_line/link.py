@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 from acquire.errors import ConfigError, DeviceError
 from acquire.load_sample import LoadFlag, LoadSample
+from acquire.opening_thread import Opening
 from acquire.serial_line.byte_ports import Port
 from acquire.serial_line.ports import PORT_ERRORS, LineSettings, find_again, identity_of
 
@@ -29,55 +30,6 @@ CLOSE_S = 0.5
 
 Opener = Callable[[LineSettings], Port]
 Report = Callable[[str, str], None]  # level, sentence
-
-
-class Opening:
-    """A port being opened by a thread.
-
-    Parameters
-    ----------
-    opener : callable taking LineSettings
-    line : callable giving LineSettings
-        Asked by the thread, since looking for a port takes time too.
-    """
-
-    def __init__(self, opener: Opener, line: Callable[[], LineSettings]) -> None:
-        self._opener, self._line = opener, line
-        self._lock, self._done, self._abandoned = threading.Lock(), threading.Event(), False
-        self._port: Port | None = None
-        self._error: Exception | None = None
-        self.url = ""
-        threading.Thread(target=self._work, name="opening", daemon=True).start()
-
-    def _work(self) -> None:
-        try:
-            line = self._line()
-            self.url = line.url
-            self._port = self._opener(line)
-        except Exception as error:
-            self._error = error
-        with self._lock:
-            self._done.set()
-            port = self._port if self._abandoned else None
-        close_port(port)
-
-    def done(self, seconds: float) -> bool:
-        """Whether it is decided, after waiting so long at most."""
-        return self._done.wait(seconds)
-
-    def take(self) -> Port:
-        """The port, once it is done; raises what opening it raised."""
-        if self._error is not None:
-            raise self._error
-        assert self._port is not None
-        return self._port
-
-    def abandon(self) -> None:
-        """Nobody waits for it any more."""
-        with self._lock:
-            self._abandoned = True
-            port = self._port if self._done.is_set() else None
-        close_port(port)
 
 
 def close_port(port: Port | None) -> None:
@@ -147,16 +99,16 @@ class Link:
         self._line, self._report, self._last_words = line, report, last_words
         self._opener, self._clock = context.opener, context.clock
         self._sleep, self._stopped = context.sleep, context.stopped
-        first = Opening(context.opener, lambda: line)
+        first = self._opening_at(lambda: line)
         if not first.done(OPEN_S):
             first.abandon()
             raise DeviceError(
                 f"{line.url}: does not open within {OPEN_S:g} s; check the device and its cable"
             )
-        self._port: Port | None = first.take()
-        self._opening: Opening | None = None
+        self._url, port = first.take()
+        self._port: Port | None = port
+        self._opening: Opening[tuple[str, Port]] | None = None
         self.identity = "" if "://" in line.url else identity_of(line.url)
-        self._url = line.url
         self._since, self._next_try = context.clock(), 0.0
         self._short = 0  # connections in a row that did not last
         self._missed = False  # reported as lost, and not yet as back
@@ -210,11 +162,9 @@ class Link:
         if self._short == 1:
             self._report("error", f"lost ({error}); {self._last_words()}; trying to reach it again")
         elif self._short == 2:
-            text = (
-                f"lost again at once ({error}): something on the other side hangs up; it is tried again ever"
-            )
+            text = f"lost again at once ({error}): the other side hangs up; phasedic tries again ever"
             self._report(
-                "error", f"{text} more seldom (up to every {SELDOM_S:g} s), and told of when it stays"
+                "error", f"{text} less often (up to every {SELDOM_S:g} s), with an event when it stays"
             )
         self._missed = True
 
@@ -225,18 +175,27 @@ class Link:
             if left > 0:
                 self._sleep(min(left, STEP_S))
                 return False
-            self._opening = Opening(self._opener, self._where)
+            self._opening = self._opening_at(self._where)
         if not self._opening.done(STEP_S):
             return False
         opening, self._opening = self._opening, None
         try:
-            self._port = opening.take()
+            self._url, self._port = opening.take()
         except (DeviceError, ConfigError) as error:
-            log.debug("%s: %s", opening.url, error)
+            log.debug("%s", error)
             self._next_try = self._clock() + RETRY_S
             return False
-        self._url, self._since = opening.url, self._clock()
+        self._since = self._clock()
         return True
+
+    def _opening_at(self, where: Callable[[], LineSettings]) -> Opening[tuple[str, Port]]:
+        """Opens a port; ``where`` it is asked by the thread, since looking for a port takes time too."""
+
+        def opened() -> tuple[str, Port]:
+            line = where()
+            return line.url, self._opener(line)
+
+        return Opening(opened, lambda found: close_port(found[1]))
 
     def _where(self) -> LineSettings:
         return dataclasses.replace(self._line, url=find_again(self._line.url, self.identity))

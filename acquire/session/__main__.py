@@ -7,20 +7,22 @@ import sys
 from acquire.errors import DataError
 
 
-def main(path: str) -> int:
-    """The child: 0 where all is readable, else the error's words and its exit code."""
+def main(path: str, salvage: str = "") -> int:
+    """The child: 0 where all is readable, or with ``salvage`` a part; else the error's words and its exit code."""
     from acquire.session.part import SessionPart
 
     try:
-        with SessionPart(path, probed=True) as part:
+        with SessionPart(path, probed=True, salvage=bool(salvage)) as part:
             part.walk_pictures()
             for read in (part.load_samples, part.events, part.clock_pairs, part.frame_counts):
                 read()
     except DataError as error:
+        if salvage:
+            return 0  # what cannot be read does not hang the library
         print(error)
         return error.exit_code
     return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1]))
+    sys.exit(main(*sys.argv[1:]))

@@ -69,7 +69,7 @@ class SessionLoadCell(_SessionDevice):
     def tare(self, *, force: bool = False) -> None:
         """Refused in an event: what is recorded is not changed."""
         text = "a recorded load cannot be tared; the tares of the recording are in it"
-        device_event(self._on_event, self.info.address, text)
+        device_event(self._on_event, self.info.address, text, tared=False)
 
 
 def open_session_camera(address: Address, on_event: EventSink) -> SessionCamera:

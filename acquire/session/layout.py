@@ -189,7 +189,9 @@ def new_images(group: h5py.Group, name: str, shape: tuple[int, ...], dtype: Any,
 def describe_camera(info: CameraInfo) -> dict[str, Any]:
     """``CameraInfo`` as JSON values."""
     names = ("address", "name", "width", "height", "bits", "live", "clock", "fps", "exposure_s")
-    return {name: getattr(info, name) for name in (*names, "pixel_format", "controls", "warnings")}
+    return {
+        name: getattr(info, name) for name in (*names, "pixel_format", "controls", "warnings", "white_level")
+    }
 
 
 def describe_load(info: LoadCellInfo | None) -> dict[str, Any] | None:

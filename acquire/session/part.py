@@ -21,6 +21,7 @@ from acquire.events import Event
 from acquire.frame import Burst, CameraInfo, Frame, frozen
 from acquire.hdf5 import (
     Declared,
+    PaddedFile,
     PictureReader,
     as_text,
     check_links,
@@ -39,21 +40,10 @@ from acquire.load_sample import LoadCellInfo, LoadFlag, LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import layout, stored
 from acquire.session.bursts import burst_from
-from acquire.session.stored import Rows, events_from, read_rows
+from acquire.session.stored import DAMAGE, Rows, events_from, read_column, read_rows
 
 TEXT = Declared("S")
 _STABLE = {code: word for word, code in layout.STABLE.items()}
-# What HDF5, JSON and our own decoding raise on bytes that are not what they were.
-DAMAGE = (
-    OSError,
-    RuntimeError,
-    LookupError,
-    ValueError,
-    TypeError,
-    AttributeError,
-    MemoryError,
-    OverflowError,
-)
 UNFINISHED = (
     "was not closed by its writer (killed, or still recording); everything complete in it is read."
     " 'phasedic recover' makes a clean copy"
@@ -84,13 +74,16 @@ class SessionPart(Closing):
 
     def __init__(self, path: str | os.PathLike[str], *, probed: bool = False, salvage: bool = False) -> None:
         self.path = Path(path)
-        self.file, self.recovered = _open_file(self.path, probed)
+        self.file, self.recovered = _open_file(self.path, probed, salvage)
+        self._salvage, self._advice = salvage, "" if salvage else ADVICE
         self._whole = self.recovered is None and not salvage
+        self._follows = self.recovered == UNFINISHED
         try:
             self._read()
         except DAMAGE as error:
             self.file.close()
-            raise damaged(self.path, "its description cannot be read", error) from error
+            what = "its description cannot be read"
+            raise damaged(self.path, what, error, self._advice or NOTHING) from error
         except PhasedicError as error:
             self.file.close()
             raise DataError(str(error)) from error
@@ -133,7 +126,7 @@ class SessionPart(Closing):
         self.troubles = (*self._frames.troubles, *self._bursts.troubles, *self._troubles_of_the_load())
 
     def _open_the_growing(self) -> None:
-        if self.recovered:
+        if self._follows:
             for group in self._groups.values():
                 for dataset in group.values():
                     dataset.id.refresh()
@@ -180,8 +173,10 @@ class SessionPart(Closing):
             Its bytes are damaged.
         """
         row = {name: column[number].item() for name, column in self.columns.items()}
-        with _reading(self.path, f"frame {number} cannot be read"):
+        with _reading(self.path, f"frame {number} cannot be read", self._advice):
             image = self._pictures[int(self._frames.places[number])]
+            if self._salvage and not image.any():  # the checksum of zeros is zero
+                raise ValueError("all bytes are zero")
         return Frame(
             image=frozen(image),
             index=row["index"],
@@ -191,6 +186,7 @@ class SessionPart(Closing):
             bits=self.camera.bits,
             raw_t=row["raw_monotonic_s"],
             damaged=bool(row["damaged"]),
+            white_level=self.camera.white_level,
         )
 
     def burst(self, number: int) -> Burst:
@@ -201,14 +197,14 @@ class SessionPart(Closing):
         DataError
             Its bytes are damaged.
         """
-        with _reading(self.path, f"burst {number} cannot be read"):
+        with _reading(self.path, f"burst {number} cannot be read", self._advice):
             place = int(self._bursts.places[number])
             row = {name: column[number].item() for name, column in self.bursts.items()}
             return burst_from(self._sums[place], self._clipped[place], row, self.camera.bits)
 
     def load_samples(self) -> list[LoadSample]:
         """All load samples with their raw lines."""
-        with _reading(self.path, "the load samples cannot be read"):
+        with _reading(self.path, "the load samples cannot be read", self._advice):
             samples = self._samples()
             lines = self._raw_lines(samples)
         columns = [samples.columns[name].tolist() for name in _SAMPLE]
@@ -228,9 +224,9 @@ class SessionPart(Closing):
 
     def _raw_lines(self, samples: Rows) -> list[bytes | None]:
         """The line of each sample; None where it is not in the file yet."""
-        content = self._lines[:].tobytes()
+        content = read_column(self._lines, whole=self._whole).tobytes()
         last = int(samples.places.max(initial=-1))
-        ends = self._groups["load"]["line_end"][: last + 1].astype(np.int64)
+        ends = read_column(self._groups["load"]["line_end"], last + 1, whole=self._whole).astype(np.int64)
         starts = np.concatenate([[0], ends])[samples.places]
         ends = ends[samples.places]
         if self._whole and (np.any(ends <= starts) or ends.max(initial=0) > stored_rows(self._lines)):
@@ -240,13 +236,13 @@ class SessionPart(Closing):
 
     def events(self) -> list[Event]:
         """All events."""
-        with _reading(self.path, "the events cannot be read"):
-            rows = self._events[: stored_rows(self._events)]
+        with _reading(self.path, "the events cannot be read", self._advice):
+            rows = read_column(self._events, whole=self._whole)
             return events_from(rows, str(self.path), whole=self._whole)
 
     def clock_pairs(self) -> list[ClockPair]:
         """The pairs of clock readings."""
-        with _reading(self.path, "the clock readings cannot be read"):
+        with _reading(self.path, "the clock readings cannot be read", self._advice):
             columns = read_rows(self._groups["clock"], layout.CLOCK_COLUMNS, whole=self._whole).columns
             return [
                 ClockPair.from_iso(float(t), utc.decode())
@@ -255,7 +251,7 @@ class SessionPart(Closing):
 
     def frame_counts(self) -> dict[str, Any] | None:
         """The final counts; None where the writer did not come to its end."""
-        with _reading(self.path, "the ledger cannot be read"):
+        with _reading(self.path, "the ledger cannot be read", self._advice):
             return stored.ledger_from(self._frame_counts[0], f"{self.path}: the ledger")
 
     def walk_pictures(self) -> None:
@@ -266,7 +262,7 @@ class SessionPart(Closing):
         DataError
             It is damaged.
         """
-        with _reading(self.path, "the index of the pictures cannot be read"):
+        with _reading(self.path, "the index of the pictures cannot be read", self._advice):
             for pictures in (self._images, self._sums, self._clipped):
                 pictures.id.get_num_chunks()
 
@@ -281,34 +277,46 @@ _SAMPLE = ("monotonic_s", "force", "unit", "stable", "flags", "device_ms")
 class _reading:
     """Turns what HDF5 and the decoding of damaged bytes raise into a ``DataError``."""
 
-    def __init__(self, path: Path, what: str) -> None:
-        self._path, self._what = path, what
+    def __init__(self, path: Path, what: str, advice: str) -> None:
+        self._path, self._what, self._advice = path, what, advice
 
     def __enter__(self) -> None:
         pass
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: object) -> None:
         if isinstance(error, DAMAGE):
-            raise damaged(self._path, self._what, error) from error
+            raise damaged(self._path, self._what, error, self._advice) from error
 
 
-def damaged(path: Path, what: str, error: BaseException) -> DataError:
+ADVICE = "; the file is damaged: 'phasedic recover' saves what can be read"
+NOTHING = "; the file is damaged, and nothing of it can be saved"
+
+
+def damaged(path: Path, what: str, error: BaseException, advice: str = ADVICE) -> DataError:
     """The error of a file whose bytes are not what they were."""
     reason = " ".join(str(error).split())[:160]
-    return DataError(
-        f"{path}: {what} ({reason}); the file is damaged: 'phasedic recover' saves what can be read"
-    )
+    return DataError(f"{path}: {what} ({reason}){advice}")
 
 
-def _open_file(path: Path, probed: bool) -> tuple[h5py.File, str | None]:
+def _open_file(path: Path, probed: bool, salvage: bool) -> tuple[h5py.File, str | None]:
     block = read_superblock(path)
-    check_size(path, block)
-    if block.unfinished and not probed:
-        probe(path, "acquire.session")
+    there = path.stat().st_size
+    is_cut = not block.unfinished and there < block.size
+    if is_cut and not salvage:
+        try:
+            check_size(path, block)
+        except DataError as error:
+            raise DataError(f"{error}, or save what is there with 'phasedic recover'") from None
+    if (block.unfinished or is_cut) and not probed:
+        probe(path, "acquire.session", words=["salvage"] if salvage else [])
     try:
+        if is_cut:
+            return h5py.File(
+                PaddedFile(path, block.size), "r"
+            ), f"is truncated: {there} of {block.size} bytes are there"
         return h5py.File(path, "r", swmr=block.unfinished), UNFINISHED if block.unfinished else None
     except (OSError, RuntimeError) as error:
-        raise damaged(path, "it cannot be opened", error) from error
+        raise damaged(path, "it cannot be opened", error, NOTHING if salvage else ADVICE) from error
 
 
 def _check_format(path: Path, file: h5py.File) -> None:

@@ -115,13 +115,16 @@ def _copy(part: SessionPart, writer: SessionWriter) -> Recovered:
 
 def _copy_frames(part: SessionPart, writer: SessionWriter, unreadable: list[str]) -> int:
     copied = skipped = 0
+    lost: list[str] = []
     for number in range(len(part)):
-        frame = _try(partial(part.frame, number), unreadable)
+        frame = _try(partial(part.frame, number), lost)
         if frame is None:
             skipped += 1
             continue
         writer.write_frame(dataclasses.replace(frame, lost_before=frame.lost_before + skipped))
         copied, skipped = copied + 1, 0
+    if lost:
+        unreadable.append(f"{len(lost)} of {len(part)} frames cannot be read, the first: {lost[0]}")
     return copied
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
@@ -40,6 +41,17 @@ EVENTS = Declared(f"S{layout.EVENT_BYTES}", (None,))
 LEDGER = Declared(f"S{layout.LEDGER_BYTES}", (1,))
 LINES = Declared("u1", (None,))
 
+# What HDF5, JSON and our own decoding raise on bytes that are not what they were.
+DAMAGE = (
+    OSError,
+    RuntimeError,
+    LookupError,
+    ValueError,
+    TypeError,
+    AttributeError,
+    MemoryError,
+    OverflowError,
+)
 _CLOCK = JsonField(str, words=layout.CLOCKS)
 CAMERA_FIELDS = {
     "address": JsonField(str),
@@ -54,6 +66,7 @@ CAMERA_FIELDS = {
     "pixel_format": JsonField(str),
     "controls": JsonField(dict),
     "warnings": JsonField(list),
+    "white_level": JsonField(int, 1, 65_535, missing=True),
 }
 LOAD_FIELDS = {
     "address": JsonField(str),
@@ -141,6 +154,28 @@ class Rows:
         return len(self.places)
 
 
+def read_column(item: h5py.Dataset, n: int | None = None, missing: Any = 0, *, whole: bool) -> NDArray[Any]:
+    """The first ``n`` rows, or all that are stored; where not ``whole``, ``missing`` in place of damaged chunks."""
+    n = _stored_rows(item, whole) if n is None else n
+    if whole:
+        return np.asarray(item[:n])
+    values = np.full(n, missing, item.dtype)
+    step = item.chunks[0] if item.chunks else max(n, 1)
+    for first in range(0, n, step):
+        with contextlib.suppress(*DAMAGE):
+            values[first : first + step] = item[first : min(first + step, n)]
+    return values
+
+
+def _stored_rows(item: h5py.Dataset, whole: bool) -> int:
+    try:
+        return stored_rows(item)
+    except DAMAGE:
+        if whole:
+            raise
+        return int(item.shape[0])
+
+
 def read_rows(
     group: h5py.Group, columns: layout.Columns, pictures: Sequence[h5py.Dataset] = (), *, whole: bool
 ) -> Rows:
@@ -160,7 +195,7 @@ def read_rows(
     """
     declared = {name: column.declared() for name, column in columns.items()}
     held = open_datasets(group, declared)
-    lengths = [stored_rows(item) for item in (*held.values(), *pictures)]
+    lengths = [_stored_rows(item, whole) for item in (*held.values(), *pictures)]
     n = min(lengths)
     extents = {len(item) for item in (*held.values(), *pictures)}
     where = f"{group.file.filename}: {group.name}"
@@ -169,7 +204,7 @@ def read_rows(
             f"{where} has {n} to {max(extents)} rows, not one number of them in all its columns; the file is"
             " damaged: 'phasedic recover' saves the rows that are whole"
         )
-    table = {name: item[:n] for name, item in held.items()}
+    table = {name: read_column(item, n, columns[name].missing, whole=whole) for name, item in held.items()}
     outside = {name: what.outside(table[name]) for name, what in declared.items()}
     beyond = np.logical_or.reduce([*outside.values()], axis=0)
     if whole and beyond.any():
@@ -189,11 +224,13 @@ def _beyond(where: str, table: Any, outside: Any, declared: Mapping[str, Declare
 
 
 def _chosen(table: dict[str, NDArray[Any]], good: NDArray[np.bool_], what: str, whole: bool) -> Rows:
+    troubles = []
+    if not whole and len(good) and not good.any():
+        troubles.append(f"none of {len(good)} {what} has a time, so all are left out")
     if not whole:  # the last rows may not be written yet
         good = good[: len(good) - int(np.argmax(good[::-1]))] if good.any() else good[:0]
     places = np.flatnonzero(good)
     columns = {name: column[places] for name, column in table.items()}
-    troubles = []
     if left_out := len(good) - len(places):
         troubles.append(
             f"{left_out} of {len(good)} {what} have no time, or values beyond sense, and are left out"

@@ -32,6 +32,7 @@ from acquire.hdf5 import (
     RowTable,
     abandon_file,
     free_bytes,
+    reason,
     to_json,
 )
 from acquire.load_sample import LoadSample
@@ -185,7 +186,7 @@ class SessionWriter(Closing):
         """Store the final counts."""
         text = to_json(frame_counts).encode()
         if len(text) > layout.LEDGER_BYTES:
-            raise ValueError(f"a ledger of {len(text)} bytes; there is room for {layout.LEDGER_BYTES}")
+            raise ValueError(f"a ledger of {len(text)} bytes; at most {layout.LEDGER_BYTES} fit")
         with self._guarded():
             self._frame_counts[0] = text
         self._written(0)
@@ -279,7 +280,7 @@ class SessionWriter(Closing):
         try:
             yield file
         except (OSError, RuntimeError) as error:
-            if keep_rows:  # a disk that is full for a picture may still have room for the rows before it
+            if keep_rows:  # a disk that is full for a picture may still take the rows before it
                 with suppress(OSError, RuntimeError):
                     self._bring(file)
             # Datasets may now differ in length; going on would put rows beside the wrong frames.
@@ -296,7 +297,7 @@ def _create(path: Path) -> h5py.File:
         if path.exists() and path.stat().st_size > 0:
             raise DataError(f"{path} exists already and is not overwritten; choose another name") from error
         raise DataError(
-            f"{path} cannot be created ({_reason(error)}); choose a folder that exists and is writable"
+            f"{path} cannot be created ({reason(error)}); choose a folder that exists and is writable"
         ) from error
 
 
@@ -330,14 +331,7 @@ def _write_failure(path: Path, error: Exception) -> str:
     try:
         free = free_bytes(path)
     except OSError:
-        return f"{path}: its disk is gone ({_reason(error)}); check the disk and cable; {kept}"
+        return f"{path}: its disk is gone ({reason(error)}); check the disk and cable; {kept}"
     if free < 16 << 20:
         return f"{path}: disk full ({free} bytes free); free some space and start a new session; {kept}"
-    return f"{path}: writing failed ({_reason(error)}); check the disk; {kept}"
-
-
-def _reason(error: Exception) -> str:
-    """HDF5's own words, shortened to the part a person can use."""
-    text = " ".join(str(error).split())
-    _, _, words = text.partition("error message = '")
-    return words.partition("'")[0] or text[:200]
+    return f"{path}: writing failed ({reason(error)}); check the disk; {kept}"

@@ -5,7 +5,7 @@ frames reported, settings read back. A fault never ends a test: a stalled, faile
 camera is closed, looked for by identity and opened again, while every step is an event.
 
 Settings: ``format``, ``width``, ``height``, ``fps``, ``input``, ``plane=raw|r|g|b`` (Bayer),
-``buffers``, ``stall_s``, ``manual=yes|no``, ``exposure_us``, ``gain``, and every control of the
+``white``, ``buffers``, ``stall_s``, ``manual=yes|no``, ``exposure_us``, ``gain``, and every control of the
 camera by its name (``brightness=10``).
 """
 
@@ -20,7 +20,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from acquire.addresses import Address, Options
-from acquire.camera import CameraBase
+from acquire.camera import CameraBase, FrameCounter, StallWatch, longest_pause_s, mid_exposure
+from acquire.camera.timing import DEAD, StampOf
 from acquire.errors import ConfigError, DataError, DeviceError, PhasedicError
 from acquire.events import EventSink, Level, RateLimiter, device_event
 from acquire.frame import CameraInfo, Clock, Frame
@@ -28,7 +29,6 @@ from acquire.v4l2.api import Kernel
 from acquire.v4l2.controls import ControlWishes
 from acquire.v4l2.device import NotACamera, Stamp, V4L2Device
 from acquire.v4l2.faults import (
-    FrameCounter,
     cameras_here,
     fault_in_words,
     find_again,
@@ -45,15 +45,11 @@ BACKOFF_S = (0.1, 0.2, 0.5, 1.0)
 EMPTY_WAKES = 50  # wake-ups without a picture, after which the device counts as dead
 
 
-def mid_exposure(stamp: Stamp, raw_t: float, exposure_s: float | None) -> float:
-    """The middle of the exposure, s, where exposure and the meaning of the stamp are known.
-
-    A stamp of the end of the frame is half an exposure late, and later by the read-out of the
-    sensor, which no driver gives; without a known exposure the raw stamp stays.
-    """
-    if exposure_s is None or not stamp.monotonic:
-        return raw_t
-    return raw_t + (exposure_s / 2 if stamp.start_of_exposure else -exposure_s / 2)
+def stamp_of(stamp: Stamp) -> StampOf:
+    """What of the exposure a stamp marks; "" on another clock."""
+    if not stamp.monotonic:
+        return ""
+    return "start" if stamp.start_of_exposure else "end"
 
 
 class V4L2Camera(CameraBase):
@@ -94,8 +90,7 @@ class V4L2Camera(CameraBase):
         self._running = False
         self._guard = threading.RLock()  # whoever closes must not take the buffers from under a reader
         self._short = RateLimiter()
-        self._last_sign = self._last_picture = self._not_before = 0.0
-        self._stalled = self._late = False
+        self._stall, self._not_before, self._late = StallWatch(self._report), 0.0, False
         self._stale = self._wakes = 0
         self._device, self._setup = self._open_first()
         self._identity = self._device.identity
@@ -138,6 +133,8 @@ class V4L2Camera(CameraBase):
             controls=setup.controls,
             warnings=setup.warnings,
             settings=setup.settings,
+            white_level=self._settings.white,
+            pause_s=self.stall_s(),
         )
 
     def _start(self) -> None:
@@ -152,9 +149,7 @@ class V4L2Camera(CameraBase):
     def _begin(self) -> None:
         self._device.start(self._settings.buffers)
         self._running = True
-        self._last_sign = self._kernel.now()
-        if not self._stalled:
-            self._last_picture = self._last_sign
+        self._stall.restart(self._kernel.now())
 
     def _release(self) -> None:
         with self._guard:
@@ -188,7 +183,7 @@ class V4L2Camera(CameraBase):
             return None
         now = self._kernel.now()
         self._wakes = 0
-        self._picture_came(now)
+        self._stall.came(now)
         raw_t = stamp.time if stamp.monotonic else now
         if self._is_stale(raw_t):
             return None
@@ -219,15 +214,17 @@ class V4L2Camera(CameraBase):
         counted = self._counter.counts_itself
         lost = self._counter.count(stamp.sequence, raw_t, self._setup.mode.fps)
         if counted and not self._counter.counts_itself:
-            self._report("the driver does not number its frames; losses are told from their stamps alone")
+            self._report("the driver does not number its frames; losses are counted from their stamps alone")
         if stamp.damaged:
             self._report(
                 f"frame {self._counter.index} is damaged: recorded, not measured", frame=self._counter.index
             )
         clock: Clock = "device" if stamp.monotonic else "host"
-        self._t = max(self._t, mid_exposure(stamp, raw_t, self._setup.exposure_s))
+        self._t = max(self._t, mid_exposure(raw_t, self._setup.exposure_s, stamp_of(stamp)))
         bits = self._setup.format.bits
-        return Frame(image, self._counter.index, self._t, clock, lost, bits, raw_t, stamp.damaged)
+        return Frame(
+            image, self._counter.index, self._t, clock, lost, bits, raw_t, stamp.damaged, self._settings.white
+        )
 
     def _is_stale(self, raw_t: float) -> bool:
         """Frames from before the first one was asked for lay in the buffers; they are left out."""
@@ -251,26 +248,15 @@ class V4L2Camera(CameraBase):
         return 1 / self._setup.mode.fps if self._setup.mode.fps else 0.1
 
     def stall_s(self) -> float:
-        """Time without a picture that counts as a stall: five periods and an exposure, at least 0.5 s."""
+        """Time without a picture that counts as a stall."""
         if self._settings.stall_s is not None:
             return self._settings.stall_s
-        return max(0.5, 5 * self._period() + (self._setup.exposure_s or 0.0))
+        return longest_pause_s(self._setup.mode.fps, self._setup.exposure_s)
 
     def _look_for_stall(self) -> None:
-        waited = self._kernel.now() - self._last_sign
-        if waited > self.stall_s() and not self._stalled:
-            self._stalled = True
-            self._report(
-                f"no picture for {waited:.1f} s; still waiting (trigger, cable, light control?)", "error"
-            )
-        if waited > 4 * self.stall_s():
+        waited = self._stall.waited(self._kernel.now(), self.stall_s())
+        if waited > DEAD * self.stall_s():
             raise OSError(errno.ETIMEDOUT, f"no picture for {waited:.1f} s")
-
-    def _picture_came(self, now: float) -> None:
-        if self._stalled:
-            self._stalled = False
-            self._report(f"pictures again after {now - self._last_picture:.1f} s", "info")
-        self._last_sign = self._last_picture = now
 
     def _woken_for_nothing(self) -> None:
         self._wakes += 1
@@ -281,7 +267,7 @@ class V4L2Camera(CameraBase):
     def _recover(self, error: OSError) -> None:
         """Close, look for the camera by its identity, open it again; until it works or is stopped."""
         self._release()  # at once: an open handle makes a replugged camera come back under another name
-        if not self._stalled:
+        if not self._stall.stalled:
             self._report(f"{fault_in_words(error)}; looking for it again", "error")
         reported = ""
         attempt = 0
@@ -311,7 +297,7 @@ class V4L2Camera(CameraBase):
         self._setup = setup
         self._begin()
         self._counter.restart()
-        if not self._stalled:
+        if not self._stall.stalled:
             moved = f" as {path}" if path != self._path else ""
             self._report(f"opened again{moved}; the frames in between are counted as lost", "info", path=path)
         self._path = path
@@ -351,6 +337,7 @@ def v4l2_settings(address: Address) -> V4L2Settings:
         fps=options.number("fps", minimum=1e-3, maximum=1e5),
         input=options.integer("input", minimum=0),
         plane=next(name for name in PLANES if name == plane),
+        white=options.integer("white", minimum=1, maximum=65535),
         buffers=options.integer("buffers", 8, minimum=2, maximum=32),
         stall_s=options.number("stall_s", minimum=0.1),
         controls=ControlWishes(

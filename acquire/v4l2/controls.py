@@ -43,7 +43,7 @@ _POWER_LINE_AUTO, _POWER_LINE_OFF = 3, 0
 
 # The settings of an address that are no controls, for messages.
 SETTINGS = (
-    *("format", "width", "height", "fps", "input", "plane", "buffers", "stall_s"),
+    *("format", "width", "height", "fps", "input", "plane", "white", "buffers", "stall_s"),
     *("manual", "exposure_us", "gain"),
 )
 

@@ -32,6 +32,8 @@ class V4L2Settings:
     input : int or None
     plane : "raw" | "r" | "g" | "b"
         Of a Bayer mosaic.
+    white : int or None, GL
+        Where a sample is saturated; None: at the highest of its bits.
     buffers : int
     stall_s : float or None, s
         Time without a picture that counts as a stall; None: from frame rate and exposure.
@@ -44,6 +46,7 @@ class V4L2Settings:
     fps: float | None = None
     input: int | None = None
     plane: Plane = "raw"
+    white: int | None = None
     buffers: int = 8
     stall_s: float | None = None
     controls: ControlWishes = field(default_factory=ControlWishes)

@@ -11,7 +11,7 @@ import hashlib
 import logging
 import os
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from pathlib import Path
 from threading import Lock
@@ -130,6 +130,18 @@ def is_cached(function: Any, kind: str = "") -> bool:
         return any(kind in str(key[0][0]) for key in index)
     except (AttributeError, IndexError, OSError):  # numba's own affair: only the announcement depends on it
         return False
+
+
+def compiled_since(functions: Iterable[Any], t: float) -> int:
+    """How many functions the cache folders of some loops got since ``t``, s since the epoch."""
+    folders = set()
+    for function in functions:
+        try:
+            folders.add(Path(_cache_file(getattr(function, "dispatcher", function))._cache_path))
+        except AttributeError:  # numba's own affair: only the progress depends on it
+            continue
+    files = (file for folder in folders for file in folder.glob("*.nbc"))
+    return sum(file.stat().st_mtime >= t for file in files)
 
 
 def _cache_file(dispatcher: Any) -> Any:

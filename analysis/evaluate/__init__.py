@@ -6,12 +6,14 @@ evaluates a test: a ``curve`` by one of the ``standards``, its ``elastic`` line 
 a test and the noise floor in it. ``deconvolution`` removes the blur of the ZOI from a map.
 """
 
+from analysis.evaluate.area import AreaStrain, Unevenness
 from analysis.evaluate.curve import Curve, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import LoadAxis, load_axis, principal_direction
+from analysis.evaluate.extensometers import ExtensionGauge, LineGauge, TransverseGauge, extension_of
 from analysis.evaluate.figure import CONFIDENCE, Figure
 from analysis.evaluate.floor import MIN_STILL_INSTANTS, NoiseFloor, evenly, noise_floor, still_phase
-from analysis.evaluate.gauge_kinds import GAUGE_KINDS, AreaGauge, LineGauge, TransverseGauge, ZoiGauge
+from analysis.evaluate.gauge_kinds import GAUGE_KINDS, AreaGauge, CircleGauge, StripGauge, ZoiGauge
 from analysis.evaluate.gauges import Gauge, GaugeValue, Parameter, inside_polygon
 from analysis.evaluate.lag import Track, find_lag
 from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
@@ -23,8 +25,11 @@ __all__ = [
     "MIN_STILL_INSTANTS",
     "STANDARDS",
     "AreaGauge",
+    "AreaStrain",
     "Band",
+    "CircleGauge",
     "Curve",
+    "ExtensionGauge",
     "Figure",
     "Gauge",
     "GaugeValue",
@@ -36,16 +41,19 @@ __all__ = [
     "Span",
     "Standard",
     "StrainZero",
+    "StripGauge",
     "TensileFigures",
     "TensileOptions",
     "Track",
     "TransverseGauge",
+    "Unevenness",
     "ZeroBy",
     "ZoiGauge",
     "deconvolved",
     "effect",
     "evaluate_test",
     "evenly",
+    "extension_of",
     "find_lag",
     "free",
     "inside_polygon",

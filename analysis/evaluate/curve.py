@@ -28,21 +28,34 @@ class Curve:
     ----------
     t : (N,) float64, s
     strain : (N,) float64
-        Along the load; NaN where unknown.
+        Along the load, of the curve and what is read from it; NaN where unknown.
     stress : (N,) float64, Pa
         NaN where unknown.
     transverse : (N,) float64 or None
         Strain across the load.
+    elastic : (N,) float64 or None
+        Strain along the load for the slopes E and nu, where another has less noise than that of the curve.
+    uneven : (N,) float64 or None
+        How much ``elastic`` varies over its area, rms.
+    misfit : (N,) float64 or None
+        That over what noise makes of it.
+    source, elastic_source : str
+        What ``strain`` and ``elastic`` are, in words.
     """
 
     t: Floats
     strain: Floats
     stress: Floats
     transverse: Floats | None = None
+    elastic: Floats | None = None
+    uneven: Floats | None = None
+    misfit: Floats | None = None
+    source: str = ""
+    elastic_source: str = ""
 
     def __post_init__(self) -> None:
         n = len(self.t)
-        for values in (self.strain, self.stress, self.transverse):
+        for values in (self.strain, self.stress, self.transverse, self.elastic, self.uneven, self.misfit):
             if values is not None and values.shape != (n,):
                 raise ValueError(f"a curve needs arrays of one length, got {values.shape} beside {n} times")
 
@@ -53,8 +66,8 @@ class Loading:
 
     Attributes
     ----------
-    t, strain, stress, transverse : (M,) float64
-        ``transverse`` NaN where unknown.
+    t, strain, stress, transverse, elastic, uneven, misfit : (M,) float64
+        As of the ``Curve``; NaN where unknown.
     level, course : (M,) float64
         Running means of stress and strain, to find places by; never a figure.
     noise_strain, noise_stress : float
@@ -71,6 +84,9 @@ class Loading:
     strain: Floats
     stress: Floats
     transverse: Floats
+    elastic: Floats
+    uneven: Floats
+    misfit: Floats
     level: Floats
     course: Floats
     noise_strain: float
@@ -84,13 +100,19 @@ class Loading:
         """What can be evaluated of ``curve``; may be empty."""
         end = broken_at(curve.stress)
         stop = len(curve.t) if end is None else end + 1
+        elastic = curve.strain if curve.elastic is None else curve.elastic
         known = np.isfinite(curve.strain[:stop]) & np.isfinite(curve.stress[:stop])
-        t, strain, stress = (a[:stop][known] for a in (curve.t, curve.strain, curve.stress))
-        across = curve.transverse[:stop][known] if curve.transverse is not None else np.full(len(t), math.nan)
+        nothing = np.full(len(curve.t), math.nan)
+        t, strain, stress, across, elastic, uneven, misfit = (
+            (nothing if a is None else a)[:stop][known]
+            for a in (
+                curve.t, curve.strain, curve.stress, curve.transverse, elastic, curve.uneven, curve.misfit
+            )
+        )  # fmt: skip
         top = int(np.argmax(stress)) if len(stress) else 0
         half = min(top // _PARTS, _WIDEST)
         return cls(
-            t, strain, stress, across, smoothed(stress, half), smoothed(strain, half),
+            t, strain, stress, across, elastic, uneven, misfit, smoothed(stress, half), smoothed(strain, half),
             noise(strain), noise(stress), half, top, end is not None,
         )  # fmt: skip
 

@@ -23,6 +23,8 @@ MIN_POINTS = 8
 """Points that a line needs."""
 
 _CLEAR = 20.0  # standard deviations of the noise that strains must move to have a direction
+_CLEAR_STRAIN, _CLEAR_RATIO = 1e-4, 1.5  # above vibration and warming; and over the strain across
+_UNEVEN_SIGMA, _UNEVEN_SHARE = 3.0, 0.02  # of a strain that is not uniform: over its noise, and of the strain
 _END = 0.1  # of the points of the interval: read at each end of a chord
 
 
@@ -153,6 +155,22 @@ def poisson(loading: Loading, line: FittedLine) -> Figure:
     return Figure.about(nu, math.hypot(sigma * line.slope, nu * line.sigma / line.slope), n - 2)
 
 
+def not_uniform(loading: Loading, line: FittedLine) -> str:
+    """A remark where the strain varies over its area, in the upper half of the interval of ``line``; else empty.
+
+    E and nu are then slopes of a mean strain, and not those of the material.
+    """
+    half = slice((line.first + line.last) // 2, line.last)
+    uneven, misfit = loading.uneven[half], loading.misfit[half]
+    if not np.isfinite(misfit).any() or np.nanmedian(misfit) < _UNEVEN_SIGMA:
+        return ""
+    noise_free = np.sqrt(np.maximum(1 - 1 / np.maximum(misfit, 1) ** 2, 0))
+    share = float(
+        np.nanmedian(uneven * noise_free) / np.nanmedian(np.abs(loading.elastic[half] - line.strain0))
+    )
+    return f"the strain varies by {share:.0%} over the region" if share > _UNEVEN_SHARE else ""
+
+
 def principal_direction(exx: Floats, eyy: Floats, exy: Floats) -> Figure:
     """The angle of the largest principal strain to x, rad, positive clockwise on the screen (y points down).
 
@@ -191,27 +209,34 @@ class LoadAxis:
     ----------
     axis : "x" or "y"
     found : bool
-        Whether it follows from the strains; else it is as given, or y.
+        Whether it follows from the strains; else it is as given, or assumed to be y.
     angle : Figure
         Angle from the axis to the direction whose length changes most, rad, positive clockwise on the screen.
+    assumed : bool
+        It was not given, and the strains do not decide.
     """
 
     axis: Literal["x", "y"]
     found: bool
     angle: Figure
+    assumed: bool = False
 
 
-def load_axis(exx: Floats, eyy: Floats, exy: Floats, given: str = "auto") -> LoadAxis:
+def load_axis(
+    exx: Floats, eyy: Floats, exy: Floats, given: str = "auto", sigma: Floats | None = None
+) -> LoadAxis:
     """The axis of the load: as ``given`` ("x", "y"), or found: nearest to the strain of largest magnitude.
 
     That holds for pulling and pressing, where Poisson's ratio is below 1. It is found once the angle and its
-    interval lie within 45 degrees of it.
+    interval lie within 45 degrees of it; of few instants, once one strain is far above its noise and the other.
 
     Parameters
     ----------
     exx, eyy, exy : (N,) float64
-        Means of a test; NaN where unknown.
+        Strains of a test; NaN where unknown.
     given : "x", "y" or "auto"
+    sigma : (N,) float64, optional
+        The larger standard uncertainty of ``exx`` and ``eyy``; without it few instants decide nothing.
     """
     angle = principal_direction(exx, eyy, exy)
     if angle.known:
@@ -222,9 +247,22 @@ def load_axis(exx: Floats, eyy: Floats, exy: Floats, given: str = "auto") -> Loa
         axis = "x" if given == "x" else "y"
         return LoadAxis(axis, False, offs[axis])
     axis = "x" if abs(offs["x"].value) < math.pi / 4 else "y"
-    found = max(abs(offs[axis].low), abs(offs[axis].high)) < math.pi / 4
-    axis = axis if found else "y"
-    return LoadAxis(axis, found, offs[axis])
+    if max(abs(offs[axis].low), abs(offs[axis].high)) < math.pi / 4:
+        return LoadAxis(axis, True, offs[axis])
+    clear = None if angle.known or sigma is None else _clear_axis(exx, eyy, sigma)
+    return LoadAxis(clear or "y", clear is not None, offs[clear or "y"], clear is None)
+
+
+def _clear_axis(exx: Floats, eyy: Floats, sigma: Floats) -> Literal["x", "y"] | None:
+    """The axis of the larger strain, where one instant shows it clearly."""
+    strains = np.abs(np.stack([exx, eyy]))
+    larger, smaller = strains.max(axis=0), strains.min(axis=0)
+    limit = np.maximum(np.maximum(_CLEAR * sigma, _CLEAR_STRAIN), _CLEAR_RATIO * smaller)
+    clear = np.flatnonzero(larger > limit)
+    if not len(clear):
+        return None
+    first, second = strains[:, clear[np.argmax(larger[clear])]]
+    return "x" if first > second else "y"
 
 
 def _is_longest(angle: float, exx: Floats, eyy: Floats, exy: Floats) -> bool:

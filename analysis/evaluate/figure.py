@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 CONFIDENCE = 0.95
 """Of all intervals here; they hold the scatter of strain and force, not the section or the load cell's class."""
@@ -41,6 +41,10 @@ class Figure:
     def known(self) -> bool:
         """Whether there is a value."""
         return math.isfinite(self.value)
+
+    def remarked(self, words: str) -> Figure:
+        """The figure with a remark, where it is known."""
+        return replace(self, why=words) if self.known and words else self
 
     def over(self, other: float) -> Figure:
         """The figure in another unit: divided by a positive number."""

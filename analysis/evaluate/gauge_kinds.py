@@ -1,14 +1,24 @@
-"""The kinds of virtual gauges: a point, an area, an extensometer along a line or across a strip.
+"""The kinds of virtual gauges: a point, an area, a circle, a strip, and the extensometers.
 
 A new kind is a class here and its name in ``GAUGE_KINDS``; configuration, report, view and page take it from there.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
+from analysis.evaluate.extensometers import (
+    BOX,
+    END,
+    RADIUS,
+    START,
+    ExtensionGauge,
+    LineGauge,
+    TransverseGauge,
+)
 from analysis.evaluate.gauges import (
     Box,
     Gauge,
@@ -25,7 +35,6 @@ from analysis.evaluate.gauges import (
     corners_of,
     near_px,
     read_area,
-    read_ends,
     zois_inside,
     zois_near,
 )
@@ -37,18 +46,13 @@ _VALUE = Parameter(
     choices=("exx", "eyy", "exy", "gamma_xy"),
     by_axis={"x": "exx", "y": "eyy"},
 )
-_STATISTIC = Parameter("choice", "of an area", choices=("mean", "largest", "smallest"))
-_AT = Parameter("point", "x, y of a zoi")
-_BOX = Parameter("box", "x, y, width, height of an area or transverse gauge")
-_CORNERS = Parameter("corners", "x, y of the corners of an area")
-_START, _END = Parameter("point", "x, y of one end of a line"), Parameter("point", "x, y of the other")
-_RADIUS = Parameter("length", "ZOIs this far around an end of a line (half a ZOI)", 0.1, 1e5)
-_ALONG = Parameter(
-    "choice",
-    "direction of a transverse gauge (across the load)",
-    choices=("x", "y"),
-    by_axis={"x": "y", "y": "x"},
+_STATISTIC = Parameter(
+    "choice", "of an area: affine fit, or of its ZOIs", choices=("affine", "mean", "largest", "smallest")
 )
+_AT = Parameter("point", "x, y of a zoi")
+_CORNERS = Parameter("corners", "x, y of the corners of an area")
+_CENTRE = Parameter("point", "x, y of the centre of a circle")
+_WIDTH = Parameter("length", "width of a strip (one ZOI)", 0.1, 1e5)
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +95,7 @@ class ZoiGauge(Gauge):
 
 @dataclass(frozen=True, slots=True)
 class AreaGauge(Gauge):
-    """Mean, largest or smallest value of the ZOIs whose centres lie in a box or polygon.
+    """The strain of the ZOIs whose centres lie in a box or polygon, by their affine field; or of single ZOIs.
 
     Of the largest and the smallest, sigma is that of the ZOI which has it: right for a peak that stands
     out of the noise. In a flat field noise alone lifts the largest of n values above the mean, by 2 to 3
@@ -104,14 +108,14 @@ class AreaGauge(Gauge):
         At least three, in place of the box.
     value : str
         One of ``analysis.field.VALUES``.
-    statistic : "mean", "largest" or "smallest"
-        By sign, not by magnitude.
+    statistic : "affine", "mean", "largest" or "smallest"
+        By ``AreaStrain``; else of the values of the ZOIs, by sign, not by magnitude.
     """
 
-    box: Box | None = field(default=None, metadata=_BOX.metadata)
+    box: Box | None = field(default=None, metadata=BOX.metadata)
     corners: tuple[Point, ...] | None = field(default=None, metadata=_CORNERS.metadata)
     value: str = field(default="eyy", metadata=_VALUE.metadata)
-    statistic: Statistic = field(default="mean", metadata=_STATISTIC.metadata)
+    statistic: Statistic = field(default="affine", metadata=_STATISTIC.metadata)
     kind, label, default_name, gesture = "area", "Area", "area", "box"
     hint = "Drag a rectangle: its mean strain."
 
@@ -148,40 +152,81 @@ class AreaGauge(Gauge):
 
 
 @dataclass(frozen=True, slots=True)
-class LineGauge(Gauge):
-    """An extensometer: (L - L0)/L0 between two points.
+class CircleGauge(Gauge):
+    """Mean value of the ZOIs whose centres lie in a circle.
 
-    Each end is the ZOIs whose centres lie within ``radius_px`` of the point (without: half the side of a
-    ZOI), at least the nearest one; L0 is the distance of their mean places, so that a uniform strain is met exactly.
+    Attributes
+    ----------
+    centre : (x, y), px
+    radius_px : float, px
+    value : str
+        One of ``analysis.field.VALUES``.
+    """
+
+    centre: Point = field(metadata=_CENTRE.metadata)
+    radius_px: float = field(metadata=RADIUS.metadata)
+    value: str = field(default="eyy", metadata=_VALUE.metadata)
+    kind, label, default_name, gesture = "circle", "Circle", "circle", "line"
+    hint = "Drag from the centre of a circle to its rim: its mean strain."
+
+    def __post_init__(self) -> None:
+        check_value(self.name, self.value)
+        if not self.radius_px > 0:
+            raise ValueError(f"gauge {self.name}: the radius must be positive, got {self.radius_px}")
+
+    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
+        return (zois_near(grid, self.centre, self.radius_px),)
+
+    def measure(self, field: StrainField) -> GaugeValue:
+        return read_area(self.zois(field.grid)[0], field, self.value)
+
+    def outline(self, zoi: float) -> tuple[Line, ...]:
+        return (circle(self.centre, self.radius_px),)
+
+    def handles(self) -> tuple[Point, ...]:
+        return self.centre, (self.centre[0] + self.radius_px, self.centre[1])
+
+    @classmethod
+    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
+        radius = max(round(math.dist(handles[0], handles[-1]), 1), 0.1)
+        return {"centre": near_px(handles[0]), "radius_px": radius}
+
+
+@dataclass(frozen=True, slots=True)
+class StripGauge(Gauge):
+    """Mean value of the ZOIs whose centres lie in a strip along a line, at any angle.
 
     Attributes
     ----------
     start, end : (x, y), px
-    radius_px : float or None, px
+    width_px : float or None, px
+        Of the strip; None: the side of a ZOI.
+    value : str
+        One of ``analysis.field.VALUES``.
     """
 
-    start: Point = field(metadata=_START.metadata)
-    end: Point = field(metadata=_END.metadata)
-    radius_px: float | None = field(default=None, metadata=_RADIUS.metadata)
-    kind, label, default_name, gesture = "line", "Extensometer", "axial", "line"
-    hint = "Drag from one end of the extensometer to the other."
+    start: Point = field(metadata=START.metadata)
+    end: Point = field(metadata=END.metadata)
+    width_px: float | None = field(default=None, metadata=_WIDTH.metadata)
+    value: str = field(default="eyy", metadata=_VALUE.metadata)
+    kind, label, default_name, gesture = "strip", "Strip", "strip", "line"
+    hint = "Drag from one end of a strip to the other: its mean strain."
 
     def __post_init__(self) -> None:
+        check_value(self.name, self.value)
         if self.start == self.end:
-            raise ValueError(f"gauge {self.name}: the two ends of a line are one point, {self.start}")
-        if self.radius_px is not None and not self.radius_px > 0:
-            raise ValueError(f"gauge {self.name}: the radius must be positive, got {self.radius_px}")
+            raise ValueError(f"gauge {self.name}: the two ends of a strip are one point, {self.start}")
+        if self.width_px is not None and not self.width_px > 0:
+            raise ValueError(f"gauge {self.name}: the width must be positive, got {self.width_px}")
 
     def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
-        reach = self.radius_px or grid.size / 2
-        return tuple(zois_near(grid, end, reach) for end in (self.start, self.end))
+        return (zois_inside(grid, self._corners(grid.size)),)
 
     def measure(self, field: StrainField) -> GaugeValue:
-        return read_ends(self.zois(field.grid), field)
+        return read_area(self.zois(field.grid)[0], field, self.value)
 
     def outline(self, zoi: float) -> tuple[Line, ...]:
-        reach = self.radius_px or zoi / 2
-        return (self.start, self.end), circle(self.start, reach), circle(self.end, reach)
+        return (closed(self._corners(zoi)),)
 
     def handles(self) -> tuple[Point, ...]:
         return self.start, self.end
@@ -190,57 +235,20 @@ class LineGauge(Gauge):
     def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
         return {"start": near_px(handles[0]), "end": near_px(handles[-1])}
 
-
-@dataclass(frozen=True, slots=True)
-class TransverseGauge(Gauge):
-    """An extensometer across a strip: the mean extension of a box between its first and its last third.
-
-    Thirds are the division that loses the least against a straight line through all points
-    (M. S. Bartlett, Biometrics 5 (1949) 207-212, doi:10.2307/3001936).
-
-    Attributes
-    ----------
-    box : (x, y, width, height), px
-    along : "x" or "y"
-        The direction whose extension is measured, across the load.
-    """
-
-    box: Box = field(metadata=_BOX.metadata)
-    along: Literal["x", "y"] = field(default="x", metadata=_ALONG.metadata)
-    kind, label, default_name, gesture = "transverse", "Transverse", "transverse", "box"
-    hint = "Drag a rectangle: strain across the load."
-
-    def __post_init__(self) -> None:
-        if not (self.box[2] > 0 and self.box[3] > 0):
-            raise ValueError(f"gauge {self.name}: width and height must be positive")
-        if self.along not in ("x", "y"):
-            raise ValueError(f"gauge {self.name}: along is x or y, got {self.along!r}")
-
-    def select(self, grid: ZoiGrid) -> tuple[Mask, ...]:
-        x, y, width, height = self.box
-        if self.along == "x":
-            third = width / 3
-            boxes = (x, y, third, height), (x + 2 * third, y, third, height)
-        else:
-            third = height / 3
-            boxes = (x, y, width, third), (x, y + 2 * third, width, third)
-        return tuple(zois_inside(grid, corners_of(box)) for box in boxes)
-
-    def measure(self, field: StrainField) -> GaugeValue:
-        return read_ends(self.zois(field.grid), field)
-
-    def outline(self, zoi: float) -> tuple[Line, ...]:
-        return (closed(corners_of(self.box)),)
-
-    def handles(self) -> tuple[Point, ...]:
-        return corners_of(self.box)[::2]
-
-    @classmethod
-    def from_handles(cls, handles: Sequence[Point]) -> dict[str, Any]:
-        return {"box": box_between(handles[0], handles[-1])}
+    def _corners(self, zoi: float) -> Line:
+        (x0, y0), (x1, y1) = self.start, self.end
+        half = (self.width_px or zoi) / 2 / math.dist(self.start, self.end)
+        across, down = (y0 - y1) * half, (x1 - x0) * half
+        return (
+            (x0 + across, y0 + down),
+            (x1 + across, y1 + down),
+            (x1 - across, y1 - down),
+            (x0 - across, y0 - down),
+        )
 
 
 GAUGE_KINDS: Mapping[str, type[Gauge]] = {
-    kind.kind: kind for kind in (LineGauge, TransverseGauge, AreaGauge, ZoiGauge)
+    kind.kind: kind
+    for kind in (LineGauge, TransverseGauge, AreaGauge, ZoiGauge, CircleGauge, StripGauge, ExtensionGauge)
 }
 """By their names in a configuration, in the order of the buttons on a page."""

@@ -17,19 +17,20 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate.extension import Ends, extension
-from analysis.field import VALUES, Status, StrainField, ZoiGrid
+from analysis.evaluate.area import GRADIENTS, AreaStrain
+from analysis.field import PAIR_INDEX, VALUES, Status, StrainField, ZoiGrid, variance_of_sum
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
 Line = tuple[Point, ...]
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float64]
-Statistic = Literal["mean", "largest", "smallest"]
+Statistic = Literal["affine", "mean", "largest", "smallest"]
 
 MIN_SHARE = 0.5
 """A gauge has a value as long as this share of the ZOIs of an area, or of each of its ends, has one."""
 _ROUND = 24  # corners of a circle that is drawn
+_U, _V = 0, 3  # among the affine parameters
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,11 +159,14 @@ class Gauge(ABC):
 # -- what kinds are made of ------------------------------------------------------------------------
 
 
-def read_area(chosen: Mask, field: StrainField, value: str, statistic: Statistic = "mean") -> GaugeValue:
-    """Mean, largest or smallest value of some ZOIs."""
+def read_area(chosen: Mask, field: StrainField, value: str, statistic: Statistic = "affine") -> GaugeValue:
+    """A value of the affine field of some ZOIs, or their mean, largest or smallest value; of u and v the mean."""
     if missing := _missing(chosen, field):
         return GaugeValue(math.nan, math.nan, missing)
-    if statistic == "mean":
+    found = AreaStrain.of(field, chosen) if statistic == "affine" and value in GRADIENTS else None
+    if found is not None:
+        return GaugeValue(found.value(value), found.sigma(value))
+    if statistic in ("affine", "mean"):
         return GaugeValue(*field.mean(value, chosen))
     sign = 1 if statistic == "largest" else -1
     values = np.where(chosen & field.ok, sign * field.value(value), -np.inf)
@@ -184,6 +188,19 @@ def read_ends(chosen: Sequence[Mask], field: StrainField) -> GaugeValue:
     return GaugeValue(found.strain, found.sigma)
 
 
+def read_strips(chosen: Sequence[Mask], field: StrainField, along: str) -> GaugeValue:
+    """``read_ends`` of two strips, each where the other has values too, so that their line is not tilted."""
+    for number, end in enumerate(chosen, 1):
+        if missing := _missing(end, field):
+            return GaugeValue(math.nan, math.nan, f"end {number}: {missing}")
+    side = 1 if along == "x" else 0
+    first, second = ((end & field.ok).any(axis=side, keepdims=True) for end in chosen)
+    both = first & second & field.ok
+    if not both.any():
+        return GaugeValue(math.nan, math.nan, "the two ends do not face each other; move or widen the gauge")
+    return read_ends([end & both for end in chosen], field)
+
+
 def _missing(chosen: Mask, field: StrainField) -> str:
     """Why there is no value; empty where enough of the ZOIs have one."""
     total = int(chosen.sum())
@@ -193,7 +210,8 @@ def _missing(chosen: Mask, field: StrainField) -> str:
             f"no ZOI is there; their centres reach from {grid.x[0]:g}, {grid.y[0]:g} to {grid.x[-1]:g},"
             f" {grid.y[-1]:g} px"
         )
-    lost = Counter(Status(int(s)) for s in field.status[chosen] if s != Status.OK)
+    status = field.status[chosen]
+    lost = Counter(Status(s) for s in status[status != Status.OK].tolist())
     if total - lost.total() >= max(MIN_SHARE * total, 1):
         return ""
     words = ", ".join(f"{n} {status.name}" for status, n in lost.most_common())
@@ -240,6 +258,16 @@ def corners_of(box: Box) -> tuple[Point, ...]:
     return (x, y), (x + width, y), (x + width, y + height), (x, y + height)
 
 
+def ends_of(box: Box, along: str, share: float) -> tuple[Box, Box]:
+    """The first and the last ``share`` of a box along x or y."""
+    x, y, width, height = box
+    if along == "x":
+        end = share * width
+        return (x, y, end, height), (x + width - end, y, end, height)
+    end = share * height
+    return (x, y, width, end), (x, y + height - end, width, end)
+
+
 def closed(corners: Line) -> Line:
     """A line around ``corners``."""
     return (*corners, corners[0])
@@ -261,3 +289,64 @@ def box_between(one: Point, other: Point) -> Box:
     (x0, x1), (y0, y1) = (sorted((round(one[k]), round(other[k]))) for k in (0, 1))
     x0, y0 = max(x0, 0), max(y0, 0)
     return float(x0), float(y0), float(max(x1 - x0, 1)), float(max(y1 - y0, 1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Ends:
+    """The ZOIs of the two ends, (R, C) bool each; all of them have a value, and none is empty."""
+
+    first: NDArray[np.bool_]
+    second: NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Extension:
+    """(L - L0)/L0 with its standard uncertainty, and L0 in px (0 where the ends lie upon each other)."""
+
+    strain: float
+    sigma: float
+    length: float
+
+
+def extension(field: StrainField, ends: Ends) -> Extension:
+    """The strain between the mean places of two ends.
+
+    Parameters
+    ----------
+    field : StrainField
+    ends : Ends
+
+    Returns
+    -------
+    Extension
+        sigma is that of the displacement difference along the line, reference noise included.
+    """
+    share = ends.second / ends.second.sum() - ends.first / ends.first.sum()
+    used = share != 0
+    weights = share[used]
+    x, y = np.meshgrid(field.grid.x, field.grid.y)
+    before = np.array([_sum(weights * x[used]), _sum(weights * y[used])])
+    length = float(np.hypot(*before))
+    if length == 0:
+        return Extension(math.nan, math.nan, 0.0)
+    # The difference of the lengths loses no digits where the extension is small.
+    moved = np.array([_sum(weights * field.u[used]), _sum(weights * field.v[used])])
+    now = float(np.hypot(*(before + moved)))
+    strain = float(moved @ (2 * before + moved)) / (now + length) / length
+    spread = np.where(used, share * _sigma_along(field, (before + moved) / now), 0.0)
+    variance = variance_of_sum(spread, "u", field.grid, field.window)
+    return Extension(strain, math.sqrt(max(variance, 0.0)) / length, length)
+
+
+def _sum(values: Floats) -> float:
+    """The sum, in the order of the values: the same bits wherever they lie in memory."""
+    return float(np.cumsum(values)[-1]) if values.size else 0.0
+
+
+def _sigma_along(field: StrainField, direction: Floats) -> Floats:
+    """Standard uncertainty of the displacement along a unit vector, (R, C), px."""
+    nx, ny = direction
+    uu, uv, vv = (
+        field.covariance[PAIR_INDEX[pair]].astype(np.float64) for pair in ((_U, _U), (_U, _V), (_V, _V))
+    )
+    return np.asarray(np.sqrt(np.maximum(nx * nx * uu + 2 * nx * ny * uv + ny * ny * vv, 0)))

@@ -12,8 +12,16 @@ from typing import Literal
 
 import numpy as np
 
-from analysis.evaluate.curve import Curve, Loading, first_crossing, reading
-from analysis.evaluate.elastic import MIN_POINTS, FittedLine, between, chord, line_through, poisson
+from analysis.evaluate.curve import Curve, Loading, first_crossing, noise, reading
+from analysis.evaluate.elastic import (
+    MIN_POINTS,
+    FittedLine,
+    between,
+    chord,
+    line_through,
+    not_uniform,
+    poisson,
+)
 from analysis.evaluate.figure import Figure
 from analysis.evaluate.standards import STANDARDS, Band, Standard
 from analysis.evaluate.strengths import (
@@ -96,6 +104,8 @@ class TensileFigures:
     span : Span or None
     zero : StrainZero
     standard : str
+    strain, elastic_strain : str
+        What the strain of the curve is, and that of E and nu, in words.
     """
 
     E: Figure
@@ -118,6 +128,8 @@ class TensileFigures:
     span: Span | None
     zero: StrainZero
     standard: str
+    strain: str = ""
+    elastic_strain: str = ""
 
 
 def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> TensileFigures:
@@ -132,8 +144,13 @@ def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> Tensil
     Returns
     -------
     TensileFigures
+        E and nu carry a remark in ``why`` where the strain is not uniform over the area that they are from.
     """
-    options = options or TensileOptions()
+    found = _evaluated(curve, options or TensileOptions())
+    return replace(found, strain=curve.source, elastic_strain=curve.elastic_source or curve.source)
+
+
+def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:
     loading, strength = Loading.of(curve), tensile_strength(curve)
     if loading.n < MIN_POINTS or loading.stress[loading.top] <= 0:
         words = f"strain and a tensile stress are known together at {loading.n} points"
@@ -203,11 +220,14 @@ def _with_line(
     rp01, rp02, rp1 = (proof_strength(loading, line, offset) for offset in (0.001, 0.002, 0.01))
     agt, at = (_from_zero(f(loading), zero) for f in (strain_at_top, strain_at_break))
     ends = [float(loading.stress[k]) for k in (loading.top, -1)]
+    region = replace(loading, strain=loading.elastic, noise_strain=noise(loading.elastic))
+    slope = line_through(region, line.first, line.last) or line
+    remark = not_uniform(loading, slope)
     figures = TensileFigures(
-        E=line.modulus,
-        E_chord=chord(loading, line),
-        r2=line.r2,
-        nu=poisson(loading, line),
+        E=slope.modulus.remarked(remark),
+        E_chord=chord(region, slope),
+        r2=slope.r2,
+        nu=poisson(loading, slope).remarked(remark),
         Rp01=rp01,
         Rp02=rp02,
         Rp1=rp1,
@@ -251,6 +271,8 @@ def _nothing(why: str, options: TensileOptions) -> TensileFigures:
         "zero": StrainZero(0.0, "as measured"),
         "standard": options.standard.name,
         "r2": math.nan,
+        "strain": "",
+        "elastic_strain": "",
     }
     names = [f.name for f in fields(TensileFigures) if f.name not in texts]
     return TensileFigures(**dict.fromkeys(names, Figure.none(why)), **texts)  # type: ignore[arg-type]

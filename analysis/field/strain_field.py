@@ -26,10 +26,9 @@ from analysis.field.uncertainty import (
     StrainTensor,
     Sums,
     combination,
-    elongations,
     fixed_sum,
-    half_logarithm,
     products,
+    strain_tensor,
     variance_of_sum,
 )
 
@@ -295,16 +294,7 @@ class StrainField:
         ValueError
             Unknown measure.
         """
-        if measure == "small":
-            return StrainTensor(measure, self.du_dx, self.dv_dy, (self.du_dy + self.dv_dx) / 2)
-        if measure not in ("engineering", "green", "hencky"):
-            raise ValueError(f"unknown strain measure {measure!r}; known: small, engineering, green, hencky")
-        cxx = (1 + self.du_dx) ** 2 + self.dv_dx**2
-        cyy = self.du_dy**2 + (1 + self.dv_dy) ** 2
-        cxy = (1 + self.du_dx) * self.du_dy + self.dv_dx * (1 + self.dv_dy)
-        if measure == "green":
-            return StrainTensor(measure, (cxx - 1) / 2, (cyy - 1) / 2, cxy / 2)
-        return elongations(cxx, cyy, cxy) if measure == "engineering" else half_logarithm(cxx, cyy, cxy)
+        return strain_tensor(measure, self.du_dx, self.du_dy, self.dv_dx, self.dv_dy)
 
     @property
     def rotation(self) -> Floats:

@@ -6,7 +6,7 @@ Also the finite strain measures, since the names of values refer to them: small,
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal, Protocol
@@ -92,11 +92,20 @@ def stretched(covariance: NDArray[np.float32], parameters: Floats) -> NDArray[np
     return out
 
 
+WeightedSum = Callable[[NDArray[np.bool_]], tuple[Floats, Floats]]
+"""Takes the ZOIs that can be measured (R, C); gives weights of the six affine parameters, (6, R, C), and of the
+variances of u and v, (2, R, C)."""
+
+
 class Sums(Protocol):
     """The noise of means, more exactly than from the overlap of windows."""
 
     def factor(self, name: str, where: NDArray[np.bool_]) -> float:
         """Standard deviation of the mean of ``name`` over a gauge (R, C), over that of ``variance_of_sum``."""
+        ...
+
+    def ratio(self, name: str, area: NDArray[np.bool_], made: WeightedSum) -> float:
+        """Standard deviation of the affine ``name`` of an area (R, C), over that of the overlap of windows."""
         ...
 
 
@@ -127,9 +136,30 @@ def _correlations(
 
 def fixed_sum(values: Floats) -> float:
     """The sum of (N,) values, added in an order that no memory alignment changes: the same bits everywhere."""
-    whole = len(values) // PARTIAL_SUMS * PARTIAL_SUMS
-    rows = np.ascontiguousarray(values[:whole]).reshape(-1, PARTIAL_SUMS)
-    return math.fsum([*rows.sum(axis=0), *values[whole:]])
+    return float(fixed_sums(values[None])[0])
+
+
+def fixed_sums(values: Floats) -> Floats:
+    """``fixed_sum`` of each row of (K, N), (K,)."""
+    whole = values.shape[1] // PARTIAL_SUMS * PARTIAL_SUMS
+    parts = np.ascontiguousarray(values[:, :whole]).reshape(len(values), -1, PARTIAL_SUMS).sum(axis=1)
+    return np.array([math.fsum([*row, *rest]) for row, rest in zip(parts, values[:, whole:], strict=True)])
+
+
+def strain_tensor(
+    measure: Measure, du_dx: Floats, du_dy: Floats, dv_dx: Floats, dv_dy: Floats
+) -> StrainTensor:
+    """The strain of displacement gradients, each of one shape, in a measure (``StrainField.strain``)."""
+    if measure == "small":
+        return StrainTensor(measure, du_dx, dv_dy, (du_dy + dv_dx) / 2)
+    if measure not in ("engineering", "green", "hencky"):
+        raise ValueError(f"unknown strain measure {measure!r}; known: small, engineering, green, hencky")
+    cxx = (1 + du_dx) ** 2 + dv_dx**2
+    cyy = du_dy**2 + (1 + dv_dy) ** 2
+    cxy = (1 + du_dx) * du_dy + dv_dx * (1 + dv_dy)
+    if measure == "green":
+        return StrainTensor(measure, (cxx - 1) / 2, (cyy - 1) / 2, cxy / 2)
+    return elongations(cxx, cyy, cxy) if measure == "engineering" else half_logarithm(cxx, cyy, cxy)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,6 +9,7 @@ overlap of windows contains: on dense grids the mean scatters up to 1.5 times as
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper
-from analysis.field import Window, ZoiGrid, combination, profile, variance_of_sum
+from analysis.field import WeightedSum, Window, ZoiGrid, combination, profile, variance_of_sum
 from analysis.fit.sensitivity import columns, parameter_scale
 
 Floats = NDArray[np.float64]
@@ -65,12 +66,32 @@ class MeanNoise:
 
         Of all its ZOIs that can be measured: one that is lost does not change it. 1 where there are too few.
         """
-        key = name, np.packbits(where).tobytes()
+        return self._kept((name, np.packbits(where).tobytes()), lambda: self._factor(name, where))
+
+    def ratio(self, name: str, area: NDArray[np.bool_], made: WeightedSum) -> float:
+        """Standard deviation of the affine ``name`` of an area (R, C), over that of overlapping windows.
+
+        Of all its ZOIs that can be measured, as ``factor``; 1 where there are none.
+        """
+        return self._kept((f"affine {name}", np.packbits(area).tobytes()), lambda: self._ratio(area, made))
+
+    def _kept(self, key: tuple[str, bytes], factor: Callable[[], float]) -> float:
         if key not in self._factors:
             if len(self._factors) >= MAX_CACHED:
                 self._factors.clear()
-            self._factors[key] = self._factor(name, where)
+            self._factors[key] = factor()
         return self._factors[key]
+
+    def _ratio(self, area: NDArray[np.bool_], made: WeightedSum) -> float:
+        measurable = np.zeros(self.grid.shape, bool)
+        measurable.ravel()[self.index[self.able]] = True
+        which = np.flatnonzero(self.able & area.ravel()[self.index])
+        if not len(which):
+            return 1.0
+        weights, noise = made(measurable)
+        expected = float(np.sum(noise * self.unit_covariance[[0, 15]]))
+        found = self._variance(weights.reshape(6, -1)[:, self.index[which]].T, which)
+        return math.sqrt(found / expected) if expected > 0 and math.isfinite(found) else 1.0
 
     def _factor(self, name: str, where: NDArray[np.bool_]) -> float:
         which = np.flatnonzero(self.able & where.ravel()[self.index])
@@ -80,11 +101,14 @@ class MeanNoise:
         chosen.ravel()[self.index[which]] = 1
         sigma = np.sqrt(np.maximum(unit_variance(name, self.unit_covariance), 0)) * chosen
         expected = variance_of_sum(sigma, name, self.grid, self.window)
-        made = self._variance(name, which)
+        shares = np.zeros((len(which), 6))
+        for parameter, share in combination(name).items():
+            shares[:, parameter] = share
+        made = self._variance(shares, which)
         return math.sqrt(made / expected) if expected > 0 and math.isfinite(made) else 1.0
 
-    def _variance(self, name: str, which: NDArray[np.intp]) -> float:
-        """Variance of the sum over the ZOIs ``which`` for noise of 1 GL."""
+    def _variance(self, shares: Floats, which: NDArray[np.intp]) -> float:
+        """Variance of the sum of ``shares`` (B, 6) of the parameters of the ZOIs ``which``, for noise of 1 GL."""
         size, origins = self.grid.size, np.ascontiguousarray(self.origins[which])
         corner = origins.min(axis=0)
         out = np.zeros(origins.max(axis=0) - corner + size)
@@ -92,17 +116,15 @@ class MeanNoise:
         along = (np.arange(size) - (size - 1) / 2) / (size / 2)
         pitch, samples = self.images.shape[2], self.images[0].size
         flat = self.images.reshape(-1)
-        scatter(flat, samples, pitch, origins, self._weights(name, which), line, along, corner, out)
+        scatter(flat, samples, pitch, origins, self._weights(shares, which), line, along, corner, out)
         return float(np.cumsum(np.cumsum(out**2, axis=1)[:, -1])[-1])
 
-    def _weights(self, name: str, which: NDArray[np.intp]) -> Floats:
-        """The row of the inverse that makes ``name``, by channel and monomial, (B, 4, 6)."""
+    def _weights(self, shares: Floats, which: NDArray[np.intp]) -> Floats:
+        """The rows of the inverse that make these sums, by channel and monomial, (B, 4, 6)."""
         half = self.inverse.shape[1] // 2 - 3
         units = parameter_scale(self.order, self.grid.size)
-        row = np.zeros((len(which), self.inverse.shape[1]))
-        for parameter, share in combination(name).items():
-            at = parameter % 3 + (half if parameter > 2 else 0)
-            row += share * units[at] * self.inverse[which, at]
+        at = np.array([0, 1, 2, half, half + 1, half + 2])
+        row = np.einsum("bk,bkp->bp", shares * units[at], self.inverse[which][:, at])
         out = np.zeros((len(which), CHANNELS, len(MONOMIALS)))
         for j, (channel, x, y) in enumerate(columns(self.order)):
             out[:, channel, MONOMIALS.index((int(x), int(y)))] = row[:, j]

@@ -118,14 +118,16 @@ def padded(*images: NDArray[np.float32]) -> NDArray[np.float32]:
 
 
 def as_image(image: ArrayLike, what: str) -> NDArray[np.float32]:
-    """A grey image as (H, W) float32, grey levels unchanged.
+    """A grey image as (H, W) float32, grey levels unchanged: a copy, since a camera may fill its buffer again.
 
     Raises
     ------
     ValueError
         Not two-dimensional, empty, of a wrong type, or with values that are not finite.
     """
-    return np.asarray(as_recorded(image, what), np.float32)
+    own = np.array(as_recorded(image, what), np.float32)
+    own.flags.writeable = False
+    return own
 
 
 def as_recorded(image: ArrayLike, what: str) -> NDArray[Any]:

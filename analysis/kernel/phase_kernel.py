@@ -35,7 +35,7 @@ class PhaseKernel:
     Parameters
     ----------
     reference : (H, W) uint8, uint16 or float32, GL
-        A frame or the mean of a burst.
+        A frame or the mean of a burst; the kernel keeps a copy.
     grid : ZoiGrid
     settings : KernelSettings, optional
     noise : float (GL, std of the reference as given) or NoiseModel, optional

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,8 @@ log = logging.getLogger("analysis")
 
 COMPILE_SECONDS = 80
 """About how long one process takes for everything; for the announcement."""
+FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 51, 5, 7
+"""That are compiled in all, more for each kind of pictures, and for the estimator by phases."""
 ITERATION, REST, PHASE, ALL = "iteration", "rest", "phase", "all"
 COMPILE_PARTS = (ITERATION, REST)
 PICTURE_KINDS = ("uint8", "uint16", "float32")
@@ -34,16 +36,30 @@ PICTURE_KINDS = ("uint8", "uint16", "float32")
 def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) -> bool:
     """Whether numba's cache lacks a loop that pictures of these kinds (and the estimator by phases) need."""
     from analysis.compiled.loops import is_cached
+    from analysis.picture import prefilter
+
+    loops = _loops(phase)
+    return not (all(map(is_cached, loops)) and all(is_cached(prefilter.coefficients, kind) for kind in kinds))
+
+
+def _loops(phase: bool) -> list[Any]:
     from analysis.fit import assembly, iteration, sensitivity, sums, verdict
     from analysis.follow import hill_climb, prediction
-    from analysis.picture import prefilter
 
     loops = [
         sensitivity.prepare, iteration.track, hill_climb.climb, prediction.advance, verdict.judge,
         assembly.weigh, assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
     ]  # fmt: skip
-    loops += [iteration.compose_all, iteration.within_image] * phase
-    return not (all(map(is_cached, loops)) and all(is_cached(prefilter.coefficients, kind) for kind in kinds))
+    return loops + [iteration.compose_all, iteration.within_image] * phase
+
+
+def share_compiled(kinds: Sequence[str], since: float, *, phase: bool) -> float:
+    """About how much of a compilation from nothing is done, 0 to 1, that began at ``since``, s since the epoch."""
+    from analysis.compiled.loops import compiled_since
+    from analysis.picture import prefilter
+
+    functions = FUNCTIONS + FUNCTIONS_OF_KIND * len(kinds) + FUNCTIONS_OF_PHASE * phase
+    return min(compiled_since([*_loops(phase), prefilter.coefficients], since) / functions, 1.0)
 
 
 def numerics() -> dict[str, str]:

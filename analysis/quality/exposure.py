@@ -55,9 +55,8 @@ class Depth:
         return max(self.stated - self.unused_above - self.unused_below, 0)
 
 
-def exposure(pixels: NDArray[Any], bits: int) -> Exposure:
-    """Light, from the pixels of a few frames, (N, P) uint8 or uint16."""
-    top = 2**bits - 1
+def exposure(pixels: NDArray[Any], top: int) -> Exposure:
+    """Light, from the pixels of a few frames, (N, P) uint8 or uint16; ``top`` (GL) is where they saturate."""
     counts = np.bincount(pixels.reshape(-1))
     highest = len(counts) - 1
     return Exposure(

@@ -26,6 +26,8 @@ OF_NOISE = sum(tap**2 for tap in SLOPE)
 SLOW_SHARE = 12  # of the shorter side: what varies over more is light, not speckle
 CELLS_OF_SLOW = 8
 FWHM_OF_RADIUS = 4 * math.sqrt(math.log(2))
+SPECKLE_RADIUS_PX = (1.5, 4.0)
+"""Wanted: finer speckle can be aliased by the pixels, which biases the strain unnoticed; coarser speckle is noisier."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

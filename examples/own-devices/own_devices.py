@@ -49,6 +49,7 @@ class Layout:
     height: int
     bits: int
     skip: int
+    white: int | None = None
 
     @property
     def dtype(self) -> np.dtype[np.uint8] | np.dtype[np.uint16]:
@@ -81,6 +82,7 @@ class RawDump(_Source):
             clock="nominal",
             fps=fps,
             pixel_format="raw",
+            white_level=layout.white,
             settings=(CameraSetting("fps", fps, LOWEST_FPS, HIGHEST_FPS, log=True),),
         )
 
@@ -102,17 +104,19 @@ class RawDump(_Source):
         native = np.uint8 if self._layout.bits <= 8 else np.uint16
         image = np.frombuffer(content, self._layout.dtype).reshape(shape).astype(native)
         t = index / self._fps
-        return Frame(frozen(image), index, t, "nominal", 0, self._layout.bits, t)
+        layout = self._layout
+        return Frame(frozen(image), index, t, "nominal", 0, layout.bits, t, white_level=layout.white)
 
 
 def open_raw(address: Address, on_event: EventSink) -> RawDump:
-    """Open ``raw:FILE?width=&height=&bits=&fps=&skip=``; raises ConfigError or DataError."""
+    """Open ``raw:FILE?width=&height=&bits=&fps=&skip=&white=``; raises ConfigError or DataError."""
     options = Options(address)
     layout = Layout(
         width=options.integer("width", 640, minimum=1),
         height=options.integer("height", 480, minimum=1),
         bits=options.integer("bits", 8, minimum=1, maximum=16),
         skip=options.integer("skip", 0, minimum=0),
+        white=options.integer("white", minimum=1, maximum=65535),
     )
     fps = options.number("fps", 1.0, minimum=LOWEST_FPS, maximum=HIGHEST_FPS)
     options.done()

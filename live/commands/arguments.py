@@ -7,9 +7,12 @@ module has ``add_arguments(parser)`` and ``command(arguments) -> exit code``.
 from __future__ import annotations
 
 import argparse
+import difflib
 import importlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 from live.commands.exit_codes import EXIT_CODES
 
@@ -23,7 +26,7 @@ EXAMPLES = {
     "replay": "phasedic replay 'shots/*.tif' --zoi 32 --step 8 --load forces.csv --section 20,2 --out out",
     "batch": "phasedic batch 'runs/*/session.h5' --zoi 32 --step 8 --section 20,2 --workers 4 --out asked-again",
     "study": "phasedic study runs/20261122T081747Z/session.h5 --zoi 24,32,48,64,96 --order 1,2 --roi all",
-    "map": "phasedic map out/strain.h5 eyy.png --field eyy --over shots/0000.tif",
+    "map": "phasedic map out eyy.png --field eyy --over shots/0000.tif",
     "show": "phasedic show runs/20261122T081747Z --from 2 --to 10",
     "export": "phasedic export runs/20261122T081747Z --to vtk --fields u,v,eyy --mm --scale 0.02 --y-up",
     "report": "phasedic report runs/20261122T081747Z --field eyy --pdf",
@@ -97,32 +100,80 @@ COMMANDS = {
     "devices": Entry("live.commands.devices", "list cameras with their formats, and serial ports"),
 }
 
-_Formatter = argparse.RawDescriptionHelpFormatter
+HELP_ALL = "--help-all"
+
+
+class _HelpFormatter(argparse.RawDescriptionHelpFormatter):
+    """Leaves out the expert options, which ``--help-all`` shows."""
+
+    def add_usage(self, usage: Any, actions: Any, groups: Any, prefix: Any = None) -> None:
+        """The usage without expert options."""
+        super().add_usage(usage, [one for one in actions if not _is_expert(one)], groups, prefix)
+
+    def add_argument(self, action: argparse.Action) -> None:
+        """The help of one argument."""
+        if not _is_expert(action):
+            super().add_argument(action)
+
+
+def _is_expert(action: argparse.Action) -> bool:
+    return "." in action.dest and action.dest in _expert_keys()
+
+
+@cache
+def _expert_keys() -> frozenset[str]:
+    from live.config.loading import options
+
+    return frozenset(key for key, field in options().values() if field.metadata["option"].expert)
+
+
+def not_empty(word: str) -> str:
+    """``word``; an empty one is refused, as a variable of a shell that is not set gives it."""
+    if not word:
+        raise argparse.ArgumentTypeError("is empty; give a value, or leave it out")
+    return word
+
+
 Command = Callable[[argparse.Namespace], int]
 
 
 def parse(argv: Sequence[str]) -> tuple[Command, argparse.Namespace]:
     """The command and its arguments; help ends the program with exit code 0, bad usage with 2."""
-    arguments = full_parser([word for word in argv if word in COMMANDS][:1]).parse_args(argv)
+    parser = full_parser([word for word in argv if word in COMMANDS][:1], all_options=HELP_ALL in argv)
+    wanted = next((word for word in argv if not word.startswith("-")), "")
+    if wanted and wanted not in COMMANDS:
+        near = difflib.get_close_matches(wanted, COMMANDS, 1)
+        meant = f" (did you mean {near[0]}?)" if near else ""
+        parser.error(f"there is no command {wanted!r}{meant}; phasedic --help lists all")
+    arguments = parser.parse_args(argv)
     command: Command = importlib.import_module(COMMANDS[arguments.command].module).command
     return command, arguments
 
 
-def full_parser(complete: Iterable[str]) -> argparse.ArgumentParser:
-    """The parser of ``phasedic``, with all arguments of the commands ``complete``."""
+def full_parser(complete: Iterable[str], *, all_options: bool = True) -> argparse.ArgumentParser:
+    """The parser of ``phasedic``, with all arguments of the commands ``complete``.
+
+    Parameters
+    ----------
+    complete : iterable of str
+    all_options : bool
+        The help shows expert options too.
+    """
+    formatter = argparse.RawDescriptionHelpFormatter if all_options else _HelpFormatter
     parser = argparse.ArgumentParser(
         prog="phasedic",
         description="Live strain measurement by phase-DIC: frames, load and strain maps during a test.",
         epilog=EXIT_CODES,
-        formatter_class=_Formatter,
+        formatter_class=formatter,
     )
     parser.add_argument("--version", action="version", version=_version())
     subparsers = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     with_arguments = set(complete)
     for name, entry in COMMANDS.items():
         own = subparsers.add_parser(
-            name, help=entry.help, epilog=example_of(name) + EXIT_CODES, formatter_class=_Formatter
+            name, help=entry.help, epilog=example_of(name) + EXIT_CODES, formatter_class=formatter
         )
+        own.register("type", None, not_empty)
         if name in with_arguments:
             importlib.import_module(entry.module).add_arguments(own)
     return parser

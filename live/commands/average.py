@@ -22,12 +22,12 @@ def command(arguments: argparse.Namespace) -> int:
     from acquire.burst import average_bursts, compile_loops, save_mean
     from acquire.errors import DataError
     from live.pipeline.warm_up import picture_kinds
-    from live.setup.devices import open_rig
+    from live.setup.devices import at_rest, open_rig
 
     screen = TerminalScreen()
     given = getattr(arguments, "camera.crop")
     crop = tuple(given) if given else None
-    rig = open_rig(arguments.camera, "none:", lambda event: screen.say(event.text), crop=crop)
+    rig = open_rig(at_rest(arguments.camera), "none:", lambda event: screen.say(event.text), crop=crop)
     try:
         compile_loops(picture_kinds(rig.camera.info)[:1])
         with rig.camera:

@@ -14,6 +14,7 @@ from live.commands.options import (
     MEASURE,
     add_as_measured,
     add_config_file,
+    add_help_all,
     add_metadata,
     add_options,
     add_section,
@@ -52,6 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_section(parser)
     add_metadata(parser)
     add_verbose(parser)
+    add_help_all(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:

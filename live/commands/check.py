@@ -14,7 +14,16 @@ from acquire.load_cell import check as load_check
 from acquire.load_cell.check import LoadReport
 from live.commands.check_watch import watch
 from live.commands.exit_codes import NOT_READY
-from live.commands.options import PICTURES, add_measure, add_options, configured, require_new
+from live.commands.options import (
+    MEASURE,
+    PICTURES,
+    add_config_file,
+    add_help_all,
+    add_options,
+    add_verbose,
+    configured,
+    require_new,
+)
 from live.commands.signals import interrupts
 from live.config.loading import Config
 from live.setup.check.check_list import CheckFigures, examine, table_lines
@@ -45,7 +54,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="repeat the check three times a second until Ctrl-C, with the peak of the sharpness",
     )
-    add_measure(parser)
+    add_config_file(parser)
+    add_options(parser, "measurement", *(name for name in MEASURE if name != "strain"), "axis")
+    add_options(parser, "view of --watch", "no-view")
+    add_verbose(parser)
+    add_help_all(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:

@@ -17,7 +17,7 @@ from live.pipeline.screen import Screen
 from live.setup.check.check_list import CheckFigures
 from live.setup.check.quick_check import QUICK_FRAMES, QuickCheck, QuickChecker, RollingFrames
 from live.setup.check.verdict import CheckLine, check_lines
-from live.setup.devices import open_rig
+from live.setup.devices import at_rest, open_rig
 from live.setup.region import report_warnings
 from live.ui.rerun.messages import ViewSetup
 from live.ui.rerun.view import View, spawn_viewer
@@ -41,7 +41,9 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
     """
     frames = 2 * (config.measure.reference_burst or DEFAULT_REFERENCE_BURST)
     checker, display, notes = QuickChecker(config), RenewedLines(screen), list[str]()
-    rig = open_rig(config.camera.address, "none:", report_warnings(notes.append), crop=config.camera.crop)
+    rig = open_rig(
+        at_rest(config.camera.address), "none:", report_warnings(notes.append), crop=config.camera.crop
+    )
     try:
         with (
             RollingFrames(rig.camera, frames, config.camera.address) as rolling,

@@ -19,7 +19,11 @@ def command(arguments: argparse.Namespace) -> int:
     from analysis import threads
 
     cameras, ports = list_cameras(), list_serial_ports()
-    say("cameras:" if cameras else "cameras: none found (V4L2 devices are /dev/video*)")
+    say(
+        "cameras:"
+        if cameras
+        else "cameras: none found (V4L2: /dev/video*; GigE and USB3 Vision: docs/machine-vision.md)"
+    )
     for camera in cameras:
         for line in camera.text().splitlines():
             say(printable(line))

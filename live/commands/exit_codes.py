@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-NOT_READY, EXIT_INTERRUPTED = 6, 130
+LOSS, NOT_READY, EXIT_INTERRUPTED = 5, 6, 130
 
 EXIT_CODES = """exit codes:
   0 success   1 a defect of phasedic   2 usage or configuration   3 device   4 file or data

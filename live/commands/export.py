@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 from acquire.errors import ConfigError
@@ -12,6 +13,12 @@ from live.results.export.job import ExportOptions
 from live.results.quantities import Display
 from live.results.run_folder import RunFolder, add_gauges, open_run
 from live.ui.terminal.screen import TerminalScreen
+
+FPS = 10.0
+_FILMS = ("mp4", "gif")
+_PAINTED = ("png", *_FILMS)
+BELONGS_TO = {"layout": ("csv",), "fps": _FILMS, "limit": _PAINTED, "no_picture": _PAINTED}
+"""Options that only some formats take."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,14 +32,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--fields", metavar="NAMES", help=words)
     parser.add_argument("--from", dest="start_s", type=float, metavar="S", help="begin at this time, s")
     parser.add_argument("--until", dest="end_s", type=float, metavar="S", help="end at this time, s")
-    words = "tables: long: a line per ZOI and instant; wide: a line per instant, a file per map; means: the means only"
-    parser.add_argument("--layout", choices=("long", "wide", "means"), default="long", help=words)
+    words = "csv: long (default): a line per ZOI and instant; wide: a file per map; means: only these"
+    parser.add_argument("--layout", choices=("long", "wide", "means"), help=words)
     add_gauge_option(parser)
     add_display(parser)
     films = parser.add_argument_group("pictures and films")
-    films.add_argument(
-        "--fps", type=float, default=10.0, metavar="N", help="instants per second of film (default 10)"
-    )
+    films.add_argument("--fps", type=float, metavar="N", help="instants per second of film (default 10)")
     films.add_argument("--limit", type=float, help="colour range -LIMIT to LIMIT (default: automatic)")
     films.add_argument("--no-picture", action="store_true", help="maps on plain grey")
 
@@ -66,14 +71,29 @@ def display_of(arguments: argparse.Namespace, stored: float | None = None) -> Di
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic export``."""
+    _refuse_without_effect(arguments)
+    arguments.fps = FPS if arguments.fps is None else arguments.fps
     if not 0.1 <= arguments.fps <= 240:
         raise ConfigError(f"--fps {arguments.fps:g} is not possible; give 0.1 to 240")
+    if arguments.limit is not None and not 0 < arguments.limit < math.inf:
+        raise ConfigError(f"--limit {arguments.limit:g} is not possible; give a number above 0")
     screen = TerminalScreen()
     with open_run(arguments.run) as run:
         if arguments.more_gauges:
             add_gauges(run, Path(arguments.more_gauges))
         screen.say(str(export(run, _request(arguments, run), screen)))
+        for note in run.notes:
+            screen.say(f"note: {note}")
     return 0
+
+
+def _refuse_without_effect(arguments: argparse.Namespace) -> None:
+    for name, formats in BELONGS_TO.items():
+        if getattr(arguments, name) not in (None, False) and arguments.to not in formats:
+            option = f"--{name.replace('_', '-')}"
+            raise ConfigError(
+                f"{option} has no effect with --to {arguments.to}; it belongs to {', '.join(formats)}"
+            )
 
 
 def _request(arguments: argparse.Namespace, run: RunFolder) -> ExportRequest:
@@ -84,5 +104,10 @@ def _request(arguments: argparse.Namespace, run: RunFolder) -> ExportRequest:
         arguments.start_s,
         arguments.end_s,
         display_of(arguments, run.mm_per_px),
-        ExportOptions(arguments.layout, arguments.fps, arguments.limit, not arguments.no_picture),
+        ExportOptions(
+            arguments.layout or "long",
+            arguments.fps,
+            arguments.limit,
+            not arguments.no_picture,
+        ),
     )

@@ -12,7 +12,16 @@ from acquire.addresses import parse_address
 from acquire.errors import DeviceError
 from acquire.files.picture import write_picture
 from acquire.printable import printable
-from live.commands.options import PICTURES, add_options, add_section, add_verbose, overrides, require_new
+from live.commands.exit_codes import LOSS
+from live.commands.options import (
+    PICTURES,
+    add_help_all,
+    add_options,
+    add_section,
+    add_verbose,
+    overrides,
+    require_new,
+)
 from live.config.loading import load_config
 from live.config.rig_file import new_rig
 from live.pipeline.screen import Screen
@@ -22,6 +31,7 @@ from live.setup.rig_proposal import Proposal, propose, rig_text
 from live.setup.specimen_drawing import Overlay, snapshot
 from live.ui.terminal.screen import TerminalScreen
 
+NO_PATTERN = 0.01  # of full scale; a pattern of less is lost in the noise
 RECORDED = ("files", "video", "session")
 MEASURE = (
     "roi", "mask", "zoi", "step", "gauges", "burst", "reference-burst", "noise", "scale", "axis",
@@ -46,10 +56,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, "measurement", *MEASURE)
     add_section(parser)
     add_verbose(parser)
+    add_help_all(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:
-    """``phasedic init``."""
+    """``phasedic init``; 5, and no file, where no pattern is visible."""
     screen = TerminalScreen()
     rig = Path(arguments.file)
     png = Path(arguments.snapshot) if arguments.snapshot else rig.with_suffix(".png")
@@ -64,6 +75,12 @@ def command(arguments: argparse.Namespace) -> int:
     first = first_look(config, screen.say)
     descriptions = found.camera_words or printable(first.camera.name), found.load_words
     proposal = propose(first, config, given, descriptions, found.others)
+    if proposal.contrast < NO_PATTERN:
+        screen.say(
+            f"no pattern is visible: the contrast is {proposal.contrast:.1%} of full scale, so nothing is written. Set"
+            " light, exposure and focus, spray a pattern, and call again"
+        )
+        return LOSS
     if mask is not None and proposal.region.mask is not None:
         write_picture(mask, mask_picture(proposal.region.mask))
     changes = {

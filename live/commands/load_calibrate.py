@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from acquire.addresses import parse_address, with_setting
 from acquire.errors import ConfigError, DataError
 from acquire.load_cell import calibration, check, stillness
 from acquire.load_sample import LoadFlag, LoadSample
@@ -26,24 +27,46 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mass", type=float, metavar="KG", help="the known load as a mass")
     parser.add_argument("--force", type=float, metavar="N", help="the known load as a force")
     parser.add_argument("--out", required=True, metavar="FILE", help="file for the calibration")
+    words = "ask nothing: take the three readings at once and accept the result (a program moves the load)"
+    parser.add_argument("--yes", action="store_true", help=words)
     parser.add_argument(
         "--seconds", type=float, default=3.0, metavar="S", help="duration of each reading (default 3)"
     )
 
 
-def command(arguments: argparse.Namespace, say: Say = print, ask: Ask = input) -> int:
+def _asked(question: str) -> str:
+    """The answer of a person, or a line of standard input."""
+    try:
+        return input(question)
+    except EOFError:
+        raise ConfigError(
+            "load-calibrate asks before each reading, and standard input has ended: run it in a terminal, or with --yes"
+        ) from None
+
+
+def _agree(question: str) -> str:
+    return "yes"
+
+
+def command(arguments: argparse.Namespace, say: Say = print, ask: Ask = _asked) -> int:
     """``phasedic load-calibrate --load ADDRESS (--mass KG | --force N) --out FILE [--seconds 3]``.
 
-    Asks before each of the three readings and before it saves the result; 6 if the result is not accepted.
+    Asks before each of the three readings and before it saves the result; 6 if the result is not accepted. A simulated
+    load cell gets its load by itself.
     """
+    ask = _agree if arguments.yes else ask
     if (arguments.mass is None) == (arguments.force is None):
         raise ConfigError("give the known load: --mass in kg, or --force in N")
     known_N = arguments.force if arguments.mass is None else arguments.mass * GRAVITY
-    address = _raw(arguments.load)
+    simulated = parse_address(arguments.load).scheme == "sim"
+    if simulated:
+        say("simulated: the known load is put on and taken off by the simulation")
 
     def read(force_N: float, what: str) -> calibration.Point:
         for _ in range(MAX_TRIES):
             ask(f"{what}, wait until it is still, then press Enter ")
+            address = _raw(arguments.load)
+            address = with_setting(address, "weight_N", force_N) if simulated else address
             cell = open_load(address, lambda event: say(f"{event.level}: {event.text}"))
             received = check.listen(cell, arguments.seconds)
             why_not = _unfit(received.samples)

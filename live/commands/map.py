@@ -8,8 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from acquire.opencv.images import read_image
+from acquire.printable import printable
 from live.results import Strain
 from live.results.maps.map import MapRequest, draw, save
+from live.results.run_folder import open_run
 from live.ui.terminal.screen import say
 
 _VISIBLE_PX = 2.0
@@ -17,7 +19,7 @@ _VISIBLE_PX = 2.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic map``."""
-    parser.add_argument("results", help="strain.h5")
+    parser.add_argument("results", help="folder of a run or replay, or a strain.h5")
     parser.add_argument("png", help="picture to write, .png or .jpg")
     parser.add_argument(
         "--field",
@@ -45,12 +47,13 @@ def command(arguments: argparse.Namespace) -> int:
     """``phasedic map``."""
     background = None if arguments.over is None else read_image(Path(arguments.over), gray="luma")
     path = Path(arguments.png)
-    with Strain.open(Path(arguments.results)) as strain:
+    with open_run(arguments.results) as run:
+        strain = run.strain
         picture = MapRequest(
             arguments.field,
             arguments.row,
             arguments.limit,
-            arguments.title or "",
+            printable(arguments.title or ""),
             arguments.median,
             arguments.low_pass,
             arguments.deconvolve,

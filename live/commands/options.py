@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError
+from live.commands.arguments import HELP_ALL, not_empty
 from live.config.loading import Config, load_config, options
 
 MEASURE = (
@@ -43,7 +44,7 @@ def _reader(read: Any) -> Any:
 
     def reader(word: str) -> Any:
         try:
-            return read(word)
+            return read(not_empty(word))
         except ValueError as error:
             kind = {int: "a whole number", float: "a number"}.get(read)
             raise argparse.ArgumentTypeError(f"{word!r}: give {kind}" if kind else str(error)) from None
@@ -51,14 +52,20 @@ def _reader(read: Any) -> Any:
     return reader
 
 
-def add_measure(parser: argparse.ArgumentParser) -> None:
-    """Add the options of measurement and output."""
+def add_measure(parser: argparse.ArgumentParser, *output: str) -> None:
+    """Add the options of measurement, and ``output``: by default all of ``OUTPUT``."""
     add_config_file(parser)
     add_options(parser, "measurement", *MEASURE)
-    add_options(parser, "output", *OUTPUT)
+    add_options(parser, "output", *(output or OUTPUT))
     add_section(parser)
     add_metadata(parser)
     add_verbose(parser)
+    add_help_all(parser)
+
+
+def add_help_all(parser: argparse.ArgumentParser) -> None:
+    """Add --help-all, for a command with expert options."""
+    parser.add_argument(HELP_ALL, action="help", help="this help, with the options for experts")
 
 
 def add_config_file(parser: argparse.ArgumentParser) -> None:

@@ -10,16 +10,16 @@ from acquire.errors import PhasedicError
 from acquire.printable import brief
 from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.init import find_devices
-from live.commands.options import add_measure, add_options, overrides
+from live.commands.options import OUTPUT, add_measure, add_options, overrides
 from live.commands.report import write_report
 from live.commands.run import OTHER_PROGRAMS, RECORDING, open_page, run_with_page
 from live.commands.signals import signals
 from live.config.loading import load_config
 from live.pipeline.screen import Screen
 from live.ui.terminal.screen import TerminalScreen
-from live.ui.web.config_draft import ConfigDraft
 from live.ui.web.page_controller import PageController
 from live.ui.web.server import DEFAULT_PORT
+from live.ui.web.setup.config_draft import ConfigDraft
 
 RIG = "rig.toml"
 
@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic page``."""
     add_options(parser, "devices and recording", *RECORDING)
     add_options(parser, "other programs", *OTHER_PROGRAMS)
-    add_measure(parser)
+    add_measure(parser, *(name for name in OUTPUT if name != "report"))
     port_help = f"port of the page on 127.0.0.1, or the next free one (default {DEFAULT_PORT})"
     parser.add_argument("--page-port", type=int, default=DEFAULT_PORT, metavar="N", help=port_help)
 
@@ -69,8 +69,7 @@ def serve(controller: PageController, screen: Screen, interrupted: threading.Eve
             interrupted.set()
             return
         report = outcome.folder / "report.html"
-        if not report.exists():
-            write_report(outcome.folder, screen)
-        controller.reported(report if report.exists() else None)
+        why = "" if report.exists() else write_report(outcome.folder, screen)
+        controller.reported(report if report.exists() else None, why)
         if not controller.after():
             return

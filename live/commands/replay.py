@@ -10,8 +10,8 @@ from typing import Any
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_as_measured, add_measure, add_time_span, overrides
 from live.commands.signals import signals
-from live.results.summary import file_lines, summary_lines
 from live.ui.terminal.screen import TerminalScreen
+from live.ui.terminal.summary import say_summary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,10 +44,15 @@ def command(arguments: argparse.Namespace) -> int:
     screen, stopping = TerminalScreen(), threading.Event()
     with signals(stopping.set, screen.say):
         done = replay(request, screen, stopping, standard_consumers(screen))
-    screen.say()
-    summary = summary_lines(done.run_state, done.config.specimen)
-    for line in [*summary, *done.lines, *file_lines(done.folder)]:
-        screen.say(line)
+    say_summary(
+        screen,
+        done.run_state,
+        done.config.specimen,
+        done.folder,
+        done.lines,
+        verbose=arguments.verbose,
+        with_report=done.config.output.report,
+    )
     if done.config.output.report:
         from live.commands.report import write_report
 

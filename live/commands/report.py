@@ -63,12 +63,14 @@ def command(arguments: argparse.Namespace) -> int:
             screen.say(str(out.with_suffix(".csv")))
         else:
             report = make_report(found[0], _request(arguments, found[0]), screen)
+        for note in (note for run in found for note in run.notes):
+            screen.say(f"note: {note}")
     _save(report, out, arguments, screen)
     return 0
 
 
-def write_report(folder: Path, screen: Screen) -> None:
-    """``report.html`` in the folder of a run; an error is printed and does not affect the run."""
+def write_report(folder: Path, screen: Screen) -> str:
+    """``report.html`` in the folder of a run; an error is printed, returned, and does not affect the run."""
     try:
         with open_run(folder) as run:
             save_page(
@@ -77,6 +79,8 @@ def write_report(folder: Path, screen: Screen) -> None:
         screen.say(f"  {folder / 'report.html'}")
     except PhasedicError as error:
         screen.say(f"warning: no report was made: {error}")
+        return str(error)
+    return ""
 
 
 def _request(arguments: argparse.Namespace, run: RunFolder) -> ReportRequest:

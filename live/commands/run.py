@@ -16,9 +16,9 @@ from live.commands.options import add_measure, add_options, configured
 from live.commands.signals import signals
 from live.config.loading import Config
 from live.pipeline.consumer import Consumer
-from live.pipeline.event_log import sentence
 from live.pipeline.screen import Screen
-from live.results.summary import file_lines, summary_lines
+from live.results.folder import check_folder
+from live.run.alarms import check_alarms
 from live.run.control import ControlPort
 from live.run.keyboard import listen
 from live.run.live_run import INTERRUPTED, LiveRun, run_live
@@ -26,6 +26,7 @@ from live.run.outcome import Outcome, StopSignal
 from live.setup.region import located
 from live.ui.rerun.view import has_display, rerun_command, spawn_viewer
 from live.ui.terminal.screen import TerminalScreen
+from live.ui.terminal.summary import say_summary, trouble_lines
 
 if TYPE_CHECKING:
     from live.ui.web.page_controller import PageController
@@ -48,11 +49,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic run``."""
-    screen = TerminalScreen()
-    with located(configured(arguments), screen.say) as config:
+    screen, config = TerminalScreen(), configured(arguments)
+    check_alarms(config)
+    check_folder(config.output.dir)
+    with located(config, screen.say) as config:
         outcome = run_and_show_page(config, screen) if arguments.page else run_attended(config, screen)
     if not arguments.page:
-        print_outcome(outcome, screen)
+        print_outcome(outcome, screen, verbose=arguments.verbose)
     return outcome.exit_code
 
 
@@ -67,7 +70,7 @@ def run_and_show_page(config: Config, screen: Screen) -> Outcome:
 
 def run_with_page(controller: PageController, config: Config, screen: Screen) -> Outcome:
     """One test, shown on the page until its end."""
-    from live.ui.web.page_controller import run_result
+    from live.ui.web.run_result import run_result
 
     controller.viewer = _open_viewer
     outcome = run_attended(config, screen, [controller.begin(config)], controller.attach)
@@ -121,28 +124,20 @@ def run_attended(
         )
 
 
-def print_outcome(outcome: Outcome, screen: Screen) -> None:
-    """Print the summary, the frame counts, the losses and the files."""
-    screen.say()
-    run_state = outcome.run_state
-    for line in summary_lines(run_state, outcome.config.specimen):
-        screen.say(line)
-    screen.say(run_state.frame_counts.line())
-    for report in outcome.outputs.reports:
-        screen.say(f"  {report.line()}")
-    warnings = run_state.event_log.events("warning", "error")
-    if warnings:
-        screen.say(
-            f"{len(warnings)} warnings and errors, the last: {sentence(warnings[-1], run_state.event_log.names)}"
-        )
-    for line in file_lines(outcome.folder):
-        screen.say(line)
-    rrd = outcome.folder / "view.rrd"
-    if rrd.exists():
-        screen.say(f"open the recorded view with: {rerun_command()} {rrd}")
-    if outcome.config.output.report:
+def print_outcome(outcome: Outcome, screen: Screen, *, verbose: bool = False) -> None:
+    """Print the summary, the frame counts, the losses and where the files are."""
+    run_state, folder = outcome.run_state, outcome.folder
+    lines = [*trouble_lines(run_state, outcome.outputs.reports, verbose=verbose)]
+    rrd = folder / "view.rrd"
+    if verbose and rrd.exists():
+        lines.append(f"open the recorded view with: {rerun_command()} {rrd}")
+    report = outcome.config.output.report
+    say_summary(
+        screen, run_state, outcome.config.specimen, folder, lines, verbose=verbose, with_report=report
+    )
+    if report:
         from live.commands.report import write_report
 
-        write_report(outcome.folder, screen)
+        write_report(folder, screen)
     if outcome.exit_code in EXIT_WORDS:
         screen.say(f"exit code {outcome.exit_code}: {EXIT_WORDS[outcome.exit_code]}")

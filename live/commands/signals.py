@@ -30,8 +30,22 @@ def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[No
 
 
 @contextlib.contextmanager
+def ended_by_sigterm() -> Iterator[None]:
+    """SIGTERM ends a command as Ctrl-C does, where the command has no handler of its own."""
+
+    def end(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    with signal_handler(end, signal.SIGTERM):
+        yield
+
+
+@contextlib.contextmanager
 def interrupts() -> Iterator[threading.Event]:
-    """An event that the first Ctrl-C or SIGTERM sets; the second one ends the program, where nothing can be lost."""
+    """An event that the first Ctrl-C sets; the second one ends the program, where nothing can be lost."""
     stop = threading.Event()
 
     def handle(number: int, frame: FrameType | None) -> None:
@@ -39,5 +53,5 @@ def interrupts() -> Iterator[threading.Event]:
             raise KeyboardInterrupt
         stop.set()
 
-    with signal_handler(handle, signal.SIGINT, signal.SIGTERM):
+    with signal_handler(handle, signal.SIGINT):
         yield stop

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import ConfigError
-from live.commands.options import add_config_file, add_options, add_verbose, overrides
+from live.commands.options import add_config_file, add_help_all, add_options, add_verbose, overrides
 from live.config.values import AUTO
 from live.results.export.atomic_file import check_free, new_folder
 from live.results.report.saving import save_figures
@@ -62,6 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_config_file(parser)
     add_options(parser, "measurement", *MEASURE)
     add_verbose(parser)
+    add_help_all(parser)
 
 
 def command(arguments: argparse.Namespace) -> int:

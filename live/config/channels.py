@@ -30,6 +30,7 @@ DEFAULT_CHANNELS = (
     "frame",
     "axial",
     "sigma_axial",
+    "strain_rate",
     "force_N",
     "stress_MPa",
     "lost_share",

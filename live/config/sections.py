@@ -40,11 +40,11 @@ class CameraConfig:
         Option("camera", "ADDRESS"))
     crop: tuple[int, int, int, int] | None = key(BOX, None,
         "x, y, width, height of the part of the picture to use, px; its corner is the origin of all coordinates",
-        Option("crop", "X,Y,W,H"))
+        Option("crop", "X,Y,W,H", expert=True))
     dark: str | None = key(TEXT, None,
-        "dark frame (TIFF), subtracted from every burst", Option("dark", "FILE"))
+        "dark frame (TIFF), subtracted from every burst", Option("dark", "FILE", expert=True))
     flat: str | None = key(TEXT, None,
-        "flat frame (TIFF); every burst is divided by it", Option("flat", "FILE"))
+        "flat frame (TIFF); every burst is divided by it", Option("flat", "FILE", expert=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,9 @@ class LoadConfig:
     max_gap_s: float = key(number(0.001, 3600), 0.5, "longest time between samples that is no gap, s")
     lag_s: float = key(number(-10, 10), 0.0,
         "delay of the load stamps behind the frames, s; the summary shows the measured value",
-        Option("lag", "S"))
+        Option("lag", "S", expert=True))
+    zero_N: float = key(number(-1e9, 1e9), 0.0,
+        "force from which forces count, N; the page sets it for one test, where the operator tares before it")
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +77,7 @@ class MeasureConfig:
         Option("burst", "N"))
     reference_burst: int | None = key(integer(1, 10000), None,
         "frames averaged for the reference (default: 32 live, 1 for files)",
-        Option("reference-burst", "N"))
+        Option("reference-burst", "N", expert=True))
     mask: str | None = key(TEXT, None,
         "mask image; ZOIs on its black parts are not measured", Option("mask", "FILE"))
     gauges: str = key(choice(GIVEN, AUTO), GIVEN,
@@ -83,19 +85,20 @@ class MeasureConfig:
         Option("gauges"))
     window: str = key(choice("gaussian", "uniform", "tukey", "bi-triangular"), "gaussian",
         "weight of the pixels of a ZOI in the least-squares fit: gaussian, uniform, tukey, bi-triangular",
-        Option("window", "NAME"))
+        Option("window", "NAME", expert=True))
     estimator: str = key(choice("spectral", "phase"), "spectral", "estimator: spectral, or phase",
-        Option("estimator", "NAME"))
+        Option("estimator", "NAME", expert=True))
     order: int = key(integer(1, 2), 1,
-        "order of the shape function of a ZOI: 1 (affine) or 2 (quadratic)", Option("order", "N"))
+        "order of the shape function of a ZOI: 1 (affine) or 2 (quadratic)", Option("order", "N", expert=True))
     strain: str = key(choice("engineering", "small", "green", "hencky"), "engineering",
         "strain measure: engineering (elongation over length, as from an extensometer), small, green or hencky",
         Option("strain", "MEASURE"))
     bending_px: float = key(number(0, math.inf), 0.05,
         "a ZOI in which the displacement jumps or bends by more than this is UNEVEN, px; inf: never",
-        Option("bending", "PX"))
+        Option("bending", "PX", expert=True))
     noise_GL: float | None = key(number(0, 65535), None,
-        "noise of one frame, grey levels (default: measured from the reference burst)", Option("noise", "GL"))
+        "noise of one frame, grey levels (default: measured from the reference burst)",
+        Option("noise", "GL", expert=True))
     renew_at: float = key(number(0, 1), 0.2,
         "share of ZOIs lost from one burst to the next above which the reference is renewed; 1: never")
     reference_shift_px: float = key(number(0, 10), 0.05,
@@ -125,13 +128,13 @@ class RecordConfig:
 
     enabled: bool = key(FLAG, True, "record the session", Option("no-record", off=True))
     mode: str = key(RECORD_MODE, "all",
-        "frames to record: all, bursts (sums only), or every=K (one in K)", Option("record", "MODE"))
+        "frames to record: all, bursts (sums only), or every=K (one in K)", Option("record", "MODE", expert=True))
     armed: bool = key(FLAG, False,
         "measure at once, but record only after the start command", Option("armed", on=True))
     keep_s: float = key(number(0, 60), 2.0,
         "pre-trigger: frames of this time before the start are recorded too, s")
     start_above_N: float | None = key(number(1e-6, 1e9), None,
-        "with armed: a force of this magnitude also starts the recording, N", Option("start-above", "N"))
+        "with armed: a force of this magnitude also starts the recording, N", Option("start-above", "N", expert=True))
     rotate_MB: float | None = key(number(10, 1e9), None,
         "size after which another file is begun, MB; all files together are one session")
     buffer_MB: float = key(number(1, 1e6), 512.0, "memory for frames that wait for the disk, MB")
@@ -148,7 +151,7 @@ class OperateConfig:
         Option("orders", "[HOST:]PORT"))
     token_file: str | None = key(TEXT, None,
         "file with the token that a client must send first; required for addresses other than 127.0.0.1",
-        Option("token-file", "FILE"))
+        Option("token-file", "FILE", expert=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,11 +165,11 @@ class StrainOutConfig:
     serial: str | None = key(TEXT, None,
         "serial port to which every measurement is written: /dev/ttyUSB1?baud=115200")
     format: str = key(choice("json", "csv"), "json",
-        "format of a line; csv begins with the names of the channels", Option("strain-format"))
+        "format of a line; csv begins with the names of the channels", Option("strain-format", expert=True))
     channels: tuple[str, ...] | None = key(NAMES, None,
-        "channels of a line (docs/guide.md; default: time, frame, axial strain, force, stress, lost share,"
-        " latency and all gauges)",
-        Option("strain-channels", "NAME,NAME"))
+        "channels of a line (docs/guide.md; default: time, frame, axial strain and its sigma and rate, force,"
+        " stress, lost share, latency and all gauges)",
+        Option("strain-channels", "NAME,NAME", expert=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +192,7 @@ class ViewConfig:
     enabled: bool = key(FLAG, True,
         "serve the rerun view (its port on 127.0.0.1 needs no token: all users of this machine can open it)",
         Option("no-view", off=True))
-    rrd: bool = key(FLAG, True, "write view.rrd", Option("no-rrd", off=True))
+    rrd: bool = key(FLAG, True, "write view.rrd", Option("no-rrd", off=True, expert=True))
     port: int = key(integer(1024, 65535), 9876, "port of the view on 127.0.0.1, or the next free one")
     spawn: bool = key(FLAG, True, "open the viewer if there is a display")
     strain_range: float | None = key(number(1e-7, 10), None,
@@ -197,7 +200,7 @@ class ViewConfig:
     scale: str = key(choice("symmetric", "automatic"), "symmetric",
         "colour range: symmetric about zero, or automatic (from lowest to highest value)")
     light: bool = key(FLAG, False, "for slow connections: a small picture, and maps once a second",
-        Option("light", on=True))
+        Option("light", on=True, expert=True))
 
 
 @dataclass(frozen=True, slots=True)
@@ -215,11 +218,11 @@ class SpecimenConfig:
         "direction of the load in the picture; auto: the direction of the largest strain, y until it is clear",
         Option("axis"))
     standard: str = key(choice("iso6892", "iso527", "astm-d3039", "free"), "iso6892",
-        "standard of the evaluation; free: only modulus_between", Option("standard"))
+        "standard of the evaluation; free: only modulus_between", Option("standard", expert=True))
     modulus_between: tuple[float, float] = key(STRAINS, (0.0005, 0.0025),
         "strain interval of the modulus in a free evaluation")
     zero: str = key(choice("raw", "toe", "preload"), "raw",
-        "zero of the strain: raw (as measured), toe (foot of the elastic line) or preload", Option("zero"))
+        "zero of the strain: raw (as measured), toe (foot of the elastic line) or preload", Option("zero", expert=True))
     preload_MPa: float = key(number(1e-3, 1e5), 1.0,
         "stress at which the strain is zero with zero = preload, MPa")
 

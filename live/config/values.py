@@ -51,12 +51,15 @@ class Option:
         "": the option offers the words of the check.
     off, on : bool
         A switch that turns the key off, or on.
+    expert : bool
+        Only ``--help-all`` shows it.
     """
 
     name: str
     metavar: str = ""
     off: bool = False
     on: bool = False
+    expert: bool = False
 
 
 def key(check: Check, default: Any, help_text: str, option: Option | None = None) -> Any:

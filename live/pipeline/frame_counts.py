@@ -15,14 +15,15 @@ class FrameCounts:
     grabbed : int
         Frames the camera handed out.
     recorded, unrecorded, thinned : int
-        Written to the session; not written although they should be (a counted gap); left out by the
-        recording mode (only bursts, every K-th).
+        Written to the session; not written although they should be (a counted gap); left out on purpose: by
+        the recording mode (only bursts, every K-th), or while recording was off.
     reference, measured, skipped, left_out : int
         Part of the reference burst; of a measured burst; of a burst that a newer one replaced or that
         came while measuring was paused; of no complete burst, or damaged.
     lost : int
         Frames that the camera or its connection lost.
-    load_samples : int
+    load_samples, load_lost : int
+        Samples of the load cell; samples that were missing when the test ended.
     """
 
     grabbed: int = 0
@@ -35,6 +36,7 @@ class FrameCounts:
     left_out: int = 0
     lost: int = 0
     load_samples: int = 0
+    load_lost: int = 0
     _lock: threading.Lock = field(default_factory=threading.Lock, repr=False, compare=False)
 
     def add(self, **counts: int) -> None:
@@ -56,8 +58,8 @@ class FrameCounts:
 
     @property
     def loss(self) -> bool:
-        """Whether frames are missing for good."""
-        return self.lost > 0 or self.unrecorded > 0
+        """Whether frames, or load samples at the end, are missing for good."""
+        return self.lost > 0 or self.unrecorded > 0 or self.load_lost > 0
 
     @property
     def skipped_share(self) -> float:
@@ -66,10 +68,12 @@ class FrameCounts:
 
     def line(self) -> str:
         """One line for a person."""
+        on_purpose = f" and {self.thinned} on purpose" * (self.thinned > 0)
         share = f" ({self.skipped_share:.1%})" * (self.skipped > 0)
+        load = f" / load samples lost {self.load_lost}" * (self.load_lost > 0)
         return (
             f"grabbed {self.grabbed} / recorded {self.recorded} / measured {self.measured}"
-            f" / skipped {self.skipped}{share} / lost {self.lost}"
-            f"  (reference {self.reference}, left over {self.left_out}, not recorded {self.unrecorded};"
-            f" {'adds up' if self.adds_up else 'DOES NOT ADD UP'})"
+            f" / skipped {self.skipped}{share} / lost {self.lost}{load}"
+            f"  (reference {self.reference}, left over {self.left_out}, not recorded {self.unrecorded}"
+            f"{on_purpose}; {'adds up' if self.adds_up else 'DOES NOT ADD UP'})"
         )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from dataclasses import fields
 from typing import Any, Generic, Literal, TypeVar, overload
 
@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.load_cell import LoadLog
-from analysis.evaluate import GaugeValue, LoadAxis, load_axis
-from live.pipeline.measurement import AXIAL, TRANSVERSE, TimeStep, strains_along
+from analysis.evaluate import Curve, GaugeValue, LoadAxis, load_axis
+from live.pipeline.measurement import AXIAL, TRANSVERSE, TimeStep, extension_along, strains_along
 
 Array = NDArray[np.float64]
 Item = TypeVar("Item")
 
 MAX_KEPT = 2000
 """Time steps that ``AxisFinder`` keeps, evenly thinned."""
-_FIRST, _GROWTH = 8, 1.1  # time steps before the first search for the axis, and the factor between searches
+_GROWTH = 1.1  # of the time steps from one search for the axis to the next
 _NUMBERS = tuple(one.name for one in fields(TimeStep) if one.name not in ("refused", "gauges"))
 _COUNTS = ("n_valid", "n_zoi")
 
@@ -175,6 +175,37 @@ class Thinned(Generic[Item]):
         return self.kept + self._newest * (not is_kept)
 
 
+def curve_of(
+    strain: Callable[[str], Array | None], gauges: Container[str], axis: str, t: Array, stress: Array
+) -> Curve:
+    """The curve of a test: ``stress`` over its extension, with the strains that E and nu are from.
+
+    Parameters
+    ----------
+    strain : callable
+        Takes the name of a gauge or of a column of ``TimeStep``; None where there is none.
+    gauges : container of str
+        Names of the gauges.
+    axis : "x" or "y"
+        Of the load.
+    t, stress : (N,) float64
+    """
+    axial, transverse = strains_along(gauges, axis)
+    elastic, extension = strain(axial), strain(extension_along(gauges, axis))
+    if axial == AXIAL:
+        return Curve(t, _known(elastic, t), stress, strain(transverse), source=f"gauge {AXIAL}")
+    if extension is None or not np.isfinite(extension).any():
+        return Curve(t, _known(elastic, t), stress, strain(transverse), source=f"mean {axial}")
+    return Curve(
+        t, extension, stress, strain(transverse), elastic, strain(f"uneven_{axial}"), strain("misfit"),
+        f"extension between strips along {axis}", f"{axial} of the region",
+    )  # fmt: skip
+
+
+def _known(strain: Array | None, t: Array) -> Array:
+    return np.full(len(t), math.nan) if strain is None else strain
+
+
 class History:
     """All time steps so far: added by one thread, read by any.
 
@@ -196,6 +227,11 @@ class History:
     def current_axis(self) -> Literal["x", "y"]:
         """Axis of the load: as configured, or as found from the strains so far; y until it is found."""
         return self._finder.axis
+
+    @property
+    def axis_assumed(self) -> bool:
+        """That axis is neither configured nor found yet."""
+        return self._finder.assumed
 
     @property
     def has_values(self) -> bool:
@@ -220,10 +256,16 @@ class History:
 
     def axis(self, given: str) -> LoadAxis:
         """Axis of the load: "x" or "y" as ``given``, or found from all time steps where that is "auto"."""
-        return load_axis(self.column("exx"), self.column("eyy"), self.column("exy"), given)
+        sigma = np.fmax(self.column("sigma_exx"), self.column("sigma_eyy"))
+        return load_axis(self.column("exx"), self.column("eyy"), self.column("exy"), given, sigma)
+
+    def curve(self, stress: Array, axis: str) -> Curve:
+        """``stress`` (N,) over the extension of the test, with the strains that E and nu are from."""
+        chosen = axis if axis in ("x", "y") else self.axis(axis).axis
+        return curve_of(self._strain, self.time_steps.gauges, chosen, self.column("t"), stress)
 
     def along(self, axis: str) -> tuple[Array, Array]:
-        """Strain along and across the load: the gauges ``axial`` and ``transverse``, or else the means."""
+        """Strain along and across the load: the gauges ``axial`` and ``transverse``, or else of the region."""
         chosen = axis if axis in ("x", "y") else self.axis(axis).axis
         axial, transverse = strains_along(self.time_steps.gauges, chosen)
         return self._strain(axial), self._strain(transverse)
@@ -248,22 +290,26 @@ class AxisFinder:
     ----------
     axis : "x" or "y"
         As given, or as found from the strains; y until it is found.
+    assumed : bool
+        It is neither given nor found.
     """
 
     def __init__(self, given: str) -> None:
         self.axis: Literal["x", "y"] = "x" if given == "x" else "y"
-        self._seeks = given not in ("x", "y")
-        self._strains: Thinned[tuple[float, float, float]] = Thinned(MAX_KEPT)
-        self._count, self._next = 0, _FIRST
+        self._seeks = self.assumed = given not in ("x", "y")
+        self._strains: Thinned[tuple[float, float, float, float]] = Thinned(MAX_KEPT)
+        self._count, self._next = 0, 1
         self._t = -math.inf
 
     def add(self, time_step: TimeStep) -> Literal["x", "y"]:
         """The axis with one more time step; one that is added twice counts once."""
         if self._seeks and time_step.t > self._t:
             self._t, self._count = time_step.t, self._count + 1
-            self._strains.append((time_step.exx, time_step.eyy, time_step.exy))
+            sigma = max(time_step.sigma_exx, time_step.sigma_eyy)
+            self._strains.append((time_step.exx, time_step.eyy, time_step.exy, sigma))
             if self._count >= self._next:
                 self._next = math.ceil(self._count * _GROWTH)
-                exx, eyy, exy = np.array(self._strains.kept, np.float64).T
-                self.axis = load_axis(exx, eyy, exy).axis
+                exx, eyy, exy, sigma = np.array(self._strains.kept, np.float64).T
+                found = load_axis(exx, eyy, exy, sigma=sigma)
+                self.axis, self.assumed = found.axis, found.assumed
         return self.axis

@@ -9,23 +9,24 @@ import math
 from collections import deque
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
 from acquire.frame import Burst
-from analysis.evaluate import Gauge, GaugeValue
+from analysis.evaluate import AreaStrain, Gauge, GaugeValue, extension_of
 from analysis.field import StrainField
 
 AXIAL, TRANSVERSE = "axial", "transverse"
 """Gauges of these names are the strain along and across the load."""
+AXES: tuple[Literal["x", "y"], ...] = ("x", "y")
 HOLD_S = 2.0
 """Measurements wait for their force at most this long, in measured time."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimeStep:
-    """Means over the valid ZOIs at one time; strains are small strains, force in N, u and v in px.
+    """The strain of the region at one time, in the measure of the field; force in N, u and v in px.
 
     Attributes
     ----------
@@ -34,8 +35,9 @@ class TimeStep:
     force : float, N
         At ``t``; NaN where no load is known (yet).
     exx, eyy, exy, sigma_exx, sigma_eyy, sigma_exy : float
-        Means and the standard uncertainties of the means.
+        Of the affine field through all valid ZOIs (``analysis.evaluate.AreaStrain``), and standard uncertainties.
     u, v : float, px
+        Means.
     largest : float
         The strain of largest magnitude of any valid ZOI.
     zoi_sigma : float
@@ -55,6 +57,12 @@ class TimeStep:
         As stamped, where ``force`` is corrected for a lag of the load; else NaN.
     zero : float, N
         What tares have subtracted from ``force`` by then.
+    extension_x, extension_y, sigma_extension_x, sigma_extension_y : float
+        (L - L0)/L0 between strips at the two ends of the region, along x and along y.
+    uneven_exx, uneven_eyy : float
+        Variation of the strain over the region (``analysis.evaluate.Unevenness``).
+    misfit : float
+        That variation over what noise makes of it.
     """
 
     t: float
@@ -78,6 +86,13 @@ class TimeStep:
     gauges: Mapping[str, GaugeValue] = field(default_factory=dict)
     force_raw: float = math.nan
     zero: float = 0.0
+    extension_x: float = math.nan
+    extension_y: float = math.nan
+    sigma_extension_x: float = math.nan
+    sigma_extension_y: float = math.nan
+    uneven_exx: float = math.nan
+    uneven_eyy: float = math.nan
+    misfit: float = math.nan
 
     def axial(self, axis: str) -> tuple[float, float]:
         """Strain along the load, which runs along ``axis`` ("x" or "y"), and its standard uncertainty."""
@@ -90,26 +105,41 @@ class TimeStep:
 def strains_along(gauges: Container[str], axis: str) -> tuple[str, str]:
     """Names of the strains along and across the load, which runs along ``axis`` ("x" or "y").
 
-    The gauges ``AXIAL`` and ``TRANSVERSE`` where they are among ``gauges``, else the mean strains.
+    The gauges ``AXIAL`` and ``TRANSVERSE`` where they are among ``gauges``, else the strains of the region.
     """
     along, across = ("exx", "eyy") if axis == "x" else ("eyy", "exx")
     return AXIAL if AXIAL in gauges else along, TRANSVERSE if TRANSVERSE in gauges else across
 
 
+def extension_along(gauges: Container[str], axis: str) -> str:
+    """Name of the extension of the test: the gauge ``AXIAL`` where it is among ``gauges``, else between strips."""
+    return AXIAL if AXIAL in gauges else f"extension_{axis}"
+
+
+def region_strains(field: StrainField) -> dict[str, Any]:
+    """The strains of a ``TimeStep`` by their names; NaN where no ZOI has a value."""
+    area = AreaStrain.of(field)
+    names = ("exx", "eyy", "exy")
+    if area is None:
+        return dict.fromkeys((*names, *(f"sigma_{name}" for name in names)), math.nan)
+    uneven = area.unevenness()
+    found = {"uneven_exx": uneven.exx, "uneven_eyy": uneven.eyy, "misfit": uneven.misfit}
+    for name in names:
+        found |= {name: area.value(name), f"sigma_{name}": area.sigma(name)}
+    for axis in AXES:
+        extension = extension_of(field, axis)
+        found |= {f"extension_{axis}": extension.value, f"sigma_extension_{axis}": extension.sigma}
+    return found
+
+
 def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: float = 0.0) -> TimeStep:
-    """The means of ``field``, measured from ``burst``."""
-    (exx, s_xx), (eyy, s_yy), (exy, s_xy) = (field.mean(name) for name in ("exx", "eyy", "exy"))
+    """The strains of ``field``, measured from ``burst``."""
     valid = field.ok
     values = np.concatenate([field.exx[valid], field.eyy[valid]])
     return TimeStep(
         t=burst.t,
         force=force,
-        exx=exx,
-        eyy=eyy,
-        exy=exy,
-        sigma_exx=s_xx,
-        sigma_eyy=s_yy,
-        sigma_exy=s_xy,
+        **region_strains(field),
         u=ordered_mean(field.u[valid]),
         v=ordered_mean(field.v[valid]),
         largest=float(values[np.argmax(np.abs(values))]) if values.size else math.nan,

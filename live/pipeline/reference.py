@@ -87,10 +87,10 @@ def prepare(
     from analysis import PhaseKernel
 
     noise_GL = frame_noise(reference, stated_noise_GL)
-    noise = averaged(noise_GL, reference.n)
+    noise, sound = averaged(noise_GL, reference.n), correct(reference)
     try:
         with on_fit_machine():
-            return PhaseKernel(correct(reference).mean, grid, settings, noise=noise), noise_GL
+            return PhaseKernel(sound.mean, grid, settings, noise=noise, clipped=sound.clipped), noise_GL
     except ValueError as error:
         raise numerics_error(error, what) from error
 

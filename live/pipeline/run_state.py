@@ -53,10 +53,14 @@ class Health:
         self.peak_N = peak_force(self.peak_N, force_N)
 
     def channels(self, now: float) -> dict[str, float]:
-        """The channels of the machine (``live.config.channels``) at ``now``, monotonic s."""
+        """The channels of the machine (``live.config.channels``) at ``now``, monotonic s.
+
+        Before the first frame or sample, the silence is that since the test began.
+        """
+        frame_t, load_t = (self.began_t if math.isnan(t) else t for t in (self.frame_t, self.load_t))
         return {
-            "silent_s": now - self.frame_t,
-            "load_silent_s": now - self.load_t,
+            "silent_s": now - frame_t,
+            "load_silent_s": now - load_t,
             "disk_min": self.disk_s / 60,
         }
 

@@ -7,10 +7,12 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from acquire.errors import ConfigError
 from acquire.events import ignore_event
-from acquire.frame import Burst
+from acquire.frame import Burst, CameraInfo
 from acquire.session import Session
-from live.config.loading import Config, load_config
+from live.config.gauges import gauges_for
+from live.config.loading import AUTO_GAUGES, Config, load_config, settings_in
 from live.config.values import AUTO
 from live.pipeline.reference import averaged
 from live.pipeline.screen import Screen
@@ -19,6 +21,7 @@ from live.replay.session import session_config, session_path, session_source
 from live.replay.source import ReplayRequest, ReplaySource, check_window
 from live.results.folder import differing_versions
 from live.setup.devices import open_rig
+from live.setup.grid import grid_for
 from live.setup.pictures import read_mask
 from live.setup.prepared import MeasurePlan, PreparedKernel
 from live.setup.region import FirstLook, located_on
@@ -36,7 +39,31 @@ def open_session_source(
         config = session_config(session, request, overrides, path)
         if request.overrides.get("measure.roi") == AUTO and "measure.mask" not in request.overrides:
             config = replace(config, measure=replace(config.measure, mask=None))  # found again
+        config = _with_fitting_gauges(config, session.camera, request, screen)
         yield session_source(session, request, config, path), config
+
+
+def _with_fitting_gauges(
+    config: Config, camera: CameraInfo, request: ReplayRequest, screen: Screen
+) -> Config:
+    """Without automatic gauges of the run that have no ZOI in the grid of the replay; raises ConfigError for others."""
+    if config.measure.roi == AUTO:
+        return config
+    mask = read_mask(config.measure.mask, camera.width, camera.height)
+    grid, axis = grid_for(config, camera.width, camera.height, mask), config.specimen.first_axis
+    given = settings_in(request.config_file) if request.config_file else {}
+    gauges = dict(config.gauges)
+    for name in AUTO_GAUGES:
+        if name not in gauges or f"gauges.{name}" in given:
+            continue
+        try:
+            gauges_for({name: gauges[name]}, axis, grid)
+        except ConfigError:
+            del gauges[name]
+            screen.say(
+                f"note: the automatic gauge {name} of the run has no ZOI in this grid, and is left out"
+            )
+    return replace(config, gauges=gauges)
 
 
 def _notes(session: Session, request: ReplayRequest) -> Iterator[str]:

@@ -72,7 +72,9 @@ def reference_from(path: str, camera: CameraInfo) -> Burst:
             f"{path}: the reference has {8 * image.itemsize}-bit samples up to {image.max()}, the pictures have"
             f" {camera.bits} bits; they must be the same"
         )
-    return burst_of([Frame(frozen(image), 0, 0.0, "nominal", 0, camera.bits, 0.0)])
+    return burst_of(
+        [Frame(frozen(image), 0, 0.0, "nominal", 0, camera.bits, 0.0, white_level=camera.white_level)]
+    )
 
 
 def write_names(source: str, path: Path) -> None:

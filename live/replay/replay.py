@@ -34,7 +34,7 @@ from live.replay.parts import StoredResults
 from live.replay.pictures import picture_of, picture_source, write_names
 from live.replay.session import session_path
 from live.replay.source import ReplayRequest, ReplaySource, Work, check_window, prefetch
-from live.results.folder import make_folder
+from live.results.folder import check_folder, make_folder
 from live.results.writer import write_results
 from live.setup.devices import open_rig
 from live.setup.pictures import with_mask
@@ -146,6 +146,7 @@ def _run(
     event_log: EventLog,
     consumers: Compose,
 ) -> Replayed:
+    check_folder(config.output.dir)
     ready = prepare_replay(source, config, request.source, screen, stopping.is_set)
     stored = StoredResults.of(request.parts, ready)
     measured = stored.measurements if stored else ready.measurements
@@ -188,7 +189,10 @@ def _run(
     speed = f"joined of {len(request.parts)} chunks" if request.parts else speed_line(run_state.history, took)
     lines = [*_account(source, run_state), speed]
     left_out = source.count.left_out if source.count else 0
-    lossy = outputs.failed or not run_state.history.has_values or left_out > 0
+    cut_off = [e.text for e in event_log.events("warning") if "missing" in e.data and not stopping.is_set()]
+    stopped = [f"{report.name} stopped: {report.failed}" for report in outputs.reports if report.failed]
+    lines = [*cut_off, *stopped, *lines]
+    lossy = outputs.failed or not run_state.history.has_values or left_out > 0 or cut_off
     code = 130 if stopping.is_set() else 5 if lossy else 0
     return Replayed(folder, run_state, config, code, tuple(lines), left_out)
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import parse_address
+from acquire.addresses import expanded, parse_address
 from acquire.camera import CAMERAS, with_scheme
 from acquire.clock import ClockPair
 from acquire.errors import ConfigError, DataError
@@ -31,7 +31,7 @@ def session_path(source: str) -> Path | None:
     """The session's path, or None where ``source`` is an address of pictures."""
     address = parse_address(with_scheme(source))
     if address.scheme == "session":
-        return Path(address.target).expanduser()
+        return expanded(address.target)
     if address.scheme and address.scheme in (*CAMERAS.schemes(), "sim"):
         return None
     raise DataError(

@@ -13,7 +13,6 @@ from acquire.load_cell import LoadLog
 from analysis.evaluate import (
     CONFIDENCE,
     STANDARDS,
-    Curve,
     Figure,
     Interval,
     LoadAxis,
@@ -34,6 +33,7 @@ _EXTENSIONS = ("Ag", "Agt", "A", "At")
 
 _PLAIN, _PERCENT, _MPA, _GPA, _KN = ("", 1.0), ("%", 0.01), ("MPa", 1e6), ("GPa", 1e9), ("kN", 1e3)
 _STRENGTH_SUFFIXES = dict(zip(_STRENGTHS, ("p0.1", "p0.2", "p1", "eH", "eL", "m"), strict=True))
+LAG_MATTERS_S = 0.005  # and beyond its own uncertainty: to correct a smaller one changes no figure
 _SMALL_KN = 2.0  # below it forces are shown in N
 
 
@@ -64,11 +64,14 @@ class TensileRow:
     unit : str
     figure : Figure
         In that unit, or why it is not known.
+    remarked : bool
+        The text shows the remark of a figure that is known.
     """
 
     name: str
     unit: str
     figure: Figure
+    remarked: bool = False
 
     @property
     def column(self) -> str:
@@ -82,10 +85,11 @@ class TensileRow:
 
     @property
     def text(self) -> str:
-        """Value, interval and unit for a person; forces below 2 kN in N."""
+        """Value, interval and unit for a person, and a remark; forces below 2 kN in N."""
+        remark = f" ({self.figure.why})" if self.remarked and self.figure.known and self.figure.why else ""
         if self.unit == "kN" and abs(self.figure.value) < _SMALL_KN:
-            return figure_text(self.figure, 1e-3, "N")
-        return figure_text(self.figure, 1.0, self.unit)
+            return figure_text(self.figure, 1e-3, "N") + remark
+        return figure_text(self.figure, 1.0, self.unit) + remark
 
 
 def tensile_table(figures: TensileFigures, *, stresses: bool) -> dict[str, TensileRow]:
@@ -103,7 +107,7 @@ def tensile_table(figures: TensileFigures, *, stresses: bool) -> dict[str, Tensi
     names |= {key: (letter + end, strength) for key, end in _STRENGTH_SUFFIXES.items()}
     names |= {key: (key, _PERCENT) for key in _EXTENSIONS}
     return {
-        key: TensileRow(name, unit, getattr(figures, key).over(one))
+        key: TensileRow(name, unit, getattr(figures, key).over(one), key in ("E", "nu"))
         for key, (name, (unit, one)) in names.items()
     }
 
@@ -116,9 +120,8 @@ def headline(figures: TensileFigures, *, stresses: bool) -> list[TensileRow]:
 
 def evaluate(history: History, loads: LoadLog, specimen: SpecimenConfig) -> TensileFigures:
     """The tensile figures of the run; stresses are forces (N) where the section is not known."""
-    axial, transverse = history.along(specimen.axis)
     stress = history.forces(loads) / (specimen.area_m2 or 1.0)
-    return evaluate_test(Curve(history.column("t"), axial, stress, transverse), tensile_options(specimen))
+    return evaluate_test(history.curve(stress, specimen.axis), tensile_options(specimen))
 
 
 def tensile_options(specimen: SpecimenConfig) -> TensileOptions:
@@ -137,7 +140,11 @@ def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list
     lag = find_lag(Track(history.column("t"), history.along(specimen.axis)[0]), Track(t, force))
     if not lag.known:
         return [f"lag of the load behind the frames: not known ({lag.why})"]
-    how = f"{loads.lag_s * 1e3:g} ms corrected" if loads.lag_s else f"not applied; --lag {lag.value:.3f} does"
+    how = "too small to matter"
+    if loads.lag_s:
+        how = f"{loads.lag_s * 1e3:g} ms corrected"
+    elif abs(lag.value) > max(LAG_MATTERS_S, lag.high - lag.value, lag.value - lag.low):
+        how = f"not applied; --lag {lag.value:.3f} does"
     return [f"lag of the load behind the frames: {figure_text(lag, 1e-3, 'ms')} ({CONFIDENCE:.0%}; {how})"]
 
 
@@ -153,6 +160,8 @@ def tare_line(history: History, loads: LoadLog) -> list[str]:
 
 def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
     """The angle from the axis of the load to the largest strain; nothing where it is not known."""
+    if not history.time_steps:
+        return []
     load = history.axis(specimen.axis)
     words = axis_text(load)
     stays = load.found and load.axis != specimen.first_axis and history.gauge("axial") is not None
@@ -160,9 +169,11 @@ def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
 
 
 def axis_text(load: LoadAxis) -> str:
-    """The axis of the load and the angle to the largest strain; empty where it is not known."""
+    """The axis of the load and the angle to the largest strain; empty where the axis is given and no more is known."""
+    if load.assumed:
+        return f"{load.axis} is assumed to be the axis of the load; give [specimen] axis = 'x' or 'y'"
     if not load.angle.known:
-        return ""
+        return f"{load.axis} was found to be the axis of the load: the larger strain" if load.found else ""
     words = f"largest strain {figure_text(load.angle, math.pi / 180, 'degrees')} off {load.axis} (clockwise)"
     if load.found:
         return f"{words}; {load.axis} was found to be the axis of the load"
@@ -176,7 +187,8 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
         return []
     rows = _rows(figures, specimen)
     hint = "" if specimen.area_m2 else " (give [specimen] width_mm and thickness_mm for E)"
-    words = f"  {_text(rows, 'nu')}  ({figures.span.n} points, +-: {CONFIDENCE:.0%} interval)"
+    of = f" of {figures.elastic_strain}" if figures.elastic_strain else ""
+    words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, +-: {CONFIDENCE:.0%} interval)"
     return [_text(rows, "E") + hint + words, _known_texts(rows, _STRENGTHS)]
 
 
@@ -202,7 +214,7 @@ def figure_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]
         low, high = span.strain
         lines.append(
             f"  {figures.standard}: strains {100 * low:.3f} to {100 * high:.3f} %, R2 = {figures.r2:.5f}, by chord"
-            f" {rows['E_chord'].text}; strain counts {figures.zero.how}"
+            f" {rows['E_chord'].text}; strain{_named(figures.strain)} counts {figures.zero.how}"
         )
     if extensions := _known_texts(rows, _EXTENSIONS):
         length = f"  (gauge length {specimen.gauge_length_mm:g} mm)" if specimen.gauge_length_mm else ""
@@ -211,6 +223,10 @@ def figure_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]
         words = f" ({figures.rate_elastic.why})" if figures.rate_elastic.why else ""
         lines.append(f"strain rate {figures.rate_elastic.value:.3g} 1/s in the elastic part{words}")
     return lines + _unknown_lines(rows)
+
+
+def _named(strain: str) -> str:
+    return f" ({strain})" if strain else ""
 
 
 def _unknown_lines(rows: Mapping[str, TensileRow]) -> list[str]:

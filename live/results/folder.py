@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import os
 import platform
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
@@ -48,6 +49,31 @@ def differing_versions(then: Mapping[str, Any]) -> list[str]:
     return [f"{name} {printable(str(then[name]))[:40]} (here {now[name]})" for name in differ]
 
 
+def check_folder(wanted: str | None) -> None:
+    """Refuse a folder before anything is opened for it.
+
+    Raises
+    ------
+    ConfigError
+        It holds a run already (files are never overwritten), or nothing can be written there.
+    """
+    folder = Path(wanted) if wanted else Path("runs")
+    there = next(place for place in (folder, *folder.absolute().parents) if place.exists())
+    if not (there.is_dir() and os.access(there, os.W_OK | os.X_OK)):
+        why = "Permission denied" if there.is_dir() else "Not a directory"
+        raise ConfigError(f"{folder}: cannot be made ({why}); choose another --out")
+    if wanted:
+        _check_free(folder)
+
+
+def _check_free(folder: Path) -> None:
+    existing = [name for name in FILES if (folder / name).exists()]
+    if existing:
+        raise ConfigError(
+            f"{folder} already holds {existing[0]}; nothing is overwritten, choose another --out"
+        )
+
+
 def make_folder(wanted: str | None, now: datetime.datetime) -> Path:
     """The folder of a run: ``wanted``, or a new one in ``runs`` named by the UTC time.
 
@@ -61,11 +87,7 @@ def make_folder(wanted: str | None, now: datetime.datetime) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ConfigError(f"{folder}: cannot be made ({error.strerror}); choose another --out") from None
-    existing = [name for name in FILES if (folder / name).exists()]
-    if existing:
-        raise ConfigError(
-            f"{folder} already holds {existing[0]}; nothing is overwritten, choose another --out"
-        )
+    _check_free(folder)
     return folder
 
 

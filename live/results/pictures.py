@@ -28,12 +28,12 @@ class Pictures:
     info : CameraInfo
         Size and bits.
     each : callable
-        Takes rows in ascending order, gives the (H, W) image of each, in grey levels; raises DataError
-        where one cannot be read.
+        Takes rows in ascending order, gives the (H, W) image of each, in grey levels; None for one that is not
+        readable, which may also raise DataError.
     """
 
     info: CameraInfo
-    each: Callable[[Sequence[int]], Iterator[Image]]
+    each: Callable[[Sequence[int]], Iterator[Image | None]]
 
 
 def of_session(session: Session, strain: Strain) -> Pictures | None:
@@ -44,7 +44,7 @@ def of_session(session: Session, strain: Strain) -> Pictures | None:
         return None
     times = _BurstTimes(session) if bursts else [float(t) for t in session.times]
 
-    def each(rows: Sequence[int]) -> Iterator[Image]:
+    def each(rows: Sequence[int]) -> Iterator[Image | None]:
         for row in rows:
             number = _nearest(times, n, float(strain.time_s[row]) + session.start_monotonic)
             yield session.burst(number).mean if bursts else session.frame(number).image
@@ -60,7 +60,7 @@ def of_images(address: str, strain: Strain, crop: Crop | None = None) -> Picture
     with _opened(address, crop) as camera:
         info = camera.info
 
-    def each(rows: Sequence[int]) -> Iterator[Image]:
+    def each(rows: Sequence[int]) -> Iterator[Image | None]:
         with _opened(address, crop) as again:
             yield from _numbered(again, [int(strain.values["frame"][row]) for row in rows])
 

@@ -47,7 +47,8 @@ class Quantity:
         return self.name in _TURNING
 
 
-_STRAINS = ("exx", "eyy", "exy", "true_strain", "du_dx", "du_dy", "dv_dx", "dv_dy")
+_EXTENSIONS = ("extension_x", "extension_y", "uneven_exx", "uneven_eyy")
+_STRAINS = ("exx", "eyy", "exy", "true_strain", "du_dx", "du_dy", "dv_dx", "dv_dy", *_EXTENSIONS)
 # One index y (of place or of displacement) changes the sign, two restore it.
 _TURNING = ("v", "exy", "du_dy", "dv_dx", "y")
 
@@ -80,6 +81,15 @@ _INSTANTS = (
     Quantity(
         "true_stress", "Pa", "stress times one plus the axial engineering strain; volume taken as constant"
     ),
+    Quantity(
+        "extension_x", UNITLESS, "(L - L0)/L0 between strips at the left and the right end of the region"
+    ),
+    Quantity(
+        "extension_y", UNITLESS, "(L - L0)/L0 between strips at the upper and the lower end of the region"
+    ),
+    Quantity("uneven_exx", UNITLESS, "variation of exx over the region, rms, up to the second degree"),
+    Quantity("uneven_eyy", UNITLESS, "variation of eyy over the region, rms, up to the second degree"),
+    Quantity("misfit", UNITLESS, "that variation over what noise makes of it; about 1 in a uniform strain"),
     Quantity("force_raw", "N", "force as stamped, not corrected for the lag of the load"),
     Quantity("zero", "N", "sum of the tares before, subtracted from the force"),
     Quantity("n_valid", UNITLESS, "ZOIs with a value"),
@@ -126,7 +136,8 @@ def mean_name(name: str) -> str:
     plain = MEANS.get(name, name)
     if plain.removeprefix("sigma_").startswith(_GAUGE):
         return plain
-    averaged = quantity_of(plain.removeprefix("sigma_")).is_strain or plain in ("u", "v")
+    of = plain.removeprefix("sigma_")
+    averaged = (quantity_of(of).is_strain and of not in _EXTENSIONS) or plain in ("u", "v")
     return f"mean_{plain}" if averaged else plain
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
-import numpy as np
 from numpy.typing import NDArray
 
-from live.pipeline.measurement import AXIAL, ordered_mean, strains_along
+from analysis.evaluate import AreaStrain
+from live.pipeline.measurement import AXIAL, extension_along, strains_along
 
 if TYPE_CHECKING:
     from acquire.frame import CameraInfo
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 StrainMeasure = Literal["small", "engineering", "green", "hencky"]
 STRAINS = ("exx", "eyy", "exy")
+EXTENSIONS = ("extension_x", "extension_y", "sigma_extension_x", "sigma_extension_y")
+UNEVEN = ("uneven_exx", "uneven_eyy", "misfit")
 GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
 
 
@@ -112,7 +114,8 @@ def _values(
         "time_s": burst.t - info.start_monotonic,
         "force_N": time_step.force,
     }
-    values |= {name: _mean(name, getattr(time_step, name), maps, info.strain_measure) for name in STRAINS}
+    values |= _strains(measurement, info.strain_measure)
+    values |= {name: getattr(time_step, name) for name in (*EXTENSIONS, *UNEVEN)}
     values |= {f"sigma_{name}": getattr(time_step, f"sigma_{name}") for name in STRAINS}
     values |= {
         "n_valid": time_step.n_valid,
@@ -132,20 +135,27 @@ def _values(
         values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma), strict=True))
     if info.area_m2 is not None:
         values["stress_Pa"] = stress = time_step.force / info.area_m2
-        stretch = _stretch(measurement, values, info.strain_measure, axis)
+        stretch = _stretch(measurement, info.strain_measure, axis)
         values |= {"true_strain": math.log(stretch), "true_stress_Pa": stress * stretch}
     if info.lagged:
         values["force_raw_N"] = time_step.force_raw
     return values
 
 
-def _stretch(
-    measurement: Measurement, values: Mapping[str, float], measure: StrainMeasure, axis: str
-) -> float:
-    """Length over first length along the load: of the gauge ``axial``, or else of the mean strain."""
-    gauges = measurement.time_step.gauges
-    name, _ = strains_along(gauges, axis)
-    stretch = 1 + gauges[name].value if name == AXIAL else _stretched(values[name], measure)
+def _strains(measurement: Measurement, measure: StrainMeasure) -> dict[str, float]:
+    """Of the region, in ``measure``: those of the time step, where its field has that measure."""
+    if measurement.field.measure == measure:
+        return {name: getattr(measurement.time_step, name) for name in STRAINS}
+    area = AreaStrain.of(replace(measurement.field, measure=measure))
+    return {name: math.nan if area is None else area.value(name) for name in STRAINS}
+
+
+def _stretch(measurement: Measurement, measure: StrainMeasure, axis: str) -> float:
+    """Length over first length along the load: of the gauge ``axial``, between strips, or of the region."""
+    time_step = measurement.time_step
+    name, extension = strains_along(time_step.gauges, axis)[0], extension_along(time_step.gauges, axis)
+    strain = time_step.gauges[AXIAL].value if name == AXIAL else getattr(time_step, extension)
+    stretch = 1 + strain if math.isfinite(strain) else _stretched(getattr(time_step, name), measure)
     return stretch if stretch > 0 else math.nan
 
 
@@ -153,7 +163,3 @@ def _stretched(strain: float, measure: StrainMeasure) -> float:
     if measure == "hencky":
         return math.exp(strain)
     return math.sqrt(max(1 + 2 * strain, 0.0)) if measure == "green" else 1 + strain
-
-
-def _mean(name: str, small: float, maps: dict[str, NDArray[Any]], measure: StrainMeasure) -> float:
-    return small if measure == "small" else ordered_mean(maps[name][np.isfinite(maps[name])])

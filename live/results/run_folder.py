@@ -1,7 +1,7 @@
 """The folder of a finished run: results, recording and settings together.
 
 with open_run("runs/20261122T081747Z") as run:
-    run.strain.values["eyy"], run.stress, run.events
+    run.strain.values["eyy"], run.stress
 
 ``add_gauges`` adds virtual gauges afterwards; it reads them from the stored maps.
 """
@@ -10,10 +10,11 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from acquire.camera import with_scheme
 from acquire.closing import Closing
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.events import Event, EventKind
+from acquire.load_sample import LoadSample
 from acquire.record_mode import Crop
 from acquire.session import Session
 from analysis.evaluate import Curve, Gauge, LoadAxis, load_axis
@@ -29,11 +31,13 @@ from analysis.field import PAIR_INDEX, WINDOWS, Measure, StrainField, Window
 from live.config.gauges import gauges_for
 from live.config.loading import from_dict, load_config
 from live.config.sections import SpecimenConfig
+from live.pipeline.history import curve_of
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
-from live.results.pictures import Pictures, of_images, of_session
+from live.results.pictures import Image, Pictures, of_images, of_session
 from live.results.reader import Strain
 from live.results.row import gauge_columns
 
+Item = TypeVar("Item")
 SESSION, STRAIN = "session.h5", "strain.h5"
 _AS_FILES = ("files:", "video:")
 _GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
@@ -71,21 +75,45 @@ class RunFolder(Closing):
     def __init__(self, path: Path, strain: Strain) -> None:
         self.path, self.strain = path, strain
         self._sessions: list[Session] = []
+        self._notes: dict[str, None] = {}  # in their order, each once
 
     @cached_property
     def session(self) -> Session | None:
-        """The recording, in this folder or the one that was replayed; None where there is none.
+        """The recording, in this folder or the one that was replayed; None where there is none that can be read.
 
-        Raises
-        ------
-        DataError
-            It exists and cannot be read.
+        The results do not depend on it; ``notes`` has why it cannot be read.
         """
         path = self.session_path
         if path is None:
             return None
-        self._sessions.append(Session.open(path))
-        return self._sessions[-1]
+        session = self._recorded(lambda: Session.open(path), None)
+        self._sessions += [] if session is None else [session]
+        return session
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What could not be read of the recording so far, a sentence each."""
+        return tuple(self._notes)
+
+    def _recorded(self, read: Callable[[], Item], otherwise: Item) -> Item:
+        """A part of the recording; ``otherwise`` and a note where it cannot be read."""
+        try:
+            return read()
+        except DataError as error:
+            self._notes[f"the recording cannot be read, the results can: {error}"] = None
+            return otherwise
+
+    @cached_property
+    def load_samples(self) -> list[LoadSample]:
+        """The samples of the load cell; empty without a recording."""
+        session = self.session
+        return [] if session is None else self._recorded(session.load_samples, [])
+
+    @cached_property
+    def frame_counts(self) -> dict[str, Any] | None:
+        """The frame counts of the recording; None where there are none."""
+        session = self.session
+        return None if session is None else self._recorded(lambda: session.frame_counts, None)
 
     @property
     def session_path(self) -> Path | None:
@@ -107,20 +135,21 @@ class RunFolder(Closing):
 
     @cached_property
     def pictures(self) -> Pictures | None:
-        """Pictures of the measured instants; None where they cannot be found any more.
-
-        Raises
-        ------
-        DataError
-            The recording exists and cannot be read.
-        """
-        if self.session is not None:
-            return of_session(self.session, self.strain)
+        """Pictures of the measured instants; None where they cannot be found or read any more."""
+        session = self.session
+        if session is not None:
+            found = self._recorded(lambda: of_session(session, self.strain), None)
+            return None if found is None else replace(found, each=lambda rows: self._readable(found, rows))
         try:
             address = with_scheme(self.camera_address) if self.camera_address else ""
             return of_images(address, self.strain, self._crop) if address.startswith(_AS_FILES) else None
         except PhasedicError:
             return None
+
+    def _readable(self, found: Pictures, rows: Sequence[int]) -> Iterator[Image | None]:
+        """The picture of each row; None for one that is damaged."""
+        for row in rows:
+            yield self._recorded(lambda row=row: next(iter(found.each([row])), None), None)  # type: ignore[misc]
 
     @property
     def _crop(self) -> Crop | None:
@@ -163,8 +192,9 @@ class RunFolder(Closing):
     @cached_property
     def load_axis(self) -> LoadAxis:
         """The axis of the load, as given or as found from the means."""
-        exx, eyy, exy = (np.asarray(self.strain.values[name], np.float64) for name in ("exx", "eyy", "exy"))
-        return load_axis(exx, eyy, exy, self.specimen.axis)
+        names = ("exx", "eyy", "exy", "sigma_exx", "sigma_eyy")
+        exx, eyy, exy, *sigmas = (np.asarray(self.strain.values[name], np.float64) for name in names)
+        return load_axis(exx, eyy, exy, self.specimen.axis, np.fmax(*sigmas))
 
     @property
     def axial(self) -> str:
@@ -192,18 +222,23 @@ class RunFolder(Closing):
 
     @property
     def axial_strain(self) -> NDArray[np.float64]:
-        """Strain along the load, (T,): of the gauge ``axial`` where there is one, else the mean."""
-        return self._strain(strains_along(self.gauges, self.load_axis.axis)[0])
+        """Strain along the load, (T,): of the gauge ``axial`` where there is one, else of the region."""
+        return self._known(strains_along(self.gauges, self.load_axis.axis)[0])
 
     @property
     def transverse_strain(self) -> NDArray[np.float64]:
-        """Strain across the load, (T,): of the gauge ``transverse`` where there is one, else the mean."""
-        return self._strain(strains_along(self.gauges, self.load_axis.axis)[1])
+        """Strain across the load, (T,): of the gauge ``transverse`` where there is one, else of the region."""
+        return self._known(strains_along(self.gauges, self.load_axis.axis)[1])
 
-    def _strain(self, name: str) -> NDArray[np.float64]:
+    def _known(self, name: str) -> NDArray[np.float64]:
+        found = self._strain(name)
+        return np.full(self.strain.n, np.nan) if found is None else found
+
+    def _strain(self, name: str) -> NDArray[np.float64] | None:
         if name in (AXIAL, TRANSVERSE):
             return self.gauges[name].value
-        return np.asarray(self.strain.values[name], np.float64)
+        found = self.strain.values.get(name)
+        return None if found is None else np.asarray(found, np.float64)
 
     def field(self, row: int) -> StrainField:
         """The strain field of one instant, as ``strain.h5`` holds it.
@@ -233,17 +268,17 @@ class RunFolder(Closing):
 
     @property
     def curve(self) -> Curve:
-        """Stress over axial strain, for evaluation; force (N) where the section is not known."""
+        """Stress over extension, for evaluation; force (N) where the section is not known."""
         load = self.force_one_zero if self.stress is None else self.stress
         times = np.asarray(self.strain.time_s, np.float64)
-        return Curve(times, self.axial_strain, load, self.transverse_strain)
+        return curve_of(self._strain, self.gauges, self.load_axis.axis, times, load)
 
     @cached_property
     def events(self) -> list[Event]:
         """The recorded events without MEASURED, which comes with every burst; empty without a recording."""
-        if self.session is None:
-            return []
-        return [event for event in self.session.events() if event.kind is not EventKind.MEASURED]
+        session = self.session
+        found: list[Event] = [] if session is None else self._recorded(session.events, [])
+        return [event for event in found if event.kind is not EventKind.MEASURED]
 
     @property
     def start_monotonic(self) -> float:
@@ -306,8 +341,8 @@ def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
     """Add the ``[gauges.NAME]`` of a TOML file to ``run`` while it is open; its files stay as they are.
 
     Values are those that a replay with this file would give, and so are the uncertainties of extensometers and single
-    ZOIs. That of a mean over an area includes only the overlap of the windows, which is low on dense grids (by 6 % at a
-    step of a quarter of a ZOI, by a third at most). A gauge replaces an existing one of the same name.
+    ZOIs. That of an area includes only the overlap of the windows (6 % low at a step of a quarter of a ZOI, a third at
+    most). A gauge replaces an existing one of the same name.
 
     Raises
     ------
@@ -331,8 +366,7 @@ def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
 
 def _read(run: RunFolder, gauges: tuple[Gauge, ...]) -> tuple[np.ndarray, np.ndarray]:
     """Values and sigmas, (T, number of gauges) each."""
-    shape = (run.strain.n, len(gauges))
-    values, sigmas = np.full(shape, np.nan), np.full(shape, np.nan)
+    values, sigmas = np.full((2, run.strain.n, len(gauges)), np.nan)
     for row in range(run.strain.n):
         field = run.field(row)
         for k, gauge in enumerate(gauges):

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import DataError
-from acquire.hdf5 import FlushTimer, PictureStack, RowTable, abandon_file
+from acquire.hdf5 import FlushTimer, PictureStack, RowTable, abandon_file, reason
 from analysis.evaluate import load_axis
 from live.results import layout
 from live.results.quantities import quantity_of
@@ -128,8 +128,10 @@ class StrainWriter:
     def _write_axis(self) -> None:
         """The axis of the load, and the angle from it to the largest strain, found from all means."""
         mean = self._file["entry/mean"]
-        exx, eyy, exy = (np.asarray(mean[name], np.float64) for name in STRAINS)
-        load = load_axis(exx, eyy, exy, self._axis)
+        exx, eyy, exy, s_xx, s_yy = (
+            np.asarray(mean[name], np.float64) for name in (*STRAINS, "sigma_exx", "sigma_eyy")
+        )
+        load = load_axis(exx, eyy, exy, self._axis, np.fmax(s_xx, s_yy))
         mean.attrs.modify("load_axis", np.array(load.axis, "S1"))
         mean.attrs.modify("load_angle_deg", np.float64(math.degrees(load.angle.value)))
 
@@ -142,7 +144,7 @@ class StrainWriter:
 
     def _trouble(self, error: Exception) -> DataError:
         return DataError(
-            f"{self._path}: cannot be written ({error}); make room on the disk or choose another --out. "
+            f"{self._path}: cannot be written ({reason(error)}); make room on the disk or choose another --out. "
             f"The {self._flushed} rows before are safe"
         )
 

@@ -13,8 +13,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from acquire.errors import ConfigError
 from acquire.events import Event, EventKind, EventSink
 from live.config.channels import SYSTEM_CHANNELS
+from live.config.loading import Config
 from live.config.sections import AlarmConfig
 from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
@@ -26,6 +28,9 @@ log = logging.getLogger(__name__)
 
 EVERY_S = 0.2
 """The channels of the machine are checked at this interval."""
+_STRAINS = ("axial", "exx", "eyy", "exy", "largest")
+_UNITS = {"_N": "N", "_MPa": "MPa", "_s": "s", "_min": "min", "_GL": "GL", "": ""}
+_LABELS = {"silent_s": "no frame for", "load_silent_s": "no force for", "disk_min": "disk full in"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +107,39 @@ def actions_of(config: AlarmConfig, means: ActionMeans) -> list[Action]:
     return [kind(config, means) for kind in ACTIONS if not kind.key or getattr(config, kind.key)]
 
 
+def check_alarms(config: Config) -> None:
+    """Refuse alarms on channels that have no value in a test with ``config``.
+
+    Raises
+    ------
+    ConfigError
+        A force without a load cell, a stress without a section, a disk that nothing is written to.
+    """
+    missing = dict.fromkeys(("force_N", "stress_MPa", "load_silent_s"), "a load cell: give --load ADDRESS")
+    if config.load.address != "none:":
+        missing.clear()
+    if config.specimen.area_m2 is None:
+        missing.setdefault("stress_MPa", "the section: give --section W,T")
+    if not config.record.enabled:
+        missing["disk_min"] = "a recording: leave --no-record out"
+    for number, alarm in enumerate(config.alarm, 1):
+        if alarm.channel in missing:
+            raise ConfigError(
+                f"alarm {number} ({alarm.channel}) can never come: it needs {missing[alarm.channel]}, or take the"
+                " alarm out of the configuration"
+            )
+
+
+def in_words(channel: str, value: float, limit: float) -> str:
+    """A channel at its value beyond its limit, for a person: ``axial 4450 um/m, limit 4000``."""
+    plain = channel.removeprefix("sigma_")
+    if plain in _STRAINS or plain.startswith("gauge_"):
+        return f"{channel.replace('_', ' ')} {value * 1e6:.0f} um/m, limit {limit * 1e6:.0f}"
+    suffix = next((one for one in _UNITS if plain.endswith(one)), "")
+    label = _LABELS.get(channel, channel.removesuffix(suffix).replace("_", " "))
+    return f"{label} {value:.6g} {_UNITS[suffix]}".rstrip() + f", limit {limit:.6g}"
+
+
 class Alarm:
     """One alarm: on beyond its limit, off when the value is back by the hysteresis.
 
@@ -137,7 +175,9 @@ class Alarm:
 
     def message(self, value: float) -> str:
         """Its text at ``value``."""
-        return f"{self.name}: {self.config.channel} is {value:.6g}"
+        c = self.config
+        named = f"{c.name}: " if c.name else ""
+        return named + in_words(c.channel, value, self._limit)
 
 
 class AlarmWatch(Consumer):

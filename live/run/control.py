@@ -11,16 +11,18 @@ The same commands from the keyboard, the TCP port and the page::
     alarm off               silence the alarms that are on
     quit                    end the run and close the files
 
-The answer is ``ok``, ``ok: TEXT`` or ``no: REASON``; a command that is carried out is an event of the test.
+The answer is ``ok``, ``ok: TEXT`` or ``no: REASON``; a command that is carried out is an event of the test. A tare is
+answered when the load cell has done or refused it, and with ``ok: queued`` where that takes longer than 2 s.
 """
 
 from __future__ import annotations
 
 import math
+import queue
 from collections.abc import Callable
 from typing import Protocol
 
-from acquire.events import EventKind, Level
+from acquire.events import Event, EventKind, Level
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.printable import printable
 from live.config.listen_address import ListenAddress, read_token
@@ -29,9 +31,12 @@ from live.run.tcp_lines import LineServer
 
 START, STOP = "start", "stop"
 """Notes of a command of ``EventKind.RECORD``."""
-FORCED, UNDO = "force", "undo"
-"""Notes of a command of ``EventKind.TARE``, which may also have none."""
-CONFIRM_S = 3.0
+FORCED, UNDO, ONCE = "force", "undo", "once"
+"""Notes of a command of ``EventKind.TARE``, which may also have none. ONCE is never the repetition of another."""
+BOUNCE_S, CONFIRM_S = 0.5, 3.0
+"""A command is repeated, as a confirmation, after this time and before that: a key that is held repeats too soon."""
+TARED_S = 2.0  # the answer to a tare waits so long for what the load cell did
+QUEUED = "queued; the load cell has not done it yet, and an event will report it"
 NO_LOAD = 1e-3  # share of the capacity
 ENDED = "ended by the operator"
 MAX_LENGTH = 500  # of a line
@@ -48,6 +53,7 @@ _COMMANDS = {
     "reference": (EventKind.NEW_REFERENCE, ""),
     "tare": (EventKind.TARE, ""),
     "tare force": (EventKind.TARE, FORCED),
+    "tare once": (EventKind.TARE, ONCE),
     "tare undo": (EventKind.TARE, UNDO),
     "pause": (EventKind.PAUSE, ""),
     "resume": (EventKind.RESUME, ""),
@@ -73,7 +79,7 @@ class TareableCell(Protocol):
 
 
 class TareControl:
-    """Carries out tare commands: at once without load or before the test, else only when given twice in 3 s.
+    """Carries out tare commands: at once without load or before the test, else only when given again after 0.5 to 3 s.
 
     A tare in mid-test moves the zero of every force after it: modulus, stress and yield point then have
     two different zeros. So one key pressed by mistake must not do it, and a tare can be undone.
@@ -87,6 +93,8 @@ class TareControl:
         The newest sample.
     emit : callable taking kind, source, text and level
     clock : callable giving monotonic seconds
+    wait_s : float, s
+        Longest wait for the event with which the cell reports what it did (``take_event``).
     """
 
     def __init__(
@@ -96,35 +104,62 @@ class TareControl:
         latest: Callable[[], LoadSample | None],
         emit: EmitEvent,
         clock: Callable[[], float],
+        wait_s: float = TARED_S,
     ) -> None:
         self._cell, self._measured, self._latest = cell, measured, latest
-        self._emit, self._clock = emit, clock
+        self._emit, self._clock, self._wait_s = emit, clock, wait_s
         self._confirm_t = -math.inf  # time of the last request for a confirmation
+        self._done: queue.SimpleQueue[Event] = queue.SimpleQueue()
 
-    def tare(self, how: str = "") -> None:
-        """Tare; FORCED: whatever the load does; UNDO: restore the zero before the last tare.
+    def take_event(self, event: Event) -> None:
+        """Note what the cell did about a tare; other events are ignored."""
+        is_answer = event.kind is EventKind.TARE or event.data.get("tared") is False
+        if is_answer and event.source == self._cell.info.address:
+            self._done.put(event)
+
+    def tare(self, how: str = "") -> str:
+        """Tare; FORCED: whatever the load does; ONCE: only without a risk; UNDO: restore the zero before the last tare.
+
+        Returns
+        -------
+        str
+            What the cell did, or that it has not done it yet.
 
         Raises
         ------
         ControlRefused
-            There is no load cell, or the command must be given again.
+            There is no load cell, the command must be given again, or the cell refuses it.
         """
         if self._cell.info.protocol == "none":
             raise ControlRefused("there is no load cell")
         confirm_t, self._confirm_t = self._confirm_t, -math.inf
-        risk = "" if how else self._risk()
+        risk = self._risk() if how in ("", ONCE) else ""
+        while not self._done.empty():
+            self._done.get()
         if how == UNDO:
             self._emit(EventKind.TARE, "operator", "undo the last tare", "info")
             self._cell.undo_tare()
-        elif risk and self._clock() - confirm_t > CONFIRM_S:
-            self._confirm_t = self._clock()
+        elif risk and (how == ONCE or not BOUNCE_S <= self._clock() - confirm_t <= CONFIRM_S):
             text = (
                 f"{risk}: forces before and after a tare have different zeros, and so have modulus and stress"
             )
+            if how == ONCE:
+                raise ControlRefused(f"{text}; confirm it")
+            self._confirm_t = self._clock()
             raise ControlRefused(f"{text}; repeat the command within {CONFIRM_S:g} s to do it")
         else:
-            self._emit(EventKind.TARE, "operator", "tare" + (", forced" if how else ""), "info")
+            self._emit(EventKind.TARE, "operator", "tare" + (", forced" if how == FORCED else ""), "info")
             self._cell.tare(force=how == FORCED)
+        return self._outcome()
+
+    def _outcome(self) -> str:
+        try:
+            event = self._done.get(timeout=self._wait_s)
+        except queue.Empty:
+            return QUEUED
+        if event.kind is not EventKind.TARE:
+            raise ControlRefused(event.text)
+        return event.text
 
     def _risk(self) -> str:
         """Why a tare now would falsify what was measured; "" where it would not."""

@@ -10,11 +10,12 @@ import logging
 import math
 import queue
 import threading
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from acquire.burst import BurstAccumulator
-from acquire.camera import Camera
+from acquire.camera import Camera, missing_at_end
 from acquire.errors import PhasedicError
 from acquire.events import EventKind, RateLimiter
 from acquire.frame import Burst, CameraInfo, Frame
@@ -78,6 +79,8 @@ class Grabber:
         Keeps the newest; with a source that waits for its reader, nothing is skipped.
     error : Exception or None
         The error that ended the camera.
+    begun_t, arrived_t : float, s
+        When the first and the last frame arrived, monotonic; before the first when it was started.
     """
 
     def __init__(
@@ -104,6 +107,7 @@ class Grabber:
         self._accumulator = BurstAccumulator(plan.burst)
         self._unassigned = 0
         self._limiter, self._unreported = RateLimiter(), 0
+        self.begun_t = self.arrived_t = math.nan
         self._first_t: float | None = None
         self._last_t: float | None = None
         self._retake = threading.Event()
@@ -111,6 +115,7 @@ class Grabber:
 
     def start(self) -> None:
         """Begin to take frames from the camera, which must have been entered."""
+        self.begun_t = self.arrived_t = time.monotonic()
         self._thread.start()
 
     def take_reference(self) -> None:
@@ -143,6 +148,7 @@ class Grabber:
             log.exception("the grab thread failed")
             self._ended_by(error, f"a defect in the grab thread: {error!r}")
         finally:
+            self._count_open_gap(time.monotonic() - self.arrived_t)
             self._frame_counts.add(left_out=self._unassigned)
             self.bursts.close()
 
@@ -150,7 +156,19 @@ class Grabber:
         self.error = error
         self._event_log.emit(EventKind.DEVICE, self._camera.info.address, text, "error")
 
+    def _count_open_gap(self, silent_s: float) -> None:
+        """Count the frames of a camera that is away, or has stalled, when the test ends."""
+        missing = missing_at_end(self._camera.info, silent_s)
+        if missing:
+            self._frame_counts.add(lost=missing)
+            text = f"{missing} frames were lost at the end: none came for the last {silent_s:.1f} s"
+            data = {"count": missing, "where": "end"}
+            self._event_log.emit(EventKind.LOST, self._camera.info.address, text, "warning", data)
+
     def _take(self, frame: Frame) -> None:
+        self.arrived_t = time.monotonic()
+        if self._first_t is None:
+            self.begun_t = self.arrived_t
         self._frame_counts.add(grabbed=1, lost=frame.lost_before)
         if frame.lost_before:
             self._report_loss(frame)

@@ -7,7 +7,6 @@ one for each consumer that may block. The measuring thread takes the newest burs
 from __future__ import annotations
 
 import json
-import math
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -23,6 +22,7 @@ from live.pipeline.latency import LatencyMonitor
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.results.writer import write_results
+from live.run.alarms import check_alarms
 from live.run.burst_queue import TAKING, BurstQueue
 from live.run.control import ControlRefused
 from live.run.grabber import Grabber, GrabPlan
@@ -37,7 +37,6 @@ from live.setup.devices import Rig, open_rig
 _ARMED = "; nothing is recorded until the command start"
 _SILENT_S = 1.0
 _HINT_AFTER = 3  # times the frames of a reference
-_GRACE_S = 5.0  # a timed run without frames ends this much later
 INTERRUPTED = "interrupted"
 """The reason to stop that gives exit code 130."""
 
@@ -70,10 +69,8 @@ class LiveRun:
         self._prepared, self._run_state, self._outputs = prepared, run_state, outputs
         self._recording, self._screen, self._stop = recording, screen, stop
         self._rig = prepared.rig
-        seconds = prepared.config.output.seconds
-        self._deadline = math.inf if seconds is None else time.monotonic() + seconds + _GRACE_S
-        plan = GrabPlan.of(prepared.config, prepared.bursts)
-        self.grabber = Grabber(self._rig.camera, plan, run_state, self._take, self._take_burst)
+        self._plan = GrabPlan.of(prepared.config, prepared.bursts)
+        self.grabber = Grabber(self._rig.camera, self._plan, run_state, self._take, self._take_burst)
         run_state.health.began_t, self._hinted = time.monotonic(), False
         self._has_recorded = self.recording
         self._burst_queue = BurstQueue(self.grabber, run_state.frame_counts, self._idle)
@@ -93,8 +90,14 @@ class LiveRun:
 
     @property
     def recording(self) -> bool:
-        """Whether frames are recorded."""
-        return self._recording is not None and self._recording.on
+        """Whether frames are recorded; not after the recording has failed, as on a full disk."""
+        recording = self._recording
+        return recording is not None and recording.on and recording.failed is None
+
+    @property
+    def live(self) -> bool:
+        """Whether the camera is there now; else its pictures are recorded."""
+        return self._rig.camera.info.live
 
     @property
     def run_state(self) -> RunState:
@@ -113,8 +116,8 @@ class LiveRun:
     def command(self, kind: EventKind, note: str = "") -> str:
         """Carry out a command of the operator and log it; raises ControlRefused where that is not possible."""
         if kind is EventKind.TARE:
-            self._tares.tare(note)
-        elif kind in (EventKind.PAUSE, EventKind.RESUME):
+            return self._tares.tare(note)
+        if kind in (EventKind.PAUSE, EventKind.RESUME):
             self._pause(kind is EventKind.PAUSE)
         elif kind is EventKind.NEW_REFERENCE:
             self._emit(kind, "a new reference is taken from the next frames")
@@ -173,7 +176,7 @@ class LiveRun:
     def __exit__(self, *_: object) -> None:
         """End all threads and close the devices, whatever happened before."""
         self._rig.camera.stop()
-        self._rig.load.stop()
+        self._load.stop()
         self.grabber.bursts.close()
         self.grabber.join()
         self._burst_queue.count_skipped()
@@ -210,12 +213,14 @@ class LiveRun:
 
     def _idle(self, words: str) -> None:
         """Called between bursts; ends a timed run whose camera gives no frames."""
+        now = time.monotonic()
+        silent = not now - self._run_state.health.frame_t < _SILENT_S
         if words or self.paused:
-            silent = not time.monotonic() - self._run_state.health.frame_t < _SILENT_S
             self._show(words if silent or not self._has_measured else "")
         if words == TAKING:
             self._hint_once()
-        if time.monotonic() > self._deadline and not self._stop.requested:
+        over = now - self.grabber.begun_t > self._plan.seconds
+        if silent and over and self._rig.camera.info.live and not self._stop.requested:
             self.stop("the time is over")
 
     def _hint_once(self) -> None:
@@ -280,13 +285,20 @@ def run_live(
     """
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS (phasedic devices lists what is there)")
+    check_alarms(config)
     stop, run_state = (
         stop or StopSignal(),
         RunState.new(config.load.max_gap_s, config.load.lag_s, config.specimen),
     )
     run_state.event_log.names |= device_names(config)
     screen.say(f"opening {config.camera.address}")
-    rig = open_rig(config.camera.address, config.load.address, run_state.event_log, crop=config.camera.crop)
+    rig = open_rig(
+        config.camera.address,
+        config.load.address,
+        run_state.event_log,
+        crop=config.camera.crop,
+        zero_N=config.load.zero_N,
+    )
     try:
         prepared = set_up(config, rig, run_state.event_log, screen, stop)
         for line in announcement(rig, prepared.folder):

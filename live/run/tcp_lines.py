@@ -203,7 +203,7 @@ class LineServer:
             return authorized
         if " HTTP/" in line:
             return False
-        if self._answer is None or not line:
+        if self._answer is None:
             return True
         return client.send(self._answer(line).encode() + b"\n")
 

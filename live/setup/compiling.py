@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import signal
 import subprocess
 import sys
@@ -21,6 +22,7 @@ from acquire.signal_mask import blocked_signals, signal_handler, unblock_signals
 
 log = logging.getLogger(__name__)
 _POLL_S = 0.25
+BAR_LENGTH, KNOWN_SHARE = 30, 0.1  # an estimate from less is none
 _INTERRUPTED = (
     "interrupted while the loops were compiled; what is compiled is kept, the next start goes on from there"
 )
@@ -51,11 +53,11 @@ def compile_ahead(
     Interrupted
         ``stopped`` returned True, or Ctrl-C or SIGTERM came; handlers of these signals are called too.
     """
-    from analysis import COMPILE_PARTS, not_compiled
+    from analysis import COMPILE_PARTS, not_compiled, share_compiled
 
     if not not_compiled(kinds, phase=phase):
         return 0.0
-    began = time.monotonic()
+    began, began_file = time.monotonic(), time.time()
     words = [",".join(kinds), "phase" if phase else "-"]
     commands = [[sys.executable, "-m", __name__, part, *words] for part in COMPILE_PARTS]
     with blocked_signals(signal.SIGINT):
@@ -67,11 +69,9 @@ def compile_ahead(
                 over = any(process.poll() == -signal.SIGINT for process in processes)
                 if over or interrupted.is_set() or stopped():
                     raise Interrupted(_INTERRUPTED)
-                done = sum(process.poll() is not None for process in processes)
-                seconds = time.monotonic() - began
-                say(
-                    f"compiling for this processor, once: {seconds:.0f} s, {done} of {len(processes)} parts done"
-                )
+                say(progress_text(share_compiled(kinds, began_file, phase=phase), time.monotonic() - began))
+    except KeyboardInterrupt:  # from the handler of a command that has no other
+        raise Interrupted(_INTERRUPTED) from None
     finally:
         for process in processes:
             if process.poll() is None:
@@ -80,6 +80,18 @@ def compile_ahead(
     if not_compiled(kinds, phase=phase):
         log.warning("what was compiled could not be kept; make numba's cache writable (NUMBA_CACHE_DIR)")
     return time.monotonic() - began
+
+
+def progress_text(share: float, seconds: float) -> str:
+    """A bar of what is compiled after so many seconds, and about how long the rest takes."""
+    full = round(BAR_LENGTH * share)
+    left = (
+        "about a minute"
+        if share < KNOWN_SHARE
+        else f"about {math.ceil(seconds * (1 / share - 1)) + 1} s left"
+    )
+    bar = "#" * full + "." * (BAR_LENGTH - full)
+    return f"compiling for this processor, once: [{bar}] {seconds:.0f} s, {left}"
 
 
 @contextlib.contextmanager

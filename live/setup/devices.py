@@ -8,10 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from acquire.addresses import parse_address
+from acquire.addresses import parse_address, with_setting
 from acquire.camera import Camera, CroppedCamera, open_camera
 from acquire.events import EventSink, ignore_event
-from acquire.load_cell import LoadCell, open_load_cell
+from acquire.load_cell import LoadCell, ZeroedLoadCell, open_load_cell
 from acquire.record_mode import Crop
 
 if TYPE_CHECKING:
@@ -41,7 +41,12 @@ class Rig:
 
 
 def open_rig(
-    camera_address: str, load_address: str, on_event: EventSink = ignore_event, *, crop: Crop | None = None
+    camera_address: str,
+    load_address: str,
+    on_event: EventSink = ignore_event,
+    *,
+    crop: Crop | None = None,
+    zero_N: float = 0.0,
 ) -> Rig:
     """Open both devices; raises as ``open_camera`` and ``open_load_cell``.
 
@@ -49,16 +54,27 @@ def open_rig(
     ----------
     crop : (x, y, width, height), px, optional
         The part of the picture to use.
+    zero_N : float, N
+        Force from which forces count.
     """
     specimen = _specimen(camera_address, load_address)
     camera = _open_camera(camera_address, on_event, specimen)
     try:
         camera = camera if crop is None else CroppedCamera(camera, crop)
-        load = _open_load(load_address, on_event, specimen)
+        load = _zeroed_load(load_address, on_event, specimen, zero_N)
     except BaseException:
         camera.close()
         raise
     return Rig(camera, load, specimen if _simulated(camera_address) else None)
+
+
+def at_rest(address: str) -> str:
+    """The address for a look at the rig before a test: a simulated test would begin by itself."""
+    if not _simulated(address):
+        return address
+    for key, value in (("max_strain", 0.0), ("seconds", 3600.0), ("hold", 1.0), ("end", 1.0)):
+        address = with_setting(address, key, value)
+    return address
 
 
 def _simulated(address: str) -> bool:
@@ -95,9 +111,17 @@ def _open_load(address: str, on_event: EventSink, specimen: VirtualSpecimen | No
     return open_sim_load(parse_address(address), on_event, specimen)
 
 
+def _zeroed_load(
+    address: str, on_event: EventSink, specimen: VirtualSpecimen | None, zero_N: float
+) -> LoadCell:
+    if not zero_N:
+        return _open_load(address, on_event, specimen)
+    return ZeroedLoadCell(lambda sink: _open_load(address, sink, specimen), zero_N, on_event)
+
+
 def open_load(address: str, on_event: EventSink = ignore_event, camera_address: str = "none:") -> LoadCell:
     """Open a load cell alone, also a simulated one; raises as ``open_load_cell``.
 
-    A simulated load cell shares its specimen with a simulated camera at ``camera_address``.
+    A simulated load cell shares its specimen, which is at rest, with a simulated camera at ``camera_address``.
     """
-    return _open_load(address, on_event, _specimen(camera_address, address))
+    return _open_load(address, on_event, _specimen(at_rest(camera_address), at_rest(address)))

@@ -22,7 +22,7 @@ from acquire.events import Event, EventSink
 from acquire.frame import CameraInfo
 from live.config.loading import Config
 from live.config.values import ALL, AUTO
-from live.setup.devices import open_rig
+from live.setup.devices import at_rest, open_rig
 from live.setup.grid import grid_for, whole_picture
 from live.setup.pictures import read_mask, with_mask
 from live.setup.placement import with_auto_gauges
@@ -168,7 +168,7 @@ def first_look(config: Config, say: Callable[[str], None]) -> FirstLook:
     DataError
         The camera ended without a whole frame.
     """
-    rig = open_rig(config.camera.address, "none:", report_warnings(say), crop=config.camera.crop)
+    rig = open_rig(at_rest(config.camera.address), "none:", report_warnings(say), crop=config.camera.crop)
     n = FIRST_LOOK_FRAMES if rig.camera.info.live else 1
     images: list[NDArray[Any]] = []
     try:

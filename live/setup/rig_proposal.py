@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
+import math
 import shlex
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -13,6 +14,7 @@ import numpy as np
 
 from acquire.errors import ConfigError
 from acquire.printable import printable
+from analysis.quality.pattern import zoi_pattern
 from live.config.gauges import GaugeTable
 from live.config.loading import Config
 from live.config.values import AUTO
@@ -48,6 +50,15 @@ class Proposal:
     camera: str
     load: str
     others: tuple[str, ...] = ()
+
+    @property
+    def contrast(self) -> float:
+        """Median over the ZOIs of the standard deviation of the grey levels without noise, share of full scale."""
+        first = self.first_look
+        grid = self.region.grid(self.config, *first.size)
+        found = zoi_pattern(first.picture.astype(np.float32), grid, first.noise or 0.0)
+        variance = float(np.median(found.variance[grid.active]))
+        return math.sqrt(variance) / float(2**first.camera.bits - 1)
 
 
 def propose(

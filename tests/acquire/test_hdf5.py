@@ -5,8 +5,6 @@ from __future__ import annotations
 import errno
 import math
 import os
-import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +18,7 @@ from acquire.hdf5 import DiskSync, PictureReader, PictureStack, compile_loops
 from acquire.hdf5 import disk as pace_module
 from acquire.hdf5.disk import forecast, free_bytes, network_share
 from tests.acquire.session.fixtures import frame, writer
+from tests.live.ui.waiting import until
 
 
 def test_free_bytes_of_what_does_not_exist_yet(tmp_path: Path) -> None:
@@ -177,13 +176,6 @@ def test_what_is_not_as_we_write_it_is_read_by_the_library(tmp_path: Path) -> No
             PictureReader(file["unfiltered"])[2]
 
 
-def until(holds: Callable[[], bool]) -> None:
-    end = time.monotonic() + 20
-    while not holds():
-        assert time.monotonic() < end
-        time.sleep(0.01)
-
-
 def test_it_is_brought_again_and_again_and_at_the_end(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -220,7 +212,10 @@ def test_the_memory_of_what_was_brought_is_let_go_but_for_the_end(
 def test_a_disk_that_fails_ends_the_recording_and_one_that_cannot_is_let_be(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, fails: bool
 ) -> None:
+    tried = list[int]()
+
     def refuse(file: int) -> None:
+        tried.append(file)
         raise OSError(code, os.strerror(code))
 
     monkeypatch.setattr(DiskSync.__init__, "__defaults__", (0.01,))
@@ -229,14 +224,13 @@ def test_a_disk_that_fails_ends_the_recording_and_one_that_cannot_is_let_be(
 
     def failed() -> bool:
         session.write_frame(frame(0))
-        time.sleep(0.06)
         return False
 
     if fails:
         with pytest.raises(DataError, match=r"session\.h5: "):
             until(failed)
     else:
+        until(lambda: tried)
         for number in range(5):
             session.write_frame(frame(number))
-            time.sleep(0.06)
         session.close()

@@ -317,15 +317,15 @@ def test_a_session_that_is_written_meanwhile_is_read_right(tmp_path: Path) -> No
         finally:
             stop.set()
             thread.join()
-    assert 20 < seen <= written
+    assert seen <= written
     with Session.open(path) as back:
         assert (back.recovered, len(back), len(back.load_samples())) == (None, written, written)
 
 
 def _follow(path: Path) -> int:
-    """Opens and refreshes for a while; the frames seen in the end, all of them right."""
-    until, seen = time.monotonic() + 3.0, 0
-    while time.monotonic() < until:
+    """Opens and refreshes until 200 frames are there; the frames seen in the end, all of them right."""
+    seen = 0
+    while seen < 200:
         with Session.open(path) as back:
             assert back.recovered is not None and "still recording" in back.recovered
             for _ in range(10):

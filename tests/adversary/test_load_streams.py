@@ -42,6 +42,7 @@ class Reader:
         self.ended.set()
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("talk", TALKS)
 @pytest.mark.parametrize("kind", PEERS)
 def test_start_and_end_are_soon_whatever_comes(kind: str, talk: str) -> None:
@@ -88,6 +89,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> None:
     run_beside("none:", tmp_path_factory.mktemp("compiled") / "run")
 
 
+@pytest.mark.timed
 @pytest.mark.usefixtures("compiled")
 @pytest.mark.parametrize(("kind", "talk"), [(kind, "flood") for kind in PEERS] + [("socket", "closed")])
 def test_a_test_goes_on_beside_it(kind: str, talk: str, tmp_path: Path) -> None:
@@ -128,6 +130,7 @@ def streams() -> dict[str, list[LoadSample]]:
     return found
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("kind", PEERS)
 def test_what_waited_on_the_way_is_stale(kind: str, streams: dict[str, list[LoadSample]]) -> None:
     samples = streams[kind]
@@ -141,6 +144,7 @@ def test_what_waited_on_the_way_is_stale(kind: str, streams: dict[str, list[Load
 # -- peers that hang up -------------------------------------------------------------------------
 
 
+@pytest.mark.timed
 def test_a_peer_that_hangs_up_at_once_is_reported_once() -> None:
     events: list[Event] = []
     with SocketPeer(leave) as peer:

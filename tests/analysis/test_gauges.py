@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 
 from analysis import Roi, Status, StrainField, ZoiGrid
-from analysis.evaluate import GAUGE_KINDS, AreaGauge, Gauge, LineGauge, TransverseGauge, ZoiGauge
+from analysis.evaluate import (
+    GAUGE_KINDS,
+    AreaGauge,
+    CircleGauge,
+    Gauge,
+    LineGauge,
+    StripGauge,
+    TransverseGauge,
+    ZoiGauge,
+)
 from tests.accuracy.gauges import line, point, ratio
 from tests.accuracy.truth import Speckle, affine
 
@@ -100,7 +109,7 @@ def test_a_gauge_beside_the_grid_names_where_the_grid_is() -> None:
     [
         (lambda: ZoiGauge("a", (0, 0), "ezz"), "gauge a: unknown value 'ezz'; known: u, v"),
         (lambda: AreaGauge("a", corners=((0, 0), (1, 1))), "at least 3 corners"),
-        (lambda: AreaGauge("a", (0, 0, 9, 9), statistic="median"), "known: mean, largest"),  # type: ignore[arg-type]
+        (lambda: AreaGauge("a", (0, 0, 9, 9), statistic="median"), "known: affine, mean, largest"),  # type: ignore[arg-type]
         (lambda: LineGauge("a", (3, 3), (3, 3)), "one point"),
         (lambda: LineGauge("a", (3, 3), (3, 9), 0), "radius must be positive"),
         (lambda: TransverseGauge("a", (0, 0, 0, 5)), "must be positive"),
@@ -130,6 +139,19 @@ def test_sigma_is_the_scatter() -> None:
     for name, part in zip(kinds, np.split(z, np.cumsum([len(some) for some in kinds.values()])[:-1], axis=1),
                           strict=True):  # fmt: skip
         assert np.sqrt(np.mean(part**2)) == pytest.approx(1, abs=0.15), name
+
+
+def test_the_zois_of_a_circle_and_of_a_strip() -> None:
+    x, y = np.meshgrid(GRID.x, GRID.y)
+    circle = CircleGauge("g", (96.0, 80.0), 40.0).zois(GRID)[0]
+    assert np.array_equal(circle, GRID.active & (np.hypot(x - 96, y - 80) <= 40)) and circle.sum() > 8
+    # Along the diagonal: the distance from the line, and the place along it, decide.
+    strip = StripGauge("g", (40.0, 40.0), (120.0, 120.0), 30.0).zois(GRID)[0]
+    off, along = (x - y) / math.sqrt(2), (x + y) / math.sqrt(2)
+    inside = (np.abs(off) < 15) & (along > 40 * math.sqrt(2)) & (along < 120 * math.sqrt(2))
+    assert np.array_equal(strip, GRID.active & inside) and strip.sum() > 5
+    whole = StripGauge("g", (40.0, 80.0), (120.0, 80.0)).outline(32)[0]
+    assert np.ptp([corner[1] for corner in whole]) == 32, "as wide as a ZOI"
 
 
 @pytest.mark.parametrize("kind", GAUGE_KINDS.values(), ids=GAUGE_KINDS)

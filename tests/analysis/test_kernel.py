@@ -39,6 +39,22 @@ def test_whole_grey_levels_are_the_same_in_any_type() -> None:
         assert np.array_equal(kernel.measure(image).parameters, expected.parameters)
 
 
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_a_frame_buffer_may_be_filled_again(dtype: type) -> None:
+    """As a camera does that reuses its buffer: the reference stays what it was."""
+    buffer, later = picture(bits=8).astype(dtype), picture(bits=8, u=0.3).astype(dtype)
+    kernel = PhaseKernel(buffer, GRID)
+    expected = kernel.measure(later).parameters
+    buffer[:] = 0
+    again = kernel.measure(later)
+    assert again.ok.all()
+    np.testing.assert_array_equal(again.parameters, expected)
+    renewed = kernel.renewed(buffer_of_later := later.copy(), again)
+    shown = renewed.measure(later).parameters
+    buffer_of_later[:] = 0
+    np.testing.assert_array_equal(renewed.measure(later).parameters, shown)
+
+
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize(
     "motion",

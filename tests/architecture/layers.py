@@ -16,6 +16,7 @@ ACQUIRE = {
     "acquire.protocols": "acquire",
     "acquire.opencv": "acquire acquire.camera acquire.files",
     "acquire.v4l2": "acquire acquire.camera acquire.opencv",
+    "acquire.genicam": "acquire acquire.camera",
     "acquire.serial_line": "acquire acquire.load_cell acquire.protocols",
     "acquire.session": "acquire acquire.hdf5",
 }
@@ -63,7 +64,7 @@ LAYERS = {
         for i, layer in enumerate(LIVE)
     },
     "live.cli": "acquire.errors acquire.printable live.commands.arguments live.commands.exit_codes"
-    " live.commands.streams",
+    " live.commands.signals live.commands.streams",
 }
 # One module opens the simulated devices. The characterisation and the demo compare with their truth.
 EXCEPTIONS = {
@@ -74,7 +75,7 @@ EXCEPTIONS = {
 
 # Library -> the packages that alone import it.
 LIBRARIES = {
-    "ctypes": "acquire.v4l2",
+    "ctypes": "acquire.genicam acquire.v4l2",
     "distributed": "live.replay",
     "cv2": "acquire analysis.follow",
     "fcntl": "acquire.v4l2",

@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import pytest
 
-from acquire.addresses import parse_address
+from acquire.addresses import parse_address, with_setting
 from acquire.camera import CameraListing, list_cameras
 from acquire.camera.contract import Camera
 from acquire.camera.opening import open_camera
@@ -28,8 +28,7 @@ from live.cli import main
 from live.commands.init import find_devices
 from live.setup.devices import open_rig
 from live.ui.terminal.screen import TerminalScreen
-from live.ui.web.check_panel import camera_values
-from live.ui.web.config_draft import with_setting
+from live.ui.web.setup.check_panel import camera_values
 from tests.acquire.session import fixtures as session_fixtures
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeKernel
 from tests.contracts.entry_points import install_example

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import itertools
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -13,8 +14,10 @@ import numpy as np
 import pytest
 
 from acquire.camera import Camera, CroppedCamera
+from acquire.errors import DataError
 from acquire.events import EventKind
 from acquire.frame import Frame
+from acquire.session import SessionWriter
 from acquire.session.reader import Session
 from live.cli import main
 from live.commands.consumers import standard_consumers
@@ -27,6 +30,7 @@ from live.run.live_run import LiveRun, run_live
 from live.run.outcome import Outcome
 from live.setup.devices import Rig
 from live.ui.terminal.screen import TerminalScreen
+from tests.live.replay.batch.running import until
 
 SIM = "sim:woven?lockstep=yes&seconds=3&fps=15&width=224&height=192&bits=12"
 SMALL = {
@@ -268,6 +272,16 @@ def test_a_new_reference_is_composed_and_replayed(tmp_path: Path) -> None:
     assert_bit_equal(strains(folder), strains(out))
 
 
+def whole_bursts(session: str) -> list[int]:
+    """Numbers of the measured bursts of three that were recorded, by their events; the reference is four frames."""
+    with Session.open(session) as recorded:
+        measured = [event.data for event in recorded.events() if event.kind is EventKind.MEASURED]
+        switched = [event.data for event in recorded.events() if event.kind is EventKind.RECORD]
+    assert [data["on"] for data in switched[-2:]] == [True, False] and switched[-2]["before"] > 0
+    assert all(data["last"] - data["first"] == 2 for data in measured)
+    return [(data["first"] - 4) // 3 for data in measured]
+
+
 @pytest.mark.parametrize("mode", ["all", "bursts"])
 def test_an_armed_run_records_from_a_little_before_the_order_to_the_end_of_it(
     tmp_path: Path, mode: str
@@ -292,17 +306,42 @@ def test_an_armed_run_records_from_a_little_before_the_order_to_the_end_of_it(
         and 4 < frame_counts.recorded < 32
         and not frame_counts.loss
     )
+    left = frame_counts.grabbed - frame_counts.recorded
+    assert f"not recorded 0 and {left} on purpose; adds up" in frame_counts.line()
     session = str(folder / "session.h5")
     for extra in ([], ["--as-measured"]):
         again = out / str(len(extra))
         assert main(["replay", session, *extra, "--out", str(again), "--no-view", "--no-rrd"]) == 0
     live, replayed = strains(folder), strains(again)
     rows = [list(live["time_s"]).index(t) for t in replayed["time_s"]]
-    assert 4 in rows and rows == list(range(rows[0], rows[-1] + 1)) and rows[0] >= 1 and 7 <= rows[-1] <= 10
+    assert rows == whole_bursts(session) and {4, 5, 6, 7} <= set(rows) < set(range(14))
     np.testing.assert_allclose(
         replayed["eyy"], live["eyy"][rows], atol=2e-5
     )  # sigma is 2e-4; the start is another
     np.testing.assert_array_equal(replayed["force_N"], live["force_N"][rows])
+
+
+def test_a_recording_that_has_failed_is_not_shown_as_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The disk is full after ten frames; the status line went on with REC."""
+    write, written = SessionWriter.write_frame, itertools.count()
+    states: list[tuple[str, bool]] = []
+
+    def write_frame(self: SessionWriter, frame: Frame) -> int:
+        if next(written) >= 10:
+            raise DataError("session.h5: the disk is full")
+        return write(self, frame)
+
+    def look(live: LiveRun, m: Measurement) -> None:
+        if m.number == 6:
+            until(lambda: not live.recording)
+        states.append((live.state, live.recording))
+
+    monkeypatch.setattr(SessionWriter, "write_frame", write_frame)
+    outcome = live_run(tmp_path / "run", each=look)
+    assert outcome.exit_code == 5
+    assert states[-1] == ("NOT RECORDING", False)
 
 
 @pytest.mark.parametrize(

@@ -20,7 +20,7 @@ from typing import Any
 from acquire.errors import ConfigError, DataError, PhasedicError
 from live.config.loading import load_config
 from live.pipeline.screen import Screen
-from live.replay.batch.cluster import Cluster
+from live.replay.batch.cluster import Cluster, check_scheduler
 from live.replay.batch.keys import key_of, longest_first
 from live.replay.batch.row import COLUMNS, BatchRow, Value, failed
 from live.replay.batch.scheduler import BatchProgress, ChunkPlan, Scheduler, cut, sweep_chunks
@@ -154,6 +154,8 @@ def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Ev
         The table cannot be written.
     """
     load_config(Path(wanted.config) if wanted.config else None, wanted.overrides)
+    if wanted.scheduler is not None:
+        check_scheduler(wanted.scheduler)
     _make(wanted.out)
     with closing(_processes(wanted)) as processes:
         rows, tasks = _planned(wanted)

@@ -9,6 +9,8 @@ from __future__ import annotations
 import contextlib
 import logging
 import queue
+import re
+import socket
 import uuid
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
@@ -30,6 +32,8 @@ _CONNECT_S, _STARTS = 10, 3
 _PER_WORKER, _MIN_QUEUED = 4, 200
 """Queued tasks for each worker, and the least in all; with ten thousand at once the scheduler stops responding."""
 
+_ADDRESS = re.compile(r"(?:tcp|tls)://([^/:\[\]]+|\[[0-9A-Fa-f:]+\]):(\d{1,5})")
+_REACH_S = 3.0  # for a first connection
 _GONE_S = 5.0  # without the scheduler
 _QUIET_S = 15.0  # without a task that ends
 
@@ -187,6 +191,32 @@ class Cluster:
             self._waiting.extendleft(self._on_done(task, row))
 
 
+def check_scheduler(address: str) -> None:
+    """Connect and disconnect, where no certificate is needed: Dask waits long for a scheduler that is not there.
+
+    Raises
+    ------
+    ConfigError
+        The address is none, or nothing takes connections there.
+    """
+    found = _ADDRESS.fullmatch(address)
+    if found is None:
+        raise ConfigError(f"--scheduler {address}: give tcp://HOST:PORT, as 'dask scheduler' prints it")
+    if address.startswith("tls:"):
+        return
+    try:
+        socket.create_connection((found[1].strip("[]"), int(found[2])), _REACH_S).close()
+    except (OSError, OverflowError, UnicodeError) as error:
+        raise _no_answer(address, getattr(error, "strerror", None) or error) from None
+
+
+def _no_answer(address: str, why: object) -> ConfigError:
+    shown = printable(str(why))[:200]
+    return ConfigError(
+        f"--scheduler {address}: nothing answers there ({shown}); start one with 'dask scheduler'"
+    )
+
+
 def _connected(address: str) -> Any:
     try:
         from distributed import Client, Security
@@ -204,10 +234,7 @@ def _connected(address: str) -> Any:
         except AssertionError:  # Dask waits at most ten seconds for its own thread
             log.debug("Dask's own thread did not start")
         except (OSError, ValueError, TypeError) as error:
-            why = printable(str(error))[:200]
-            raise ConfigError(
-                f"--scheduler {address}: nothing answers there ({why}); start one with 'dask scheduler'"
-            ) from None
+            raise _no_answer(address, error) from None
     raise ConfigError(f"--scheduler {address}: Dask does not start here; this machine is too busy, try again")
 
 

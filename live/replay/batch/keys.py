@@ -10,7 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from acquire.addresses import parse_address
+from acquire.addresses import expanded, parse_address
 from acquire.camera import with_scheme
 from acquire.errors import DataError
 from acquire.files.picture import check_regular
@@ -60,7 +60,7 @@ def longest_first(tasks: Iterable[Task]) -> list[Task]:
 def _bytes(task: Task) -> int:
     if not is_session(task.source):
         return 0
-    path = Path(parse_address(with_scheme(task.source)).target).expanduser()
+    path = expanded(parse_address(with_scheme(task.source)).target)
     with contextlib.suppress(OSError):
         return sum(file.stat().st_size for file in _set_of(path))
     return 0  # removed since; the replay reports it
@@ -88,7 +88,7 @@ def is_session(source: str) -> bool:
 def _source(source: str) -> Any:
     """A recording by its length, beginning and end; pictures by names, lengths and times."""
     address = parse_address(with_scheme(source))
-    path = Path(address.target).expanduser()
+    path = expanded(address.target)
     try:
         if address.scheme == "session":
             return [_ends(file) for file in _set_of(path)]

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from acquire.addresses import parse_address
+from acquire.addresses import expanded, parse_address
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import read_bytes
 from acquire.printable import printable
@@ -79,7 +79,7 @@ def _sources(word: str) -> Iterator[str]:
     if scheme and scheme != "session" and not Path(word).exists():
         yield word
         return
-    path = Path(word.removeprefix("session:")).expanduser()
+    path = expanded(word.removeprefix("session:"))
     pattern = str(path.relative_to(path.anchor))
     paths = [path] if path.exists() else sorted(Path(path.anchor).glob(pattern))
     if not paths:
@@ -212,4 +212,4 @@ def _beside(path: Path, word: str) -> str:
     address = parse_address(word)
     scheme = f"{address.scheme}:" if address.scheme else ""
     rest = word.removeprefix(scheme)
-    return f"{scheme}{(path.absolute().parent / Path(rest).expanduser())}"
+    return f"{scheme}{(path.absolute().parent / expanded(rest))}"

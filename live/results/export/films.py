@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+import io
+from collections.abc import Generator, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -29,6 +30,9 @@ _CODECS = {
         "VP9: old versions of QuickTime and PowerPoint do not play it; give --out NAME.mp4 for them",
     ),
 }
+
+MAX_GIF_BYTES = 8_000_000
+_MIN_GIF_PX = 120  # smaller pictures show nothing
 
 
 def write_png(job: ExportJob, path: Path) -> None:
@@ -76,7 +80,7 @@ def write_mp4(job: ExportJob, path: Path) -> None:
 
 
 def write_gif(job: ExportJob, path: Path) -> None:
-    """A film that every program shows; 256 colours, at most 640 px.
+    """A film that every program shows; 256 colours, at most 640 px and 8 MB: smaller pictures where it would be larger.
 
     Raises
     ------
@@ -90,15 +94,21 @@ def write_gif(job: ExportJob, path: Path) -> None:
             "--to gif needs Pillow: pip install 'phasedic[export]'; --to mp4 does without"
         ) from None
     with new_file(path) as part:
-        pages = [Pillow.fromarray(image[..., ::-1].copy()).quantize() for _, image in _frames(job, 640)]
-        pages[0].save(
-            part,
-            "GIF",
-            save_all=True,
-            append_images=pages[1:],
-            duration=round(1000 / job.options.fps),
-            loop=0,
-        )
+        images = [Pillow.fromarray(image[..., ::-1].copy()) for _, image in _frames(job, 640)]
+        content = _gif(images, 1000 / job.options.fps)
+        while len(content) > MAX_GIF_BYTES and min(images[0].size) > _MIN_GIF_PX:
+            share = max(0.5, 0.95 * (MAX_GIF_BYTES / len(content)) ** 0.5)
+            images = [image.resize([round(share * side) for side in image.size]) for image in images]
+            content = _gif(images, 1000 / job.options.fps)
+        part.write_bytes(content)
+
+
+def _gif(images: Sequence[Any], duration_ms: float) -> bytes:
+    """The film of these pictures, each for ``duration_ms``."""
+    first, *rest = (image.quantize() for image in images)
+    file = io.BytesIO()
+    first.save(file, "GIF", save_all=True, append_images=rest, duration=round(duration_ms), loop=0)
+    return file.getvalue()
 
 
 def _frames(job: ExportJob, longest: int = 1280) -> Iterator[tuple[int, NDArray[np.uint8]]]:

@@ -99,6 +99,8 @@ def export(run: RunFolder, request: ExportRequest, screen: Screen) -> Path:
     rows = chosen_rows(run.strain, request.start_s, request.end_s)
     job = ExportJob(run, fields, rows, request.display, screen, request.options)
     path = request.out or run.path / FOLDER / _name(kind, request, fields[0])
+    if request.format == "mp4" and not path.suffix:
+        path = path.with_name(f"{path.name}.mp4")  # the encoder takes the format from the name
     kind.write(job, path)
     return path
 

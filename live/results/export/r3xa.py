@@ -27,7 +27,7 @@ def write_r3xa(job: ExportJob, path: Path) -> None:
     with new_folder(path) as folder:
         with (folder / "means.csv").open("x", encoding="utf-8", newline="\n") as file:
             means(job, file, notes=False)
-        samples = job.run.session.load_samples() if job.run.session is not None else []
+        samples = job.run.load_samples
         if samples:
             with (folder / "load.csv").open("x", encoding="utf-8", newline="\n") as file:
                 load_table(job.run, samples, file)

@@ -37,11 +37,14 @@ class Painted:
         None for the map of statuses.
     legend : tuple of StatusCount
         Of the map of statuses.
+    values : (R, C) float or None
+        None for the map of statuses.
     """
 
     rgba: NDArray[np.uint8]
     scale: ColourScale | None
     legend: tuple[StatusCount, ...] = ()
+    values: NDArray[np.floating] | None = None
 
 
 class FieldMaps:
@@ -96,4 +99,4 @@ class FieldMaps:
         else:
             sigmas = field.sigma(self._along)
         scale = ColourScale.of(name, self._ranges[name].update(values, sigmas))
-        return Painted(scale.colours(values, self._alpha), scale)
+        return Painted(scale.colours(values, self._alpha), scale, values=values)

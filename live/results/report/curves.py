@@ -47,11 +47,20 @@ def stress_strain(curve: EvaluatedCurve) -> Plot:
         name = "Rp0.2" if curve.is_stress else "Fp0.2"
         words = f"{name} = {figures.Rp02.value * load.factor:.4g} {load.name}"
         marks.append(Mark(strain * e.factor, figures.Rp02.value * load.factor, words))
+    if figures.Rm.known:
+        marks.append(_highest(curve, e, load))
     what = "stress" if curve.is_stress else "force"
     title = f"{what.capitalize()} against strain"
     return Plot(
         "stress-strain", title, f"axial strain, {e.name}", f"{what}, {load.name}", tuple(curves), tuple(marks)
     )
+
+
+def _highest(curve: EvaluatedCurve, e: Unit, load: Unit) -> Mark:
+    """The point of the highest stress or force."""
+    top, name = curve.figures.Rm.value * load.factor, "Rm" if curve.is_stress else "Fm"
+    strain = curve.axial[int(np.nanargmax(np.where(np.isfinite(curve.axial), curve.load, np.nan)))]
+    return Mark(strain * e.factor, top, f"{name} = {top:.4g} {load.name}")
 
 
 def _straight(curve: EvaluatedCurve, label: str, offset: float, e: Unit, load: Unit) -> PlotLine:
@@ -92,7 +101,7 @@ def gauge_strains(run: RunFolder) -> Plot | None:
 
 def force(run: RunFolder) -> Plot | None:
     """Force against time, with every reading of the load cell where a session has them; None without force."""
-    samples = run.session.load_samples() if run.session is not None else []
+    samples = run.load_samples
     if samples:
         t = np.array([s.t - run.start_monotonic for s in samples])
         f = np.array([s.force for s in samples])

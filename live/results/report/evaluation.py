@@ -46,7 +46,7 @@ class EvaluatedCurve:
         measured, is_stress = run.curve, run.specimen.area_m2 is not None
         figures = evaluate_test(measured, tensile_options(run.specimen))
         axial, load = measured.strain, measured.stress
-        return cls(axial, run.transverse_strain, load, is_stress, figures, _intercept(axial, load, figures))
+        return cls(axial, run.transverse_strain, load, is_stress, figures, intercept_of(axial, load, figures))
 
     @property
     def has_load(self) -> bool:
@@ -68,14 +68,15 @@ def _elastic(axial: Array, load: Array, figures: TensileFigures) -> NDArray[np.b
     return np.asarray(before & (strain >= span.strain[0]) & (strain <= span.strain[1]), np.bool_)
 
 
-def _intercept(axial: Array, load: Array, figures: TensileFigures) -> float:
+def intercept_of(axial: Array, load: Array, figures: TensileFigures) -> float:
+    """The load of the elastic line at no strain, in the unit of ``load``; NaN where there is no line."""
     part = _elastic(axial, load, figures) & np.isfinite(load)
     return float(np.mean(load[part]) - figures.E.value * np.mean(axial[part])) if part.any() else math.nan
 
 
 def lag_of(run: RunFolder) -> Figure:
     """The lag of the recorded load behind the frames, s, found from the test itself."""
-    samples = run.session.load_samples() if run.session is not None else []
+    samples = run.load_samples
     if not samples:
         return Figure.none("no readings of a load cell were recorded")
     t = np.array([sample.t - run.start_monotonic for sample in samples])

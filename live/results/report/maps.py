@@ -44,20 +44,14 @@ class MapPictures:
 
 
 def map_pictures(run: RunFolder, rows: list[int]) -> MapPictures:
-    """Read the pictures of ``rows``; where there are none, the painter uses plain grey of the extent of the ZOIs.
-
-    Raises
-    ------
-    DataError
-        The recording exists and cannot be read.
-    """
+    """Read the pictures of ``rows``; where there are none, the painter uses plain grey of the extent of the ZOIs."""
     pictures = run.pictures
     if pictures is None:
         roi = run.strain.grid.roi
         return MapPictures(dict.fromkeys(rows), None, (2 * roi.x + roi.width, 2 * roi.y + roi.height))
     images: dict[int, NDArray[Any] | None] = dict.fromkeys(rows)
     images.update(zip(rows, pictures.each(rows), strict=False))
-    first = images[rows[0]]
+    first = next((image for image in images.values() if image is not None), None)
     levels = Levels.of(first) if first is not None else None
     return MapPictures(images, levels, (pictures.info.width, pictures.info.height), pictures.info)
 

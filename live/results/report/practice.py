@@ -18,6 +18,7 @@ from acquire.events import EventKind
 from acquire.frame import CameraInfo
 from analysis.evaluate import NoiseFloor
 from analysis.picture.pattern import describe_pattern
+from analysis.quality.pattern import FWHM_OF_RADIUS, SPECKLE_RADIUS_PX
 from live.results.report.page import Html, element, table
 from live.results.run_folder import RunFolder
 
@@ -99,12 +100,12 @@ def _feature(known: PracticeValues) -> str:
         width = describe_pattern(part).autocorrelation_fwhm
     except ValueError:
         return ""
+    if not math.isfinite(width):
+        return ""
     scale = f" ({width * known.mm_per_px:.3g} mm)" if known.mm_per_px else ""
-    return (
-        f"{width:.1f} px{scale}, full width at half height of the autocorrelation"
-        if math.isfinite(width)
-        else ""
-    )
+    radius, (low, high) = width / FWHM_OF_RADIUS, SPECKLE_RADIUS_PX
+    judged = "" if low <= radius <= high else f" (LOOK: wanted are {low:g} to {high:g} px)"
+    return f"{width:.1f} px{scale}, full width at half height of the autocorrelation; radius {radius:.2f} px{judged}"
 
 
 def _analysis(known: PracticeValues) -> list[tuple[str, str, str]]:

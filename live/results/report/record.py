@@ -83,7 +83,7 @@ def times(run: RunFolder) -> Html:
 
 def frame_counts(run: RunFolder) -> Html:
     """The frame counts of the recording."""
-    found = run.session.frame_counts if run.session is not None else None
+    found = run.frame_counts
     return facts(found) if found else paragraph("No frame counts were recorded.", "dim")
 
 
@@ -129,7 +129,7 @@ def version_table(run: RunFolder) -> Html:
 
 def hashes(run: RunFolder, screen: Screen) -> Html:
     """The files of the run and the replayed recording, with their size and hash."""
-    files = {path for path in run.path.iterdir() if path.suffix in _KINDS}
+    files = {path for path in run.path.iterdir() if path.suffix in _KINDS and path.is_file()}
     session = run.session_path
     beside = [session] if session is not None and session.parent.resolve() != run.path.resolve() else []
     rows = []

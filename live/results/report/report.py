@@ -129,11 +129,15 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
         section("Maps", *(maps(run, name, chosen, pictures, side) for name in fields)),
         section("Noise floor", *_noise_section(content)),
         section("Status of the ZOIs", statuses(run, max(chosen), pictures, min(side, 480))),
-        section("Frame counts and events", frame_counts(run), events(run)),
+        section("Frame counts and events", frame_counts(run), events(run), *_unreadable(run)),
         section("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
         section("Definitions", definitions(run)),
         section("Versions and files", version_table(run), content.files),
     ]
+
+
+def _unreadable(run: RunFolder) -> list[Html]:
+    return [paragraph(note, "warning") for note in run.notes]
 
 
 def _head(run: RunFolder, curve: EvaluatedCurve) -> Html:

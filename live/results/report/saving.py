@@ -79,7 +79,7 @@ def _run(page: Path, target: Path, arguments: list[str]) -> None:
             raise DataError(
                 f"{target}: {browser} did not finish within {_TIMEOUT_S} s; print the page from it"
             ) from None
-    if not target.exists():
+    if not target.exists() or not target.stat().st_size:
         words = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
         raise DataError(f"{target}: {browser} failed on {page} ({' '.join(words)}); print the page from it")
 
@@ -97,17 +97,26 @@ def save_pdf(page: Path, path: Path) -> None:
 
 
 def save_figures(figures: Sequence[Plot], folder: Path, screen: Screen) -> None:
-    """Each as SVG and CSV, and as PNG where a browser is installed; raises as ``new_folder``."""
-    browser = find_browser()
+    """Each as SVG and CSV, and as PNG where a browser works; raises as ``new_folder``."""
     with new_folder(folder) as part:
         for figure in figures:
             svg = part / f"{figure.name}.svg"
             svg.write_text(draw(figure, standalone=True), encoding="utf-8")
             (part / f"{figure.name}.csv").write_text(as_csv(figure), encoding="utf-8")
-            if browser is not None:
-                to_png(svg, svg.with_suffix(".png"), WIDTH, HEIGHT)
-    if browser is None:
-        screen.say(NO_PNG)
+        if trouble := _png_trouble([part / f"{figure.name}.svg" for figure in figures]):
+            screen.say(f"warning: {trouble}")
+
+
+def _png_trouble(pictures: Sequence[Path]) -> str:
+    """Render each SVG beside it; why that is not possible, at the first that fails."""
+    if find_browser() is None:
+        return NO_PNG
+    try:
+        for svg in pictures:
+            to_png(svg, svg.with_suffix(".png"), WIDTH, HEIGHT)
+    except (DataError, OSError) as error:
+        return f"the figures are SVG and CSV without PNG: {error}"
+    return ""
 
 
 def as_csv(figure: Plot) -> str:

@@ -196,14 +196,14 @@ def figures_of(
     load: LoadReport | None = None,
 ) -> CheckFigures:
     """All figures: those of the kernel, and those that follow from the frames directly."""
-    check_region, m, bits = sample.check_region, sample.check_region.config.measure, sample.stack.camera.bits
+    check_region, m, camera = sample.check_region, sample.check_region.config.measure, sample.stack.camera
     same = sample.picture.mean is sample.raw
     return CheckFigures(
         region=check_region.region,
         stack=sample.stack,
         noise=sample.noise,
-        exposure=exposure(sample.pixels, bits),
-        depth=depth(sample.pixels, bits),
+        exposure=exposure(sample.pixels, camera.saturation),
+        depth=depth(sample.pixels, camera.bits),
         radius=_radius(sample),
         zois=_zois(sample, measured.predicted.sigma),
         still=replace(measured.still, light=light(sample)),
@@ -229,7 +229,12 @@ def automatic_controls(controls: Mapping[str, Any]) -> tuple[str, ...]:
 def _is_automatic(name: str, value: object) -> bool:
     if isinstance(value, str):
         words = value.lower()
-        return "auto" in name and "manual" not in words and "shutter" not in words and words != "disabled"
+        return (
+            "auto" in name
+            and "manual" not in words
+            and "shutter" not in words
+            and words not in ("disabled", "off")
+        )
     named = "auto" in name or "continuous" in name or "dynamic_framerate" in name
     # 1 is "manual" for the exposure of V4L2, but that menu has texts; here a number is a switch.
     return named and isinstance(value, int | float) and bool(value)

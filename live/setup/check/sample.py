@@ -19,7 +19,7 @@ from analysis.picture.pattern import noise_of_picture
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
 from live.pipeline.reference import Correction, averaged
-from live.setup.devices import open_rig
+from live.setup.devices import at_rest, open_rig
 from live.setup.grid import kernel_settings
 from live.setup.pictures import correction
 from live.setup.region import Region
@@ -81,7 +81,7 @@ class FrameStack:
             mean=frozen(mean.astype(np.float32)),
             n=len(part),
             noise=math.nan,
-            clipped=frozen(part.max(axis=0) >= 2**self.camera.bits - 1),
+            clipped=frozen(part.max(axis=0) >= self.camera.saturation),
             bits=self.camera.bits,
             t=float(times.mean()),
             duration=float(times[-1] - times[0]),
@@ -124,7 +124,7 @@ def take(config: Config, on_event: EventSink = ignore_event) -> FrameStack:
         The camera gave too few frames.
     """
     reference = config.measure.reference_burst or DEFAULT_REFERENCE_BURST
-    rig = open_rig(config.camera.address, "none:", on_event, crop=config.camera.crop)
+    rig = open_rig(at_rest(config.camera.address), "none:", on_event, crop=config.camera.crop)
     frames: list[Frame] = []
     lost = 0
     try:

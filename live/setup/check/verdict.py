@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from analysis.quality.pattern import SPECKLE_RADIUS_PX
 from analysis.quality.steadiness import Steadiness, aliased, mains_of
 from live.setup.check.check_list import CheckFigures, median
 from live.setup.check.noise_floor import ZoiFloor
@@ -19,8 +20,6 @@ from live.setup.check.sample import MIN_FRAMES
 MAX_SATURATED, MAX_DARK, MAX_PILED = 1e-4, 0.01, 1e-3
 MIN_LIGHT = 0.3  # of full scale, 99th percentile
 MIN_CONTRAST = 0.05  # of full scale
-# 0.9 is a full width of 3 px, the finest in the iDICs Good Practices Guide: its bias is 0.0003 px.
-RADIUS_PX = (0.9, 6.0)
 MAX_FLICKER, MAX_WITHOUT_PATTERN, MIN_SHARPNESS_RATIO = 0.01, 0.02, 0.7
 MAX_NOISE_PX = 0.05  # of one ZOI in one frame
 MAX_OVER_PREDICTED = 1.5  # measured over predicted noise
@@ -133,9 +132,9 @@ def _light(f: CheckFigures) -> Iterator[CheckLine]:
                    "raise the black level of the camera, or the light: what is cut off is lost")  # fmt: skip
     if e.piled > MAX_PILED:
         yield CheckLine("clipped below the top", f"{e.piled:.1%} at one highest level", False,
-                   "saturated before the end of the scale: less light, or give the true depth (bits=...)")  # fmt: skip
+                   "less light; where this is where the camera saturates, give it (bits=... or white=...)")  # fmt: skip
     yield _not_measured(f, "flicker") if f.stack.few else _flicker(f)
-    full = 2**f.stack.camera.bits - 1
+    full = f.stack.camera.saturation
     shown = f"{f.noise:.2f} GL of one frame, {f.noise / full:.2%} of full scale"
     if f.stack.few:
         yield CheckLine("noise", f"{shown}, {_noise_source(f)}")
@@ -165,14 +164,14 @@ def _flicker(f: CheckFigures) -> CheckLine:
 
 
 def _pattern(f: CheckFigures) -> Iterator[CheckLine]:
-    full, z = 2**f.stack.camera.bits - 1, f.zois
+    full, z = f.stack.camera.saturation, f.zois
     contrast = median(z.contrast) / full
     yield CheckLine("contrast (std)", f"{contrast:.1%} of full scale", contrast > MIN_CONTRAST,
                "more light, a longer exposure, or a pattern of blacker black and whiter white")  # fmt: skip
-    low, high = RADIUS_PX
+    low, high = SPECKLE_RADIUS_PX
     words = "finer speckle or a wider field of view" if f.radius > high else "coarser speckle, or focus"
     radius = f"{f.radius:.2f} px" if math.isfinite(f.radius) else "none is visible"
-    yield CheckLine("speckle radius", f"{radius} (best from 1.5 to 4)", low <= f.radius <= high, words)
+    yield CheckLine("speckle radius", f"{radius} (from {low:g} to {high:g})", low <= f.radius <= high, words)
     yield _sharpness(f)
     yield _sssig(f)
     share, n = z.without_pattern, z.grid.n_active

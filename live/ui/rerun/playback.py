@@ -128,8 +128,10 @@ class _PlayedMessages:
 def _report_selection(shown: int, run: RunFolder, screen: Screen) -> None:
     if shown < run.strain.n:
         screen.say(f"{shown} of {run.strain.n} instants are shown; --from, --to and --every choose others")
-    if run.pictures is None:
+    if run.pictures is None and not run.notes:
         screen.say("note: the pictures that were measured are not here any more; maps alone")
+    for note in run.notes:
+        screen.say(f"note: {note}")
 
 
 def _notify(screen: Screen, text: str, level: Level) -> None:
@@ -250,8 +252,8 @@ def _curves(run: RunFolder) -> Iterator[Message]:
     for name, gauge in run.gauges.items():
         yield rows_message(Kind.GAUGE, zip(t, gauge.value, gauge.sigma, strict=True), name)
     loads = [(t[row], run.force[row]) for row in range(run.strain.n)]
-    if run.session is not None and (samples := run.session.load_samples()):
-        loads = [(sample.t - run.start_monotonic, sample.force) for sample in samples]
+    if run.load_samples:
+        loads = [(sample.t - run.start_monotonic, sample.force) for sample in run.load_samples]
     yield rows_message(Kind.LOADS, (row for row in loads if math.isfinite(row[1])))
 
 

@@ -7,30 +7,31 @@ map only while a page is open.
 from __future__ import annotations
 
 import math
-import threading
 import time
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.printable import printable
+from analysis.evaluate import LineGauge
 from live.config.gauges import complete_gauges
 from live.config.loading import Config
+from live.pipeline.channel_values import ChannelValues
 from live.pipeline.consumer import Consumer, Policy
 from live.pipeline.event_log import sentence
-from live.pipeline.history import Thinned
-from live.pipeline.measurement import Measurement
+from live.pipeline.measurement import AXIAL, Measurement, TimeStep
 from live.pipeline.run_state import RunState
-from live.pipeline.snapshot import Snapshot
-from live.results.maps.field_maps import FIELD_MAPS, FieldMaps, Painted
-from live.results.maps.painting import overlay_cells
+from live.pipeline.snapshot import Snapshot, peak_force
 from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.curve_history import CurveHistory
+from live.ui.web.map_view import MapView, gauge_shapes
 from live.ui.web.painting import as_jpeg, shrunk
 
-MAX_POINTS, MAX_EVENTS = 4000, 30
+MAX_EVENTS = 30
 STATE_S, PICTURE_S = 0.1, 0.25
 """Between states and between pictures."""
 
@@ -43,6 +44,9 @@ class Running(Protocol):
 
     @property
     def recording(self) -> bool: ...
+
+    @property
+    def live(self) -> bool: ...
 
     @property
     def run_state(self) -> RunState: ...
@@ -59,12 +63,15 @@ class PageConsumer(Consumer):
     broadcaster : Broadcaster
     config : Config
     now : callable giving monotonic seconds
+    picture : bytes
+        Shown until there is one of the run, as JPEG.
 
     Attributes
     ----------
     picture : bytes
         The newest picture with its map, as JPEG.
     curve : CurveHistory
+    map : MapView
     """
 
     name = "page"
@@ -72,37 +79,48 @@ class PageConsumer(Consumer):
     timeout_s = 5.0
 
     def __init__(
-        self, broadcaster: Broadcaster, config: Config, now: Callable[[], float] = time.monotonic
+        self,
+        broadcaster: Broadcaster,
+        config: Config,
+        now: Callable[[], float] = time.monotonic,
+        picture: bytes = b"",
     ) -> None:
         self._broadcaster, self._config, self._now = broadcaster, config, now
-        axis = config.specimen.first_axis
-        self._component = f"e{axis * 2}"
-        self._maps = FieldMaps(axis, config.view.strain_range)
+        self.map = MapView(config)
         names = list(config.gauges) or ["exx", "eyy", "exy"]
         self.curve = CurveHistory(["t", "stress" if config.specimen.area_m2 else "force", "axial", *names])
         self._names = names
-        self.picture = b""
+        self.picture = picture
         self._shown = 0
         self._scale: dict[str, Any] = {}
         self._running: Running | None = None
         self._newest: Measurement | None = None
+        self._matched: Measurement | None = None
+        self._peak: Measurement | None = None
+        self._peak_N = math.nan
         self._frame: Frame | None = None
         self._fresh = False
         self._events: deque[tuple[float, dict[str, Any]]] = deque(maxlen=MAX_EVENTS)
         self._start_t = now()
         self._t0 = math.nan
+        self._channels: ChannelValues | None = None
+        self._rate = math.nan
+        self._length_mm = axial_length_mm(config)
         self._due = {"state": 0.0, "picture": 0.0}
 
     def attach(self, running: Running) -> None:
         """Use ``running``, which has begun."""
         self._running, self._start_t = running, running.run_state.health.began_t
+        self._channels = ChannelValues(self._start_t, running.run_state.snapshot)
 
-    def select_map(self, component: str) -> str:
-        """Show another map; the reason of a refusal, or empty."""
-        if component not in FIELD_MAPS:
-            return f"there is no map {component!r}; there are {', '.join(FIELD_MAPS)}"
-        self._component, self._fresh = component, True
-        return ""
+    def select_map(self, request: Mapping[str, Any]) -> str:
+        """Show another map or range; the reason of a refusal, or empty."""
+        choice = self.map.choice
+        refusal = self.map.choose(
+            request.get("of"), request.get("range", choice.span), request.get("limit", choice.limit)
+        )
+        self._fresh = self._fresh or not refusal
+        return refusal
 
     # -- data of a run ------------------------------------------------------------------------
 
@@ -111,15 +129,26 @@ class PageConsumer(Consumer):
         self._newest, self._fresh = measurement, True
 
     def matched(self, measurement: Measurement) -> None:
-        """Add a point of the curves."""
-        i = measurement.time_step
+        """Add a point of the curves; keep the measurement at the highest force."""
+        i, running = measurement.time_step, self._running
+        self._matched = measurement
         if math.isnan(self._t0):
             self._t0 = i.t
-        running, first_axis = self._running, self._config.specimen.first_axis
+        first_axis = self._config.specimen.first_axis
         axis = first_axis if running is None else running.run_state.history.current_axis
         strains = [i.gauges[n].value if n in i.gauges else getattr(i, n, math.nan) for n in self._names]
         stress = i.force / (self._config.specimen.area_m2 or 1.0)
         self.curve.add([i.t - self._t0, stress, i.axial(axis)[0], *strains])
+        if self._channels is not None:
+            self._rate = self._channels.read(measurement)["strain_rate"]
+        self._keep_peak(measurement)
+
+    def _keep_peak(self, measurement: Measurement) -> None:
+        """The measurement at the force of largest magnitude; without a force the last one."""
+        force = measurement.time_step.force
+        self._peak_N = peak_force(self._peak_N, force)
+        if self._peak is None or math.isnan(self._peak_N) or self._peak_N == force:
+            self._peak = measurement
 
     def frame(self, frame: Frame) -> None:
         """Keep the newest frame, shown until something is measured."""
@@ -148,8 +177,24 @@ class PageConsumer(Consumer):
 
     def end(self) -> str:
         """Send the last state."""
-        self._broadcaster.publish("run", self.state() | {"state": "ended"})
+        self._broadcaster.publish("run", self.state() | {"state": "ended", "recording": False})
         return f"{self._shown} pictures shown"
+
+    def at_peak(self) -> dict[str, Any]:
+        """For the page after the test: the map and the gauges at the highest force, without one at the end."""
+        m = self._peak
+        if m is None:
+            return {"peak": None, "gauges": [], "points": self.curve.position}
+        self.picture, shown = self.map.draw(m)
+        self._shown += 1
+        words = "at the end" if math.isnan(self._peak_N) else "at the highest force"
+        peak = shown | {"picture": f"/picture?after={self._shown}"}
+        return {
+            "peak": peak,
+            "atpeak": words,
+            "gauges": _gauges(m.time_step),
+            "points": self.curve.position,
+        }
 
     # -- messages to the page -----------------------------------------------------------------
 
@@ -157,15 +202,23 @@ class PageConsumer(Consumer):
         """The state of the run, as the page shows it."""
         running, now = self._running, self._now()
         elapsed_s = now - self._start_t
-        s = Snapshot(now, elapsed_s=elapsed_s) if running is None else running.run_state.snapshot(now)
+        s = Snapshot(now, elapsed_s=elapsed_s) if running is None else self._snapshot(running, now)
         values: dict[str, Any] = {
             "state": self._state_name(s),
             "elapsed_s": s.elapsed_s,
+            "recording": None if running is None else running.recording,
             "force_N": s.force_N,
             "peak_N": s.peak_N,
             "stress_Pa": s.stress_Pa,
+            "strain_rate": self._rate,
+            "elongation_mm": None if self._length_mm is None else s.axial * self._length_mm,
             "points": self.curve.position,
-            "picture": {"n": self._shown, "of": self._component, **self._scale},
+            "picture": {
+                "n": self._shown,
+                "of": self.map.choice.name,
+                "range": self.map.choice.span,
+                **self._scale,
+            },
             "events": [{"s": max(at - self._start_t, 0.0), **event} for at, event in self._events],
             "late_s": s.latency_p95_s,
             "fps": s.fps,
@@ -173,9 +226,16 @@ class PageConsumer(Consumer):
             "alarms": [printable(text) for text in s.alarms],
             "disk_min": s.disk_s / 60,
         }
-        if running is not None:
-            values |= {"recording": running.recording, "folder": str(running.folder)}
         return values | _measured(s)
+
+    def _snapshot(self, running: Running, now: float) -> Snapshot:
+        """The state of the test; of a recording all figures are of one instant, and nothing is late."""
+        if running.live or self._matched is None:
+            return running.run_state.snapshot(now)
+        step, area = self._matched.time_step, self._config.specimen.area_m2
+        s = running.run_state.snapshot(now, step)
+        stress = step.force / area if area else math.nan
+        return replace(s, force_N=step.force, stress_Pa=stress, peak_N=self._peak_N, latency_p95_s=math.nan)
 
     def _state_name(self, s: Snapshot) -> str:
         if self._running is None:
@@ -188,92 +248,37 @@ class PageConsumer(Consumer):
         self._fresh = False
         m, frame = self._newest, self._frame
         if m is not None:
-            picture, scale = shrunk(m.burst.mean, m.burst.bits)
-            painted = self._maps.paint(m.field, (self._component,))[self._component]
-            overlay_cells(picture, scale, m.field.grid, painted.rgba, (m.time_step.u, m.time_step.v))
-            self._scale = _scale_of(painted)
-            size = m.burst.mean.shape
+            self.picture, self._scale = self.map.draw(m)
         elif frame is not None:
-            picture, scale = shrunk(frame.image, frame.bits)
-            size = frame.image.shape
-        else:
-            return
-        self._scale |= {"width": size[1], "height": size[0], "gauges": gauge_shapes(self._config)}
-        self.picture = as_jpeg(picture)
+            height, width = frame.image.shape
+            self.picture = as_jpeg(shrunk(frame.image, frame.bits)[0])
+            self._scale = {"width": width, "height": height, "gauges": gauge_shapes(self._config)}
         self._shown += 1
 
 
-class CurveHistory:
-    """Rows of numbers by time, bounded: a long test is thinned evenly, and a page then requests all rows again.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Of the columns.
-    """
-
-    def __init__(self, names: Sequence[str]) -> None:
-        self._names = list(names)
-        self._rows: Thinned[Sequence[float]] = Thinned(MAX_POINTS)
-        self._lock = threading.Lock()
-
-    def add(self, row: Sequence[float]) -> None:
-        """Add a row; a long curve is thinned."""
-        with self._lock:
-            self._rows.append(row)
-
-    @property
-    def position(self) -> tuple[int, int]:
-        """Edition (rows of another edition are useless) and number of rows."""
-        with self._lock:
-            return self._rows.halvings, len(self._rows.kept)
-
-    def since(self, edition: int, count: int) -> dict[str, Any]:
-        """The rows that a page with ``count`` rows of ``edition`` lacks."""
-        with self._lock:
-            first = count if edition == self._rows.halvings else 0
-            return {
-                "names": self._names,
-                "edition": self._rows.halvings,
-                "first": first,
-                "rows": self._rows.kept[first:],
-            }
+def axial_length_mm(config: Config) -> float | None:
+    """The length over which the axial strain is an elongation, mm: of the gauge ``axial``, else as given."""
+    px_per_mm = config.scale.px_per_mm
+    for gauge in complete_gauges(config.gauges, config.specimen.first_axis):
+        if gauge.name == AXIAL and isinstance(gauge, LineGauge) and px_per_mm:
+            return math.dist(gauge.start, gauge.end) / px_per_mm
+    return config.specimen.gauge_length_mm
 
 
-def _scale_of(painted: Painted) -> dict[str, Any]:
-    """The colour scale of a map, as the page shows it."""
-    scale = painted.scale
-    if scale is not None:
-        return {"low": scale.low, "high": scale.high, "unit": scale.unit}
-    legend = [{"text": f"{one.name} {one.count}", "colour": f"rgb{one.rgb}"} for one in painted.legend]
-    return {"legend": legend}
-
-
-def gauge_shapes(config: Config) -> dict[str, Any]:
-    """The gauges of a configuration as the page draws them: kind, handles and lines, px."""
-    found = complete_gauges(config.gauges, config.specimen.first_axis)
-    zoi = config.measure.zoi
-    return {
-        one.name: {
-            "kind": one.kind,
-            "handles": one.handles(),
-            "outline": [[(round(x, 1), round(y, 1)) for x, y in line] for line in one.outline(zoi)],
-        }
-        for one in found
-    }
+def _gauges(step: TimeStep) -> list[dict[str, Any]]:
+    return [
+        {"name": name, "value": gauge.value, "sigma": gauge.sigma, "reason": gauge.reason}
+        for name, gauge in step.gauges.items()
+    ]
 
 
 def _measured(s: Snapshot) -> dict[str, Any]:
     i = s.time_step
     if i is None:
         return {}
-    gauges = [
-        {"name": name, "value": gauge.value, "sigma": gauge.sigma, "reason": gauge.reason}
-        for name, gauge in i.gauges.items()
-    ]
     return {
         "axial": {"name": s.axial_name, "value": s.axial, "sigma": s.sigma_axial},
-        "gauges": gauges,
+        "gauges": _gauges(i),
         "valid": s.valid,
         "zois": s.zois,
         "refused": i.refused,

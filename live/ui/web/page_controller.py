@@ -1,7 +1,8 @@
 """The stages of the page: set-up, run, after, and again; what each shows, and which commands it accepts.
 
 A command is the same line from the page as from the keyboard (``live.run.control``). Before and after a test there
-are ``start``, ``next`` and ``quit``.
+are ``start``, ``next``, ``again`` and ``quit``. The page names the stage it shows, so that a press that comes late
+does nothing in the next one.
 """
 
 from __future__ import annotations
@@ -17,29 +18,24 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.errors import PhasedicError
 from acquire.printable import brief, printable
-from analysis.evaluate import GAUGE_KINDS, TensileFigures
+from analysis.evaluate import GAUGE_KINDS
 from live.config.loading import Config
-from live.config.sections import SpecimenConfig
-from live.pipeline.event_log import sentence
-from live.pipeline.run_state import RunState
-from live.results.figures import TensileRow, evaluate, headline
 from live.results.maps.field_maps import FIELD_MAPS
-from live.results.summary import summary_lines
-from live.run.control import Controls, answer
+from live.run.control import ONCE, Controls, answer
 from live.ui.web.authorization import HttpError
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.config_draft import ConfigDraft, next_name
-from live.ui.web.draft_changes import CHANGES
-from live.ui.web.drawn_region import DrawnRegion
 from live.ui.web.page_consumer import PageConsumer, Running
 from live.ui.web.painting import RAMP, as_png
 from live.ui.web.server import DEFAULT_PORT, REPORT_POLICY, PageServer, Response, jpeg_response, json_response
-from live.ui.web.setup_session import SetupSession
+from live.ui.web.setup.config_draft import ConfigDraft, next_name
+from live.ui.web.setup.draft_changes import CHANGES
+from live.ui.web.setup.drawn_region import DrawnRegion
+from live.ui.web.setup.setup_session import SetupSession
 
 SET_UP, RUN, AFTER = "setup", "run", "after"
-START, NEXT, QUIT = "start", "next", "quit"
+START, NEXT, AGAIN, QUIT = "start", "next", "again", "quit"
 FIRST = "specimen-1"
 GOODBYE_S = 0.5
 
@@ -77,6 +73,7 @@ class PageController:
         self._live: ControlledRun | None = None
         self._report: Path | None = None
         self._result: dict[str, Any] = {}
+        self._stages, self._last_picture = 0, b""
         self._requests: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._folder = TemporaryDirectory(prefix="phasedic-")
         self._message = ""
@@ -85,6 +82,7 @@ class PageController:
             "/points": self._points,
             "/picture": self._picture,
             "/mask": self._mask,
+            "/value": self._value,
             "/report": self._show_report,
         }
         posts = {"/order": self._command, "/setup": self._change, "/map": self._map, "/viewer": self._viewer}
@@ -126,11 +124,11 @@ class PageController:
             self.session = session
             self._enter(SET_UP, message)
             started = self._requests.get() == START
-        self.session, self._drawn = None, session.drawn
+        self.session, self._drawn, self._last_picture = None, session.region.drawn, session.picture
         return self._to_run(session) if started else None
 
     def _to_run(self, session: SetupSession) -> Config:
-        config = session.config(Path(self._folder.name))
+        config = session.region.config(Path(self._folder.name))
         wanted = self._folder_of(str(config.metadata["specimen"]))
         tries = (wanted.with_name(f"{wanted.name}_{n}") for n in range(2, 10_000))
         folder = next(one for one in tries if not one.exists()) if wanted.exists() else wanted
@@ -150,7 +148,7 @@ class PageController:
 
     def begin(self, config: Config) -> PageConsumer:
         """Begin the stage of the run; the consumer of its data."""
-        self._consumer, self._live = PageConsumer(self._broadcaster, config), None
+        self._consumer, self._live = PageConsumer(self._broadcaster, config, picture=self._last_picture), None
         self._enter(RUN, "")
         return self._consumer
 
@@ -163,34 +161,47 @@ class PageController:
     def end(self, result: Mapping[str, Any]) -> None:
         """Begin the stage after the run and show its ``result``."""
         self._live, self._report = None, None
-        name = None
-        if self.draft is not None:
-            name = self._free_name(next_name(str(self.draft.config.metadata.get("specimen", FIRST))))
-        self._result = {**result, "report": False, "next": name}
+        shown = {} if self._consumer is None else self._consumer.at_peak()
+        self._result = {**shown, **result, "report": None, **self._names()}
         self._broadcaster.publish("after", self._result)
         self._enter(AFTER, "")
+        if self.draft is None:
+            self.reported(None, "this run makes no report; phasedic report makes one of its folder")
 
-    def reported(self, report: Path | None) -> None:
-        """Show that the report of the last run exists, or (None) that it could not be made."""
+    def _names(self) -> dict[str, str | None]:
+        """The names of this specimen and of the next one; None where no other test follows."""
+        if self.draft is None:
+            return {"again": None, "next": None}
+        name = str(self.draft.config.metadata.get("specimen", FIRST))
+        return {"again": name, "next": self._free_name(next_name(name))}
+
+    def reported(self, report: Path | None, why: str = "") -> None:
+        """Show that the report of the last run can be opened, or (None) why there is none."""
         self._report = report
-        self._result |= {"report": report is not None}
+        self._result |= {"report": True if report is not None else printable(why) or "no report was made"}
         self._broadcaster.publish("after", self._result)
 
     def after(self) -> bool:
-        """Wait for the operator; whether a next specimen follows."""
+        """Wait for the operator; whether another test follows, of the next specimen or of the same."""
         assert self.draft is not None
-        if self._requests.get() != NEXT:
-            return False
-        self.draft.change_all({"metadata.specimen": self._result["next"]})
-        return True
+        request = self._requests.get()
+        if request == NEXT:
+            self.draft.change_all({"metadata.specimen": self._result["next"]})
+        return request in (NEXT, AGAIN)
 
     def _enter(self, stage: str, message: str) -> None:
         self.stage, self._message = stage, printable(message)
+        self._stages += 1
         self._requests = queue.SimpleQueue()
         self._publish_stage()
 
     def _publish_stage(self) -> None:
-        stage = {"stage": self.stage, "words": self._message, "alone": self.draft is None}
+        stage = {
+            "stage": self.stage,
+            "n": self._stages,
+            "words": self._message,
+            "alone": self.draft is None,
+        }
         kinds = [
             {"kind": name, "label": one.label, "hint": one.hint, "gesture": one.gesture}
             for name, one in GAUGE_KINDS.items()
@@ -216,7 +227,19 @@ class PageController:
     def _mask(self, query: Mapping[str, str]) -> Response:
         if self.session is None:
             raise HttpError(404, "nothing is set up")
-        return Response(self.session.mask_picture(), "image/png")
+        return Response(self.session.region.shade(), "image/png")
+
+    def _value(self, query: Mapping[str, str]) -> Response:
+        """The value of the map at a place of the picture, px."""
+        if self._consumer is None:
+            raise HttpError(404, "nothing has been measured")
+        try:
+            x, y = (float(query.get(key, "")) for key in ("x", "y"))
+        except ValueError:
+            raise HttpError(400, "x and y are numbers, in px") from None
+        if not (abs(x) < 1e6 and abs(y) < 1e6):
+            raise HttpError(400, "x and y are numbers, in px")
+        return json_response(self._consumer.map.value_at(x, y))
 
     def _show_report(self, query: Mapping[str, str]) -> Response:
         if self._report is None:
@@ -226,7 +249,7 @@ class PageController:
     def _map(self, request: Mapping[str, Any]) -> dict[str, str]:
         if self._consumer is None:
             return {"answer": "no: nothing is measured"}
-        refusal = self._consumer.select_map(str(request.get("of")))
+        refusal = self._consumer.select_map(request)
         return {"answer": f"no: {refusal}" if refusal else "ok"}
 
     def _viewer(self, request: Mapping[str, Any]) -> dict[str, str]:
@@ -238,16 +261,21 @@ class PageController:
 
     def _command(self, request: Mapping[str, Any]) -> dict[str, str]:
         """Run a command line."""
-        line = request.get("line")
-        return {"answer": self._answer_to(line) if isinstance(line, str) else "no: a command is a line"}
+        line, stage = request.get("line"), request.get("stage", self.stage)
+        if not isinstance(line, str):
+            return {"answer": "no: a command is a line"}
+        if stage != self.stage:
+            return {"answer": "no: the stage has changed meanwhile; press again"}
+        return {"answer": self._answer_to(line)}
 
     def _answer_to(self, line: str) -> str:
         live, command = self._live, line.strip()
         if live is not None:
-            return answer(line, live)
+            # Two pages must not confirm one another: the page that asks forces the tare.
+            return answer(f"{command} {ONCE}" if command in ("t", "tare") else line, live)
         if self.stage == RUN or (self.stage == SET_UP and self.session is None):
             return "no: the test is being opened"
-        allowed = (START, QUIT) if self.stage == SET_UP else (NEXT, QUIT)
+        allowed = (START, QUIT) if self.stage == SET_UP else (NEXT, AGAIN, QUIT)
         if command not in allowed or self.draft is None:
             return f"no: the commands of this stage are {', '.join(allowed)}"
         try:
@@ -268,31 +296,7 @@ class PageController:
             return {"answer": f"no: the changes are {', '.join(CHANGES)}"}
         try:
             change(session, request)
-        except (ConfigError, DataError) as error:
+        except PhasedicError as error:
             return {"answer": f"no: {printable(brief(error))}"}
         session.refresh()
         return {"answer": "ok"}
-
-
-def run_result(run_state: RunState, specimen: SpecimenConfig, folder: Path, words: str) -> dict[str, Any]:
-    """Figures, summary, frame counts and losses; ``words`` describe how the run ended, empty where it ended well."""
-    figures = evaluate(run_state.history, run_state.loads, specimen) if run_state.history.time_steps else None
-    troubles = run_state.event_log.events("warning", "error")
-    return {
-        "folder": str(folder),
-        "words": words,
-        "figures": [] if figures is None else _figures(figures, specimen),
-        "lines": [line.strip() for line in summary_lines(run_state, specimen)],
-        "ledger": run_state.frame_counts.line(),
-        "troubles": [sentence(event, run_state.event_log.names) for event in troubles[-5:]],
-    }
-
-
-def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str, Any]]:
-    return [_figure(row) for row in headline(figures, stresses=specimen.area_m2 is not None)]
-
-
-def _figure(row: TensileRow) -> dict[str, Any]:
-    if not row.figure.known:
-        return {"name": row.name, "text": None, "why": row.figure.why}
-    return {"name": row.name, "text": row.text.replace("+-", "±"), "why": ""}

@@ -35,9 +35,9 @@ def shrunk(image: NDArray[Any], bits: int, max_side_px: int = MAX_SIDE_PX) -> tu
     return np.repeat(grey[..., None], 3, axis=2), scale
 
 
-def mark_saturated(picture: Bytes, scale: float, image: NDArray[Any], bits: int) -> None:
-    """Paint saturated pixels red; a single one is visible in a reduced picture too."""
-    rows, columns = np.nonzero(image >= 2**bits - 1)
+def mark_saturated(picture: Bytes, scale: float, image: NDArray[Any], saturation: int) -> None:
+    """Paint pixels from ``saturation`` (GL) on red; a single one is visible in a reduced picture too."""
+    rows, columns = np.nonzero(image >= saturation)
     if rows.size:
         height, width = picture.shape[:2]
         y = np.minimum((rows * scale).astype(np.intp), height - 1)

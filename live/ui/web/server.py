@@ -6,11 +6,14 @@ request before anything is done. Every response has a policy that limits what th
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import logging
 import secrets
 import socket
 import threading
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -33,6 +36,10 @@ HEARTBEAT_S = 0.5
 
 _SEND_BYTES = 2**14  # buffer for a page that does not read; more data would be old when it reads again
 _TIMEOUT_S = 10.0  # a page that reads nothing for so long is disconnected
+MAX_CONNECTIONS = 64
+"""At one time; a browser opens six for each page."""
+REQUEST_S = 10.0
+"""For a whole request, headers and body, from the end of the one before on the same connection."""
 
 PAGE_POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; connect-src 'self';"
@@ -52,6 +59,7 @@ Post = Callable[[Mapping[str, Any]], Any]
 _TYPES = {
     "html": "text/html; charset=utf-8",
     "js": "text/javascript; charset=utf-8",
+    "json": "application/json",
     "css": "text/css; charset=utf-8",
     "txt": "text/plain; charset=utf-8",
 }
@@ -163,6 +171,28 @@ class _Server(ThreadingHTTPServer):
     daemon_threads = True
     page: PageServer
 
+    def __init__(self, *arguments: Any) -> None:
+        self._free = threading.BoundedSemaphore(MAX_CONNECTIONS)
+        super().__init__(*arguments)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        """Serve a connection in a thread of its own, or close it where too many are open."""
+        if self._free.acquire(blocking=False):
+            super().process_request(request, client_address)
+        else:
+            self.shutdown_request(request)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        """Serve a connection."""
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """A connection that breaks is no fault of phasedic: nothing is printed."""
+        log.debug("a connection to the page broke")
+
     def server_bind(self) -> None:
         """Bind the configured port or one of the next."""
         self.socket.close()
@@ -180,6 +210,26 @@ def _open_server(port: int) -> _Server:
         ) from None
 
 
+class _TimedStream(io.RawIOBase):
+    """What a connection sends, up to a time for the whole request: one that sends a letter a second is cut off."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        self._connection, self.end = connection, 0.0
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        left = self.end - time.monotonic()
+        if left <= 0:
+            raise TimeoutError("the request takes too long")
+        self._connection.settimeout(left)
+        try:
+            return self._connection.recv_into(buffer)
+        finally:
+            self._connection.settimeout(_TIMEOUT_S)
+
+
 class _Handler(BaseHTTPRequestHandler):
     """One request."""
 
@@ -191,6 +241,13 @@ class _Handler(BaseHTTPRequestHandler):
     def setup(self) -> None:
         lower_priority(OUTPUT)
         super().setup()
+        self._stream = _TimedStream(self.connection)
+        self.rfile = io.BufferedReader(self._stream)
+
+    def handle_one_request(self) -> None:
+        """One request, within ``REQUEST_S``."""
+        self._stream.end = time.monotonic() + REQUEST_S
+        super().handle_one_request()
 
     def log_message(self, format: str, *args: Any) -> None:
         """Log nothing: an address with the token must not be in a log."""
@@ -208,14 +265,17 @@ class _Handler(BaseHTTPRequestHandler):
             self.server.page.guard.check_host(self.headers)
             step()
         except HttpError as refused:
-            self.close_connection = True
-            self._send(Response(refused.reason.encode(), "text/plain; charset=utf-8"), refused.status)
+            self._refuse(refused.reason, refused.status)
         except (OSError, ValueError):  # the browser closed the connection, or does not send HTTP
             self.close_connection = True
         except Exception:
             log.exception("a request to the page failed")
-            self.close_connection = True
-            self._send(Response(b"a defect; see the log", "text/plain; charset=utf-8"), 500)
+            self._refuse("a defect; see the log", 500)
+
+    def _refuse(self, reason: str, status: int) -> None:
+        self.close_connection = True
+        with contextlib.suppress(OSError):  # nobody may be there to read it
+            self._send(Response(reason.encode(), "text/plain; charset=utf-8"), status)
 
     def _get(self) -> None:
         page, parts = self.server.page, urlsplit(self.path)
@@ -251,12 +311,21 @@ class _Handler(BaseHTTPRequestHandler):
         if handler is None:
             raise HttpError(404, "not found")
         try:
-            value = json.loads(self.rfile.read(length))
+            value = json.loads(self._body(length))
         except (ValueError, RecursionError):
             raise HttpError(400, "not JSON") from None
         if not isinstance(value, dict):
             raise HttpError(400, "an object is expected")
         self._send(json_response(handler(value)))
+
+    def _body(self, length: int) -> bytes:
+        try:
+            body = self.rfile.read(length)
+        except TimeoutError:
+            body = b""
+        if len(body) < length:
+            raise HttpError(400, "the body is shorter than its length")
+        return body
 
     def _events(self, broadcaster: Broadcaster) -> None:
         """Send events until the page is closed or the server ends."""

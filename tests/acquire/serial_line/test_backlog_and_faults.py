@@ -15,11 +15,11 @@ from dataclasses import dataclass, field
 import pytest
 
 from acquire.addresses import parse_address
+from acquire.device_clock import DeviceClock
 from acquire.events import Event
 from acquire.load_cell.contract import open_load_cell
 from acquire.load_sample import LoadFlag, LoadSample
 from acquire.serial_line.cell import SerialCell
-from acquire.serial_line.clock import DeviceClock
 from acquire.serial_line.settings import read_settings
 from hw_mocks.faults import SERIAL_FAULTS, FaultPlan, parse_faults
 from hw_mocks.indicator import AsciiIndicator
@@ -64,6 +64,7 @@ def device() -> Iterator[Device]:
     made.close()
 
 
+@pytest.mark.timed
 def test_what_waited_before_the_test_is_not_taken_for_a_flood_nor_for_a_restart(device: Device) -> None:
     told: list[Event] = []
     address = f"{device.port.path}?protocol=ascii&millis=1&column=2&wait=0"
@@ -175,6 +176,7 @@ def runs() -> dict[str, Run]:
     return found
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("name", NAMES)
 def test_no_force_is_wrong(name: str, runs: dict[str, Run]) -> None:
     run = runs[name]
@@ -187,6 +189,7 @@ def test_no_force_is_wrong(name: str, runs: dict[str, Run]) -> None:
         assert s.force == pytest.approx(truth(s.t - run.began), abs=allowed), (name, s)
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("name", NAMES)
 def test_times_never_go_back(name: str, runs: dict[str, Run]) -> None:
     times = [s.t for s in runs[name].samples]
@@ -211,12 +214,14 @@ SIGNS: dict[str, Callable[[Run], bool]] = {
 }
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize("name", SIGNS)
 def test_the_fault_shows(name: str, runs: dict[str, Run]) -> None:
     run = runs[name]
     assert SIGNS[name](run), (run.told, [s for s in run.samples if s.flags][:3])
 
 
+@pytest.mark.timed
 def test_without_a_fault_nothing_is_told(runs: dict[str, Run]) -> None:
     assert [event.level for event in runs[""].events] == ["info"]
     assert "device clock: arrivals" in runs[""].told

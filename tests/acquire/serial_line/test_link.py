@@ -8,10 +8,12 @@ import time
 import pytest
 
 from acquire.errors import DeviceError
+from acquire.opening_thread import Opening
 from acquire.serial_line import link as link_module
-from acquire.serial_line.link import Link, LinkContext, Opening, close_port
+from acquire.serial_line.link import Link, LinkContext, close_port
 from acquire.serial_line.ports import LineSettings
 from tests.acquire.serial_line.fake_port import FakePort, FakeTime
+from tests.live.ui.waiting import until
 
 LINE = LineSettings("socket://fake:1")
 
@@ -68,45 +70,50 @@ def test_a_rare_loss_is_told_each_time_and_mended_soon() -> None:
 
 
 class SlowPort(FakePort):
-    """One that takes long to close."""
+    """One that closes only when it is let."""
+
+    def __init__(self) -> None:
+        super().__init__(FakeTime(), [])
+        self.let = threading.Event()
 
     def close(self) -> None:
+        self.let.wait(60)
         super().close()
-        time.sleep(0.9)
 
 
 def test_closing_waits_for_nobody(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link_module, "CLOSE_S", 0.05)
-    port, began = SlowPort(FakeTime(), []), time.monotonic()
+    port = SlowPort()
     close_port(port)
-    assert port.closed == 1 and time.monotonic() - began < 0.8
+    assert port.closed == 0
+    port.let.set()
+    until(lambda: port.closed == 1)
 
 
 def test_a_port_that_opens_when_nobody_waits_any_more_is_closed() -> None:
     go, port = threading.Event(), FakePort(FakeTime(), [])
 
-    def open_late(line: LineSettings) -> FakePort:
-        go.wait(5)
+    def open_late() -> FakePort:
+        go.wait(60)
         return port
 
-    opening = Opening(open_late, lambda: LINE)
+    opening = Opening(open_late, close_port)
     assert not opening.done(0.01)
     opening.abandon()
     go.set()
-    assert opening.done(5)
-    until = time.monotonic() + 5
-    while not port.closed and time.monotonic() < until:
-        time.sleep(0.001)
-    assert port.closed == 1
+    assert opening.done(60)
+    until(lambda: port.closed == 1)
 
 
 def test_a_port_that_never_opens_fails_the_start(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(link_module, "OPEN_S", 0.05)
+    let = threading.Event()
 
     def never(line: LineSettings) -> FakePort:
-        time.sleep(0.5)
+        let.wait(60)
         return FakePort(FakeTime(), [])
 
     context = LinkContext(never, time.monotonic, threading.Event(), time.sleep)
     with pytest.raises(DeviceError, match="does not open within"):
         Link(LINE, context, lambda level, text: None)
+    let.set()

@@ -108,6 +108,58 @@ def test_a_frame_that_cannot_be_read_becomes_a_counted_loss(tmp_path: Path) -> N
         assert back.frame_counts == {"grabbed": 4}
 
 
+def long_session(path: Path, frames: int = 600) -> bytes:
+    with writer(path) as session:
+        for k in range(frames):
+            session.write_load(sample(k))
+            session.write_frame(frame(k))
+            if k % 20 == 0:
+                session.flush()  # as every second in a test
+        session.write_ledger({"grabbed": frames})
+    return path.read_bytes()
+
+
+def test_of_a_file_cut_to_half_the_frames_that_are_there_are_saved(tmp_path: Path) -> None:
+    path = tmp_path / "session.h5"
+    content = long_session(path)
+    path.write_bytes(content[: len(content) // 2])
+    with pytest.raises(DataError, match=r"is truncated: .* or save what is there with 'phasedic recover'"):
+        Session.open(path)
+    done = recover(path)
+    assert 200 < done.frames < 400 and any(f"{600 - done.frames} of 600 frames" in s for s in done.unreadable)
+    with Session.open(done.path) as back:
+        assert len(back) == done.frames
+        for k, found in enumerate(back.frames()):
+            np.testing.assert_array_equal(found.image, frame(k).image)
+
+
+def test_zeros_in_the_middle_cost_only_what_stood_there(tmp_path: Path) -> None:
+    """A checksum of zeros is right over zeros: such a picture must not pass as a black one."""
+    path = tmp_path / "session.h5"
+    content = bytearray(long_session(path))
+    with Session.open(path) as back:
+        images = back._parts[0].entry["frames/image"].id
+        chunks = [images.get_chunk_info(number) for number in (300, 301, 302)]
+    for chunk in chunks:
+        content[chunk.byte_offset : chunk.byte_offset + chunk.size] = bytes(chunk.size)
+    path.write_bytes(content)
+    done = recover(path)
+    assert done.frames == 597 and "3 of 600 frames cannot be read" in " ".join(done.unreadable)
+    with Session.open(done.path) as back:
+        assert back.frame(300).lost_before == frame(303).lost_before + 3
+        np.testing.assert_array_equal(back.frame(300).image, frame(303).image)
+
+
+def test_why_nothing_can_be_saved(tmp_path: Path) -> None:
+    """It advised to do what had just failed."""
+    path = tmp_path / "session.h5"
+    content = long_session(path, 10)
+    path.write_bytes(content[:6000])
+    with pytest.raises(DataError, match="nothing of it can be saved") as refused:
+        recover(path)
+    assert "phasedic recover" not in str(refused.value)
+
+
 def test_a_cropped_session_keeps_its_crop(tmp_path: Path) -> None:
     path = tmp_path / "session.h5"
     with writer(path, mode=RecordMode("every", 2, (3, 2, 8, 5))) as session:

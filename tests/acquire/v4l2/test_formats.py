@@ -7,12 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from acquire.camera.opening import FailureGuard, RepeatGuard, missing_between
+from acquire.camera import FailureGuard, FrameCounter, RepeatGuard, missing_between
 from acquire.errors import DataError
 from acquire.events import RateLimiter
 from acquire.v4l2 import api
 from acquire.v4l2.api import fourcc, fourcc_text
-from acquire.v4l2.faults import FrameCounter
 from acquire.v4l2.formats import FORMATS, PLANES, Plane, decode, preferred, warning_of
 from acquire.v4l2.listing import list_cameras
 from tests.acquire.v4l2.fake_kernel import FakeCamera, FakeControl, FakeKernel

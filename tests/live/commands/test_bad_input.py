@@ -87,6 +87,21 @@ def test_pictures_that_are_cut_off_or_of_another_size_are_left_out(
         assert strain.values["lost"].tolist() == [1, 1]
 
 
+def test_a_film_that_is_cut_off(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """It ended with 0, and the end of the test was missing."""
+    film = tmp_path / "film.avi"
+    writer = cv2.VideoWriter(str(film), cv2.VideoWriter.fourcc(*"FFV1"), 25, (128, 96))
+    for seed in range(12):
+        writer.write(cv2.cvtColor(speckle(seed // 12), cv2.COLOR_GRAY2BGR))
+    writer.release()
+    words = ["--zoi", "32", "--no-view", "--no-rrd", "--out"]
+    assert main(["replay", str(film), *words, str(tmp_path / "whole")]) == 0
+    film.write_bytes(film.read_bytes()[: film.stat().st_size * 2 // 3])
+    capsys.readouterr()
+    assert main(["replay", str(film), *words, str(tmp_path / "cut")]) == 5
+    assert "of 12 frames; it may be cut off" in capsys.readouterr().out
+
+
 def test_a_reference_that_is_cut_off(capsys: pytest.CaptureFixture[str], shots: Path, tmp_path: Path) -> None:
     (shots / "a_0.png").write_bytes(b"no picture")
     check_refusal(capsys, 4, "a_0.png", "replay", f"files:{shots}/*.png", "--zoi", "32", out=tmp_path / "out")

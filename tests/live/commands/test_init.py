@@ -118,6 +118,18 @@ def test_pictures(tmp_path: Path, wide: bool) -> None:
     assert np.abs(found["axial"]).max() < 1e-4
 
 
+@pytest.mark.parametrize("level", [0, 128, 255])
+def test_a_picture_without_a_pattern_gives_no_rig(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], level: int
+) -> None:
+    """Lens cap on, overexposed, or out of focus: it wrote a rig file, and ended with 0."""
+    shot, rig = tmp_path / "shot.png", tmp_path / "rig.toml"
+    cv2.imwrite(str(shot), np.full((240, 320), level, np.uint8))
+    assert main(["init", str(rig), "--camera", f"files:{shot}"]) == 5
+    assert "no pattern is visible" in capsys.readouterr().out
+    assert [path.name for path in tmp_path.iterdir()] == ["shot.png"]
+
+
 def test_devices_are_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The first camera without trouble, under the name that plugging does not change; a cell that talks."""
     from live.commands import init

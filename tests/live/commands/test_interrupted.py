@@ -14,8 +14,9 @@ from pathlib import Path
 import pytest
 
 from acquire.errors import Interrupted
+from analysis import PICTURE_KINDS, share_compiled
 from live import cli
-from live.setup.compiling import compile_ahead
+from live.setup.compiling import compile_ahead, progress_text
 from tests.bench.soak import children
 from tests.live.replay.batch.running import until
 
@@ -122,6 +123,14 @@ def test_whoever_handles_a_signal_hears_of_it(
         signal.signal(number, before)
 
 
+def test_ctrl_c_in_a_command_without_a_handler(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As ``demo`` and ``warm-up``: it says what is kept."""
+    never_ending(monkeypatch)
+    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(Interrupted, match="what is compiled is kept"):
+        compile_ahead(("uint8",))
+
+
 def test_it_was_stopped_before(monkeypatch: pytest.MonkeyPatch) -> None:
     never_ending(monkeypatch)
     with pytest.raises(Interrupted):
@@ -145,3 +154,20 @@ def test_a_process_that_was_interrupted_ends_the_other(monkeypatch: pytest.Monke
     with pytest.raises(Interrupted):
         compile_ahead(("uint8",))
     assert [process.returncode for process in made] == [-signal.SIGINT, -signal.SIGTERM]
+
+
+@pytest.mark.parametrize(
+    ("share", "seconds", "bar", "left"),
+    [(0.0, 1.0, 0, "about a minute"), (0.5, 20.0, 15, "about 21 s left"), (1.0, 50.0, 30, "about 1 s left")],
+)
+def test_one_bar_with_an_estimate(share: float, seconds: float, bar: int, left: str) -> None:
+    text = progress_text(share, seconds)
+    assert text.count("#") == bar and text.count(".") == 30 - bar
+    assert text.endswith(f"{seconds:.0f} s, {left}")
+
+
+def test_the_share_that_is_compiled() -> None:
+    """Everything was compiled since 1970, and nothing will have been in an hour."""
+    compile_ahead(PICTURE_KINDS, phase=True)
+    assert share_compiled(PICTURE_KINDS, 0.0, phase=True) == 1.0
+    assert share_compiled(PICTURE_KINDS, time.time() + 3600, phase=True) == 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import socket
 import threading
 import time
@@ -19,6 +20,7 @@ from acquire.serial_line import identify as identify_module
 from hw_mocks.indicator import AsciiIndicator
 from hw_mocks.indicator_output import Sensing
 from hw_mocks.indicator_server import IndicatorServer
+from live.cli import main
 from live.commands import identify, load_calibrate, load_check, recover, run
 from live.commands.consumers import standard_consumers
 from live.config.loading import load_config
@@ -93,7 +95,7 @@ def calibrate(bench: Bench, folder: Path, accept: str, **known: float | None) ->
         return ""
 
     arguments = argparse.Namespace(
-        load=f"{bench.server.path}?unit=N&wait=1", out=str(folder / "cal.toml"), seconds=0.4,
+        load=f"{bench.server.path}?unit=N&wait=1", out=str(folder / "cal.toml"), seconds=0.4, yes=False,
         **{"mass": None, "force": None, **known},
     )  # fmt: skip
     return load_calibrate.command(arguments, lines.append, answer), lines
@@ -115,6 +117,29 @@ def test_a_load_that_moves_is_no_point_of_a_calibration(bench: Bench, tmp_path: 
     bench.per_s = 500.0
     with pytest.raises(DataError, match="3 times the load moved"):
         calibrate(bench, tmp_path, "yes", force=200.0)
+
+
+def test_calibrating_in_simulation_without_a_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO(""))
+    words = ["load-calibrate", "--load", "sim:?noise_N=0.1", "--mass", "5", "--seconds", "0.4"]
+    assert main([*words, "--out", str(tmp_path / "a.toml")]) == 2
+    assert "run it in a terminal, or with --yes" in capsys.readouterr().err
+    assert main([*words, "--out", str(tmp_path / "b.toml"), "--yes"]) == 0
+    assert load(str(tmp_path / "b.toml")).gain == pytest.approx(1.0, rel=0.01)
+    assert "simulated" in capsys.readouterr().out
+    assert [path.name for path in tmp_path.iterdir()] == ["b.toml"]
+
+
+def test_the_simulated_rig_is_at_rest_before_a_run(capsys: pytest.CaptureFixture[str]) -> None:
+    """It began to pull after two seconds, and the checks of the README ended with NO-GO."""
+    moving = "sim:?seconds=4&hold=0.01"
+    assert main(["load-check", "--load", moving, "--seconds", "1"]) == 0
+    small = ["--roi", "all", "--zoi", "48", "--step", "48", "--reference-burst", "8"]
+    camera = "sim:uniform?seconds=2&hold=0.01&end=0.01&fps=50&width=320&height=256"
+    assert main(["check", "--camera", camera, "--load", "sim:", *small]) == 0
+    assert "LOOK" not in capsys.readouterr().out
 
 
 def test_calibrating_needs_one_known_load(bench: Bench, tmp_path: Path) -> None:

@@ -38,7 +38,7 @@ def loaded(*forces: float, axis: str = "y") -> RunState:
 
 
 class Run:
-    paused, recording, folder = False, True, Path("run")
+    paused, recording, live, folder = False, True, True, Path("run")
 
     def __init__(self, run_state: RunState) -> None:
         self.run_state = run_state

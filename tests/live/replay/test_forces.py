@@ -126,4 +126,4 @@ def test_names_must_fit(shots: Path, tmp_path: Path, capsys: pytest.CaptureFixtu
     stack = tmp_path / "stack.tif"
     assert cv2.imwritemulti(str(stack), [cv2.imread(str(shots / f"a{k}.png"), 0) for k in range(3)])
     assert replayed(shots, tmp_path, "file,force_N\na0.png,1\n", source=str(stack))[0] == 2
-    assert "not told apart by their names" in capsys.readouterr().err
+    assert "two pictures share a name" in capsys.readouterr().err

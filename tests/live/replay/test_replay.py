@@ -33,6 +33,7 @@ from live.pipeline.measure import Tracker
 from live.replay.burst_index import burst_ends, index_of_frames
 from live.replay.source import prefetch
 from live.results import Strain
+from tests.live.ui.waiting import until
 
 
 def test_the_same_items_in_order() -> None:
@@ -100,8 +101,9 @@ def test_bursts_are_let_go_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -
     measured = Tracker.measure
 
     def measure(tracker: Tracker, burst: Burst) -> Any:
-        if len(kept) == 4:
-            time.sleep(0.5)  # all is read that can be, and what was measured before is written
+        if len(kept) == 4:  # once all is read that can be; then one too many has time to come
+            until(lambda: len(bursts()) - len(others) >= NEEDED)
+            time.sleep(0.3)
         kept.append(len(bursts()) - len(others))
         return measured(tracker, burst)
 

@@ -177,3 +177,36 @@ def test_a_report_at_the_end(shots: Path, tmp_path: Path, capsys: pytest.Capture
     assert main(["replay", str(shots), *SMALL, "--report", "--out", str(out)]) == 0
     assert str(out / "report.html") in capsys.readouterr().out
     assert "<h2>Maps</h2>" in (out / "report.html").read_text(encoding="utf-8")
+
+
+GAUGES = """
+[gauges.axial]
+start = [60, 30]
+end = [60, 98]
+[gauges.area]
+kind = "area"
+box = [70, 20, 4, 4]
+[gauges.mine]
+kind = "area"
+box = [40, 30, 80, 70]
+"""
+
+
+def test_automatic_gauges_that_do_not_fit_another_grid_are_left_out(
+    shots: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Other ZOIs made a replay of a rig with automatic gauges end with an error."""
+    rig = tmp_path / "gauges.toml"
+    rig.write_text(GAUGES, encoding="utf-8")
+    words = ["--no-view", "--no-rrd", "--roi", "0,0,160,128", "--out"]
+    fine = ["--config", str(rig), "--zoi", "32", "--step", "2", "--burst", "1"]
+    assert main(["run", "--camera", f"files:{shots}", *fine, *words, str(tmp_path / "run")]) == 0
+    session, coarse = str(tmp_path / "run" / "session.h5"), ["--zoi", "64", "--step", "32"]
+    capsys.readouterr()
+    assert main(["replay", session, *coarse, *words, str(tmp_path / "again")]) == 0
+    assert "note: the automatic gauge area of the run has no ZOI in this grid" in capsys.readouterr().out
+    with Strain.open(tmp_path / "again" / "strain.h5") as strain:
+        gauges = {name for name in strain.values if name.startswith("gauge_")}
+    assert gauges == {"gauge_axial", "gauge_mine"}
+    assert main(["replay", session, *coarse, "--config", str(rig), *words, str(tmp_path / "mine")]) == 2
+    assert "gauges.area: no ZOI is there" in capsys.readouterr().err

@@ -30,7 +30,7 @@ def kept(truth: Truth, lag: float = 0.0, tared_at: float | None = None) -> tuple
     assert curve.transverse is not None
     one = make_measurement(0).time_step
     for t, axial, across in zip(curve.t, curve.strain, curve.transverse, strict=True):
-        history.add(replace(one, t=START + t, eyy=axial, exx=across))
+        history.add(replace(one, t=START + t, eyy=axial, exx=across, extension_y=axial, extension_x=across))
     true = truth.curve
     zero = 0.0
     for t in np.arange(0, true.t[-1] + 0.5, 1 / 80):
@@ -120,10 +120,11 @@ def test_the_axis_is_found_where_it_is_not_given() -> None:
     history, loads = kept(ramberg_osgood())
     turned = History()
     for i in history.time_steps:
-        turned.add(replace(i, exx=i.eyy, eyy=i.exx))
+        turned.add(replace(i, exx=i.eyy, eyy=i.exx, extension_x=i.extension_y, extension_y=i.extension_x))
     assert "off x (clockwise); x was found" in alignment_line(turned, FLAT)[0]
     upright, lying = (figure_lines(evaluate(h, loads, FLAT), FLAT) for h in (history, turned))
-    assert upright == lying
+    assert "along y" in "".join(upright) and "exx of the region" in lying[0]
+    assert upright == [line.replace("exx of", "eyy of").replace("along x", "along y") for line in lying]
     given = replace(FLAT, axis="y")
     assert figure_lines(evaluate(turned, loads, given), given) != lying
 

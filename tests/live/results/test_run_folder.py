@@ -111,8 +111,9 @@ def test_what_is_not_a_run_is_refused_in_words(tmp_path: Path) -> None:
         open_run(tmp_path)
     make_run(tmp_path)
     (tmp_path / "session.h5").write_bytes(b"no HDF5")
-    with open_run(tmp_path) as run, pytest.raises(DataError, match=r"session\.h5"):
-        _ = run.pictures
+    with open_run(tmp_path) as run:
+        assert run.pictures is None and run.events == [] and run.load_samples == []
+        assert len(run.notes) == 1 and "session.h5" in run.notes[0]
     with h5py.File(tmp_path / "strain.h5", "a") as file:
         del file["entry/config"]
         file["entry/config"] = json.dumps({"specimen": {"width_mm": "wide"}})
@@ -146,7 +147,7 @@ def test_they_are_those_of_the_test(run_dir: Path, toml: Path, tmp_path: Path) -
         assert run.gauges == {}
         assert add_gauges(run, toml) == ("axial", "shear")
         for name, gauge in with_gauges.gauges.items():
-            np.testing.assert_allclose(run.gauges[name].value, gauge.value, atol=1e-10)
+            np.testing.assert_allclose(run.gauges[name].value, gauge.value, atol=1e-9)
             np.testing.assert_allclose(run.gauges[name].sigma, gauge.sigma, rtol=1e-5)
         assert run.gauges["axial"].described["start"] == (64.0, 20.0)
         np.testing.assert_array_equal(run.axial_strain, run.gauges["axial"].value)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,7 @@ from live.results.report.evaluation import EvaluatedCurve as RunCurve
 from live.results.report.report import tensile
 from live.results.run_folder import open_run
 from live.results.summary import summary_lines
-from live.ui.web.page_controller import run_result
+from live.ui.web.run_result import run_result
 from tests.analysis.curves import noisy, ramberg_osgood
 from tests.live.made_run import CONFIG, PULLED, make_run
 from tests.live.results.test_figures import AREA_M2, FLAT, kept
@@ -60,8 +61,12 @@ def test_summary_and_page_agree(specimen: SpecimenConfig) -> None:
     history, loads = kept(ramberg_osgood())
     run_state = RunState(EventLog(), FrameCounts(), loads, history)
     summary = "\n".join(summary_lines(run_state, specimen)).replace("+-", "±")
-    for one in run_result(run_state, specimen, Path("runs"), "")["figures"]:
-        assert one["text"] is not None and f"{one['name']} = {one['text']}" in summary
+    figures = run_result(run_state, specimen, Path("runs"), "")["figures"]
+    shown = [one for one in figures if re.search(rf"(?<!\w){re.escape(one['name'])} = ", summary)]
+    assert len(shown) >= 5 and "nu" in {one["name"] for one in shown}
+    for one in shown:
+        value, _, unit = one["text"].partition(" ")
+        assert f"{one['name']} = {value} {one['interval']} {unit}".rstrip() in summary
 
 
 def read(folders: list[Path]) -> tuple[list[dict[str, str]], str]:

@@ -80,7 +80,7 @@ def test_the_table_has_the_columns_scripts_rely_on(tmp_path: Path) -> None:
     assert (row["frame"], row["last_frame"], row["n_frames"], row["lost"]) == ("24", "31", "8", "1")
     assert (int(row["n_valid"]), int(row["n_zoi"])) == (n_active - 1, n_active)
     assert float(row["eyy"]) == pytest.approx(2e-3, rel=1e-9)
-    assert float(row["sigma_eyy"]) == pytest.approx(make_measurement(0).field.mean("eyy")[1], rel=1e-8)
+    assert float(row["sigma_eyy"]) == pytest.approx(make_measurement(0).time_step.sigma_eyy, rel=1e-8)
     assert float(row["force_N"]) == pytest.approx(30.0, rel=1e-6)
 
 
@@ -178,7 +178,12 @@ def test_the_axis_of_the_load_is_stored(tmp_path: Path, given: str) -> None:
         for k in range(40):
             m, e = make_measurement(k, 0.0, force=1.0), 1e-4 * k
             results.add(
-                dataclasses.replace(m, time_step=dataclasses.replace(m.time_step, exx=e, eyy=-0.3 * e))
+                dataclasses.replace(
+                    m,
+                    time_step=dataclasses.replace(
+                        m.time_step, exx=e, eyy=-0.3 * e, extension_x=e, extension_y=-0.3 * e
+                    ),
+                )
             )
     with h5py.File(tmp_path / "strain.h5") as file:
         attributes = dict(file["entry/mean"].attrs)

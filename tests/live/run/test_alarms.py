@@ -22,8 +22,10 @@ from live.cli import main
 from live.config.loading import from_dict, load_config
 from live.config.sections import AlarmConfig
 from live.pipeline.run_state import ActiveAlarms, Health
-from live.run.alarms import ACTIONS, ActionMeans, Alarm, AlarmWatch, actions_of
+from live.pipeline.screen import Screen
+from live.run.alarms import ACTIONS, ActionMeans, Alarm, AlarmWatch, actions_of, check_alarms
 from live.run.control import ControlPort, answer
+from live.run.live_run import run_live
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.run.test_strain_output import Listener, free_port, read
 from tests.live.run.test_tcp_lines import Caller
@@ -43,6 +45,37 @@ def test_on_beyond_the_limit_and_off_when_back_by_the_hysteresis() -> None:
 
 def test_without_hysteresis_the_limit_itself_is_off() -> None:
     assert changes(Alarm(AlarmConfig(channel="x", above=1.0)), 1.0, 1.1, 1.0, 0.9) == [True, False]
+
+
+@pytest.mark.parametrize(
+    ("channel", "settings", "needs"),
+    [
+        ("force_N", {}, "a load cell"),
+        ("load_silent_s", {}, "a load cell"),
+        ("stress_MPa", {"specimen.area_mm2": 40.0}, "a load cell"),
+        ("stress_MPa", {"load.address": "sim:"}, "the section"),
+        ("disk_min", {"record.enabled": False}, "a recording"),
+        ("force_N", {"load.address": "sim:"}, ""),
+        ("stress_MPa", {"load.address": "sim:", "specimen.area_mm2": 40.0}, ""),
+        ("axial", {}, ""),
+        ("disk_min", {}, ""),
+    ],
+)
+def test_an_alarm_that_can_never_come_is_refused(channel: str, settings: dict[str, Any], needs: str) -> None:
+    alarm = [{"channel": "silent_s", "above": 1.0}, {"channel": channel, "above": 1.0}]
+    config = load_config(None, {"camera.address": "sim:?fsp=3", "alarm": alarm, **settings})
+    if not needs:
+        check_alarms(config)
+        return
+    with pytest.raises(ConfigError, match=rf"alarm 2 \({channel}\) can never come: it needs {needs}"):
+        run_live(config, Screen())  # before the camera is opened, which has an unknown setting
+
+
+def test_a_device_that_never_sends_is_silent_since_the_start() -> None:
+    health = Health(began_t=10.0)
+    assert health.channels(12.5)["load_silent_s"] == health.channels(12.5)["silent_s"] == 2.5
+    health.loaded(12.0, 1.0)
+    assert health.channels(12.5)["load_silent_s"] == 0.5
 
 
 class Kept:
@@ -92,13 +125,31 @@ def test_what_comes_is_told_stands_on_the_board_and_goes() -> None:
         {"alarm": "camera", "on": True, "value": 2.5, "line": "HALT", "end": True}
     ]
     assert bench.check(silent_s=3.0) == []
-    assert bench.active.texts == ("camera: silent_s is 2.5",)
+    assert bench.active.texts == ("camera: no frame for 2.5 s, limit 2",)
     assert bench.check(silent_s=0.1) == [{"alarm": "camera", "on": False, "value": 0.1}]
     assert bench.active.texts == ()
     assert [event.level for event in bench.events] == ["warning", "info"]
     assert bench.watch.end() == "1 came"
-    assert (bench.rung, bench.ended) == (1, ["ALARM camera: silent_s is 2.5"])
+    assert (bench.rung, bench.ended) == (1, ["ALARM camera: no frame for 2.5 s, limit 2"])
     assert bench.sent.lines == ["HALT"]
+
+
+@pytest.mark.parametrize(
+    ("config", "value", "words"),
+    [
+        (AlarmConfig(channel="axial", above=0.004), 0.00445, "axial 4450 um/m, limit 4000"),
+        (AlarmConfig(channel="gauge_tip", below=-0.001), -0.002, "gauge tip -2000 um/m, limit -1000"),
+        (
+            AlarmConfig(channel="force_N", above=3000.0, name="grips"),
+            3120.5,
+            "grips: force 3120.5 N, limit 3000",
+        ),
+        (AlarmConfig(channel="disk_min", below=5.0), 4.5, "disk full in 4.5 min, limit 5"),
+        (AlarmConfig(channel="lost_share", above=0.1), 0.25, "lost share 0.25, limit 0.1"),
+    ],
+)
+def test_its_message_has_value_unit_and_limit(config: AlarmConfig, value: float, words: str) -> None:
+    assert Alarm(config).message(value) == words
 
 
 def test_an_alarm_does_only_what_it_is_asked_for() -> None:
@@ -174,6 +225,7 @@ def test_alarms_come_back_from_a_file_as_they_were() -> None:
 REAL = "sim:uniform?seconds=4&fps=20&buffers=64&width=224&height=192&bits=12"
 
 
+@pytest.mark.timed
 def test_from_the_stamp_of_the_frame_to_the_action_within_two_measurement_periods(tmp_path: Path) -> None:
     """In real time; the alarm ends the run, is in the session, and is silenced by a command."""
     alarms = ({"channel": "axial", "above": 0.0005}, {"channel": "force_N", "above": 3000.0, "end": True})
@@ -203,6 +255,7 @@ GAUGES = {
 }
 
 
+@pytest.mark.timed
 def test_a_test_with_all_that_there_is(tmp_path: Path) -> None:
     folder, again, port, serial = tmp_path / "run", tmp_path / "again", free_port(), PtyPort()
     controls, listeners, answers = (

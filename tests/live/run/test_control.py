@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from acquire.errors import ConfigError
-from acquire.events import EventKind, Level
+from acquire.events import Event, EventKind, Level
 from acquire.load_sample import LoadCellInfo, LoadSample
 from live.run.control import (
     ENDED,
     FORCED,
+    ONCE,
     START,
     STOP,
     UNDO,
@@ -140,18 +142,30 @@ def test_beyond_this_machine_only_with_a_token(tmp_path: Path) -> None:
     port.close()
 
 
+def tared(text: str, source: str = "/dev/x", kind: EventKind = EventKind.TARE, **data: Any) -> Event:
+    return Event(10.0, kind, source, text, "info", data)
+
+
 class FakeCell:
-    """Notes what it is asked."""
+    """Notes what it is asked, and answers with the events ``says``."""
 
     def __init__(self, capacity_N: float | None, protocol: str = "ascii") -> None:
         self.info = LoadCellInfo("/dev/x", "a cell", protocol, capacity_N=capacity_N)
         self.calls: list[str] = []
+        self.says: list[Event] = []
+        self.listeners: list[Callable[[Event], None]] = []
 
     def tare(self, *, force: bool = False) -> None:
-        self.calls.append("forced" if force else "tare")
+        self._called("forced" if force else "tare")
 
     def undo_tare(self) -> None:
-        self.calls.append("undo")
+        self._called("undo")
+
+    def _called(self, what: str) -> None:
+        self.calls.append(what)
+        for event in self.says:
+            for listener in self.listeners:
+                listener(event)
 
 
 class TareSetup:
@@ -162,7 +176,10 @@ class TareSetup:
     ) -> None:
         self.now, self.cell, self.told = 10.0, FakeCell(capacity_N), list[tuple[EventKind, Level, str]]()
         sample = LoadSample(10.0, force)
-        self.controls = TareControl(self.cell, lambda: measured, lambda: sample, self._tell, lambda: self.now)
+        self.controls = TareControl(
+            self.cell, lambda: measured, lambda: sample, self._tell, lambda: self.now, wait_s=0
+        )
+        self.cell.listeners.append(self.controls.take_event)
 
     def _tell(self, kind: EventKind, source: str, text: str, level: Level) -> None:
         self.told.append((kind, level, text))
@@ -193,9 +210,33 @@ def test_a_late_second_order_is_a_first_one() -> None:
 def test_a_third_order_asks_again() -> None:
     bench = TareSetup()
     bench.refused()
+    bench.now += 1.0
     bench.controls.tare()
     bench.refused()
     assert bench.cell.calls == ["tare"]
+
+
+def test_a_key_that_is_held_or_bounces_is_no_confirmation() -> None:
+    bench = TareSetup()
+    for _ in range(40):
+        bench.refused()
+        bench.now += 0.1
+    assert bench.cell.calls == []
+    bench.now += 0.5
+    bench.controls.tare()
+    assert bench.cell.calls == ["tare"]
+
+
+def test_a_tare_once_is_never_the_confirmation_of_another() -> None:
+    bench = TareSetup()
+    for _ in range(3):
+        with pytest.raises(ControlRefused, match=r"800 N in mid-test: .*; confirm it$"):
+            bench.controls.tare(ONCE)
+        bench.now += 1.0
+    assert bench.cell.calls == []
+    free = TareSetup(0.0)
+    free.controls.tare(ONCE)
+    assert free.cell.calls == ["tare"]
 
 
 @pytest.mark.parametrize(("force", "capacity_N"), [(0.0, None), (0.9, 1000.0)])
@@ -229,6 +270,24 @@ def test_forced_and_undone_at_once() -> None:
     bench.controls.tare(UNDO)
     assert bench.cell.calls == ["forced", "undo"]
     assert [kind for kind, *_ in bench.told] == [EventKind.TARE] * 2
+
+
+def test_the_answer_is_what_the_cell_did() -> None:
+    bench = TareSetup(measured=False)
+    bench.cell.says = [
+        tared("device: no sample for 1 s", kind=EventKind.DEVICE),
+        tared("tared: 8 N is zero now"),
+    ]
+    assert bench.controls.tare() == "tared: 8 N is zero now"
+    bench.cell.says = [tared("not tared: the load moves", kind=EventKind.DEVICE, tared=False)]
+    assert bench.refused() == "not tared: the load moves"
+
+
+def test_a_tare_that_is_not_done_yet_is_queued() -> None:
+    bench = TareSetup(measured=False)
+    bench.controls.take_event(tared("an earlier one"))
+    bench.cell.says = [tared("tare", source="operator")]
+    assert bench.controls.tare().startswith("queued; ")
 
 
 def test_an_undoing_is_no_confirmation() -> None:

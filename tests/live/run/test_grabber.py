@@ -96,6 +96,31 @@ def test_a_camera_that_dies_is_told_and_kept() -> None:
     assert event_log.events("error")[0].text == "list: is gone; plug it in again"
 
 
+@pytest.mark.parametrize(("live", "missing"), [(True, 69), (False, 0)])
+def test_a_gap_that_is_open_at_the_end_is_counted(
+    monkeypatch: pytest.MonkeyPatch, live: bool, missing: int
+) -> None:
+    """The last frame came 7 s before the end, of a camera with 10 frames a second."""
+    now = [100.0]
+    monkeypatch.setattr("live.run.grabber.time.monotonic", lambda: now[0])
+    camera = ListCamera((frame(i) for i in range(4)), live=live)
+    camera.info = replace(camera.info, fps=10.0)
+    run_state = RunState.new(0.5)
+
+    def take(one: Frame) -> None:
+        now[0] += 7.0 if one.index == 3 else 0.1
+
+    grabber = Grabber(camera, GrabPlan(1, 1), run_state, take)
+    grabber.start()
+    while not grabber.bursts.finished:
+        grabber.bursts.get(1.0)
+    grabber.join()
+    assert run_state.frame_counts.lost == missing
+    assert run_state.frame_counts.loss is live
+    texts = [event.text for event in run_state.event_log.events("warning")]
+    assert texts == (["69 frames were lost at the end: none came for the last 7.0 s"] if live else [])
+
+
 def test_a_live_source_never_waits() -> None:
     """Nobody takes the bursts: all but the newest are skipped, and counted."""
     camera = ListCamera((frame(i) for i in range(21)), live=True)
@@ -214,6 +239,7 @@ def recovered(rows: np.ndarray, after: float) -> bool:
     return len(later) > 5 and float(np.median(later[:, 1])) < 0.2
 
 
+@pytest.mark.timed
 def test_a_measurement_held_up_skips_and_catches_up(tmp_path: Path) -> None:
     paused: list[float] = []
 
@@ -230,6 +256,7 @@ def test_a_measurement_held_up_skips_and_catches_up(tmp_path: Path) -> None:
     assert recovered(rows, paused[0])
 
 
+@pytest.mark.timed
 @pytest.mark.parametrize(("buffer_MB", "gap"), [(512.0, False), (1.0, True)], ids=["buffer", "no buffer"])
 def test_a_slow_disk_is_borne_by_the_buffer_or_leaves_a_counted_gap(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, buffer_MB: float, gap: bool
@@ -260,6 +287,7 @@ class Flood(NoLoadCell):
         yield from (LoadSample(now + 1e-6 * k, float(k), raw=b"+1.0 N") for k in range(10_000))
 
 
+@pytest.mark.timed
 def test_a_flood_of_load_lines_does_not_hold_up_the_pictures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -273,6 +301,7 @@ def test_a_flood_of_load_lines_does_not_hold_up_the_pictures(
     assert recovered(rows, float(rows[0, 0]) + 1.2)
 
 
+@pytest.mark.timed
 def test_another_program_on_a_core_loses_no_frame(tmp_path: Path) -> None:
     burn = [sys.executable, "-c", "while True: pass"]
     with subprocess.Popen(burn) as other:

@@ -21,6 +21,7 @@ from acquire.serial_line.ports import LineSettings
 from examples.strain_rate import main
 from hw_mocks.indicator_server import PtyPort
 from hw_mocks.machine import ELASTIC_SHARE, Machine
+from live.config.channels import DEFAULT_CHANNELS
 from live.config.listen_address import ListenAddress
 from live.config.loading import load_config
 from live.config.sections import SpecimenConfig
@@ -53,6 +54,13 @@ def test_a_measurement_as_json_and_as_csv() -> None:
     assert lines.heading == ",".join(CHANNELS)
     row = dict(zip(CHANNELS, lines.of(m).split(","), strict=True))
     assert row["axial"] == "0.0015" and row["frame"] == "16" and row["latency_s"] == "nan"
+
+
+def test_the_channels_without_a_choice_are_those_of_the_guide() -> None:
+    guide = (Path(__file__).parents[3] / "docs" / "guide.md").read_text(encoding="utf-8")
+    listed = ", ".join(f"`{name}`" for name in DEFAULT_CHANNELS)
+    assert "strain_rate" in DEFAULT_CHANNELS
+    assert f"{listed} and all gauges" in " ".join(guide.split())
 
 
 def test_the_strain_rate_is_the_slope_of_the_last_second() -> None:
@@ -148,6 +156,7 @@ def free_port() -> int:
         return int(one.getsockname()[1])
 
 
+@pytest.mark.timed
 def test_from_the_stamp_of_the_frame_to_the_read_of_the_client(tmp_path: Path) -> None:
     """In real time, with a client that reads, and one that does not: the first feels nothing of the second."""
     port, listeners, stamps = free_port(), list[Any](), dict[int, float]()
@@ -171,6 +180,7 @@ def test_from_the_stamp_of_the_frame_to_the_read_of_the_client(tmp_path: Path) -
     assert report.summary.startswith("2 clients") and not report.failed
 
 
+@pytest.mark.timed
 def test_the_table_can_be_followed_while_the_test_runs(tmp_path: Path) -> None:
     """Without a load to wait for, a row appears within one measurement."""
     rows: list[int] = []
@@ -192,6 +202,7 @@ def test_the_table_can_be_followed_while_the_test_runs(tmp_path: Path) -> None:
 RATE, UNTIL = 5e-4, 4e-3
 
 
+@pytest.mark.timed
 def test_the_strain_rate_is_held_through_yield(tmp_path: Path) -> None:
     """Within the 20 % of ISO 6892-1 over a second, where the machine alone would be 40 % off."""
     outcome = main(str(tmp_path / "run"), RATE, UNTIL)

@@ -56,6 +56,13 @@ def test_each_line_is_answered() -> None:
         caller.close()
 
 
+def test_an_empty_line_is_answered_too() -> None:
+    with server(answer=lambda line: f"no: {line!r} is no command") as one:
+        caller = Caller(one.port)
+        assert caller.ask("") == "no: '' is no command"
+        caller.close()
+
+
 def test_without_the_token_nothing_is_heard_or_told() -> None:
     received: list[str] = []
     with server(token=WORD, answer=lambda line: received.append(line) or "ok", greeting="welcome") as one:  # type: ignore[func-returns-value]

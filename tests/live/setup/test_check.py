@@ -43,6 +43,7 @@ def test_a_good_picture_is_ready(capsys: pytest.CaptureFixture[str]) -> None:
     ("more", "arguments", "message"),
     [
         ("&radius=12", (), "LOOK  speckle radius"),
+        ("&radius=1.09", (), "LOOK  speckle radius"),
         ("&contrast=3", (), "LOOK  contrast"),
         ("&brightness=1.6", (), "LOOK  saturated"),
         ("&brightness=0.25", (), "LOOK  light"),
@@ -52,14 +53,20 @@ def test_a_good_picture_is_ready(capsys: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_a_bad_picture_is_not(
-    capsys: pytest.CaptureFixture[str], more: str, arguments: tuple[str, ...], message: str
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    more: str,
+    arguments: tuple[str, ...],
+    message: str,
 ) -> None:
+    monkeypatch.setattr("live.setup.check.sample.at_rest", lambda address: address)
     code, output = checked(capsys, more, *arguments)
     assert code == 6, output
     assert message in output
 
 
-def test_too_short(capsys: pytest.CaptureFixture[str]) -> None:
+def test_too_short(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("live.setup.check.sample.at_rest", lambda address: address)
     assert main(["check"]) == 2
     assert main(["check", "--camera", "sim:uniform?fps=50&seconds=0.1&width=224&height=192"]) == 4
     assert "whole frames, a check needs 8" in capsys.readouterr().err

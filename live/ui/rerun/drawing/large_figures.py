@@ -25,7 +25,7 @@ WHITE, GREY, RED, GREEN, AMBER = (
 )
 _CELLS = ((14, 370), (400, 506), (920, 346), (1280, 306))  # left edge and width
 _LABEL_Y, _VALUE_Y, _LINE_Y = 28, 116, 157  # base lines
-_STATES = {"REC": RED, "ARMED": AMBER, "REPLAY": GREY}
+_STATES = {"REC": RED, "ARMED": AMBER, "NOT RECORDING": AMBER, "REPLAY": GREY}
 
 
 def paint(snapshot: Snapshot) -> NDArray[np.uint8]:

@@ -1,25 +1,66 @@
-// After a test: figures, summary, report.
-import { $, put } from "./base.js";
+// After a test: warnings first, then the figures, the curve with its lines, the map at the highest force, the report.
+import { $, el, fill, put } from "./base.js";
+import { finishCurve, updateCurves } from "./curves.js";
+import { drawGauges } from "./draw.js";
+import { short, strainText, strainUnit } from "./numbers.js";
 import { t } from "./words.js";
 
-export function showAfter(result) {
-  $("results").replaceChildren(...result.figures.map((one) => {
-    const box = document.createElement("div"), name = document.createElement("span"), value = document.createElement("output");
-    name.textContent = one.name;
-    value.textContent = one.text ?? "–";
-    const why = document.createElement("em");
-    why.textContent = one.why;
-    box.append(name, value, why);
-    return box;
-  }));
-  put($("folder"), result.folder);
-  put($("ended"), result.words);
-  $("summary").replaceChildren(...[...result.lines, result.ledger, ...result.troubles].map((text) => {
-    const item = document.createElement("li");
-    item.textContent = text;
-    return item;
-  }));
-  $("report").setAttribute("aria-disabled", String(!result.report));
-  put($("next"), result.next ?? "");
-  if (result.report) $("report").textContent = t("Open the report");
+let result = null;
+for (const kind of ["unit", "language"]) addEventListener(kind, () => { if (result) show(); });
+
+export async function showAfter(value) {
+  result = value;
+  show();
+  if (value.points) await updateCurves(value.points);
+  finishCurve(value.lines ?? []);
 }
+
+function show() {
+  put($("ended"), t(result.words));
+  fill($("troubles"), result.troubles, (text) => el("li", { text: t(text) }));
+  document.querySelector(".warnings").hidden = !result.words && !result.troubles.length;
+  fill($("results"), [{ head: ["figure", "value", "interval"] }, ...result.figures], row);
+  fill($("gaugeresults"), result.gauges.length ? [{ head: ["gauge", result.atpeak, ""] }, ...result.gauges] : [], gaugeRow);
+  put($("folder"), result.folder);
+  put($("ledger"), t(result.ledger));
+  put($("next"), result.next ?? "");
+  put($("again"), result.again ?? "");
+  finishCurve(result.lines ?? []);
+  showPeak(result.peak);
+  showReport(result.report);
+}
+
+const heads = (head) => el("tr", {}, ...head.map((text) => el("th", { text: t(text), scope: "col" })));
+
+// One line for a figure: its name, its value with unit, its interval; or why it is not known.
+function row(one) {
+  if (one.head) return heads(one.head);
+  const name = el("th", { text: one.name.includes(" ") ? t(one.name) : one.name, scope: "row" });
+  if (one.text == null) return el("tr", { class: "unknown" }, name, el("td", { text: t(one.why), title: t(one.why), colSpan: 2 }));
+  return el("tr", {}, name, el("td", { text: one.text }), el("td", { text: one.interval }));
+}
+
+function gaugeRow(one) {
+  if (one.head) return heads(one.head);
+  const text = one.value == null ? t(one.reason || "lost") : strainText(one.value, one.sigma);
+  return el("tr", {}, el("th", { text: one.name, scope: "row" }), el("td", { text, colSpan: 2 }));
+}
+
+function showPeak(peak) {
+  document.querySelector(".peak").hidden = !peak;
+  if (!peak) return;
+  const factor = peak.strain ? strainUnit().factor : 1, unit = peak.strain ? strainUnit().name : peak.unit;
+  put($("peakwords"), `${t(peak.of)}, ${t(result.atpeak)}`);
+  if (!$("peakmap").src.endsWith(peak.picture)) $("peakmap").src = peak.picture;
+  drawGauges($("peakgauges"), peak.gauges, peak.width, peak.height);
+  put($("peakscale"), peak.high == null ? "" : `${short(peak.low * factor)} … ${short(peak.high * factor)} ${unit}`);
+}
+
+// The report opens in a window of its own, or the page shows why there is none.
+function showReport(report) {
+  const link = $("report"), ready = report === true, words = { wait: "The report is being made …", ready: "Open the report", none: "No report" };
+  put(link, t(report === null ? words.wait : ready ? words.ready : words.none));
+  link.setAttribute("aria-disabled", String(!ready));
+  put($("whynoreport"), typeof report === "string" ? t(report) : "");
+}
+

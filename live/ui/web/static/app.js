@@ -1,23 +1,33 @@
 // The page: receives the events of phasedic, shows the stage, sends commands.
-import { $, change, command, post, put } from "./base.js";
-import { language, setLanguage, translate } from "./words.js";
-import { showRun } from "./run.js";
-import { showSetup, setupKeys } from "./setup.js";
+import { $, change, command, el, post, put } from "./base.js";
+import { ask, pause } from "./press.js";
+import { language, setLanguage, t } from "./words.js";
+import { themeChanged } from "./curves.js";
+import { beginRun, showRun } from "./run.js";
+import { beginSetup, showSetup } from "./setup.js";
+import { setupKeys } from "./drawing.js";
 import { showAfter } from "./after.js";
 
-const LOST_MS = 2000, CONFIRM_MS = 3000;
+const LOST_MS = 2000;
 let last = performance.now(), stage = {};
 
 const handlers = {
   stage(value) {
+    const changed = stage.n !== value.n;
     stage = value;
-    const changed = document.body.dataset.stage !== value.stage;
     document.body.dataset.stage = value.stage;
     document.body.classList.toggle("alone", value.alone);
-    for (const item of $("stages").children) item.classList.toggle("here", item.dataset.of === value.stage);
-    if (value.words) { put($("answer"), value.words); $("answer").classList.add("no"); }
-    if (changed && value.stage === "run") showRun.begin(value);
-    if (changed && value.stage === "setup") showSetup.begin(value);
+    for (const item of $("stages").children) {
+      item.classList.toggle("here", item.dataset.of === value.stage);
+      item.toggleAttribute("aria-current", item.dataset.of === value.stage);
+    }
+    $("failed").hidden = !value.words;
+    put($("whyfailed"), t(value.words));
+    if (!changed) return;
+    if (!value.words) put($("answer"), "");
+    pause();
+    if (value.stage === "run") beginRun(value);
+    if (value.stage === "setup") beginSetup(value);
   },
   setup: (value) => { if (stage.stage === "setup") showSetup(value); },
   run: (value) => { if (stage.stage === "run") showRun(value); },
@@ -46,37 +56,41 @@ setInterval(() => {
   document.body.classList.toggle("nolink", stage.stage !== "gone" && performance.now() - last > LOST_MS);
 }, 200);
 
-// A command that ends something needs a second press.
-function confirmed(button) {
-  if (!button.dataset.twice || button.classList.contains("confirm")) return true;
-  const label = button.querySelector("[data-t]");
-  button.classList.add("confirm");
-  label.dataset.t0 = label.dataset.t;
-  label.dataset.t = "Press again to end";
-  translate(button);
-  setTimeout(() => { button.classList.remove("confirm"); label.dataset.t = label.dataset.t0; translate(button); }, CONFIRM_MS);
-  return false;
+// One command at a time; what needs it is asked for. A tare under load is refused once, and forced when confirmed.
+let busy = false;
+async function order(button) {
+  if (busy) return;
+  busy = true;
+  try {
+    const { line, ask: question, because, yes } = button.dataset;
+    if (question && !(await ask(question, because ?? "", yes))) return;
+    const answer = await command(line);
+    const risk = /^no: not tared yet: (.*); confirm it$/s.exec(answer);
+    if (risk && (await ask("Tare in mid-test?", risk[1], "Tare"))) await command("tare force");
+  } finally {
+    busy = false;
+  }
 }
 
 document.addEventListener("click", (event) => {
   const button = event.target.closest("button");
   if (!button) return;
-  if (button.dataset.line && confirmed(button)) command(button.dataset.line);
+  if (button.dataset.line) order(button);
   if (button.dataset.do) change({ do: button.dataset.do });
 });
 
 for (const button of document.querySelectorAll("[data-key]")) {
-  const key = document.createElement("kbd");
-  key.textContent = button.dataset.key;
-  button.append(key);
+  button.append(el("kbd", { text: button.dataset.key, "aria-hidden": "true" }));
+  button.setAttribute("aria-keyshortcuts", button.dataset.key);
 }
 
 document.addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.altKey || event.metaKey || event.target.closest("input:not([type=range]):not([type=checkbox]), select")) return;
+  if (event.ctrlKey || event.altKey || event.metaKey || $("ask").open) return;
+  if (event.target.closest("input:not([type=range]):not([type=checkbox]), select")) return;
   if (stage.stage === "setup" && setupKeys(event)) return;
+  if (event.key === "n" && stage.stage === "run") { event.preventDefault(); $("notetext").focus(); return; }
   const button = $(stage.stage)?.querySelector(`[data-key="${CSS.escape(event.key)}"]`);
   if (button && !button.disabled) { event.preventDefault(); button.click(); }
-  if (event.key === "n" && stage.stage === "run") { event.preventDefault(); $("notetext").focus(); }
 });
 
 $("note").addEventListener("submit", async (event) => {
@@ -86,14 +100,15 @@ $("note").addEventListener("submit", async (event) => {
 });
 $("notetext").addEventListener("keydown", (event) => { if (event.key === "Escape") event.target.blur(); });
 $("viewer").addEventListener("click", () => post("/viewer", {}));
+$("seen").addEventListener("click", () => { $("failed").hidden = true; });
 
 function theme(name) {
   document.documentElement.dataset.theme = name;
   localStorage.setItem("theme", name);
-  showRun.theme();
+  themeChanged();
 }
 $("theme").addEventListener("click", () => theme(document.documentElement.dataset.theme === "dark" ? "light" : "dark"));
 $("language").addEventListener("change", (event) => setLanguage(event.target.value));
 theme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
-await setLanguage(language());
+setLanguage(language());
 connect();

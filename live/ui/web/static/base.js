@@ -1,4 +1,4 @@
-// Shared by all parts of the page: elements by name, and requests to phasedic.
+// Shared by all parts of the page: elements, and requests to phasedic.
 import { t } from "./words.js";
 
 export const $ = (id) => document.getElementById(id);
@@ -8,6 +8,30 @@ export function put(element, text) {
   if (element.textContent !== text) element.textContent = text;
 }
 
+// A new element: tag, properties (class, text, t: a text to translate, data-...), children.
+export function el(tag, properties = {}, ...children) {
+  const element = document.createElement(tag);
+  for (const [key, value] of Object.entries(properties)) {
+    if (key === "class") element.className = value;
+    else if (key === "text") element.textContent = value;
+    else if (key === "t") { element.dataset.t = value; element.textContent = t(value); }
+    else if (key.includes("-")) element.setAttribute(key, value);
+    else element[key] = value;
+  }
+  element.append(...children);
+  return element;
+}
+
+// Replaces the children of a list only where its values have changed; make gives an element for a value.
+export function fill(list, values, make) {
+  const mark = `${document.documentElement.lang} ${JSON.stringify(values)}`;
+  if (list.dataset.mark === mark) return;
+  list.dataset.mark = mark;
+  list.replaceChildren(...values.map(make));
+}
+
+const DONE = "{} ✓";
+
 export async function post(path, value) {
   let answer;
   try {
@@ -16,12 +40,18 @@ export async function post(path, value) {
     });
     answer = response.ok ? (await response.json()).answer : `no: ${await response.text()}`;
   } catch {
-    answer = `no: ${t("NO LINK")}`;
+    answer = "no: NO LINK";
   }
-  put($("answer"), answer === "ok" ? `${value.line ?? value.do ?? value.of ?? ""} ✓` : answer);
-  $("answer").classList.toggle("no", answer.startsWith("no"));
+  showAnswer(answer, value.line ?? value.do ?? value.of ?? "");
   return answer;
 }
 
-export const command = (line) => post("/order", { line });
+export function showAnswer(answer, what) {
+  const refused = answer.startsWith("no");
+  const [, words] = /^(?:no|ok): (.*)$/s.exec(answer) ?? [];
+  put($("answer"), words ? t(words) : DONE.replace("{}", what));
+  $("answer").classList.toggle("no", refused);
+}
+
+export const command = (line) => post("/order", { line, stage: document.body.dataset.stage });
 export const change = (value) => post("/setup", value);

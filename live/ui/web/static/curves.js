@@ -1,87 +1,157 @@
-// Two curves: stress or force against the axial strain, and all gauges against time.
+// The curves: stress or force against the axial strain, and all gauges against time. Dragging zooms, a double click
+// shows everything again, and the point next to the pointer is read out.
+import { $, el, fill, put } from "./base.js";
+import { colourOf, fixed, short, strainUnit } from "./numbers.js";
 import { t } from "./words.js";
 
-const COLOURS = ["#0b8f8f", "#c2571a", "#8e44ad", "#3d7a1f", "#b8336a", "#5a6acf"];
 const REQUEST_MS = 200;
 
-export class Curves {
-  constructor(first, second) {
-    this.places = [first, second];
-    this.clear();
-    addEventListener("resize", () => this.draw(true));
+// One plot: columns of numbers, of which the first goes across.
+class Plot {
+  constructor(place, labels) {
+    this.place = place;
+    this.labels = labels;  // function: texts of both axes
+    this.drawn = null;
+    this.straight = [];    // lines and marks over the curve, in shown units
+    place.addEventListener("dblclick", () => { this.zoomed = false; this.show(this.data, this.colours); });
   }
 
-  clear() {
-    this.names = []; this.rows = []; this.edition = 0; this.requested = 0; this.busy = false;
-    for (const plot of this.plots ?? []) plot.destroy();
-    this.plots = null;
+  destroy() { this.drawn?.destroy(); this.drawn = null; this.zoomed = false; }
+
+  show(data, colours) {
+    this.data = data;
+    this.colours = colours;
+    if (!this.place.clientWidth || !data[0].length) return;
+    if (this.drawn && this.drawn.series.length !== data.length) this.destroy();
+    this.drawn ??= this.made(data);
+    this.drawn.setData(data, !this.zoomed);
+    if (this.zoomed) this.drawn.redraw();
   }
 
-  theme() { if (this.plots) this.draw(true); }
-
-  async update([edition, count]) {
-    const now = performance.now();
-    if (this.busy || now - this.requested < REQUEST_MS || (edition === this.edition && count === this.rows.length)) return;
-    this.busy = true;
-    this.requested = now;
-    try {
-      const response = await fetch(`/points?edition=${this.edition}&count=${this.rows.length}`);
-      if (!response.ok) return;
-      const received = await response.json();
-      this.rows = [...this.rows.slice(0, received.first), ...received.rows];
-      this.edition = received.edition;
-      const renamed = received.names.join() !== this.names.join();
-      this.names = received.names;
-      this.draw(renamed);
-    } finally {
-      this.busy = false;
-    }
-  }
-
-  draw(rebuild) {
-    if (!this.rows.length) return;
-    const column = (i) => this.rows.map((row) => row[i]);
-    const micro = (values) => values.map((v) => (v == null ? null : v * 1e6));
-    const data = [
-      [micro(column(2)).map((v) => v ?? NaN), column(1).map((v) => (v == null || this.names[1] === "force" ? v : v / 1e6))],
-      [column(0), ...this.names.slice(3).map((_, i) => micro(column(i + 3)))],
-    ];
-    if (rebuild || !this.plots) {
-      for (const plot of this.plots ?? []) plot.destroy();
-      this.plots = [this.plot(0, ["µm/m", this.names[1] === "stress" ? `${t("Stress")}, MPa` : `${t("Force")}, N`], [""], data[0]), this.plot(1, ["s", "µm/m"], this.names.slice(3), data[1])];
-    }
-    this.plots.forEach((plot, i) => plot.setData(data[i]));
-  }
-
-  plot(index, [across, up], names, data) {
+  made(data) {
     const style = getComputedStyle(document.documentElement), ink = style.getPropertyValue("--ink").trim(), line = style.getPropertyValue("--line").trim();
-    const place = this.places[index], font = "13px system-ui, sans-serif";
-    const axis = (label, size) => ({ label, stroke: ink, font, labelFont: font, labelSize: 18, size, grid: { stroke: line, width: 1 }, ticks: { stroke: line } });
+    const [across, up] = this.labels(), font = "13px system-ui, sans-serif";
+    const axis = (label, size) => ({ label, stroke: ink, font, labelFont: font, labelSize: 18, size, grid: { stroke: line, width: 1 }, ticks: { stroke: line }, values: (_, ticks) => ticks.map(short) });
     // Strain is not monotonic: a range wider than the data keeps all of them drawn.
-    const range = (_, low, high) => { const pad = Math.max((high - low) * 0.04, 1e-6); return [low - pad, high + pad]; };
+    const range = (_, low, high) => { if (this.zoomed) return [low, high]; const pad = Math.max((high - low) * 0.04, 1e-6); return [low - pad, high + pad]; };
     return new uPlot({
-      width: place.clientWidth, height: place.clientHeight, legend: { show: false }, cursor: { show: false },
+      width: this.place.clientWidth, height: this.place.clientHeight, legend: { show: false },
+      cursor: { points: { show: false }, drag: { x: true, y: true, uni: 20 } },
       scales: { x: { time: false, range } },
       axes: [axis(across, 34), axis(up, 62)],
-      series: [{ sorted: 0 }, ...names.map((label, i) => ({ label, stroke: COLOURS[i % COLOURS.length], width: 2, points: { show: false } }))],
-      hooks: { draw: [(u) => legend(u, names, ink)] },
-    }, data, place);
+      series: [{ sorted: 0 }, ...data.slice(1).map((_, k) => ({ stroke: this.colours(k), width: 2, points: { show: false } }))],
+      hooks: {
+        setCursor: [(u) => this.read(u)], setSelect: [(u) => { if (u.select.width > 0 || u.select.height > 0) this.zoomed = true; }],
+        draw: [(u) => over(u, this.straight, ink)],
+      },
+    }, data, this.place);
+  }
+
+  // The point next to the pointer, of all curves.
+  read(u) {
+    const out = this.place.parentElement.querySelector(".at"), { left, top } = u.cursor;
+    if (left < 0) { put(out, ""); return; }
+    let best = Infinity, at = null;
+    for (let i = 0; i < this.data[0].length; i++) {
+      const x = u.valToPos(this.data[0][i], "x");
+      for (let k = 1; k < this.data.length; k++) {
+        const far = Math.hypot(x - left, u.valToPos(this.data[k][i], "y") - top);
+        if (far < best) { best = far; at = [this.data[0][i], this.data[k][i], k - 1]; }
+      }
+    }
+    const [across, up] = this.labels();
+    put(out, at ? `${this.names?.[at[2]] ?? ""} ${across}: ${short(at[0])} · ${up}: ${short(at[1])}`.trim() : "");
   }
 }
 
-// The legend, inside the plot.
-function legend(u, names, ink) {
-  if (names.length < 2) return;
+// Straight lines and marks with their words, over a curve.
+function over(u, parts, ink) {
   const { ctx, bbox } = u, ratio = devicePixelRatio;
   ctx.save();
-  Object.assign(ctx, { textAlign: "left", textBaseline: "middle" });
+  ctx.beginPath();
+  ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+  ctx.clip();
   ctx.font = `${13 * ratio}px system-ui, sans-serif`;
-  names.forEach((name, i) => {
-    const y = bbox.top + (12 + 17 * i) * ratio, x = bbox.left + 10 * ratio;
-    ctx.fillStyle = COLOURS[i % COLOURS.length];
-    ctx.fillRect(x, y - 2 * ratio, 18 * ratio, 4 * ratio);
-    ctx.fillStyle = ink;
-    ctx.fillText(name, x + 24 * ratio, y);
-  });
+  ctx.textBaseline = "middle";
+  const at = ([x, y]) => [u.valToPos(x, "x", true), u.valToPos(y, "y", true)];
+  for (const { points, words } of parts) {
+    ctx.strokeStyle = ctx.fillStyle = ink;
+    ctx.setLineDash([6 * ratio, 4 * ratio]);
+    ctx.lineWidth = 1.5 * ratio;
+    ctx.beginPath();
+    for (const [k, p] of points.map(at).entries()) k ? ctx.lineTo(...p) : ctx.moveTo(...p);
+    ctx.stroke();
+    if (points.length > 1) continue;
+    const [x, y] = at(points[0]), right = x > bbox.left + bbox.width / 2;
+    ctx.beginPath();
+    ctx.arc(x, y, 5 * ratio, 0, 7);
+    ctx.fill();
+    ctx.textAlign = right ? "right" : "left";
+    ctx.fillText(words, x + (right ? -10 : 10) * ratio, Math.min(y + 14 * ratio, bbox.top + bbox.height - 8 * ratio));
+  }
   ctx.restore();
 }
+
+const data = { names: [], rows: [], edition: 0, requested: 0, busy: false };
+const isStress = () => data.names[1] !== "force";
+const loadLabel = () => (isStress() ? `${t("Stress")}, MPa` : `${t("Force")}, N`);
+const column = (i) => data.rows.map((row) => row[i]);
+const strains = (i) => column(i).map((v) => (v == null ? null : v * strainUnit().factor));
+const loads = () => column(1).map((v) => (v == null || !isStress() ? v : v / 1e6));
+
+const tension = () => [`${t("Strain")}, ${strainUnit().name}`, loadLabel()];
+const first = new Plot($("curve1"), tension), result = new Plot($("curve3"), tension);
+const second = new Plot($("curve2"), () => ["s", strainUnit().name]);
+const plots = [first, second, result];
+
+export function clearCurves() {
+  Object.assign(data, { names: [], rows: [], edition: 0, requested: 0, busy: false });
+  for (const plot of plots) plot.destroy();
+  result.straight = [];
+}
+
+export async function updateCurves([edition, count]) {
+  const now = performance.now();
+  if (data.busy || now - data.requested < REQUEST_MS || (edition === data.edition && count === data.rows.length)) return;
+  data.busy = true;
+  data.requested = now;
+  try {
+    const response = await fetch(`/points?edition=${data.edition}&count=${data.rows.length}`);
+    if (!response.ok) return;
+    const received = await response.json();
+    data.rows = [...data.rows.slice(0, received.first), ...received.rows];
+    data.edition = received.edition;
+    data.names = received.names;
+    draw();
+  } finally {
+    data.busy = false;
+  }
+}
+
+function draw() {
+  if (!data.rows.length) return;
+  const names = data.names.slice(3), curve = [strains(2).map((v) => v ?? NaN), loads()];
+  second.names = names;
+  if (document.body.dataset.stage === "after") { result.show(curve, colourOf); return; }
+  first.show(curve, colourOf);
+  second.show([column(0), ...names.map((_, i) => strains(i + 3))], colourOf);
+  fill($("names"), names, (name, k) => {
+    const key = el("i", { class: "key" });
+    key.style.background = colourOf(k);
+    return el("li", {}, key, name);
+  });
+}
+
+// The finished curve with the lines of the evaluation: points in SI units.
+export function finishCurve(lines) {
+  const unit = strainUnit().factor, load = isStress() ? 1e-6 : 1;
+  result.straight = lines.map(({ points, words }) => ({ points: points.map(([x, y]) => [x * unit, y * load]), words: words && `${words.name} = ${fixed(words.value * load, 1)} ${isStress() ? "MPa" : "N"}` }));
+  draw();
+}
+
+function again() {
+  for (const plot of plots) plot.destroy();
+  draw();
+}
+export const themeChanged = again;
+for (const kind of ["resize", "language", "unit"]) addEventListener(kind, again);

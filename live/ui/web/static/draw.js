@@ -1,4 +1,6 @@
-// Drawing over the picture with the mouse. Coordinates are px of the picture; the centre of the first pixel is 0, 0.
+// Shapes over the picture. Coordinates are px of the picture; the centre of the first pixel is 0, 0.
+import { colourOf } from "./numbers.js";
+
 const SVG = "http://www.w3.org/2000/svg";
 
 export function make(name, attributes, ...children) {
@@ -8,9 +10,24 @@ export function make(name, attributes, ...children) {
   return element;
 }
 
-// The lines of a gauge as the server gives them.
-function shape(gauge) {
-  return gauge.outline.map((line) => make("polyline", { class: "gauge", points: line.join(" ") }));
+// The lines of a gauge as the server gives them, on a dark rim.
+function outline(gauge, colour) {
+  const lines = gauge.outline.map((line) => line.join(" "));
+  return [...lines.map((points) => make("polyline", { class: "rim", points })), ...lines.map((points) => make("polyline", { class: "gauge", points, stroke: colour }))];
+}
+
+// Places for names: beside the first handle, moved down while they would lie on another name.
+function namePlaces(gauges, size, width, height) {
+  const taken = [];
+  return gauges.map(([name, gauge]) => {
+    const long = name.length * size * 0.62, [hx, hy] = gauge.handles[0];
+    const x = Math.max(0, Math.min(hx + size / 2, width - long));
+    let y = Math.max(size, hy - size / 3);
+    const lies = (other) => Math.abs(other.y - y) < size && x < other.x + other.long && other.x < x + long;
+    for (let tries = 0; taken.some(lies) && tries < 100; tries++) y = y + size < height ? y + size * 0.25 : size;
+    taken.push({ x, y, long });
+    return [x, y];
+  });
 }
 
 export function drawGauges(svg, gauges, width, height, handles) {
@@ -18,15 +35,17 @@ export function drawGauges(svg, gauges, width, height, handles) {
   if (svg.dataset.mark === mark) return;
   svg.dataset.mark = mark;
   svg.setAttribute("viewBox", `-0.5 -0.5 ${width} ${height}`);
-  const size = Math.max(width, height) / 40, focused = document.activeElement?.dataset?.handle;
-  const parts = [];
-  for (const [name, gauge] of Object.entries(gauges)) {
-    const points = gauge.handles, text = make("text", { class: "gaugename", x: points[0][0] + size / 2, y: points[0][1] - size / 3, "font-size": size });
+  const size = Math.max(width, height) / 38, focused = document.activeElement?.dataset?.handle;
+  const all = Object.entries(gauges), places = namePlaces(all, size, width, height), parts = [], names = [], dots = [];
+  all.forEach(([name, gauge], k) => {
+    const colour = colourOf(k), [x, y] = places[k];
+    const text = make("text", { class: "gaugename", x, y, "font-size": size, fill: colour });
     text.textContent = name;
-    parts.push(...shape(gauge), text);
-    if (handles) points.forEach((p, i) => parts.push(make("circle", { class: "handle", cx: p[0], cy: p[1], r: size / 3, tabindex: 0, "data-handle": `${name} ${i}`, "aria-label": `${name} ${i + 1}` })));
-  }
-  svg.replaceChildren(...parts);
+    parts.push(...outline(gauge, colour));
+    names.push(text);
+    if (handles) gauge.handles.forEach((p, i) => dots.push(make("circle", { class: "handle", cx: p[0], cy: p[1], r: size / 3, fill: colour, tabindex: 0, role: "button", "data-handle": `${name} ${i}`, "aria-label": `${name} ${i + 1}` })));
+  });
+  svg.replaceChildren(...parts, ...names, ...dots);
   if (focused) svg.querySelector(`[data-handle="${CSS.escape(focused)}"]`)?.focus();
 }
 
@@ -34,4 +53,22 @@ export function drawGauges(svg, gauges, width, height, handles) {
 export function position(svg, event) {
   const p = new DOMPoint(event.clientX, event.clientY).matrixTransform(svg.getScreenCTM().inverse());
   return [p.x, p.y];
+}
+
+// The wheel zooms a picture about the pointer; 0 and a double click show all of it again.
+export function zoomable(content) {
+  const frame = content.parentElement;
+  let scale = 1, x = 0, y = 0;
+  const show = () => { content.style.transform = scale === 1 ? "" : `translate(${x}px, ${y}px) scale(${scale})`; };
+  const reset = () => { scale = 1; x = y = 0; show(); };
+  frame.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    const box = frame.getBoundingClientRect(), px = event.clientX - box.left, py = event.clientY - box.top;
+    const next = Math.min(Math.max(scale * (event.deltaY < 0 ? 1.25 : 0.8), 1), 16), of = next / scale;
+    x = Math.min(0, Math.max(px - (px - x) * of, box.width * (1 - next)));
+    y = Math.min(0, Math.max(py - (py - y) * of, box.height * (1 - next)));
+    scale = next;
+    show();
+  }, { passive: false });
+  return reset;
 }

@@ -1,154 +1,107 @@
-// A running test: large figures, the map, the curves, the events.
-import { $, command, post, put } from "./base.js";
-import { drawGauges } from "./draw.js";
+// A running test: what is done with the frames, large figures, alarms, machine and events.
+import { $, el, fill, put } from "./base.js";
+import { clearCurves, updateCurves } from "./curves.js";
+import { beginMap, showMap } from "./map.js";
+import { chooseStrainUnit, colourOf, fixed, strainText, strainUnit, time, withSigma } from "./numbers.js";
 import { t } from "./words.js";
-import { Curves } from "./curves.js";
-
-const curves = new Curves($("curve1"), $("curve2"));
-let ramp = [], loading = false, shownPicture = 0, paused = false;
-
-export const fixed = (value, digits = 0) => (value == null ? "–" : value.toFixed(digits).replace("-", "−"));
-const signed = (value, digits = 0) => (value == null ? "–" : (value < 0 ? "−" : "+") + Math.abs(value).toFixed(digits));
-
-export function strainUnit(largest) {
-  return largest >= 0.02 ? { name: "%", factor: 100, digits: 3 } : { name: "µm/m", factor: 1e6, digits: 0 };
-}
-
-function time(seconds) {
-  const whole = Math.floor(Math.max(seconds ?? 0, 0)), two = (n) => String(n).padStart(2, "0");
-  const hours = Math.floor(whole / 3600);
-  return `${hours ? `${hours}:` : ""}${two(Math.floor(whole / 60) % 60)}:${two(whole % 60)}`;
-}
 
 const WORDS = {
   opening: "opening", reference: "reference: keep still", measuring: "measuring", paused: "paused", ended: "closing the files",
 };
+const RECORDING = { on: "REC", off: "NOT RECORDING" };
+let state = null;
 
-export function showRun(state) {
-  paused = state.state === "paused";
-  $("state").dataset.word = state.state;
-  put($("word"), t(WORDS[state.state] ?? state.state));
-  put($("elapsed"), time(state.elapsed_s));
-  put($("pause").querySelector("[data-t]"), t(paused ? "Resume" : "Pause"));
-  $("state").classList.toggle("unrecorded", state.recording === false);
-  put($("notrecorded"), state.recording === false && state.state !== "ended" ? t("not recorded") : "");
-  document.querySelector("#run [data-line=start]").disabled = state.recording !== false;
-  document.querySelector("#run [data-line=stop]").disabled = state.recording !== true;
-  put($("force"), fixed(state.force_N, Math.abs(state.force_N ?? 0) < 1000 ? 1 : 0));
-  put($("stress"), state.stress_Pa == null ? "–" : fixed(state.stress_Pa / 1e6, 1));
-  showStrains(state);
-  showStrip(state);
-  showEvents(state.events);
-  showAlarm(state);
-  showPicture(state.picture);
-  curves.update(state.points);
+$("strainunit").value = strainUnit().name;
+$("strainunit").addEventListener("change", (event) => { chooseStrainUnit(event.target.value); event.target.blur(); });
+addEventListener("unit", () => { if (state) showStrains(state); });
+
+export function beginRun(stage) {
+  clearCurves();
+  beginMap(stage);
+  showRun({ state: "opening", elapsed_s: 0, events: [], alarms: [], gauges: [], recording: null });
 }
 
-showRun.begin = (stage) => {
-  ramp = stage.ramp;
-  shownPicture = 0;
-  curves.clear();
-  const chosen = $("component");
-  if (!chosen.children.length) {
-    for (const name of stage.components) chosen.append(new Option(t(name), name));
-    chosen.addEventListener("change", () => post("/map", { of: chosen.value }));
-  }
-  $("ramp").style.background = `linear-gradient(to left, ${ramp.join(", ")})`;
-};
-showRun.theme = () => curves.theme();
+export function showRun(value) {
+  state = value;
+  const paused = value.state === "paused", ended = value.state === "ended";
+  $("state").dataset.word = value.state;
+  put($("word"), t(WORDS[value.state] ?? value.state));
+  put($("elapsed"), time(value.elapsed_s));
+  showRecording(value.recording, ended);
+  $("pause").dataset.line = paused ? "resume" : "pause";
+  $("pause").firstElementChild.dataset.t = paused ? "Resume" : "Pause";
+  put($("pause").firstElementChild, t($("pause").firstElementChild.dataset.t));
+  put($("force"), fixed(value.force_N, 1));
+  put($("stress"), value.stress_Pa == null ? "–" : fixed(value.stress_Pa / 1e6, 2));
+  showStrains(value);
+  put($("peak"), value.peak_N == null ? "–" : `${fixed(value.peak_N, 1)} N`);
+  put($("elongation"), value.elongation_mm == null ? "–" : `${fixed(value.elongation_mm, 4)} mm`);
+  put($("strainrate"), value.strain_rate == null ? "–" : `${rate(value.strain_rate)} 1/s`);
+  showStrip(value);
+  showEvents(value.events);
+  showAlarm(value);
+  if (value.picture) showMap(value.picture);
+  if (value.points) updateCurves(value.points);
+}
 
-function showStrains(state) {
-  const axial = state.axial, unit = strainUnit(Math.abs(axial?.value ?? 0));
+// Always written: REC or NOT RECORDING.
+function showRecording(recording, ended) {
+  $("state").classList.toggle("unrecorded", recording !== true && !ended);
+  put($("rec"), t(recording === true ? RECORDING.on : RECORDING.off));
+  $("rec").className = recording === true ? "on" : "off";
+  document.querySelector("#run [data-line=start]").disabled = recording !== false;
+  document.querySelector("#run [data-line=stop]").disabled = recording !== true;
+}
+
+// 2.5·10⁻⁴: one form for all rates.
+function rate(value) {
+  if (value === 0) return "0";
+  const power = Math.floor(Math.log10(Math.abs(value)));
+  const digits = [...String(power)].map((c) => (c === "-" ? "⁻" : "⁰¹²³⁴⁵⁶⁷⁸⁹"[c])).join("");
+  return `${fixed(value / 10 ** power, 1)}·10${digits}`;
+}
+
+function showStrains(value) {
+  const unit = strainUnit(), axial = value.axial, [text, sigma] = withSigma(axial?.value, axial?.sigma, unit);
   put($("axialname"), axial?.name ?? "");
-  put($("axial"), axial ? signed(axial.value == null ? null : axial.value * unit.factor, unit.digits) : "–");
-  put($("axialunit"), unit.name);
-  put($("axialsigma"), axial?.sigma == null ? "" : `± ${(axial.sigma * unit.factor).toFixed(unit.digits || 1)}`);
-  const rows = (state.gauges ?? []).filter((one) => one.name !== "axial").slice(0, 6);
-  const list = $("others");
-  while (list.children.length < rows.length) list.append(row());
-  while (list.children.length > rows.length) list.lastChild.remove();
-  rows.forEach((one, i) => {
-    const u = strainUnit(Math.abs(one.value ?? 0)), [name, value] = list.children[i].children;
+  put($("axial"), text);
+  put($("axialsigma"), sigma ? `± ${sigma} ${unit.name}` : "");
+  const gauges = (value.gauges ?? []).map((one, k) => ({ ...one, k })), list = $("others");
+  while (list.children.length > gauges.length) list.lastChild.remove();
+  while (list.children.length < gauges.length) list.append(el("li", {}, el("i", { class: "key" }), el("span"), el("b")));
+  gauges.forEach((one, i) => {
+    const [key, name, number] = list.children[i].children;
+    key.style.background = colourOf(one.k);
     put(name, one.name);
-    put(value, one.reason || one.value == null ? t("lost") : `${signed(one.value * u.factor, u.digits)} ± ${(one.sigma * u.factor).toFixed(u.digits || 1)} ${u.name}`);
+    put(number, one.reason || one.value == null ? t("lost") : strainText(one.value, one.sigma));
+    number.title = one.reason ? t(one.reason) : "";
   });
 }
 
-function row() {
-  const item = document.createElement("li");
-  item.append(document.createElement("span"), document.createElement("b"));
-  return item;
-}
-
-const CELLS = ["ZOIs", "frames/s", "latency", "recorded", "skipped", "lost", "kernel", "peak force", "disk"];
-function showStrip(state) {
-  const l = state.ledger ?? {}, lost = (l.lost ?? 0) + (l.unrecorded ?? 0);
+const CELLS = ["ZOIs", "frames/s", "latency", "recorded", "skipped", "lost", "kernel", "disk"];
+function showStrip(value) {
+  const l = value.ledger ?? {}, lost = (l.lost ?? 0) + (l.unrecorded ?? 0), ms = (s) => (s == null ? "–" : `${fixed(s * 1e3)} ms`);
   const values = [
-    state.zois == null ? "–" : `${state.valid} / ${state.zois}`, fixed(state.fps, 0), state.late_s == null ? "–" : `${fixed(state.late_s * 1e3)} ms`,
-    String(l.recorded ?? "–"), String(l.skipped ?? "–"), String(lost), state.kernel_s == null ? "–" : `${fixed(state.kernel_s * 1e3)} ms`,
-    state.peak_N == null ? "–" : `${fixed(state.peak_N, 0)} N`, state.disk_min == null ? "–" : disk(state.disk_min),
+    value.zois == null ? "–" : `${value.valid} / ${value.zois}`, fixed(value.fps, 0), ms(value.late_s),
+    String(l.recorded ?? "–"), String(l.skipped ?? "–"), String(lost), ms(value.kernel_s), value.disk_min == null ? "–" : disk(value.disk_min),
   ];
   const box = $("strip");
-  if (!box.children.length) {
-    for (const name of CELLS) {
-      const cell = document.createElement("div"), head = document.createElement("dt");
-      head.dataset.t = name;
-      head.textContent = t(name);
-      cell.append(head, document.createElement("dd"));
-      box.append(cell);
-    }
-  }
-  values.forEach((value, i) => put(box.children[i].lastChild, value));
+  fill(box, CELLS, (name) => el("div", {}, el("dt", { t: name }), el("dd")));
+  values.forEach((text, i) => put(box.children[i].lastChild, text));
   box.children[5].lastChild.classList.toggle("bad", lost > 0);
 }
 
 const disk = (minutes) => (minutes > 600 ? `${fixed(minutes / 60)} h` : `${fixed(minutes)} min`);
 
-let newest = "";
 function showEvents(list) {
-  const mark = `${list.length} ${list.at(-1)?.s} ${list.at(-1)?.text}`;
-  if (mark === newest) return;
-  newest = mark;
-  $("events").replaceChildren(...list.toReversed().map((one) => {
-    const item = document.createElement("li"), when = document.createElement("time"), text = document.createElement("span");
-    when.textContent = time(one.s);
-    text.textContent = one.text;
-    text.className = one.level;
-    item.append(when, text);
-    return item;
-  }));
+  fill($("events"), list.toReversed(), (one) => el("li", {}, el("time", { text: time(one.s) }), el("span", { text: t(one.text), class: one.level })));
 }
 
 // An alarm stays until it clears or is switched off, an error for 20 s.
-function showAlarm(state) {
-  const error = state.events.findLast((one) => one.level === "error" && state.elapsed_s - one.s < 20);
-  const words = [...(state.alarms ?? []), ...(error && !state.alarms?.length ? [error.text] : [])].join(" · ");
+function showAlarm(value) {
+  const error = value.events.findLast((one) => one.level === "error" && value.elapsed_s - one.s < 20);
+  const words = [...(value.alarms ?? []), ...(error && !value.alarms?.length ? [error.text] : [])].map((one) => t(one)).join(" · ");
   $("state").classList.toggle("alarm", Boolean(words));
   put($("alarm"), words);
 }
 
-// The next picture is requested when the last has arrived: a slow page gets fewer pictures, never old ones.
-function showPicture(picture) {
-  if (picture.n === shownPicture || loading) return;
-  const image = $("map");
-  loading = true;
-  shownPicture = picture.n;
-  image.onload = image.onerror = () => { loading = false; };
-  image.src = `/picture?run=${picture.n}`;
-  if ($("component") !== document.activeElement) $("component").value = picture.of;
-  const scaled = picture.high != null;
-  $("ramp").parentElement.classList.toggle("status", Boolean(picture.legend));
-  $("ramp").style.visibility = scaled ? "" : "hidden";
-  $("statuses").replaceChildren(...(picture.legend ?? []).map((one) => {
-    const item = document.createElement("span"), key = document.createElement("i");
-    key.style.background = one.colour;
-    item.append(key, one.text);
-    return item;
-  }));
-  put($("low"), scaled ? fixed(picture.low, picture.unit === "µm/m" ? 0 : 3) : "");
-  put($("high"), scaled ? fixed(picture.high, picture.unit === "µm/m" ? 0 : 3) : "");
-  put($("unit"), scaled ? picture.unit : "");
-  if (picture.width) drawGauges($("gaugemap"), picture.gauges, picture.width, picture.height);
-}
-
-$("pause").addEventListener("click", () => command(paused ? "resume" : "pause"));

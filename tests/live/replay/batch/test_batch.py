@@ -47,6 +47,37 @@ def test_twelve_tests_in_one_table(done: Path) -> None:
     assert not parts(done)
 
 
+LIMITED = """
+import resource, sys
+from live.cli import main
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), int(sys.argv[1])))
+sys.exit(main(["batch", *sys.argv[2:]]))
+"""
+
+
+def test_a_full_disk_is_a_line_of_each_test(runs: Path, tmp_path: Path) -> None:
+    """The limit on the size of files stands in for the disk."""
+    words = [str(runs / f"hole-{n}" / "session.h5") for n in (1, 2)]
+    command = [
+        sys.executable,
+        "-c",
+        LIMITED,
+        "60000",
+        *words,
+        *SETTINGS,
+        "--burst",
+        "1",
+        "--out",
+        str(tmp_path / "o"),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    said = done.stdout + done.stderr
+    assert done.returncode == 5 and "Traceback" not in said, said
+    assert len(said.splitlines()) < 14, said
+    assert {row["exit_code"] for row in rows(tmp_path / "o")} == {"5"}
+    assert all("cannot be written (File too large)" in row["error"] for row in rows(tmp_path / "o"))
+
+
 @pytest.mark.parametrize("name", ["uniform-1", "hole-2", "woven-4"])
 def test_bit_equal_to_a_replay(runs: Path, done: Path, tmp_path: Path, name: str) -> None:
     words = ["replay", str(runs / name / "session.h5"), *SETTINGS, "--no-view", "--no-rrd"]

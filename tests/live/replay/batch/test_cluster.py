@@ -202,7 +202,7 @@ def test_nobody_is_there(
     assert main([*words, "tls://127.0.0.1:9"]) == 2
     assert "no certificate is known here" in capsys.readouterr().err
     assert main([*words, "nonsense://1"]) == 2
-    assert "nothing answers there" in capsys.readouterr().err
+    assert "give tcp://HOST:PORT" in capsys.readouterr().err
 
 
 def answer(**other: object) -> dict[str, object]:

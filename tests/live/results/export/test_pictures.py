@@ -13,6 +13,7 @@ import pytest
 from acquire.errors import ConfigError, DataError
 from analysis.field.strain_field import StrainField
 from live.cli import main
+from live.results.export import films
 from live.results.export.atomic_file import new_file
 from live.results.export.formats import FORMATS, ExportRequest, export
 from live.results.export.job import ExportJob, ExportOptions, chosen_rows
@@ -70,6 +71,20 @@ def test_pictures(run_dir: Path, tmp_path: Path, field: str) -> None:
     drawn = cv2.imread(str(out / f"{field}_00001.png"))
     assert drawn.shape[1] > SIZE[0] * 0.85
     assert drawn.std() > 5
+
+
+def test_a_film_without_an_ending_gets_one(run_dir: Path, tmp_path: Path) -> None:
+    assert main(["export", str(run_dir), "--to", "mp4", "--out", str(tmp_path / "film"), "--from", "1"]) == 0
+    assert [path.name for path in tmp_path.iterdir()] == ["film.mp4"]
+
+
+def test_a_gif_stays_below_its_limit(run_dir: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ["export", str(run_dir), "--to", "gif", "--from", "1", "--out"]
+    assert main([*words, str(tmp_path / "free.gif")]) == 0
+    free = (tmp_path / "free.gif").stat().st_size
+    monkeypatch.setattr(films, "MAX_GIF_BYTES", free // 2)
+    assert main([*words, str(tmp_path / "small.gif")]) == 0
+    assert 1000 < (tmp_path / "small.gif").stat().st_size <= free // 2
 
 
 def moved(number: int, strain: float) -> StrainField:
@@ -134,7 +149,7 @@ def test_nothing_is_overwritten(
         (2, "--mm needs the scale", ["--mm"]),
         (2, "has no effect without --mm", ["--scale", "0.1"]),
         (2, "mm/px is not possible", ["--mm", "--scale", "-1"]),
-        (2, "--fps 0 is not possible", ["--fps", "0"]),
+        (2, "--fps 0 is not possible", ["--to", "gif", "--fps", "0"]),
         (2, ".mp4 or .webm", ["--to", "mp4", "--out", "film.avi"]),
     ],
 )
@@ -150,9 +165,9 @@ def test_broken_files_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "no strain.h5 there" in capsys.readouterr().err
     make_run(tmp_path)
     (tmp_path / "session.h5").write_bytes((tmp_path / "session.h5").read_bytes()[:5000])
-    assert main(["export", str(tmp_path), "--to", "png"]) == 4
-    assert "session.h5" in capsys.readouterr().err
-    assert main(["export", str(tmp_path), "--to", "png", "--no-picture", "--from", "4"]) == 0
+    assert main(["export", str(tmp_path), "--to", "png", "--from", "4"]) == 0
+    output = capsys.readouterr().out
+    assert "note: the recording cannot be read, the results can: " in output and "session.h5" in output
     whole = (tmp_path / "strain.h5").read_bytes()
     (tmp_path / "strain.h5").write_bytes(whole[: len(whole) // 2])
     assert main(["export", str(tmp_path), "--to", "npz"]) == 4

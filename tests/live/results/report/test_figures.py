@@ -10,9 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hw_mocks.deformation import Affine
+from hw_mocks.speckle import Speckle
 from live.cli import main
 from live.results.report.comparison import summary
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
+from live.results.report.practice import PracticeValues, reporting_table
 from live.results.report.record import times
 from live.results.report.report import ReportRequest, make_report
 from live.results.run_folder import open_run
@@ -55,6 +58,16 @@ def test_mean_and_scatter() -> None:
     assert (mean, deviation, n) == (2.0, pytest.approx(np.sqrt(2)), 2)
 
 
+@pytest.mark.parametrize(("radius", "is_wanted"), [(1.0, False), (2.0, True)])
+def test_the_report_has_the_limit_of_the_check(run_dir: Path, radius: float, is_wanted: bool) -> None:
+    picture = 255 * Speckle((192, 256), radius=radius, seed=3).render(Affine(), (192, 256))
+    with open_run(run_dir) as run:
+        text = str(reporting_table(PracticeValues(run, None, picture[:96, :128], {}, None)))
+    found = re.search(r"autocorrelation; radius ([\d.]+) px", text)
+    assert found is not None and float(found[1]) == pytest.approx(radius, rel=0.3)
+    assert ("(LOOK: wanted are 1.5 to 4 px)" not in text) is is_wanted
+
+
 @pytest.fixture(scope="module")
 def gauged(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return make_run(tmp_path_factory.mktemp("gauged"), config={**CONFIG, "gauges": GAUGES})
@@ -81,7 +94,7 @@ def test_the_report_shows_every_gauge_with_its_band(gauged: Path) -> None:
 def test_the_curve_is_that_of_the_gauge_axial(gauged: Path, run_dir: Path) -> None:
     with open_run(gauged) as run, open_run(run_dir) as plain:
         np.testing.assert_array_equal(EvaluatedCurve.of(run).axial, run.strain.values["gauge_axial"])
-        np.testing.assert_array_equal(EvaluatedCurve.of(plain).axial, plain.strain.values["eyy"])
+        np.testing.assert_array_equal(EvaluatedCurve.of(plain).axial, plain.strain.values["extension_y"])
 
 
 def test_the_lag_is_told_or_why_not(gauged: Path, tmp_path: Path) -> None:

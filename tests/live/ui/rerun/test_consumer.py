@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import pytest
@@ -91,10 +90,8 @@ def test_the_card_shows_the_state_of_the_test() -> None:
     writer = CardWriter(
         view, StatusCard(SpecimenConfig(), make_loads(10.0, lambda t: 1e3 * t)), RunState.new(1.0)
     )  # type: ignore[arg-type]
-    begin = time.perf_counter()
     for number in range(100):
         writer.measurement(make_measurement(number, 1e-5 * number))
-    assert time.perf_counter() - begin < 10.0
     (_, (text,)) = view.calls[-1]
     assert "33 of 34" in text.replace("*", "") or "ZOIs valid" in text
 

@@ -127,6 +127,7 @@ def test_killed_it_is_restarted_on_its_port_with_the_past_data(
     assert "started 2 times" in view.report
 
 
+@pytest.mark.timed
 def test_stopped_it_is_replaced_and_delays_nothing(
     make: Callable[..., ViewRecord], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -84,6 +84,7 @@ class Page:
 
     def __init__(self, page: Any) -> None:
         self.page = page
+        self.address = ""
         self.requested: list[str] = []
         self.posted: list[dict[str, Any]] = []
         self.errors: list[str] = []
@@ -116,9 +117,16 @@ class Page:
         """The stage that the page shows."""
         return str(self.page.get_attribute("body", "data-stage"))
 
-    def answered(self) -> None:
-        """Wait for the answer to the last command."""
-        self.until(lambda: bool(self.text("answer")), "an answer")
+    def press(self, key: str) -> None:
+        """Press a key when that is neither a bounce nor too soon after a change of the stage."""
+        self.page.wait_for_timeout(350)
+        self.until(lambda: not self.page.locator("body.pausing").count(), "the pause is over")
+        self.page.keyboard.press(key)
+
+    def confirm(self) -> None:
+        """Answer a question with yes, as soon as that is possible."""
+        self.until(lambda: bool(self.page.is_visible("#yes") and self.page.is_enabled("#yes")), "a question")
+        self.page.click("#yes")
 
     def on_screen(self, points: list[tuple[float, float]]) -> list[tuple[float, float]]:
         """Positions of the picture, px, as positions of the mouse."""

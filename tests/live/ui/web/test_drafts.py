@@ -9,16 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from acquire.addresses import with_setting
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Frame, frozen
 from live.config.loading import load_config
+from live.setup.devices import at_rest
 from live.setup.pictures import read_mask
 from live.setup.scale import from_board
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.config_draft import ConfigDraft, at_rest, next_name, with_setting
-from live.ui.web.draft_changes import CHANGES
-from live.ui.web.drawn_region import DrawnRegion
-from live.ui.web.setup_session import SetupSession
+from live.ui.web.setup.config_draft import ConfigDraft, next_name
+from live.ui.web.setup.draft_changes import CHANGES
+from live.ui.web.setup.drawn_region import DrawnRegion
+from live.ui.web.setup.setup_session import SetupSession
 from tests.live.setup.test_scale import CHARUCO, CHECKER, seen
 
 PX_PER_MM = 9.0
@@ -182,6 +184,8 @@ def test_settings_of_an_address() -> None:
     assert with_setting("/dev/video0", "gain", 3) == "/dev/video0?gain=3"
     assert with_setting("/dev/video0?gain=3&fps=30", "gain", 7.5) == "/dev/video0?gain=7.5&fps=30"
     assert with_setting("files:a?b/*.tif", "fps", 3) == "files:a?b/*.tif?fps=3"
+    assert with_setting("/dev/video0?fps=30&format=Y12", "fps", "") == "/dev/video0?format=Y12"
+    assert with_setting("/dev/video0?fps=30", "fps", "") == "/dev/video0"
 
 
 def test_only_a_simulated_specimen_has_to_be_held() -> None:

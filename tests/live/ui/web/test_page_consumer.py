@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import json
 import math
-import re
 import time
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
-import live.ui.web
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from analysis.evaluate import GAUGE_KINDS, GaugeValue
@@ -25,8 +24,18 @@ from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.results.maps.field_maps import FIELD_MAPS
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.page_consumer import MAX_POINTS, CurveHistory, PageConsumer
+from live.ui.web.curve_history import MAX_POINTS, CurveHistory
+from live.ui.web.page_consumer import PageConsumer, axial_length_mm
 from tests.live.made_up import make_frame, make_measurement
+from tests.live.ui.waiting import until
+from tests.live.ui.web.sentences import (
+    LANGUAGES,
+    STATIC,
+    catalogue,
+    of_the_page,
+    of_the_program,
+    translated,
+)
 
 
 def measurement() -> Measurement:
@@ -56,7 +65,7 @@ def config() -> Config:
 class Run:
     """A run with a state."""
 
-    paused, recording, folder = False, True, Path("run")
+    paused, recording, live, folder = False, True, True, Path("run")
 
     def __init__(self, config: Config) -> None:
         self.run_state = RunState.new(1.0, specimen=config.specimen)
@@ -110,11 +119,14 @@ def test_another_map(config: Config) -> None:
     consumer = ready(PageConsumer(broadcaster, config))
     for name in ("exx", "e1", "u", "sigma", "status"):
         consumer.measurement(measurement())
-        assert consumer.select_map(name) == ""
-        before = consumer.picture
-        while consumer.picture == before:
+        assert consumer.select_map({"of": name}) == ""
+        before = consumer.state()["picture"]["n"]
+        while consumer.state()["picture"]["n"] == before:
             consumer.idle()
-    assert "there is no map" in consumer.select_map("exx; rm")
+    assert "there is no map" in consumer.select_map({"of": "exx; rm"})
+    assert "ranges of a map" in consumer.select_map({"of": "exx", "range": "wide"})
+    for limit in (None, "1", True, 0.0, math.inf):
+        assert "a fixed range" in consumer.select_map({"of": "exx", "range": "fixed", "limit": limit})
 
 
 def test_points_are_bounded_and_a_page_gets_what_it_lacks() -> None:
@@ -160,6 +172,7 @@ def costs_of(worker: ConsumerThread, m: Measurement) -> list[float]:
     return costs
 
 
+@pytest.mark.timed
 def test_eight_frozen_pages_cost_the_measuring_thread_under_a_millisecond(worker: ConsumerThread) -> None:
     """In thread time: other busy programs do not count."""
     assert np.percentile(costs_of(worker, measurement()), 95) < 1e-3
@@ -179,40 +192,104 @@ def test_a_failing_page_is_one_consumer_that_failed(config: Config) -> None:
     assert isinstance(Broken(Broadcaster(), config), Consumer)
 
 
-STATIC = Path(live.ui.web.__file__).parent / "static"
-SCRIPTS = [
-    path for path in STATIC.glob("*.js") if path.name != "uplot.js" and not path.name.startswith("words-")
-]
+def drawn(consumer: PageConsumer, request: dict[str, object]) -> dict[str, Any]:
+    """The scale of the map after a request."""
+    assert consumer.select_map(request) == ""
+    consumer.measurement(measurement())
+    before = consumer.state()["picture"]["n"]
+    until(lambda: consumer.idle() and consumer.state()["picture"]["n"] > before)
+    return dict(consumer.state()["picture"])
 
 
-def entries(name: str) -> dict[str, str]:
-    lines = re.findall(r'^  "(.+?)": "(.+)",$', (STATIC / f"words-{name}.js").read_text("utf-8"), re.M)
-    assert len(lines) == len(dict(lines)), "a text is there twice"
-    return dict(lines)
+def test_the_range_of_a_map_and_its_histogram(config: Config) -> None:
+    broadcaster = Broadcaster()
+    broadcaster.open()
+    consumer = ready(PageConsumer(broadcaster, config))
+    field = measurement().field
+    values = field.value("eyy")[field.ok]
+    found = drawn(consumer, {"of": "eyy", "range": "automatic"})
+    assert found["low"] <= np.percentile(values, 1) and found["high"] >= np.percentile(values, 99)
+    assert found["strain"] and sum(found["histogram"]) == np.sum(
+        (values >= found["low"]) & (values <= found["high"])
+    )
+    found = drawn(consumer, {"of": "eyy", "range": "symmetric"})
+    assert found["low"] == -found["high"]
+    found = drawn(consumer, {"of": "eyy", "range": "fixed", "limit": 0.005})
+    assert (found["low"], found["high"]) == pytest.approx((-0.005, 0.005))
 
 
-def words() -> set[str]:
-    """All translated texts: marked in the page, passed to ``t``, or in a table of texts."""
-    html = (STATIC / "index.html").read_text("utf-8")
-    found = set(re.findall(r'data-t="(.+?)"', html))
-    for path in SCRIPTS:
-        text = path.read_text("utf-8")
-        found |= set(re.findall(r'\bt\("(.+?)"\)', text)) | set(re.findall(r'dataset\.t = "(.+?)"', text))
-        found |= {word for pair in re.findall(r'\bt\(\w+ \? "(.+?)" : "(.+?)"\)', text) for word in pair}
-        for table in re.findall(r"const (?:HINTS|LABELS|WORDS|BOARD) = \{(.*?)\};", text, re.S):
-            found |= set(re.findall(r': "(.+?)"', table))
-        for cells in re.findall(r"const CELLS = \[(.*?)\]", text, re.S):
-            found |= set(re.findall(r'"(.+?)"', cells)) - {"ZOIs"}
-    return found
+def test_the_value_at_a_place_of_the_map(config: Config) -> None:
+    broadcaster = Broadcaster()
+    broadcaster.open()
+    consumer = ready(PageConsumer(broadcaster, config))
+    assert consumer.map.value_at(1, 1) == {"value": None, "status": "no ZOI is here"}
+    drawn(consumer, {"of": "eyy"})
+    m = measurement()
+    row, column = np.argwhere(m.field.ok)[3]
+    x, y = m.field.grid.x[column] + m.time_step.u, m.field.grid.y[row] + m.time_step.v
+    found = consumer.map.value_at(x + 0.3, y - 0.3)
+    assert found["value"] == pytest.approx(m.field.value("eyy")[row, column])
+    assert found["sigma"] == pytest.approx(m.field.sigma("eyy")[row, column])
+    assert consumer.map.value_at(-500, -500)["value"] is None
 
 
-@pytest.mark.parametrize("name", ["de", "fr"])
-def test_every_text_is_translated(name: str) -> None:
-    known = set(entries(name))
-    assert not words() - known
-    # Names of maps and gauge kinds come from the server; one without a translation stays English.
-    served = {*FIELD_MAPS, *(word for kind in GAUGE_KINDS.values() for word in (kind.label, kind.hint))}
-    assert not known - words() - served
+def test_a_recording_shows_figures_of_one_instant(config: Config) -> None:
+    """Its load samples come far ahead of its pictures: the newest force is of another instant."""
+    broadcaster, run = Broadcaster(), Run(config)
+    run.live = False  # type: ignore[misc]
+    consumer = ready(PageConsumer(broadcaster, config))
+    consumer.attach(run)  # type: ignore[arg-type]
+    m = measurement()
+    m = replace(m, time_step=replace(m.time_step, force=1234.0, latency_s=3.0))
+    run.run_state.loads.append(LoadSample(1e3, -9999.0))
+    run.run_state.health.loaded(1e3, -9999.0)
+    run.run_state.health.latency_p95_s = 3.0
+    run.run_state.history.add(m.time_step)
+    consumer.matched(m)
+    state = consumer.state()
+    assert state["force_N"] == state["peak_N"] == 1234.0 and state["stress_Pa"] == pytest.approx(1234 / 40e-6)
+    assert math.isnan(state["late_s"])
+    assert consumer.curve.since(0, 0)["rows"][-1][1] == pytest.approx(state["stress_Pa"])
+
+
+def test_the_map_at_the_highest_force(config: Config) -> None:
+    consumer = ready(PageConsumer(Broadcaster(), config))
+    assert consumer.at_peak()["peak"] is None
+    for force, strain in ((100.0, 0.001), (-900.0, 0.002), (500.0, 0.003)):
+        m = measurement()
+        gauges = {"axial": GaugeValue(strain, 1e-6)}
+        consumer.matched(replace(m, time_step=replace(m.time_step, force=force, gauges=gauges)))
+    found = consumer.at_peak()
+    assert found["atpeak"] == "at the highest force" and found["gauges"][0]["value"] == 0.002
+    assert found["peak"]["width"] == measurement().burst.mean.shape[1] and consumer.picture
+
+
+def test_the_length_of_an_elongation() -> None:
+    line = {"gauges.axial": {"kind": "line", "start": [10, 20], "end": [10, 120]}}
+    given = {"specimen.gauge_length_mm": 50.0}
+    assert axial_length_mm(load_config(None, {**line, "scale.mm_per_px": 0.1})) == pytest.approx(10.0)
+    assert axial_length_mm(load_config(None, line | given)) == 50.0
+    assert axial_length_mm(load_config(None, line)) is None
+
+
+def test_every_text_of_the_page_is_translated() -> None:
+    known = catalogue()
+    missing = {text for text in of_the_page() if not translated(text, known)}
+    served = {word for kind in GAUGE_KINDS.values() for word in (kind.label, kind.hint)}
+    missing |= {text for text in {*FIELD_MAPS, *served} if text not in known}
+    assert not missing
+
+
+def test_every_message_of_the_program_is_translated() -> None:
+    known, texts = catalogue(), set(of_the_program())
+    assert len(texts) > 100 and not {text for text in texts if not translated(text, known)}
+
+
+@pytest.mark.parametrize("name", LANGUAGES)
+def test_a_translation_keeps_what_is_filled_in(name: str) -> None:
+    for english, words in catalogue().items():
+        assert words.get(name), f"{english} has no {name}"
+        assert words[name].count("{}") == english.count("{}"), english
 
 
 def test_the_library_has_its_licence_and_origin() -> None:

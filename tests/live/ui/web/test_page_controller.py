@@ -11,10 +11,14 @@ from typing import Any
 import pytest
 
 from acquire.events import EventKind
+from acquire.files.picture import write_picture
 from live.config.loading import Config, load_config
 from live.pipeline.run_state import RunState
-from live.ui.web.config_draft import ConfigDraft
+from live.setup.devices import at_rest, open_rig
+from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.page_controller import PageController
+from live.ui.web.setup.config_draft import ConfigDraft
+from live.ui.web.setup.setup_session import SetupSession
 from tests.live.ui.waiting import LONG_S, until
 from tests.live.ui.web.test_server import fetch
 
@@ -69,7 +73,7 @@ def at(tmp_path: Path) -> Iterator[PageSession]:
 def test_set_up_changed_saved_and_started(at: PageSession, tmp_path: Path) -> None:
     session = at.controller.session
     assert session is not None
-    until(lambda: session.drawn is not None and bool(session.draft.config.gauges))
+    until(lambda: session.region.drawn is not None and bool(session.draft.config.gauges))
     assert set(session.draft.config.gauges) == {"axial", "transverse", "area"}, "placed, as the rig asks for"
     assert at.command("tare").startswith("no:") and at.command("next").startswith("no:")
     assert at.change(do="draw", strokes=[{"tool": "rectangle", "points": [[20, 20], [200, 170]]}]) == "ok"
@@ -166,7 +170,9 @@ def test_commands_during_a_run_and_after(at: PageSession) -> None:
     at.controller.attach(run)
     assert at.command("tare") == "ok" and at.command("note a b") == "ok" and at.command("quit") == "ok"
     assert at.command("fly").startswith("no:") and at.post("/order", {"line": 3}).startswith("no:")
-    assert run.received == ["tare", "note a b", "quit"]
+    assert run.received == ["tare once", "note a b", "quit"], "two pages cannot confirm one another's tare"
+    assert at.post("/order", {"line": "quit", "stage": "after"}).startswith("no: the stage has changed")
+    assert at.post("/order", {"line": "quit", "stage": "run"}) == "ok"
     assert at.change(do="all") == "no: nothing is set up now"
     assert at.post("/map", {"of": "e1"}) == "ok" and at.post("/map", {"of": "x"}).startswith("no:")
     opened: list[int] = []
@@ -179,3 +185,67 @@ def test_commands_during_a_run_and_after(at: PageSession) -> None:
     assert at.command("tare").startswith("no:") and at.command("next") == "ok"
     assert at.controller.after()
     assert at.controller.draft is not None and at.controller.draft.config.metadata["specimen"] == "specimen-2"
+
+
+def recorded(folder: Path, count: int) -> Path:
+    """A folder with pictures of the simulated specimen."""
+    shots = folder / "shots"
+    shots.mkdir()
+    rig = open_rig(at_rest(CAMERA), "none:")
+    with rig.camera as camera:
+        for k, frame in zip(range(count), camera, strict=False):
+            write_picture(shots / f"{k:02}.png", frame.image)
+    rig.close()
+    return shots
+
+
+@pytest.mark.parametrize("count", [3, 12])
+def test_recorded_pictures_are_checked_too(tmp_path: Path, count: int) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text(
+        f'[camera]\naddress = "files:{recorded(tmp_path, count)}"\n[measure]\nzoi = 32\nroi = "all"\n'
+    )
+    draft = ConfigDraft(load_config(rig, {}), rig, {})
+    with SetupSession(draft, Broadcaster()) as session:
+        until(lambda: session.state().get("sigma") is not None)
+        session.check.begin()
+        until(lambda: session.state()["go"] is not None)
+        lines = {line["what"]: line for line in session.state()["lines"]}
+        assert lines["load cell"]["value"].startswith("none") and not lines["load cell"]["measured"]
+        assert lines["drift"]["measured"] is (count >= 8)
+        draft.change_all({"measure.gauges": "given"})
+        session.region.set_gauges({"gauges.axial": {"kind": "zoi", "at": [-900, 20]}})
+        session.check.begin()
+        until(lambda: session.state()["go"] is False and not session.state()["checking"])
+        assert any("no ZOI is there" in line["value"] for line in session.state()["lines"]), "and why"
+
+
+def test_a_zero_taken_in_the_set_up_holds_in_the_test(at: PageSession) -> None:
+    session = at.controller.session
+    assert session is not None
+    assert at.change(do="tare").startswith("no: not tared"), "there is no load cell"
+    assert at.change(do="untare") == "no: there is no tare to undo"
+    assert at.change(do="load", value="sim:?noise_N=0.5") == "ok"
+    until(lambda: session.load.state()["rate"] is not None)
+    assert session.load.trouble == ""
+    until(lambda: at.change(do="tare") == "ok")
+    zero = session.draft.config.load.zero_N
+    assert 0 < abs(zero) < 1 and "load.zero_N" not in session.draft.changes, "of one test, not of the rig"
+    folder = at.rig.parent
+    until(lambda: session.region.drawn is not None)
+    assert session.ready(folder).load.zero_N == zero
+    assert at.change(do="untare") == "ok" and session.draft.config.load.zero_N == 0
+
+
+@pytest.mark.parametrize(
+    "address", ["sim:?width=wide", "a\x00b", "", 3, "x" * 600, "files:/no/such", "/dev/video99"]
+)
+def test_a_bad_address_is_refused_in_words(at: PageSession, address: Any) -> None:
+    session = at.controller.session
+    assert session is not None
+    before = session.draft.config.camera.address
+    answer = at.change(do="address", value=address)
+    assert (
+        answer.startswith("no: ") and len(answer) > 15 and "defect" not in answer and "Error(" not in answer
+    )
+    assert session.draft.config.camera.address == before

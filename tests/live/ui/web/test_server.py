@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import http.client
 import socket
+import struct
+import threading
 from collections.abc import Iterator, Mapping
 from typing import Any
 
 import pytest
 
+from live.ui.web import server
 from live.ui.web.broadcaster import MAX_PAGES, Broadcaster
 from live.ui.web.server import PageServer, json_response
 from tests.live.ui.waiting import until
@@ -16,14 +20,14 @@ from tests.live.ui.waiting import until
 
 @pytest.fixture
 def page() -> Iterator[PageServer]:
-    server = PageServer(
+    opened = PageServer(
         Broadcaster(),
         {"/picture": lambda query: json_response(dict(query))},
         {"/order": lambda value: {"got": value}},
         port=0,
     )
-    yield server
-    server.close()
+    yield opened
+    opened.close()
 
 
 class ReadResponse:
@@ -195,3 +199,82 @@ def test_a_frozen_page_delays_nothing() -> None:
         broadcaster.publish("state", number)
     assert broadcaster.open() is None
     assert [one.take(0) for one in frozen if one] == [{"state": b"999"}] * MAX_PAGES
+
+
+def connected(page: PageServer, text: bytes) -> socket.socket:
+    """A connection that has sent this."""
+    opened = socket.create_connection(("127.0.0.1", page.guard.port), timeout=5)
+    opened.sendall(text)
+    return opened
+
+
+def post_head(page: PageServer, length: int) -> bytes:
+    guard = page.guard
+    lines = [
+        "POST /order HTTP/1.1",
+        f"Host: {guard.host}",
+        f"Origin: {guard.origin}",
+        f"Content-Length: {length}",
+    ]
+    lines += ["Content-Type: application/json", f"Cookie: {guard.cookie.partition(';')[0]}", "", ""]
+    return "\r\n".join(lines).encode()
+
+
+def test_a_body_shorter_than_its_length_is_refused(page: PageServer) -> None:
+    with connected(page, post_head(page, 50) + b'{"line":') as opened:
+        opened.shutdown(socket.SHUT_WR)
+        assert opened.recv(100).startswith(b"HTTP/1.1 400")
+
+
+def test_a_request_that_takes_too_long_is_cut_off(page: PageServer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "REQUEST_S", 0.1)
+    with connected(page, b"GET / HTTP/1.1\r\nHost: ") as opened:
+        assert opened.recv(100) == b"", "the head is not complete"
+    with connected(page, post_head(page, 50) + b'{"line":') as opened:
+        assert opened.recv(100).startswith(b"HTTP/1.1 400"), "the body is not complete"
+
+
+def test_connections_are_limited(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "MAX_CONNECTIONS", 2)
+    page = PageServer(Broadcaster(), {"/picture": lambda query: json_response({})}, {}, port=0)
+    try:
+        first, second = (connected(page, b"GET /picture HTTP/1.1\r\n") for _ in range(2))
+        with connected(page, b"") as third:
+            assert third.recv(100) == b"", "closed at once"
+        first.close()
+
+        def answered() -> bool:
+            try:
+                return fetch(page, "/picture").status == 200
+            except (http.client.HTTPException, OSError):
+                return False
+
+        until(answered)
+        second.close()
+    finally:
+        page.close()
+
+
+def test_nothing_is_printed_whatever_comes(page: PageServer, capfd: pytest.CaptureFixture[str]) -> None:
+    sent = [
+        b"",
+        b"\x00" * 500,
+        b"GET\r\n\r\n",
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"A" * 70_000,
+        post_head(page, 900) + b"{",
+    ]
+    sent += [
+        b"GET /picture HTTP/1.1\r\nHost: evil\r\n\r\n",
+        b"POST /order HTTP/1.1\r\n\r\n",
+        post_head(page, 2),
+    ]
+    for text in sent:
+        opened = connected(page, b"")
+        opened.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # reset, not closed
+        with contextlib.suppress(OSError):
+            opened.sendall(text)
+        opened.close()
+    assert fetch(page, "/picture").status == 200
+    until(lambda: not [one for one in threading.enumerate() if "process_request" in one.name])
+    assert capfd.readouterr() == ("", "")

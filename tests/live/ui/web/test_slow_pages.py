@@ -132,6 +132,7 @@ def test_eight_pages_that_do_not_read_change_no_result(program: Program, tmp_pat
     assert_untouched(tmp_path / "out")
 
 
+@pytest.mark.timed
 def test_eight_pages_that_do_not_read_cost_under_a_millisecond_a_measurement() -> None:
     """In the time of the thread that measures: another busy program is not the page's doing."""
     config, m = load_config(None, {}), measurement()

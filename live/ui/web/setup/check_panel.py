@@ -48,7 +48,13 @@ def camera_values(info: CameraInfo) -> dict[str, Any]:
 
 def line_values(line: CheckLine) -> dict[str, Any]:
     """A line of the check."""
-    return {"what": line.what, "value": printable(line.value), "good": line.good, "advice": line.advice}
+    return {
+        "what": line.what,
+        "value": printable(line.value),
+        "good": line.good,
+        "advice": printable(line.advice),
+        "measured": line.measured,
+    }
 
 
 def table_values(figures: CheckFigures) -> dict[str, Any]:

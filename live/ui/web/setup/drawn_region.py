@@ -19,7 +19,8 @@ from analysis.evaluate import inside_polygon
 
 TOOLS = ("rectangle", "polygon", "brush", "eraser")
 MAX_POINTS = 5000
-_MAX_UNDO = 12  # masks kept for undo
+MAX_UNDO = 12
+"""Edits that can be undone."""
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -158,7 +159,7 @@ class DrawnRegion:
 
     def replace(self, mask: Bools, origin: str) -> None:
         """Replace the mask by another of the same size."""
-        kept = self._masks[-_MAX_UNDO:]
+        kept = self._masks[-MAX_UNDO:]
         self._masks = [*kept, (mask, origin)]
 
     def undo(self) -> None:

@@ -9,23 +9,18 @@ from typing import Any
 
 import numpy as np
 
+from acquire.addresses import with_setting
 from acquire.bounds import NotAllowed, as_number
-from acquire.errors import ConfigError, DataError
+from acquire.errors import ConfigError
 from analysis.evaluate import GAUGE_KINDS
 from live.setup.scale import Board, from_points
-from live.ui.web.config_draft import with_setting
-from live.ui.web.drawn_region import DrawnRegion, are_points
-from live.ui.web.setup_session import OVERLAYS, SetupSession
+from live.ui.web.setup.drawn_region import are_points
+from live.ui.web.setup.setup_session import OVERLAYS, SetupSession
 
 Request = Mapping[str, Any]
 MAX_MM = 1e5
 MAX_GAUGE_POINTS = 100
-
-
-def _region(session: SetupSession) -> DrawnRegion:
-    if session.drawn is None:
-        raise DataError("the camera has given no picture yet")
-    return session.drawn
+MAX_ADDRESS = 500  # letters
 
 
 def draw(session: SetupSession, request: Request) -> None:
@@ -35,14 +30,12 @@ def draw(session: SetupSession, request: Request) -> None:
         raise ConfigError("strokes are a list")
     if not all(isinstance(one, dict) for one in strokes):
         raise ConfigError("a stroke has a tool and points")
-    _region(session).draw(strokes)
-    session.region_changed()
+    session.region.draw(strokes)
 
 
 def undo(session: SetupSession, request: Request) -> None:
-    """Undo the last change of the region."""
-    _region(session).undo()
-    session.region_changed()
+    """Undo the last edit of the region or of the gauges."""
+    session.region.undo()
 
 
 def find(session: SetupSession, request: Request) -> None:
@@ -52,9 +45,7 @@ def find(session: SetupSession, request: Request) -> None:
 
 def whole_picture(session: SetupSession, request: Request) -> None:
     """Measure the whole picture."""
-    drawn = _region(session)
-    drawn.replace(np.ones_like(drawn.mask), "the whole picture")
-    session.region_changed()
+    session.region.replace(np.ones_like(session.region.known.mask), "the whole picture")
 
 
 def overlay(session: SetupSession, request: Request) -> None:
@@ -75,11 +66,49 @@ def camera(session: SetupSession, request: Request) -> None:
     session.preview.reopen(with_setting(session.draft.config.camera.address, str(key), number))
 
 
+def option(session: SetupSession, request: Request) -> None:
+    """Change the format or the rate in the address of the camera; an empty value leaves it to the camera."""
+    key, value = request.get("key"), request.get("value")
+    if key not in ("format", "fps") or not isinstance(value, str) or len(value) > 40:
+        raise ConfigError("the options of a camera are format and fps")
+    session.preview.reopen(with_setting(session.draft.config.camera.address, key, value.strip()))
+
+
 def address(session: SetupSession, request: Request) -> None:
     """Open another camera."""
-    if not isinstance(request.get("value"), str):
-        raise ConfigError("an address is a text")
-    session.preview.reopen(request["value"])
+    session.preview.reopen(_address(request.get("value")))
+
+
+def load(session: SetupSession, request: Request) -> None:
+    """Read another load cell."""
+    session.open_load(_address(request.get("value")))
+
+
+def _address(value: object) -> str:
+    """The address of a device from a page: a text in one line."""
+    if not isinstance(value, str) or not value or len(value) > MAX_ADDRESS or not value.isprintable():
+        raise ConfigError(f"an address is a text of 1 to {MAX_ADDRESS} letters in one line")
+    return value
+
+
+def devices(session: SetupSession, request: Request) -> None:
+    """Search for cameras, serial ports and sessions."""
+    session.devices.search()
+
+
+def identify(session: SetupSession, request: Request) -> None:
+    """Listen on a serial port for a load cell."""
+    session.devices.identify(_address(request.get("port")))
+
+
+def tare(session: SetupSession, request: Request) -> None:
+    """Make the present force zero, for the test too."""
+    session.load.tare()
+
+
+def undo_tare(session: SetupSession, request: Request) -> None:
+    """Restore the zero before."""
+    session.load.undo_tare()
 
 
 def set_key(session: SetupSession, request: Request) -> None:
@@ -87,13 +116,13 @@ def set_key(session: SetupSession, request: Request) -> None:
     key, value = request.get("key"), request.get("value")
     if (
         not isinstance(key, str)
-        or key.startswith(("camera.", "gauges."))
+        or key.startswith(("camera.", "gauges.", "load."))
         or key in ("measure.roi", "measure.mask")
     ):
         raise ConfigError(f"{key} cannot be changed like this")
     session.draft.change_all({key: None if value == "" else value})
     if key.startswith("measure."):
-        session.region_changed()
+        session.region.changed()
 
 
 def gauge(session: SetupSession, request: Request) -> None:
@@ -116,7 +145,7 @@ def gauge(session: SetupSession, request: Request) -> None:
         if name in gauges:
             raise ConfigError(f"there is already a gauge {name}")
         changes[f"gauges.{was}"] = None
-    session.draft.change_all(changes | {f"gauges.{name}": table})
+    session.region.set_gauges(changes | {f"gauges.{name}": table})
 
 
 def _parameters_at(kind: object, points: object) -> dict[str, Any]:
@@ -136,7 +165,7 @@ def _free_name(usual: str, taken: Container[str]) -> str:
 
 def place(session: SetupSession, request: Request) -> None:
     """Place the automatic gauges on the region; others stay."""
-    session.place_gauges()
+    session.region.place_gauges()
 
 
 def scale(session: SetupSession, request: Request) -> None:
@@ -148,7 +177,7 @@ def scale(session: SetupSession, request: Request) -> None:
     mm = _number("a distance", request.get("mm"))
     session.draft.change_all(from_points((x1, y1, x2, y2), mm).changes())
     session.clear_remarks()
-    session.region_changed()
+    session.region.changed()
 
 
 def board(session: SetupSession, request: Request) -> None:
@@ -168,7 +197,7 @@ def board(session: SetupSession, request: Request) -> None:
     marker = _number("a marker in mm", request.get("marker", 0), 0, MAX_MM)
     calibration_board = Board(columns, rows, square, marker, dictionary)
     session.draft.change_all(session.scale_from(calibration_board).changes())
-    session.region_changed()
+    session.region.changed()
 
 
 def _number(what: str, value: object, low: float = -math.inf, high: float = math.inf) -> float:
@@ -180,17 +209,17 @@ def _number(what: str, value: object, low: float = -math.inf, high: float = math
 
 def check(session: SetupSession, request: Request) -> None:
     """Run the whole check, with its table."""
-    session.check()
+    session.check.begin()
 
 
 def reset_peak(session: SetupSession, request: Request) -> None:
     """Reset the peak of the sharpness."""
-    session.reset_peak()
+    session.check.reset_peak()
 
 
 def save(session: SetupSession, request: Request) -> None:
     """Save the rig file."""
-    session.save()
+    session.region.save()
 
 
 CHANGES: dict[str, Callable[[SetupSession, Request], None]] = {
@@ -200,7 +229,13 @@ CHANGES: dict[str, Callable[[SetupSession, Request], None]] = {
     "all": whole_picture,
     "overlay": overlay,
     "camera": camera,
+    "option": option,
     "address": address,
+    "load": load,
+    "devices": devices,
+    "identify": identify,
+    "tare": tare,
+    "untare": undo_tare,
     "set": set_key,
     "gauge": gauge,
     "place": place,

@@ -7,12 +7,10 @@ import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
 
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import parse_address
 from acquire.errors import ConfigError, DataError
 from acquire.files.picture import write_picture
 from live.config.loading import Config, from_dict, load_config, settings_in
@@ -24,15 +22,15 @@ CHANGEABLE = frozenset(
         "measure.mask", "measure.gauges",
         "specimen.width_mm", "specimen.thickness_mm", "specimen.diameter_mm", "specimen.area_mm2",
         "specimen.gauge_length_mm", "specimen.axis", "specimen.standard", "metadata.specimen", "metadata.operator",
-        "metadata.material", "scale.mm_per_px", "scale.sigma_mm_per_px", "scale.date", "scale.method",
+        "metadata.material", "metadata.note", "load.zero_N", "scale.mm_per_px",
+        "scale.sigma_mm_per_px", "scale.date", "scale.method",
     }
 )  # fmt: skip
 """Keys that a page may change, beside gauges."""
 
-TRANSIENT = ("output.", "view.")
-"""Keys of the command line with these beginnings are not saved."""
+TRANSIENT = ("output.", "view.", "load.zero_N")
+"""Keys with these beginnings are of one test, and not saved."""
 
-_SAFE = "/:,@+-_.*~"
 _NUMBERED = re.compile(r"^(.*?)-?(\d{1,6})$")
 
 
@@ -79,7 +77,7 @@ class ConfigDraft:
             else:
                 tree[section][key] = value
         self._config = from_dict(tree, {}, "the page")
-        self.changes |= changes
+        self.changes |= {key: value for key, value in changes.items() if not key.startswith(TRANSIENT)}
 
     def save(self, mask: NDArray[np.bool_] | None) -> None:
         """Write the changes into the rig file and ``mask`` into a picture beside it; the old rig file is kept.
@@ -92,7 +90,8 @@ class ConfigDraft:
         if mask is not None:
             self.change_all({"measure.mask": str(self._write_mask(mask))})
         write_rig(self.path, self.changes)
-        self._config = load_config(self.path, self._transient)
+        zero = {"load.zero_N": self._config.load.zero_N}
+        self._config = load_config(self.path, self._transient | zero)
         self.changes = {}
 
     def _write_mask(self, mask: NDArray[np.bool_]) -> Path:
@@ -105,22 +104,6 @@ class ConfigDraft:
         except DataError as error:
             raise ConfigError(str(error)) from None
         return path
-
-
-def with_setting(address: str, key: str, value: float) -> str:
-    """The address with one setting changed."""
-    settings = dict(parse_address(address).settings) | {key: f"{value:g}"}
-    body = address.partition("?")[0] if parse_address(address).settings else address
-    return f"{body}?{'&'.join(f'{k}={quote(v, safe=_SAFE)}' for k, v in settings.items())}"
-
-
-def at_rest(address: str) -> str:
-    """The address of a rig without load: a simulated test would start by itself."""
-    if parse_address(address).scheme != "sim":
-        return address
-    for key, value in (("max_strain", 0.0), ("seconds", 3600.0), ("hold", 1.0), ("end", 1.0)):
-        address = with_setting(address, key, value)
-    return address
 
 
 def next_name(name: str) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import queue
 import threading
@@ -11,25 +10,32 @@ from collections import deque
 from collections.abc import Callable
 
 from acquire.camera import Camera
-from acquire.errors import DataError, PhasedicError
+from acquire.errors import DataError, DeviceError, PhasedicError
 from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
 from acquire.printable import brief, printable
 from live.pipeline.latency import OUTPUT, lower_priority
-from live.setup.devices import open_rig
-from live.ui.web.config_draft import ConfigDraft, at_rest
+from live.setup.devices import at_rest, open_rig
+from live.ui.web.setup.config_draft import ConfigDraft
 
 log = logging.getLogger(__name__)
 
 RECENT = 8
 """Frames kept."""
+MAX_BYTES = 400_000_000
+"""Of the frames of a check."""
 
 RETRY_S, OPEN_S = 1.0, 20.0
 """Delay before the camera is opened again; time limit for opening it."""
+REDRAW_S = 0.2  # between pictures of a recording that stands still
+
+Answers = queue.SimpleQueue[PhasedicError | None]
 
 
 class CameraPreview:
     """Reads the camera of ``draft``, and opens it again where it fails.
+
+    Of a recording (files, video, session) only the first frames are read: the specimen at rest.
 
     Parameters
     ----------
@@ -38,6 +44,8 @@ class CameraPreview:
         Called before the first frame of a camera.
     on_frame : callable taking a Frame, giving monotonic s
         Called with the newest frame; returns when to be called again.
+    needed : callable taking a CameraInfo, giving an int
+        Frames of a whole check.
 
     Attributes
     ----------
@@ -47,15 +55,21 @@ class CameraPreview:
     """
 
     def __init__(
-        self, draft: ConfigDraft, on_open: Callable[[CameraInfo], None], on_frame: Callable[[Frame], float]
+        self,
+        draft: ConfigDraft,
+        on_open: Callable[[CameraInfo], None],
+        on_frame: Callable[[Frame], float],
+        needed: Callable[[CameraInfo], int],
     ) -> None:
-        self._draft, self._on_open, self._on_frame = draft, on_open, on_frame
+        self._draft, self._on_open, self._on_frame, self._needed = draft, on_open, on_frame, needed
         self.info: CameraInfo | None = None
         self.trouble = ""
         self._camera: Camera | None = None
         self._recent: deque[Frame] = deque(maxlen=RECENT)
+        self._first: list[Frame] = []  # of a recording
+        self._whole = False  # all frames that are needed of the recording are read
         self._collected: deque[Frame] | None = None
-        self._opened: queue.SimpleQueue[PhasedicError | None] = queue.SimpleQueue()
+        self._opened: Answers = queue.SimpleQueue()
         self._lock = threading.Lock()
         self._closing, self._reopen = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._work, name="page-camera", daemon=True)
@@ -71,26 +85,40 @@ class CameraPreview:
         self._thread.join()
 
     def reopen(self, address: str) -> None:
-        """Open the camera with another address; where that fails, raise and keep the old address."""
+        """Open the camera with another address; where that fails, raise and keep the old address.
+
+        Raises
+        ------
+        ConfigError, DeviceError, DataError
+        """
         before = self._draft.config.camera.address
         self._draft.change_all({"camera.address": address})
         self._opened = queue.SimpleQueue()
         self._reopen.set()
         self._stop()
-        with contextlib.suppress(queue.Empty):
-            if (error := self._opened.get(timeout=OPEN_S)) is not None:
-                self._draft.change_all({"camera.address": before})
-                raise error
+        try:
+            error = self._opened.get(timeout=OPEN_S)
+        except queue.Empty:
+            error = DeviceError(
+                f"{brief(address)}: not open within {OPEN_S:g} s; look at its cable and power"
+            )
+        if error is not None:
+            self._draft.change_all({"camera.address": before})
+            raise error
 
     def recent(self) -> list[Frame]:
-        """The last frames of this camera."""
+        """The last frames of this camera, ``RECENT`` of them, or all of a shorter recording; else none."""
         with self._lock:
-            return list(self._recent)
+            return list(self._recent) if len(self._recent) == RECENT or self._whole else []
 
-    def collect(self, n: int) -> None:
-        """Keep the next ``n`` frames."""
+    def collect(self) -> None:
+        """Keep the next frames, as many as a whole check needs; the first ones of a recording."""
+        info = self.info
+        if info is None:
+            raise DataError("the camera has given no picture yet")
         with self._lock:
-            self._collected = deque(maxlen=n)
+            n = self._needed(info) if info.live else len(self._first)
+            self._collected = deque([] if info.live else self._first, maxlen=max(n, 1))
 
     @property
     def collecting(self) -> bool:
@@ -116,30 +144,30 @@ class CameraPreview:
     def _work(self) -> None:
         lower_priority(OUTPUT)
         while not self._closing.is_set():
+            self._reopen.clear()
+            asked = self._opened  # an answer is for who asked before the camera was opened
             try:
-                self._preview()
+                self._preview(asked)
             except PhasedicError as error:
-                self.trouble = printable(brief(error))
+                self._failed(error, asked)
             except Exception as error:
                 log.exception("the preview of the camera failed")
-                self.trouble = f"a defect: {error!r}"
+                self._failed(DeviceError(f"the camera failed: {error!r}"), asked)
             if self.trouble and not self._reopen.is_set():
                 self._closing.wait(RETRY_S)
 
-    def _preview(self) -> None:
-        self._reopen.clear()
+    def _failed(self, error: PhasedicError, asked: Answers) -> None:
+        self.trouble = printable(brief(error))
+        asked.put(error)
+
+    def _preview(self, asked: Answers) -> None:
         config = self._draft.config.camera
         if not config.address:
-            raise DataError(
-                "no camera is given: start with --camera ADDRESS (phasedic devices lists the cameras)"
-            )
-        try:
-            rig = open_rig(at_rest(config.address), "none:", self._on_event, crop=config.crop)
-        except PhasedicError as error:
-            self._opened.put(error)
-            raise
+            raise DataError("no camera is chosen: choose one under Devices")
+        rig = open_rig(at_rest(config.address), "none:", self._on_event, crop=config.crop)
         try:
             self._camera_opened(rig.camera)
+            asked.put(None)
             with rig.camera:
                 self._drain(rig.camera)
         finally:
@@ -150,26 +178,47 @@ class CameraPreview:
         with self._lock:
             self._camera, self.info = camera, camera.info
             self._recent.clear()
-            self._collected = None
+            self._first, self._whole, self._collected = [], False, None
         self._on_open(camera.info)
-        self._opened.put(None)
+
+    @property
+    def _over(self) -> bool:
+        return self._closing.is_set() or self._reopen.is_set()
 
     def _drain(self, camera: Camera) -> None:
-        due = 0.0
+        due, most = 0.0, 0 if camera.info.live else self._needed(camera.info)
         for frame in camera:
-            if self._closing.is_set() or self._reopen.is_set():
+            if self._over:
                 return
             if not frame.damaged:
-                self._keep(frame)
+                self._keep(frame, most)
             if time.monotonic() >= due:
                 due = self._on_frame(frame)
+            if most and len(self._first) >= most:
+                break
+        if most:
+            self._rest()
 
-    def _keep(self, frame: Frame) -> None:
+    def _keep(self, frame: Frame, most: int) -> None:
         self.trouble = ""
         with self._lock:
             self._recent.append(frame)
-            if self._collected is not None and len(self._collected) != self._collected.maxlen:
+            if most:
+                self._first.append(frame)
+            elif self._collected is not None and len(self._collected) != self._collected.maxlen:
                 self._collected.append(frame)
+
+    def _rest(self) -> None:
+        """Show the last frame of a recording until another camera is opened."""
+        if not self._first:
+            raise DataError("the recording has no picture that can be used")
+        with self._lock:
+            self._whole = True
+        due = 0.0
+        while not self._over:
+            if time.monotonic() >= due:
+                due = self._on_frame(self._first[-1])
+            self._closing.wait(REDRAW_S)
 
     def _on_event(self, event: Event) -> None:
         if event.level != "info":

@@ -1,0 +1,47 @@
+"""Which GenICam cameras there are and what they offer: for ``phasedic devices``. Looks and never streams."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+
+from acquire.camera import CameraListing
+from acquire.genicam.device import GenicamDevice
+from acquire.genicam.finding import FoundCamera, find_cameras
+from acquire.genicam.formats import FORMATS, preferred
+from acquire.genicam.library import Aravis, GenicamError, has_aravis, load_aravis
+
+
+def list_cameras() -> list[CameraListing]:
+    """All that answer, those that another program holds included; none where the library is not installed."""
+    if not has_aravis():
+        return []
+    library = load_aravis()
+    return [_look_at(library, found) for found in find_cameras(library)]
+
+
+def _look_at(library: Aravis, found: FoundCamera) -> CameraListing:
+    try:
+        with contextlib.closing(GenicamDevice(library, found.id)) as device:
+            best = preferred(device.choices("PixelFormat"))
+            return CameraListing(
+                address=f"genicam:{found.id}" + (f"?format={best}" if best else ""),
+                name=str(found),
+                trouble="" if best else "it has no monochrome format",
+                details=tuple(_details(device)),
+            )
+    except GenicamError as error:
+        return CameraListing(f"genicam:{found.id}", str(found), f"it does not open: {error}")
+
+
+def _details(device: GenicamDevice) -> Iterator[str]:
+    readable = [name for name in device.choices("PixelFormat") if name in FORMATS]
+    yield f"format={', '.join(readable)}"
+    size, most = ([of(name) for name in ("Width", "Height")] for of in (device.integer, device.highest))
+    yield f"{size[0]}x{size[1]} of {most[0]}x{most[1]}"
+    for what, key in (("frame_rate", "fps"), ("exposure_time", "exposure_us"), ("gain", "gain")):
+        if device.ask(f"arv_camera_is_{what}_available"):
+            low, high = device.bounds_of(what)
+            yield f"{key}={device.ask(f'arv_camera_get_{what}'):g} ({low:g}..{high:g})"
+    if device.has("TriggerSource"):
+        yield f"trigger=no, {', '.join(device.choices('TriggerSource'))}"

@@ -1,0 +1,335 @@
+"""A GenICam camera set up as its address asks: bounds checked, everything read back, a difference refused."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from acquire.bounds import NotAllowed, as_number
+from acquire.errors import ConfigError, DeviceError
+from acquire.frame import CameraSetting
+from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
+from acquire.genicam.formats import FORMATS, MonoFormat, preferred
+from acquire.genicam.library import GenicamError
+from acquire.genicam.settings import KEYS, NO_TRIGGER, GenicamSettings
+
+# Set to "Off", so that nothing changes by itself during a test.
+AUTOMATIC = (
+    *("ExposureAuto", "GainAuto", "BlackLevelAuto", "BalanceWhiteAuto", "AcquisitionFrameRateAuto"),
+    *("TargetBrightnessAuto", "DefectCorrectStaticAuto"),
+)
+# Set to false, so that grey levels stay proportional to light, and buffers hold a picture alone.
+SWITCHED_OFF = ("GammaEnable", "LUTEnable", "ChunkModeActive")
+# Stored with the recording where the camera has them.
+SHOWN = (
+    *("DeviceFirmwareVersion", "DeviceTemperature", "PixelFormat", "Width", "Height", "OffsetX", "OffsetY"),
+    *("BinningHorizontal", "BinningVertical", "ExposureTime", "ExposureTimeAbs", "Gain", "GainRaw"),
+    *("BlackLevel", "Gamma", "AcquisitionFrameRate", "ResultingFrameRate", "AcquisitionResultingFrameRate"),
+    *("TriggerMode", "TriggerSource", "TriggerActivation", "GevSCPSPacketSize", "GevSCPD"),
+    *AUTOMATIC,
+)
+RESULTING_RATES = ("ResultingFrameRate", "AcquisitionResultingFrameRate", "ResultingFrameRateAbs")
+SMALL_PACKETS = 1500
+
+
+@dataclass(frozen=True, slots=True)
+class GenicamSetup:
+    """What is in force.
+
+    Attributes
+    ----------
+    format : MonoFormat
+    x, y, width, height : int, px
+    fps, exposure_s, gain : float or None
+    bits, white : int, int or None
+    controls : mapping of str to JSON value
+    settings : tuple of CameraSetting
+    warnings : tuple of str
+    """
+
+    format: MonoFormat
+    x: int
+    y: int
+    width: int
+    height: int
+    fps: float | None
+    exposure_s: float | None
+    gain: float | None
+    bits: int
+    white: int | None
+    controls: dict[str, Any]
+    settings: tuple[CameraSetting, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def picture(self) -> tuple[str, int, int]:
+        """What must be the same after the camera was away."""
+        return self.format.name, self.width, self.height
+
+    def kept(self, asked: GenicamSettings) -> GenicamSettings:
+        """What to ask of the camera when it comes back: it may have lost its power and all its settings."""
+        return replace(
+            asked, format=self.format.name, x=self.x, y=self.y, width=self.width, height=self.height,
+            exposure_us=None if self.exposure_s is None else self.exposure_s * 1e6, gain=self.gain,
+        )  # fmt: skip
+
+
+def set_up(device: GenicamDevice, settings: GenicamSettings, where: str) -> GenicamSetup:
+    """Set the camera up.
+
+    Parameters
+    ----------
+    device : GenicamDevice
+    settings : GenicamSettings
+    where : str
+        The address, for messages.
+
+    Raises
+    ------
+    ConfigError
+        The camera does not honour what was asked; says what it offers.
+    DeviceError
+        It offers nothing that can be measured with.
+    GenicamError
+        It does not answer.
+    """
+    _put_on_manual(device)
+    for feature, value in settings.features.items():
+        _set_feature(device, feature, value, where)
+    pixel_format = _choose_format(device, settings.format, where)
+    _set_region(device, settings, where)
+    _set_trigger(device, settings, where)
+    for what, key, number in (
+        ("exposure_time", "exposure_us", settings.exposure_us),
+        ("gain", "gain", settings.gain),
+        ("frame_rate", "fps", None if settings.fires_triggers else settings.fps),
+    ):
+        if number is not None:
+            _set_number(device, what, key, number, where)
+    _set_packets(device, settings, where)
+    return _in_force(device, settings, pixel_format, where)
+
+
+def _put_on_manual(device: GenicamDevice) -> None:
+    for feature in AUTOMATIC:
+        if device.has(feature) and "Off" in device.choices(feature):
+            with contextlib.suppress(GenicamError):
+                device.set_text(feature, "Off")
+    for feature in SWITCHED_OFF:
+        if device.has(feature):
+            with contextlib.suppress(GenicamError):
+                device.set_text(feature, "false")
+    if device.has("AcquisitionMode"):
+        device.set_text("AcquisitionMode", "Continuous")
+
+
+def _set_feature(device: GenicamDevice, feature: str, value: str, where: str) -> None:
+    if not device.has(feature):
+        raise ConfigError(
+            f"{where}: this camera has no feature {feature!r}; known settings: {', '.join(KEYS)}"
+        )
+    kind = device.kind(feature)
+    if kind == "Enumeration" and value not in device.choices(feature):
+        offered = ", ".join(device.choices(feature))
+        raise ConfigError(f"{where}: {feature}={value} is not possible; allowed: {offered}")
+    try:
+        device.set_text(feature, value)
+    except GenicamError as error:
+        raise ConfigError(f"{where}: {feature}={value}: the camera refuses it ({error})") from error
+    if kind != "Command" and not _same(got := device.text(feature), value):
+        raise ConfigError(f"{where}: {feature}={value}: the camera makes it {got}; ask for that")
+
+
+def _same(got: str, asked: str) -> bool:
+    try:
+        return abs(float(got) - float(asked)) <= 1e-4 * abs(float(asked))
+    except ValueError:
+        return got.lower() == asked.lower()
+
+
+def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> MonoFormat:
+    offered = device.choices("PixelFormat")
+    usable = [name for name in FORMATS if name in offered]
+    if not usable:
+        raise DeviceError(
+            f"{where}: offers {', '.join(offered) or 'nothing'}, none of them grey levels we can read"
+        )
+    name = preferred(offered) if asked is None else asked
+    if name not in usable:
+        raise ConfigError(f"{where}: format={asked} is not possible; the camera offers {', '.join(usable)}")
+    device.set_text("PixelFormat", name)
+    if (got := device.text("PixelFormat")) != name:
+        raise ConfigError(f"{where}: asked for format={name}, the camera gives {got}; ask for that")
+    return FORMATS[name]
+
+
+def _set_region(device: GenicamDevice, settings: GenicamSettings, where: str) -> None:
+    asked = (settings.x, settings.y, settings.width, settings.height)
+    if asked == (None,) * 4:
+        return
+    offsets = [name for name in ("OffsetX", "OffsetY") if device.has(name)]
+    for name in offsets:  # the size that is possible depends on where it begins
+        device.set_integer(name, device.integer_bounds(name)[0])
+    for name, key, value in (
+        ("Width", "width", settings.width),
+        ("Height", "height", settings.height),
+        ("OffsetX", "x", settings.x),
+        ("OffsetY", "y", settings.y),
+    ):
+        if value is not None:
+            _set_whole(device, name, key, value, where)
+
+
+def _set_whole(device: GenicamDevice, feature: str, key: str, value: int, where: str) -> None:
+    low, high, step = device.integer_bounds(feature)
+    if not low <= value <= high or (value - low) % max(step, 1):
+        steps = f" in steps of {step}" if step > 1 else ""
+        raise ConfigError(f"{where}: {key}={value} is not possible; allowed: {low} to {high}{steps}")
+    device.set_integer(feature, value)
+    if (got := device.integer(feature)) != value:
+        raise ConfigError(f"{where}: {key}={value}: the camera makes it {got}; ask for that")
+
+
+def _set_trigger(device: GenicamDevice, settings: GenicamSettings, where: str) -> None:
+    if device.has("TriggerMode"):
+        device.ask("arv_camera_clear_triggers")
+    if settings.trigger == NO_TRIGGER:
+        return
+    offered = device.choices("TriggerSource") if device.has("TriggerSource") else []
+    if settings.trigger not in offered:
+        raise ConfigError(
+            f"{where}: trigger={settings.trigger} is not possible; allowed: {', '.join([NO_TRIGGER, *offered])}"
+        )
+    if settings.fires_triggers and settings.fps is None:
+        raise ConfigError(f"{where}: trigger=Software needs fps=, the rate at which pictures are triggered")
+    device.ask("arv_camera_set_trigger", settings.trigger)
+    got = device.text("TriggerMode"), device.text("TriggerSource")
+    if got != ("On", settings.trigger):
+        raise ConfigError(f"{where}: trigger={settings.trigger}: the camera makes it {got[1]}, {got[0]}")
+
+
+def _set_number(device: GenicamDevice, what: str, key: str, value: float, where: str) -> None:
+    if not device.ask(f"arv_camera_is_{what}_available"):
+        raise ConfigError(f"{where}: {key}={value:g}: this camera has no such setting; leave it out")
+    try:
+        as_number(value, *device.bounds_of(what))
+    except NotAllowed as allowed:
+        raise ConfigError(f"{where}: {key}={value:g} is not possible; allowed: {allowed}") from None
+    device.ask(f"arv_camera_set_{what}", value)
+    got = device.ask(f"arv_camera_get_{what}")
+    if abs(got - value) > 0.01 * abs(value):
+        raise ConfigError(f"{where}: {key}={value:g}: the camera makes it {got:g}; ask for that")
+
+
+def _set_packets(device: GenicamDevice, settings: GenicamSettings, where: str) -> None:
+    if settings.packet_size is not None and not device.is_gige:
+        raise ConfigError(f"{where}: packet_size= is for GigE cameras; leave it out")
+    if not device.is_gige:
+        return
+    if settings.packet_size is None:
+        if device.has("GevSCPSFireTestPacket"):
+            device.ask("arv_camera_gv_auto_packet_size")
+        return
+    device.ask("arv_camera_gv_set_packet_size_adjustment", NO_ADJUSTMENT)
+    device.ask("arv_camera_gv_set_packet_size", settings.packet_size)
+    got = device.ask("arv_camera_gv_get_packet_size")
+    if got != settings.packet_size:
+        raise ConfigError(
+            f"{where}: packet_size={settings.packet_size}: the camera makes it {got}; ask for that"
+        )
+
+
+def _in_force(
+    device: GenicamDevice, settings: GenicamSettings, pixel_format: MonoFormat, where: str
+) -> GenicamSetup:
+    exposure_us, gain = (
+        device.ask(f"arv_camera_get_{what}") if device.ask(f"arv_camera_is_{what}_available") else None
+        for what in ("exposure_time", "gain")
+    )
+    fps = _rate(device, settings)
+    bits = _bits(settings, pixel_format, where)
+    return GenicamSetup(
+        format=pixel_format,
+        x=device.integer("OffsetX") if device.has("OffsetX") else 0,
+        y=device.integer("OffsetY") if device.has("OffsetY") else 0,
+        width=device.integer("Width"),
+        height=device.integer("Height"),
+        fps=fps,
+        exposure_s=None if exposure_us is None else exposure_us * 1e-6,
+        gain=gain,
+        bits=bits,
+        white=_white(device, settings, bits),
+        controls=dict(_shown(device, settings)),
+        settings=tuple(_changeable(device, exposure_us, gain, fps)),
+        warnings=tuple(_warnings(device, settings, fps)),
+    )
+
+
+def _rate(device: GenicamDevice, settings: GenicamSettings) -> float | None:
+    """Frames a second; None where a line triggers them."""
+    if settings.waits_for_trigger:
+        return None
+    if settings.fires_triggers:
+        return settings.fps
+    for feature in RESULTING_RATES:
+        if device.has(feature):
+            return float(device.text(feature)) or None
+    return float(device.ask("arv_camera_get_frame_rate")) or None if _has_rate(device) else None
+
+
+def _has_rate(device: GenicamDevice) -> bool:
+    return bool(device.ask("arv_camera_is_frame_rate_available"))
+
+
+def _bits(settings: GenicamSettings, pixel_format: MonoFormat, where: str) -> int:
+    if settings.bits is None:
+        return pixel_format.bits
+    if not (8 if pixel_format.bits == 8 else 9) <= settings.bits <= pixel_format.bits:
+        raise ConfigError(f"{where}: bits={settings.bits} is not possible with {pixel_format.name}")
+    return settings.bits
+
+
+def _white(device: GenicamDevice, settings: GenicamSettings, bits: int) -> int | None:
+    """As given, else as the camera has it, where that is below the top of its bits."""
+    white = settings.white
+    if white is None and device.has("PixelDynamicRangeMax"):
+        with contextlib.suppress(GenicamError):
+            white = device.integer("PixelDynamicRangeMax")
+    return white if white is not None and 0 < white < 2**bits - 1 else None
+
+
+def _shown(device: GenicamDevice, settings: GenicamSettings) -> Iterator[tuple[str, Any]]:
+    for feature in dict.fromkeys((*SHOWN, *settings.features)):
+        if device.has(feature):
+            with contextlib.suppress(GenicamError):
+                yield feature, device.text(feature)
+
+
+def _changeable(
+    device: GenicamDevice, exposure_us: float | None, gain: float | None, fps: float | None
+) -> Iterator[CameraSetting]:
+    """Exposure, within one picture, and gain."""
+    if exposure_us:
+        low, high = device.bounds_of("exposure_time")
+        high = max(exposure_us, min(high, 1e6 / fps if fps else high))
+        yield CameraSetting("exposure_us", exposure_us, min(max(low, 1.0), exposure_us), high, log=True)
+    if gain is not None:
+        low, high = device.bounds_of("gain")
+        yield CameraSetting("gain", gain, min(low, gain), max(high, gain))
+
+
+def _warnings(device: GenicamDevice, settings: GenicamSettings, fps: float | None) -> Iterator[str]:
+    automatic = [name for name in AUTOMATIC if device.has(name) and device.text(name) != "Off"]
+    if automatic:
+        yield f"the camera goes on changing by itself: {', '.join(automatic)}; grey levels may drift"
+    if device.has("Gamma") and not _same(device.text("Gamma"), "1"):
+        yield f"Gamma is {device.text('Gamma')}: grey levels are not proportional to light; give Gamma=1"
+    if settings.fps is not None and fps is not None and fps < 0.99 * settings.fps:
+        yield f"the camera gives {fps:g} frames a second, not {settings.fps:g}: exposure, size or line limit it"
+    if device.is_gige and (size := device.ask("arv_camera_gv_get_packet_size")) < SMALL_PACKETS:
+        yield (
+            f"packets of {size} bytes: larger ones did not pass; set the MTU of the network card to 9000 "
+            "(docs/machine-vision.md)"
+        )

@@ -1,0 +1,131 @@
+"""The strain of an area: one affine displacement field through all its ZOIs, its uncertainty, and how well it fits.
+
+Generalised least squares (A. C. Aitken, Proc. R. Soc. Edinburgh 55 (1935) 42-48) to the displacements and gradients
+of the ZOIs: large areas take their strain from the displacements, small ones from the gradients.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.evaluate.affine import AffineWeights, Places, affine_weights
+from analysis.evaluate.unevenness import strain_shapes, variation
+from analysis.field import PAIR_INDEX, StrainField, combination, fixed_sums, strain_tensor
+
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+
+GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy", "exx", "eyy", "exy", "gamma_xy", "omega")
+"""Values that an area has by its affine field; its u and v are means."""
+_DISPLACEMENTS = [PAIR_INDEX[0, 0], PAIR_INDEX[3, 3]]  # variances of u and v among the 21 pairs
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AreaStrain:
+    """The affine displacement field of an area.
+
+    Attributes
+    ----------
+    field : StrainField
+    area, valid : (R, C) bool
+        Its ZOIs, and those of them that have a value.
+    weights : AffineWeights
+    fitted : (2, 3) float64
+        Displacement in the middle (px), change along x and along y: of u, then of v.
+    """
+
+    field: StrainField
+    area: Bools
+    valid: Bools
+    weights: AffineWeights
+    fitted: Floats
+
+    @classmethod
+    def of(cls, field: StrainField, where: ArrayLike | None = None) -> AreaStrain | None:
+        """Of the active ZOIs of ``field``, or of those in ``where`` (R, C); None where none has a value."""
+        area = field.grid.active if where is None else field.grid.active & np.asarray(where, bool)
+        valid = area & field.ok
+        if not valid.any():
+            return None
+        weights = affine_weights(Places.of(field.grid, field.window), area, valid)
+        products = _affine(field, valid)[:, None] * weights.weights.reshape(3, -1)
+        return cls(field, area, valid, weights, fixed_sums(products.reshape(6, -1)).reshape(2, 3))
+
+    def value(self, name: str) -> float:
+        """A strain, in the measure of the field, or a gradient, by its name; one of ``GRADIENTS``."""
+        (_, du_dx, du_dy), (_, dv_dx, dv_dy) = self.fitted
+        if self.field.measure != "small" and name in ("exx", "eyy", "exy", "gamma_xy"):
+            strain = strain_tensor(self.field.measure, *np.array([[du_dx], [du_dy], [dv_dx], [dv_dy]]))
+            return float(2 * strain.exy[0] if name == "gamma_xy" else getattr(strain, name)[0])
+        return math.fsum(share * self.fitted[divmod(i, 3)] for i, share in combination(name).items())
+
+    def sigma(self, name: str) -> float:
+        """Standard uncertainty of ``value`` (of the small strain), the noise of the reference included."""
+        _, noise = _sum_of(name, self.weights)
+        here = np.where(self.valid, self.field.covariance[_DISPLACEMENTS], 0).reshape(2, -1)
+        variance = math.fsum(fixed_sums(noise.reshape(2, -1) * here))
+        return math.sqrt(max(variance, 0.0)) * self._beyond_overlap(name)
+
+    def _beyond_overlap(self, name: str) -> float:
+        """Noise that the pattern of the ZOIs makes, over that which follows from their overlap."""
+        if self.field.sums is None:
+            return 1.0
+        places = Places.of(self.field.grid, self.field.window)
+
+        def made(measurable: Bools) -> tuple[Floats, Floats]:
+            return _sum_of(name, affine_weights(places, self.area, measurable))
+
+        return self.field.sums.ratio(name, self.area, made)
+
+    def unevenness(self) -> Unevenness:
+        """How much the strain varies over the area."""
+        grid = self.field.grid
+        shapes = strain_shapes(Places.of(grid, self.field.window), self.area)
+        if shapes is None:
+            return Unevenness(math.nan, math.nan, math.nan)
+        plane = np.array([np.ones(grid.shape), self.weights.x, self.weights.y]).reshape(3, -1)
+        moved = _affine(self.field, self.valid)[:, : plane.shape[1]]
+        left = np.where(self.valid.ravel(), moved - self.fitted @ plane, 0.0)
+        here = np.where(self.valid, self.field.covariance[_DISPLACEMENTS], 0).reshape(2, -1)
+        exx, eyy = variation(shapes.along_x, left[0]), variation(shapes.along_y, left[1])
+        expected = math.fsum(fixed_sums(np.stack([shapes.noise_x, shapes.noise_y]) * here))
+        return Unevenness(exx, eyy, math.hypot(exx, eyy) / math.sqrt(expected) if expected > 0 else math.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class Unevenness:
+    """How much strain varies over an area, as far as polynomials of the second degree follow it.
+
+    Attributes
+    ----------
+    exx, eyy : float
+        Root mean square about the strain of the area; NaN where it has too few ZOIs.
+    misfit : float
+        How far the area is from affine: that variation over what noise makes of it, about 1 for an affine field.
+    """
+
+    exx: float
+    eyy: float
+    misfit: float
+
+
+def _affine(field: StrainField, valid: Bools) -> Floats:
+    """Displacement and gradients, one after the other, of u and of v, (2, 3 N); zero where not valid."""
+    half = len(field.parameters) // 2
+    parameters = field.parameters.reshape(2, half, *field.grid.shape)[:, :3]
+    return np.where(valid, parameters, 0.0).reshape(2, -1)
+
+
+def _sum_of(name: str, weights: AffineWeights) -> tuple[Floats, Floats]:
+    """A value as weights of the six affine parameters, (6, R, C), and of the variances of u and v, (2, R, C)."""
+    shape = weights.x.shape
+    shares, noise = np.zeros((2, 3, *shape)), np.zeros((2, *shape))
+    for parameter, share in combination(name).items():
+        component, mode = divmod(parameter, 3)
+        shares[component] += share * weights.weights[mode]
+        noise[component] += share**2 * weights.noise[mode]
+    return shares.reshape(6, *shape), noise

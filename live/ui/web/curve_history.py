@@ -1,0 +1,48 @@
+"""The curves of a test for the page: rows of numbers by time, of which a page requests what it lacks."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from typing import Any
+
+from live.pipeline.history import Thinned
+
+MAX_POINTS = 4000
+
+
+class CurveHistory:
+    """Rows of numbers by time, bounded: a long test is thinned evenly, and a page then requests all rows again.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Of the columns.
+    """
+
+    def __init__(self, names: Sequence[str]) -> None:
+        self._names = list(names)
+        self._rows: Thinned[Sequence[float]] = Thinned(MAX_POINTS)
+        self._lock = threading.Lock()
+
+    def add(self, row: Sequence[float]) -> None:
+        """Add a row; a long curve is thinned."""
+        with self._lock:
+            self._rows.append(row)
+
+    @property
+    def position(self) -> tuple[int, int]:
+        """Edition (rows of another edition are useless) and number of rows."""
+        with self._lock:
+            return self._rows.halvings, len(self._rows.kept)
+
+    def since(self, edition: int, count: int) -> dict[str, Any]:
+        """The rows that a page with ``count`` rows of ``edition`` lacks."""
+        with self._lock:
+            first = count if edition == self._rows.halvings else 0
+            return {
+                "names": self._names,
+                "edition": self._rows.halvings,
+                "first": first,
+                "rows": self._rows.kept[first:],
+            }

@@ -1,0 +1,133 @@
+"""The map over the picture of a running test: its range, its histogram, and the value at a place."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from analysis.field import VALUES, Status
+from live.config.gauges import complete_gauges
+from live.config.loading import Config
+from live.pipeline.measurement import Measurement
+from live.results.maps.colours import MICROSTRAIN, PERCENT
+from live.results.maps.field_maps import FIELD_MAPS, FieldMaps, Painted
+from live.results.maps.painting import overlay_cells
+from live.ui.web.painting import as_jpeg, shrunk
+
+RANGES = ("automatic", "symmetric", "fixed")
+BARS = 24
+"""Of the histogram, over the range of the colours."""
+OUTSIDE = "no ZOI is here"
+
+
+@dataclass(frozen=True, slots=True)
+class MapChoice:
+    """Which map is shown, and how its colours are spread.
+
+    Attributes
+    ----------
+    name : str
+        One of ``FIELD_MAPS``.
+    span : "automatic", "symmetric" or "fixed"
+        Over the values, symmetric about zero, or from ``-limit`` to ``limit`` (strains only).
+    limit : float or None
+    """
+
+    name: str
+    span: str
+    limit: float | None = None
+
+
+class MapView:
+    """Paints the map of one measurement after the other.
+
+    Parameters
+    ----------
+    config : Config
+
+    Attributes
+    ----------
+    choice : MapChoice
+    """
+
+    def __init__(self, config: Config) -> None:
+        self._config, self._axis = config, config.specimen.first_axis
+        limit = config.view.strain_range
+        self._painted: tuple[Measurement, Painted] | None = None
+        self._take(MapChoice(f"e{self._axis * 2}", "automatic" if limit is None else "fixed", limit))
+
+    def _take(self, choice: MapChoice) -> None:
+        self.choice = choice
+        limit = choice.limit if choice.span == "fixed" else None
+        self._maps = FieldMaps(self._axis, limit, about_zero=choice.span == "symmetric")
+
+    def choose(self, name: object, span: object, limit: object) -> str:
+        """Show another map, or another range; the reason of a refusal, or empty."""
+        if name not in FIELD_MAPS:
+            return f"there is no map {str(name)[:40]!r}; there are {', '.join(FIELD_MAPS)}"
+        if span not in RANGES:
+            return f"the ranges of a map are {', '.join(RANGES)}"
+        given = isinstance(limit, int | float) and not isinstance(limit, bool)
+        if span == "fixed" and not (given and 1e-7 <= limit <= 10):  # type: ignore[operator]
+            return "a fixed range is a strain from 1e-7 to 10"
+        self._take(MapChoice(str(name), str(span), float(limit) if given else None))  # type: ignore[arg-type]
+        return ""
+
+    def draw(self, m: Measurement) -> tuple[bytes, dict[str, Any]]:
+        """The picture of ``m`` with its map, as JPEG, and its scale as the page shows it."""
+        picture, zoom = shrunk(m.burst.mean, m.burst.bits)
+        painted = self._maps.paint(m.field, (self.choice.name,))[self.choice.name]
+        overlay_cells(picture, zoom, m.field.grid, painted.rgba, (m.time_step.u, m.time_step.v))
+        self._painted = m, painted
+        height, width = m.burst.mean.shape
+        shown = {"of": self.choice.name, "range": self.choice.span, "width": width, "height": height}
+        return as_jpeg(picture), shown | _scale_of(painted) | {"gauges": gauge_shapes(self._config)}
+
+    def value_at(self, x: float, y: float) -> dict[str, Any]:
+        """Value, sigma and status of the ZOI that is shown at a place of the picture, px."""
+        if self._painted is None:
+            return {"value": None, "status": OUTSIDE}
+        m, painted = self._painted
+        grid, moved = m.field.grid, np.nan_to_num([m.time_step.u, m.time_step.v])
+        column, row = (
+            int(np.argmin(np.abs(c - p))) for c, p in ((grid.x, x - moved[0]), (grid.y, y - moved[1]))
+        )
+        far = max(abs(grid.x[column] - x + moved[0]), abs(grid.y[row] - y + moved[1]))
+        if far > grid.step / 2 or not grid.active[row, column]:
+            return {"value": None, "status": OUTSIDE}
+        status = Status(int(m.field.status[row, column]))
+        if painted.values is None or not np.isfinite(painted.values[row, column]):
+            return {"value": None, "status": status.text}
+        name = self.choice.name
+        sigma = float(m.field.sigma(name)[row, column]) if name in VALUES else None
+        return {"value": float(painted.values[row, column]), "sigma": sigma, "status": status.text}
+
+
+def _scale_of(painted: Painted) -> dict[str, Any]:
+    """The colours of a map: ends, unit and histogram, strains without unit; or the legend of statuses."""
+    scale, values = painted.scale, painted.values
+    if scale is None or values is None:
+        legend = [{"text": one.text, "count": one.count, "colour": f"rgb{one.rgb}"} for one in painted.legend]
+        return {"legend": legend}
+    strain = scale.unit in (MICROSTRAIN.name, PERCENT.name)
+    factor = scale.factor if strain else 1.0
+    low, high = scale.low / factor, scale.high / factor
+    counts, _ = np.histogram(values[np.isfinite(values)], BARS, (low, high))
+    unit = "" if strain else scale.unit
+    return {"low": low, "high": high, "strain": strain, "unit": unit, "histogram": counts.tolist()}
+
+
+def gauge_shapes(config: Config) -> dict[str, Any]:
+    """The gauges of a configuration as the page draws them: kind, handles and lines, px."""
+    found = complete_gauges(config.gauges, config.specimen.first_axis)
+    zoi = config.measure.zoi
+    return {
+        one.name: {
+            "kind": one.kind,
+            "handles": one.handles(),
+            "outline": [[(round(x, 1), round(y, 1)) for x, y in line] for line in one.outline(zoi)],
+        }
+        for one in found
+    }

@@ -1,0 +1,74 @@
+"""The result of a run as the page shows it: warnings, figures, and the straight lines of the evaluation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from analysis.evaluate import TensileFigures
+from live.config.sections import SpecimenConfig
+from live.pipeline.event_log import sentence
+from live.pipeline.run_state import RunState
+from live.results.figures import TensileRow, evaluate, tensile_table
+from live.results.report.curves import load_unit, strain_unit, stress_strain
+from live.results.report.evaluation import EvaluatedCurve, intercept_of
+from live.results.summary import why_nothing
+
+MAX_TROUBLES = 20
+
+
+def run_result(run_state: RunState, specimen: SpecimenConfig, folder: Path, words: str) -> dict[str, Any]:
+    """Warnings, figures, lines over the curve, and frame counts of a run.
+
+    ``words`` describe how the run ended; they are empty where it ended well.
+    """
+    log, measured = run_state.event_log, run_state.history.has_values
+    troubles = [sentence(event, log.names) for event in log.events("warning", "error")][-MAX_TROUBLES:]
+    figures = evaluate(run_state.history, run_state.loads, specimen) if measured else None
+    return {
+        "folder": str(folder),
+        "words": words,
+        "figures": [] if figures is None else [_figure(row) for row in _rows(figures, specimen)],
+        "lines": [] if figures is None else list(_lines(run_state, specimen, figures)),
+        "ledger": run_state.frame_counts.line(),
+        "troubles": troubles if measured else [*troubles, why_nothing(run_state)],
+    }
+
+
+def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> list[TensileRow]:
+    """All figures of the standard."""
+    rows = tensile_table(figures, stresses=specimen.area_m2 is not None).values()
+    return [row for row in rows if row.figure.known or not row.figure.why.startswith("not a figure of")]
+
+
+def _figure(row: TensileRow) -> dict[str, Any]:
+    if not row.figure.known:
+        return {"name": row.name, "text": None, "why": row.figure.why}
+    value, between, interval = row.text.partition(" +- ")
+    number, _, unit = (interval or value).partition(" ")
+    text = f"{value} {unit}".strip() if between else value
+    return {"name": row.name, "text": text, "interval": f"± {number}" if between else ""}
+
+
+def _lines(
+    run_state: RunState, specimen: SpecimenConfig, figures: TensileFigures
+) -> Iterator[dict[str, Any]]:
+    """The lines and marks of the report's curve, in SI units."""
+    history, loads = run_state.history, run_state.loads
+    axial, transverse = history.along(specimen.axis)
+    load = history.forces(loads) / (specimen.area_m2 or 1.0)
+    if not np.isfinite(load).any():
+        return
+    curve = EvaluatedCurve(
+        axial, transverse, load, specimen.area_m2 is not None, figures, intercept_of(axial, load, figures)
+    )
+    plot, e, unit = stress_strain(curve), strain_unit(axial), load_unit(curve)
+    for line in plot.curves[1:]:
+        points = zip(line.x / e.factor, line.y / unit.factor, strict=True)
+        yield {"points": [(float(x), float(y)) for x, y in points]}
+    for mark in plot.marks:
+        name, value = mark.words.partition(" = ")[0], mark.y / unit.factor
+        yield {"points": [(mark.x / e.factor, value)], "words": {"name": name, "value": value}}

@@ -1,0 +1,117 @@
+"""The devices to choose from during set-up, searched in threads of their own: cameras, serial ports, sessions."""
+
+from __future__ import annotations
+
+import logging
+import re
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from acquire.addresses import parse_address
+from acquire.camera import CameraListing, list_cameras
+from acquire.errors import PhasedicError
+from acquire.printable import brief, printable
+from acquire.serial_line import identify
+from acquire.serial_line.ports import PortInfo, list_serial_ports
+
+log = logging.getLogger(__name__)
+
+MAX_SESSIONS = 20
+_FORMAT = re.compile(r"^format=(\S+)")
+Cameras = Callable[[], list[CameraListing]]
+Ports = Callable[[], list[PortInfo]]
+
+
+class DeviceLists:
+    """What ``search`` and ``identify`` have found.
+
+    Parameters
+    ----------
+    runs : callable giving a Path
+        The folder of the recorded sessions.
+    cameras, ports : callable
+        Give what there is; for tests.
+    """
+
+    def __init__(
+        self, runs: Callable[[], Path], cameras: Cameras = list_cameras, ports: Ports = list_serial_ports
+    ) -> None:
+        self._runs, self._list_cameras, self._list_ports = runs, cameras, ports
+        self._cameras: list[CameraListing] = []
+        self._loads: list[dict[str, str]] = []
+        self._finding = ""
+        self._busy = threading.Lock()
+
+    def search(self) -> None:
+        """Search again, unless a search is under way."""
+        self._begin(self._search)
+
+    def identify(self, port: str) -> None:
+        """Listen on a serial port for a load cell; nothing is sent."""
+        self._begin(lambda: self._identify(port))
+
+    def state(self, camera: str) -> dict[str, Any]:
+        """The lists as the page shows them; formats are those of the camera at the address ``camera``."""
+        target = parse_address(camera).target if camera else ""
+        same = [one for one in self._cameras if target in _device(one)]
+        lines = (line for one in same for line in one.details)
+        return {
+            "cameras": [_shown(one) for one in self._cameras],
+            "loads": self._loads,
+            "formats": [found[1] for line in lines if (found := _FORMAT.match(line))],
+            "finding": self._finding,
+        }
+
+    def _begin(self, work: Callable[[], None]) -> None:
+        if self._busy.acquire(blocking=False):
+            threading.Thread(target=self._guarded, args=(work,), name="page-devices", daemon=True).start()
+
+    def _guarded(self, work: Callable[[], None]) -> None:
+        try:
+            work()
+        except PhasedicError as error:
+            self._finding = printable(brief(error))
+        except Exception as error:
+            log.exception("the search for devices failed")
+            self._finding = f"the search failed: {error!r}"
+        finally:
+            self._busy.release()
+
+    def _search(self) -> None:
+        self._finding = "searching …"
+        recorded = [CameraListing(address, "recorded session") for address in self._sessions()]
+        simulated = [CameraListing("sim:", "simulated"), CameraListing("sim:hole", "simulated")]
+        self._cameras = [*self._list_cameras(), *recorded, *simulated]
+        ports = [_port(one) for one in self._list_ports()]
+        self._loads = [*ports, {"address": "sim:", "name": "simulated"}, {"address": "none:", "name": "none"}]
+        self._finding = ""
+
+    def _sessions(self) -> Iterator[str]:
+        files = sorted(self._runs().glob("*/session*.h5"), key=lambda path: path.stat().st_mtime)
+        return (f"session:{path}" for path in files[-MAX_SESSIONS:])
+
+    def _identify(self, port: str) -> None:
+        self._finding = "listening at all speeds …"
+        for _, _, finding in identify.listen(port):
+            if finding is not None:
+                known = [one for one in self._loads if one["address"] != finding.address]
+                self._loads = [{"address": finding.address, "name": finding.protocol}, *known]
+                self._finding = f"found: {finding.protocol}; choose it in the list"
+                return
+        self._finding = "nothing recognised: check cable and power, or write the address"
+
+
+def _device(listing: CameraListing) -> set[str]:
+    """The names of the device of a camera."""
+    return {parse_address(one).target for one in (listing.address, listing.stable_address) if one}
+
+
+def _shown(one: CameraListing) -> dict[str, str]:
+    return {"address": one.address, "name": printable(one.name), "trouble": printable(one.trouble)}
+
+
+def _port(one: PortInfo) -> dict[str, str]:
+    trouble = "" if one.accessible else "this user may not open it"
+    return {"address": one.device, "name": printable(one.description), "trouble": trouble}

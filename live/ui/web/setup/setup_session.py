@@ -1,0 +1,182 @@
+"""Set-up before a test: camera, load cell, region, gauges and check of one rig, joined for the page."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import DataError
+from acquire.frame import CameraInfo, Frame
+from acquire.printable import printable
+from live.config.loading import Config
+from live.config.sections import DEFAULT_BURST
+from live.results.maps.painting import overlay_cells
+from live.setup.scale import Board, Scale, from_board
+from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.map_view import gauge_shapes
+from live.ui.web.painting import as_jpeg, mark_saturated, shrunk
+from live.ui.web.setup.camera_preview import CameraPreview
+from live.ui.web.setup.check_panel import camera_values, quality_colours
+from live.ui.web.setup.config_draft import ConfigDraft
+from live.ui.web.setup.device_lists import DeviceLists
+from live.ui.web.setup.drawn_region import DrawnRegion
+from live.ui.web.setup.load_preview import LoadPreview
+from live.ui.web.setup.specimen_check import SpecimenCheck, recent_stack
+from live.ui.web.setup.specimen_region import SpecimenRegion
+
+PICTURE_S = 0.2
+OVERLAYS = ("saturated", "quality")
+SPECIMEN_KEYS = ("width_mm", "thickness_mm", "diameter_mm", "gauge_length_mm", "axis")
+
+
+class SetupSession:
+    """The set-up of a rig; reads camera and load cell from ``with`` to its end.
+
+    Parameters
+    ----------
+    draft : ConfigDraft
+    broadcaster : Broadcaster
+        Gets the state for the pages.
+    drawn : DrawnRegion, optional
+        The region of the last specimen.
+
+    Attributes
+    ----------
+    picture : bytes
+        The newest picture with its overlays, as JPEG.
+    preview : CameraPreview
+    load : LoadPreview
+    region : SpecimenRegion
+    check : SpecimenCheck
+    devices : DeviceLists
+    """
+
+    def __init__(
+        self, draft: ConfigDraft, broadcaster: Broadcaster, drawn: DrawnRegion | None = None
+    ) -> None:
+        self.draft, self._broadcaster = draft, broadcaster
+        self.picture = b""
+        self.overlays = {"saturated": True, "quality": False}
+        self._remarks: list[str] = []
+        self._shown = 0
+        self._folder = TemporaryDirectory(prefix="phasedic-")
+        self._lock = threading.Lock()
+        self.devices = DeviceLists(lambda: Path(draft.config.output.dir or "runs"))
+        self.load = LoadPreview(draft)
+        self.preview = CameraPreview(
+            draft, self._opened, self._show, lambda info: self.check.frames_needed(info)
+        )
+        self.region = SpecimenRegion(draft, drawn, lambda: self.check.discard())
+        self.check = SpecimenCheck(
+            draft, self.preview, self.load, self.region, Path(self._folder.name), self.refresh
+        )
+
+    def __enter__(self) -> SetupSession:
+        self.preview.start()
+        self.load.start()
+        self.check.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.preview.close()
+        self.load.close()
+        self.check.close()
+        self._folder.cleanup()
+
+    # -- requests of the page -----------------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Send the state to the pages."""
+        with self._lock:
+            self._broadcaster.publish("setup", self.state())
+
+    def find(self) -> None:
+        """Find the specimen in the last frames; raises DataError where there is no picture or no specimen."""
+        self.region.find(self._camera(), self._recent())
+
+    def scale_from(self, board: Board) -> Scale:
+        """The scale from a board in the last frames; raises DataError where there is none."""
+        picture = self._recent().mean(axis=0)
+        scale = from_board(picture, board, stand_off_mm=self.draft.config.scale.stand_off_mm)
+        self._remarks = [printable(remark) for remark in scale.remarks]
+        return scale
+
+    def clear_remarks(self) -> None:
+        """Remove the remarks on a calibration board: the scale was taken another way."""
+        self._remarks = []
+
+    def open_load(self, address: str) -> None:
+        """Read another load cell; its zero is its own. Raises ConfigError for an invalid address."""
+        self.draft.change_all({"load.address": address, "load.zero_N": 0.0})
+        self.check.discard()
+        self.load.reopen()
+
+    def ready(self, folder: Path) -> Config:
+        """The configuration for a test; raises DataError or ConfigError where a test cannot begin with it."""
+        return self.region.ready(folder)
+
+    def state(self) -> dict[str, Any]:
+        """The state of the set-up, as the page shows it."""
+        info, config, drawn = self.preview.info, self.draft.config, self.region.drawn
+        m, specimen = config.measure, config.specimen
+        region = drawn and {"words": drawn.origin, "box": drawn.box, "edition": self.region.edition}
+        return {
+            **self.check.values,
+            "remarks": self._remarks,
+            "trouble": self.preview.trouble,
+            "camera": None if info is None else camera_values(info),
+            "address": config.camera.address,
+            "load": self.load.state(),
+            "devices": self.devices.state(config.camera.address),
+            "picture": self._shown,
+            "overlays": self.overlays,
+            "region": region,
+            "gauges": gauge_shapes(config),
+            "measure": {"zoi": m.zoi, "step": m.step, "burst": m.burst or DEFAULT_BURST},
+            "specimen": {key: getattr(specimen, key) for key in SPECIMEN_KEYS},
+            "metadata": dict(config.metadata),
+            "scale": {"px_per_mm": config.scale.px_per_mm, "sigma": config.scale.sigma_mm_per_px},
+            "unsaved": sorted(self.draft.changes),
+            "file": str(self.draft.path),
+        }
+
+    # -- the camera ---------------------------------------------------------------------------
+
+    def _camera(self) -> CameraInfo:
+        info = self.preview.info
+        if info is None:
+            raise DataError("the camera has given no picture yet")
+        return info
+
+    def _recent(self) -> NDArray[np.float32]:
+        """(N, H, W), the last frames."""
+        frames = self.preview.recent()
+        if not frames:
+            raise DataError("the camera has given no picture yet")
+        return recent_stack(frames)
+
+    def _opened(self, info: CameraInfo) -> None:
+        self.check.values["checking"] = False
+        self.check.discard()
+        self.region.opened(info)
+
+    def _show(self, frame: Frame) -> float:
+        """Draw the picture while a page is open; when to draw again."""
+        began = time.monotonic()
+        if self._broadcaster.open_pages:
+            picture, scale = shrunk(frame.image, frame.bits)
+            figures = self.check.figures
+            if self.overlays["quality"] and figures is not None:
+                overlay_cells(picture, scale, figures.zois.grid, quality_colours(figures))
+            if self.overlays["saturated"]:
+                mark_saturated(picture, scale, frame.image, frame.saturation)
+            self.picture = as_jpeg(picture)
+            self._shown += 1
+        self.refresh()
+        return max(began + PICTURE_S, time.monotonic() + 2 * (time.monotonic() - began))

@@ -1,0 +1,196 @@
+"""The check of the still specimen during set-up: a thread judges the newest frames; the whole check on request."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import PhasedicError
+from acquire.frame import CameraInfo, Frame
+from acquire.printable import brief, printable
+from live.config.sections import DEFAULT_REFERENCE_BURST
+from live.config.values import AUTO
+from live.pipeline.latency import OUTPUT, lower_priority
+from live.pipeline.warm_up import picture_kinds
+from live.setup.check.check_list import CheckFigures, examine
+from live.setup.check.quick_check import QuickChecker
+from live.setup.check.verdict import CheckLine, check_lines
+from live.setup.compiling import compile_ahead
+from live.ui.web.setup.camera_preview import MAX_BYTES, RECENT, CameraPreview
+from live.ui.web.setup.check_panel import figure_values, frame_stack, line_values, table_values
+from live.ui.web.setup.config_draft import ConfigDraft
+from live.ui.web.setup.load_preview import NONE, LoadPreview
+from live.ui.web.setup.specimen_region import SpecimenRegion
+
+log = logging.getLogger(__name__)
+
+EVALUATE_S = 0.4
+_NO_VERDICT: dict[str, Any] = {"table": None, "go": None, "lines": []}
+
+
+def recent_stack(frames: list[Frame]) -> NDArray[np.float32]:
+    """(N, H, W)."""
+    return np.stack([frame.image for frame in frames]).astype(np.float32)
+
+
+class SpecimenCheck:
+    """Checks the specimen until it is closed.
+
+    Parameters
+    ----------
+    draft : ConfigDraft
+    preview : CameraPreview
+    load : LoadPreview
+    region : SpecimenRegion
+    folder : Path
+        For masks.
+    refresh : callable
+        Called when ``values`` have changed.
+
+    Attributes
+    ----------
+    values : dict
+        For the page: the verdict ``go``, its ``lines`` and ``table``, the figures, and what is being done.
+    figures : CheckFigures or None
+        The newest.
+    """
+
+    def __init__(
+        self,
+        draft: ConfigDraft,
+        preview: CameraPreview,
+        load: LoadPreview,
+        region: SpecimenRegion,
+        folder: Path,
+        refresh: Callable[[], None],
+    ) -> None:
+        self._draft, self._preview, self._load, self._region = draft, preview, load, region
+        self._folder, self._refresh = folder, refresh
+        self.values: dict[str, Any] = {**_NO_VERDICT, "checking": False, "doubt": "", "busy": ""}
+        self.figures: CheckFigures | None = None
+        self._checker, self._checked_for = QuickChecker(draft.config), tuple[Any, ...]()
+        self._peak = 0.0
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="page-check", daemon=True)
+
+    def start(self) -> None:
+        """Start the thread."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread."""
+        self._closing.set()
+        self._thread.join()
+
+    def begin(self) -> None:
+        """Run the whole check on the next frames; raises DataError where there is no camera."""
+        self._preview.collect()
+        self.values |= {"checking": True, "go": None}
+
+    def discard(self) -> None:
+        """Discard the verdict: it holds for another region, rig or camera."""
+        self.values |= _NO_VERDICT
+
+    def reset_peak(self) -> None:
+        """Reset the peak hold of the sharpness."""
+        self._peak = 0.0
+
+    def frames_needed(self, info: CameraInfo) -> int:
+        """Frames of a whole check."""
+        wanted = 2 * (self._draft.config.measure.reference_burst or DEFAULT_REFERENCE_BURST)
+        return max(min(wanted, MAX_BYTES // (2 * info.width * info.height)), RECENT)
+
+    def _work(self) -> None:
+        lower_priority(OUTPUT)
+        while not self._closing.is_set():
+            try:
+                self._evaluate()
+            except PhasedicError as error:
+                self._failed(printable(brief(error)))
+            except Exception as error:
+                log.exception("the check of the specimen failed")
+                self._failed(f"a defect: {error!r}")
+            self._refresh()
+            self._closing.wait(EVALUATE_S)
+
+    def _failed(self, why: str) -> None:
+        """A whole check that fails gives a verdict too: NO-GO, with the reason."""
+        if self.values["checking"]:
+            line = CheckLine("check", why, False, "mend this, then check again")
+            self.values |= {"go": False, "lines": [line_values(line)], "table": None}
+        self.values |= {"doubt": why, "checking": False}
+
+    def _evaluate(self) -> None:
+        info, frames = self._preview.info, self._preview.recent()
+        if info is None or not frames or self._preview.collecting:
+            return  # a busy processor must not lose frames of a check
+        self._compile(info)
+        if self._region.drawn is None:
+            self._region.begin(info, recent_stack(frames))
+            if self._draft.config.measure.gauges == AUTO:
+                self._region.place_gauges()
+        collected = self._preview.collected()
+        if collected is not None:
+            self._check(collected, info)
+        else:
+            self._quick_check(frames, info)
+
+    def _compile(self, info: CameraInfo) -> None:
+        """Compile in separate processes: the test that follows must load the kernel from its cache."""
+
+        def report(text: str) -> None:
+            self.values["busy"] = text
+            self._refresh()
+
+        phase = self._draft.config.measure.estimator == "phase"
+        compile_ahead(picture_kinds(info), phase=phase, say=report, stopped=self._closing.is_set)
+        self.values["busy"] = ""
+
+    def _quick_check(self, frames: list[Frame], info: CameraInfo) -> None:
+        """Update the figures that change while lens and light are adjusted."""
+        now = (self._region.edition, self._draft.config, info)
+        if self._checked_for != now:
+            self._checked_for = now
+            self._checker = QuickChecker(self._region.config(self._folder))
+        self._keep_figures(self._checker.check(frame_stack(frames, info)).figures)
+
+    def _keep_figures(self, figures: CheckFigures) -> None:
+        sharpness = figures.sharpness
+        self.figures = figures
+        self._peak = max(self._peak, sharpness if np.isfinite(sharpness) else 0.0)
+        self.values |= figure_values(figures) | {"peak": self._peak, "doubt": ""}
+
+    def _check(self, frames: list[Frame], info: CameraInfo) -> None:
+        edition, config = self._region.edition, self._region.config(self._folder)
+        figures = examine(frame_stack(frames, info), config, self._load.report())
+        shift = config.measure.reference_shift_px
+        lines = [*check_lines(figures, None, shift), *self._load_lines(), self._gauge_line()]
+        self._keep_figures(figures)
+        self.values["checking"] = False
+        if edition == self._region.edition:  # else the region has changed meanwhile
+            go = all(line.good for line in lines)
+            shown = [line_values(line) for line in lines]
+            self.values |= {"lines": shown, "go": go, "table": table_values(figures)}
+
+    def _load_lines(self) -> Iterator[CheckLine]:
+        """What the report on the load cell does not have: a cell that is missing, and none."""
+        if self._load.address == NONE:
+            yield CheckLine("load cell", "none: force, stress and modulus are not measured", measured=False)
+        elif self._load.report() is None and not self._load.trouble:
+            yield CheckLine("load cell", "recorded, with the pictures or for itself", measured=False)
+        elif self._load.trouble:
+            yield CheckLine("load cell", self._load.trouble, False, "choose the load cell under Devices")
+
+    def _gauge_line(self) -> CheckLine:
+        """Whether every gauge lies on ZOIs."""
+        try:
+            names = ", ".join(self._region.ready(self._folder).gauges)
+        except PhasedicError as error:
+            return CheckLine("gauges", str(error), False, "move it onto the region")
+        return CheckLine("gauges", f"placed: {names}" if names else "none: the mean strain is reported")

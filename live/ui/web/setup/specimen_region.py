@@ -1,0 +1,196 @@
+"""The region of the specimen and its gauges during set-up: drawn, found or placed, undone, and saved."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import ConfigError, DataError
+from acquire.files.picture import write_picture
+from acquire.frame import CameraInfo
+from live.config.gauges import GaugeTable, gauges_for
+from live.config.loading import Config
+from live.config.values import GIVEN
+from live.setup.grid import grid_for
+from live.setup.pictures import read_mask
+from live.setup.placement import auto_gauges
+from live.setup.region import region_of
+from live.ui.web.painting import as_png
+from live.ui.web.setup.config_draft import ConfigDraft
+from live.ui.web.setup.drawn_region import MAX_UNDO, DrawnRegion
+
+SHADE = (60, 20, 0, 150)
+"""Colour over pixels that are not measured: blue, green, red, opacity."""
+
+
+class SpecimenRegion:
+    """The drawn region and the gauges of a draft, with one undo for both.
+
+    Parameters
+    ----------
+    draft : ConfigDraft
+    drawn : DrawnRegion or None
+        The region of the last specimen.
+    on_change : callable
+        Called when the results of the former region no longer hold.
+
+    Attributes
+    ----------
+    drawn : DrawnRegion or None
+        None until there is a picture.
+    edition : int
+        Counts the changes.
+    """
+
+    def __init__(self, draft: ConfigDraft, drawn: DrawnRegion | None, on_change: Callable[[], None]) -> None:
+        self._draft, self.drawn, self._on_change = draft, drawn, on_change
+        self.edition = 0
+        # What each edit has replaced: the gauges, or None for the mask, which ``drawn`` keeps.
+        self._edits: deque[Mapping[str, GaugeTable] | None] = deque(maxlen=MAX_UNDO)
+
+    def changed(self) -> None:
+        """Discard the results of the former region."""
+        self.edition += 1
+        self._on_change()
+
+    @property
+    def known(self) -> DrawnRegion:
+        """The drawn region; raises DataError before the first picture."""
+        if self.drawn is None:
+            raise DataError("the camera has given no picture yet")
+        return self.drawn
+
+    def opened(self, info: CameraInfo) -> None:
+        """Forget the region where the picture has another size."""
+        if self.drawn is not None and self.drawn.mask.shape != (info.height, info.width):
+            self.drawn = None
+            self._edits.clear()
+
+    # -- edits ----------------------------------------------------------------------------------
+
+    def draw(self, strokes: list[Mapping[str, Any]]) -> None:
+        """Draw strokes; raises ConfigError where one is invalid."""
+        self.known.draw(strokes)
+        self._edited_mask()
+
+    def replace(self, mask: NDArray[np.bool_], origin: str) -> None:
+        """Replace the mask."""
+        self.known.replace(mask, origin)
+        self._edited_mask()
+
+    def set_gauges(self, changes: Mapping[str, Any]) -> None:
+        """Change gauges, by their keys ``gauges.NAME``; raises ConfigError and changes nothing where one is invalid."""
+        before = dict(self._draft.config.gauges)
+        self._draft.change_all(changes)
+        self._edits.append(before)
+
+    def undo(self) -> None:
+        """Undo the last edit of the mask or of the gauges; raises ConfigError without one."""
+        if not self._edits:
+            raise ConfigError("there is nothing to undo")
+        before = self._edits.pop()
+        if before is None:
+            self.known.undo()
+            self.changed()
+            return
+        removed: dict[str, Any] = {f"gauges.{name}": None for name in self._draft.config.gauges}
+        self._draft.change_all(removed | {f"gauges.{name}": dict(table) for name, table in before.items()})
+
+    def _edited_mask(self) -> None:
+        self._edits.append(None)
+        self.changed()
+
+    # -- found in the picture ---------------------------------------------------------------------
+
+    def begin(self, info: CameraInfo, stack: NDArray[np.float32]) -> None:
+        """Begin with the region of the rig file, or with the specimen that is found; raises as ``find``."""
+        m = self._draft.config.measure
+        if not isinstance(m.roi, tuple) and m.mask is None:
+            self.drawn = self._found(info, stack)
+        else:
+            region = region_of(self._draft.config, np.zeros((info.height, info.width), np.float32))
+            given = read_mask(m.mask, info.width, info.height)
+            inside = region.inside(info.width, info.height, m.zoi)
+            self.drawn = DrawnRegion(inside if given is None else inside & given, region.words)
+        self.changed()
+
+    def find(self, info: CameraInfo, stack: NDArray[np.float32]) -> None:
+        """Find the specimen in the last frames, (N, H, W); raises DataError where there is none."""
+        found = self._found(info, stack)
+        self.replace(found.mask, found.origin)
+
+    def _found(self, info: CameraInfo, stack: NDArray[np.float32]) -> DrawnRegion:
+        noise = float(np.diff(stack, axis=0).std()) / 2**0.5 / len(stack) ** 0.5 if len(stack) > 1 else None
+        m = self._draft.config.measure
+        automatic = replace(self._draft.config, measure=replace(m, roi=None, mask=None))
+        region = region_of(automatic, stack.mean(axis=0), noise or None)
+        return DrawnRegion(region.inside(info.width, info.height, m.zoi), region.words)
+
+    def place_gauges(self) -> None:
+        """Place gauges on the drawn region; raises DataError or ConfigError where they do not fit."""
+        (drawn, roi), config = self._boxed(), self._draft.config
+        height, width = drawn.mask.shape
+        box = replace(config, measure=replace(config.measure, roi=roi, mask=None))
+        placed = auto_gauges(grid_for(box, width, height, drawn.mask), config.specimen.first_axis)
+        self.set_gauges(
+            {f"gauges.{name}": table for name, table in placed.items()} | {"measure.gauges": GIVEN}
+        )
+
+    # -- for the check, the test and the rig file ---------------------------------------------------
+
+    def config(self, folder: Path) -> Config:
+        """The configuration with the drawn region; a mask that is not a rectangle is written into ``folder``.
+
+        Raises
+        ------
+        DataError, ConfigError
+            No region is drawn, or no ZOI or gauge fits into it.
+        """
+        (drawn, roi), config = self._boxed(), self._draft.config
+        path = None
+        if not drawn.is_box:
+            path = folder / f"mask-{time.monotonic_ns()}.png"
+            write_picture(path, drawn.mask.astype(np.uint8) * 255)
+        region = replace(config.measure, roi=roi, mask=None if path is None else str(path))
+        return replace(config, measure=region)
+
+    def ready(self, folder: Path) -> Config:
+        """As ``config``, for a test: also raises where no ZOI, or not every gauge, lies in the region."""
+        config = self.config(folder)
+        height, width = self.known.mask.shape
+        grid = grid_for(config, width, height, self.known.mask)
+        if not grid.n_active:
+            raise DataError("no ZOI lies in the region: draw a larger one, or take smaller ZOIs")
+        gauges_for(config.gauges, config.specimen.first_axis, grid)
+        return config
+
+    def save(self) -> None:
+        """Write the rig file with the drawn region; raises ConfigError where a file cannot be written."""
+        drawn = self.drawn
+        if drawn is None or drawn.box is None:
+            self._draft.save(None)
+            return
+        self._draft.change_all({"measure.roi": list(drawn.box), "measure.mask": None})
+        self._draft.save(None if drawn.is_box else drawn.mask)
+
+    def shade(self) -> bytes:
+        """An overlay that darkens the pixels that are not measured, as PNG."""
+        drawn = self.drawn
+        mask = np.ones((1, 1), bool) if drawn is None else drawn.mask
+        shade = np.zeros((*mask.shape, 4), np.uint8)
+        shade[~mask] = SHADE
+        return as_png(shade)
+
+    def _boxed(self) -> tuple[DrawnRegion, tuple[int, int, int, int]]:
+        """The drawn region and its box."""
+        drawn = self.drawn
+        if drawn is None or drawn.box is None:
+            raise DataError("no region is drawn yet: draw one, or find the specimen")
+        return drawn, drawn.box

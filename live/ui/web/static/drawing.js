@@ -1,0 +1,249 @@
+// Drawing on the picture during set-up: region, gauges and scale, with the mouse or the keyboard.
+import { $, change, el, put } from "./base.js";
+import { ask } from "./press.js";
+import { drawGauges, make, position, zoomable } from "./draw.js";
+import { t } from "./words.js";
+
+const svg = $("drawing");
+let state = {}, tool = "rectangle", points = [], drag = null, pending = null, kinds = {};
+
+const HINTS = {
+  rectangle: "Drag a rectangle over the specimen; with Shift it is added.",
+  polygon: "Click the corners; Enter or a double click closes it, Escape discards it.",
+  brush: "Paint what is measured.",
+  eraser: "Paint what is not measured.",
+  move: "Drag the handles; with the keyboard Tab and the arrows.",
+  scale: "Click two points whose distance is known.",
+  board: "Hold the board where the specimen will be. Of a checkerboard count the inner corners, of a ChArUco board the squares.",
+};
+const isDragged = () => tool === "rectangle" || ["line", "box"].includes(kinds[tool]?.gesture);
+const isClicked = () => kinds[tool]?.gesture === "click";
+zoomable(svg.parentElement);
+
+function choose(name) {
+  tool = name;
+  points = [];
+  drag = null;
+  for (const button of document.querySelectorAll("[data-tool]")) button.setAttribute("aria-pressed", String(button.dataset.tool === name));
+  hint(HINTS[name] ?? kinds[name].hint);
+  svg.style.cursor = name === "move" ? "default" : "crosshair";
+  sketch();
+}
+for (const button of document.querySelectorAll("[data-tool]")) button.addEventListener("click", () => choose(button.dataset.tool));
+
+function hint(words) {
+  $("hint").dataset.t = words;
+  put($("hint"), t(words));
+}
+
+// A button for each kind of gauge; the first ones have the keys 5 to 8.
+export function beginDrawing(stage) {
+  kinds = Object.fromEntries(stage.kinds.map((one) => [one.kind, one]));
+  $("kinds").replaceChildren(...stage.kinds.map((one, i) => {
+    const button = el("button", { type: "button" }, el("span", { t: one.label }));
+    button.dataset.tool = one.kind;
+    if (i < 4) {
+      button.dataset.key = String(i + 5);
+      button.append(el("kbd", { text: button.dataset.key, "aria-hidden": "true" }));
+    }
+    button.addEventListener("click", () => choose(one.kind));
+    return button;
+  }));
+}
+
+// Gauges of the same names are replaced: only when confirmed.
+$("place").addEventListener("click", async () => {
+  const names = Object.keys(state.gauges ?? {});
+  if (names.length && !(await ask("Place the gauges anew?", "Gauges with the names axial, transverse and area are replaced. Undo brings them back.", "Place gauges"))) return;
+  change({ do: "place" });
+});
+
+// -- the mouse ---------------------------------------------------------------------------------
+
+svg.addEventListener("pointerdown", (event) => {
+  if (event.button !== 0 || !state.camera) return;
+  const at = position(svg, event), handle = event.target.dataset?.handle;
+  if (handle && (tool === "move" || tool in kinds)) {
+    const [name, index] = handle.split(" ");
+    drag = { name, index: Number(index) };
+    pending = state.gauges[name];
+  } else if (tool === "polygon" || isClicked() || tool === "scale") {
+    points.push(at);
+    if (isClicked() || (tool === "scale" && points.length === 2)) finish(false);
+  } else if (tool !== "move") {
+    points = [at];
+    drag = { tool };
+  }
+  if (drag) svg.setPointerCapture(event.pointerId);
+  sketch();
+});
+
+svg.addEventListener("pointermove", (event) => {
+  if (!drag) return;
+  const moves = event.getCoalescedEvents?.() ?? [];
+  for (const one of moves.length ? moves : [event]) dragTo(position(svg, one));
+  sketch();
+});
+
+function dragTo(at) {
+  if (drag.name) {
+    pending = { ...pending, handles: pending.handles.map((p, i) => (i === drag.index ? at : p)) };
+  } else if (isDragged()) {
+    points = [points[0], at];
+  } else {
+    points.push(at);
+  }
+}
+
+svg.addEventListener("pointerup", (event) => {
+  if (!drag) return;
+  dragTo(position(svg, event));
+  const was = drag;
+  drag = null;
+  if (was.name) {
+    change({ do: "gauge", name: was.name, points: pending.handles });
+    state.gauges[was.name] = pending;
+    pending = null;
+  } else {
+    finish(event.shiftKey);
+  }
+  sketch();
+});
+svg.addEventListener("dblclick", () => { if (tool === "polygon") { points.pop(); finish(false); } });
+
+function finish(add) {
+  const drawn = points;
+  points = [];
+  if (tool in kinds) newGauge(drawn);
+  else if (tool === "scale") askLength(drawn);
+  else if (tool !== "polygon" || drawn.length > 2) change({ do: "draw", strokes: strokes(drawn, add) });
+  sketch();
+}
+
+// A long path is sent in connected pieces.
+function strokes(drawn, add) {
+  const radius = Number($("radius").value), found = [];
+  for (let i = 0; i < drawn.length; i += 4000) found.push({ tool, points: drawn.slice(Math.max(i - 1, 0), i + 4000), radius, add });
+  return found;
+}
+
+const isShort = (drawn) => drawn.length < 2 || Math.hypot(drawn[1][0] - drawn[0][0], drawn[1][1] - drawn[0][1]) < 3;
+
+function newGauge(drawn) {
+  if (isClicked() || !isShort(drawn)) change({ do: "gauge", kind: tool, points: drawn });
+}
+
+// -- the scale ---------------------------------------------------------------------------------
+
+let scaled = null, asking = false;
+function askLength(drawn) {
+  if (isShort(drawn)) return;
+  scaled = drawn;
+  asking = false;
+  const input = el("input", { type: "number", min: "0", step: "any", required: true, placeholder: "mm", "aria-label": t("Length in mm") });
+  const form = el("form", {}, input, el("button", { t: "Apply" }));
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    await change({ do: "scale", points: scaled, mm: Number(input.value) });
+    scaled = null;
+    sketch();
+    showScale();
+  });
+  $("scale").replaceChildren(form);
+  input.focus();
+}
+
+// A calibration board is found in the picture: only its dimensions are needed.
+const BOARD = { columns: "Columns", rows: "Rows", square: "Square, mm", marker: "Marker, mm (none: checkerboard)" };
+$("board").addEventListener("click", () => {
+  asking = true;
+  scaled = null;
+  hint(HINTS.board);
+  const inputs = Object.entries(BOARD).map(([key, words]) => {
+    const whole = key === "columns" || key === "rows";
+    return labelled(el("input", { name: key, type: "number", min: whole ? "3" : "0", step: whole ? "1" : "any", required: key !== "marker" }), words);
+  });
+  const last = el("input", { name: "dictionary", type: "text", value: "4X4_50", maxLength: 39 });
+  const form = el("form", {}, ...inputs, labelled(last, "Dictionary of the markers"), el("button", { t: "Apply" }));
+  form.addEventListener("submit", async (event) => {
+    event.preventDefault();
+    const request = { do: "board", dictionary: last.value };
+    for (const key of Object.keys(BOARD)) request[key] = form.elements[key].value === "" ? 0 : Number(form.elements[key].value);
+    if (await change(request) !== "ok") return;
+    asking = false;
+    showScale();
+  });
+  $("scale").replaceChildren(form);
+  inputs[0].querySelector("input").focus();
+});
+
+const labelled = (input, words) => el("label", {}, el("span", { t: words }), input);
+
+function showScale() {
+  if (scaled || asking) return;
+  const s = state.scale;
+  put($("scale"), s?.px_per_mm ? `${s.px_per_mm.toFixed(2)} px/mm${s.sigma ? ` ± ${(100 * s.sigma * s.px_per_mm).toFixed(2)} %` : ""}${state.remarks.map((one) => ` · ${t(one)}`).join("")}` : "");
+}
+
+// -- display -----------------------------------------------------------------------------------
+
+function sketch() {
+  for (const old of svg.querySelectorAll(".sketch")) old.remove();
+  const group = make("g", { class: "sketch" }), last = points.at(-1);
+  if (pending) group.append(preview(kinds[pending.kind]?.gesture, pending.handles));
+  if (scaled ?? (tool === "scale" && points.length > 1)) {
+    const [a, b] = scaled ?? points;
+    group.append(make("line", { class: "drawn", x1: a[0], y1: a[1], x2: b[0], y2: b[1] }));
+  } else if (points.length && (tool === "brush" || tool === "eraser")) {
+    group.append(make("polyline", { class: "stroke", points: points.join(" "), "stroke-width": 2 * $("radius").value }));
+  } else if (points.length && (tool === "polygon" || tool === "scale")) {
+    group.append(make("polygon", { class: "drawn", points: points.join(" ") }));
+    for (const p of points) group.append(make("circle", { class: "drawn", cx: p[0], cy: p[1], r: 2 }));
+  } else if (points.length > 1) {
+    group.append(preview(kinds[tool]?.gesture ?? "box", [points[0], last]));
+  }
+  if (group.children.length) svg.append(group);
+}
+
+// The dragged shape, until the server sends its outline.
+function preview(gesture, at) {
+  if (gesture !== "box" || at.length !== 2) return make(at.length > 2 ? "polygon" : "polyline", { class: "drawn", points: at.join(" ") });
+  const [[x0, y0], [x1, y1]] = at;
+  return make("rect", { class: "drawn", x: Math.min(x0, x1), y: Math.min(y0, y1), width: Math.abs(x1 - x0), height: Math.abs(y1 - y0) });
+}
+
+// Handles the keys of the set-up; true where one was used.
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+export function setupKeys(event) {
+  const handle = document.activeElement?.dataset?.handle, arrow = ARROWS[event.key];
+  if (handle && arrow) {
+    const [name, index] = handle.split(" "), step = event.shiftKey ? 10 : 1, gauge = state.gauges[name];
+    const handles = gauge.handles.map((p, i) => (i === Number(index) ? p.map((v, k) => v + step * arrow[k]) : p));
+    state.gauges[name] = { ...gauge, handles };
+    change({ do: "gauge", name, points: handles });
+    showGauges();
+    event.preventDefault();
+    return true;
+  }
+  if (event.key === "Enter" && tool === "polygon" && points.length > 2) { finish(false); return true; }
+  if (event.key === "Escape") { points = []; drag = pending = scaled = null; asking = false; showScale(); sketch(); return true; }
+  return false;
+}
+
+export function showDrawing(value) {
+  const dragged = drag?.name ? state.gauges[drag.name] : null;
+  state = value;
+  if (dragged) state.gauges[drag.name] = dragged;
+  showGauges();
+  showScale();
+}
+
+function showGauges() {
+  if (state.camera && !pending) {
+    const before = svg.dataset.mark;
+    drawGauges(svg, state.gauges, state.camera.width, state.camera.height, true);
+    if (svg.dataset.mark !== before) sketch();
+  }
+}
+
+choose("rectangle");

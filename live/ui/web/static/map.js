@@ -1,0 +1,81 @@
+// The map over the picture of a running test: its colours with a histogram, its range, the value under the pointer.
+import { $, el, fill, post, put } from "./base.js";
+import { drawGauges, make, position, zoomable } from "./draw.js";
+import { fixed, short, strainText, strainUnit } from "./numbers.js";
+import { t } from "./words.js";
+
+const READ_MS = 150;
+let loading = false, shownPicture = 0, picture = null, reading = 0;
+const reset = zoomable($("gaugemap").parentElement);
+$("gaugemap").addEventListener("dblclick", reset);
+
+export function beginMap(stage) {
+  shownPicture = 0;
+  loading = false;
+  reset();
+  if (!$("component").children.length) {
+    for (const name of stage.components) $("component").append(el("option", { value: name, t: name }));
+  }
+  $("ramp").style.background = `linear-gradient(to left, ${stage.ramp.join(", ")})`;
+  load(++shownPicture);
+}
+
+for (const id of ["component", "range", "limit"]) {
+  $(id).addEventListener("change", () => {
+    $("limit").hidden = $("range").value !== "fixed";
+    const limit = Number($("limit").value) / strainUnit().factor;
+    if ($("range").value === "fixed" && !(limit > 0)) { $("limit").focus(); return; }
+    post("/map", { of: $("component").value, range: $("range").value, limit });
+  });
+}
+
+const factor = () => (picture?.strain ? strainUnit().factor : 1);
+
+// The next picture is requested when the last has arrived: a slow page gets fewer pictures, never old ones.
+function load(n) {
+  loading = true;
+  const image = $("map");
+  image.onload = image.onerror = () => { loading = false; };
+  image.src = `/picture?run=${n}`;
+}
+
+export function showMap(value) {
+  if (value.n !== shownPicture && !loading) { shownPicture = value.n; load(value.n); }
+  const mark = picture?.n !== value.n;
+  picture = value;
+  if (mark) showLegend();
+  if (value.width) drawGauges($("gaugemap"), value.gauges, value.width, value.height);
+}
+addEventListener("unit", () => { if (picture) showLegend(); });
+
+function showLegend() {
+  for (const [id, now] of [["component", picture.of], ["range", picture.range]]) if ($(id) !== document.activeElement) $(id).value = now;
+  $("limit").hidden = $("range").value !== "fixed";
+  const scaled = picture.high != null, unit = picture.strain ? strainUnit().name : (picture.unit ?? "");
+  if ($("limit") !== document.activeElement && scaled && picture.range === "fixed" && picture.strain) $("limit").value = short(picture.high * factor()).replace("−", "-");
+  $("ramp").closest(".legend").classList.toggle("status", Boolean(picture.legend));
+  fill($("statuses"), picture.legend ?? [], (one) => {
+    const key = el("i", { class: "key" });
+    key.style.background = one.colour;
+    return el("li", {}, key, `${one.count} ${t(one.text)}`);
+  });
+  const at = (share) => (scaled ? `${short((picture.low + share * (picture.high - picture.low)) * factor())}` : "");
+  put($("low"), at(0));
+  put($("middle"), at(0.5));
+  put($("high"), scaled ? `${at(1)} ${unit}` : "");
+  const bars = picture.histogram ?? [], most = Math.max(...bars, 1);
+  $("histogram").replaceChildren(...bars.map((n, k) => make("rect", { x: k, y: 1 - n / most, width: 1, height: n / most })));
+}
+
+// The value under the pointer.
+$("gaugemap").addEventListener("pointermove", async (event) => {
+  const now = performance.now();
+  if (!picture?.width || now - reading < READ_MS) return;
+  reading = now;
+  const [x, y] = position($("gaugemap"), event);
+  const response = await fetch(`/value?x=${x.toFixed(1)}&y=${y.toFixed(1)}`);
+  if (!response.ok) return;
+  const found = await response.json(), place = `x ${x.toFixed(0)}, y ${y.toFixed(0)} px`;
+  put($("readout"), found.value == null ? `${place}: ${t(found.status)}` : `${place}: ${picture.strain ? strainText(found.value, found.sigma) : `${fixed(found.value, 4)} ${picture.unit ?? ""}`}`);
+});
+$("gaugemap").addEventListener("pointerleave", () => put($("readout"), ""));

@@ -1,0 +1,51 @@
+// Numbers for a person. Each quantity has one unit through a test: the operator chooses that of strains.
+const DASH = "–", UNITS = { "µm/m": { factor: 1e6, digits: 0 }, "%": { factor: 100, digits: 4 } };
+
+export const fixed = (value, digits = 0) => (value == null ? DASH : value.toFixed(digits).replace("-", "−"));
+export const signed = (value, digits = 0) => (value == null ? DASH : (value < 0 ? "−" : "+") + Math.abs(value).toFixed(digits));
+
+export function strainUnit() {
+  const name = localStorage.getItem("strain");
+  return name in UNITS ? { name, ...UNITS[name] } : { name: "µm/m", ...UNITS["µm/m"] };
+}
+
+export function chooseStrainUnit(name) {
+  localStorage.setItem("strain", name);
+  dispatchEvent(new Event("unit"));
+}
+
+// Value and uncertainty as texts: the uncertainty with two digits, the value to the same place.
+export function withSigma(value, sigma, { factor, digits }) {
+  if (value == null) return [DASH, ""];
+  if (!(sigma > 0)) return [signed(value * factor, digits), ""];
+  const two = Number((sigma * factor).toPrecision(2)), place = Math.floor(Math.log10(two)) - 1;
+  const step = 10 ** place, decimals = Math.max(-place, 0);
+  return [signed(Math.round((value * factor) / step) * step, decimals), (Math.round(two / step) * step).toFixed(decimals)];
+}
+
+export function strainText(value, sigma) {
+  const unit = strainUnit(), [text, two] = withSigma(value, sigma, unit);
+  return value == null ? DASH : `${text}${two && ` ± ${two}`} ${unit.name}`;
+}
+
+export function time(seconds) {
+  const whole = Math.floor(Math.max(seconds ?? 0, 0)), two = (n) => String(n).padStart(2, "0");
+  const hours = Math.floor(whole / 3600);
+  return `${hours ? `${hours}:` : ""}${two(Math.floor(whole / 60) % 60)}:${two(whole % 60)}`;
+}
+
+// As short as four digits allow, without an exponent for what a person reads.
+export function short(value) {
+  if (value == null) return DASH;
+  const size = Math.abs(value);
+  if (size !== 0 && (size < 1e-3 || size >= 1e6)) return value.toExponential(1).replace(/-/g, "−");
+  return String(Number(value.toPrecision(4))).replace("-", "−");
+}
+
+export const percent = (value) => (value == null ? DASH : value > 0 && value < 1e-4 ? "<0.01 %" : `${(value * 100).toFixed(2)} %`);
+
+const COLOURS = [
+  "#1f77b4", "#d9541e", "#2a9134", "#c62f6b", "#8757c9", "#8c6239", "#0097a7", "#7a7f00", "#d13ad1", "#5c6bc0", "#00897b", "#b8860b",
+];
+// The colour of a gauge, in the curves, in the lists and on the picture.
+export const colourOf = (k) => COLOURS[k % COLOURS.length];

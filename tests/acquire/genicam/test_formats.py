@@ -1,0 +1,43 @@
+"""Packed samples become the grey levels they are, bit for bit; the packing is that of the test, bit by bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from acquire.errors import DataError
+from acquire.genicam.formats import FORMATS, decode, preferred
+from tests.genicam.packing import PACK, bits_of, picture
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("size", [(64, 48), (3, 5), (5, 1), (1, 1)])
+def test_every_format_bit_for_bit(name: str, size: tuple[int, int]) -> None:
+    width, height = size
+    sent = picture(7, width, height, name)
+    content = PACK[name](sent.reshape(-1))
+    assert len(content) == FORMATS[name].size(width * height)
+    image = decode(content, FORMATS[name], width, height)
+    assert np.array_equal(image, sent)
+    assert image.dtype == (np.uint8 if FORMATS[name].bits == 8 else np.uint16)
+    assert not image.flags.writeable
+
+
+@given(st.sampled_from(sorted(FORMATS)), st.lists(st.integers(0, 2**16 - 1), min_size=1, max_size=40))
+def test_any_grey_levels(name: str, levels: list[int]) -> None:
+    sent = np.array(levels, np.uint16) & np.uint16(2 ** bits_of(name) - 1)
+    assert decode(PACK[name](sent), FORMATS[name], len(sent), 1)[0].tolist() == sent.tolist()
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_too_few_bytes_are_no_picture(name: str) -> None:
+    content = PACK[name](picture(0, 8, 8, name).reshape(-1))
+    with pytest.raises(DataError, match=f"{len(content) - 1} bytes instead of {len(content)}"):
+        decode(content[:-1], FORMATS[name], 8, 8)
+
+
+def test_twelve_bits_are_preferred() -> None:
+    assert preferred(["Mono8", "Mono12Packed", "Mono16"]) == "Mono12Packed"
+    assert preferred(["BayerRG8"]) is None

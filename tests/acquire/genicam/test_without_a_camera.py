@@ -1,0 +1,67 @@
+"""What needs no camera: settings, the library that is missing, and which camera is meant."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from acquire.addresses import parse_address
+from acquire.errors import ConfigError, DeviceError
+from acquire.genicam import library
+from acquire.genicam.finding import name_of
+from acquire.genicam.library import CALLS, load_aravis
+from acquire.genicam.listing import list_cameras
+from acquire.genicam.settings import genicam_settings
+
+
+class ListOfCameras:
+    """A library that only lists."""
+
+    def __init__(self, *serials: str) -> None:
+        self.serials = serials
+
+    def call(self, name: str, *arguments: Any) -> Any:
+        assert name in CALLS
+        if name == "arv_get_n_devices":
+            return len(self.serials)
+        if name == "arv_update_device_list":
+            return None
+        serial = self.serials[arguments[0]]
+        return {"id": f"Maker-{serial}", "model": "Modern", "serial_nbr": serial}.get(
+            name.removeprefix("arv_get_device_"), "x"
+        )
+
+
+def named(target: str, *serials: str) -> str:
+    return name_of(ListOfCameras(*serials), target, "genicam:")  # type: ignore[arg-type]
+
+
+def test_which_camera_is_meant() -> None:
+    assert named("", "1") == "Maker-1"
+    assert named("2", "1", "2") == named("Maker-2", "1", "2") == "Maker-2"
+    assert named("Modern", "1") == "Maker-1"
+    assert named("192.168.0.3") == "192.168.0.3"
+    with pytest.raises(ConfigError, match=r"2 cameras are meant.*genicam:Maker-1 .*genicam:Maker-2"):
+        named("Modern", "1", "2")
+    with pytest.raises(DeviceError, match="Cameras here: none"):
+        named("")
+
+
+def test_settings_and_features() -> None:
+    address = parse_address("genicam:1?format=Mono12p&fps=30&trigger=Line0&stamp=end&BlackLevel=64")
+    settings = genicam_settings(address)
+    assert (settings.format, settings.fps, settings.stamp) == ("Mono12p", 30, "end")
+    assert settings.waits_for_trigger and not settings.fires_triggers
+    assert settings.features == {"BlackLevel": "64"}
+
+
+def test_a_missing_library_is_named_and_lists_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(library, "LIBRARY", "libaravis-not-here.so.0")
+    monkeypatch.setattr(
+        library.ctypes.util, "find_library", lambda name: name if name == "aravis-0.10" else None
+    )
+    load_aravis.cache_clear()
+    with pytest.raises(DeviceError, match=r"aravis-0\.10 is here, .*sudo apt install libaravis-0\.8-0"):
+        load_aravis()
+    assert list_cameras() == []

@@ -1,0 +1,51 @@
+"""What is read from a curve by value: the break, true stress, crossings, running means, noise."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from analysis.evaluate.curve import broken_at, first_crossing, noise, reading, smoothed, true_curve
+
+
+@pytest.mark.parametrize(("least", "broken"), [(0.5, False), (0.03, False), (0.015, True), (0.0, True)])
+def test_broken_below_two_percent_of_the_highest_stress(least: float, broken: bool) -> None:
+    """The fall begins where it is steep: at the last value that still belongs to the curve."""
+    stress = np.concatenate([np.linspace(0, 100, 101), np.linspace(100, 95, 20), np.full(10, 100 * least)])
+    assert broken_at(stress) == (120 if broken else None)
+
+
+def test_true_stress_and_strain_up_to_the_highest_stress() -> None:
+    """Volume is kept: the section shrinks as the length grows."""
+    strain, stress = np.array([0.0, 0.1, 0.2, 0.3]), np.array([0.0, 100.0, 200.0, 150.0])
+    logarithmic, true = true_curve(strain, stress)
+    assert logarithmic[:3] == pytest.approx([0.0, math.log(1.1), math.log(1.2)])
+    assert true[:3] == pytest.approx([0.0, 110.0, 240.0])
+    assert math.isnan(logarithmic[3]) and math.isnan(true[3])
+
+
+def test_the_first_crossing_lies_between_samples() -> None:
+    values = np.array([0.0, 1.0, 3.0, 2.0, 5.0])
+    assert first_crossing(values, 2.0) == 1.5
+    assert first_crossing(values, 4.0, 2) == pytest.approx(3 + 2 / 3)
+    assert math.isnan(first_crossing(values, 6.0)) and math.isnan(first_crossing(values, 0.0))
+
+
+def test_a_running_mean_is_symmetric_to_the_ends() -> None:
+    assert smoothed(np.array([0.0, 3.0, 6.0, 0.0, 9.0]), 2) == pytest.approx([0.0, 3.0, 3.6, 5.0, 9.0])
+
+
+def test_the_noise_on_a_bent_course() -> None:
+    t = np.linspace(0, 1, 4001)
+    values = 5 * t**2 + np.random.default_rng(0).normal(0, 0.01, t.size)
+    assert noise(values) == pytest.approx(0.01, rel=0.05)
+
+
+def test_a_reading_between_samples_of_a_parabola() -> None:
+    k = np.arange(20.0)
+    found = reading(0.5 * k**2 + 2 * k + 1, 7.25, 2, 14, min_sigma=0.1)
+    assert found.value == pytest.approx(0.5 * 7.25**2 + 2 * 7.25 + 1)
+    assert found.slope == pytest.approx(9.25)
+    assert 0 < found.sigma < 0.1

@@ -1,0 +1,61 @@
+"""The noise of means over overlapping ZOIs by value: summed up pixel by pixel."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis import KernelSettings, PhaseKernel, Roi, StrainField, ZoiGrid
+from analysis.field import Window
+from analysis.field.uncertainty import variance_of_sum
+from tests.analysis.speckle import picture
+
+SIZE, STEP = 12, 5
+GRID = ZoiGrid.cover(Roi(0, 0, SIZE + 5 * STEP, SIZE + 2 * STEP), SIZE, STEP)  # 3 rows, 6 columns
+POWERS = {"u": [(0, 0)], "du_dx": [(1, 0)], "eyy": [(0, 1)], "exy": [(0, 1), (1, 0)]}
+"""Powers of x and y that weigh the noise of a pixel, beside the window, in each parameter of a value."""
+
+
+def pixel_by_pixel(window: Window, power: tuple[int, int], sigma: np.ndarray) -> float:
+    """The variance of the sum of estimates that weigh the same white noise with x^p y^q and the window."""
+    x = np.arange(SIZE) - (SIZE - 1) / 2
+    weight = GRID.weights(window) * x ** power[0] * x[:, None] ** power[1]
+    weight /= np.sqrt(np.sum(weight**2))
+    total = np.zeros((GRID.roi.height, GRID.roi.width))
+    for row, top in enumerate(GRID.first_y):
+        for column, left in enumerate(GRID.first_x):
+            total[top : top + SIZE, left : left + SIZE] += sigma[row, column] * weight
+    return float(np.sum(total**2))
+
+
+@pytest.mark.parametrize("window", ["gaussian", "uniform"])
+@pytest.mark.parametrize("name", POWERS)
+def test_the_variance_of_a_sum(name: str, window: Window) -> None:
+    assert GRID.shape == (3, 6)
+    sigma = np.random.default_rng(0).uniform(0.5, 2, GRID.shape)
+    parts = [pixel_by_pixel(window, power, sigma) for power in POWERS[name]]
+    assert variance_of_sum(sigma, name, GRID, window) == pytest.approx(np.mean(parts), rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["u", "exx", "eyy"])
+def test_the_sigma_of_a_mean_of_phases_is_that_of_the_overlap(name: str) -> None:
+    """The phase estimator has no other prediction: sigma of each ZOI, correlated as the windows overlap."""
+    grid = ZoiGrid.cover(Roi(40, 40, 80, 48), size=32, step=8)
+    field = PhaseKernel(picture(), grid, KernelSettings(estimator="phase"), noise=4.0).measure(picture(u=0.3))
+    assert field.ok.all() and grid.shape == (3, 7)
+    expected = np.sqrt(variance_of_sum(field.sigma(name), name, grid, field.window)) / grid.n_active
+    assert field.mean(name)[1] == pytest.approx(expected, rel=1e-9)
+    alone = np.sqrt(np.sum(field.sigma(name) ** 2)) / grid.n_active
+    assert name != "u" or field.mean(name)[1] > 1.5 * alone
+
+
+def test_a_mean_over_some_leaves_the_others_out() -> None:
+    values = np.arange(18.0).reshape(GRID.shape)
+    field = StrainField.from_values(GRID, {"u": values}, 0.1)
+    some = np.zeros(GRID.shape, bool)
+    some[1, 2:5] = True
+    mean, sigma = field.mean("u", some)
+    assert mean == pytest.approx(9.0)
+    assert sigma == pytest.approx(
+        np.sqrt(variance_of_sum(np.where(some, 0.1, 0.0), "u", GRID, field.window)) / 3
+    )

@@ -1,0 +1,67 @@
+"""Frames are those that were sent, bit for bit, with the numbers and times of the camera."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from tests.genicam.fake_camera import FIRST, PIXEL_FORMATS
+from tests.genicam.inside.fakes import FakeCameraProcess, FrameWatch
+from tests.genicam.packing import bits_of, picture
+
+
+@pytest.mark.parametrize("name", PIXEL_FORMATS)
+def test_every_format_arrives_bit_for_bit(name: str) -> None:
+    width, height = 66, 50
+    with FakeCameraProcess():
+        watch = FrameWatch(f"genicam:127.0.0.1?format={name}&fps=50&width={width}&height={height}")
+        frames = watch.first(5)
+    assert watch.camera.info.pixel_format == name
+    for frame in frames:
+        sent = picture(frame.index - FIRST, width, height, name)
+        assert np.array_equal(frame.image, sent)
+        assert (frame.bits, frame.image.dtype.itemsize) == (bits_of(name), 1 if name == "Mono8" else 2)
+
+
+def test_numbers_go_on_where_those_of_the_camera_begin_again() -> None:
+    """GigE counts to 65535 and goes on with 1; the fake begins shortly before."""
+    with FakeCameraProcess():
+        watch = FrameWatch("genicam:127.0.0.1?format=Mono8&fps=400&width=32&height=32&packet_size=1400")
+        watch.take(lambda: watch.frames[-1].index > 65540)
+    assert watch.frames[0].index == FIRST < 65535
+    watch.check_numbers()
+    assert sum(frame.lost_before for frame in watch.frames) < 20
+    for frame in watch.frames[-3:]:
+        assert np.array_equal(frame.image, picture(frame.index - FIRST, 32, 32, "Mono8"))
+
+
+def test_stamps_are_on_our_clock() -> None:
+    with FakeCameraProcess():
+        watch = FrameWatch("genicam:127.0.0.1?format=Mono8&fps=20&width=64&height=48")
+        begun = time.monotonic()
+        frames = watch.first(10)
+        ended = time.monotonic()
+    assert all(begun - 0.1 < frame.t <= ended for frame in frames)
+    assert np.diff([frame.t for frame in frames]) == pytest.approx(0.05, abs=0.03)
+    assert {frame.clock for frame in frames} == {"device"}
+
+
+@pytest.mark.parametrize(("stamp", "shift"), [("start", 2e-3), ("end", -2e-3)])
+def test_time_is_mid_exposure_where_the_meaning_of_the_stamp_is_given(stamp: str, shift: float) -> None:
+    with FakeCameraProcess():
+        watch = FrameWatch(
+            f"genicam:127.0.0.1?format=Mono8&fps=20&width=64&height=48&exposure_us=4000&stamp={stamp}"
+        )
+        frame = watch.first(1)[0]
+    assert frame.t - frame.raw_t == pytest.approx(shift)
+
+
+def test_a_region_of_the_sensor() -> None:
+    with FakeCameraProcess():
+        watch = FrameWatch("genicam:127.0.0.1?format=Mono8&fps=20&width=100&height=80&x=40&y=30")
+        frame = watch.first(1)[0]
+    controls = watch.camera.info.controls
+    assert frame.image.shape == (80, 100)
+    assert [controls[key] for key in ("OffsetX", "OffsetY", "Width", "Height")] == ["40", "30", "100", "80"]

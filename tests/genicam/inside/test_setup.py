@@ -1,0 +1,102 @@
+"""What an address asks is checked, set and read back; what is not possible is refused with what is."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+
+import pytest
+
+from acquire.camera.opening import list_cameras, open_camera
+from acquire.errors import ConfigError, DeviceError
+from tests.genicam.inside.fakes import FakeCameraProcess, FrameWatch
+
+
+@pytest.fixture(scope="module")
+def fake() -> Iterator[FakeCameraProcess]:
+    with FakeCameraProcess("--white", "4080", "--automatic") as started:
+        yield started
+
+
+SMALL = "format=Mono12p&width=64&height=48"
+
+
+def test_it_is_listed_with_what_it_offers(fake: FakeCameraProcess) -> None:
+    (found,) = [one for one in list_cameras() if one.address.startswith("genicam:")]
+    assert found.address == "genicam:Aravis-Fake-GV01?format=Mono12p"
+    assert found.trouble == ""
+    assert "Mono12Packed" in found.text() and "exposure_us=" in found.text()
+    open_camera(found.address).close()
+
+
+@pytest.mark.parametrize("target", ["", "GV01", "Fake", "Aravis-Fake-GV01", "127.0.0.1"])
+def test_a_camera_has_several_names(fake: FakeCameraProcess, target: str) -> None:
+    with contextlib.closing(open_camera(f"genicam:{target}?{SMALL}")) as camera:
+        assert "Aravis Fake (GV01)" in camera.info.name
+
+
+def test_settings_are_in_force_and_can_be_changed(fake: FakeCameraProcess) -> None:
+    address = f"genicam:127.0.0.1?{SMALL}&fps=20&exposure_us=5000&gain=3"
+    with contextlib.closing(open_camera(address)) as camera:
+        info = camera.info
+    assert (info.fps, info.exposure_s, info.bits) == (pytest.approx(20), pytest.approx(5e-3), 12)
+    exposure, gain = info.settings
+    assert (exposure.key, exposure.value, exposure.high) == ("exposure_us", 5000, pytest.approx(50_000))
+    assert (gain.key, gain.value, gain.low, gain.high) == ("gain", 3, 0, 10)
+
+
+def test_automatics_are_off_and_the_white_level_is_the_cameras(fake: FakeCameraProcess) -> None:
+    with contextlib.closing(open_camera(f"genicam:127.0.0.1?{SMALL}")) as camera:
+        info = camera.info
+    assert info.controls["GainAuto"] == "Off"
+    assert (info.white_level, info.saturation) == (4080, 4080)
+    assert not [text for text in info.warnings if "by itself" in text]
+    watch = FrameWatch(f"genicam:127.0.0.1?{SMALL}&fps=20&white=4000&GainAuto=Continuous")
+    assert watch.first(1)[0].saturation == 4000
+    assert any("GainAuto" in text for text in watch.camera.info.warnings)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ("format=Mono9", "the camera offers Mono12p, "),
+        ("width=5000", "allowed: 1 to 2048"),
+        ("exposure_us=1", "from 10 to"),
+        ("gain=11", "from 0 to 10"),
+        ("trigger=Line7", "allowed: no, Line0"),
+        ("trigger=Software", "needs fps="),
+        ("bits=13&format=Mono12p", "bits=13 is not possible with Mono12p"),
+        ("stamp=middle", "one of start, end"),
+        ("Fancy=1", "no feature 'Fancy'"),
+        ("GainAuto=Sometimes", "allowed: Off, Once, Continuous"),
+        ("GainRaw=99", "the camera refuses it"),
+        ("buffers=1", "from 2 to 1000"),
+    ],
+)
+def test_what_is_not_possible_is_refused_with_what_is(
+    fake: FakeCameraProcess, settings: str, words: str
+) -> None:
+    with pytest.raises(ConfigError) as caught:
+        open_camera(f"genicam:127.0.0.1?{settings}")
+    assert words in str(caught.value)
+    open_camera(f"genicam:127.0.0.1?{SMALL}").close()  # nothing was left open
+
+
+def test_a_camera_that_another_program_holds(fake: FakeCameraProcess) -> None:
+    held = contextlib.closing(open_camera(f"genicam:127.0.0.1?{SMALL}"))
+    with held, pytest.raises(DeviceError, match="Close other programs"):
+        open_camera(f"genicam:127.0.0.1?{SMALL}")
+    open_camera(f"genicam:127.0.0.1?{SMALL}").close()
+
+
+def test_a_camera_that_is_not_there(fake: FakeCameraProcess) -> None:
+    with pytest.raises(DeviceError, match=r"Cameras here: genicam:Aravis-Fake-GV01"):
+        open_camera("genicam:Basler-1234")
+
+
+def test_several_cameras_are_told_apart(fake: FakeCameraProcess) -> None:
+    with FakeCameraProcess("--serial", "GV02", "--interface", "127.0.0.2"):
+        with pytest.raises(ConfigError, match="2 cameras are meant"):
+            open_camera("genicam:")
+        with contextlib.closing(open_camera(f"genicam:GV02?{SMALL}")) as camera:
+            assert "GV02" in camera.info.name

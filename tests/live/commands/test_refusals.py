@@ -1,0 +1,329 @@
+"""What the system, the shell or a file refuses: one message that says what to do, an exit code, and no traceback."""
+
+from __future__ import annotations
+
+import errno
+import os
+import signal
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from live import cli
+from live.cli import main
+from live.commands import arguments as arguments_module
+from live.commands.arguments import COMMANDS
+from live.commands.signals import ended_by_sigterm, interrupts
+from live.results.report import saving
+from live.results.report.svg import Plot, PlotLine
+from live.ui.terminal.screen import TerminalScreen
+from tests.adversary.test_terminal import HOSTILE
+from tests.live.made_run import make_run
+
+ROOT = Path(__file__).parents[3]
+
+
+def refused(capsys: pytest.CaptureFixture[str], *words: str) -> tuple[int, str]:
+    """Exit code and message of a command that must not end with a traceback."""
+    capsys.readouterr()
+    try:
+        code = main(list(words))
+    except SystemExit as ended:
+        code = int(ended.code or 0)
+    said = "".join(capsys.readouterr())
+    assert "Traceback" not in said and "please report it" not in said, said
+    return code, said
+
+
+LONG = "x" * 300
+OF_A_FILE = [
+    ("replay", LONG),
+    ("replay", "~nosuchuser/session.h5"),
+    ("replay", "files:~nosuchuser/*.tif"),
+    ("replay", "video:~nosuchuser/film.mp4"),
+    ("batch", "~nosuchuser/session.h5", "--out", "out"),
+    ("batch", LONG, "--out", "out"),
+    ("report", LONG),
+    ("show", LONG),
+    ("export", LONG, "--to", "csv"),
+    ("map", LONG, "map.png"),
+    ("recover", LONG),
+    ("run", "--camera", "sim:", "--config", LONG),
+    ("check", "--camera", "sim:", "--snapshot", f"{LONG}.png"),
+    ("init", f"{LONG}.toml", "--camera", "sim:"),
+    ("scale", "--camera", "sim:", "--config", LONG, "--points", "1,1,9,9", "--length", "1"),
+    ("study", LONG),
+    ("inspect", LONG, "--zoi", "1,1", "--frame", "0"),
+]
+
+
+@pytest.mark.parametrize("words", OF_A_FILE, ids=lambda words: " ".join(words)[:40])
+def test_names_that_cannot_be(
+    capsys: pytest.CaptureFixture[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    words: tuple[str, ...],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    code, said = refused(capsys, *words)
+    assert code in (2, 4), said
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("number", "code", "advice"),
+    [
+        (errno.EACCES, 4, "check the path, the permissions and the room on the disk"),
+        (errno.ENOSPC, 4, "the room on the disk"),
+        (errno.ENAMETOOLONG, 2, "give another name"),
+    ],
+)
+def test_what_the_system_refuses_names_the_file(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, number: int, code: int, advice: str
+) -> None:
+    def command(arguments: object) -> int:
+        raise OSError(number, os.strerror(number), "/there/session.h5")
+
+    monkeypatch.setattr(cli, "parse", lambda words: (command, arguments_module.argparse.Namespace()))
+    found, said = refused(capsys, "devices")
+    assert found == code
+    assert f"phasedic: /there/session.h5: {os.strerror(number)}; " in said and advice in said
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+@pytest.mark.parametrize(
+    "words", [("export", "RUN", "--to", "csv"), ("report", "RUN"), ("map", "RUN", "RUN/a.png")]
+)
+def test_a_folder_of_somebody_else(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, words: tuple[str, ...]
+) -> None:
+    run = make_run(tmp_path / "run")
+    run.chmod(0o500)
+    try:
+        code, said = refused(capsys, *(word.replace("RUN", str(run)) for word in words))
+    finally:
+        run.chmod(0o700)
+    assert code == 4 and "ermission denied" in said
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "--camera", "sim:", "--out", ""),
+        ("run", "--camera", ""),
+        ("replay", ""),
+        ("map", "run", ""),
+        ("batch", "", "--out", "a"),
+        ("check", "--config", ""),
+    ],
+)
+def test_an_empty_word_is_refused(capsys: pytest.CaptureFixture[str], words: tuple[str, ...]) -> None:
+    code, said = refused(capsys, *words)
+    assert code == 2 and "is empty; give a value, or leave it out" in said
+
+
+@pytest.mark.parametrize("command", [("run", "--camera", "sim:?fsp=1"), ("demo",), ("replay", "SHOTS")])
+def test_a_folder_that_is_taken_is_refused_first(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, command: tuple[str, ...]
+) -> None:
+    """Before a camera is opened or anything is compiled."""
+    import cv2
+
+    cv2.imwrite(str(tmp_path / "a.png"), np.zeros((64, 64), np.uint8))
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "strain.h5").touch()
+    (tmp_path / "file").touch()
+    words = [word.replace("SHOTS", f"files:{tmp_path}/a.png") for word in command]
+    for out, why in (("out", "already holds strain.h5"), ("file/below", "cannot be made (Not a directory)")):
+        code, said = refused(capsys, *words, "--out", str(tmp_path / out))
+        assert code == 2 and why in said
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("rnu", "run"), ("reprot", "report"), ("chekc", "check"), ("qqqqqq", "")]
+)
+def test_a_mistyped_command(capsys: pytest.CaptureFixture[str], typed: str, meant: str) -> None:
+    code, said = refused(capsys, typed, "--camera", "sim:")
+    assert code == 2 and f"there is no command '{typed}'" in said
+    assert (f"(did you mean {meant}?)" in said) is bool(meant)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("NUMBA_NUM_THREADS", value) for value in ("0", "-1", "two", "")),
+        *(("SOURCE_DATE_EPOCH", value) for value in ("x", "-1", "1.5", "")),
+    ],
+)
+def test_an_environment_that_ends_numba(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str, value: str
+) -> None:
+    monkeypatch.setenv(name, value)
+    code, said = refused(capsys, "devices")
+    assert code == 2 and f"{name}={value} is not possible" in said
+
+
+@pytest.mark.parametrize("limit", ["0", "nan", "-1", "inf"])
+def test_a_colour_range_that_cannot_be(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, limit: str
+) -> None:
+    run = make_run(tmp_path / "run")
+    code, said = refused(capsys, "export", str(run), "--to", "png", "--limit", limit)
+    assert code == 2 and "--limit" in said and "give a number above 0" in said
+    assert not (run / "export").exists()
+
+
+def test_escapes_in_a_title_are_shown(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    run = make_run(tmp_path / "run")
+    assert refused(capsys, "map", str(run), str(tmp_path / "a.png"), "--title", HOSTILE)[0] == 0
+    assert (tmp_path / "a.png").stat().st_size > 1000
+
+
+def test_a_pipe_in_the_place_of_the_recording_holds_nothing_up(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    run = make_run(tmp_path / "run", session=False)
+    os.mkfifo(run / "session.h5")
+    assert refused(capsys, "report", str(run))[0] == 0
+    assert (run / "report.html").exists()
+
+
+def test_a_folder_whose_name_reads_as_settings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    run = make_run(tmp_path / "a&b?c=d")
+    code, said = refused(capsys, "replay", f"{run}/session.h5", "--from", "99")
+    assert "unknown setting" not in said and "no such session" not in said
+    assert code == 4 and f"{run}/session.h5: of the burst of frames 0 to 7 only 2 of 8 are recorded" in said
+
+
+@pytest.mark.parametrize("part", ["the whole", "one picture", "the events"])
+@pytest.mark.parametrize(
+    "command", [("report", "RUN"), ("export", "RUN", "--to", "png"), ("export", "RUN", "--to", "r3xa")]
+)
+def test_results_do_not_need_the_recording(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, command: tuple[str, ...], part: str
+) -> None:
+    """strain.h5 is whole: a damaged session.h5 costs its pictures and events, and a note says so."""
+    import h5py
+
+    run = make_run(tmp_path / "run")
+    path = run / "session.h5"
+    content = bytearray(path.read_bytes())
+    with h5py.File(path) as file:
+        name, numbers = ("frames/image", (0, 1)) if part == "one picture" else ("events", (0,))
+        chunks = [file[f"entry/{name}"].id.get_chunk_info(number) for number in numbers]
+    places = [slice(chunk.byte_offset, chunk.byte_offset + 11) for chunk in chunks]
+    for at in [slice(0, 48)] if part == "the whole" else places:
+        content[at] = bytes(b ^ 0xFF for b in content[at])
+    path.write_bytes(content)
+    code, said = refused(capsys, *(word.replace("RUN", str(run)) for word in command))
+    assert code == 0, said
+    needed = (
+        command[0] == "report"
+        or part in {"png": ("the whole", "one picture"), "r3xa": ("the whole",)}[command[-1]]
+    )
+    assert ("note: the recording cannot be read, the results can: " in said) is needed, said
+
+
+def test_a_browser_that_fails_costs_the_png_alone(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """It lost a finished study of many minutes."""
+    monkeypatch.setattr(saving, "find_browser", lambda: "/bin/false")
+    x = np.array([0.0, 1.0])
+    saving.save_figures(
+        [Plot("a", "A", "x", "y", (PlotLine("one", x, x),))], tmp_path / "figures", TerminalScreen()
+    )
+    assert {path.name for path in (tmp_path / "figures").iterdir()} == {"a.svg", "a.csv"}
+    assert "warning: the figures are SVG and CSV without PNG: " in capsys.readouterr().out
+
+
+def test_sigterm_ends_a_command_without_a_handler_of_its_own(capsys: pytest.CaptureFixture[str]) -> None:
+    def command(arguments: object) -> int:
+        os.kill(os.getpid(), signal.SIGTERM)
+        threading.Event().wait(60)
+        return 0
+
+    before = signal.getsignal(signal.SIGTERM)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(cli, "parse", lambda words: (command, arguments_module.argparse.Namespace()))
+        assert main(["devices"]) == 130
+    assert capsys.readouterr().err == "phasedic: interrupted\n"
+    assert signal.getsignal(signal.SIGTERM) is before
+
+
+def test_sigterm_is_no_ctrl_c() -> None:
+    """Ctrl-C ends ``check --watch`` with a full check; SIGTERM ends it."""
+    with ended_by_sigterm(), interrupts() as stop:
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGTERM)
+        assert not stop.is_set()
+        signal.raise_signal(signal.SIGINT)
+        assert stop.is_set()
+
+
+@pytest.mark.parametrize("name", ["run", "replay", "check"])
+def test_expert_options_are_in_the_long_help(capsys: pytest.CaptureFixture[str], name: str) -> None:
+    short, long = (refused(capsys, name, word)[1] for word in ("--help", "--help-all"))
+    for option in ("--window", "--bending", "--estimator", "--noise"):
+        assert option in long and option not in short
+    for option in ("--zoi", "--config", "--roi", "--help-all"):
+        assert option in long and option in short
+    assert len(short.splitlines()) < 0.8 * len(long.splitlines())
+
+
+def test_expert_options_are_accepted_all_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = refused(capsys, "run", "--camera", "sim:?fsp=1", "--window", "tukey")
+    assert code == 2 and "unknown setting 'fsp'" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "option"),
+    [
+        ("check", "--report"),
+        ("check", "--out=a"),
+        ("check", "--standard=free"),
+        ("check", "--strain=green"),
+        ("page", "--report"),
+    ],
+)
+def test_options_without_effect_are_not_accepted(
+    capsys: pytest.CaptureFixture[str], name: str, option: str
+) -> None:
+    code, said = refused(capsys, name, "--camera", "sim:?fsp=1", option)
+    assert code == 2 and "unrecognized arguments" in said
+
+
+@pytest.mark.parametrize(
+    ("to", "option"),
+    [("npz", "--layout=wide"), ("csv", "--fps=5"), ("vtk", "--limit=1"), ("mat", "--no-picture")],
+)
+def test_options_of_another_format_are_not_accepted(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, to: str, option: str
+) -> None:
+    code, said = refused(capsys, "export", str(make_run(tmp_path)), "--to", to, option)
+    assert code == 2 and f"{option.partition('=')[0]} has no effect with --to {to}" in said
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_has_a_help(capsys: pytest.CaptureFixture[str], name: str) -> None:
+    assert refused(capsys, name, "--help")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("scheduler", "why"),
+    [
+        ("xx", "give tcp://HOST:PORT"),
+        ("tcp://127.0.0.1", "give tcp://"),
+        ("tcp://127.0.0.1:1", "nothing answers there"),
+    ],
+)
+def test_a_scheduler_that_is_not_there(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, scheduler: str, why: str
+) -> None:
+    (tmp_path / "session.h5").write_bytes(b"x")
+    words = ("batch", str(tmp_path / "session.h5"), "--out", str(tmp_path / "out"), "--scheduler", scheduler)
+    code, said = refused(capsys, *words)
+    assert code == 2 and why in said
+    assert not (tmp_path / "out").exists()

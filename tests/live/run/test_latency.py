@@ -1,0 +1,54 @@
+"""The latency of a result: from the stamp of the last frame of its burst, on the clock of this machine."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from live.pipeline.latency import LatencyMonitor, LatencySample
+from live.run import measuring
+from live.run.measuring import MeasureThread
+from tests.live.made_up import START, make_measurement
+
+
+@pytest.fixture
+def thread(monkeypatch: pytest.MonkeyPatch) -> MeasureThread:
+    """One that is not started; half a second has passed since START."""
+    monkeypatch.setattr(measuring, "time", SimpleNamespace(monotonic=lambda: START + 0.5))
+    nothing: Any = None
+    return MeasureThread(nothing, nothing, nothing, nothing, nothing, nothing)
+
+
+def test_it_counts_from_the_last_frame(thread: MeasureThread) -> None:
+    """The burst's time is that of its middle, and it took 0.07 s."""
+    assert thread._timed(make_measurement(0)).time_step.latency_s == pytest.approx(0.5 - 0.035)
+
+
+def test_nominal_times_have_none(thread: MeasureThread) -> None:
+    made = make_measurement(0)
+    made = replace(made, burst=replace(made.burst, clock="nominal"))
+    assert math.isnan(thread._timed(made).time_step.latency_s)
+
+
+def warnings(
+    latency_s: float, period_s: float = 0.1, backlog: float = 0.0, kernel_s: float = 0.01
+) -> set[str]:
+    """Of 20 s of measurements that come ``latency_s`` late."""
+    monitor = LatencyMonitor(lambda: backlog, lambda: None)
+    said = {monitor.check(LatencySample(k * period_s, latency_s, kernel_s), period_s) for k in range(200)}
+    return said - {""}
+
+
+def test_a_warning_from_two_periods_on() -> None:
+    assert not warnings(0.19)
+    assert len(warnings(0.21)) == 1
+
+
+def test_the_cause_is_named() -> None:
+    assert "the disk is too slow" in warnings(0.5, backlog=0.2).pop()
+    assert "the kernel needs 90 ms" in warnings(0.5, kernel_s=0.09).pop()
+    assert "the processor is short" in warnings(0.5).pop()

@@ -1,0 +1,61 @@
+"""A load cell that is away when the test ends is counted; one that has come to its end is not."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+
+import pytest
+
+from acquire.load_cell.contract import NoLoadCell
+from acquire.load_sample import LoadSample
+from live.pipeline.consumer_thread import Outputs
+from live.pipeline.run_state import RunState
+from live.run.load_thread import LoadThread
+
+
+class SilentCell(NoLoadCell):
+    """Sends ``count`` samples at 10 a second, and then nothing until it is stopped."""
+
+    def __init__(self, now: list[float], count: int, *, ends: bool = False) -> None:
+        self._now, self._count, self._ends = now, count, ends
+        self.silent, self._stopped = threading.Event(), threading.Event()
+
+    def __iter__(self) -> Iterator[LoadSample]:
+        for _ in range(self._count):
+            self._now[0] += 0.1
+            yield LoadSample(self._now[0], 1.0)
+        self.silent.set()
+        if not self._ends:
+            self._stopped.wait(10)
+
+    def stop(self) -> None:
+        self._stopped.set()
+
+
+@pytest.mark.parametrize(
+    ("count", "silent_s", "ends", "missing"),
+    [(21, 4.0, False, 40), (21, 0.9, False, 0), (0, 4.0, False, 1), (21, 4.0, True, 0)],
+)
+def test_samples_that_are_missing_at_the_end(
+    monkeypatch: pytest.MonkeyPatch, count: int, silent_s: float, ends: bool, missing: int
+) -> None:
+    now, run_state = [100.0], RunState.new(0.5)
+    monkeypatch.setattr("live.run.load_thread.time.monotonic", lambda: now[0])
+    cell = SilentCell(now, count, ends=ends)
+    thread = LoadThread(
+        cell, run_state, Outputs([], run_state.loads, run_state.event_log, run_state.history), None
+    )
+    thread.start()
+    assert cell.silent.wait(10)
+    if ends:
+        thread.join()
+    now[0] += silent_s
+    thread.stop()
+    thread.join()
+    counts = run_state.frame_counts
+    assert (counts.load_lost, counts.loss) == (missing, missing > 0)
+    assert ("load samples lost" in counts.line()) is (missing > 0)
+    assert any("the load is missing" in event.text for event in run_state.event_log.events("warning")) is (
+        missing > 0
+    )

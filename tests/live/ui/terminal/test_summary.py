@@ -1,0 +1,82 @@
+"""The summary of a test: at most a dozen lines, each of which a person needs; the rest with --verbose."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from acquire.load_sample import LoadSample
+from live.config.sections import SpecimenConfig
+from live.pipeline.measurement import Measurement
+from live.pipeline.run_state import RunState
+from live.pipeline.screen import Screen
+from live.ui.terminal.summary import brief_lines, say_summary, trouble_lines
+from tests.live.made_run import PULLED, force_of
+from tests.live.made_up import make_measurement
+
+SECTION = SpecimenConfig(width_mm=10.0, thickness_mm=2.0, axis="y")
+
+
+class Said(Screen):
+    """Keeps the lines."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def say(self, text: str = "") -> None:
+        self.lines.append(text)
+
+
+def run_of(strains: Sequence[float], specimen: SpecimenConfig = SECTION, *, loads: bool = True) -> RunState:
+    run_state = RunState.new(0.5, specimen=specimen)
+    for k, strain in enumerate(strains):
+        force = force_of(strain) if loads else math.nan
+        measurement: Measurement = make_measurement(k, strain, force=force)
+        run_state.history.add(measurement.time_step)
+        run_state.frame_counts.add(grabbed=8, measured=8, recorded=8)
+        if loads:
+            run_state.loads.append(LoadSample(measurement.t, force))
+    run_state.loads.close()
+    return run_state
+
+
+def test_what_a_test_gave_in_a_dozen_lines(tmp_path: Path) -> None:
+    run_state, screen = run_of(PULLED), Said()
+    (tmp_path / "strain.h5").write_bytes(bytes(2_000_000))
+    say_summary(screen, run_state, SECTION, tmp_path, [*trouble_lines(run_state, ())])
+    text = "\n".join(screen.lines)
+    assert len(screen.lines) <= 12
+    assert re.search(r"^E = (70\.0|69\.9|70)\d* ± [\d.]+ GPa  nu = 0\.[23]", text, re.MULTILINE), text
+    assert "Rp0.2 = " in text and "Rm = " in text
+    assert "strain along y at the end: +8,000 ± " in text and "µm/m" in text
+    assert "noise: " in text and "adds up" in text
+    assert f"files: {tmp_path} (strain.h5; 2 MB); next: phasedic report {tmp_path}" in text
+    assert "--lag" not in text and "um/m" not in text
+
+
+def test_verbose_has_all(tmp_path: Path) -> None:
+    run_state, screen = run_of(PULLED), Said()
+    say_summary(screen, run_state, SECTION, tmp_path, [], verbose=True)
+    text = "\n".join(screen.lines)
+    assert "last mean strain: exx" in text and "lag of the load behind the frames" in text
+
+
+@pytest.mark.parametrize(
+    ("strains", "loads", "why"),
+    [
+        (PULLED, False, "E is not known: no force is known (--load)"),
+        ((0.0, 1e-5, 2e-5), True, "E is not known: strain and a tensile stress are known together at"),
+    ],
+)
+def test_why_there_is_no_modulus(strains: Sequence[float], loads: bool, why: str) -> None:
+    assert any(line.startswith(why) for line in brief_lines(run_of(strains, loads=loads), SECTION))
+
+
+def test_nothing_measured_is_the_only_line() -> None:
+    assert brief_lines(RunState.new(0.5), SECTION) == [
+        "nothing was measured: 0 frames gave no burst after the reference; take shorter bursts"
+    ]
