@@ -4,6 +4,7 @@
 ``uncertainty`` has sigmas of values and means, ``motion`` predicts the next field.
 """
 
+from analysis.field.blur import Blur, blur_maps, mean_blur
 from analysis.field.grid import WINDOWS, Roi, Window, ZoiGrid, profile
 from analysis.field.motion import Motion
 from analysis.field.status import Status
@@ -26,6 +27,7 @@ __all__ = [
     "PAIR_INDEX",
     "VALUES",
     "WINDOWS",
+    "Blur",
     "Measure",
     "Motion",
     "Roi",
@@ -35,8 +37,10 @@ __all__ = [
     "WeightedSum",
     "Window",
     "ZoiGrid",
+    "blur_maps",
     "combination",
     "fixed_sums",
+    "mean_blur",
     "products",
     "profile",
     "strain_tensor",

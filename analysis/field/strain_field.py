@@ -109,6 +109,9 @@ class StrainField:
         Makes the uncertainty of means right where neighbours nearly cancel (gradients on dense grids).
     picture : PictureError, optional
         What the picture leaves beyond its noise; it is part of the uncertainties.
+    blur : (2, R, C) float32, px^2, optional
+        Growth of the variance of the blur since the last reference, mean of x and y, negative where the picture
+        is sharper; and its standard uncertainty.
     """
 
     grid: ZoiGrid
@@ -125,10 +128,11 @@ class StrainField:
     measure: Measure = "small"
     sums: Sums | None = None
     picture: PictureError | None = None
+    blur: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         for name in ("parameters", "covariance", "covariance_reference", "residual", "status",
-                     "iterations", "gain"):  # fmt: skip
+                     "iterations", "gain", "blur"):  # fmt: skip
             array = getattr(self, name)
             if array is not None:
                 array.flags.writeable = False

@@ -19,11 +19,12 @@ from numpy.typing import NDArray
 from analysis.compiled.loops import helper
 from analysis.field import WeightedSum, Window, ZoiGrid, combination, profile, variance_of_sum
 from analysis.fit.sensitivity import columns, parameter_scale
+from analysis.fit.shapes import CHANNELS
 
 Floats = NDArray[np.float64]
 
-CHANNELS, MONOMIALS = 4, ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-"""f_x, f_y, f and 1, each times 1, x, y, x^2, xy, y^2."""
+MONOMIALS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+"""1, x, y, x^2, xy, y^2, with which a channel is multiplied."""
 MAX_CACHED = 64
 """Gauges whose factors are remembered."""
 
@@ -43,8 +44,8 @@ class MeanNoise:
         Flat places of the active ZOIs on the grid.
     origins : (A, 2) int64
         First row and column of each.
-    images : (>= 3, H, W) float32
-        f_x, f_y and f of the filtered reference.
+    images : (4, H, W) float32
+        See ``PreparedReference.images``.
     inverse : (>= A, P, P) float32
         (J' w J)^-1 of each ZOI.
     unit_covariance : (21, R, C) float32
@@ -120,9 +121,9 @@ class MeanNoise:
         return float(np.cumsum(np.cumsum(out**2, axis=1)[:, -1])[-1])
 
     def _weights(self, shares: Floats, which: NDArray[np.intp]) -> Floats:
-        """The rows of the inverse that make these sums, by channel and monomial, (B, 4, 6)."""
-        half = self.inverse.shape[1] // 2 - 3
+        """The rows of the inverse that make these sums, by channel and monomial, (B, 7, 6)."""
         units = parameter_scale(self.order, self.grid.size)
+        half = len(units) // 2
         at = np.array([0, 1, 2, half, half + 1, half + 2])
         row = np.einsum("bk,bkp->bp", shares * units[at], self.inverse[which][:, at])
         out = np.zeros((len(which), CHANNELS, len(MONOMIALS)))
@@ -136,6 +137,13 @@ def unit_variance(name: str, covariance: NDArray[np.float32]) -> Floats:
     from analysis.field import products
 
     return np.asarray(sum(share * covariance[pair].astype(np.float64) for pair, share in products(name)))
+
+
+@helper
+def blurred(f: Any, i: int, pitch: int, along_x: Any, along_y: Any, across: Any) -> Any:
+    """The second differences of an image at one pixel (``images.second_differences``), each with its factor."""
+    out = along_x * (f[i - 1] + f[i + 1] - 2 * f[i]) + along_y * (f[i - pitch] + f[i + pitch] - 2 * f[i])
+    return out + across * (f[i + pitch + 1] + f[i - pitch - 1] - f[i + pitch - 1] - f[i - pitch + 1]) / 4
 
 
 @helper
@@ -159,7 +167,8 @@ def scatter(
             d0 = a[3, 0] + eta * a[3, 2]
             for x in range(size):
                 xi = along[x]
-                value = images[at + x] * (x0 + xi * (x1 + xi * a[0, 3]))
+                value = blurred(images, 2 * samples + at + x, pitch, a[4, 0], a[5, 0], a[6, 0])
+                value += images[at + x] * (x0 + xi * (x1 + xi * a[0, 3]))
                 value += images[samples + at + x] * (y0 + xi * (y1 + xi * a[1, 3]))
                 value += images[2 * samples + at + x] * (f0 + xi * a[2, 1])
                 to[x] += line[y] * line[x] * (value + d0 + xi * a[3, 1])

@@ -1,8 +1,8 @@
 """What made the error of a picture, from what is left of some ZOIs: noise, compression, bands, blur, filters.
 
 Measured on twenty ways to spoil a real picture (``tests/accuracy/degraded.py``): blocks 1.9 to 2.9 where a codec was,
-else 0.98 to 1.06; lines 18 to 19 for bands, else up to 3.1; likeness to the Laplacian 0.44 for a blur of 1 px, else up
-to 0.17; correlation of neighbours up to 0.05 for noise, else 0.15 and more.
+else 0.98 to 1.06; lines 18 to 19 for bands, else up to 3.1; correlation of neighbours up to 0.05 for noise, else 0.15
+and more. The blur is that of the fit, px^2.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from analysis.picture.blocks import BLOCKS, blockiness
 
 SAMPLE = 30
 """ZOIs that are looked at."""
-LINES, LAPLACIAN, NEIGHBOURS = 8.0, 0.3, 0.12
+LINES, BLUR, NEIGHBOURS = 8.0, 0.25, 0.12
 Pixels = NDArray[np.float64]
 
 
@@ -25,22 +25,14 @@ def error_cause(solution: Solution, ok: NDArray[np.bool_]) -> Cause:
     if blockiness(solution.image) > BLOCKS:
         return "compression"
     which = np.flatnonzero(ok)
-    left, level = _left(solution, which[:: max(1, len(which) // SAMPLE)])
+    left = _left(solution, which[:: max(1, len(which) // SAMPLE)])
     variance = float(np.mean(left**2))
     if max(_line_share(left, 1), _line_share(left, 2)) > LINES * variance:
         return "bands"
-    laplacian = sum(np.diff(np.diff(level, axis=k), axis=k)[_crop(k)] for k in (1, 2))
-    inner = left[:, 1:-1, 1:-1]
-    likeness = np.mean(inner * laplacian) / np.sqrt(np.mean(inner**2) * np.mean(laplacian**2) + 1e-12)
-    if abs(likeness) > LAPLACIAN:
+    if abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR:
         return "blur"
     beside = (np.mean(left[:, 1:] * left[:, :-1]) + np.mean(left[:, :, 1:] * left[:, :, :-1])) / 2
     return "noise" if abs(beside) < NEIGHBOURS * variance else "filter"
-
-
-def _crop(axis: int) -> tuple[slice, ...]:
-    """Of (N, n, n) less two along ``axis``: less two along the other."""
-    return (slice(None), slice(None), slice(1, -1)) if axis == 1 else (slice(None), slice(1, -1), slice(None))
 
 
 def _line_share(left: Pixels, axis: int) -> float:
@@ -48,8 +40,8 @@ def _line_share(left: Pixels, axis: int) -> float:
     return float(np.mean(left.mean(axis=axis) ** 2)) * int(left.shape[axis])
 
 
-def _left(solution: Solution, which: NDArray[np.intp]) -> tuple[Pixels, Pixels]:
-    """What is left of some ZOIs without their rims, and their filtered reference, (N, n, n) each."""
+def _left(solution: Solution, which: NDArray[np.intp]) -> Pixels:
+    """What is left of some ZOIs without their rims, (N, n, n)."""
     from analysis.fit.iteration import warp_zois
 
     ready, size = solution.reference.prepared, solution.reference.grid.size
@@ -59,6 +51,6 @@ def _left(solution: Solution, which: NDArray[np.intp]) -> tuple[Pixels, Pixels]:
     places = [np.s_[top : top + size, left : left + size] for top, left in ready.origins[which]]
     raw, level = (np.stack([ready.images[k][place] for place in places]).astype(np.float64) for k in (3, 2))
     gain = solution.found.nuisance[which, 0][:, None, None]
-    left = (warped - raw - (gain - 1) * level)[:, size // 8 : -(size // 8), size // 8 : -(size // 8)]
-    level = level[:, size // 8 : -(size // 8), size // 8 : -(size // 8)]
-    return left - left.mean(axis=(1, 2), keepdims=True), level
+    inner = slice(size // 8, -(size // 8))
+    left = (warped - raw - (gain - 1) * level)[:, inner, inner]
+    return left - left.mean(axis=(1, 2), keepdims=True)

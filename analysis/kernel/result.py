@@ -69,6 +69,9 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         whole,
     )
     parts = _covariances(solution, ok, noise, first, whole)
+    variance = np.where(ok, reference.prepared.blur * whole, np.float32(np.nan))
+    sigma_blur = np.sqrt(np.maximum(variance, 0))  # rounding may leave a little less than nothing
+    blur = np.stack([np.where(ok, found.nuisance[:, 2], np.nan), sigma_blur]).astype(np.float32)
     values = reference.total(found.p)
     if not ok.all():
         values = np.where(ok[:, None], values, np.nan)
@@ -88,6 +91,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         motion=None if expected is None else _motion(solution, values, expected),
         sums=reference.sums,
         picture=_picture_error(solution, ok, noise),
+        blur=reference.spread(blur.T),
     )
 
 

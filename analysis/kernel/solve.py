@@ -69,6 +69,8 @@ class Solution:
         self._take(self._cleaned(image) if reference.cleaned else image)
         self.table = tap_table(reference.settings.interpolant)
         self.tolerance = reference.tolerance(self._current_std())
+        self._noise, current = self.variances(np.s_[:], np.ones(len(guess)))
+        self._noise_left = np.maximum(prepared.freedom * (self._noise + current), 1e-9)
         able = prepared.status == Status.OK
         known = np.isfinite(guess.sum()) or np.isfinite(guess @ np.ones(guess.shape[1]))  # as a rule all
         which = np.flatnonzero(able & known)
@@ -175,7 +177,8 @@ class Solution:
             ready.images.ravel(), ready.images[0].size, ready.images.shape[2],
             ready.origins[which], grid.size, self.reference.spacing, order, ready.shapes.rows, ready.shapes.mix,
             ready.inverse[padded], ready.cross[padded],
-            ready.weight * ready.energy[which], parameter_scale(order, grid.size),
+            ready.weight * ready.energy[which], parameter_scale(order, grid.size), ready.bias[which],
+            self._noise[which], self._noise_left[which],
         )  # fmt: skip
 
     def _by_phases(self, sensors: Sensors, which: Places, guess: Floats) -> OutArgs:

@@ -148,9 +148,11 @@ def _iteration() -> None:
     from analysis.fit.kernel_args import FitArgs, OutArgs, StopArgs
 
     none, no_images = np.empty(0), np.empty((0, 6, 6), np.float32)
+    no_bias = np.empty((0, 6), np.float32)
     fit = FitArgs(
         np.empty(0, np.float32), 0, 0, np.empty((0, 2), np.int64), 32, 16, 1,
         np.empty((4, 32), np.float32), np.empty((4, 4)), no_images, no_images, np.empty((0, 2)), np.empty(6),
+        no_bias, none, none,
     )  # fmt: skip
     track(
         _no_picture(),

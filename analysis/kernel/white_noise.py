@@ -16,8 +16,6 @@ Floats = NDArray[np.float64]
 
 SAMPLE = 50
 """ZOIs whose answer to white noise is computed."""
-ONES = 3
-"""The channel that is 1 everywhere (``sensitivity.columns``)."""
 
 
 def white_cubic(ready: PreparedReference, size: int, order: int, unit: Floats) -> Floats:
@@ -44,9 +42,7 @@ def _of_zoi(ready: PreparedReference, z: int, size: int, order: int) -> Floats:
     """The same of one ZOI, px^2 per GL^2."""
     from analysis.fit.sensitivity import columns
 
-    top, left = ready.origins[z]
-    zoi = ready.images[:, top : top + size, left : left + size].astype(np.float64)
-    zoi[ONES] = 1
+    zoi = _channels(ready, ready.origins[z], size)
     line, xi = ready.shapes.rows[0, :size], (np.arange(size) - (size - 1) / 2) / (size / 2)
     window = np.outer(line, line).ravel()
     modes = np.stack([(zoi[k] * np.outer(xi**py, xi**px)).ravel() for k, px, py in columns(order)]) * window
@@ -59,6 +55,18 @@ def _of_zoi(ready: PreparedReference, z: int, size: int, order: int) -> Floats:
         weights = (shapes * window - taken) / (ready.weight * ready.energy[z, k])
         out[k] = _median_of_squares(np.linalg.eigvalsh(weights @ weights.T))
     return out
+
+
+def _channels(ready: PreparedReference, origin: NDArray[np.int64], size: int) -> Floats:
+    """f_x, f_y, f, 1, f_xx, f_yy and f_xy of one ZOI (``sensitivity.columns``), (7, n, n)."""
+    rows, columns = (
+        np.clip(at + np.arange(-1, size + 1), 0, end - 1) for at, end in zip(origin, ready.shape, strict=True)
+    )
+    fx, fy, f = ready.images[:3, rows[:, None], columns].astype(np.float64)
+    inner = f[1:-1, 1:-1]
+    along_x, along_y = np.diff(f, n=2, axis=1)[1:-1], np.diff(f, n=2, axis=0)[:, 1:-1]
+    across = (f[2:, 2:] + f[:-2, :-2] - f[2:, :-2] - f[:-2, 2:]) / 4
+    return np.stack([fx[1:-1, 1:-1], fy[1:-1, 1:-1], inner, np.ones_like(inner), along_x, along_y, across])
 
 
 def _median_of_squares(variances: Floats) -> float:

@@ -18,8 +18,9 @@ from acquire.burst import LIMIT_PX
 from acquire.events import Event, EventKind, EventSink, Level, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
+from analysis.field import Blur
 from analysis.field.picture_error import LIMIT, PictureError
-from live.pipeline.measurement import Measurement
+from live.pipeline.measurement import Measurement, TimeStep
 from live.pipeline.reference import Correction, averaged, unchanged
 
 if TYPE_CHECKING:
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 MAX_ROTATION, MAX_STRAIN = math.radians(0.5), 0.02
 """Limits of small strains, rad and 1: the error is then 40 um/m by the rotation and 200 um/m by the strain."""
+MAX_BLUR_PX, CERTAIN, CALM = 0.5, 3.0, 0.8
+"""A blur beyond this gives an event, by so many of its sigmas; below this share of it the picture is well again."""
 
 
 class Tracker:
@@ -226,6 +229,35 @@ class NewReference:
     burst: Burst
 
 
+class BlurGuard:
+    """Checks the sharpness of each measurement; an event when the limit is passed, either way, and when it ends.
+
+    Parameters
+    ----------
+    on_event : callable taking an Event
+    limit_px : float, px
+    """
+
+    def __init__(self, on_event: EventSink, limit_px: float = MAX_BLUR_PX) -> None:
+        self._on_event, self._limit = on_event, limit_px
+        self._changed = False
+
+    def check(self, step: TimeStep) -> None:
+        """Check one time step; one whose blur is not known changes nothing."""
+        blur, size = Blur(step.blur, step.sigma_blur), abs(step.blur)
+        if not self._changed and size - CERTAIN * blur.sigma > self._limit:
+            self._changed = True
+            text = f"the picture is {blur.text} since the reference: look at focus, distance and exposure"
+            self._emit(step, text, "warning")
+        elif self._changed and size < CALM * self._limit:
+            self._changed = False
+            self._emit(step, "the picture is as sharp as the reference again", "info")
+
+    def _emit(self, step: TimeStep, text: str, level: Level) -> None:
+        data = {"blur_px": step.blur, "sigma_blur_px": step.sigma_blur}
+        self._on_event(Event(step.t, EventKind.MEASUREMENT, "sharpness", text, level, data))
+
+
 Timer = Callable[[], float]
 
 
@@ -263,7 +295,7 @@ def measure(
     strain : "small", "engineering", "green" or "hencky"
         The measure of strain of the fields and means.
     on_event : callable taking an Event
-        Called when the reference is renewed.
+        Called when the reference is renewed, and where a guard warns.
     timer : callable
         Gives seconds; only for ``Measurement.measure_s``.
 
@@ -274,6 +306,7 @@ def measure(
     """
     tracker = Tracker(kernel, noise_GL, renew_at, on_event)
     guards = StrainGuard(strain, on_event), PictureGuard(on_event)
+    sharpness = BlurGuard(on_event)
     number = 0
     for item in bursts:
         if isinstance(item, NewReference):
@@ -284,5 +317,7 @@ def measure(
         took = timer() - began
         for guard in guards:
             guard.check(field, item.t)
-        yield Measurement.of(number, item, field, loads.force_at(item.t), took, gauges)
+        measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges)
+        sharpness.check(measurement.time_step)
+        yield measurement
         number += 1

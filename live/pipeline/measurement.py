@@ -15,7 +15,7 @@ import numpy as np
 
 from acquire.frame import Burst
 from analysis.evaluate import AreaStrain, Gauge, GaugeValue, extension_of
-from analysis.field import StrainField
+from analysis.field import StrainField, mean_blur
 
 AXIAL, TRANSVERSE = "axial", "transverse"
 """Gauges of these names are the strain along and across the load."""
@@ -63,6 +63,8 @@ class TimeStep:
         Variation of the strain over the region (``analysis.evaluate.Unevenness``).
     misfit : float
         That variation over what noise makes of it.
+    blur, sigma_blur : float, px
+        Of the picture since its reference (``analysis.field.Blur``); negative: sharper.
     """
 
     t: float
@@ -93,6 +95,8 @@ class TimeStep:
     uneven_exx: float = math.nan
     uneven_eyy: float = math.nan
     misfit: float = math.nan
+    blur: float = math.nan
+    sigma_blur: float = math.nan
 
     def axial(self, axis: str) -> tuple[float, float]:
         """Strain along the load, which runs along ``axis`` ("x" or "y"), and its standard uncertainty."""
@@ -136,6 +140,7 @@ def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: floa
     """The strains of ``field``, measured from ``burst``."""
     valid = field.ok
     values = np.concatenate([field.exx[valid], field.eyy[valid]])
+    blur = mean_blur(field)
     return TimeStep(
         t=burst.t,
         force=force,
@@ -149,6 +154,8 @@ def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: floa
         refused=", ".join(f"{n} {status.name}" for status, n in field.refused.items()),
         noise_GL=burst.noise,
         measure_s=measure_s,
+        blur=blur.px,
+        sigma_blur=blur.sigma,
     )
 
 

@@ -35,7 +35,7 @@ _BURST = np.dtype(
     [("n", "i8"), ("noise", "f8"), ("bits", "i8"), ("t", "f8"), ("duration", "f8"), ("first_index", "i8"),
      ("last_index", "i8"), ("lost", "i8"), ("clock", "U8"), ("motion_px", "f8"), ("field_noise", "f8")]
 )  # fmt: skip
-_ARRAYS = ("parameters", "covariance", "residual", "gain", "status", "iterations")
+_ARRAYS = ("parameters", "covariance", "residual", "gain", "blur", "status", "iterations")
 _NO_PICTURE = frozen(np.zeros((0, 0), np.float32))
 _NOT_CLIPPED = frozen(np.zeros((0, 0), np.bool_))
 

@@ -23,6 +23,7 @@ from analysis.evaluate import (
     find_lag,
     free,
 )
+from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
 
@@ -156,6 +157,15 @@ def tare_line(history: History, loads: LoadLog) -> list[str]:
     return [
         f"tared in mid-test by {tared:+.4g} N: these figures use the zero before; strain.csv has the tare as zero_N"
     ]
+
+
+def sharpness_line(blur: Sequence[float], sigma: Sequence[float]) -> list[str]:
+    """How the sharpness of the picture changed, from its blur and sigma over time, px; nothing where not known."""
+    known = [one for one in map(Blur, blur, sigma) if one.text]
+    if not known:
+        return []
+    largest = max(known, key=lambda one: abs(one.px))
+    return [f"sharpness since the reference: {largest.text} at most, {known[-1].text} in the last picture"]
 
 
 def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:

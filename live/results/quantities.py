@@ -63,6 +63,7 @@ _FIELDS = (
     Quantity("eyy", UNITLESS, "normal strain along y"),
     Quantity("exy", UNITLESS, "shear strain, tensor component: half of the engineering shear gamma_xy"),
     Quantity("residual", UNITLESS, "variance left by the fit over that expected from the noise; about 1"),
+    Quantity("blur", "px", "standard deviation of the blur since the reference; negative: sharper"),
     Quantity("status", UNITLESS, "0 where the ZOI has a value, else the reason why it has none"),
     Quantity("iterations", UNITLESS, "iterations of the fit"),
 )
@@ -110,6 +111,7 @@ MEANS = {
     "time_s": "time", "force_N": "force", "stress_Pa": "stress", "true_stress_Pa": "true_stress",
     "force_raw_N": "force_raw", "zero_N": "zero", "noise_GL": "noise",
     "duration_s": "duration", "kernel_s": "kernel", "latency_s": "latency", "u_px": "u", "v_px": "v",
+    "blur_px": "blur", "sigma_blur_px": "sigma_blur",
 }  # fmt: skip
 """Column of ``Strain.values`` with the unit in its name -> quantity; other columns have the name of their quantity."""
 
@@ -137,7 +139,7 @@ def mean_name(name: str) -> str:
     if plain.removeprefix("sigma_").startswith(_GAUGE):
         return plain
     of = plain.removeprefix("sigma_")
-    averaged = (quantity_of(of).is_strain and of not in _EXTENSIONS) or plain in ("u", "v")
+    averaged = (quantity_of(of).is_strain and of not in _EXTENSIONS) or of in ("u", "v", "blur")
     return f"mean_{plain}" if averaged else plain
 
 

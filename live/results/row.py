@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from numpy.typing import NDArray
 
 from analysis.evaluate import AreaStrain
+from analysis.field import blur_maps
 from live.pipeline.measurement import AXIAL, extension_along, strains_along
 
 if TYPE_CHECKING:
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 StrainMeasure = Literal["small", "engineering", "green", "hencky"]
 STRAINS = ("exx", "eyy", "exy")
 EXTENSIONS = ("extension_x", "extension_y", "sigma_extension_x", "sigma_extension_y")
+BLUR = ("blur", "sigma_blur")
 UNEVEN = ("uneven_exx", "uneven_eyy", "misfit")
 GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
 
@@ -75,7 +77,7 @@ class StrainRow:
     ----------
     maps : mapping of name to (R, C) array
         u, v (px), gradients and strains (dimensionless), sigma_* of each, residual, status,
-        iterations.
+        iterations; blur and its sigma (px).
     values : mapping of name to number
         One a row, in the order of the columns of ``strain.csv``.
     """
@@ -102,6 +104,7 @@ def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any
     maps |= {name: getattr(strain, name) for name in STRAINS}
     maps |= {f"sigma_{name}": getattr(field, f"sigma_{name}") for name in (*plain, *STRAINS)}
     maps |= {name: getattr(field, name) for name in ("residual", "status", "iterations")}
+    maps |= dict(zip(BLUR, blur_maps(field), strict=True))
     return maps
 
 
@@ -130,6 +133,8 @@ def _values(
         "latency_s": time_step.latency_s,
         "kernel_s": time_step.measure_s or math.nan,
         "zero_N": time_step.zero,
+        "blur_px": time_step.blur,
+        "sigma_blur_px": time_step.sigma_blur,
     }
     for name, gauge in time_step.gauges.items():
         values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma), strict=True))

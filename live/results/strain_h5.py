@@ -40,7 +40,9 @@ _WORDS = {
     "residual": "residual chi^2 (about 1 when all is well)",
     "status": "status of the ZOI (0 = ok)",
     "iterations": "iterations",
+    "blur": "blur since the reference, negative: sharper",
 }
+_MAPS = (*layout.MAPS, *layout.ADDED_MAPS)
 
 
 class StrainWriter:
@@ -76,7 +78,7 @@ class StrainWriter:
         self._timer = FlushTimer(flush_s, now)
         self._file = self._guard(lambda: _create(path, grid, info))
         entry = self._file["entry"]
-        self._maps = {n: PictureStack(entry["strain"][n]) for n in layout.MAPS}
+        self._maps = {n: PictureStack(entry["strain"][n]) for n in _MAPS}
         self._values = RowTable(entry["mean"], _value_names(info))
 
     def write(self, row: StrainRow) -> None:
@@ -233,9 +235,9 @@ def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
         title=f"Strain maps, {info.strain_measure} strain",
         default_slice=_slice_of(0),
     )
-    for name in layout.MAPS:
+    for name in _MAPS:
         _add_map(strain, name, grid.shape)
-    for name in layout.PLAIN_MAPS:
+    for name in (*layout.PLAIN_MAPS, "blur"):
         strain[f"{name}{layout.ERRORS}"] = strain[f"sigma_{name}"]
     for name, values in (("x", grid.x), ("y", grid.y)):
         strain[name] = np.asarray(values, np.float64)
@@ -254,7 +256,7 @@ def _add_map(strain: Any, name: str, shape: tuple[int, int]) -> None:
         fletcher32=True,
     )  # fmt: skip
     plain = name.removeprefix("sigma_")
-    unit = "px" if plain in ("u", "v") else ""
+    unit = quantity_of(plain).unit
     words = _WORDS[plain] if plain == name else f"standard uncertainty of {_WORDS[plain]}"
     dataset.attrs.update(units=unit, long_name=f"{words} ({unit})" if unit else words, interpretation="image")
     if name == "status":

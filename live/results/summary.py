@@ -9,11 +9,20 @@ import numpy as np
 
 from acquire.load_cell import LoadLog
 from acquire.printable import brief
+from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import Snapshot
-from live.results.figures import alignment_line, elastic_lines, evaluate, figure_lines, lag_line, tare_line
+from live.results.figures import (
+    alignment_line,
+    elastic_lines,
+    evaluate,
+    figure_lines,
+    lag_line,
+    sharpness_line,
+    tare_line,
+)
 
 _CARD_EVERY_S = 1.0  # of the test
 
@@ -67,6 +76,7 @@ def summary_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
         f" largest of any ZOI {largest * 1e6:+.0f} um/m",
         noise_line(history),
     ]
+    lines += sharpness_line(history.column("blur").tolist(), history.column("sigma_blur").tolist())
     lines += latency_lines(history)
     figures = figure_lines(evaluate(history, run_state.loads, specimen), specimen)
     if figures:
@@ -107,6 +117,8 @@ class StatusCard:
             f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
             f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, mean **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
         ]
+        blur = Blur(i.blur, i.sigma_blur).text
+        lines += [f"{blur} since the reference".replace("+-", "±")] * bool(blur)
         figures = evaluate(history, self._loads, self._specimen)
         lines += [
             line.replace("  ", ", ").replace("+-", "±") for line in elastic_lines(figures, self._specimen)

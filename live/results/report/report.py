@@ -10,7 +10,7 @@ import numpy as np
 from acquire.errors import DataError
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
-from live.results.figures import axis_text, figure_lines, headline
+from live.results.figures import axis_text, figure_lines, headline, sharpness_line
 from live.results.noise_floor import StillPhase, still_phase_of
 from live.results.report import curves
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
@@ -128,6 +128,7 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
         section("Lag and latency", times(run)),
         section("Maps", *(maps(run, name, chosen, pictures, side) for name in fields)),
         section("Noise floor", *_noise_section(content)),
+        *_sharpness_section(run),
         section("Status of the ZOIs", statuses(run, max(chosen), pictures, min(side, 480))),
         section("Frame counts and events", frame_counts(run), events(run), *_unreadable(run)),
         section("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
@@ -226,6 +227,15 @@ def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
     """The figures as text, how they were found, and why others are not known."""
     lines = figure_lines(curve.figures, run.specimen) if curve.has_load else []
     return [paragraph(line.strip().replace("+-", "±").replace("  ", ", ")) for line in lines]
+
+
+def _sharpness_section(run: RunFolder) -> list[Html]:
+    """Nothing for results of earlier versions, which do not have the blur."""
+    values = run.strain.values
+    if "blur_px" not in values:
+        return []
+    lines = sharpness_line(values["blur_px"].tolist(), values["sigma_blur_px"].tolist())
+    return [section("Sharpness", *(paragraph(line.replace("+-", "±")) for line in lines))] * bool(lines)
 
 
 def _noise_section(content: _Content) -> list[Html]:

@@ -92,10 +92,10 @@ def light(sample: CheckSample) -> Steadiness:
 
 def _fields(sample: CheckSample, grid: ZoiGrid) -> list[StrainField]:
     """The strain field of every frame, on the necessary part of the picture."""
-    check_region, middle = sample.check_region, _middle(grid)
-    cut = around(_covered(middle, check_region.at_zois.shape))
+    check_region, chosen = sample.check_region, middle(grid)
+    cut = around(covered(chosen, check_region.at_zois.shape))
     correct = correction(check_region.config, check_region.camera, cut)
-    stack, grid = sample.stack.cut(*cut), moved(middle, cut)
+    stack, grid = sample.stack.cut(*cut), moved(chosen, cut)
     try:
         kernel, _ = prepare(correct(stack.mean(0, FIRST_FRAMES)), grid, sample.settings, sample.noise)
     except DataError:
@@ -107,7 +107,7 @@ def _fields(sample: CheckSample, grid: ZoiGrid) -> list[StrainField]:
     return fields[1:]
 
 
-def _middle(grid: ZoiGrid) -> ZoiGrid:
+def middle(grid: ZoiGrid) -> ZoiGrid:
     """A grid of the ZOIs nearest to the middle, side by side rather than overlapping."""
     spread = math.ceil(math.sqrt(grid.n_active / MAX_ZOIS))
     thin = grid.subset(every=max(1, min(spread, math.ceil(grid.size / grid.step))))
@@ -124,7 +124,7 @@ def _middle(grid: ZoiGrid) -> ZoiGrid:
     return replace(grid, roi=Roi(x, y, width, height), active=part)
 
 
-def _covered(grid: ZoiGrid, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def covered(grid: ZoiGrid, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """(H, W) bool: the pixels of the active ZOIs."""
     found = np.zeros(shape, bool)
     for row, column in np.argwhere(grid.active):

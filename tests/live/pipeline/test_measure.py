@@ -9,6 +9,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from acquire.burst.accumulate import burst_of
 from acquire.events import Event, EventKind
@@ -20,7 +21,7 @@ from analysis.evaluate import GaugeValue
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.pipeline.history import AxisFinder, History
-from live.pipeline.measure import NewReference, SmearGuard, measure
+from live.pipeline.measure import BlurGuard, NewReference, SmearGuard, measure
 from live.pipeline.measurement import HOLD_S, ForceMatching, TimeStep, ordered_mean
 from live.pipeline.reference import averaged, frame_noise, motion_between, prepare
 from tests.live.fakes import frame
@@ -147,6 +148,31 @@ def test_smear_is_told_when_it_begins_and_ends() -> None:
     assert [event.level for event in told] == ["warning", "info", "warning"]
     assert "0.20 px during a burst of 2" in told[0].text
     assert told[0].data == {"motion_px": 0.2, "n": 2}
+
+
+def test_a_change_of_sharpness_is_told_once_and_when_it_ends() -> None:
+    told: list[Event] = []
+    guard, step = BlurGuard(told.append), make_measurement(0).time_step
+    # Not known, small, not certain, certain, still, nearly well, well, sharper.
+    changes = [(math.nan, math.nan), (0.4, 0.01), (0.55, 0.05), (0.62, 0.02), (0.9, 0.02), (0.45, 0.02), (0.1, 0.02),
+               (-0.7, 0.02)]  # fmt: skip
+    for blur, sigma in changes:
+        guard.check(replace(step, blur=blur, sigma_blur=sigma))
+    assert [event.level for event in told] == ["warning", "info", "warning"]
+    assert "less sharp by 0.62 +- 0.02 px" in told[0].text and "sharper by 0.70 +- 0.02 px" in told[2].text
+    assert told[0].data == {"blur_px": 0.62, "sigma_blur_px": 0.02}
+
+
+def test_a_blurred_picture_is_told_with_its_width_and_changes_no_strain(speckle: Speckle) -> None:
+    still = picture(speckle)
+    bursts = [burst(gaussian_filter(still, blur), k) for k, blur in enumerate((0.0, 0.0, 0.8))]
+    kernel, noise = prepare(bursts[0], GRID, KernelSettings(), 1.0)
+    told: list[Event] = []
+    found = list(measure(bursts[1:], kernel, LoadLog(), noise_GL=noise, on_event=told.append))
+    assert abs(found[0].time_step.blur) < 0.02
+    assert found[1].time_step.blur == pytest.approx(0.8, abs=0.1)
+    assert abs(found[1].time_step.exx) < 30e-6
+    assert [event.source for event in told] == ["sharpness"] and told[0].t == 2.0
 
 
 @pytest.mark.parametrize("size", [1, 7, 945, 15_129])

@@ -20,6 +20,7 @@ import pytest
 
 from acquire.errors import DataError
 from acquire.hdf5 import damage as child
+from live.pipeline.measurement import Measurement
 from live.results import Results, ResultsInfo, Strain
 from live.results.row import StrainRow
 from live.results.strain_csv import COLUMNS
@@ -67,6 +68,42 @@ def test_what_was_written_comes_back(tmp_path: Path) -> None:
         np.testing.assert_array_equal(strain.maps("status", 4), field.status)
         assert strain.maps("exx").shape == (5, *strain.grid.shape)
         assert len(strain.maps("exx", slice(1, 3))) == 2
+
+
+def blurred(number: int) -> Measurement:
+    """With a blur of 0.5 px that is known to 0.1 px^2 in each ZOI."""
+    m = make_measurement(number)
+    blur = np.stack([np.where(m.field.ok, value, np.nan) for value in (0.25, 0.1)]).astype(np.float32)
+    return dataclasses.replace(
+        m,
+        field=dataclasses.replace(m.field, blur=blur),
+        time_step=dataclasses.replace(m.time_step, blur=0.5, sigma_blur=0.02),
+    )
+
+
+def test_the_blur_comes_back_and_files_without_it_open(tmp_path: Path) -> None:
+    with open_results(tmp_path) as results:
+        results.add(blurred(0))
+    path = tmp_path / "strain.h5"
+    with Strain.open(path) as strain:
+        ok = strain.maps("status", 0) == 0
+        assert (
+            strain.maps("blur", 0)[ok] == pytest.approx(0.5) and np.isnan(strain.maps("blur", 0)[~ok]).all()
+        )
+        assert strain.maps("sigma_blur", 0)[ok] == pytest.approx((math.sqrt(0.35) - math.sqrt(0.15)) / 2)
+        assert (strain.values["blur_px"][0], strain.values["sigma_blur_px"][0]) == (0.5, 0.02)
+    with h5py.File(path, "r+") as file:
+        for name in (
+            "strain/blur",
+            "strain/sigma_blur",
+            "strain/blur_errors",
+            "mean/blur_px",
+            "mean/sigma_blur_px",
+        ):
+            del file["entry"][name]
+    with Strain.open(path) as strain:
+        assert "blur" not in strain.names and "blur_px" not in strain.values
+        assert np.isfinite(strain.maps("eyy", 0)[ok]).all()
 
 
 def test_the_table_has_the_columns_scripts_rely_on(tmp_path: Path) -> None:

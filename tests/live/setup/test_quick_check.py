@@ -18,7 +18,7 @@ from scipy.ndimage import gaussian_filter
 
 from live.cli import main
 from live.commands import check_watch as check_watch
-from live.commands.check_watch import RenewedLines, card, peak_line
+from live.commands.check_watch import RenewedLines, blur_line, card, peak_line
 from live.config.loading import load_config
 from live.setup.check.check_list import examine
 from live.setup.check.quick_check import RENEW_EVERY, SEARCH_EVERY, QuickCheck, QuickChecker
@@ -50,6 +50,10 @@ def test_the_peak_is_held() -> None:
     assert f"{values[3] / values[2]:.0%} of the peak" in peak_line(found[3])
     assert peak_line(found[3]).count("#") == round(30 * values[3] / values[2])
     assert found[0].figures.floors == ()
+    # Of each against the sharpest before: the third is sharper than the second, the last softer than the third.
+    assert abs(found[0].blur.px) < 0.01 and found[1].blur.px < 0 and found[2].blur.px < 0
+    assert found[3].blur.px == pytest.approx(1.5, rel=0.35)
+    assert "less sharp by" in blur_line(found[3])[0] and blur_line(found[3])[0] in card(found[3], [])
 
 
 class FakeView:
