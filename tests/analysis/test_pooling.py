@@ -137,7 +137,7 @@ def test_noise_is_not_below_the_rounding_of_the_picture() -> None:
     assert rounding_variance(step + np.float32(0.5)) == 0
     image = picture(0, 1)
     field = PhaseKernel(image, GRID).measure(image)
-    assert (field.u == 0).all()
+    assert np.abs(field.u).max() < 1e-5
     shared = PhaseKernel(image, GRID, noise=12**-0.5).measure(image, noise=12**-0.5)
     assert field.sigma_u == pytest.approx(shared.sigma_u, rel=0.2)
 
