@@ -61,6 +61,7 @@ def judge(
         chance = NOISE_FACTOR + CHANCE * spread
         if not rule.noise_known:
             chance = max(chance, UNKNOWN_NOISE_FACTOR if common.scatter == 0 else POOLED_NOISE_FACTOR)
+            chance *= min(common.ratio[z], 1.0)
         pattern = known.signal[z] * min(gain, 1.0) ** 2
         error, allowed = common.forgiven[z] * expected[z], chance * expected[z]
         if common.forgiven[z] > 1:
@@ -79,7 +80,8 @@ def judge(
         else:
             by_noise = NOISE_FACTOR * max(expected[z], error) if rule.noise_known else allowed
             misfit = _used(left[z], by_noise, allowed + MODEL_SHARE * pattern - by_noise)
-            bent = _bent(found, z, known, colour * max(expected[z], left[z]), rule)
+            many = colour if common.forgiven[z] > 1 else 1.0
+            bent = _bent(found, z, known, many * max(expected[z], left[z]), rule)
             doubt = (misfit + bent) * _beyond(known, z, rule.far)
             out[z] = OK if doubt <= 1 else POOR_MATCH if misfit > bent else UNEVEN
 
@@ -98,7 +100,7 @@ def _is_empty(left: Any, expected: Any) -> Any:
 @helper
 def _slow(found: Any, z: int, known: Any, variance: Any) -> Any:
     """Whether a weak pattern was followed in so many small steps that it may have been led away."""
-    return found.iterations[z] >= MANY_STEPS and _sigma(known, z, variance) > SLOW_SIGMA
+    return found.iterations[z] >= MANY_STEPS and known.centre[z] * math.sqrt(variance) > SLOW_SIGMA
 
 
 @helper

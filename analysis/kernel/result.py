@@ -99,6 +99,8 @@ def _picture_error(solution: Solution, ok: NDArray[np.bool_], noise: _Noise) -> 
     if np.isnan(noise.over):
         return None
     error = PictureError(noise.over, (float(noise.colour[0]), float(noise.colour[1])))
+    if solution.had_lines:
+        return replace(error, cause="bands")
     return replace(error, cause=error_cause(solution, ok)) if error.factor > LIMIT else error
 
 

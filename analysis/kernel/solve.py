@@ -32,6 +32,8 @@ Floats = NDArray[np.float64]
 DISTURBED_RATIO, DISTURBED_SHARE = 2.0, 0.02
 """Of what is left over what the noise explains, and of the ZOIs that are refused: from here on wild pixels of the
 image are looked for."""
+LINE_ROUNDS = 3
+"""How often bands and lines are taken off; each time more ZOIs show them."""
 
 
 class Solution:
@@ -55,6 +57,8 @@ class Solution:
         Where the iteration may stop.
     common : PooledError or None
         What the fits leave in common; None: of too few ZOIs to be taken.
+    had_lines : bool
+        Whether bands or lines were taken off the image.
     """
 
     def __init__(
@@ -66,7 +70,8 @@ class Solution:
         self.guess = guess
         self.rounding = reference.rounding + rounding_variance(image)
         self.common: PooledError | None = None
-        self._take(self._cleaned(image) if reference.cleaned else image)
+        self.had_lines = False
+        self._take(_cleaned(image) if reference.cleaned else image)
         self.table = tap_table(reference.settings.interpolant)
         self.tolerance = reference.tolerance(self._current_std())
         self._noise, current = self.variances(np.s_[:], np.ones(len(guess)))
@@ -75,11 +80,7 @@ class Solution:
         known = np.isfinite(guess.sum()) or np.isfinite(guess @ np.ones(guess.shape[1]))  # as a rule all
         which = np.flatnonzero(able & known)
         self._solve(which, able & ~known)
-        if not reference.cleaned and self._is_disturbed(which):
-            cleaned = self._cleaned(image)
-            if cleaned is not image:
-                self._take(cleaned)
-                self._solve(which, able & ~known)
+        self._mend(which, able & ~known)
 
     def _take(self, image: NDArray[Any]) -> None:
         """Measure in ``image``."""
@@ -87,11 +88,23 @@ class Solution:
         self.common = None
         self.picture = self._picture(self.reference.reached(self.guess))
 
-    def _cleaned(self, image: NDArray[Any]) -> NDArray[Any]:
+    def _mend(self, which: NDArray[np.intp], unknown: NDArray[np.bool_]) -> None:
+        """Measure once more without wild pixels, and without lines, where the image has some."""
+        from analysis.kernel.lines import without_lines
         from analysis.picture.impulses import without_impulses
 
-        cleaned = without_impulses(image)
-        return image if cleaned is None else cleaned
+        if not self.reference.cleaned and self._is_disturbed(which):
+            mended = without_impulses(self.image)
+            if mended is not None:
+                self._take(mended)
+                self._solve(which, unknown)
+        for _ in range(LINE_ROUNDS):
+            mended = without_lines(self, self.status == Status.OK) if self._is_disturbed(which) else None
+            if mended is None:
+                return
+            self.had_lines = True
+            self._take(mended)
+            self._solve(which, unknown)
 
     def _is_disturbed(self, which: NDArray[np.intp]) -> bool:
         """Whether the image leaves much more than its noise, or many ZOIs are refused: it may have wild pixels."""
@@ -254,6 +267,13 @@ class Solution:
         if own is None:
             return reference, reference
         return reference, own.variance(level if own.slope == 0 else level * np.maximum(gain, 0))
+
+
+def _cleaned(image: NDArray[Any]) -> NDArray[Any]:
+    from analysis.picture.impulses import without_impulses
+
+    cleaned = without_impulses(image)
+    return image if cleaned is None else cleaned
 
 
 RETRY_ROUNDS = 40
