@@ -18,6 +18,7 @@ from analysis.picture.blocks import BLOCKS, blockiness
 SAMPLE = 30
 """ZOIs that are looked at."""
 BLUR, NEIGHBOURS = 0.25, 0.12
+"""Growth of the variance of the blur, px^2; correlation of neighbouring pixels."""
 
 
 def error_cause(solution: Solution, ok: NDArray[np.bool_]) -> Cause:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis.field import Motion, Status, StrainField, stretched
 from analysis.field.picture_error import LIMIT, PictureError
 from analysis.follow.renewal import UNSHARED, Placement
-from analysis.kernel.error_cause import error_cause
+from analysis.kernel.error_cause import BLUR, error_cause
 from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]
@@ -117,10 +117,13 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     reference, current = solution.variances(np.s_[:], gain)
     common = solution.pooled(which := np.flatnonzero(ok), solution.found.at(which))
     if common is not None:
+        blurred = abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR
+        # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
+        colour = np.maximum(common.colour, 1) if blurred else common.colour
         whole = common.ratio * solution.expected(np.s_[:], gain)
         return _Noise(
             *_parted(whole, reference * gain**2, gain, solution),
-            common.colour,
+            colour,
             float(np.sqrt(np.median(common.ratio[ok]))),
         )
     if solution.noise is not None or not ok.any():

@@ -34,6 +34,12 @@ BAND = 0.4
 """Cycles per pixel beyond which nothing of the real picture is kept: it could not be moved."""
 SIZE, STEP, RIM = 32, 16, 12
 WRONG_PX = 0.5
+MIN_KEPT, MAX_WRONG, WITHIN = 0.97, 1e-3, (0.60, 0.75)
+OTHER_WITHIN = {"gamma 0.7 later": (0.60, 0.88)}
+"""What a change of gamma leaves goes with the pattern and moves u less than noise does: u has too large a sigma."""
+QUICK = ("noise 1 GL", "JPEG 50", "banding 10 GL that moves", "salt and pepper 1 %", "wire that stands still")
+RATIOS = [pair for a in (0, 1) for b in (2, 3, 5) for pair in ((a, b), (b, a))]
+MIN_KEPT_NOISE, RATIO_WITHIN = 0.99, 0.05
 
 
 def _moved(picture: Array, shift: float, strain: float) -> Array:
@@ -197,15 +203,38 @@ def measured(folder: Path, name: str, noise: float | None = None) -> Outcome:
     return outcome(field, first.shape, under_wire(grid) if name.startswith("wire") else None)
 
 
-def ratio_of_noise(folder: Path, first: float, second: float, stated: float | None) -> tuple[float, float]:
-    """Share kept, and predicted over observed scatter of u, v and gradients, for noises of two levels, GL."""
+def cases(folder: Path, quick: bool) -> Iterator[tuple[str, tuple[Outcome, bool]]]:
+    """What was found of each case, and whether it keeps to the limits."""
+    for name in QUICK if quick else CASES:
+        found = measured(folder, name)
+        low, high = OTHER_WITHIN.get(name, WITHIN)
+        good = (
+            found.kept >= MIN_KEPT and low <= found.within <= high and found.wrong <= MAX_WRONG * found.zois
+        )
+        yield name, (found, good)
+
+
+def ratio_cases(folder: Path, quick: bool) -> Iterator[tuple[tuple[str, ...], float, float, bool]]:
+    """Noise of the reference, of the picture and as stated, GL; kept, predicted over observed, within the limits."""
+    for first, second in RATIOS[:2] if quick else RATIOS:
+        for stated in (None, float(max(first, 0.3)), float(max(second, 0.3))):
+            kept, ratio, error = ratio_of_noise(folder, first, second, stated)
+            good = kept >= MIN_KEPT_NOISE and abs(ratio - 1) <= RATIO_WITHIN + 2 * error
+            yield (f"{first}", f"{second}", "none" if stated is None else f"{stated:g}"), kept, ratio, good
+
+
+def ratio_of_noise(
+    folder: Path, first: float, second: float, stated: float | None
+) -> tuple[float, float, float]:
+    """Share kept, predicted over observed scatter of u, v and gradients, for noises of two levels, GL; its error."""
     rng = np.random.default_rng(3)
     images = [stored(_noisy(p, rng, s)) for p, s in zip(pair(folder), (first, second), strict=True)]
     grid = grid_of(images[0].shape)
     field = PhaseKernel(images[0], grid, noise=stated).measure(images[1], noise=stated)
     off, ok = errors(field, images[0].shape), field.ok
     ratios = [np.sqrt(np.mean(field.sigma(n)[ok] ** 2) / np.mean(off[n][ok] ** 2)) for n in off]
-    return float(ok.mean()), float(np.mean(ratios))
+    # Six values that ZOIs half a width apart show independently, as their windows hardly overlap.
+    return float(ok.mean()), float(np.mean(ratios)), float(1 / np.sqrt(2 * len(ratios) * ok.sum()))
 
 
 FILM_SHAPE, FILM_PICTURES, FILM_STRAIN = (480, 640), 60, 7.8e-3
