@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from analysis.field import Motion, Status, StrainField, stretched
 from analysis.field.picture_error import LIMIT, PictureError
 from analysis.follow.renewal import UNSHARED, Placement
+from analysis.kernel.coloured import coloured_bias
 from analysis.kernel.error_cause import BLUR, error_cause
 from analysis.kernel.solve import Solution
 
@@ -39,6 +40,11 @@ class _Noise(NamedTuple):
     current: Floats
     colour: Floats
     over: float
+
+    def share(self, gain: Floats, ok: NDArray[np.bool_]) -> float:
+        """What of the variance is the reference's, median of some ZOIs."""
+        first = self.reference * gain**2
+        return float(np.median((first / (first + self.current))[ok])) if ok.any() else 0.0
 
 
 def field_of(solution: Solution, expected: PredictedMotion | None = None) -> StrainField:
@@ -69,10 +75,13 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         whole,
     )
     parts = _covariances(solution, ok, noise, first, whole)
+    error = _picture_error(solution, ok, noise)
+    moved, sharper = coloured_bias(solution, ok, error, noise.share(gain, ok))
+    p = found.p + moved
     variance = np.where(ok, reference.prepared.blur * whole, np.float32(np.nan))
     sigma_blur = np.sqrt(np.maximum(variance, 0))  # rounding may leave a little less than nothing
-    blur = np.stack([np.where(ok, found.nuisance[:, 2], np.nan), sigma_blur]).astype(np.float32)
-    values = reference.total(found.p)
+    blur = np.stack([np.where(ok, found.nuisance[:, 2] + sharper, np.nan), sigma_blur]).astype(np.float32)
+    values = reference.total(p)
     if not ok.all():
         values = np.where(ok[:, None], values, np.nan)
     gradients = reference.spread(values[:, reference.affine])
@@ -90,7 +99,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         window=reference.settings.window,
         motion=None if expected is None else _motion(solution, values, expected),
         sums=reference.sums,
-        picture=_picture_error(solution, ok, noise),
+        picture=error,
         blur=reference.spread(blur.T),
     )
 

@@ -231,6 +231,11 @@ class Solution:
         return pooled(found, left, expected, self._known(), which, self._is_given)
 
     @property
+    def noise_taken(self) -> Floats:
+        """Variance a pixel of the reference, (A,), whose bias the fits have taken off (``noise_bias``), GL^2."""
+        return np.asarray(self._noise * np.minimum(np.maximum(self.found.left, 0) / self._noise_left, 1))
+
+    @property
     def _is_given(self) -> bool:
         """Whether the noise of both images was given."""
         return self.noise is not None and self.reference.noise_model is not None
