@@ -1,11 +1,11 @@
-# make demo | test | lint | docs | bench | accuracy | mutants | newest | lowest | v4l2-test | genicam-test | bare-test ;
-# each sets up its own .venv first.
+# make demo | test | lint | docs | bench | accuracy | mutants | newest | lowest | v4l2-test | genicam-test | pylon-test |
+# bare-test ; each sets up its own .venv first.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test lint format docs bench accuracy mutants newest lowest constraints v4l2-test genicam-test bare-test clean
+.PHONY: demo test lint format docs bench accuracy mutants newest lowest constraints v4l2-test genicam-test pylon-test bare-test clean
 .DEFAULT_GOAL := demo
 
 $(VENV)/base: pyproject.toml constraints.txt
@@ -79,6 +79,13 @@ v4l2-test: $(VENV)/test
 
 genicam-test: $(VENV)/test
 	@$(BIN)/python -m tests.genicam.namespace --tests
+
+# pypylon goes into a folder of its own, so that other tests run without it.
+$(VENV)/pylon: $(VENV)/test
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check --upgrade --target $@ 'pypylon>=26.9'
+
+pylon-test: $(VENV)/pylon
+	@PYTHONPATH=$(CURDIR)/$(VENV)/pylon PYLON_CAMEMU=2 $(BIN)/python -m tests.genicam.namespace --tests tests/pylon
 
 # In a bare Debian made on the spot: make bare-test SUITE=trixie ONLY=demo
 SUITE ?= forky

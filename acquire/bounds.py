@@ -26,6 +26,14 @@ def as_integer(value: object, low: float = -math.inf, high: float = math.inf) ->
     return value
 
 
+def same_value(got: str, asked: str) -> bool:
+    """Whether a device has in force what was asked of it: numbers to 1e-4 of their value, words in any case."""
+    try:
+        return abs(float(got) - float(asked)) <= 1e-4 * abs(float(asked))
+    except ValueError:
+        return got.lower() == asked.lower()
+
+
 def _between(low: float, high: float) -> str:
     start = "" if low == -math.inf else f" from {_shown(low)}"
     return start if high == math.inf else f"{start} to {_shown(high)}"

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Generic, TypeVar
 
 Opened = TypeVar("Opened")
+RETRY_S, LOOK_S = 0.5, 0.1
 
 
 class Opening(Generic[Opened]):
@@ -59,3 +60,42 @@ class Opening(Generic[Opened]):
     def _close_opened(self) -> None:
         while self._opened:
             self._close(self._opened.pop())
+
+
+def open_again(
+    attempt: Callable[[], Opened],
+    close: Callable[[Opened], object],
+    stopped: threading.Event,
+    errors: tuple[type[Exception], ...],
+    failed: Callable[[Exception], object] = lambda error: None,
+) -> Opened | None:
+    """Try in a thread until it works; None once ``stopped`` is set, however long the attempt still blocks.
+
+    Parameters
+    ----------
+    attempt : callable
+        Opens and returns the device.
+    close : callable
+        Closes what was opened too late.
+    stopped : threading.Event
+    errors : tuple of exceptions
+        After which it is tried again; any other ends it, and is raised here.
+    failed : callable taking an exception, optional
+        Called after each such error.
+    """
+
+    def until_it_works() -> Opened | None:
+        while not stopped.is_set():
+            try:
+                return attempt()
+            except errors as error:
+                failed(error)
+            stopped.wait(RETRY_S)
+        return None
+
+    opening = Opening(until_it_works, lambda opened: opened is not None and close(opened))
+    while not stopped.is_set():
+        if opening.done(LOOK_S):
+            return opening.take()
+    opening.abandon()
+    return None

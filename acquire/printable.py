@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 # Control characters of both kinds (but for line feed and tab), halves of surrogate pairs, marks that turn the
@@ -28,6 +29,11 @@ def brief(text: object) -> str:
     return _ADDRESS.sub(r"\1", str(text))
 
 
+def counted(n: int, noun: str) -> str:
+    """As "1 frame" or "3 frames"."""
+    return f"{n} {noun}{'' if n == 1 else 's'}"
+
+
 def duration(seconds: float) -> str:
     """As 1:23 or 1:02:03."""
     minutes, rest = divmod(max(0, round(seconds)), 60)
@@ -40,3 +46,8 @@ def _escaped(found: re.Match[str]) -> str:
     if 0xDC80 <= code <= 0xDCFF:  # a byte that Python could not decode
         code -= 0xDC00
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+
+
+def share_text(share: float) -> str:
+    """What marks a value whose area lost a block: "of 83 % of the area"; empty where it stands for all of it."""
+    return "" if share == 1 else f"of {math.floor(100 * share)} % of the area"

@@ -14,6 +14,7 @@ from acquire.camera.opening import (
 from acquire.camera.timing import (
     FrameCounter,
     StallWatch,
+    exposure_and_gain,
     longest_pause_s,
     mid_exposure,
     missing_at_end,
@@ -30,6 +31,7 @@ __all__ = [
     "FrameCounter",
     "RepeatGuard",
     "StallWatch",
+    "exposure_and_gain",
     "list_cameras",
     "longest_pause_s",
     "mid_exposure",

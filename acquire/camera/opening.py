@@ -33,13 +33,18 @@ CAMERAS: Registry[Camera] = Registry(
     {
         "": "acquire.v4l2.camera:open_v4l2",
         "genicam": "acquire.genicam.camera:open_genicam",
+        "pylon": "acquire.pylon.camera:PylonCamera",
         "opencv": "acquire.opencv.webcam:open_opencv",
         "video": "acquire.opencv.video:open_video",
         "files": "acquire.opencv.images:open_files",
         "session": "acquire.session.devices:open_session_camera",
     },
     lists_group="phasedic.camera_lists",
-    lists={"": "acquire.v4l2.listing:list_cameras", "genicam": "acquire.genicam.listing:list_cameras"},
+    lists={
+        "": "acquire.v4l2.listing:list_cameras",
+        "genicam": "acquire.genicam.listing:list_cameras",
+        "pylon": "acquire.pylon.camera:list_cameras",
+    },
 )
 
 

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal
 
-from acquire.frame import CameraInfo
+from acquire.frame import CameraInfo, CameraSetting
 
 StampOf = Literal["start", "end", ""]
 STAMPS: tuple[StampOf, ...] = ("start", "end", "")
+Bounded = tuple[float, float, float]
 DEAD = 4.0  # so many times the longest pause, and the device counts as dead
 
 
@@ -52,6 +53,27 @@ def missing_at_end(info: CameraInfo, silent_s: float) -> int:
     if pause is None:
         pause = longest_pause_s(info.fps, info.exposure_s)
     return missing_between(0.0, silent_s, info.fps) if info.live and silent_s > pause else 0
+
+
+def exposure_and_gain(
+    exposure_us: Bounded | None, gain: Bounded | None, fps: float | None
+) -> tuple[CameraSetting, ...]:
+    """What of a camera can be changed while the picture is live: the exposure, within one picture, and the gain.
+
+    Parameters
+    ----------
+    exposure_us, gain : (value, lowest, highest) or None
+        None: the camera has none.
+    fps : float or None, 1/s
+    """
+    settings = []
+    if exposure_us is not None and exposure_us[0] > 0:
+        value, low, high = exposure_us
+        high = max(value, min(high, 1e6 / fps if fps else high))
+        settings.append(CameraSetting("exposure_us", value, min(max(low, 1.0), value), high, log=True))
+    if gain is not None:
+        settings.append(CameraSetting("gain", gain[0], min(gain[1], gain[0]), max(gain[2], gain[0])))
+    return tuple(settings)
 
 
 class FrameCounter:

@@ -34,12 +34,11 @@ from acquire.genicam.library import Aravis, GenicamError, load_aravis
 from acquire.genicam.settings import GenicamSettings, genicam_settings
 from acquire.genicam.setup import GenicamSetup, set_up
 from acquire.genicam.trigger import SoftwareTrigger
-from acquire.opening_thread import Opening
+from acquire.opening_thread import open_again
 
 log = logging.getLogger(__name__)
 
 SLICE_S = 0.1  # longest wait between two looks at whether to stop
-RETRY_S = 0.5
 CLOSE_S = 0.8  # of a camera that may have died a moment ago; a thread goes on with it
 GIGE_NUMBERS, ALL_NUMBERS = 65535, 2**64  # GigE counts from 1 to 65535 and begins again
 
@@ -77,7 +76,7 @@ class GenicamCamera(CameraBase):
         self._clock = DeviceClock()
         self._stall = StallWatch(self._report)
         self._t = -math.inf
-        self._damaged, self._unstamped = RateLimiter(), False
+        self._damaged, self._unstamped, self._refused = RateLimiter(), False, ""
         self._trigger: SoftwareTrigger | None = None
         self._guard = threading.RLock()  # whoever closes must not take the device from under a reader
         self._device: GenicamDevice | None = None
@@ -189,9 +188,9 @@ class GenicamCamera(CameraBase):
         self._stall.came(now)
         return self._frame(received, now - received.age_s)
 
-    def _take(self, content: memoryview) -> NDArray[Any] | None:
+    def _take(self, content: memoryview, padding: int) -> NDArray[Any] | None:
         try:
-            return decode(content, self._setup.format, self._setup.width, self._setup.height)
+            return decode(content, self._setup.format, self._setup.width, self._setup.height, padding)
         except DataError as error:
             log.debug("%s: %s", self._address, error)
             return None
@@ -235,34 +234,35 @@ class GenicamCamera(CameraBase):
         old, self._device = self._device, None
         if self._trigger is not None:
             self._trigger.stop()
-        opening = Opening(lambda: self._open_again(old), lambda opened: opened[0].close())
-        while not opening.done(SLICE_S):
-            if self.stopped.is_set():
-                opening.abandon()
-                return
-        self._resume(*opening.take())
 
-    def _open_again(self, old: GenicamDevice | None) -> tuple[GenicamDevice, GenicamSetup]:
-        """In a thread: close what is left, then try until it works or the test ends."""
-        if old is not None:
-            old.close()
-        reported = ""
-        while True:
-            try:
-                return self._opened_alike()
-            except (GenicamError, PhasedicError) as error:
-                if (text := str(error)) != reported:
-                    reported = text
-                    log.info("%s: not back yet: %s", self._address, text)
-            if self.stopped.wait(RETRY_S):
-                raise GenicamError("the test has ended")
+        def attempt() -> tuple[GenicamDevice, GenicamSetup]:
+            if old is not None:
+                old.close()
+            return self._opened_alike()
+
+        opened = open_again(
+            attempt,
+            lambda found: found[0].close(),
+            self.stopped,
+            (GenicamError, PhasedicError),
+            self._not_back,
+        )
+        if opened is not None:
+            self._resume(*opened)
 
     def _opened_alike(self) -> tuple[GenicamDevice, GenicamSetup]:
         device, setup = self._open(self._setup.kept(self._settings))
         if device.identity != self._identity or setup.picture != self._setup.picture:
             device.close()
-            raise GenicamError(f"{device.identity} with {setup.picture} came back, not {self._identity}")
+            raise DeviceError(f"{device.identity} with {setup.picture} came back, not {self._identity}")
         return device, setup
+
+    def _not_back(self, error: Exception) -> None:
+        """A camera that answers and cannot be used is reported, once; one that is away has been already."""
+        log.debug("%s: not back yet: %s", self._address, error)
+        if isinstance(error, PhasedicError) and str(error) != self._refused:
+            self._refused = str(error)
+            self._report(f"it is back, but cannot be used: {error}", "error")
 
     def _resume(self, device: GenicamDevice, setup: GenicamSetup) -> None:
         with self._guard:

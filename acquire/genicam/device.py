@@ -15,6 +15,8 @@ from typing import Any
 
 from acquire.genicam.library import Aravis, GenicamError
 
+Take = Callable[[memoryview, int], Any]
+
 RANGE_CHECK = 1  # ARV_RANGE_CHECK_POLICY_ENABLE
 NO_ADJUSTMENT = 0  # ARV_GV_PACKET_SIZE_ADJUSTMENT_NEVER
 SUCCESS = 0
@@ -208,8 +210,11 @@ class GenicamDevice:
             )
         self.ask("arv_camera_start_acquisition")
 
-    def fetch(self, timeout_s: float, take: Callable[[memoryview], Any]) -> Received | None:
-        """The next picture within that time: ``take`` copies it out of the buffer, which goes back at once."""
+    def fetch(self, timeout_s: float, take: Take) -> Received | None:
+        """The next picture within that time: ``take`` copies it out of the buffer, which goes back at once.
+
+        ``take`` gets its bytes, and how many of them are padding after each row.
+        """
         with self._pictures:
             if self._stream is None:
                 raise GenicamError("the camera is closed")
@@ -221,7 +226,7 @@ class GenicamDevice:
             finally:
                 self._library.call("arv_stream_push_buffer", self._stream, buffer)
 
-    def _received(self, buffer: int, take: Callable[[memoryview], Any]) -> Received:
+    def _received(self, buffer: int, take: Take) -> Received:
         about = {
             name: self._library.call(f"arv_buffer_get_{name}", buffer)
             for name in ("status", "frame_id", "timestamp", "system_timestamp")
@@ -232,7 +237,7 @@ class GenicamDevice:
             for side in ("width", "height")
         )
         with self._library.content(buffer) as content:
-            taken = take(content) if good else None
+            taken = take(content, self._library.row_padding(buffer)) if good else None
         age = (time.time_ns() - about["system_timestamp"]) * 1e-9
         return Received(
             number=about["frame_id"],

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
@@ -72,7 +73,9 @@ def preferred(offered: list[str]) -> str | None:
     return next((name for name in FORMATS if name in offered), None)
 
 
-def decode(data: bytes | memoryview, pixel_format: MonoFormat, width: int, height: int) -> NDArray[Any]:
+def decode(
+    data: bytes | memoryview, pixel_format: MonoFormat, width: int, height: int, padding: int = 0
+) -> NDArray[Any]:
     """A picture of its own memory from the bytes of a camera.
 
     Parameters
@@ -80,6 +83,8 @@ def decode(data: bytes | memoryview, pixel_format: MonoFormat, width: int, heigh
     data : buffer of bytes
     pixel_format : MonoFormat
     width, height : int, px
+    padding : int, bytes
+        After each row; a row then begins with a byte of its own.
 
     Returns
     -------
@@ -90,12 +95,27 @@ def decode(data: bytes | memoryview, pixel_format: MonoFormat, width: int, heigh
     DataError
         Too few bytes.
     """
-    pixels = width * height
-    needed = pixel_format.size(pixels)
+    rows, pixels = (height, width) if padding else (1, width * height)
+    length = pixel_format.size(pixels)
+    needed = rows * (length + padding) - padding
     samples = np.frombuffer(data, np.uint8)
     if samples.size < needed:
         raise DataError(f"{samples.size} bytes instead of {needed}")
-    return frozen(_unpacked(samples[:needed], pixel_format, pixels).reshape(height, width))
+    return frozen(
+        _unpacked_rows(samples[:needed], pixel_format, pixels, length + padding).reshape(height, width)
+    )
+
+
+def _unpacked_rows(
+    samples: NDArray[np.uint8], pixel_format: MonoFormat, pixels: int, pitch: int
+) -> NDArray[Any]:
+    """Grey levels of rows of so many pixels that begin ``pitch`` bytes after one another."""
+    length = pixel_format.size(pixels)
+    count = (samples.size - length) // pitch + 1
+    rows = as_strided(samples, (count, length), (pitch, 1))
+    if pixel_format.size(2 * pixels) == 2 * length:  # no row ends within a byte
+        return _unpacked(rows.reshape(-1), pixel_format, count * pixels)
+    return np.stack([_unpacked(row, pixel_format, pixels) for row in rows])
 
 
 def _unpacked(samples: NDArray[np.uint8], pixel_format: MonoFormat, pixels: int) -> NDArray[Any]:

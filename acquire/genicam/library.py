@@ -124,6 +124,11 @@ class Aravis:
             function = getattr(library, name)
             function.restype, function.argtypes = result, arguments
             self._functions[name] = function
+        # Since 0.8.23; an older one has no padding to report.
+        self._get_padding = getattr(library, "arv_buffer_get_image_padding", None)
+        if self._get_padding is not None:
+            self._get_padding.restype = None
+            self._get_padding.argtypes = [_object, c.POINTER(_int), c.POINTER(_int)]
         self._connect = library.g_signal_connect_data
         self._connect.argtypes = [_object, _text, _Handler, _object, _object, _int]
         self._connect.restype = c.c_ulong
@@ -170,6 +175,13 @@ class Aravis:
         size = _size()
         address = self.call("arv_buffer_get_data", buffer, c.byref(size))
         return memoryview((c.c_char * (size.value if address else 0)).from_address(address or 0)).cast("B")
+
+    def row_padding(self, buffer: int) -> int:
+        """Bytes after each row of the picture in a buffer."""
+        across, down = _int(), _int()
+        if self._get_padding is not None:
+            self._get_padding(buffer, c.byref(across), c.byref(down))
+        return across.value
 
     def on_signal(self, instance: int, signal: str, action: Callable[[], None]) -> Any:
         """Have ``action`` called by a thread of the library; what is returned must be kept as long."""

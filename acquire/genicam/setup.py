@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
-from acquire.bounds import NotAllowed, as_number
+from acquire.bounds import NotAllowed, as_number, same_value
+from acquire.camera.timing import Bounded, exposure_and_gain
 from acquire.errors import ConfigError, DeviceError
 from acquire.frame import CameraSetting
 from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
@@ -138,15 +139,8 @@ def _set_feature(device: GenicamDevice, feature: str, value: str, where: str) ->
         device.set_text(feature, value)
     except GenicamError as error:
         raise ConfigError(f"{where}: {feature}={value}: the camera refuses it ({error})") from error
-    if kind != "Command" and not _same(got := device.text(feature), value):
+    if kind != "Command" and not same_value(got := device.text(feature), value):
         raise ConfigError(f"{where}: {feature}={value}: the camera makes it {got}; ask for that")
-
-
-def _same(got: str, asked: str) -> bool:
-    try:
-        return abs(float(got) - float(asked)) <= 1e-4 * abs(float(asked))
-    except ValueError:
-        return got.lower() == asked.lower()
 
 
 def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> MonoFormat:
@@ -262,7 +256,9 @@ def _in_force(
         bits=bits,
         white=_white(device, settings, bits),
         controls=dict(_shown(device, settings)),
-        settings=tuple(_changeable(device, exposure_us, gain, fps)),
+        settings=exposure_and_gain(
+            _bounded(device, "exposure_time", exposure_us), _bounded(device, "gain", gain), fps
+        ),
         warnings=tuple(_warnings(device, settings, fps)),
     )
 
@@ -307,24 +303,15 @@ def _shown(device: GenicamDevice, settings: GenicamSettings) -> Iterator[tuple[s
                 yield feature, device.text(feature)
 
 
-def _changeable(
-    device: GenicamDevice, exposure_us: float | None, gain: float | None, fps: float | None
-) -> Iterator[CameraSetting]:
-    """Exposure, within one picture, and gain."""
-    if exposure_us:
-        low, high = device.bounds_of("exposure_time")
-        high = max(exposure_us, min(high, 1e6 / fps if fps else high))
-        yield CameraSetting("exposure_us", exposure_us, min(max(low, 1.0), exposure_us), high, log=True)
-    if gain is not None:
-        low, high = device.bounds_of("gain")
-        yield CameraSetting("gain", gain, min(low, gain), max(high, gain))
+def _bounded(device: GenicamDevice, what: str, value: float | None) -> Bounded | None:
+    return None if value is None else (value, *device.bounds_of(what))
 
 
 def _warnings(device: GenicamDevice, settings: GenicamSettings, fps: float | None) -> Iterator[str]:
     automatic = [name for name in AUTOMATIC if device.has(name) and device.text(name) != "Off"]
     if automatic:
         yield f"the camera goes on changing by itself: {', '.join(automatic)}; grey levels may drift"
-    if device.has("Gamma") and not _same(device.text("Gamma"), "1"):
+    if device.has("Gamma") and not same_value(device.text("Gamma"), "1"):
         yield f"Gamma is {device.text('Gamma')}: grey levels are not proportional to light; give Gamma=1"
     if settings.fps is not None and fps is not None and fps < 0.99 * settings.fps:
         yield f"the camera gives {fps:g} frames a second, not {settings.fps:g}: exposure, size or line limit it"

@@ -11,14 +11,14 @@ import math
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.evaluate.area import GRADIENTS, AreaStrain
-from analysis.field import PAIR_INDEX, VALUES, Status, StrainField, ZoiGrid, variance_of_sum
+from analysis.field import PAIR_INDEX, VALUES, Status, StrainField, ZoiGrid, area_share, variance_of_sum
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -73,11 +73,14 @@ class GaugeValue:
         Strain, or the unit of the gauge's value; NaN where there is none.
     reason : str
         Why there is none; empty where there is one.
+    share : float
+        Of its area that the value stands for, at either end (``analysis.field.area_share``).
     """
 
     value: float
     sigma: float
     reason: str = ""
+    share: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,6 +153,11 @@ class Gauge(ABC):
             if key not in given:
                 raise ValueError(f"a gauge of kind {cls.kind!r} needs {key!r}")
         return cls(name, **(by_axis | given))
+
+    def read(self, field: StrainField) -> GaugeValue:
+        """Its value with the share of its area that the value stands for."""
+        share = min(area_share(field, mask) for mask in self.zois(field.grid))
+        return replace(self.measure(field), share=share)
 
     def zois(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         """The active ZOIs that it takes, (R, C) bool: one mask, or one for each of its two ends."""

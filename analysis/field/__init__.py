@@ -1,9 +1,10 @@
 """Measured fields on a grid, with their uncertainty.
 
 ``grid`` places the ZOIs and weighs their pixels, ``strain_field`` is the result with its ``status``,
-``uncertainty`` has sigmas of values and means, ``motion`` predicts the next field.
+``uncertainty`` has sigmas of values and means, ``motion`` predicts the next field, ``blocks`` are what is missing.
 """
 
+from analysis.field.blocks import area_share, in_blocks
 from analysis.field.blur import Blur, blur_maps, mean_blur
 from analysis.field.grid import WINDOWS, Roi, Window, ZoiGrid, profile
 from analysis.field.motion import Motion
@@ -37,9 +38,11 @@ __all__ = [
     "WeightedSum",
     "Window",
     "ZoiGrid",
+    "area_share",
     "blur_maps",
     "combination",
     "fixed_sums",
+    "in_blocks",
     "mean_blur",
     "products",
     "profile",

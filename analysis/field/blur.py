@@ -24,10 +24,10 @@ class Blur(NamedTuple):
 
     @property
     def text(self) -> str:
-        """In words, "less sharp by 0.41 +- 0.02 px"; empty where it is not known."""
+        """In words, "less sharp by 0.41 ± 0.02 px"; empty where it is not known."""
         if not math.isfinite(self.px):
             return ""
-        return f"{'less sharp' if self.px >= 0 else 'sharper'} by {abs(self.px):.2f} +- {self.sigma:.2f} px"
+        return f"{'less sharp' if self.px >= 0 else 'sharper'} by {abs(self.px):.2f} ± {self.sigma:.2f} px"
 
 
 def mean_blur(field: StrainField) -> Blur:

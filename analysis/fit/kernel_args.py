@@ -18,8 +18,8 @@ Floats = NDArray[np.float64]
 
 IMAGES = 4
 """Of a reference (``PreparedReference.images``)."""
-NUISANCES = 9
-"""Columns of J beside those of the displacement; f_xx and f_yy are the last but two and one."""
+NUISANCES, BLURS = 9, 3
+"""Columns of J beside those of the displacement; the last of them, f_xx, f_yy and f_xy, are blur."""
 RUNNING, CONVERGED, LEFT_IMAGE, DIVERGED = 0, 1, 2, 3
 """How the iteration of a ZOI ended (``OutArgs.state``)."""
 

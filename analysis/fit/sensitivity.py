@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper, parallel
 from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
-from analysis.fit.kernel_args import NUISANCES, NormalArgs, ReferenceImages, WindowRows
+from analysis.fit.kernel_args import BLURS, NUISANCES, NormalArgs, ReferenceImages, WindowRows
 from analysis.fit.shapes import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, cross_moments, product_moments
 
 CHUNK = 32
 """ZOIs that a thread takes at a time."""
-RIDGE = 1e-7
-"""Added to the unit diagonal of the scaled normal matrix."""
+RIDGE, BLUR_RIDGE = 1e-7, 1e-3
+"""Added to the unit diagonal of the scaled normal matrix; in a pattern of one frequency blur and gain are alike."""
 
 
 def columns(order: int) -> NDArray[np.int64]:
@@ -61,7 +61,7 @@ def _assemble(moments: Any, table: Any, out: Any) -> None:
 
 @helper
 def _invert(matrix: Any, low: Any, inverse: Any) -> bool:
-    """Inverse of a symmetric positive matrix by Cholesky after scaling to a unit diagonal, ridged."""
+    """Inverse of a symmetric positive matrix by Cholesky after scaling to a unit diagonal, ridged; blur stands last."""
     n = len(matrix)
     scale = np.empty(n)
     for i in range(n):
@@ -72,7 +72,7 @@ def _invert(matrix: Any, low: Any, inverse: Any) -> bool:
         for j in range(i + 1):
             total = matrix[i, j] * scale[i] * scale[j]
             if i == j:
-                total += RIDGE
+                total += RIDGE if i < n - BLURS else BLUR_RIDGE
             for k in range(j):
                 total -= low[i, k] * low[j, k]
             if i == j:

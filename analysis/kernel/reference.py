@@ -79,6 +79,8 @@ class ReferencePicture:
         ``white_noise.white_cubic``.
     cleaned : bool
         Whether it had wild pixels, which were replaced; later pictures are then cleaned, too.
+    period : (A,) float64, px
+        Smallest displacement at which a ZOI looks like itself (``repeating.periods``); infinite: none.
     """
 
     grid: ZoiGrid
@@ -99,6 +101,7 @@ class ReferencePicture:
     rounding: float
     white: Floats
     cleaned: bool
+    period: Floats
 
     @classmethod
     def first(
@@ -139,7 +142,8 @@ class ReferencePicture:
         prepared = prepare_reference(whole, placement.origins, size, settings, model, saturated)
         gone = placement.status != Status.OK
         prepared = replace(prepared, status=np.where(gone, placement.status, prepared.status))
-        return _laid_out(whole, self.grid, settings, model, prepared, cleaned is not None, placement)
+        made = _laid_out(whole, self.grid, settings, model, prepared, cleaned is not None, placement)
+        return replace(made, period=self.period)
 
     @property
     def modes(self) -> int:
@@ -208,6 +212,21 @@ class ReferencePicture:
         origins, deformed = self.prepared.origins, image.astype(np.float32)
         return self.all_modes(search(self.image, deformed, offset, self.region, origins, self.grid.size))
 
+    def searched_near(self, image: NDArray[Any], which: NDArray[np.intp], reach: float) -> Floats:
+        """The same for some ZOIs (B,) that are not farther than ``reach`` px from where they were, (B, modes)."""
+        from analysis.follow.search import search
+
+        origins, size = self.prepared.origins[which], self.grid.size
+        first, last = origins.min(axis=0), origins.max(axis=0) + size
+        top, left = np.maximum(first - int(reach), 0)
+        bottom, right = last + int(reach)
+        part = np.s_[top:bottom, left:right]
+        box = Roi(int(first[1] - left), int(first[0] - top), *(int(n) for n in (last - first)[::-1]))
+        offset = np.float32(self.prepared.pattern.mean)
+        deformed = np.ascontiguousarray(image[part], np.float32)
+        reference = np.ascontiguousarray(self.image[part])
+        return self.all_modes(search(reference, deformed, offset, box, origins - (top, left), size))
+
     def spread(self, values: NDArray[Any], empty: float = np.nan) -> NDArray[Any]:
         """(A, K) onto the grid: (K, R, C); where all ZOIs are active, the same memory."""
         return _spread(values, self.index, self.grid.shape, empty)
@@ -252,6 +271,7 @@ def _laid_out(
         rounding=rounding_variance(image),
         white=white_cubic(prepared, grid.size, settings.order, share_variance),
         cleaned=cleaned,
+        period=np.full(len(index), np.inf),
     )
 
 

@@ -1,12 +1,11 @@
-"""One image measured against a reference: every ZOI iterated from a guess and judged, lost ones tried again.
+"""One image measured against a reference: every ZOI iterated from a guess and judged.
 
-A lost ZOI is tried again without extrapolation, from its neighbours, and by a search. ``result`` puts everything on
-the grid.
+``retry`` tries lost ones again, ``result`` puts everything on the grid.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -144,7 +143,7 @@ class Solution:
         if self._box != reference.whole and (found.state == LEFT_IMAGE).any():
             self.picture = self._picture(reference.whole)
             found = self._fitted(places, guess)
-        return found, self._verdicts(places, found)
+        return found, self.verdicts(places, found)
 
     def _fitted(self, places: Places, guess: Floats) -> OutArgs:
         if self.reference.sensors is None:
@@ -206,7 +205,8 @@ class Solution:
         seen = self._iterated(which, values, max_iterations=1)
         return seen._replace(p=values, state=state, iterations=iterations)
 
-    def _verdicts(self, which: Places, found: OutArgs) -> NDArray[np.uint8]:
+    def verdicts(self, which: Places, found: OutArgs) -> NDArray[np.uint8]:
+        """The status of some ZOIs with what was found of them."""
         from analysis.fit.verdict import judge
 
         reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
@@ -279,123 +279,3 @@ def _cleaned(image: NDArray[Any]) -> NDArray[Any]:
 
     cleaned = without_impulses(image)
     return image if cleaned is None else cleaned
-
-
-RETRY_ROUNDS = 40
-SEARCH_SHARE = 0.3
-"""Share of lost ZOIs from which on the whole picture is searched again."""
-_WORTH_RETRYING = np.isin(
-    list(Status), (Status.LOST, Status.NOT_CONVERGED, Status.POOR_MATCH, Status.OUTSIDE)
-)
-"""By status."""
-_DOWN, _RIGHT = (offset.ravel() - 1 for offset in np.indices((3, 3)))
-"""Rows and columns to a ZOI's neighbours, itself among them."""
-
-
-def retry_lost(solution: Solution, before: Floats | None, clipped: NDArray[np.bool_] | None = None) -> None:
-    """Try lost ZOIs again from other guesses; a worse outcome does not replace a better one.
-
-    Parameters
-    ----------
-    solution : Solution
-    before : (A, modes), or None
-        Parameters of the frame before; None: the guess was searched for.
-    clipped : (H, W) bool, or None
-        Saturated pixels: a ZOI on them is refused, before it is tried again and after.
-    """
-    if clipped is not None:
-        solution.refuse_clipped(clipped)
-    lost = _lost(solution)
-    if not lost.any():
-        return
-    _retry_lost(solution, before)
-    if clipped is not None:
-        solution.refuse_clipped(clipped, lost)
-
-
-def _retry_lost(solution: Solution, before: Floats | None) -> None:
-    reference = solution.reference
-    # Without its gradients a guess is right for ZOIs beside a discontinuity.
-    displacements = np.arange(reference.modes) % (reference.modes // 2) == 0
-    _retry(solution, solution.guess * displacements if before is None else before)
-    _retry_from_neighbours(solution)
-    able = np.count_nonzero(reference.prepared.status == Status.OK)
-    if before is not None and np.count_nonzero(_lost(solution)) > SEARCH_SHARE * able:
-        _retry(solution, reference.searched(solution.image))
-        _retry_from_neighbours(solution)
-
-
-def _lost(solution: Solution) -> NDArray[np.bool_]:
-    return np.asarray(_WORTH_RETRYING[solution.status] & (solution.reference.prepared.status == Status.OK))
-
-
-def _retry(solution: Solution, guess: Floats) -> None:
-    which = np.flatnonzero(_lost(solution) & np.isfinite(guess).all(axis=1))
-    if len(which):
-        _retry_some(solution, which, guess[which])
-
-
-def _retry_some(solution: Solution, which: NDArray[np.intp], guess: Floats) -> None:
-    found, status = solution.solved(which, guess)
-    good = np.flatnonzero(status == Status.OK)
-    solution.keep(which[good], found.at(good), status[good])
-
-
-def _retry_from_neighbours(solution: Solution) -> None:
-    """Let good ZOIs lend their shape to lost neighbours, round by round."""
-    solved = np.zeros(len(solution.status), np.uint8)
-    places = _Places.of(solution.reference)
-    for _ in range(RETRY_ROUNDS):
-        lost = np.flatnonzero(_lost(solution))
-        guess, lenders = _lent_guesses(solution, places, lost)
-        fresh = np.isfinite(guess[:, 0]) & (lenders > solved[lost])
-        if not fresh.any():
-            return
-        solved[lost] = lenders
-        _retry_some(solution, lost[fresh], guess[fresh])
-
-
-class _Places(NamedTuple):
-    """Where the ZOIs lie on the grid.
-
-    Attributes
-    ----------
-    zoi : (R + 2, C + 2)
-        Which of the active ZOIs, -1 for none; the grid begins at (1, 1).
-    row, column : (A,)
-        Of each active ZOI in ``zoi``.
-    """
-
-    zoi: NDArray[np.intp]
-    row: NDArray[np.intp]
-    column: NDArray[np.intp]
-
-    @classmethod
-    def of(cls, reference: ReferencePicture) -> _Places:
-        rows, columns = reference.grid.shape
-        row, column = np.unravel_index(reference.index, (rows, columns))
-        zoi = np.full((rows + 2, columns + 2), -1, np.intp)
-        zoi[row + 1, column + 1] = np.arange(len(reference.index))
-        return cls(zoi, row + 1, column + 1)
-
-
-def _lent_guesses(
-    solution: Solution, places: _Places, lost: NDArray[np.intp]
-) -> tuple[Floats, NDArray[np.uint8]]:
-    """For each of the lost ZOIs (L,) the mean of what its good neighbours predict there, (L, modes), and their number.
-
-    Of a ZOI's shape u, du_dx, du_dy, v, dv_dx, dv_dy count, moved by the step to the neighbour.
-    """
-    reference, step = solution.reference, solution.reference.grid.step
-    good = np.append(solution.status == Status.OK, False)  # the last for "none"
-    zoi = places.zoi[places.row[lost, None] + _DOWN, places.column[lost, None] + _RIGHT]
-    to, which = np.nonzero(good[zoi])
-    lender = zoi[to, which]
-    part = reference.total(solution.found.p[lender], lender)[:, reference.affine]
-    for r in (0, 3):
-        part[:, r] -= step * (_RIGHT[which] * part[:, r + 1] + _DOWN[which] * part[:, r + 2])
-    number = np.bincount(to, minlength=len(lost))
-    total = np.stack([np.bincount(to, values, len(lost)) for values in part.T], axis=1)
-    with np.errstate(invalid="ignore"):
-        mean = np.where(number[:, None] > 0, total / np.maximum(number, 1)[:, None], np.nan)
-    return reference.local(reference.all_modes(mean), lost), number.astype(np.uint8)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from acquire.errors import ConfigError, DataError
-from live.ui.terminal.screen import say
+from live.ui.terminal.screen import print_line
 
 if TYPE_CHECKING:
     from analysis.field import ZoiGrid
@@ -52,8 +52,10 @@ def command(arguments: argparse.Namespace) -> int:
     title = f"{Path(arguments.session).name}: {where}, frame {arguments.frame}"
     draw_spectrum(drawn, spectrum, title)
     save_new(drawn, out)
-    say(f"{title}\nu = {spectrum.u:.4f} px, v = {spectrum.v:.4f} px from {spectrum.used.sum()} frequencies")
-    say(f"figure: {out}")
+    print_line(
+        f"{title}\nu = {spectrum.u:.4f} px, v = {spectrum.v:.4f} px from {spectrum.used.sum()} frequencies"
+    )
+    print_line(f"figure: {out}")
     return 0
 
 

@@ -27,7 +27,7 @@ def command(arguments: argparse.Namespace) -> int:
     screen = TerminalScreen()
     given = getattr(arguments, "camera.crop")
     crop = tuple(given) if given else None
-    rig = open_rig(at_rest(arguments.camera), "none:", lambda event: screen.say(event.text), crop=crop)
+    rig = open_rig(at_rest(arguments.camera), "none:", lambda event: screen.print(event.text), crop=crop)
     try:
         compile_loops(picture_kinds(rig.camera.info)[:1])
         with rig.camera:
@@ -38,5 +38,5 @@ def command(arguments: argparse.Namespace) -> int:
         raise DataError(f"{arguments.camera}: gave fewer than {arguments.frames} frames without a gap")
     save_mean(burst.mean, Path(arguments.out))
     noise = f", noise of one frame {burst.noise:.2f} GL" if burst.n > 1 else ""
-    screen.say(f"{arguments.out}: {burst.n} frames, mean {burst.mean.mean():.1f} GL{noise}")
+    screen.print(f"{arguments.out}: {burst.n} frames, mean {burst.mean.mean():.1f} GL{noise}")
     return 0

@@ -76,14 +76,14 @@ def command(arguments: argparse.Namespace) -> int:
         scheduler=arguments.scheduler,
     )
     screen, stopping = TerminalScreen(), threading.Event()
-    with signals(stopping.set, screen.say):
+    with signals(stopping.set, screen.print):
         done = run_campaign(request, screen, stopping)
     for path in done.files:
-        screen.say(f"  {path}")
+        screen.print(f"  {path}")
     if done.exit_code == 5:
-        screen.say("exit code 5: tests failed or have losses; see the column error")
+        screen.print("exit code 5: tests failed or have losses; see the column error")
     elif done.exit_code in EXIT_WORDS:
-        screen.say("exit code 130: interrupted; finished tests are kept, the same call does the rest")
+        screen.print("exit code 130: interrupted; finished tests are kept, the same call does the rest")
     return done.exit_code
 
 

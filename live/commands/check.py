@@ -74,15 +74,15 @@ def command(arguments: argparse.Namespace) -> int:
         with interrupts() as stop:
             figures = watch(config, target, screen, stop.is_set)
     else:
-        figures = examine(take(config, report_warnings(screen.say)), config, _load(config))
+        figures = examine(take(config, report_warnings(screen.print)), config, _load(config))
     if arguments.snapshot:
         write_picture(Path(arguments.snapshot), _drawn(figures, config, target))
-        screen.say(f"written: {arguments.snapshot}")
+        screen.print(f"written: {arguments.snapshot}")
     lines = check_lines(figures, target, config.measure.reference_shift_px)
     for line in [*(line.text() for line in lines), "", *table_lines(figures)]:
-        screen.say(line)
+        screen.print(line)
     ready = all(line.good for line in lines)
-    screen.say(_verdict(figures, ready))
+    screen.print(_verdict(figures, ready))
     return 0 if ready else NOT_READY
 
 

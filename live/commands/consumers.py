@@ -44,7 +44,7 @@ def signals_of(about: RunInfo, run_state: RunState, screen: Screen) -> list[Cons
             if out is not None:
                 opened.callback(out.end)
                 outputs.append(out)
-                screen.say(out.name)
+                screen.print(out.name)
         opened.pop_all()
     means = ActionMeans(screen.bell, about.end, outputs)
     alarms = [Alarm(config, actions_of(config, means)) for config in about.config.alarm]
@@ -153,9 +153,9 @@ def _view(about: RunInfo, run_state: RunState, screen: Screen) -> View | None:
 def _announce(view: View, spawn: bool, screen: Screen, trouble: Callable[[str], None]) -> None:
     """Open the viewer if there is a display; else print how to open it."""
     if spawn and view.port is not None and spawn_viewer(view.port, trouble) is not None:
-        screen.say("the viewer opens in its own window")
+        screen.print("the viewer opens in its own window")
         return
     why = "no display" if spawn else "view.spawn is off"
-    screen.say(f"no viewer is opened ({why}); the test runs without it. To open one:")
+    screen.print(f"no viewer is opened ({why}); the test runs without it. To open one:")
     for line in view.instructions.splitlines():
-        screen.say(f"  {line}")
+        screen.print(f"  {line}")

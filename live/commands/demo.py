@@ -58,13 +58,13 @@ def command(arguments: argparse.Namespace) -> int:
     config = configured(arguments, _defaults(arguments))
     check_folder(config.output.dir)
     # All that the next commands need too: 8-bit pictures, and a batch.
-    compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
+    compile_ahead(PICTURE_KINDS, phase=True, show=screen.status)
     collector = MeansCollector()
     outcome = run_attended(config, screen, [collector])
     print_outcome(outcome, screen, verbose=arguments.verbose)
     if outcome.rig.specimen is None or not collector.measurements:
         return outcome.exit_code
-    code = compare(outcome, collector, config, screen.say)
+    code = compare(outcome, collector, config, screen.print)
     return outcome.exit_code or code
 
 
@@ -192,7 +192,9 @@ def middle_of(specimen: VirtualSpecimen, times: Array) -> float:
     return float(np.interp(strain.mean(), strain, times))
 
 
-def compare(outcome: Outcome, collector: MeansCollector, config: Config, say: Callable[[str], None]) -> int:
+def compare(
+    outcome: Outcome, collector: MeansCollector, config: Config, print_line: Callable[[str], None]
+) -> int:
     """Print what was measured against the truth; 1 where the elastic part differs, 5 where E was not measured."""
     specimen = outcome.rig.specimen
     assert specimen is not None
@@ -207,40 +209,44 @@ def compare(outcome: Outcome, collector: MeansCollector, config: Config, say: Ca
         if times[-1] <= specimen.yield_s:
             ratios.append([np.abs(error) / (RELATIVE * np.abs(true) + k * sigma) for k in (3, 5)])
             errors.append(error)
-    say("")
-    say("against the simulated truth (elastic part; exx, eyy, exy):")
-    agreed = _say_strain(np.array(ratios), np.array(errors), say)
-    _say_force(outcome, specimen, say)
+    print_line("")
+    print_line("against the simulated truth (elastic part; exx, eyy, exy):")
+    agreed = _print_strain(np.array(ratios), np.array(errors), print_line)
+    _print_force(outcome, specimen, print_line)
     figures = evaluate(outcome.run_state.history, outcome.run_state.loads, config.specimen)
     rows = tensile_table(figures, stresses=True)
-    say(f"  E  {rows['E'].text}, true {specimen.E / 1e9:g} GPa".replace("+-", "±"))
-    say(f"  nu {rows['nu'].text}, true {specimen.nu:g}".replace("+-", "±"))
+    print_line(f"  E  {rows['E'].text}, true {specimen.E / 1e9:g} GPa")
+    print_line(f"  nu {rows['nu'].text}, true {specimen.nu:g}")
     if agreed and not figures.E.known:
-        say(f"exit code {LOSS}: E was not measured ({figures.E.why}); end other programs, or give --fps 5")
+        print_line(
+            f"exit code {LOSS}: E was not measured ({figures.E.why}); end other programs, or give --fps 5"
+        )
         return LOSS
     return 0 if agreed else 1
 
 
-def _say_strain(ratios: Array, errors: Array, say: Callable[[str], None]) -> bool:
+def _print_strain(ratios: Array, errors: Array, print_line: Callable[[str], None]) -> bool:
     """``ratios`` (N, 2, 3): the error of each of the three in units of 0.05 % + 3 sigma, and of 0.05 % + 5 sigma."""
     if not ratios.size:
-        say("  no instant of the elastic part was measured")
+        print_line("  no instant of the elastic part was measured")
         return False
     within, rms = ratios[:, 0] <= 1, np.sqrt(np.mean(errors**2, axis=0)) * 1e6
     beyond = int(np.sum(~(ratios[:, 1] <= 1)))
-    say(
-        f"  strain of the region: error {rms[0]:.2f}, {rms[1]:.2f}, {rms[2]:.2f} um/m rms in {len(ratios)} instants"
+    print_line(
+        f"  strain of the region: error {rms[0]:.2f}, {rms[1]:.2f}, {rms[2]:.2f} µm/m rms in {len(ratios)} instants"
     )
-    say(
+    print_line(
         f"  {within.mean():.1%} of these {within.size} values within {RELATIVE:.2%} of the strain + 3 sigma,"
         f" {beyond} beyond 5 sigma"
     )
     return float(within.mean()) >= MIN_WITHIN and beyond == 0
 
 
-def _say_force(outcome: Outcome, specimen: VirtualSpecimen, say: Callable[[str], None]) -> None:
+def _print_force(outcome: Outcome, specimen: VirtualSpecimen, print_line: Callable[[str], None]) -> None:
     t, force = outcome.run_state.loads.arrays()
     true = specimen.force(np.array([specimen.elapsed(time) for time in t]))
     error = (force - true)[np.isfinite(force)]
     if error.size:
-        say(f"  force: mean error {error.mean():+.2f} N, scatter {error.std():.2f} N in {error.size} samples")
+        print_line(
+            f"  force: mean error {error.mean():+.2f} N, scatter {error.std():.2f} N in {error.size} samples"
+        )

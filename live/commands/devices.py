@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from live.ui.terminal.screen import say
+from live.ui.terminal.screen import print_line
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -19,16 +19,16 @@ def command(arguments: argparse.Namespace) -> int:
     from analysis import threads
 
     cameras, ports = list_cameras(), list_serial_ports()
-    say(
+    print_line(
         "cameras:"
         if cameras
         else "cameras: none found (V4L2: /dev/video*; GigE and USB3 Vision: docs/machine-vision.md)"
     )
     for camera in cameras:
         for line in camera.text().splitlines():
-            say(printable(line))
-    say("serial ports:" if ports else "serial ports: none found")
+            print_line(printable(line))
+    print_line("serial ports:" if ports else "serial ports: none found")
     for port in ports:
-        say(port.text())
-    say(f"threads that measure: {threads()}")
+        print_line(port.text())
+    print_line(f"threads that measure: {threads()}")
     return 0

@@ -81,9 +81,9 @@ def command(arguments: argparse.Namespace) -> int:
     with open_run(arguments.run) as run:
         if arguments.more_gauges:
             add_gauges(run, Path(arguments.more_gauges))
-        screen.say(str(export(run, _request(arguments, run), screen)))
+        screen.print(str(export(run, _request(arguments, run), screen)))
         for note in run.notes:
-            screen.say(f"note: {note}")
+            screen.print(f"note: {note}")
     return 0
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from acquire.serial_line import identify
 from live.commands.exit_codes import NOT_READY
 
-Say = Callable[[str], None]
+PrintLine = Callable[[str], None]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -17,37 +17,39 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ask", action="store_true", help="also send queries (an unknown machine may move)")
 
 
-def command(arguments: argparse.Namespace, say: Say = print) -> int:
+def command(arguments: argparse.Namespace, print_line: PrintLine = print) -> int:
     """``phasedic identify DEVICE [--ask]``; 0 if a device was identified, else 6."""
     for baud, received, finding in identify.listen(arguments.device):
         shown = received[:60].decode("ascii", "backslashreplace")
-        say(f"{baud:7} baud: {len(received)} bytes {shown!r}" if received else f"{baud:7} baud: silence")
+        print_line(
+            f"{baud:7} baud: {len(received)} bytes {shown!r}" if received else f"{baud:7} baud: silence"
+        )
         if finding is not None:
-            _propose(finding.address, finding.remark, say)
+            _propose(finding.address, finding.remark, print_line)
             return 0
     if arguments.ask:
-        return _ask_all(arguments.device, say)
-    say("nothing recognised; --ask sends queries to this port (only if no machine there can move)")
+        return _ask_all(arguments.device, print_line)
+    print_line("nothing recognised; --ask sends queries to this port (only if no machine there can move)")
     return NOT_READY
 
 
-def _ask_all(device: str, say: Say) -> int:
+def _ask_all(device: str, print_line: PrintLine) -> int:
     questions = identify.questions(device)
-    say("will send, one after the other:")
+    print_line("will send, one after the other:")
     for question in questions:
         line = question.line
-        say(f"  {question.data!r}  at {line.baud} {line.bytesize}{line.parity}1 ({question.protocol})")
+        print_line(f"  {question.data!r}  at {line.baud} {line.bytesize}{line.parity}1 ({question.protocol})")
     for question in questions:
         finding = identify.ask(question)
-        say(f"  {question.protocol}: {'answers' if finding else 'no answer'}")
+        print_line(f"  {question.protocol}: {'answers' if finding else 'no answer'}")
         if finding is not None:
-            _propose(finding.address, finding.remark, say)
+            _propose(finding.address, finding.remark, print_line)
             return 0
-    say("no answer; check cable, speed and the device's own settings (docs/load-cells.md)")
+    print_line("no answer; check cable, speed and the device's own settings (docs/load-cells.md)")
     return NOT_READY
 
 
-def _propose(address: str, remark: str, say: Say) -> None:
-    say(f"use  --load '{address}'")
+def _propose(address: str, remark: str, print_line: PrintLine) -> None:
+    print_line(f"use  --load '{address}'")
     if remark:
-        say(f"note {remark}")
+        print_line(f"note {remark}")

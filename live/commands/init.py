@@ -72,11 +72,11 @@ def command(arguments: argparse.Namespace) -> int:
     given = overrides(arguments)
     found = find_devices(given, screen)
     config = load_config(None, {**given, "camera.address": found.camera, "load.address": found.load})
-    first = first_look(config, screen.say)
+    first = first_look(config, screen.print)
     descriptions = found.camera_words or printable(first.camera.name), found.load_words
     proposal = propose(first, config, given, descriptions, found.others)
     if proposal.contrast < NO_PATTERN:
-        screen.say(
+        screen.print(
             f"no pattern is visible: the contrast is {proposal.contrast:.1%} of full scale, so nothing is written. Set"
             " light, exposure and focus, spray a pattern, and call again"
         )
@@ -118,11 +118,11 @@ def find_devices(given: dict[str, object], screen: Screen) -> FoundDevices:
     camera, descriptions, others = str(given.get("camera.address") or ""), "", tuple[str, ...]()
     if not camera:
         camera, descriptions, others = _camera()
-        screen.say(f"camera: {camera}  {descriptions}")
+        screen.print(f"camera: {camera}  {descriptions}")
     load, load_words = str(given.get("load.address") or ""), ""
     if not load:
         load, load_words = _load(camera, screen)
-        screen.say(f"load cell: {load}  {load_words}".rstrip())
+        screen.print(f"load cell: {load}  {load_words}".rstrip())
     return FoundDevices(camera, printable(descriptions), load, printable(load_words), others)
 
 
@@ -164,9 +164,9 @@ def _listen(screen: Screen) -> Iterator[tuple[str, str]]:
 
     for port in list_serial_ports():
         if not port.accessible:
-            screen.say(port.text().strip())
+            screen.print(port.text().strip())
             continue
-        screen.say(f"listening on {port.device} (--load ADDRESS or --load none: skips this)")
+        screen.print(f"listening on {port.device} (--load ADDRESS or --load none: skips this)")
         for _, _, finding in identify.listen(port.device):
             if finding is not None:
                 yield finding.address, finding.remark or finding.protocol
@@ -183,11 +183,11 @@ def _draw(p: Proposal, png: Path) -> None:
 
 def _print(p: Proposal, rig: Path, png: Path, screen: Screen) -> None:
     grid = p.region.grid(p.config, *p.first_look.size)
-    screen.say(p.region.words)
-    screen.say(
+    screen.print(p.region.words)
+    screen.print(
         f"{grid.n_active} ZOIs of {grid.size} px, {grid.step} px apart; load along {p.config.specimen.axis}"
     )
-    screen.say(f"gauges: {', '.join(p.config.gauges) or 'none'}")
-    screen.say(f"written: {rig}, and {png} as a picture of it")
+    screen.print(f"gauges: {', '.join(p.config.gauges) or 'none'}")
+    screen.print(f"written: {rig}, and {png} as a picture of it")
     name = shlex.quote(str(rig))
-    screen.say(f"next: phasedic check --config {name}, then phasedic run --config {name}")
+    screen.print(f"next: phasedic check --config {name}, then phasedic run --config {name}")

@@ -14,7 +14,7 @@ from acquire.load_sample import LoadFlag, LoadSample
 from live.commands.exit_codes import NOT_READY
 from live.setup.devices import open_load
 
-Say = Callable[[str], None]
+PrintLine = Callable[[str], None]
 Ask = Callable[[str], str]
 
 GRAVITY = 9.80665  # m/s^2
@@ -48,7 +48,7 @@ def _agree(question: str) -> str:
     return "yes"
 
 
-def command(arguments: argparse.Namespace, say: Say = print, ask: Ask = _asked) -> int:
+def command(arguments: argparse.Namespace, print_line: PrintLine = print, ask: Ask = _asked) -> int:
     """``phasedic load-calibrate --load ADDRESS (--mass KG | --force N) --out FILE [--seconds 3]``.
 
     Asks before each of the three readings and before it saves the result; 6 if the result is not accepted. A simulated
@@ -60,21 +60,21 @@ def command(arguments: argparse.Namespace, say: Say = print, ask: Ask = _asked) 
     known_N = arguments.force if arguments.mass is None else arguments.mass * GRAVITY
     simulated = parse_address(arguments.load).scheme == "sim"
     if simulated:
-        say("simulated: the known load is put on and taken off by the simulation")
+        print_line("simulated: the known load is put on and taken off by the simulation")
 
     def read(force_N: float, what: str) -> calibration.Point:
         for _ in range(MAX_TRIES):
             ask(f"{what}, wait until it is still, then press Enter ")
             address = _raw(arguments.load)
             address = with_setting(address, "weight_N", force_N) if simulated else address
-            cell = open_load(address, lambda event: say(f"{event.level}: {event.text}"))
+            cell = open_load(address, lambda event: print_line(f"{event.level}: {event.text}"))
             received = check.listen(cell, arguments.seconds)
             why_not = _unfit(received.samples)
             if not why_not:
                 found = calibration.point(force_N, [sample.force for sample in received.samples])
-                say(f"  {found.value:.8g} on the line (noise {found.noise:.3g}, {found.n} readings)")
+                print_line(f"  {found.value:.8g} on the line (noise {found.noise:.3g}, {found.n} readings)")
                 return found
-            say(f"  not taken: {why_not}")
+            print_line(f"  not taken: {why_not}")
         raise DataError(
             f"{arguments.load}: {MAX_TRIES} times {why_not}; look at it with 'phasedic load-check'"
         )
@@ -82,12 +82,12 @@ def command(arguments: argparse.Namespace, say: Say = print, ask: Ask = _asked) 
     points = [read(0.0, "take off all load"), read(known_N, f"put on {known_N:.6g} N")]
     points.append(read(0.0, "take off all load again"))
     found = calibration.fit(points)
-    say(f"gain {found.gain:.8g} N per unit, zero {found.zero:.8g}, residual {found.residual_N:.3g} N")
+    print_line(f"gain {found.gain:.8g} N per unit, zero {found.zero:.8g}, residual {found.residual_N:.3g} N")
     if ask("accept? (yes/no) ").strip().lower() not in ("y", "yes"):
-        say("not kept")
+        print_line("not kept")
         return NOT_READY
     calibration.save(found, Path(arguments.out), arguments.load)
-    say(f"kept in {arguments.out}; use it with calibration={arguments.out} in the address")
+    print_line(f"kept in {arguments.out}; use it with calibration={arguments.out} in the address")
     return 0
 
 

@@ -9,7 +9,7 @@ from acquire.load_cell import check
 from live.commands.exit_codes import NOT_READY
 from live.setup.devices import open_load
 
-Say = Callable[[str], None]
+PrintLine = Callable[[str], None]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -20,12 +20,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def command(arguments: argparse.Namespace, say: Say = print) -> int:
+def command(arguments: argparse.Namespace, print_line: PrintLine = print) -> int:
     """``phasedic load-check``; 0 if ready for a test, else 6."""
-    cell = open_load(arguments.load, lambda event: say(f"{event.level}: {event.text}"))
-    say(f"listening to {cell.info.name} for {arguments.seconds:g} s ...")
+    cell = open_load(arguments.load, lambda event: print_line(f"{event.level}: {event.text}"))
+    print_line(f"listening to {cell.info.name} for {arguments.seconds:g} s ...")
     found = check.report(check.listen(cell, arguments.seconds), cell.info)
     for line in check.report_lines(found):
-        say(line)
-    say("ready" if found.ready else "not ready")
+        print_line(line)
+    print_line("ready" if found.ready else "not ready")
     return 0 if found.ready else NOT_READY

@@ -12,7 +12,7 @@ from acquire.printable import printable
 from live.results import Strain
 from live.results.maps.map import MapRequest, draw, save
 from live.results.run_folder import open_run
-from live.ui.terminal.screen import say
+from live.ui.terminal.screen import print_line
 
 _VISIBLE_PX = 2.0
 
@@ -61,7 +61,7 @@ def command(arguments: argparse.Namespace) -> int:
         save(draw(strain, picture, background), path)
         if arguments.over is not None:
             _warn_of_motion(strain, arguments.row)
-    say(str(path))
+    print_line(str(path))
     return 0
 
 
@@ -69,7 +69,7 @@ def _warn_of_motion(strain: Strain, row: int) -> None:
     """Warn if the specimen moved: the map lies on the reference, and on a later picture it is misplaced."""
     moved = float(np.nanmax(np.hypot(strain.maps("u", row), strain.maps("v", row)), initial=0.0))
     if moved > _VISIBLE_PX:
-        say(
+        print_line(
             f"note: the map lies on the reference picture; the specimen moved by up to {moved:.0f} px since, so give"
             " the reference to --over, or phasedic export --to png, which moves the map with it"
         )

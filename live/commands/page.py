@@ -48,7 +48,7 @@ def command(arguments: argparse.Namespace) -> int:
             interrupted.set()
             controller.quit()
 
-        with signals(interrupt, screen.say):
+        with signals(interrupt, screen.print):
             open_page(controller, screen)
             serve(controller, screen, interrupted)
     return EXIT_INTERRUPTED if interrupted.is_set() else 0
@@ -62,7 +62,7 @@ def serve(controller: PageController, screen: Screen, interrupted: threading.Eve
             outcome = run_with_page(controller, config, screen)
         except PhasedicError as error:
             message = brief(error)
-            screen.say(f"the test did not begin: {message}")
+            screen.print(f"the test did not begin: {message}")
             continue
         message = ""
         if outcome.exit_code == EXIT_INTERRUPTED:

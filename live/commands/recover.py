@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable
 
-from live.ui.terminal.screen import say as print_line
+from live.ui.terminal.screen import print_line
 
-Say = Callable[[str], None]
+PrintLine = Callable[[str], None]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -16,12 +16,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="FILE", help="new file (default: beside the session)")
 
 
-def command(arguments: argparse.Namespace, say: Say = print_line) -> int:
+def command(arguments: argparse.Namespace, print_line: PrintLine = print_line) -> int:
     """``phasedic recover SESSION [--out FILE]``; 5 if a part cannot be read."""
     from acquire.session import recover as copy
 
     done = copy(arguments.session, arguments.out)
-    say(done.line())
+    print_line(done.line())
     for sentence in done.unreadable[:10]:
-        say(f"  {sentence}")
+        print_line(f"  {sentence}")
     return 5 if done.unreadable else 0

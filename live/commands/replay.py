@@ -11,7 +11,7 @@ from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_as_measured, add_measure, add_time_span, overrides
 from live.commands.signals import signals
 from live.ui.terminal.screen import TerminalScreen
-from live.ui.terminal.summary import say_summary
+from live.ui.terminal.summary import print_summary
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,9 +42,9 @@ def command(arguments: argparse.Namespace) -> int:
         forces=Path(arguments.forces) if arguments.forces else None,
     )
     screen, stopping = TerminalScreen(), threading.Event()
-    with signals(stopping.set, screen.say):
+    with signals(stopping.set, screen.print):
         done = replay(request, screen, stopping, standard_consumers(screen))
-    say_summary(
+    print_summary(
         screen,
         done.run_state,
         done.config.specimen,
@@ -58,7 +58,7 @@ def command(arguments: argparse.Namespace) -> int:
 
         write_report(done.folder, screen)
     if done.exit_code in EXIT_WORDS:
-        screen.say(f"exit code {done.exit_code}: {EXIT_WORDS[done.exit_code]}")
+        screen.print(f"exit code {done.exit_code}: {EXIT_WORDS[done.exit_code]}")
     return done.exit_code
 
 

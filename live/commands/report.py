@@ -60,11 +60,11 @@ def command(arguments: argparse.Namespace) -> int:
             report = compare(tests)
             with new_file(out.with_suffix(".csv")) as part, part.open("x", encoding="utf-8") as file:
                 write_table(tests, file)
-            screen.say(str(out.with_suffix(".csv")))
+            screen.print(str(out.with_suffix(".csv")))
         else:
             report = make_report(found[0], _request(arguments, found[0]), screen)
         for note in (note for run in found for note in run.notes):
-            screen.say(f"note: {note}")
+            screen.print(f"note: {note}")
     _save(report, out, arguments, screen)
     return 0
 
@@ -76,9 +76,9 @@ def write_report(folder: Path, screen: Screen) -> str:
             save_page(
                 make_report(run, ReportRequest(mm_per_px=run.mm_per_px), screen), folder / "report.html"
             )
-        screen.say(f"  {folder / 'report.html'}")
+        screen.print(f"  {folder / 'report.html'}")
     except PhasedicError as error:
-        screen.say(f"warning: no report was made: {error}")
+        screen.print(f"warning: no report was made: {error}")
         return str(error)
     return ""
 
@@ -97,10 +97,10 @@ def _targets(out: Path, arguments: argparse.Namespace) -> list[Path]:
 
 def _save(report: Report, out: Path, arguments: argparse.Namespace, screen: Screen) -> None:
     save_page(report, out)
-    screen.say(str(out))
+    screen.print(str(out))
     if arguments.figures:
         save_figures(report.figures, Path(arguments.figures), screen)
-        screen.say(arguments.figures)
+        screen.print(arguments.figures)
     if arguments.pdf:
         save_pdf(out, out.with_suffix(".pdf"))
-        screen.say(str(out.with_suffix(".pdf")))
+        screen.print(str(out.with_suffix(".pdf")))

@@ -26,7 +26,7 @@ from live.run.outcome import Outcome, StopSignal
 from live.setup.region import located
 from live.ui.rerun.view import has_display, rerun_command, spawn_viewer
 from live.ui.terminal.screen import TerminalScreen
-from live.ui.terminal.summary import say_summary, trouble_lines
+from live.ui.terminal.summary import print_summary, trouble_lines
 
 if TYPE_CHECKING:
     from live.ui.web.page_controller import PageController
@@ -52,7 +52,7 @@ def command(arguments: argparse.Namespace) -> int:
     screen, config = TerminalScreen(), configured(arguments)
     check_alarms(config)
     check_folder(config.output.dir)
-    with located(config, screen.say) as config:
+    with located(config, screen.print) as config:
         outcome = run_and_show_page(config, screen) if arguments.page else run_attended(config, screen)
     if not arguments.page:
         print_outcome(outcome, screen, verbose=arguments.verbose)
@@ -83,8 +83,8 @@ def run_with_page(controller: PageController, config: Config, screen: Screen) ->
 def open_page(controller: PageController, screen: Screen) -> None:
     """Open the page if there is a display, and print its address."""
     if has_display() and webbrowser.open(controller.address):
-        screen.say("the page opens in the browser")
-    screen.say(f"the page: {controller.address}")
+        screen.print("the page opens in the browser")
+    screen.print(f"the page: {controller.address}")
 
 
 def _open_viewer(port: int) -> str:
@@ -118,7 +118,7 @@ def run_attended(
 
         if port is not None:
             stack.callback(port.close)
-        stack.enter_context(signals(lambda: stop.request(INTERRUPTED), screen.say))
+        stack.enter_context(signals(lambda: stop.request(INTERRUPTED), screen.print))
         return run_live(
             config, screen, stop=stop, consumers=standard_consumers(screen, consumers), on_start=on_start
         )
@@ -132,7 +132,7 @@ def print_outcome(outcome: Outcome, screen: Screen, *, verbose: bool = False) ->
     if verbose and rrd.exists():
         lines.append(f"open the recorded view with: {rerun_command()} {rrd}")
     report = outcome.config.output.report
-    say_summary(
+    print_summary(
         screen, run_state, outcome.config.specimen, folder, lines, verbose=verbose, with_report=report
     )
     if report:
@@ -140,4 +140,4 @@ def print_outcome(outcome: Outcome, screen: Screen, *, verbose: bool = False) ->
 
         write_report(folder, screen)
     if outcome.exit_code in EXIT_WORDS:
-        screen.say(f"exit code {outcome.exit_code}: {EXIT_WORDS[outcome.exit_code]}")
+        screen.print(f"exit code {outcome.exit_code}: {EXIT_WORDS[outcome.exit_code]}")

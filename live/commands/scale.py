@@ -74,15 +74,15 @@ def command(arguments: argparse.Namespace) -> int:
     config = configured(arguments)
     stand_off = arguments.stand_off or config.scale.stand_off_mm
     scale = _scale(arguments, config, stand_off, screen)
-    screen.say(
-        f"scale: {scale.mm_per_px:.6g} +- {scale.sigma:.2g} mm/px ({scale.relative:.2%}), {scale.method}"
+    screen.print(
+        f"scale: {scale.mm_per_px:.6g} ± {scale.sigma:.2g} mm/px ({scale.relative:.2%}), {scale.method}"
     )
     for remark in scale.remarks:
-        screen.say(f"LOOK  {remark}")
+        screen.print(f"LOOK  {remark}")
     _print_false_strain(stand_off, screen)
     if arguments.config:
         write_rig(Path(arguments.config), scale.changes(arguments.stand_off))
-        screen.say(f"written to {arguments.config}; the former file is {arguments.config}.bak")
+        screen.print(f"written to {arguments.config}; the former file is {arguments.config}.bak")
     return 0
 
 
@@ -109,7 +109,7 @@ def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | Non
         return from_points((x1, y1, x2, y2), _needed(arguments, "length"), arguments.sigma)
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS or --config rig.toml")
-    first = first_look(config, screen.say)
+    first = first_look(config, screen.print)
     if arguments.width is None:
         return from_board(first.picture, _board(arguments), arguments.sigma, stand_off)
     width = config.specimen.width_mm if arguments.width == WIDTH_OF_RIG else arguments.width
@@ -151,9 +151,9 @@ def _numbers(
 def _print_false_strain(stand_off: float | None, screen: Screen) -> None:
     moved = f"{OUT_OF_PLANE_MM:g} mm toward the camera"
     if stand_off is None:
-        screen.say(f"give --stand-off MM for the false strain of {moved}")
+        screen.print(f"give --stand-off MM for the false strain of {moved}")
         return
     strain = false_strain(stand_off) * 1e6
-    screen.say(
-        f"{moved} at a stand-off of {stand_off:g} mm gives a false strain of {strain:.0f} um/m (exx and eyy)"
+    screen.print(
+        f"{moved} at a stand-off of {stand_off:g} mm gives a false strain of {strain:.0f} µm/m (exx and eyy)"
     )

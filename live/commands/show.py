@@ -37,7 +37,7 @@ def command(arguments: argparse.Namespace) -> int:
             add_gauges(run, Path(arguments.more_gauges))
         show(run, request, screen, stop, port=arguments.port, rrd=rrd)
     if rrd is not None:
-        screen.say(str(rrd))
+        screen.print(str(rrd))
     return 0
 
 

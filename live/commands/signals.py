@@ -12,7 +12,7 @@ from acquire.signal_mask import signal_handler
 
 
 @contextlib.contextmanager
-def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[None]:
+def signals(stop: Callable[[], None], print_line: Callable[[str], None]) -> Iterator[None]:
     """SIGINT and SIGTERM call ``stop``, the third one kills; the loss of the terminal is ignored."""
     times = 0
 
@@ -22,7 +22,7 @@ def signals(stop: Callable[[], None], say: Callable[[str], None]) -> Iterator[No
         if times > 2:
             signal.signal(number, signal.SIG_DFL)
             signal.raise_signal(number)
-        say("closing the files ..." if times == 1 else "still closing; a third signal ends it at once")
+        print_line("closing the files ..." if times == 1 else "still closing; a third signal ends it at once")
         stop()
 
     with signal_handler(handle, signal.SIGINT, signal.SIGTERM), signal_handler(signal.SIG_IGN, signal.SIGHUP):

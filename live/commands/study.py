@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import ConfigError
+from acquire.printable import counted
 from live.commands.options import add_config_file, add_help_all, add_options, add_verbose, overrides
 from live.config.values import AUTO
 from live.results.export.atomic_file import check_free, new_folder
@@ -84,23 +85,23 @@ def command(arguments: argparse.Namespace) -> int:
                 " 'phasedic replay' leaves beside its results"
             )
         compile_ahead(
-            picture_kinds(material.camera), phase=config.measure.estimator == "phase", say=screen.status
+            picture_kinds(material.camera), phase=config.measure.estimator == "phase", show=screen.status
         )
         windows = take_windows(material, arguments.static, arguments.loaded)
-        n = f"{len(windows.still)} still and {len(windows.loaded)} loaded bursts"
-        screen.say(f"{len(settings)} settings on {n} of {arguments.source}")
-        screen.say(_HEAD)
+        n = f"{len(windows.still)} still and {counted(len(windows.loaded), 'loaded burst')}"
+        screen.print(f"{counted(len(settings), 'setting')} on {n} of {arguments.source}")
+        screen.print(_HEAD)
         for one in study(material, windows, config, settings):
             found.append(one)
-            screen.say(_line(one))
+            screen.print(_line(one))
     advice = recommended(found)
     with new_folder(out) as part:
         (part / "study.csv").write_text(_csv(found), encoding="utf-8")
         (part / "measure.toml").write_text(_section(advice), encoding="utf-8")
         save_figures(_figures(found), part / "figures", screen)
-    screen.say(f"take {advice.found.setting.words}: {advice.why}")
-    screen.say(_section(advice).rstrip())
-    screen.say(f"  {out}")
+    screen.print(f"take {advice.found.setting.words}: {advice.why}")
+    screen.print(_section(advice).rstrip())
+    screen.print(f"  {out}")
     return 0
 
 
@@ -118,8 +119,8 @@ def _settings(arguments: argparse.Namespace) -> list[StudySetting]:
 # -- output -------------------------------------------------------------------------------------
 
 _HEAD = (
-    "  zoi step order window        l10 px  VSG px  noise um/m  over predicted  strain um/m    +-"
-    "  gradient um/m/px  valid"
+    "  zoi step order window        l10 px  VSG px  noise µm/m  over predicted  strain µm/m     ±"
+    "  gradient µm/m/px  valid"
 )
 
 
@@ -164,8 +165,8 @@ def _figures(found: Sequence[StudyResult]) -> list[Plot]:
     )
     x = "size of the virtual gauge, px"
     return [
-        Plot("noise", "Noise of one ZOI", x, "noise, um/m", noise),
-        Plot("strain", "Largest strain, corrected for its noise", x, "strain, um/m", seen),
+        Plot("noise", "Noise of one ZOI", x, "noise, µm/m", noise),
+        Plot("strain", "Largest strain, corrected for its noise", x, "strain, µm/m", seen),
     ]
 
 

@@ -20,10 +20,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic warm-up``; raises MachineUnfit if a known pattern is measured wrong."""
     screen = TerminalScreen()
-    took = compile_ahead(PICTURE_KINDS, phase=True, say=screen.status)
-    screen.say(f"everything is compiled ({took:.0f} s)" if took else "everything was compiled already")
+    took = compile_ahead(PICTURE_KINDS, phase=True, show=screen.status)
+    screen.print(f"everything is compiled ({took:.0f} s)" if took else "everything was compiled already")
     with on_fit_machine():
         for settings in (KernelSettings(), KernelSettings(order=2), KernelSettings(estimator="phase")):
             check_machine(settings, SELF_TEST_ZOI)
-    screen.say("self-test: a known pattern is measured right")
+    screen.print("self-test: a known pattern is measured right")
     return 0

@@ -31,7 +31,7 @@ _COUNTS = ("n_valid", "n_zoi")
 class TimeSeries(Sequence[TimeStep]):
     """A list that one thread appends to and any thread reads: numbers as columns, each text once.
 
-    About 200 bytes for each time step and 24 more for each gauge.
+    About 200 bytes for each time step and 32 more for each gauge.
     """
 
     def __init__(self) -> None:
@@ -119,6 +119,7 @@ class _GaugeColumn:
         nothing = [math.nan] * since
         self.since = since
         self.values, self._sigmas = array("d", nothing), array("d", nothing)
+        self._shares = array("d", nothing)
         self._reasons, self._missing = _TextColumn(), array("b", [1] * since)
         for _ in range(since):
             self._reasons.append("")
@@ -127,11 +128,14 @@ class _GaugeColumn:
         stored = value or GaugeValue(math.nan, math.nan)
         self.values.append(stored.value)
         self._sigmas.append(stored.sigma)
+        self._shares.append(stored.share)
         self._reasons.append(stored.reason)
         self._missing.append(value is None)
 
     def at(self, i: int) -> GaugeValue | None:
-        return None if self._missing[i] else GaugeValue(self.values[i], self._sigmas[i], self._reasons[i])
+        if self._missing[i]:
+            return None
+        return GaugeValue(self.values[i], self._sigmas[i], self._reasons[i], self._shares[i])
 
 
 def _copied(kept: array[float], count: int) -> Array:

@@ -21,7 +21,7 @@ from acquire.load_cell import LoadLog
 from analysis.field import Blur
 from analysis.field.picture_error import LIMIT, PictureError
 from live.pipeline.measurement import Measurement, TimeStep
-from live.pipeline.reference import Correction, averaged, unchanged
+from live.pipeline.reference import Correction, averaged, repetition_text, unchanged
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
@@ -143,7 +143,7 @@ class SmearGuard:
 class StrainGuard:
     """Checks each field of small strains, and warns once where another measure is more exact.
 
-    A rotation by r changes small strains by r^2/2 (3 degrees: 1400 um/m); they differ from the other measures
+    A rotation by r changes small strains by r^2/2 (3 degrees: 1400 µm/m); they differ from the other measures
     by about e^2/2 at a strain e.
 
     Parameters
@@ -166,7 +166,7 @@ class StrainGuard:
             self._warned = True
             text = (
                 f"turned by {math.degrees(turned):.1f} degrees, strained by {strained:.1%}: small strains are off by"
-                f" about {(turned**2 + strained**2) / 2 * 1e6:.0f} um/m; measure with --strain engineering"
+                f" about {(turned**2 + strained**2) / 2 * 1e6:.0f} µm/m; measure with --strain engineering"
             )
             data = {"rotation": turned, "strain": strained}
             self._on_event(Event(t, EventKind.MEASUREMENT, "strain", text, "warning", data))
@@ -307,11 +307,13 @@ def measure(
     tracker = Tracker(kernel, noise_GL, renew_at, on_event)
     guards = StrainGuard(strain, on_event), PictureGuard(on_event)
     sharpness = BlurGuard(on_event)
-    number = 0
+    number, repeats = 0, repetition_text(kernel.period)
     for item in bursts:
         if isinstance(item, NewReference):
             tracker.renew_on_demand(correct(item.burst))
             continue
+        if number == 0 and repeats:
+            on_event(Event(item.t, EventKind.MEASUREMENT, "pattern", repeats, "warning"))
         began = timer()
         field = replace(tracker.measure(correct(item)), measure=strain)
         took = timer() - began

@@ -15,7 +15,7 @@ import numpy as np
 
 from acquire.frame import Burst
 from analysis.evaluate import AreaStrain, Gauge, GaugeValue, extension_of
-from analysis.field import StrainField, mean_blur
+from analysis.field import StrainField, area_share, mean_blur
 
 AXIAL, TRANSVERSE = "axial", "transverse"
 """Gauges of these names are the strain along and across the load."""
@@ -65,6 +65,8 @@ class TimeStep:
         That variation over what noise makes of it.
     blur, sigma_blur : float, px
         Of the picture since its reference (``analysis.field.Blur``); negative: sharper.
+    area_share : float
+        Of the region that its strains stand for, where a block of ZOIs was lost (``analysis.field.area_share``).
     """
 
     t: float
@@ -97,6 +99,12 @@ class TimeStep:
     misfit: float = math.nan
     blur: float = math.nan
     sigma_blur: float = math.nan
+    area_share: float = 1.0
+
+    @property
+    def least_share(self) -> float:
+        """The smallest share of an area that the strains of the region and of the gauges stand for."""
+        return min(self.area_share, *(gauge.share for gauge in self.gauges.values() if not gauge.reason), 1.0)
 
     def axial(self, axis: str) -> tuple[float, float]:
         """Strain along the load, which runs along ``axis`` ("x" or "y"), and its standard uncertainty."""
@@ -156,6 +164,7 @@ def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: floa
         measure_s=measure_s,
         blur=blur.px,
         sigma_blur=blur.sigma,
+        area_share=area_share(field),
     )
 
 
@@ -194,7 +203,7 @@ class Measurement:
 
         ``force`` (N) is NaN where it is not known, ``measure_s`` (s) the time of the kernel.
         """
-        values = {gauge.name: gauge.measure(field) for gauge in gauges}
+        values = {gauge.name: gauge.read(field) for gauge in gauges}
         return cls(number, burst, field, replace(time_step_of(burst, field, force, measure_s), gauges=values))
 
     @property

@@ -151,6 +151,7 @@ class RunState:
             sigma_axial=sigma,
             valid=time_step.n_valid if time_step else 0,
             zois=time_step.n_zoi if time_step else 0,
+            area_share=time_step.least_share if time_step else 1.0,
             latency_p95_s=health.latency_p95_s,
             disk_s=health.disk_s,
             alarms=self.alarms.texts,

@@ -17,7 +17,7 @@ class Screen:
         """Whether the status line may be renewed now."""
         return False
 
-    def say(self, text: str = "") -> None:
+    def print(self, text: str = "") -> None:
         """Print a permanent line."""
 
     def bell(self) -> None:

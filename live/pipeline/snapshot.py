@@ -33,6 +33,8 @@ class Snapshot:
         Strain along the load and its standard uncertainty.
     valid, zois : int
         ZOIs with a value, and all.
+    area_share : float
+        The smallest share of an area that the strains stand for (``TimeStep.least_share``).
     latency_p95_s : float, s
         Of the last seconds.
     disk_s : float, s
@@ -57,6 +59,7 @@ class Snapshot:
     sigma_axial: float = math.nan
     valid: int = 0
     zois: int = 0
+    area_share: float = 1.0
     latency_p95_s: float = math.nan
     disk_s: float = math.inf
     alarms: tuple[str, ...] = ()

@@ -34,7 +34,7 @@ def open_session_source(
     """Open a session for a replay and show the notes on it; raises as ``replay``."""
     with Session.open(path) as session:
         for note in _notes(session, request):
-            screen.say(f"note: {note}")
+            screen.print(f"note: {note}")
         overrides = {"camera.address": f"session:{path}", "load.address": f"session:{path}"}
         config = session_config(session, request, overrides, path)
         if request.overrides.get("measure.roi") == AUTO and "measure.mask" not in request.overrides:
@@ -60,7 +60,7 @@ def _with_fitting_gauges(
             gauges_for({name: gauges[name]}, axis, grid)
         except ConfigError:
             del gauges[name]
-            screen.say(
+            screen.print(
                 f"note: the automatic gauge {name} of the run has no ZOI in this grid, and is left out"
             )
     return replace(config, gauges=gauges)
@@ -118,7 +118,7 @@ def prepare_replay(
     mask = read_mask(config.measure.mask, camera.width, camera.height)
     if AUTO in (config.measure.roi, config.measure.gauges):
         look = FirstLook(source.reference.mean, _noise_of(source.reference), camera)
-        config, mask = located_on(config, look, screen.say)
+        config, mask = located_on(config, look, screen.print)
     plan = MeasurePlan.of(config, camera, mask)
     plan.compile(camera, screen.status, stopped)
     return plan.on(source.reference, f"the reference of {name}")

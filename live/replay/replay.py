@@ -161,7 +161,7 @@ def _run(
         specimen=config.specimen,
     )
     write_names(request.source, folder / "pictures.csv")
-    screen.say(f"replaying {request.source} into {request.final_folder or folder}")
+    screen.print(f"replaying {request.source} into {request.final_folder or folder}")
     about = RunInfo(
         config,
         folder,

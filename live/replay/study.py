@@ -271,6 +271,10 @@ def _largest(first: Array, second: Array) -> float:
     return float(max(0.0, np.sign(first[place]) * second[place]))
 
 
+def _least_noise(kept: int) -> str:
+    return "it alone shows" if kept == 1 else f"it has the least noise of the {kept} settings that show"
+
+
 def recommended(found: Sequence[StudyResult]) -> Advice:
     """The knee: least noise among those that still show the largest strain.
 
@@ -288,8 +292,8 @@ def recommended(found: Sequence[StudyResult]) -> Advice:
     keep = [one for one in significant if one.seen >= KEPT_SHARE * (top.seen - top.sigma)]
     best = min(keep, key=lambda one: one.noise)
     why = (
-        f"of the {len(keep)} settings that show at least {KEPT_SHARE:.0%} of the largest strain"
-        f" ({top.seen * 1e6:.0f} um/m, with {top.setting.words}) it has the least noise"
+        f"{_least_noise(len(keep))} at least {KEPT_SHARE:.0%} of the largest strain"
+        f" ({top.seen * 1e6:,.0f} µm/m, with {top.setting.words})"
     )
     larger = [one for one in significant if one.noise < best.noise]
     if larger:

@@ -39,13 +39,13 @@ _SMALL_KN = 2.0  # below it forces are shown in N
 
 
 def value_text(value: float, sigma: float, unit: str) -> str:
-    """``value +- sigma unit``, rounded to two digits of the uncertainty."""
+    """``value ± sigma unit``, rounded to two digits of the uncertainty."""
     if not math.isfinite(value):
         return "not known"
     if not math.isfinite(sigma) or sigma <= 0:
         return f"{value:.4g} {unit}".rstrip()
     digits = max(0, min(6, 1 - math.floor(math.log10(sigma))))
-    return f"{value:.{digits}f} +- {sigma:.{digits}f} {unit}".rstrip()
+    return f"{value:.{digits}f} ± {sigma:.{digits}f} {unit}".rstrip()
 
 
 def figure_text(figure: Figure, unit_is: float = 1.0, unit: str = "") -> str:
@@ -198,7 +198,7 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
     rows = _rows(figures, specimen)
     hint = "" if specimen.area_m2 else " (give [specimen] width_mm and thickness_mm for E)"
     of = f" of {figures.elastic_strain}" if figures.elastic_strain else ""
-    words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, +-: {CONFIDENCE:.0%} interval)"
+    words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, ±: {CONFIDENCE:.0%} interval)"
     return [_text(rows, "E") + hint + words, _known_texts(rows, _STRENGTHS)]
 
 

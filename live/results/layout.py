@@ -17,7 +17,11 @@ BYTES = {"status", "iterations"}  # maps of whole numbers; the others are float3
 WHOLE = {"frame", "last_frame", "n_frames", "lost", "n_valid", "n_zoi"}  # columns; the others are float64
 ANY_COLUMN = Declared("number", (None,))  # of a gauge, or added by another version
 # The columns that every file of this version has, and those that it may have.
-REQUIRED = {*COLUMNS} - {"latency_s", "kernel_s", "zero_N", *EXTENSIONS, *UNEVEN, "blur_px", "sigma_blur_px"}
+REQUIRED = {*COLUMNS} - {
+    *("latency_s", "kernel_s", "zero_N", "blur_px", "sigma_blur_px", "area_share"),
+    *EXTENSIONS,
+    *UNEVEN,
+}
 KNOWN = {*COLUMNS, "stress_Pa", "true_strain", "true_stress_Pa", "force_raw_N"}
 ERRORS = "_errors"  # NeXus: the uncertainty of NAME is also called NAME_errors
 MAX_SIDE_PX = 65_535

@@ -91,6 +91,11 @@ _INSTANTS = (
     Quantity("uneven_exx", UNITLESS, "variation of exx over the region, rms, up to the second degree"),
     Quantity("uneven_eyy", UNITLESS, "variation of eyy over the region, rms, up to the second degree"),
     Quantity("misfit", UNITLESS, "that variation over what noise makes of it; about 1 in a uniform strain"),
+    Quantity(
+        "area_share",
+        UNITLESS,
+        "share of the region that its strains stand for; below 1 where a block was lost",
+    ),
     Quantity("force_raw", "N", "force as stamped, not corrected for the lag of the load"),
     Quantity("zero", "N", "sum of the tares before, subtracted from the force"),
     Quantity("n_valid", UNITLESS, "ZOIs with a value"),
@@ -104,7 +109,7 @@ _INSTANTS = (
     Quantity("kernel", "s", "time that the kernel took; nan where it was not measured"),
     Quantity("latency", "s", "from the stamp of the last frame of the burst to the result; nan in a replay"),
 )
-_GAUGE = "gauge_"
+_GAUGE, _SHARE = "gauge_", "share_gauge_"
 _KNOWN = {q.name: q for q in (*_FIELDS, *_PLACES, *_INSTANTS)}
 
 MEANS = {
@@ -122,6 +127,9 @@ def quantity_of(name: str) -> Quantity:
     if plain in _KNOWN:
         return _KNOWN[plain]
     gauge = plain.removeprefix("sigma_")
+    if plain.startswith(_SHARE):
+        words = f"share of its area that {plain.removeprefix('share_')} stands for, at either end"
+        return Quantity(plain, UNITLESS, words)
     if gauge.startswith(_GAUGE):
         words = f"strain of the virtual gauge {gauge.removeprefix(_GAUGE)!r}; nan where it was lost"
         return Quantity(

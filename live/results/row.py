@@ -92,9 +92,9 @@ class StrainRow:
         return cls(maps, _values(measurement, maps, info, axis))
 
 
-def gauge_columns(name: str) -> tuple[str, str]:
-    """The names that value and standard uncertainty of a virtual gauge have in files."""
-    return f"gauge_{name}", f"sigma_gauge_{name}"
+def gauge_columns(name: str) -> tuple[str, str, str]:
+    """The names that value, standard uncertainty and share of the area of a virtual gauge have in files."""
+    return f"gauge_{name}", f"sigma_gauge_{name}", f"share_gauge_{name}"
 
 
 def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any]]:
@@ -135,9 +135,10 @@ def _values(
         "zero_N": time_step.zero,
         "blur_px": time_step.blur,
         "sigma_blur_px": time_step.sigma_blur,
+        "area_share": time_step.area_share,
     }
     for name, gauge in time_step.gauges.items():
-        values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma), strict=True))
+        values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma, gauge.share), strict=True))
     if info.area_m2 is not None:
         values["stress_Pa"] = stress = time_step.force / info.area_m2
         stretch = _stretch(measurement, info.strain_measure, axis)

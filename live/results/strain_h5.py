@@ -219,7 +219,7 @@ def _add_gauges(entry: Any, info: ResultsInfo) -> None:
     group = _group(entry, "gauges", "NXdata", signal=first, axes=["time_s"], title="Virtual gauges")
     group["time_s"] = entry["mean/time_s"]
     for name, described in info.gauges.items():
-        column, sigma = gauge_columns(name)
+        column, sigma, _ = gauge_columns(name)
         group[name], group[f"sigma_{name}"] = entry["mean"][column], entry["mean"][sigma]
         group[f"{name}{layout.ERRORS}"] = entry["mean"][sigma]
         entry["mean"][column].attrs.update(uncertainties=sigma, gauge=json.dumps(described))

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from acquire.load_cell import LoadLog
-from acquire.printable import brief
+from acquire.printable import brief, share_text
 from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
@@ -35,7 +35,7 @@ def noise_line(history: History) -> str:
     one = np.nanmedian(history.column("zoi_sigma")) * 1e6
     mean = np.nanmedian(history.column("sigma_eyy")) * 1e6
     return (
-        f"noise: {picture}strain of one ZOI {one:.3g} um/m, of the mean {mean:.2g} um/m (predicted, 1 sigma)"
+        f"noise: {picture}strain of one ZOI {one:.3g} µm/m, of the mean {mean:.2g} µm/m (predicted, 1 sigma)"
     )
 
 
@@ -70,10 +70,12 @@ def summary_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     last, strains = history.time_steps[int(valid[-1])], history.column("largest")[valid]
     largest = strains[np.argmax(np.abs(strains))]
     refused = f" ({last.refused})" if last.refused else ""
+    part = share_text(last.least_share)
     lines = [
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} um/m;"
-        f" largest of any ZOI {largest * 1e6:+.0f} um/m",
+        f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
+        f"{f' {part}' if part else ''};"
+        f" largest of any ZOI {largest * 1e6:+.0f} µm/m",
         noise_line(history),
     ]
     lines += sharpness_line(history.column("blur").tolist(), history.column("sigma_blur").tolist())
@@ -118,11 +120,11 @@ class StatusCard:
             f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, mean **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
         ]
         blur = Blur(i.blur, i.sigma_blur).text
-        lines += [f"{blur} since the reference".replace("+-", "±")] * bool(blur)
+        lines += [f"{blur} since the reference"] * bool(blur)
+        if part := share_text(i.least_share):
+            lines.append(f"strain **{part}**")
         figures = evaluate(history, self._loads, self._specimen)
-        lines += [
-            line.replace("  ", ", ").replace("+-", "±") for line in elastic_lines(figures, self._specimen)
-        ]
+        lines += [line.replace("  ", ", ") for line in elastic_lines(figures, self._specimen)]
         lines.append(
             f"recorded {frames['recorded']}, measured {frames['measured']}, skipped {frames['skipped']},"
             f" lost {f'**{lost}**' if lost else 0}"

@@ -134,7 +134,7 @@ def in_words(channel: str, value: float, limit: float) -> str:
     """A channel at its value beyond its limit, for a person: ``axial 4450 um/m, limit 4000``."""
     plain = channel.removeprefix("sigma_")
     if plain in _STRAINS or plain.startswith("gauge_"):
-        return f"{channel.replace('_', ' ')} {value * 1e6:.0f} um/m, limit {limit * 1e6:.0f}"
+        return f"{channel.replace('_', ' ')} {value * 1e6:.0f} µm/m, limit {limit * 1e6:.0f}"
     suffix = next((one for one in _UNITS if plain.endswith(one)), "")
     label = _LABELS.get(channel, channel.removesuffix(suffix).replace("_", " "))
     return f"{label} {value:.6g} {_UNITS[suffix]}".rstrip() + f", limit {limit:.6g}"

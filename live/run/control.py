@@ -266,7 +266,7 @@ class ControlPort:
         self._server = LineServer(self._listening, self._token, lambda line: answer(line, controls))
         self._server.start()
         token = " (with a token)" if self._token else ""
-        self._screen.say(f"commands are taken at {self._host}:{self._server.port}{token}")
+        self._screen.print(f"commands are taken at {self._host}:{self._server.port}{token}")
         return self._server.port
 
     def close(self) -> None:

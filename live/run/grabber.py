@@ -19,6 +19,7 @@ from acquire.camera import Camera, missing_at_end
 from acquire.errors import PhasedicError
 from acquire.events import EventKind, RateLimiter
 from acquire.frame import Burst, CameraInfo, Frame
+from acquire.printable import counted
 from live.config.loading import Config
 from live.pipeline.queues import LatestQueue
 from live.pipeline.reference import ReferenceBurst, ReferenceTaker
@@ -161,7 +162,7 @@ class Grabber:
         missing = missing_at_end(self._camera.info, silent_s)
         if missing:
             self._frame_counts.add(lost=missing)
-            text = f"{missing} frames were lost at the end: none came for the last {silent_s:.1f} s"
+            text = f"{counted(missing, 'frame')} lost at the end: none came for the last {silent_s:.1f} s"
             data = {"count": missing, "where": "end"}
             self._event_log.emit(EventKind.LOST, self._camera.info.address, text, "warning", data)
 
@@ -190,7 +191,7 @@ class Grabber:
         self._unreported += frame.lost_before
         if not self._limiter.due(frame.t):
             return
-        text = f"{self._unreported} frames were lost, the last before frame {frame.index}"
+        text = f"{counted(self._unreported, 'frame')} lost, the last before frame {frame.index}"
         data = {"count": self._unreported, "before": frame.index}
         self._event_log.emit(EventKind.LOST, self._camera.info.address, text, "warning", data)
         self._unreported = 0

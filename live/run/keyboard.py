@@ -68,7 +68,7 @@ class Keys:
         elif letter == "q":
             self._quit()
         elif letter not in ENTER:
-            self._screen.say(HELP)
+            self._screen.print(HELP)
 
     def _edit(self, letter: str) -> None:
         line = self._line or ""
@@ -89,14 +89,14 @@ class Keys:
 
     def _command(self, line: str) -> None:
         if (text := answer(line, self._controls)) != "ok":
-            self._screen.say(text)
+            self._screen.print(text)
 
     def _quit(self) -> None:
         before, self._quit_t = self._quit_t, self._clock()
         if self._quit_t - before <= QUIT_AGAIN_S:
             self._controls.stop(ENDED)
         else:
-            self._screen.say(f"q again within {QUIT_AGAIN_S:g} s ends the test")
+            self._screen.print(f"q again within {QUIT_AGAIN_S:g} s ends the test")
 
 
 class Keyboard:
@@ -110,7 +110,7 @@ class Keyboard:
 
     def start(self) -> None:
         """Show the keys, and begin to read."""
-        self._screen.say(HELP if self._terminal else LINES_HELP)
+        self._screen.print(HELP if self._terminal else LINES_HELP)
         self._thread.start()
 
     def join(self, seconds: float) -> None:
@@ -134,7 +134,7 @@ class Keyboard:
     def _take_lines(self) -> None:
         for text in self._stream:
             if text.strip() and (reply := answer(text, self._controls)) != "ok":
-                self._screen.say(reply)
+                self._screen.print(reply)
 
     def _take_keys(self, terminal: _Terminal) -> None:
         keys = Keys(self._controls, self._screen)

@@ -291,7 +291,7 @@ def run_live(
         RunState.new(config.load.max_gap_s, config.load.lag_s, config.specimen),
     )
     run_state.event_log.names |= device_names(config)
-    screen.say(f"opening {config.camera.address}")
+    screen.print(f"opening {config.camera.address}")
     rig = open_rig(
         config.camera.address,
         config.load.address,
@@ -302,7 +302,7 @@ def run_live(
     try:
         prepared = set_up(config, rig, run_state.event_log, screen, stop)
         for line in announcement(rig, prepared.folder):
-            screen.say(line)
+            screen.print(line)
         about = RunInfo(
             prepared.config,
             prepared.folder,

@@ -69,7 +69,7 @@ def set_up(config: Config, rig: Rig, event_log: EventLog, screen: Screen, stop: 
     bursts = _burst_lengths(config, camera.live)
     took = plan.compile(camera, screen.status, lambda: stop.requested)
     if took > 0:
-        screen.say(f"everything is compiled ({took:.0f} s)")
+        screen.print(f"everything is compiled ({took:.0f} s)")
     compile_loops()
     dry_run(camera, plan.grid, plan.settings, bursts)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))

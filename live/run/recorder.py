@@ -100,9 +100,9 @@ def _announce_disk(path: Path, camera: CameraInfo, mode: RecordMode, screen: Scr
     rate = camera.width * camera.height * (2 if camera.bits > 8 else 1) * (camera.fps or 30.0) / mode.every
     minutes = forecast(path, rate) / 60
     where = f"recording about {rate / 1e6:.0f} MB/s at most, room for {minutes:.0f} minutes"
-    screen.say(f"warning: {where}" if minutes < 30 else where)
+    screen.print(f"warning: {where}" if minutes < 30 else where)
     if share := network_share(path):
-        screen.say(f"warning: {path.parent} is on a network share ({share}); a local disk is safer")
+        screen.print(f"warning: {path.parent} is on a network share ({share}); a local disk is safer")
     return minutes * 60
 
 

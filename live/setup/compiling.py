@@ -32,7 +32,7 @@ def compile_ahead(
     kinds: Sequence[str],
     *,
     phase: bool = False,
-    say: Callable[[str], object] = lambda text: None,
+    show: Callable[[str], object] = lambda text: None,
     stopped: Callable[[], bool] = lambda: False,
 ) -> float:
     """Compile what pictures of these kinds need and the cache lacks; returns the seconds that took.
@@ -43,7 +43,7 @@ def compile_ahead(
         Of ``analysis.PICTURE_KINDS``.
     phase : bool
         Also for the phase estimator.
-    say : callable taking a text, optional
+    show : callable taking a text, optional
         Receives the progress several times a second.
     stopped : callable, optional
         Polled several times a second; True ends the compilation.
@@ -69,7 +69,7 @@ def compile_ahead(
                 over = any(process.poll() == -signal.SIGINT for process in processes)
                 if over or interrupted.is_set() or stopped():
                     raise Interrupted(_INTERRUPTED)
-                say(progress_text(share_compiled(kinds, began_file, phase=phase), time.monotonic() - began))
+                show(progress_text(share_compiled(kinds, began_file, phase=phase), time.monotonic() - began))
     except KeyboardInterrupt:  # from the handler of a command that has no other
         raise Interrupted(_INTERRUPTED) from None
     finally:

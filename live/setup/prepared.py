@@ -63,10 +63,12 @@ class MeasurePlan:
         gauges = gauges_for(config.gauges, config.specimen.first_axis, grid)
         return cls(config, mask, grid, gauges, kernel_settings(config), correction(config, camera))
 
-    def compile(self, camera: CameraInfo, say: Callable[[str], object], stopped: Callable[[], bool]) -> float:
+    def compile(
+        self, camera: CameraInfo, show: Callable[[str], object], stopped: Callable[[], bool]
+    ) -> float:
         """Compile what is not compiled yet (``compile_ahead``); returns the seconds that took."""
         phase = self.settings.estimator == "phase"
-        return compile_ahead(picture_kinds(camera), phase=phase, say=say, stopped=stopped)
+        return compile_ahead(picture_kinds(camera), phase=phase, show=show, stopped=stopped)
 
     def on(self, reference: Burst, what: str = "the reference") -> PreparedKernel:
         """The kernel on ``reference``, named ``what`` in errors; raises as ``live.pipeline.reference.prepare``."""

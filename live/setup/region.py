@@ -158,17 +158,19 @@ class FirstLook:
         return width, height
 
 
-def first_look(config: Config, say: Callable[[str], None]) -> FirstLook:
+def first_look(config: Config, print_line: Callable[[str], None]) -> FirstLook:
     """Open the camera, take a few frames, and close it; raises as ``open_rig``.
 
-    ``say`` receives the warnings of the camera meanwhile.
+    ``print_line`` receives the warnings of the camera meanwhile.
 
     Raises
     ------
     DataError
         The camera ended without a whole frame.
     """
-    rig = open_rig(at_rest(config.camera.address), "none:", report_warnings(say), crop=config.camera.crop)
+    rig = open_rig(
+        at_rest(config.camera.address), "none:", report_warnings(print_line), crop=config.camera.crop
+    )
     n = FIRST_LOOK_FRAMES if rig.camera.info.live else 1
     images: list[NDArray[Any]] = []
     try:
@@ -184,12 +186,12 @@ def first_look(config: Config, say: Callable[[str], None]) -> FirstLook:
     return FirstLook(*_mean_and_noise(images), rig.camera.info)
 
 
-def report_warnings(say: Callable[[str], None]) -> EventSink:
-    """An event sink that passes the warnings and errors of a device to ``say``."""
+def report_warnings(print_line: Callable[[str], None]) -> EventSink:
+    """An event sink that passes the warnings and errors of a device to ``print_line``."""
 
     def report(event: Event) -> None:
         if event.level != "info":
-            say(event.text)
+            print_line(event.text)
 
     return report
 
@@ -203,7 +205,7 @@ def _mean_and_noise(images: list[NDArray[Any]]) -> tuple[NDArray[Any], float | N
 
 
 @contextmanager
-def located(config: Config, say: Callable[[str], None]) -> Iterator[Config]:
+def located(config: Config, print_line: Callable[[str], None]) -> Iterator[Config]:
     """The configuration of a test with the specimen found, if no region is given, and automatic gauges placed.
 
     The mask lies in a temporary folder; a run copies it into its own.
@@ -212,12 +214,14 @@ def located(config: Config, say: Callable[[str], None]) -> Iterator[Config]:
         yield config
         return
     auto_region = is_auto_region(config)
-    config, mask = located_on(config, first_look(config, say), say)
+    config, mask = located_on(config, first_look(config, print_line), print_line)
     with TemporaryDirectory(prefix="phasedic-") as folder:
         yield with_mask(config, mask if auto_region else None, Path(folder))
 
 
-def located_on(config: Config, first: FirstLook, say: Callable[[str], None]) -> tuple[Config, Bools | None]:
+def located_on(
+    config: Config, first: FirstLook, print_line: Callable[[str], None]
+) -> tuple[Config, Bools | None]:
     """The configuration with region and automatic gauges in px, and the mask (H, W).
 
     Raises
@@ -227,5 +231,5 @@ def located_on(config: Config, first: FirstLook, say: Callable[[str], None]) -> 
     """
     region = region_of(config, first.picture, first.noise)
     if is_auto_region(config):
-        say(f"{region.words} (--roi all or --roi X,Y,W,H choose another region)")
+        print_line(f"{region.words} (--roi all or --roi X,Y,W,H choose another region)")
     return with_auto_gauges(region.config(config), region.grid(config, *first.size)), region.mask

@@ -218,7 +218,7 @@ def ratio_cases(folder: Path, quick: bool) -> Iterator[tuple[tuple[str, ...], fl
     """Noise of the reference, of the picture and as stated, GL; kept, predicted over observed, within the limits."""
     for first, second in RATIOS[:2] if quick else RATIOS:
         # A reference that is said to be sharper than its noise lets it pass for pattern: sigma 10 % too small at 5 GL.
-        for stated in (None, *{float(max(noise, 0.3)) for noise in (first, max(first, second))}):
+        for stated in (None, *sorted({float(max(noise, 0.3)) for noise in (first, max(first, second))})):
             kept, ratio, error = ratio_of_noise(folder, first, second, stated)
             good = kept >= MIN_KEPT_NOISE and abs(ratio - 1) <= RATIO_WITHIN + 2 * error
             yield (f"{first}", f"{second}", "none" if stated is None else f"{stated:g}"), kept, ratio, good

@@ -96,8 +96,8 @@ def test_a_stream_that_fails_is_let_go() -> None:
 def test_a_narrow_encoding_does_not_silence_the_screen() -> None:
     raw = io.BytesIO()
     screen = TerminalScreen(io.TextIOWrapper(raw, encoding="ascii"))
-    screen.say("5 µm/m")
-    screen.say("next")
+    screen.print("5 µm/m")
+    screen.print("next")
     assert raw.getvalue() == b"5 \\xb5m/m\nnext\n"
 
 

@@ -11,8 +11,9 @@ from analysis.field import StrainField
 from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, ReferenceArgs, VerdictArgs
 from analysis.fit.verdict import judge
 from analysis.kernel.images import as_model
+from analysis.kernel.neighbours import Neighbours
 from analysis.kernel.reference import ReferencePicture
-from analysis.kernel.solve import Solution, _lent_guesses, _Places
+from analysis.kernel.solve import Solution
 from tests.analysis.speckle import SHAPE, picture
 
 PIXELS, SIGNAL, EXPECTED = 200.0, 1e4, 4.0
@@ -23,7 +24,7 @@ ALLOWED = (1.05 + 4 * np.sqrt(2 / PIXELS)) * EXPECTED
 def verdict(left: float, *, gain: float = 1.0, noise_known: bool = True, **changed: int) -> Status:
     """The status of one ZOI that leaves a variance of ``left`` GL^2 where the noise has EXPECTED."""
     found = OutArgs.starting(np.zeros((1, 6)))
-    found.left[:], found.bending[:], found.nuisance[:] = left, 0, (gain, 0)
+    found.left[:], found.bending[:], found.nuisance[:] = left, 0, (gain, 0, 0)
     found.state[:], found.iterations[:] = changed.get("state", CONVERGED), changed.get("iterations", 3)
     known = ReferenceArgs(np.full(1, SIGNAL), np.full(1, PIXELS), np.full((1, 2), 1e-6), np.full(1, 1e-3))
     rule = VerdictArgs(noise_known, np.array([1.0, 1.0]), 32 / 6, 0.05, 4.0)
@@ -117,7 +118,9 @@ def test_a_neighbour_lends_what_it_predicts_at_the_place_of_the_lost_zoi() -> No
     for lost in (GRID.shape[1] + 1, 0, len(field) - 1):
         solution.status[:] = Status.OK
         solution.status[lost] = Status.LOST
-        guess, lenders = _lent_guesses(solution, _Places.of(reference), np.array([lost]))
+        guess, lenders = Neighbours.of(reference).lent(
+            solution, np.array([lost]), solution.status == Status.OK
+        )
         assert guess[0] == pytest.approx(field[lost], abs=1e-9)
         assert lenders[0] == (8 if lost == GRID.shape[1] + 1 else 3)
 

@@ -17,6 +17,7 @@ ACQUIRE = {
     "acquire.opencv": "acquire acquire.camera acquire.files",
     "acquire.v4l2": "acquire acquire.camera acquire.opencv",
     "acquire.genicam": "acquire acquire.camera",
+    "acquire.pylon": "acquire acquire.camera acquire.genicam",
     "acquire.serial_line": "acquire acquire.load_cell acquire.protocols",
     "acquire.session": "acquire acquire.hdf5",
 }
@@ -81,6 +82,7 @@ LIBRARIES = {
     "fcntl": "acquire.v4l2",
     "h5py": "acquire.hdf5 acquire.session live.results",
     "llvmlite": "analysis.compiled",
+    "pypylon": "acquire.pylon",
     "rerun": "live.ui",
     "serial": "acquire.serial_line",
     "tomlkit": "live.config",

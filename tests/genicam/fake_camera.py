@@ -40,6 +40,7 @@ PAYLOAD = """<IntSwissKnife Name="PayloadSize" NameSpace="Standard">
 WHITE = """<Integer Name="PixelDynamicRangeMax" NameSpace="Standard"><Value>{}</Value>
 <Min>0</Min><Max>65535</Max></Integer>"""
 GAIN_MODE, CONTINUOUS = 0x114, 2
+SENSOR_WIDTH = 0x11C
 FILL = c.CFUNCTYPE(None, c.c_void_p, c.c_void_p, c.c_uint32, c.c_uint32, c.c_uint32)
 
 
@@ -108,6 +109,8 @@ def serve(options: argparse.Namespace) -> None:
         lib.arv_fake_camera_set_fill_pattern(inner, callback, None)
         if options.automatic:
             lib.arv_fake_camera_write_register(inner, GAIN_MODE, CONTINUOUS)
+        if options.sensor is not None:
+            lib.arv_fake_camera_write_register(inner, SENSOR_WIDTH, options.sensor)
         lib.g_object_set(camera, b"gvsp-lost-ratio", c.c_double(options.loss), None)
         assert lib.arv_gv_fake_camera_is_running(camera), "the fake camera does not run"
         print("ready", flush=True)
@@ -123,6 +126,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--loss", type=float, default=0.0, help="share of the packets that are lost")
     parser.add_argument("--white", type=int, help="the white level that the camera states")
     parser.add_argument("--automatic", action="store_true", help="its gain is automatic at first")
+    parser.add_argument("--sensor", type=int, help="its width, px")
     return parser.parse_args()
 
 

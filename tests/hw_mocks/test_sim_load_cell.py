@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import os
 import threading
@@ -96,29 +97,37 @@ def test_unplugged_port_is_reached_again() -> None:
 
 @pytest.mark.parametrize("protocol", INDICATORS)
 def test_every_protocol_reads_the_force(protocol: str) -> None:
-    """Simulator and reader were written apart from the same descriptions; here they meet."""
+    """Simulator and reader were written apart from the same descriptions; here they meet.
+
+    The force rises for a second, then stands still: what is read there depends on no delay. A reader that comes late
+    may find two answers in one (NaN), never a wrong force.
+    """
     cell, specimen = opened(f"sim:?seconds=1&hold=0&noise_N=0&wait=1&protocol={protocol}")
+    top, forces = float(specimen.force(specimen.duration_s)), []
     with cell:
-        samples = first(cell, 12)
-    assert [s.force for s in samples] == sorted(s.force for s in samples)
-    for s in samples[-4:]:
-        low, high = specimen.force([specimen.elapsed(s.t) - 0.2, specimen.elapsed(s.t) + 0.05])
-        assert low - 1 < s.force < high + 1
-    assert samples[-1].force > 100
+        for sample in itertools.islice(cell, 1000):
+            forces += [] if math.isnan(sample.force) else [sample.force]
+            if forces[-3:] == pytest.approx([top] * 3, abs=0.06):
+                break
+    assert forces[-3:] == pytest.approx([top] * 3, abs=0.06)
+    assert forces == sorted(forces) and forces[0] < top / 2
 
 
 @pytest.mark.parametrize("fault", SERIAL_FAULTS)
 def test_every_fault_is_survived_by_the_reader(fault: str) -> None:
+    """While the force still rises there are readings again that fit their time; one that is late itself may not."""
     short = SERIAL_FAULTS[fault] in (1.0, 5.0) and fault not in ("partial", "split", "duplicate")
     amount = "*0.1" if short else ""
-    text = f"sim:?seconds=1&hold=0&noise_N=0&rate=200&faults={fault}@0.05{amount}"
+    text = f"sim:?seconds=10&hold=0&noise_N=0&rate=200&faults={fault}@0.05{amount}"
     cell, specimen = opened(text)
+
+    def fits(sample: LoadSample) -> bool:
+        e = specimen.elapsed(sample.t)
+        low, high = specimen.force([e - 0.05, e + 0.05])
+        return 0.3 < e < 9 and low - 2 < sample.force < high + 2
+
     with cell:
-        late = (s for s in cell if specimen.elapsed(s.t) > 0.3 and not math.isnan(s.force))
-        sample = next(late)
-    e = specimen.elapsed(sample.t)
-    low, high = specimen.force([e - 0.05, e + 0.05])
-    assert low - 2 < sample.force < high + 2
+        assert any(fits(sample) for sample in itertools.islice(cell, 1500))
 
 
 def test_nominal_time_in_lock_step() -> None:

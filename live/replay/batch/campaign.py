@@ -161,7 +161,7 @@ def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Ev
         rows, tasks = _planned(wanted)
         _sweep(wanted.out, rows, tasks)
         ready = len(wanted.tests) - len(tasks)
-        screen.say(
+        screen.print(
             f"{len(wanted.tests)} tests: {ready} as they are, {len(tasks)} to replay into {wanted.out}"
         )
         if tasks:
@@ -270,7 +270,7 @@ def _work(
             screen.status(progress.words())
     finally:
         workers.close()
-    screen.say(progress.words())
+    screen.print(progress.words())
 
 
 def _compile(processes: WorkerProcesses, screen: Screen, stopping: threading.Event) -> None:
@@ -282,7 +282,7 @@ def _compile(processes: WorkerProcesses, screen: Screen, stopping: threading.Eve
     if not ready:
         from analysis import PICTURE_KINDS
 
-        compile_ahead(PICTURE_KINDS, phase=True, say=screen.status, stopped=stopping.is_set)
+        compile_ahead(PICTURE_KINDS, phase=True, show=screen.status, stopped=stopping.is_set)
 
 
 def _cuts(tasks: Sequence[Task], screen: Screen) -> dict[str, ChunkPlan]:
@@ -290,5 +290,5 @@ def _cuts(tasks: Sequence[Task], screen: Screen) -> dict[str, ChunkPlan]:
     found = {task.name: cut(task) for task in tasks if task.chunk_s is not None}
     for name, one in found.items():
         if one.why:
-            screen.say(f"{name}: done whole: {one.why}")
+            screen.print(f"{name}: done whole: {one.why}")
     return found

@@ -101,7 +101,7 @@ class Cluster:
         if self._quiet_s > _QUIET_S and self._client.status == "running":
             self._quiet_s = 0.0
             if not self._client.nthreads():
-                self._screen.say(f"note: {self._address} has no workers any more; waiting for some")
+                self._screen.print(f"note: {self._address} has no workers any more; waiting for some")
 
     def close(self) -> None:
         """Cancel what has not begun, and close the connection; a worker completes a task that it has begun."""
@@ -122,7 +122,7 @@ class Cluster:
             token.unlink(missing_ok=True)
         check(self._address, found)
         for words in advice(found):
-            self._screen.say(words)
+            self._screen.print(words)
         self._max_queued = max(_MIN_QUEUED, _PER_WORKER * len(found))
         self._compile(found)
 

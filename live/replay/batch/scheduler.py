@@ -210,7 +210,7 @@ class Scheduler:
         self._rows[name] = row
         self._progress.ended()
         if not row.is_well:
-            self._screen.say(row.words)
+            self._screen.print(row.words)
 
     def _chunk_done(self, task: Task, row: BatchRow) -> Sequence[Task]:
         name = task.of
@@ -228,7 +228,7 @@ class Scheduler:
 
     def _whole(self, name: str) -> Sequence[Task]:
         del self._left[name]
-        self._screen.say(f"{name}: a reference was renewed in it; it is not cut, but measured whole")
+        self._screen.print(f"{name}: a reference was renewed in it; it is not cut, but measured whole")
         for chunk in self._cuts[name].chunks:
             self._progress.expect(chunk.title, 0)
         self._progress.expect(name)

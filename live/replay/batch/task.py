@@ -131,7 +131,7 @@ class _LogScreen(Screen):
         self._stream, self._on_progress, self._reported_t, self._zois = stream, on_progress, 0.0, 0
         self.last = TaskProgress(0, None, 0)
 
-    def say(self, text: str = "") -> None:
+    def print(self, text: str = "") -> None:
         """Write a line of the file."""
         print(printable(text), file=self._stream, flush=True)
 
@@ -196,7 +196,7 @@ def _replayed(task: Task, staging: Path, on_progress: OnProgress) -> BatchRow:
         screen, began = _LogScreen(file, on_progress), time.monotonic()
         done = replay(task.request(staging), screen, threading.Event())
         for line in [*summary_lines(done.run_state, done.config.specimen), *done.lines]:
-            screen.say(line)
+            screen.print(line)
     on_progress(screen.last)
     before = sum(_seconds(Path(chunk)) for chunk in task.chunks)
     return row_of(task.name, task.source, done, before + time.monotonic() - began)

@@ -76,7 +76,7 @@ def write_mp4(job: ExportJob, path: Path) -> None:
                 writer.release()
         if not part.exists():
             raise DataError(f"{path}: the encoder wrote nothing; is the disk full?")
-    job.screen.say(remark)
+    job.screen.print(remark)
 
 
 def write_gif(job: ExportJob, path: Path) -> None:
@@ -116,7 +116,7 @@ def _frames(job: ExportJob, longest: int = 1280) -> Iterator[tuple[int, NDArray[
     (name,) = job.fields
     pictures = job.run.pictures if job.options.picture else None
     if pictures is None and job.options.picture:
-        job.screen.say("the pictures are not here any more; maps are painted on plain grey")
+        job.screen.print("the pictures are not here any more; maps are painted on plain grey")
     scale = None
     if name != "status":
         display = job.display

@@ -166,6 +166,7 @@ _STATUSES = {
     Status.NOT_CONVERGED: (255, 127, 14),
     Status.POOR_MATCH: (31, 119, 180),
     Status.UNEVEN: (140, 86, 75),
+    Status.AMBIGUOUS: (227, 119, 194),
 }
 _UNKNOWN = (60, 60, 60)
 

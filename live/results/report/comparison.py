@@ -136,7 +136,7 @@ def _cell(row: TensileRow) -> Html:
     """Value and half of the interval in the unit of the column; where it is not known, the reason as a tooltip."""
     if not row.figure.known:
         return element("span", "not known", title=row.figure.why)
-    return safe(value_text(row.figure.value, row.half, "").replace("+-", "±"))
+    return safe(value_text(row.figure.value, row.half, ""))
 
 
 def _number(value: float) -> str:

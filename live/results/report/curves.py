@@ -124,6 +124,22 @@ def valid_share(run: RunFolder) -> Plot:
     )
 
 
+def parts(run: RunFolder) -> str:
+    """When the strains of the region and of gauges stand for a part of their area; empty where they never do."""
+    names = [name for name in run.strain.values if name == "area_share" or name.startswith("share_gauge_")]
+    shares = np.min(
+        [np.asarray(run.strain.values[name], np.float64) for name in names] or [np.ones(1)], axis=0
+    )
+    rows = np.flatnonzero(shares < 1)
+    if not rows.size:
+        return ""
+    first, last = (float(run.strain.time_s[row]) for row in (rows[0], rows[-1]))
+    return (
+        f"A block of ZOIs had no value at {rows.size} of {len(shares)} instants, between {first:.4g} and {last:.4g} s:"
+        f" the strains there stand for part of their area, {100 * shares.min():.0f} % at the least."
+    )
+
+
 def time_range(run: RunFolder) -> tuple[float, float]:
     """The time axis of all plots against time."""
     t = run.strain.time_s

@@ -42,7 +42,7 @@ def gauges(run: RunFolder) -> Html:
     for name, gauge in run.gauges.items():
         e = unit_for(_largest(gauge.value))
         known = np.isfinite(gauge.value)
-        last = value_text(gauge.value[-1] * e.factor, gauge.sigma[-1] * e.factor, e.name).replace("+-", "±")
+        last = value_text(gauge.value[-1] * e.factor, gauge.sigma[-1] * e.factor, e.name)
         words = "; ".join(f"{key} {_plain(value)}" for key, value in gauge.described.items())
         largest = f"{_largest(gauge.value) * e.factor:.4g} {e.name}" if known.any() else "not known"
         rows.append((name, words or "not recorded", largest, last, int(np.count_nonzero(~known))))
@@ -64,7 +64,7 @@ def _plain(value: object) -> str:
 def times(run: RunFolder) -> Html:
     """The lag of the load behind the frames, and the latency of the results."""
     lag = lag_of(run)
-    words = figure_text(lag, 1e-3, "ms").replace("+-", "±") if lag.known else f"not known: {lag.why}"
+    words = figure_text(lag, 1e-3, "ms") if lag.known else f"not known: {lag.why}"
     sign = f" ({CONFIDENCE:.0%} interval; positive: the load is late)" if lag.known else ""
     late = np.asarray(run.strain.values.get("latency_s", ()), np.float64) * 1e3
     late = late[np.isfinite(late)]

@@ -122,7 +122,7 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
     return [
         _head(run, content.curve),
         section("Specimen and rig", facts(_rig(run, pictures))),
-        section("Curves", plots(content.figures), _about_curves(content.curve)),
+        section("Curves", plots(content.figures), _about_parts(run), _about_curves(content.curve)),
         section("Figures of the test", *figure_table(run, content.curve)),
         section("Virtual gauges", gauges(run)),
         section("Lag and latency", times(run)),
@@ -158,7 +158,7 @@ def _head(run: RunFolder, curve: EvaluatedCurve) -> Html:
 def tensile(curve: EvaluatedCurve) -> dict[str, str]:
     """E, nu and the strengths by name, each with its uncertainty; without those that are not known."""
     rows = headline(curve.figures, stresses=curve.is_stress)
-    return {row.name: row.text.replace("+-", "±") for row in rows if row.figure.known}
+    return {row.name: row.text for row in rows if row.figure.known}
 
 
 def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
@@ -207,6 +207,11 @@ def plots(figures: tuple[Plot, ...]) -> Html:
     return element("div", joined(found), class_="plots")
 
 
+def _about_parts(run: RunFolder) -> Html:
+    words = curves.parts(run)
+    return paragraph(words, "warning") if words else Html("")
+
+
 def _about_curves(curve: EvaluatedCurve) -> Html:
     if not curve.has_load:
         return paragraph("No force is known at any instant, so there is no stress-strain curve.", "dim")
@@ -226,7 +231,7 @@ def _about_curves(curve: EvaluatedCurve) -> Html:
 def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
     """The figures as text, how they were found, and why others are not known."""
     lines = figure_lines(curve.figures, run.specimen) if curve.has_load else []
-    return [paragraph(line.strip().replace("+-", "±").replace("  ", ", ")) for line in lines]
+    return [paragraph(line.strip().replace("  ", ", ")) for line in lines]
 
 
 def _sharpness_section(run: RunFolder) -> list[Html]:

@@ -90,6 +90,8 @@ class CheckFigures:
     floors : tuple of ZoiFloor
     zoi, order, burst : int
         Settings of the test.
+    repetition : str
+        What repeats in the pattern, and what that allows; empty where nothing does.
     noise_stated : bool
         Whether the noise was given; else too few frames take it from the spectrum of the picture.
     removed : float or None, GL
@@ -116,6 +118,7 @@ class CheckFigures:
     zoi: int
     order: int
     burst: int
+    repetition: str = ""
     noise_stated: bool = False
     removed: float | None = None
     gauges: tuple[GaugeNoise, ...] = ()
@@ -211,6 +214,7 @@ def figures_of(
         zoi=m.zoi,
         order=m.order,
         burst=sample.burst,
+        repetition=measured.predicted.repetition,
         noise_stated=m.noise_GL is not None,
         removed=None if same else float((sample.picture.mean - sample.raw)[check_region.inside].std()),
         gauges=measured.predicted.gauges,
@@ -276,7 +280,7 @@ def table_lines(figures: CheckFigures) -> list[str]:
     head = f"  ZOI order {f'l_10% {unit}':>9} {f'VSG {unit}':>7}  " + "".join(f"{n:>15}" for n in bursts)
     reference = figures.floors[0].reference if figures.floors else 0
     return [
-        f"strain noise of one ZOI, um/m: measured (predicted) for bursts of so many frames, reference of {reference}",
+        f"strain noise of one ZOI, µm/m: measured (predicted) for bursts of so many frames, reference of {reference}",
         head,
         *(_row(floor, bursts, figures) for floor in figures.floors),
     ]

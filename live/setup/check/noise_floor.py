@@ -21,7 +21,7 @@ from analysis.field import StrainField
 from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.gauges import gauges_for
 from live.pipeline.measure import picture_words
-from live.pipeline.reference import averaged, prepare
+from live.pipeline.reference import averaged, prepare, repetition_text
 from live.setup.check.sample import CheckSample
 from live.setup.placement import with_auto_gauges
 
@@ -213,11 +213,14 @@ class PredictedNoise:
         The gauges of the test, and the mean of all ZOIs along the load; empty without pattern.
     picture : str
         What the picture shows beyond its noise, in words; "": nothing.
+    repetition : str
+        What repeats in the pattern, and what that allows; empty where nothing does.
     """
 
     sigma: NDArray[np.float64]
     gauges: tuple[GaugeNoise, ...]
     picture: str = ""
+    repetition: str = ""
 
     @property
     def measurable(self) -> NDArray[np.bool_]:
@@ -228,26 +231,31 @@ class PredictedNoise:
 def predict_noise(sample: CheckSample) -> PredictedNoise:
     """Predict the strain noise of each ZOI and gauge of the test."""
     grid = sample.check_region.grid
-    field = _half_on_half(sample)
+    field, repetition = _half_on_half(sample)
     if field is None:
         return PredictedNoise(np.full(grid.shape, np.nan), ())
     factor = math.sqrt((1 / sample.reference + 1 / sample.burst) / (2 / sample.half))
     both = np.sqrt((field.sigma_exx**2 + field.sigma_eyy**2) / 2)
     sigma = np.where(field.ok, factor * both, np.nan)
-    gauges = tuple(_gauges(sample.check_region.config, replace(field, grid=grid), factor))
-    return PredictedNoise(sigma, gauges, picture_words(field))
+    return PredictedNoise(
+        sigma,
+        tuple(_gauges(sample.check_region.config, replace(field, grid=grid), factor)),
+        picture_words(field),
+        repetition,
+    )
 
 
-def _half_on_half(sample: CheckSample) -> StrainField | None:
-    """The second half of the frames against the first; None without pattern."""
+def _half_on_half(sample: CheckSample) -> tuple[StrainField | None, str]:
+    """The second half of the frames against the first, None without pattern; and what repeats in the pattern."""
     first, second = sample.halves()
     try:
         kernel, _ = prepare(first, sample.check_region.zois, sample.settings, sample.noise)
     except DataError:
-        return None
+        return None, ""
     # The specimen stands still: the fit begins at zero motion, and only failed ZOIs are searched.
     still = StrainField.from_values(kernel.grid, {})
-    return kernel.measure(second.mean, start=still, noise=averaged(sample.noise, sample.half))
+    field = kernel.measure(second.mean, start=still, noise=averaged(sample.noise, sample.half))
+    return field, repetition_text(kernel.period)
 
 
 def _gauges(config: Config, field: StrainField, factor: float) -> Iterator[GaugeNoise]:

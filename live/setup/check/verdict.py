@@ -172,6 +172,9 @@ def _pattern(f: CheckFigures) -> Iterator[CheckLine]:
     words = "finer speckle or a wider field of view" if f.radius > high else "coarser speckle, or focus"
     radius = f"{f.radius:.2f} px" if math.isfinite(f.radius) else "none is visible"
     yield CheckLine("speckle radius", f"{radius} (from {low:g} to {high:g})", low <= f.radius <= high, words)
+    if f.repetition:
+        words = "a random pattern; else more pictures a second: displacements may be wrong by a period"
+        yield CheckLine("repetition", f.repetition, False, words)
     yield _sharpness(f)
     yield _sssig(f)
     share, n = z.without_pattern, z.grid.n_active
@@ -224,10 +227,10 @@ def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
         yield CheckLine("drift", "not measured", f.zois.without_pattern < 1, "no ZOI can be followed")
         return
     strain = max((s.exx, s.eyy), key=lambda one: abs(one.drift))
-    yield CheckLine("drift", f"{s.drift_px:.4f} px and {strain.drift * 1e6:+.0f} um/m in {s.u.seconds:.3g} s",
+    yield CheckLine("drift", f"{s.drift_px:.4f} px and {strain.drift * 1e6:+.0f} µm/m in {s.u.seconds:.3g} s",
                s.drift_px <= max_px, "keep specimen and camera still")  # fmt: skip
     shake = s.worse
-    yield CheckLine("vibration", f"{_vibration(shake, 1, 'px', 4)}, {_vibration(s.worse_strain, 1e6, 'um/m', 0)}",
+    yield CheckLine("vibration", f"{_vibration(shake, 1, 'px', 4)}, {_vibration(s.worse_strain, 1e6, 'µm/m', 0)}",
                shake.vibration <= max_px, "a stiffer tripod, a quiet floor, no fan on the bench")  # fmt: skip
 
 
@@ -257,18 +260,18 @@ def _floor(f: CheckFigures, target: float | None) -> CheckLine:
         words = "a larger region, smaller ZOIs, or a pattern"
         return CheckLine(what, f"not measured: too few ZOIs of {f.zoi} px", False, words)
     known = typical if noise is None else noise.known
-    found = f"{known * 1e6:.0f} um/m predicted"
+    found = f"{known * 1e6:.0f} µm/m predicted"
     if f.stack.few:
         found += f", noise {_noise_source(f)}"
     elif noise is not None:
-        found = f"{noise.known * 1e6:.0f} um/m measured, {noise.predicted * 1e6:.0f} predicted"
+        found = f"{noise.known * 1e6:.0f} µm/m measured, {noise.predicted * 1e6:.0f} predicted"
     value = f"{found} (one ZOI of {f.zoi} px, burst of {f.burst})"
     if noise is not None and noise.measured > MAX_OVER_PREDICTED * noise.predicted:
         return CheckLine(what, value, False, "something moves or flickers: vibration, air, lamp")
     wanted = DEFAULT_TARGET if target is None else target
     limit = "asked for" if target is not None else "that are the limit without --target"
     enough = known <= wanted
-    words = f"more than the {wanted * 1e6:.1f} um/m {limit}: {'' if enough else advice(f, wanted)}"
+    words = f"more than the {wanted * 1e6:.1f} µm/m {limit}: {'' if enough else advice(f, wanted)}"
     return CheckLine(what, value, enough, words)
 
 
@@ -276,7 +279,7 @@ def _gauges(f: CheckFigures) -> Iterator[CheckLine]:
     """Noise of the gauges and the mean: a test reports these, not one ZOI."""
     for gauge in f.gauges:
         name = f"noise of {gauge.name}" if gauge.name else "noise of the mean"
-        value = f"{gauge.sigma * 1e6:.1f} um/m predicted (burst of {f.burst})"
+        value = f"{gauge.sigma * 1e6:.1f} µm/m predicted (burst of {f.burst})"
         yield CheckLine(name, gauge.reason or value, not gauge.reason, "move it, or take smaller ZOIs")
 
 

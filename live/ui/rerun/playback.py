@@ -127,27 +127,27 @@ class _PlayedMessages:
 
 def _report_selection(shown: int, run: RunFolder, screen: Screen) -> None:
     if shown < run.strain.n:
-        screen.say(f"{shown} of {run.strain.n} instants are shown; --from, --to and --every choose others")
+        screen.print(f"{shown} of {run.strain.n} instants are shown; --from, --to and --every choose others")
     if run.pictures is None and not run.notes:
-        screen.say("note: the pictures that were measured are not here any more; maps alone")
+        screen.print("note: the pictures that were measured are not here any more; maps alone")
     for note in run.notes:
-        screen.say(f"note: {note}")
+        screen.print(f"note: {note}")
 
 
 def _notify(screen: Screen, text: str, level: Level) -> None:
-    screen.say(text if level == "info" else f"{level}: {text}")
+    screen.print(text if level == "info" else f"{level}: {text}")
 
 
 def _announce(view: View, screen: Screen) -> None:
     """Open the viewer where there is a display; else print how to watch."""
     if view.port is None:
         return
-    if spawn_viewer(view.port, screen.say) is not None:
-        screen.say("the viewer opens in a window of its own; Ctrl-C here ends it")
+    if spawn_viewer(view.port, screen.print) is not None:
+        screen.print("the viewer opens in a window of its own; Ctrl-C here ends it")
         return
-    screen.say("no viewer is opened here (no display); this shows it, Ctrl-C ends it:")
+    screen.print("no viewer is opened here (no display); this shows it, Ctrl-C ends it:")
     for line in view.instructions.splitlines():
-        screen.say(f"  {line}")
+        screen.print(f"  {line}")
 
 
 def selected_rows(run: RunFolder, request: ShowRequest) -> tuple[int, ...]:
@@ -275,4 +275,4 @@ def _status(run: RunFolder) -> str:
     ]
     values = run.strain.values
     head = f"**{run.title}**, {run.strain.n} instants, {values['n_valid'][-1]} of {values['n_zoi'][-1]} ZOIs at the end"
-    return "\n\n".join([head, *(line.strip().replace("+-", "±") for line in lines)])
+    return "\n\n".join([head, *(line.strip() for line in lines)])

@@ -6,14 +6,16 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from acquire.printable import duration
+from acquire.printable import duration, share_text
 
 if TYPE_CHECKING:
+    from analysis.evaluate import GaugeValue
     from live.pipeline.measurement import TimeStep
     from live.pipeline.snapshot import Snapshot
 
 GAP = "  "
 MAX_GAUGES = 4
+LARGE_SIGMA = 10e-6  # from here on without a decimal
 Item = tuple[int, str]
 """Rank and text; a line that is too long loses the items with the highest rank first."""
 
@@ -43,8 +45,8 @@ def _strain(i: TimeStep | None) -> list[Item]:
     if i is None:
         return []
     items = [(5 if number == 0 else 10, text) for number, text in enumerate(gauge_texts(i))]
-    items[-1] = items[-1][0], f"{items[-1][1]} um/m"
-    return [*items, (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
+    items[-1] = items[-1][0], f"{items[-1][1]} µm/m"
+    return [*items, (5, share_text(i.area_share)), (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
 
 
 def _machine(s: Snapshot) -> list[Item]:
@@ -66,14 +68,23 @@ def force_text(value: float) -> str:
     return "" if math.isnan(value) else f"{value:.1f} N"
 
 
+def strain_text(value: float, sigma: float) -> str:
+    """A strain and its sigma in µm/m, thousands apart; the unit stands once at the end of a line."""
+    digits = 1 if sigma < LARGE_SIGMA else 0
+    return f"{value * 1e6:+z,.0f} ± {sigma * 1e6:,.{digits}f}"
+
+
 def gauge_texts(i: TimeStep) -> list[str]:
-    """The virtual gauges with their sigmas in um/m, or the means where there are none."""
+    """The virtual gauges with their sigmas in µm/m, or the means where there are none."""
     if not i.gauges:
         return [
-            f"{name} {getattr(i, name) * 1e6:+.0f} +- {getattr(i, f'sigma_{name}') * 1e6:.0f}"
+            f"{name} {strain_text(getattr(i, name), getattr(i, f'sigma_{name}'))}"
             for name in ("eyy", "exx", "exy")
         ]
-    return [
-        f"{name} lost" if gauge.reason else f"{name} {gauge.value * 1e6:+.0f} +- {gauge.sigma * 1e6:.0f}"
-        for name, gauge in list(i.gauges.items())[:MAX_GAUGES]
-    ]
+    return [_gauge_text(name, gauge) for name, gauge in list(i.gauges.items())[:MAX_GAUGES]]
+
+
+def _gauge_text(name: str, gauge: GaugeValue) -> str:
+    if gauge.reason:
+        return f"{name} lost"
+    return f"{name} {strain_text(gauge.value, gauge.sigma)} {share_text(gauge.share)}".rstrip()

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from acquire.printable import counted
 from live.config.sections import SpecimenConfig
 from live.pipeline.consumer import ConsumerReport
 from live.pipeline.event_log import sentence
@@ -16,11 +17,12 @@ from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.results.figures import alignment_line, elastic_lines, evaluate, figure_lines, lag_line, tare_line
 from live.results.summary import file_lines, noise_line, summary_lines, why_nothing
+from live.ui.terminal.status_line import strain_text
 
 TURNED = math.radians(5)  # off the axis of the load, from which on the summary shows it
 
 
-def say_summary(
+def print_summary(
     screen: Screen,
     run_state: RunState,
     specimen: SpecimenConfig,
@@ -31,14 +33,14 @@ def say_summary(
     with_report: bool = False,
 ) -> None:
     """Print the figures of a test, then ``lines``, then where the files are; ``with_report``: one will be made."""
-    screen.say()
+    screen.print()
     if verbose:
         shown = [*summary_lines(run_state, specimen), *lines, *file_lines(folder)]
     else:
         following = "" if with_report else f"; next: phasedic report {shlex.quote(str(folder))}"
         shown = [*brief_lines(run_state, specimen), *lines, _files(folder) + following]
     for line in shown:
-        screen.say(line)
+        screen.print(line)
 
 
 def brief_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
@@ -53,12 +55,12 @@ def brief_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     strain, sigma = last.axial(axis)
     lines = [
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        f"strain along {axis} at the end: {strain * 1e6:+,.0f} +- {sigma * 1e6:,.1f} um/m",
+        f"strain along {axis} at the end: {strain_text(strain, sigma)} µm/m",
         *_figures(run_state, specimen),
         noise_line(history),
         *_remarks(run_state, specimen),
     ]
-    return [line.strip().replace("+-", "±").replace("um/m", "µm/m") for line in lines]
+    return [line.strip() for line in lines]
 
 
 def _figures(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
@@ -90,7 +92,9 @@ def trouble_lines(
     warnings = run_state.event_log.events("warning", "error")
     if warnings:
         last = sentence(warnings[-1], run_state.event_log.names)
-        yield f"{len(warnings)} warnings and errors, the last: {last}"
+        levels = [event.level for event in warnings]
+        counts = [counted(levels.count(one), one) for one in ("warning", "error") if one in levels]
+        yield f"{' and '.join(counts)}, the last: {last}"
 
 
 def _files(folder: Path) -> str:

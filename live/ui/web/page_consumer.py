@@ -16,7 +16,7 @@ from typing import Any, Protocol
 
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
-from acquire.printable import printable
+from acquire.printable import printable, share_text
 from analysis.evaluate import LineGauge
 from live.config.gauges import complete_gauges
 from live.config.loading import Config
@@ -267,7 +267,13 @@ def axial_length_mm(config: Config) -> float | None:
 
 def _gauges(step: TimeStep) -> list[dict[str, Any]]:
     return [
-        {"name": name, "value": gauge.value, "sigma": gauge.sigma, "reason": gauge.reason}
+        {
+            "name": name,
+            "value": gauge.value,
+            "sigma": gauge.sigma,
+            "reason": gauge.reason,
+            "part": share_text(gauge.share),
+        }
         for name, gauge in step.gauges.items()
     ]
 
@@ -282,5 +288,6 @@ def _measured(s: Snapshot) -> dict[str, Any]:
         "valid": s.valid,
         "zois": s.zois,
         "refused": i.refused,
+        "part": share_text(s.area_share),
         "kernel_s": i.measure_s,
     }

@@ -47,7 +47,7 @@ def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> list[TensileRow]
 def _figure(row: TensileRow) -> dict[str, Any]:
     if not row.figure.known:
         return {"name": row.name, "text": None, "why": row.figure.why}
-    value, between, interval = row.text.partition(" +- ")
+    value, between, interval = row.text.partition(" ± ")
     number, _, unit = (interval or value).partition(" ")
     text = f"{value} {unit}".strip() if between else value
     return {"name": row.name, "text": text, "interval": f"± {number}" if between else ""}

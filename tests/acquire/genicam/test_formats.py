@@ -38,6 +38,18 @@ def test_too_few_bytes_are_no_picture(name: str) -> None:
         decode(content[:-1], FORMATS[name], 8, 8)
 
 
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("width", [8, 5])
+@pytest.mark.parametrize("last", [0, 7])
+def test_rows_with_padding(name: str, width: int, last: int) -> None:
+    """USB3 cameras may fill up their rows, or all but the last; each row begins with a byte of its own."""
+    sent, padding = picture(3, width, 6, name), np.random.default_rng(0)
+    content = b"".join(PACK[name](row) + padding.bytes(7) for row in sent)[: -7 + last or None]
+    assert np.array_equal(decode(content, FORMATS[name], width, 6, 7), sent)
+    with pytest.raises(DataError, match="bytes instead of"):
+        decode(content[: len(content) - last - 1], FORMATS[name], width, 6, 7)
+
+
 def test_twelve_bits_are_preferred() -> None:
     assert preferred(["Mono8", "Mono12Packed", "Mono16"]) == "Mono12Packed"
     assert preferred(["BayerRG8"]) is None

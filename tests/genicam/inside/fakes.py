@@ -25,9 +25,9 @@ class FakeCameraProcess:
         self._options, self._process = options, None
         self.plug()
 
-    def plug(self) -> None:
-        """Start it, and wait until it answers."""
-        words = [sys.executable, "-m", "tests.genicam.fake_camera", *self._options]
+    def plug(self, *others: str) -> None:
+        """Start it, perhaps with other options, and wait until it answers."""
+        words = [sys.executable, "-m", "tests.genicam.fake_camera", *(others or self._options)]
         self._process = subprocess.Popen(words, stdout=subprocess.PIPE, text=True, cwd=ROOT)
         assert self._process.stdout is not None
         assert self._process.stdout.readline() == "ready\n"

@@ -7,6 +7,9 @@ import time
 
 import pytest
 
+from acquire.camera.timing import DEAD
+from acquire.genicam.device import GenicamDevice
+from acquire.genicam.library import Aravis, GenicamError
 from tests.genicam.inside.fakes import FakeCameraProcess, FrameWatch
 
 SMALL = "genicam:127.0.0.1?format=Mono8&fps=20&width=200&height=100"
@@ -46,6 +49,51 @@ def test_unplugged_and_plugged_in_again(away_s: float) -> None:
     before = watch.frames[watch.frames.index(first_after) - 1]
     assert first_after.lost_before == pytest.approx((first_after.t - before.t) * 20 - 1, abs=1.01)
     assert first_after.lost_before >= 20 * away_s
+
+
+def test_one_that_comes_back_too_small_is_reported_and_not_taken() -> None:
+    """The picture would be another; the right one is taken when it comes."""
+    with FakeCameraProcess() as fake:
+        watch = FrameWatch(SMALL)
+
+        def swapped(*options: str) -> None:
+            fake.unplug()
+            fake.plug(*options)
+
+        watch.on_text["cannot be used"] = swapped
+        watch.take(watch.after("pictures again"), {5: lambda: swapped("--sensor", "150")})
+    watch.check_numbers()
+    assert "it is back, but cannot be used" in watch.texts()
+    assert "width=200 is not possible; allowed: 1 to 150" in watch.texts()
+    assert {frame.image.shape for frame in watch.frames} == {(100, 200)}
+
+
+def test_one_that_answers_no_more_is_found_by_its_heartbeat() -> None:
+    """Where pauses are allowed, as with a trigger, the library finds that the camera is gone."""
+    with FakeCameraProcess() as fake:
+        watch = FrameWatch(f"{SMALL}&stall_s=60")
+        watch.on_text["no longer answers"] = fake.plug
+        watch.take(watch.after("opened again"), {5: fake.unplug})
+    watch.check_numbers()
+    assert "no picture for" not in watch.texts()
+    assert max(frame.lost_before for frame in watch.frames) > 20
+
+
+def test_the_end_comes_at_once_while_the_camera_is_looked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each attempt fails at once here, and the end comes between two of them: no error comes out of it."""
+    with FakeCameraProcess() as fake:
+        watch = FrameWatch(SMALL.replace("127.0.0.1", "GV01"))
+
+        def gone(library: Aravis, name: str) -> GenicamDevice:
+            raise GenicamError("it is not there")
+
+        def stop_soon() -> None:
+            monkeypatch.setattr("acquire.genicam.camera.GenicamDevice", gone)
+            threading.Timer(1.0 + DEAD * 0.5, watch.camera.stop).start()
+
+        watch.on_text["no picture for"] = stop_soon
+        watch.take(lambda: False, {5: fake.unplug})
+    assert len(watch.frames) >= 5
 
 
 def test_the_end_does_not_wait_for_a_camera_that_is_away() -> None:

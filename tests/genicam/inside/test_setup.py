@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes as c
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
 from acquire.camera.opening import list_cameras, open_camera
 from acquire.errors import ConfigError, DeviceError
+from acquire.genicam.library import load_aravis
 from tests.genicam.inside.fakes import FakeCameraProcess, FrameWatch
 
 
@@ -80,6 +83,27 @@ def test_what_is_not_possible_is_refused_with_what_is(
         open_camera(f"genicam:127.0.0.1?{settings}")
     assert words in str(caught.value)
     open_camera(f"genicam:127.0.0.1?{SMALL}").close()  # nothing was left open
+
+
+def test_small_packets_are_warned_of(fake: FakeCameraProcess) -> None:
+    for size, few in ((1400, True), (4000, False)):
+        with contextlib.closing(open_camera(f"genicam:127.0.0.1?{SMALL}&packet_size={size}")) as camera:
+            assert any(f"packets of {size} bytes" in text for text in camera.info.warnings) == few
+            assert camera.info.controls["GevSCPSPacketSize"] == str(size)
+
+
+def test_the_padding_of_rows_is_read_through_the_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The fake sends none; here a function of C with the same arguments gives it."""
+    library = load_aravis()
+
+    @c.CFUNCTYPE(None, c.c_void_p, c.POINTER(c.c_int), c.POINTER(c.c_int))
+    def six_bytes(buffer: int, across: Any, down: Any) -> None:
+        across[0], down[0] = 6, 0
+
+    monkeypatch.setattr(library, "_get_padding", six_bytes)
+    assert library.row_padding(7) == 6
+    monkeypatch.setattr(library, "_get_padding", None)  # Aravis before 0.8.23
+    assert library.row_padding(7) == 0
 
 
 def test_a_camera_that_another_program_holds(fake: FakeCameraProcess) -> None:

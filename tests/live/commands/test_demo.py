@@ -21,7 +21,7 @@ def test_without_a_modulus_it_says_so(
     code: int,
 ) -> None:
     """As on a busy machine, which measures few bursts of the elastic part; it ended with 0."""
-    monkeypatch.setattr(demo, "_say_strain", lambda *values: agreed)
+    monkeypatch.setattr(demo, "_print_strain", lambda *values: agreed)
     words = ["demo", *SHORT, "--no-view", "--no-rrd", "--out", str(tmp_path / "out")]
     assert main(words) == code
     output = capsys.readouterr().out

@@ -111,6 +111,25 @@ def test_a_blank_picture_does_not_end_the_measurement(speckle: Speckle) -> None:
     assert "was not renewed" in told[0].text
 
 
+def test_a_pattern_that_repeats_is_an_event_at_the_first_burst(speckle: Speckle) -> None:
+    told: list[Event] = []
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    k = 2 * np.pi / 8
+    for image, words in (
+        (120 + 40 * (np.sin(k * x) + np.sin(k * y)), ["every 8.0 px"]),
+        (picture(speckle), []),
+    ):
+        kernel, noise = prepare(burst(image, 0), GRID, KernelSettings(), 1.0)
+        told.clear()
+        list(
+            measure(
+                [burst(image, 1), burst(image, 2)], kernel, LoadLog(), noise_GL=noise, on_event=told.append
+            )
+        )
+        assert len(told) == len(words) and all(word in told[0].text for word in words)
+        assert all(event.level == "warning" and event.t == 1.0 for event in told)
+
+
 def time_steps(count: int) -> list[TimeStep]:
     """Still for a third, then pulled along x."""
     one, rng = make_measurement(0).time_step, np.random.default_rng(1)
@@ -159,7 +178,7 @@ def test_a_change_of_sharpness_is_told_once_and_when_it_ends() -> None:
     for blur, sigma in changes:
         guard.check(replace(step, blur=blur, sigma_blur=sigma))
     assert [event.level for event in told] == ["warning", "info", "warning"]
-    assert "less sharp by 0.62 +- 0.02 px" in told[0].text and "sharper by 0.70 +- 0.02 px" in told[2].text
+    assert "less sharp by 0.62 ± 0.02 px" in told[0].text and "sharper by 0.70 ± 0.02 px" in told[2].text
     assert told[0].data == {"blur_px": 0.62, "sigma_blur_px": 0.02}
 
 
@@ -269,4 +288,4 @@ def test_little_memory() -> None:
         history.add(some(i))
     grown = tracemalloc.get_traced_memory()[0] / 20_000
     tracemalloc.stop()
-    assert grown < 320, "bytes an instant with two gauges"
+    assert grown < 360, "bytes an instant with two gauges"

@@ -52,7 +52,9 @@ def test_windows_given_and_missing(session: Path, tmp_path: Path, capsys: pytest
     words = ["study", str(session), "--zoi", "48", "--roi", "all", "--out", str(tmp_path / "a")]
     assert main([*words, "--static", "0,2", "--loaded", "5,5.9"]) == 0
     printed = capsys.readouterr().out
-    assert "of the 1 settings" in printed
+    assert (
+        "\n1 setting on " in f"\n{printed}" and "it alone shows at least 95% of the largest strain" in printed
+    )
     assert main(words) == 2
     assert "exists already" in capsys.readouterr().err
     words[-1] = str(tmp_path / "b")

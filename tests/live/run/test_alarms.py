@@ -137,8 +137,8 @@ def test_what_comes_is_told_stands_on_the_board_and_goes() -> None:
 @pytest.mark.parametrize(
     ("config", "value", "words"),
     [
-        (AlarmConfig(channel="axial", above=0.004), 0.00445, "axial 4450 um/m, limit 4000"),
-        (AlarmConfig(channel="gauge_tip", below=-0.001), -0.002, "gauge tip -2000 um/m, limit -1000"),
+        (AlarmConfig(channel="axial", above=0.004), 0.00445, "axial 4450 µm/m, limit 4000"),
+        (AlarmConfig(channel="gauge_tip", below=-0.001), -0.002, "gauge tip -2000 µm/m, limit -1000"),
         (
             AlarmConfig(channel="force_N", above=3000.0, name="grips"),
             3120.5,

@@ -79,7 +79,7 @@ def test_gaps_and_damage_are_left_out_and_emit() -> None:
     assert frame_counts.left_out == 2
     assert frame_counts.adds_up
     assert any(
-        "3 frames were lost, the last before frame 8" in event.text for event in event_log.events("warning")
+        "3 frames lost, the last before frame 8" in event.text for event in event_log.events("warning")
     )
 
 
@@ -118,7 +118,7 @@ def test_a_gap_that_is_open_at_the_end_is_counted(
     assert run_state.frame_counts.lost == missing
     assert run_state.frame_counts.loss is live
     texts = [event.text for event in run_state.event_log.events("warning")]
-    assert texts == (["69 frames were lost at the end: none came for the last 7.0 s"] if live else [])
+    assert texts == (["69 frames lost at the end: none came for the last 7.0 s"] if live else [])
 
 
 def test_a_live_source_never_waits() -> None:

@@ -48,7 +48,7 @@ def test_a_good_picture_is_ready(capsys: pytest.CaptureFixture[str]) -> None:
         ("&brightness=1.6", (), "LOOK  saturated"),
         ("&brightness=0.25", (), "LOOK  light"),
         ("&noise=0", (), "LOOK  noise"),
-        ("", ("--target", "5"), "more than the 5.0 um/m asked for: "),
+        ("", ("--target", "5"), "more than the 5.0 µm/m asked for: "),
         ("&hold=0.01&end=0.1&drift_x=40", (), "LOOK  drift"),
     ],
 )
@@ -77,7 +77,7 @@ def test_a_short_reference_is_checked_with_frames_enough(capsys: pytest.CaptureF
     output = capsys.readouterr().out
     assert code == 0, output
     assert "reference of 1" in output
-    assert re.search(r"strain noise +\d+ um/m measured", output)
+    assert re.search(r"strain noise +\d+ µm/m measured", output)
 
 
 @pytest.mark.parametrize("count", [1, 5])
@@ -150,10 +150,10 @@ def test_the_snapshot_and_the_gauges(capsys: pytest.CaptureFixture[str], tmp_pat
     assert code == 0, output
     assert "l_10% mm" in output
     noise = {
-        name: float(re.search(rf"noise of {name} +([0-9.]+) um/m", output)[1])  # type: ignore[index]
+        name: float(re.search(rf"noise of {name} +([0-9.]+) µm/m", output)[1])  # type: ignore[index]
         for name in ("the mean", "axial", "transverse", "area")
     }
-    one = float(re.search(r"strain noise +(\d+) um/m measured", output)[1])  # type: ignore[index]
+    one = float(re.search(r"strain noise +(\d+) µm/m measured", output)[1])  # type: ignore[index]
     assert noise["the mean"] < one
     assert noise["area"] < one
     drawn = cv2.imread(str(shot))
@@ -338,6 +338,16 @@ def test_what_surrounds_the_specimen_decides_nothing(taken: FrameStack) -> None:
     bad = [line.text() for line in check_lines(found) if not line.good]
     assert bad == []
     assert found.noise == pytest.approx(examine(taken, config, table=False).noise, rel=0.05)
+
+
+def test_a_pattern_that_repeats_is_named_with_its_period() -> None:
+    rng = np.random.default_rng(0)
+    k = 2 * np.pi / 9
+    y, x = np.mgrid[:240, :320]
+    grid = 120 + 40 * (np.sin(k * x) + np.sin(k * y))
+    frames = np.rint(grid + rng.normal(0, 1, (16, *grid.shape))).astype(np.uint8)
+    text = line_text(shots_of(frames, 8), "repetition")
+    assert text.startswith("LOOK") and "repeats every 9.0 px" in text and "move by 3.6 px" in text
 
 
 def test_automatic_controls_by_name_and_value() -> None:

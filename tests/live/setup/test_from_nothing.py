@@ -89,11 +89,11 @@ def test_its_bits_are_those_of_every_replay(tmp_path: Path) -> None:
 STILL = 16
 
 
-def gone_through(folder: Path, camera: str, *arguments: str) -> dict[str, np.ndarray]:
-    """Run the three commands as a person types them; returns the gauges of the run."""
+def gone_through(folder: Path, camera: str, *arguments: str, ready: int = 0) -> dict[str, np.ndarray]:
+    """Run the three commands as a person types them, ``check`` ends with ``ready``; returns the gauges of the run."""
     rig, out = str(folder / "rig.toml"), folder / "run"
     assert main(["init", rig, "--camera", camera, "--reference-burst", "8", *arguments]) == 0
-    assert main(["check", "--config", rig]) == 0  # GO
+    assert main(["check", "--config", rig]) == ready
     assert main(["run", "--config", rig, "--no-view", "--no-rrd", "--out", str(out)]) == 0
     with h5py.File(out / "strain.h5") as file:
         gauges = file["entry/gauges"]
@@ -123,9 +123,12 @@ def test_the_simulated_rig(tmp_path: Path) -> None:
 
 @pytest.mark.data
 @pytest.mark.slow
-def test_the_open_hole(tmp_path: Path, data_dir: Path) -> None:
+def test_the_open_hole(tmp_path: Path, data_dir: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its speckle radius of 1.09 px is finer than the limit: not ready for that reason alone."""
     paths = sorted((data_dir / "dic_challenge_1_sample12_ohtcfrp").glob("*.tiff"))
-    found = gone_through(tmp_path, played(tmp_path, paths, 3.0, 1.0))
+    found = gone_through(tmp_path, played(tmp_path, paths, 3.0, 1.0), ready=6)
+    looks = [line for line in capsys.readouterr().out.splitlines() if line.startswith("LOOK")]
+    assert [line.split()[1:3] for line in looks] == [["speckle", "radius"]]
     pulled = {name: values[-len(paths) + 1 :] for name, values in found.items()}
     assert all(np.isfinite(values).all() for values in found.values())
     assert np.abs(found["axial"][: -len(paths) + 1]).max() < 5e-5

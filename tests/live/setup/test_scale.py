@@ -115,7 +115,7 @@ def test_the_rig_file_gets_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     arguments = ["--config", str(rig), "--checkerboard", "9x6", "--square", "5", "--stand-off", "400"]
     assert main(["scale", *arguments]) == 0
     output = capsys.readouterr().out
-    assert "0.1 mm toward the camera at a stand-off of 400 mm gives a false strain of 250 um/m" in output
+    assert "0.1 mm toward the camera at a stand-off of 400 mm gives a false strain of 250 µm/m" in output
     found = load_config(rig, {"measure.zoi": "5 mm"})
     assert found.scale.mm_per_px == pytest.approx(0.125, rel=1e-3)
     assert found.measure.zoi == 40

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
+from acquire.printable import share_text
 from live.pipeline.snapshot import Snapshot
 from live.ui.rerun.drawing.shapes import BACKGROUND
 
@@ -66,7 +67,9 @@ def _line(s: Snapshot) -> str:
     if not s.zois:
         return "nothing measured yet"
     lost = s.zois - s.valid
-    return f"{s.valid} of {s.zois} ZOIs" + (f", {lost} LOST" if lost else "")
+    part = share_text(s.area_share)
+    words = f"{s.valid} of {s.zois} ZOIs" + (f", {lost} LOST" if lost else "")
+    return f"{words}; strain {part}" if part else words
 
 
 def _write(
@@ -75,7 +78,7 @@ def _write(
     """Write text of ``height`` px on a base line, smaller where it would be wider than ``width``."""
     cv2 = load_cv2()
     font, thick = cv2.FONT_HERSHEY_SIMPLEX, max(2, height // 12)
-    text = text.encode("ascii", "replace").decode()
+    text = text.replace("µ", "u").encode("ascii", "replace").decode()
     scale = cv2.getFontScaleFromHeight(font, height, thick)
     (wide, _), _ = cv2.getTextSize(text, font, scale, thick)
     if wide > width:

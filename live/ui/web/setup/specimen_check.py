@@ -149,7 +149,7 @@ class SpecimenCheck:
             self._refresh()
 
         phase = self._draft.config.measure.estimator == "phase"
-        compile_ahead(picture_kinds(info), phase=phase, say=report, stopped=self._closing.is_set)
+        compile_ahead(picture_kinds(info), phase=phase, show=report, stopped=self._closing.is_set)
         self.values["busy"] = ""
 
     def _quick_check(self, frames: list[Frame], info: CameraInfo) -> None:

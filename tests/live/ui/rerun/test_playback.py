@@ -106,7 +106,7 @@ def test_it_serves_until_it_is_stopped(run: RunFolder) -> None:
     stop, lines = threading.Event(), list[str]()
 
     class RecordingScreen(Screen):
-        def say(self, text: str = "") -> None:
+        def print(self, text: str = "") -> None:
             lines.append(text)
             if "--connect" in text:
                 stop.set()

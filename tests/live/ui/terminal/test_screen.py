@@ -37,7 +37,7 @@ def test_the_status_line_is_renewed_in_place_and_not_too_often() -> None:
     screen.status("too early")
     now[0] = 1.0
     screen.status("two")
-    screen.say("stays")
+    screen.print("stays")
     assert stream.getvalue() == "one long line\rtwo          \r   \rstays\n"
 
 
@@ -50,10 +50,11 @@ def test_the_progress_of_a_replay_is_one_line() -> None:
     screen.progress(time_step(), 21, 20, 2.5)
     screen.progress(time_step(), 1, 100_000, 1.0)
     assert stream.getvalue().splitlines() == [
-        "5 of 20 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs  20 ZOI/s  0:08 left",
-        "5 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs",
-        "21 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs  84 ZOI/s",
-        "1 of 100000 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs  10 ZOI/s  27:46:39 left",
+        "5 of 20 bursts  7.0 N  eyy -200 ± 0.0  exx +100 ± 0.0  exy +0 ± 0.0 µm/m  8/10 ZOIs  20 ZOI/s  0:08 left",
+        "5 bursts  7.0 N  eyy -200 ± 0.0  exx +100 ± 0.0  exy +0 ± 0.0 µm/m  8/10 ZOIs",
+        "21 bursts  7.0 N  eyy -200 ± 0.0  exx +100 ± 0.0  exy +0 ± 0.0 µm/m  8/10 ZOIs  84 ZOI/s",
+        "1 of 100000 bursts  7.0 N  eyy -200 ± 0.0  exx +100 ± 0.0  exy +0 ± 0.0 µm/m  8/10 ZOIs"
+        "  10 ZOI/s  27:46:39 left",
     ]
 
 
@@ -73,7 +74,7 @@ def snapshot(**more: Any) -> Snapshot:
 
 def test_a_wide_status_line_has_everything() -> None:
     assert status_line(snapshot(peak_N=1500.0), 200) == (
-        "REC  1:15  1234.5 N  30.9 MPa  peak 1500.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 um/m  8/10 ZOIs"
+        "REC  1:15  1234.5 N  30.9 MPa  peak 1500.0 N  eyy -200 ± 0.0  exx +100 ± 0.0  exy +0 ± 0.0 µm/m  8/10 ZOIs"
         "  30 fps  measured 120  skipped 8  lost 0  p95 42 ms  disk 120 min"
     )
 
@@ -95,7 +96,7 @@ def test_what_is_typed_is_not_overwritten() -> None:
     screen.prompt(": note sl_")
     now[0] = 9.0
     screen.status("hidden")
-    screen.say("stays")
+    screen.print("stays")
     screen.prompt(None)
     screen.status("again")
     assert stream.getvalue().split("\r") == [
@@ -125,8 +126,8 @@ def test_an_address_is_named_once_and_without_its_settings() -> None:
 
 def test_a_lost_terminal_does_not_matter() -> None:
     screen = TerminalScreen(ClosedTerminal())
-    screen.say("nobody reads this")
-    screen.say("nor this")
+    screen.print("nobody reads this")
+    screen.print("nor this")
 
 
 def test_the_frame_counts_show_when_they_do_not_add_up() -> None:
@@ -154,10 +155,10 @@ def test_late_listeners_get_every_event_once() -> None:
 @pytest.mark.parametrize(
     ("value", "sigma", "text"),
     [
-        (70.123456, 0.0234, "70.123 +- 0.023 GPa"),
+        (70.123456, 0.0234, "70.123 ± 0.023 GPa"),
         (70.1, math.nan, "70.1 GPa"),
         (math.nan, 1.0, "not known"),
-        (123456.0, 1200.0, "123456 +- 1200 GPa"),
+        (123456.0, 1200.0, "123456 ± 1200 GPa"),
     ],
 )
 def test_quantities_have_digits_by_their_sigma(value: float, sigma: float, text: str) -> None:

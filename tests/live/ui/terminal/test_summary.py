@@ -14,7 +14,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import Measurement
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
-from live.ui.terminal.summary import brief_lines, say_summary, trouble_lines
+from live.ui.terminal.summary import brief_lines, print_summary, trouble_lines
 from tests.live.made_run import PULLED, force_of
 from tests.live.made_up import make_measurement
 
@@ -27,7 +27,7 @@ class Said(Screen):
     def __init__(self) -> None:
         self.lines: list[str] = []
 
-    def say(self, text: str = "") -> None:
+    def print(self, text: str = "") -> None:
         self.lines.append(text)
 
 
@@ -47,7 +47,7 @@ def run_of(strains: Sequence[float], specimen: SpecimenConfig = SECTION, *, load
 def test_what_a_test_gave_in_a_dozen_lines(tmp_path: Path) -> None:
     run_state, screen = run_of(PULLED), Said()
     (tmp_path / "strain.h5").write_bytes(bytes(2_000_000))
-    say_summary(screen, run_state, SECTION, tmp_path, [*trouble_lines(run_state, ())])
+    print_summary(screen, run_state, SECTION, tmp_path, [*trouble_lines(run_state, ())])
     text = "\n".join(screen.lines)
     assert len(screen.lines) <= 12
     assert re.search(r"^E = (70\.0|69\.9|70)\d* ± [\d.]+ GPa  nu = 0\.[23]", text, re.MULTILINE), text
@@ -60,7 +60,7 @@ def test_what_a_test_gave_in_a_dozen_lines(tmp_path: Path) -> None:
 
 def test_verbose_has_all(tmp_path: Path) -> None:
     run_state, screen = run_of(PULLED), Said()
-    say_summary(screen, run_state, SECTION, tmp_path, [], verbose=True)
+    print_summary(screen, run_state, SECTION, tmp_path, [], verbose=True)
     text = "\n".join(screen.lines)
     assert "last mean strain: exx" in text and "lag of the load behind the frames" in text
 

@@ -83,7 +83,8 @@ def test_the_state_of_a_run(config: Config) -> None:
     consumer.attach(run)
     m = measurement()
     i = replace(
-        m.time_step, gauges={"axial": GaugeValue(0.001, 2e-6), "b": GaugeValue(math.nan, math.nan, "lost")}
+        m.time_step,
+        gauges={"axial": GaugeValue(0.001, 2e-6, share=0.83), "b": GaugeValue(math.nan, math.nan, "lost")},
     )
     consumer.measurement(replace(m, time_step=i))
     run.run_state.history.add(i)
@@ -96,7 +97,8 @@ def test_the_state_of_a_run(config: Config) -> None:
     assert isinstance(state, dict)
     assert state["force_N"] == -400 and state["peak_N"] == 500 and state["stress_Pa"] == pytest.approx(-1e7)
     assert state["axial"] == {"name": "axial", "value": 0.001, "sigma": 2e-6}
-    assert state["gauges"][1] == {"name": "b", "value": None, "sigma": None, "reason": "lost"}
+    assert state["gauges"][1] == {"name": "b", "value": None, "sigma": None, "reason": "lost", "part": ""}
+    assert state["part"] == state["gauges"][0]["part"] == "of 83 % of the area"
     assert state["events"][0]["level"] == "error" and "\x1b" not in state["events"][0]["text"]
 
 
