@@ -1,7 +1,8 @@
 """Which ZOIs are valid: the limits of what a fit may leave, and which ZOIs have a pattern at all.
 
-Each ZOI is judged by its own numbers alone (``verdict``), so that a verdict depends neither on threads nor on
-neighbours. Tried and rejected (of 75 wrong ZOIs accepted before the shares were added, 34 are left):
+Each ZOI is judged by its own numbers and by what all leave in common (``verdict``, ``pooling``), so that a verdict
+depends neither on threads nor on neighbours. Tried and rejected (of 75 wrong ZOIs accepted before the shares were
+added, 34 are left):
 
 - squares of the two shares, or powers of 1.5: found 14 and 28 of the 75, their sum 39;
 - half of MODEL_SHARE: found 46, but real pictures (an open hole, noise estimated) come to 0.87 of the present one;

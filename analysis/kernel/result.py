@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from analysis.field import Motion, Status, StrainField, stretched
 from analysis.field.picture_error import LIMIT, PictureError
 from analysis.follow.renewal import UNSHARED, Placement
-from analysis.kernel.coloured import coloured_bias
-from analysis.kernel.error_cause import BLUR, error_cause
+from analysis.kernel.coloured import BLUR, coloured_bias, error_cause
 from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]

@@ -198,10 +198,10 @@ class PictureGuard:
         error = field.picture
         if error is None or not field.ok.any():
             return
-        if error.cause and error.cause != self._cause:
+        if error.cause and not self._cause:
             self._emit(t, picture_words(field), "warning", error)
             self._cause = error.cause
-        elif self._cause and error.factor < 0.85 * LIMIT:
+        elif self._cause and not error.cause and error.factor < 0.85 * LIMIT:
             self._emit(t, "the picture leaves what its noise explains again", "info", error)
             self._cause = ""
 
@@ -216,10 +216,8 @@ def picture_words(field: StrainField) -> str:
     if error is None or not error.cause:
         return ""
     sigma = float(np.nanmedian(np.hypot(field.sigma_exx, field.sigma_eyy))) / math.sqrt(2) * 1e6
-    return (
-        f"the picture shows {CAUSES[error.cause]}: strain of a ZOI is uncertain by {sigma:.0f} um/m"
-        f" in place of {sigma / error.factor:.0f}"
-    )
+    text = f"the picture shows {CAUSES[error.cause]}: strain of a ZOI is uncertain by {sigma:.0f} µm/m"
+    return f"{text} in place of {sigma / error.factor:.0f}" if error.factor > 1 else text
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from analysis import PhaseKernel, Roi, Status, StrainField, ZoiGrid
+from analysis.field import mean_blur
 from analysis.fit.kernel_args import CONVERGED, OutArgs, ReferenceArgs
 from analysis.fit.pooling import pooled
 from analysis.kernel.images import rounding_variance
@@ -192,7 +193,6 @@ def lines(image: np.ndarray, seed: int) -> np.ndarray:
     ("cause", "spoilt"),
     [
         ("noise", lambda image: image + np.random.default_rng(9).normal(0, 5, SHAPE)),
-        ("bands", lambda image: lines(image, 9)),
         (
             "filter",
             lambda image: (
@@ -207,3 +207,23 @@ def test_the_cause_of_an_error_is_named(cause: str, spoilt) -> None:
     assert field.picture is not None and field.picture.cause == cause
     assert field.picture.factor > 1.5
     assert np.mean(field.status == Status.OK) > 0.97
+
+
+def test_bands_and_lines_are_taken_off_whatever_way_they_run() -> None:
+    first, clean = picture(1, 1), picture(1, 2, **MOTION).astype(np.float32)
+    kernel = PhaseKernel(first, GRID, noise=1.04)
+    wave = 10 * np.sin(2 * np.pi * np.arange(SHAPE[0]) / 23).astype(np.float32)
+    for later in (clean + wave[:, None], clean + wave, lines(clean, 9).astype(np.float32)):
+        field = kernel.measure(later, noise=1.04)
+        assert field.picture is not None and field.picture.cause == "bands" and field.picture.factor < 1.5
+        assert field.ok.mean() > 0.99
+        off = np.hypot(field.u - MOTION["u"], field.v - MOTION["v"])[field.ok]
+        assert np.sqrt(np.mean(off**2)) < 0.02
+
+
+def test_mean_strain_and_sharpness_of_compressed_pictures() -> None:
+    images = [jpeg(picture(1.5, k, **(MOTION if k else {})), 50) for k in (0, 1)]
+    field = PhaseKernel(images[0], GRID).measure(images[1])
+    means = [field.mean(name) for name in ("exx", "eyy")]
+    assert all(abs(mean) < 3 * sigma for mean, sigma in means)
+    assert abs(mean_blur(field).px) < 0.2

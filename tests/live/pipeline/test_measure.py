@@ -195,6 +195,21 @@ def test_a_blurred_picture_is_told_with_its_width_and_changes_no_strain(speckle:
 
 
 @pytest.mark.parametrize("size", [1, 7, 945, 15_129])
+def test_what_the_picture_has_become_is_told_once_with_its_cost_and_when_it_ends(speckle: Speckle) -> None:
+    rng = np.random.default_rng(3)
+    noises = (1.0, 1.0, 5.0, 5.0, 1.0, 5.0)
+    bursts = [burst(picture(speckle) + rng.normal(0, s, SHAPE), k) for k, s in enumerate(noises)]
+    kernel, noise = prepare(bursts[0], GRID, KernelSettings(), 1.0)
+    told: list[Event] = []
+    found = list(measure(bursts[1:], kernel, LoadLog(), noise_GL=noise, renew_at=0.1, on_event=told.append))
+    assert [(event.level, event.t) for event in told] == [("warning", 2.0), ("info", 4.0), ("warning", 5.0)]
+    assert told[0].data["cause"] == "noise" and told[0].data["factor"] == pytest.approx(13**0.5, rel=0.1)
+    costs = [float(np.nanmedian(m.field.sigma_exx)) * 1e6 for m in found[:2]]
+    words = told[0].text.split()
+    assert [int(words[words.index("by") + 1]), int(words[-1])] == pytest.approx([costs[1], costs[0]], rel=0.1)
+    assert all(m.field.ok.all() for m in found)
+
+
 def test_the_mean_does_not_depend_on_the_place_in_memory(size: int) -> None:
     values = np.random.default_rng(size).normal(1e-3, 1.0, size).astype(np.float32)
     means = set()
