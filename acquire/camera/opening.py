@@ -40,6 +40,7 @@ CAMERAS: Registry[Camera] = Registry(
         "session": "acquire.session.devices:open_session_camera",
     },
     lists_group="phasedic.camera_lists",
+    elsewhere=["sim"],
     lists={
         "": "acquire.v4l2.listing:list_cameras",
         "genicam": "acquire.genicam.listing:list_cameras",

@@ -12,7 +12,7 @@ from acquire.camera.timing import Bounded, exposure_and_gain
 from acquire.errors import ConfigError, DeviceError
 from acquire.frame import CameraSetting
 from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
-from acquire.genicam.formats import FORMATS, MonoFormat, preferred
+from acquire.genicam.formats import FORMATS, MonoFormat, preferred, readable
 from acquire.genicam.library import GenicamError
 from acquire.genicam.settings import KEYS, NO_TRIGGER, GenicamSettings
 
@@ -32,7 +32,7 @@ SHOWN = (
     *AUTOMATIC,
 )
 RESULTING_RATES = ("ResultingFrameRate", "AcquisitionResultingFrameRate", "ResultingFrameRateAbs")
-SMALL_PACKETS = 1500
+SMALL_PACKETS, TEST_PACKET = 1500, "GevSCPSFireTestPacket"
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +47,7 @@ class GenicamSetup:
     bits, white : int, int or None
     controls : mapping of str to JSON value
     settings : tuple of CameraSetting
+    formats : tuple of str
     warnings : tuple of str
     """
 
@@ -62,6 +63,7 @@ class GenicamSetup:
     white: int | None
     controls: dict[str, Any]
     settings: tuple[CameraSetting, ...]
+    formats: tuple[str, ...]
     warnings: tuple[str, ...]
 
     @property
@@ -145,7 +147,7 @@ def _set_feature(device: GenicamDevice, feature: str, value: str, where: str) ->
 
 def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> MonoFormat:
     offered = device.choices("PixelFormat")
-    usable = [name for name in FORMATS if name in offered]
+    usable = readable(offered)
     if not usable:
         raise DeviceError(
             f"{where}: offers {', '.join(offered) or 'nothing'}, none of them grey levels we can read"
@@ -223,7 +225,7 @@ def _set_packets(device: GenicamDevice, settings: GenicamSettings, where: str) -
     if not device.is_gige:
         return
     if settings.packet_size is None:
-        if device.has("GevSCPSFireTestPacket"):
+        if device.has(TEST_PACKET):
             device.ask("arv_camera_gv_auto_packet_size")
         return
     device.ask("arv_camera_gv_set_packet_size_adjustment", NO_ADJUSTMENT)
@@ -259,6 +261,7 @@ def _in_force(
         settings=exposure_and_gain(
             _bounded(device, "exposure_time", exposure_us), _bounded(device, "gain", gain), fps
         ),
+        formats=tuple(readable(device.choices("PixelFormat"))),
         warnings=tuple(_warnings(device, settings, fps)),
     )
 
@@ -316,7 +319,10 @@ def _warnings(device: GenicamDevice, settings: GenicamSettings, fps: float | Non
     if settings.fps is not None and fps is not None and fps < 0.99 * settings.fps:
         yield f"the camera gives {fps:g} frames a second, not {settings.fps:g}: exposure, size or line limit it"
     if device.is_gige and (size := device.ask("arv_camera_gv_get_packet_size")) < SMALL_PACKETS:
+        larger = (
+            "larger ones did not pass" if device.has(TEST_PACKET) else "it cannot try larger ones by itself"
+        )
         yield (
-            f"packets of {size} bytes: larger ones did not pass; set the MTU of the network card to 9000 "
+            f"packets of {size} bytes: {larger}; set the MTU of the network card to 9000, then packet_size=8000 "
             "(docs/machine-vision.md)"
         )

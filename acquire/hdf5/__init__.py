@@ -4,7 +4,15 @@
 and forecasts the free space, ``declared`` checks what a file holds.
 """
 
-from acquire.hdf5.damage import PaddedFile, abandon_file, check_size, probe, read_superblock, reason
+from acquire.hdf5.damage import (
+    PaddedFile,
+    abandon_file,
+    check_size,
+    create_file,
+    probe,
+    read_superblock,
+    reason,
+)
 from acquire.hdf5.declared import (
     Declared,
     JsonField,
@@ -48,6 +56,7 @@ __all__ = [
     "check_object",
     "check_size",
     "compile_loops",
+    "create_file",
     "forecast",
     "free_bytes",
     "network_share",

@@ -121,6 +121,18 @@ class LineSettings:
         return (1 + self.bytesize + (self.parity != "N") + self.stopbits) / self.baud
 
 
+def check_present(url: str) -> None:
+    """Refuse a port that is not there without opening it, which can reset a device.
+
+    Raises
+    ------
+    DeviceError
+        Lists the ports there are.
+    """
+    if url.startswith("/dev/") and not Path(url).exists():
+        raise DeviceError(f"{url}: there is no such port; {ports_line()}")
+
+
 def open_port(line: LineSettings) -> Port:
     """Open a port.
 

@@ -153,7 +153,9 @@ def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> Tensil
 def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:
     loading, strength = Loading.of(curve), tensile_strength(curve)
     if loading.n < MIN_POINTS or loading.stress[loading.top] <= 0:
-        words = f"strain and a tensile stress are known together at {loading.n} points"
+        words = (
+            f"strain and a tensile stress are known together at {loading.n} points, {MIN_POINTS} are needed"
+        )
         return replace(_nothing(words, options), Rm=strength)
     elastic = _elastic(loading, options)
     if isinstance(elastic, str):

@@ -126,7 +126,8 @@ class Strain(Closing):
         if name not in self.names:
             raise DataError(f"{self.path}: no map {name!r}; there are {', '.join(self.names)}")
         if isinstance(row, int) and not -self.n <= row < self.n:
-            raise DataError(f"{self.path}: no row {row}; there are {self.n}")
+            there = f"no row {row}; there are {self.n}" if self.n else "holds no measurement"
+            raise DataError(f"{self.path}: {there}")
         rows = range(self.n)[row]
         dataset = self._maps[name]
         try:

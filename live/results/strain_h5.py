@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from acquire.errors import DataError
-from acquire.hdf5 import FlushTimer, PictureStack, RowTable, abandon_file, reason
+from acquire.hdf5 import FlushTimer, PictureStack, RowTable, abandon_file, create_file, reason
+from acquire.printable import counted
 from analysis.evaluate import load_axis
 from live.results import layout
 from live.results.quantities import quantity_of
@@ -76,7 +77,7 @@ class StrainWriter:
         self._path, self.failed, self._axis = path, False, info.axis
         self._flushed = 0  # rows
         self._timer = FlushTimer(flush_s, now)
-        self._file = self._guard(lambda: _create(path, grid, info))
+        self._file = self._guard(lambda: create_file(path, lambda file: _declare(file, grid, info)))
         entry = self._file["entry"]
         self._maps = {n: PictureStack(entry["strain"][n]) for n in _MAPS}
         self._values = RowTable(entry["mean"], _value_names(info))
@@ -145,9 +146,9 @@ class StrainWriter:
             raise self._trouble(error) from error
 
     def _trouble(self, error: Exception) -> DataError:
+        kept = f"; {counted(self._flushed, 'row')} before stay readable" if self._flushed else ""
         return DataError(
-            f"{self._path}: cannot be written ({reason(error)}); make room on the disk or choose another --out. "
-            f"The {self._flushed} rows before are safe"
+            f"{self._path}: cannot be written ({reason(error)}){kept}; make room on the disk or choose another --out"
         )
 
 
@@ -155,11 +156,8 @@ def _value_names(info: ResultsInfo) -> tuple[str, ...]:
     return layout.column_names(info.gauges, info.extras)
 
 
-def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
-    import h5py
-
-    # These bounds give the format that survives SIGKILL; older ones promise nothing.
-    file = h5py.File(path, "x", libver=("v110", "v110"))
+def _declare(file: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
+    """Everything but the rows."""
     file.attrs.update(
         NX_class="NXroot",
         default="entry",
@@ -177,9 +175,6 @@ def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
     _add_mean(entry, info)
     _add_gauges(entry, info)
     _add_notes(entry, info)
-    file.flush()
-    file.swmr_mode = True
-    return file
 
 
 def _slice_of(row: int) -> Any:

@@ -82,6 +82,8 @@ class Grabber:
         The error that ended the camera.
     begun_t, arrived_t : float, s
         When the first and the last frame arrived, monotonic; before the first when it was started.
+    time_is_over : bool
+        The frames of ``plan.seconds`` have come.
     """
 
     def __init__(
@@ -106,7 +108,7 @@ class Grabber:
         self.fps = 0.0
         self._taker: ReferenceTaker | None = ReferenceTaker(plan.reference_burst)
         self._accumulator = BurstAccumulator(plan.burst)
-        self._unassigned = 0
+        self._unassigned, self.time_is_over = 0, False
         self._limiter, self._unreported = RateLimiter(), 0
         self.begun_t = self.arrived_t = math.nan
         self._first_t: float | None = None
@@ -141,7 +143,8 @@ class Grabber:
         try:
             for frame in self._camera:
                 self._take(frame)
-                if frame.t - (self._first_t or 0.0) >= self._plan.seconds:
+                self.time_is_over = frame.t - (self._first_t or 0.0) >= self._plan.seconds
+                if self.time_is_over:
                     break
         except PhasedicError as error:
             self._ended_by(error, str(error))

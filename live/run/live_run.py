@@ -39,6 +39,7 @@ _SILENT_S = 1.0
 _HINT_AFTER = 3  # times the frames of a reference
 INTERRUPTED = "interrupted"
 """The reason to stop that gives exit code 130."""
+TIME_IS_OVER = "the time is over"
 
 
 class LiveRun:
@@ -179,6 +180,8 @@ class LiveRun:
         self._load.stop()
         self.grabber.bursts.close()
         self.grabber.join()
+        if self.grabber.time_is_over:
+            self.stop(TIME_IS_OVER)
         self._burst_queue.count_skipped()
         self._load.join()
         self._run_state.loads.close()
@@ -221,7 +224,7 @@ class LiveRun:
             self._hint_once()
         over = now - self.grabber.begun_t > self._plan.seconds
         if silent and over and self._rig.camera.info.live and not self._stop.requested:
-            self.stop("the time is over")
+            self.stop(TIME_IS_OVER)
 
     def _hint_once(self) -> None:
         """A reference needs frames without a gap: warn once where frames are lost again and again."""

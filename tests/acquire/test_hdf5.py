@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import math
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +16,63 @@ import pytest
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.hdf5 import DiskSync, PictureReader, PictureStack, compile_loops
+from acquire.hdf5 import DiskSync, PictureReader, PictureStack, compile_loops, create_file
 from acquire.hdf5 import disk as pace_module
 from acquire.hdf5.disk import forecast, free_bytes, network_share
 from tests.acquire.session.fixtures import frame, writer
 from tests.live.ui.waiting import until
 
+ROOT = Path(__file__).parents[2]
+
 
 def test_free_bytes_of_what_does_not_exist_yet(tmp_path: Path) -> None:
     assert free_bytes(tmp_path / "a" / "b" / "session.h5") > 0
+
+
+DECLARED = """
+import resource, sys
+from pathlib import Path
+from acquire.hdf5 import create_file
+limit = int(sys.argv[2])
+resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+def declare(file):
+    for k in range(40):
+        file.create_group(f"a{k}").create_dataset("b", (0,), "f8", maxshape=(None,), chunks=(256,)).attrs["units"] = "m"
+try:
+    create_file(Path(sys.argv[1]), declare).close()
+except OSError as error:
+    print(error.strerror)
+"""
+
+
+@pytest.mark.parametrize("limit", [0, 900, 5000, 20_000])
+def test_a_file_without_room_for_its_groups_leaves_nothing(tmp_path: Path, limit: int) -> None:
+    """HDF5 objects that were open on a full disk printed a traceback each."""
+    path = tmp_path / "a.h5"
+    done = subprocess.run(
+        [sys.executable, "-c", DECLARED, path, str(limit)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ("File too large\n", "")
+    assert not path.exists()
+
+
+def test_a_new_file_is_read_while_it_grows_and_replaces_none(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    file = create_file(path, lambda head: head.create_dataset("b", (0,), "f8", maxshape=(None,), chunks=(4,)))
+    with file, h5py.File(path, "r", swmr=True) as reader:
+        file["b"].resize((3,))
+        file["b"][:] = [1.0, 2.0, 3.0]
+        file.flush()
+        reader["b"].refresh()
+        assert reader["b"][:].tolist() == [1.0, 2.0, 3.0]
+    content = path.read_bytes()
+    with pytest.raises(FileExistsError):
+        create_file(path, lambda head: head.create_group("other"))
+    assert path.read_bytes() == content
 
 
 def test_forecast(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

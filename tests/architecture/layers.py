@@ -64,8 +64,8 @@ LAYERS = {
         )
         for i, layer in enumerate(LIVE)
     },
-    "live.cli": "acquire.errors acquire.printable live.commands.arguments live.commands.exit_codes"
-    " live.commands.signals live.commands.streams",
+    "live.cli": "acquire.errors acquire.printable live.commands.arguments live.commands.environment"
+    " live.commands.exit_codes live.commands.signals live.commands.streams",
 }
 # One module opens the simulated devices. The characterisation and the demo compare with their truth.
 EXCEPTIONS = {

@@ -132,7 +132,8 @@ class QuickChecker:
         figures = figures_of(sample, measured)
         if math.isfinite(figures.sharpness):
             self._peak = max(self._peak, figures.sharpness)
-        return QuickCheck(figures, self._peak, self._sharpest.compare(sample, measured.predicted.measurable))
+        blur = self._sharpest.compare(sample, measured.predicted.measurable, figures.sharpness)
+        return QuickCheck(figures, self._peak, blur)
 
     def full(self, stack: FrameStack) -> CheckFigures:
         """All figures with the table of strain noise."""

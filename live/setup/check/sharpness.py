@@ -28,8 +28,9 @@ class SharpestPicture:
 
     def __init__(self) -> None:
         self._kernel: PhaseKernel | None = None
+        self._peak = math.nan  # sharpness figure of the reference
 
-    def compare(self, sample: CheckSample, measurable: NDArray[np.bool_]) -> Blur:
+    def compare(self, sample: CheckSample, measurable: NDArray[np.bool_], sharpness: float) -> Blur:
         """The blur of a sample since the sharpest picture, over some dozens of ZOIs about the middle.
 
         Parameters
@@ -37,6 +38,8 @@ class SharpestPicture:
         sample : CheckSample
         measurable : (R, C) bool
             ZOIs with a pattern. Without any the blur is NaN.
+        sharpness : float
+            Figure of the sample; decides where the blur has changed too much to be measured (NaN).
         """
         measurable = measurable & sample.check_region.grid.active
         if not measurable.any():
@@ -50,7 +53,10 @@ class SharpestPicture:
                 self._kernel, _ = prepare(burst, moved(chosen, cut), sample.settings, sample.noise)
             except DataError:
                 return NOT_KNOWN
+            self._peak = sharpness
         found = mean_blur(self._kernel.measure(burst.mean, noise=averaged(sample.noise, burst.n)))
-        if found.px < -SHARPER * found.sigma:
+        too_sharp = math.isnan(found.px) and sharpness > self._peak
+        if too_sharp or found.px < -SHARPER * found.sigma:
+            self._peak = sharpness
             self._kernel, _ = prepare(burst, self._kernel.grid, sample.settings, sample.noise)
         return found

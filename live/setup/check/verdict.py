@@ -91,8 +91,9 @@ def _not_measured(f: CheckFigures, what: str) -> CheckLine:
 
 
 def _camera(f: CheckFigures) -> Iterator[CheckLine]:
+    yield from (CheckLine("camera", warning, measured=False) for warning in f.stack.camera.warnings)
     if f.stack.lost:
-        yield CheckLine("frames lost", f"{f.stack.lost} between {len(f.stack)}", False,
+        yield CheckLine("frames lost", f"{f.stack.lost} between the {len(f.stack)} looked at", False,
                    "a lower frame rate, a smaller picture (--crop), another port or a faster machine")  # fmt: skip
     automatic = ", ".join(f.automatic)
     yield CheckLine("automatic controls", automatic or "none", not automatic, f"put on manual: {automatic}")
@@ -248,7 +249,7 @@ def _vibration(s: Steadiness, unit: float, name: str, digits: int) -> str:
 
 def _load(f: CheckFigures) -> Iterator[CheckLine]:
     if f.load is not None:
-        value = f"{f.load.rate:.4g} 1/s, noise {f.load.noise_N:.3g} N, mean {f.load.mean_N:.5g} N"
+        value = f"{f.load.rate:.4g} 1/s, noise {f.load.noise_N:.3g} N, mean {f.load.mean_text}"
         yield CheckLine("load cell", value, f.load.ready, "; ".join(f.load.remarks))
 
 

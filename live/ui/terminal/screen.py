@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from live.pipeline.snapshot import Snapshot
 
 _TERMINAL_EVERY_S, _FILE_EVERY_S = 0.25, 5.0
+_IN_ASCII = str.maketrans({"µ": "u", "±": "+-"})
 _UNKNOWN_WIDTH, _FILE_WIDTH = 119, 1000
 
 
@@ -108,7 +109,11 @@ class TerminalScreen(Screen):
     def _write(self, text: str) -> None:
         encoding = getattr(self._stream, "encoding", None) or "utf-8"
         try:
-            self._stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
+            text.encode(encoding)
+        except UnicodeEncodeError:
+            text = text.translate(_IN_ASCII).encode(encoding, "backslashreplace").decode(encoding)
+        try:
+            self._stream.write(text)
             self._stream.flush()
         except (OSError, ValueError):
             self._quiet = True

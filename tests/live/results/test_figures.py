@@ -99,7 +99,7 @@ def test_without_a_section_forces_stand_for_stresses() -> None:
 def test_the_lag_of_the_load_is_told() -> None:
     history, loads = kept(ramberg_osgood(), lag=0.15)
     (line,) = lag_line(history, loads, FLAT)
-    found = float(line.split(": ")[1].split(" +-")[0])
+    found = float(line.split(": ")[1].split(" ±")[0])
     assert abs(found - 150) < 40
     assert lag_line(history, LoadLog(), FLAT) == []
     (refused,) = lag_line(History(), loads, FLAT)

@@ -84,8 +84,10 @@ def test_gaps_and_damage_are_left_out_and_emit() -> None:
 
 
 def test_the_end_of_the_time_ends_the_run() -> None:
-    _, _, frame_counts, _, _ = grabbed(ListCamera(frame(i) for i in range(1000)), seconds=2.0)
-    assert frame_counts.grabbed == 21
+    grabber, _, frame_counts, _, _ = grabbed(ListCamera(frame(i) for i in range(1000)), seconds=2.0)
+    assert frame_counts.grabbed == 21 and grabber.time_is_over
+    grabber, *_ = grabbed(ListCamera(frame(i) for i in range(15)), seconds=2.0)
+    assert not grabber.time_is_over
 
 
 def test_a_camera_that_dies_is_told_and_kept() -> None:

@@ -287,6 +287,14 @@ def line_text(stack: FrameStack, what: str) -> str:
     return next(line.text() for line in lines if line.what == what)
 
 
+def test_warnings_of_the_camera_and_lost_frames_are_shown(taken: FrameStack) -> None:
+    stack = replace(taken, camera=replace(taken.camera, warnings=("its gain is automatic",)), lost=3)
+    assert line_text(stack, "camera") == "?     camera                 its gain is automatic"
+    assert line_text(stack, "frames lost").startswith(
+        f"LOOK  frames lost            3 between the {len(taken)} looked at"
+    )
+
+
 def test_lamps_on_the_mains_are_named(taken: FrameStack) -> None:
     t = np.arange(len(taken)) / 30
     bright = 1 + 0.05 * np.sin(2 * np.pi * 100 * t)

@@ -117,8 +117,13 @@ class CameraPreview:
         if info is None:
             raise DataError("the camera has given no picture yet")
         with self._lock:
-            n = self._needed(info) if info.live else len(self._first)
-            self._collected = deque([] if info.live else self._first, maxlen=max(n, 1))
+            self._collected = deque(maxlen=max(self._needed(info), 1))
+            if self._whole:
+                self._collect_first()
+
+    def _collect_first(self) -> None:
+        """Of a recording: its first frames are those of the check."""
+        self._collected = deque(self._first, maxlen=len(self._first))
 
     @property
     def collecting(self) -> bool:
@@ -214,6 +219,8 @@ class CameraPreview:
             raise DataError("the recording has no picture that can be used")
         with self._lock:
             self._whole = True
+            if self._collected is not None:  # asked for while they were read
+                self._collect_first()
         due = 0.0
         while not self._over:
             if time.monotonic() >= due:

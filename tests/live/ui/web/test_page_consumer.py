@@ -31,10 +31,11 @@ from tests.live.ui.waiting import until
 from tests.live.ui.web.sentences import (
     LANGUAGES,
     STATIC,
+    Translator,
     catalogue,
+    of_the_devices,
     of_the_page,
     of_the_program,
-    translated,
 )
 
 
@@ -275,16 +276,28 @@ def test_the_length_of_an_elongation() -> None:
 
 
 def test_every_text_of_the_page_is_translated() -> None:
-    known = catalogue()
-    missing = {text for text in of_the_page() if not translated(text, known)}
+    known, translator = catalogue(), Translator()
+    missing = {text for text in of_the_page() if not translator.knows(text)}
     served = {word for kind in GAUGE_KINDS.values() for word in (kind.label, kind.hint)}
     missing |= {text for text in {*FIELD_MAPS, *served} if text not in known}
     assert not missing
 
 
 def test_every_message_of_the_program_is_translated() -> None:
-    known, texts = catalogue(), set(of_the_program())
-    assert len(texts) > 100 and not {text for text in texts if not translated(text, known)}
+    translator, texts = Translator(), set(of_the_program())
+    assert len(texts) > 100 and not {text for text in texts if not translator.knows(text)}
+
+
+def test_every_message_of_a_device_or_file_is_translated() -> None:
+    translator, texts = Translator(), of_the_devices()
+    assert len(texts) > 400
+    assert not {f"{module}: {text}" for text, module in texts.items() if not translator.knows(text)}
+
+
+def test_a_pattern_with_words_that_are_not_translated_does_not_count() -> None:
+    translator = Translator()
+    assert translator.knows("burst {}") and not translator.knows("burst {} fell off the table")
+    assert translator.knows("{}: no picture for {} s") and not translator.knows("{}: the moon is {}")
 
 
 @pytest.mark.parametrize("name", LANGUAGES)
