@@ -194,7 +194,6 @@ def test_a_blurred_picture_is_told_with_its_width_and_changes_no_strain(speckle:
     assert [event.source for event in told] == ["sharpness"] and told[0].t == 2.0
 
 
-@pytest.mark.parametrize("size", [1, 7, 945, 15_129])
 def test_what_the_picture_has_become_is_told_once_with_its_cost_and_when_it_ends(speckle: Speckle) -> None:
     rng = np.random.default_rng(3)
     noises = (1.0, 1.0, 5.0, 5.0, 1.0, 5.0)
@@ -210,6 +209,7 @@ def test_what_the_picture_has_become_is_told_once_with_its_cost_and_when_it_ends
     assert all(m.field.ok.all() for m in found)
 
 
+@pytest.mark.parametrize("size", [1, 7, 945, 15_129])
 def test_the_mean_does_not_depend_on_the_place_in_memory(size: int) -> None:
     values = np.random.default_rng(size).normal(1e-3, 1.0, size).astype(np.float32)
     means = set()
