@@ -146,7 +146,7 @@ class StrainWriter:
             raise self._trouble(error) from error
 
     def _trouble(self, error: Exception) -> DataError:
-        kept = f"; {counted(self._flushed, 'row')} before stay readable" if self._flushed else ""
+        kept = f"; {counted(self._flushed, 'row')} before can be read" if self._flushed else ""
         return DataError(
             f"{self._path}: cannot be written ({reason(error)}){kept}; make room on the disk or choose another --out"
         )

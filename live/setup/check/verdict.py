@@ -249,7 +249,7 @@ def _vibration(s: Steadiness, unit: float, name: str, digits: int) -> str:
 
 def _load(f: CheckFigures) -> Iterator[CheckLine]:
     if f.load is not None:
-        value = f"{f.load.rate:.4g} 1/s, noise {f.load.noise_N:.3g} N, mean {f.load.mean_text}"
+        value = f"{f.load.rate:.4g} 1/s, noise {f.load.noise_N:.3g} N, mean {f.load.mean_text} N"
         yield CheckLine("load cell", value, f.load.ready, "; ".join(f.load.remarks))
 
 

@@ -166,7 +166,9 @@ def test_a_disk_that_takes_no_more_is_told_and_spoils_nothing(
 
     with monkeypatch.context() as patch:
         patch.setattr(h5py.File, "flush", full)
-        with pytest.raises(DataError, match=r"strain\.h5: cannot be written .*no space.* 1 rows"):
+        with pytest.raises(
+            DataError, match=r"strain\.h5: cannot be written .*no space.*; 1 row before can be read"
+        ):
             results.add(make_measurement(1))
             time.sleep(results.flush_when_due())
             results.flush_when_due()
