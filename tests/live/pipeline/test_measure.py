@@ -85,10 +85,12 @@ def test_a_renewed_reference_stays_composed(speckle: Speckle, on_demand: bool) -
     if on_demand:
         steps = [burst(images[0], 1), NewReference(burst(images[0], 2)), burst(images[1], 3)]
     else:
-        # Another pattern fades in: the first reference no longer fits the last picture.
+        # On the left another pattern fades in: the first reference no longer fits the last picture there.
+        left = np.arange(SHAPE[1]) < 96
         other = Speckle(SHAPE, radius=2.0, seed=6)
         fading = zip((0.96, 0.92), ({"u": 2.0, "du_dx": 0.02}, {"u": 3.0, "du_dx": 0.03}), strict=True)
-        mixed = [w * picture(speckle, **g) + (1 - w) * picture(other, **g) for w, g in fading]
+        shares = ((np.where(left, w, 1), g) for w, g in fading)
+        mixed = [w * picture(speckle, **g) + (1 - w) * picture(other, **g) for w, g in shares]
         steps = [burst(image, i) for i, image in enumerate(mixed, 1)]
     found = list(measure(steps, kernel, LoadLog(), noise_GL=noise, renew_at=0.2, on_event=told.append))
     renewals = [event for event in told if event.kind is EventKind.REFERENCE]
