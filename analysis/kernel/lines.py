@@ -7,13 +7,13 @@ both off the deformed one makes the pictures alike again.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from analysis.kernel.solve import Solution
+from analysis.field import Status
+from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]
@@ -23,6 +23,27 @@ LINES = 8.0
 """Variance of the means of lines over what noise of single pixels would leave in them: real pictures have up to 3.1."""
 SAMPLE, MAX_ZOIS = 30, 1000
 """ZOIs that show whether there are lines, and how strong each is, at most."""
+
+
+ROUNDS = 3
+"""How often lines are taken off; each time more ZOIs show them."""
+
+
+def mend(solution: Solution) -> None:
+    """Measure once more without wild pixels, and without lines, where the image has some."""
+    from analysis.picture.impulses import without_impulses
+
+    if not solution.reference.cleaned and solution.is_disturbed:
+        mended = without_impulses(solution.image)
+        if mended is not None:
+            solution.measure_in(mended)
+    for _ in range(ROUNDS):
+        ok = solution.status == Status.OK
+        mended = without_lines(solution, ok) if solution.is_disturbed else None
+        if mended is None:
+            return
+        solution.had_lines = True
+        solution.measure_in(mended)
 
 
 def without_lines(solution: Solution, ok: NDArray[np.bool_]) -> Pixels | None:

@@ -31,8 +31,6 @@ Floats = NDArray[np.float64]
 DISTURBED_RATIO, DISTURBED_SHARE = 2.0, 0.02
 """Of what is left over what the noise explains, and of the ZOIs that are refused: from here on wild pixels of the
 image are looked for."""
-LINE_ROUNDS = 3
-"""How often bands and lines are taken off; each time more ZOIs show them."""
 
 
 class Solution:
@@ -57,7 +55,7 @@ class Solution:
     common : PooledError or None
         What the fits leave in common; None: of too few ZOIs to be taken.
     had_lines : bool
-        Whether bands or lines were taken off the image.
+        Whether bands or lines were taken off the image (``lines.mend``).
     """
 
     def __init__(
@@ -78,8 +76,8 @@ class Solution:
         able = prepared.status == Status.OK
         known = np.isfinite(guess.sum()) or np.isfinite(guess @ np.ones(guess.shape[1]))  # as a rule all
         which = np.flatnonzero(able & known)
-        self._solve(which, able & ~known)
-        self._mend(which, able & ~known)
+        self._places = which, able & ~known
+        self._solve(*self._places)
 
     def _take(self, image: NDArray[Any]) -> None:
         """Measure in ``image``."""
@@ -87,26 +85,15 @@ class Solution:
         self.common = None
         self.picture = self._picture(self.reference.reached(self.guess))
 
-    def _mend(self, which: NDArray[np.intp], unknown: NDArray[np.bool_]) -> None:
-        """Measure once more without wild pixels, and without lines, where the image has some."""
-        from analysis.kernel.lines import without_lines
-        from analysis.picture.impulses import without_impulses
+    def measure_in(self, image: NDArray[Any]) -> None:
+        """Measure once more, in ``image``, from the same guess."""
+        self._take(image)
+        self._solve(*self._places)
 
-        if not self.reference.cleaned and self._is_disturbed(which):
-            mended = without_impulses(self.image)
-            if mended is not None:
-                self._take(mended)
-                self._solve(which, unknown)
-        for _ in range(LINE_ROUNDS):
-            mended = without_lines(self, self.status == Status.OK) if self._is_disturbed(which) else None
-            if mended is None:
-                return
-            self.had_lines = True
-            self._take(mended)
-            self._solve(which, unknown)
-
-    def _is_disturbed(self, which: NDArray[np.intp]) -> bool:
+    @property
+    def is_disturbed(self) -> bool:
         """Whether the image leaves much more than its noise, or many ZOIs are refused: it may have wild pixels."""
+        which = self._places[0]
         refused = np.count_nonzero(self.status[which] != Status.OK)
         much = self.common is not None and float(np.median(self.common.ratio)) > DISTURBED_RATIO
         return much or bool(refused > DISTURBED_SHARE * len(which))
