@@ -29,6 +29,8 @@ GROUP, MAX_GROUPS = 50, 8
 """ZOIs of like contrast whose median counts, at least, and number of such groups at most."""
 COLOUR_SPREAD = 1.0
 """Standard deviation of the logarithm of the ratio that the shapes of one ZOI show."""
+SAME = 1e-3
+"""What is left over what the noise as stated explains, below which the picture is its own reference and shows no noise."""
 LOWEST, LOWEST_DEVIATION = 5, 0.84
 """One ZOI in so many leaves less than its group by these standard deviations; if these few ..."""
 AS_STATED = 1.1
@@ -61,6 +63,8 @@ def pooled(
     matched = _matched(found, left, expected, own)
     count = int(np.count_nonzero(matched))
     if count < MIN_POOLED:
+        return None
+    if np.median((found.left / (own.pixels * expected))[matched]) < SAME:
         return None
     ratio, contrast = left[matched] / expected[matched], own.signal[matched]
     groups = _alike(contrast)

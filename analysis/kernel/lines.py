@@ -39,7 +39,7 @@ def mend(solution: Solution) -> None:
             solution.measure_in(mended)
     for _ in range(ROUNDS):
         ok = solution.status == Status.OK
-        mended = without_lines(solution, ok) if solution.is_disturbed else None
+        mended = without_lines(solution, ok) if solution.leaves_much else None
         if mended is None:
             return
         solution.had_lines = True

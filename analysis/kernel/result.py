@@ -136,7 +136,8 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
         )
     if solution.noise is not None or not ok.any():
         return _Noise(reference, current, white, float("nan"))
-    found = float(np.median((solution.found.left / solution.reference.prepared.freedom)[ok]))
+    left = solution.found.left / solution.reference.prepared.freedom
+    found = max(float(np.median(left[ok])), solution.rounding)
     whole = np.full(len(ok), found)
     return _Noise(*_parted(whole, reference, np.ones(len(ok)), solution), white, float("nan"))
 

@@ -95,8 +95,12 @@ class Solution:
         """Whether the image leaves much more than its noise, or many ZOIs are refused: it may have wild pixels."""
         which = self._places[0]
         refused = np.count_nonzero(self.status[which] != Status.OK)
-        much = self.common is not None and float(np.median(self.common.ratio)) > DISTURBED_RATIO
-        return much or bool(refused > DISTURBED_SHARE * len(which))
+        return self.leaves_much or bool(refused > DISTURBED_SHARE * len(which))
+
+    @property
+    def leaves_much(self) -> bool:
+        """Whether the image leaves much more than its noise."""
+        return self.common is not None and float(np.median(self.common.ratio)) > DISTURBED_RATIO
 
     def _solve(self, which: NDArray[np.intp], unknown: NDArray[np.bool_]) -> None:
         guess = self.guess
