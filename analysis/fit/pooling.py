@@ -30,7 +30,7 @@ GROUP, MAX_GROUPS = 50, 8
 COLOUR_SPREAD = 1.0
 """Standard deviation of the logarithm of the ratio that the shapes of one ZOI show."""
 SAME = 1e-3
-"""What is left over what the noise as stated explains, below which the picture is its own reference and shows no noise."""
+"""What is left over what the noise as stated explains, below which the picture is its own reference: no noise shows."""
 LOWEST, LOWEST_DEVIATION = 5, 0.84
 """One ZOI in so many leaves less than its group by these standard deviations; if these few ..."""
 AS_STATED = 1.1
