@@ -27,7 +27,7 @@ from acquire.hdf5.declared import (
     stored_rows,
 )
 from acquire.hdf5.disk import DiskSync, FlushTimer, forecast, free_bytes, network_share
-from acquire.hdf5.pictures import PictureReader, PictureStack, compile_loops
+from acquire.hdf5.pictures import COMPRESSED, PictureReader, PictureStack, compile_loops
 from acquire.hdf5.tables import (
     NO_UNIT,
     GrowingDataset,
@@ -40,6 +40,7 @@ from acquire.hdf5.tables import (
 )
 
 __all__ = [
+    "COMPRESSED",
     "NO_UNIT",
     "Declared",
     "DiskSync",

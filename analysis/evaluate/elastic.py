@@ -155,6 +155,29 @@ def poisson(loading: Loading, line: FittedLine) -> Figure:
     return Figure.about(nu, math.hypot(sigma * line.slope, nu * line.sigma / line.slope), n - 2)
 
 
+def poisson_between(loading: Loading, low: float, high: float) -> Figure:
+    """Poisson's ratio between two strains along the load, or up to the highest stress: the slope of one over the other.
+
+    The noise of the strain along the load is taken out of its variance.
+    """
+    along, across = (values[: loading.top + 1] for values in (loading.elastic, loading.transverse))
+    used = (along >= low) & (along <= high) & np.isfinite(across)
+    n, reached = int(used.sum()), float(np.nanmax(along))
+    if n < MIN_POINTS:
+        return Figure.none(
+            f"{n} points between the strains {100 * low:g} and {100 * high:g} %, {MIN_POINTS} are needed"
+            f" (the strain reaches {100 * reached:.2g} %)"
+        )
+    x, y = along[used] - along[used].mean(), across[used] - across[used].mean()
+    sxx = float(x @ x) - (n - 1) * noise(loading.elastic) ** 2
+    if not sxx > 0:
+        return Figure.none("the strain does not rise above its noise there")
+    slope = float(x @ y) / sxx
+    rest = y - slope * x
+    words = f"strains {100 * low:g} to {100 * min(high, reached):.3g} %"
+    return Figure.about(-slope, math.sqrt(float(rest @ rest) / (n - 2) / sxx), n - 2, words)
+
+
 def not_uniform(loading: Loading, line: FittedLine) -> str:
     """A remark where the strain varies over its area, in the upper half of the interval of ``line``; else empty.
 

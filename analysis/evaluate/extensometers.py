@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from analysis.evaluate.affine import Places
+from analysis.evaluate.area.affine import Places
 from analysis.evaluate.gauges import (
     Box,
     Gauge,

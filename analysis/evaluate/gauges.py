@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate.area import GRADIENTS, AreaStrain
+from analysis.evaluate.area.strain import GRADIENTS, AreaStrain
 from analysis.field import PAIR_INDEX, VALUES, Status, StrainField, ZoiGrid, area_share, variance_of_sum
 
 Point = tuple[float, float]
@@ -197,15 +197,21 @@ def read_ends(chosen: Sequence[Mask], field: StrainField) -> GaugeValue:
 
 
 def read_strips(chosen: Sequence[Mask], field: StrainField, along: str) -> GaugeValue:
-    """``read_ends`` of two strips, each where the other has values too, so that their line is not tilted."""
+    """``read_ends`` of two strips, each where the other has values too, so that their line is not tilted.
+
+    Strips that hardly face each other, as those of a specimen that leans, are read whole.
+    """
+    side = 1 if along == "x" else 0
+    sides = [end.any(axis=side) for end in chosen]
+    if np.sum(sides[0] & sides[1]) < MIN_SHARE * min(one.sum() for one in sides):
+        return read_ends(chosen, field)
     for number, end in enumerate(chosen, 1):
         if missing := _missing(end, field):
             return GaugeValue(math.nan, math.nan, f"end {number}: {missing}")
-    side = 1 if along == "x" else 0
     first, second = ((end & field.ok).any(axis=side, keepdims=True) for end in chosen)
     both = first & second & field.ok
     if not both.any():
-        return GaugeValue(math.nan, math.nan, "the two ends do not face each other; move or widen the gauge")
+        return GaugeValue(math.nan, math.nan, "the ZOIs with a value at its two ends do not face each other")
     return read_ends([end & both for end in chosen], field)
 
 
@@ -216,7 +222,7 @@ def _missing(chosen: Mask, field: StrainField) -> str:
         grid = field.grid
         return (
             f"no ZOI is there; their centres reach from {grid.x[0]:g}, {grid.y[0]:g} to {grid.x[-1]:g},"
-            f" {grid.y[-1]:g} px"
+            f" {grid.y[-1]:g} px; move the gauge there"
         )
     status = field.status[chosen]
     lost = Counter(Status(s) for s in status[status != Status.OK].tolist())

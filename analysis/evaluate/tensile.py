@@ -10,8 +10,6 @@ import math
 from dataclasses import dataclass, fields, replace
 from typing import Literal
 
-import numpy as np
-
 from analysis.evaluate.curve import Curve, Loading, first_crossing, noise, reading
 from analysis.evaluate.elastic import (
     MIN_POINTS,
@@ -21,9 +19,12 @@ from analysis.evaluate.elastic import (
     line_through,
     not_uniform,
     poisson,
+    poisson_between,
 )
 from analysis.evaluate.figure import Figure
-from analysis.evaluate.standards import STANDARDS, Band, Standard
+from analysis.evaluate.flow import anisotropy, hardening
+from analysis.evaluate.rates import midway, seconds_of, strain_rate
+from analysis.evaluate.standards import STANDARDS, Standard
 from analysis.evaluate.strengths import (
     Yield,
     proof_strength,
@@ -96,6 +97,8 @@ class TensileFigures:
     Rm : Figure, Pa
     Agt, Ag, At, A : Figure
         Total and plastic strain at the highest stress, and at break; not in percent.
+    r, n : Figure
+        Plastic anisotropy and strain hardening; ``why`` has the interval.
     rate_elastic, rate_plastic : Figure, 1/s
         Strain rate over ``span``, and over the second half of the strain from there to the highest
         stress; ``why`` holds it against the standard.
@@ -122,6 +125,8 @@ class TensileFigures:
     Ag: Figure
     At: Figure
     A: Figure
+    r: Figure
+    n: Figure
     rate_elastic: Figure
     rate_plastic: Figure
     seconds: Figure
@@ -225,11 +230,12 @@ def _with_line(
     region = replace(loading, strain=loading.elastic, noise_strain=noise(loading.elastic))
     slope = line_through(region, line.first, line.last) or line
     remark = not_uniform(loading, slope)
+    nu = _poisson(loading, slope, options.standard)
     figures = TensileFigures(
         E=slope.modulus.remarked(remark),
         E_chord=chord(region, slope),
         r2=slope.r2,
-        nu=poisson(loading, slope).remarked(remark),
+        nu=nu.remarked(remark),
         Rp01=rp01,
         Rp02=rp02,
         Rp1=rp1,
@@ -240,9 +246,13 @@ def _with_line(
         Ag=_plastic(agt, ends[0], line),
         At=at,
         A=_plastic(at, ends[1], line),
-        rate_elastic=_rate(loading, line.first, line.last, options.standard.rates_elastic),
-        rate_plastic=_rate(loading, _midway(loading, line), loading.top + 1, options.standard.rates_plastic),
-        seconds=_seconds(loading, options.standard),
+        r=anisotropy(loading, slope, nu),
+        n=hardening(loading, slope),
+        rate_elastic=strain_rate(loading, line.first, line.last, options.standard.rates_elastic),
+        rate_plastic=strain_rate(
+            loading, midway(loading, line), loading.top + 1, options.standard.rates_plastic
+        ),
+        seconds=seconds_of(loading, options.standard),
         span=_span(loading, line, zero),
         zero=elastic.zero,
         standard=options.standard.name,
@@ -250,9 +260,17 @@ def _with_line(
     return figures if options.standard.flow else _without_flow(figures)
 
 
+def _poisson(loading: Loading, line: FittedLine, standard: Standard) -> Figure:
+    if standard.poisson is None:
+        return poisson(loading, line)
+    return poisson_between(loading, *standard.poisson)
+
+
 def _without_flow(figures: TensileFigures) -> TensileFigures:
     none = Figure.none(f"not a figure of {figures.standard}")
-    return replace(figures, Rp01=none, Rp02=none, Rp1=none, ReH=none, ReL=none, Ag=none, A=none)
+    return replace(
+        figures, Rp01=none, Rp02=none, Rp1=none, ReH=none, ReL=none, Ag=none, A=none, r=none, n=none
+    )
 
 
 def _without_line(loading: Loading, options: TensileOptions, why: str) -> TensileFigures:
@@ -262,7 +280,7 @@ def _without_line(loading: Loading, options: TensileOptions, why: str) -> Tensil
         _nothing(f"no elastic line: {why}", options),
         Agt=_from_zero(strain_at_top(loading), zero),
         At=_from_zero(strain_at_break(loading), zero),
-        seconds=_seconds(loading, options.standard),
+        seconds=seconds_of(loading, options.standard),
         zero=StrainZero(zero, how),
     )
 
@@ -294,47 +312,3 @@ def _span(loading: Loading, line: FittedLine, zero: float) -> Span:
     ends = [line.first, line.last - 1]
     strain, stress = loading.course[ends] - zero, loading.level[ends]
     return Span((float(strain[0]), float(strain[1])), (float(stress[0]), float(stress[1])), line.n)
-
-
-def _rate(loading: Loading, first: int, last: int, bands: tuple[Band, ...]) -> Figure:
-    """The slope of strain over time, held against the bands of a standard."""
-    t, strain = loading.t[first:last], loading.strain[first:last]
-    if len(t) < 3 or np.ptp(t) == 0:
-        return Figure.none(f"{len(t)} points of that part are known")
-    dt, de = t - t.mean(), strain - strain.mean()
-    stt = float(dt @ dt)
-    slope = float(dt @ de) / stt
-    rest = de - slope * dt
-    found = Figure.about(slope, math.sqrt(float(rest @ rest) / (len(t) - 2) / stt), len(t) - 2)
-    return replace(found, why=_against(slope, bands))
-
-
-def _midway(loading: Loading, line: FittedLine) -> int:
-    """Where half the strain between the elastic interval and the highest stress has gone."""
-    first, last = line.last - 1, loading.top
-    if last <= first:
-        return last + 1
-    half = 0.5 * (loading.course[first] + loading.course[last])
-    return first + int(np.argmax(loading.course[first:] >= half))
-
-
-def _against(rate: float, bands: tuple[Band, ...]) -> str:
-    if not bands:
-        return ""
-    inside = [band for band in bands if band.low <= rate <= band.high]
-    if inside:
-        return f"within {inside[0].name}"
-    allowed = ", ".join(f"{band.name} {band.low:.2g} to {band.high:.2g} 1/s" for band in bands)
-    return f"outside the standard ({allowed})"
-
-
-def _seconds(loading: Loading, standard: Standard) -> Figure:
-    begins = first_crossing(loading.level, 0.02 * float(loading.stress[loading.top]))
-    start = loading.t[0] if math.isnan(begins) else np.interp(begins, np.arange(loading.n), loading.t)
-    last = loading.n - 1 if loading.broke else loading.top
-    value, step = float(loading.t[last] - start), float(np.median(np.diff(loading.t)))
-    wanted, words = standard.seconds_to_break, ""
-    if wanted and loading.broke:
-        inside = wanted[0] <= value <= wanted[1]
-        words = f"{'within' if inside else 'outside'} {wanted[0]:g} to {wanted[1]:g} s of the standard"
-    return Figure(value, value - step, value + step, words)

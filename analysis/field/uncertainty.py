@@ -6,10 +6,10 @@ Also the finite strain measures, since the names of values refer to them: small,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, Protocol
+from typing import Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from analysis.field.grid import Window, ZoiGrid, overlap
 
 Floats = NDArray[np.float64]
+Item = TypeVar("Item")
 Measure = Literal["small", "engineering", "green", "hencky"]
 U, DU_DX, DU_DY, V, DV_DX, DV_DY = range(6)
 STRETCH = 0.01
@@ -92,11 +93,6 @@ def stretched(covariance: NDArray[np.float32], parameters: Floats) -> NDArray[np
     return out
 
 
-WeightedSum = Callable[[NDArray[np.bool_]], tuple[Floats, Floats]]
-"""Takes the ZOIs that can be measured (R, C); gives weights of the six affine parameters, (6, R, C), and of the
-variances of u and v, (2, R, C)."""
-
-
 class Sums(Protocol):
     """The noise of means, more exactly than from the overlap of windows."""
 
@@ -104,8 +100,23 @@ class Sums(Protocol):
         """Standard deviation of the mean of ``name`` over a gauge (R, C), over that of ``variance_of_sum``."""
         ...
 
-    def ratio(self, name: str, area: NDArray[np.bool_], made: WeightedSum) -> float:
-        """Standard deviation of the affine ``name`` of an area (R, C), over that of the overlap of windows."""
+    def information(self, at: NDArray[np.intp]) -> Floats:
+        """Inverse covariance of the six affine values of ZOIs at flat places (n,), up to a factor, (6, 6, n).
+
+        Zero where a ZOI has no pattern.
+        """
+        ...
+
+    def variance(self, at: NDArray[np.intp], weights: Floats) -> float:
+        """Variance of a sum of the six affine values of ZOIs by ``weights`` (6, n), for noise of 1 GL."""
+        ...
+
+    def unit_variances(self, at: NDArray[np.intp]) -> Floats:
+        """Variances of u and v of ZOIs, (2, n), for noise of 1 GL."""
+        ...
+
+    def kept(self, key: Hashable, make: Callable[[], Item]) -> Item:
+        """What ``make`` gives, remembered as long as the reference holds."""
         ...
 
 

@@ -70,7 +70,7 @@ class Config:
         return plain | {"alarm": {str(n): alarm for n, alarm in enumerate(plain["alarm"], 1)}}
 
 
-AUTO_GAUGES = ("axial", "transverse", "area")
+AUTO_GAUGES = ("extension", "width", "area")
 """The gauges that ``live.setup.placement`` places on the specimen."""
 
 _SECTIONS: dict[str, type] = {

@@ -81,7 +81,7 @@ class MeasureConfig:
     mask: str | None = key(TEXT, None,
         "mask image; ZOIs on its black parts are not measured", Option("mask", "FILE"))
     gauges: str = key(choice(GIVEN, AUTO), GIVEN,
-        "virtual gauges: given: those of the configuration; auto: also axial, transverse and area on the specimen",
+        "virtual gauges: given: those of the configuration; auto: also extension, width and area of the specimen",
         Option("gauges"))
     window: str = key(choice("gaussian", "uniform", "tukey", "bi-triangular"), "gaussian",
         "weight of the pixels of a ZOI in the least-squares fit: gaussian, uniform, tukey, bi-triangular",

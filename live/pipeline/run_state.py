@@ -147,6 +147,8 @@ class RunState:
             stress_Pa=force / area if area else math.nan,
             peak_N=health.peak_N,
             axial_name=strains_along(time_step.gauges if time_step else (), axis)[0],
+            axis=axis,
+            axis_assumed=self.history.axis_assumed,
             axial=axial,
             sigma_axial=sigma,
             valid=time_step.n_valid if time_step else 0,

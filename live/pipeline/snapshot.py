@@ -29,6 +29,10 @@ class Snapshot:
         The force of largest magnitude so far, with its sign.
     axial_name : str
         What ``axial`` is: a gauge, "exx" or "eyy".
+    axis : "x" or "y"
+        Of the load.
+    axis_assumed : bool
+        It is neither given nor found yet.
     axial, sigma_axial : float
         Strain along the load and its standard uncertainty.
     valid, zois : int
@@ -55,6 +59,8 @@ class Snapshot:
     stress_Pa: float = math.nan
     peak_N: float = math.nan
     axial_name: str = ""
+    axis: str = "y"
+    axis_assumed: bool = False
     axial: float = math.nan
     sigma_axial: float = math.nan
     valid: int = 0

@@ -9,14 +9,15 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.hdf5 import FlushTimer, PictureStack, RowTable, abandon_file, create_file, reason
+from acquire.hdf5 import COMPRESSED, FlushTimer, PictureStack, RowTable, abandon_file, create_file, reason
 from acquire.printable import counted
 from analysis.evaluate import load_axis
 from live.results import layout
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from analysis.field import ZoiGrid
     from live.results.row import ResultsInfo
 
+VALUE_BITS, SIGMA_BITS = 9, 9
+"""Binary digits kept: of a value below its standard uncertainty; of an uncertainty."""
 FLUSH_S = 0.25  # a row of a live test waits for its flush no longer than this
 _WORDS = {
     "u": "displacement along x (right)",
@@ -112,8 +115,8 @@ class StrainWriter:
 
     def _append(self, row: StrainRow) -> None:
         values = self._values.row(row.values)
-        for name, stack in self._maps.items():
-            stack.append(row.maps[name])
+        for name, stored in rounded(row.maps).items():
+            self._maps[name].append(stored)
         self._values.hold(values)
 
     def _flush(self) -> None:
@@ -150,6 +153,29 @@ class StrainWriter:
         return DataError(
             f"{self._path}: cannot be written ({reason(error)}){kept}; make room on the disk or choose another --out"
         )
+
+
+def rounded(maps: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """The maps without the digits that are noise, which no compression makes smaller.
+
+    A value keeps the binary digits down to 1/512 of its standard uncertainty (so it changes by 1/1024 of it at
+    most), a standard uncertainty and the residual keep nine significant ones (0.2 %). Values without an
+    uncertainty stay as they are.
+    """
+    stored = dict(maps)
+    for name in (*layout.PLAIN_MAPS, "blur"):
+        sigma = maps[f"sigma_{name}"]
+        stored[name] = _to_digit(maps[name], np.frexp(sigma)[1] - 1 - VALUE_BITS, sigma)
+    for name in (*(f"sigma_{name}" for name in (*layout.PLAIN_MAPS, "blur")), "residual"):
+        stored[name] = _to_digit(maps[name], np.frexp(maps[name])[1] - SIGMA_BITS, maps[name])
+    return stored
+
+
+def _to_digit(values: NDArray[Any], digit: NDArray[Any], scale: NDArray[Any]) -> NDArray[Any]:
+    """Round to multiples of 2**digit, where ``scale``, from which the digit is, is a number above 0."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        multiple = np.ldexp(np.rint(np.ldexp(values, -digit)), digit)
+        return np.where(np.isfinite(multiple) & (scale > 0) & np.isfinite(scale), multiple, values)
 
 
 def _value_names(info: ResultsInfo) -> tuple[str, ...]:
@@ -189,7 +215,14 @@ def _group(parent: Any, name: str, nx_class: str, **attrs: Any) -> Any:
 
 
 def _add_mean(entry: Any, info: ResultsInfo) -> None:
-    mean = _group(entry, "mean", "NXdata", signal="eyy", axes=["time_s"], title="Means over the valid ZOIs")
+    mean = _group(
+        entry,
+        "mean",
+        "NXdata",
+        signal="eyy",
+        axes=["time_s"],
+        title="Strains of the region",
+    )
     mean.attrs["auxiliary_signals"] = ["exx", "exy"]
     mean.attrs["load_axis"] = np.array("x" if info.axis == "x" else "y", "S1")
     mean.attrs["load_angle_deg"] = np.float64(math.nan)
@@ -248,7 +281,7 @@ def _add_map(strain: Any, name: str, shape: tuple[int, int]) -> None:
     kind = layout.map_declared(name, shape).dtype
     dataset = strain.create_dataset(
         name, (0, *shape), kind, maxshape=(None, *shape), chunks=(1, *shape), fillvalue=_fill(kind),
-        fletcher32=True,
+        fletcher32=True, **COMPRESSED,
     )  # fmt: skip
     plain = name.removeprefix("sigma_")
     unit = quantity_of(plain).unit

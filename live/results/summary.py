@@ -34,9 +34,7 @@ def noise_line(history: History) -> str:
     picture = f"one frame {np.median(noise):.3g} GL, " if noise.size else ""
     one = np.nanmedian(history.column("zoi_sigma")) * 1e6
     mean = np.nanmedian(history.column("sigma_eyy")) * 1e6
-    return (
-        f"noise: {picture}strain of one ZOI {one:.3g} µm/m, of the mean {mean:.2g} µm/m (predicted, 1 sigma)"
-    )
+    return f"noise: {picture}strain of one ZOI {one:.3g} µm/m, of the region {mean:.2g} µm/m (predicted, 1 sigma)"
 
 
 def latency_lines(history: History) -> list[str]:
@@ -73,7 +71,8 @@ def summary_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     part = share_text(last.least_share)
     lines = [
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
+        "last strain of the region:"
+        f" exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
         f"{f' {part}' if part else ''};"
         f" largest of any ZOI {largest * 1e6:+.0f} µm/m",
         noise_line(history),
@@ -117,12 +116,14 @@ class StatusCard:
         i, frames, lost = history.time_steps[-1], snapshot.frames, snapshot.lost
         lines = [
             f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
-            f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, mean **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
+            f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, region **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
         ]
         blur = Blur(i.blur, i.sigma_blur).text
         lines += [f"{blur} since the reference"] * bool(blur)
         if part := share_text(i.least_share):
             lines.append(f"strain **{part}**")
+        if snapshot.axis_assumed:
+            lines.append(f"axis of the load **{snapshot.axis}**, assumed")
         figures = evaluate(history, self._loads, self._specimen)
         lines += [line.replace("  ", ", ") for line in elastic_lines(figures, self._specimen)]
         lines.append(

@@ -12,8 +12,9 @@ from collections.abc import Callable
 from acquire.errors import PhasedicError
 from acquire.events import Event, EventKind
 from acquire.frame import Burst
+from acquire.system import lower_priority
 from live.pipeline.consumer_thread import Outputs
-from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample, lower_priority
+from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample
 from live.pipeline.measure import SmearGuard
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import ReferenceBurst, motion_between

@@ -16,7 +16,7 @@ import pytest
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.hdf5 import DiskSync, PictureReader, PictureStack, compile_loops, create_file
+from acquire.hdf5 import COMPRESSED, DiskSync, PictureReader, PictureStack, compile_loops, create_file
 from acquire.hdf5 import disk as pace_module
 from acquire.hdf5.disk import forecast, free_bytes, network_share
 from tests.acquire.session.fixtures import frame, writer
@@ -143,6 +143,24 @@ def test_the_bytes_are_those_of_hdf5(tmp_path: Path, shape: tuple[int, ...], dty
             assert chunks[0] == chunks[1]
             assert len(chunks[0][1]) == picture.nbytes + 4
             np.testing.assert_array_equal(file["ours"][k], picture)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.uint32])
+@pytest.mark.parametrize("shape", SIZES, ids=str)
+def test_compressed_pictures_come_back_through_the_library(
+    tmp_path: Path, shape: tuple[int, ...], dtype: Any
+) -> None:
+    with h5py.File(tmp_path / "small.h5", "w") as file:
+        stack = PictureStack(new_stack(file, "image", shape, dtype, **COMPRESSED))
+        for picture in pictures(shape, dtype):
+            stack.append(picture)
+    with h5py.File(tmp_path / "small.h5") as file:
+        reader = PictureReader(file["image"])
+        for k, picture in enumerate(pictures(shape, dtype)):
+            np.testing.assert_array_equal(file["image"][k], picture, strict=True)
+            np.testing.assert_array_equal(reader[k], picture, strict=True)
+        if picture.nbytes > 1000:
+            assert file["image"].id.get_chunk_info(1).size < picture.nbytes / 50
 
 
 def test_a_flipped_bit_is_seen_by_hdf5(tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ def _straight(curve: EvaluatedCurve, label: str, offset: float, e: Unit, load: U
 
 
 def mean_strains(run: RunFolder) -> Plot:
-    """Mean strains against time, each in a band of one standard uncertainty."""
+    """Strains of the region against time, each in a band of one standard uncertainty."""
     values, t = run.strain.values, run.strain.time_s
     found = [np.asarray(values[name], np.float64) for name in _NAMES]
     e = strain_unit(*found)
@@ -80,7 +80,12 @@ def mean_strains(run: RunFolder) -> Plot:
         for colour, (name, mean) in enumerate(zip(_NAMES, found, strict=True))
     )
     return Plot(
-        "strain-time", "Mean strains", "time, s", f"strain, {e.name}", curves, x_range=time_range(run)
+        "strain-time",
+        "Strains of the region",
+        "time, s",
+        f"strain, {e.name}",
+        curves,
+        x_range=time_range(run),
     )
 
 

@@ -13,7 +13,7 @@ from live.pipeline.screen import Screen
 from live.results.figures import axis_text, figure_lines, headline, sharpness_line
 from live.results.noise_floor import StillPhase, still_phase_of
 from live.results.report import curves
-from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
+from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
 from live.results.report.maps import MapPictures, map_pictures, maps, statuses
 from live.results.report.page import (
     Html,
@@ -158,7 +158,9 @@ def _head(run: RunFolder, curve: EvaluatedCurve) -> Html:
 def tensile(curve: EvaluatedCurve) -> dict[str, str]:
     """E, nu and the strengths by name, each with its uncertainty; without those that are not known."""
     rows = headline(curve.figures, stresses=curve.is_stress)
-    return {row.name: row.text for row in rows if row.figure.known}
+    found = {row.name: row.text for row in rows if row.figure.known}
+    strain = {f"strain of {rows[0].name}, nu": curve.figures.elastic_strain} if rows[0].figure.known else {}
+    return found | strain
 
 
 def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
@@ -166,7 +168,7 @@ def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
     found = {"ZOIs with a value, last": f"{int(values['n_valid'][-1])} of {int(values['n_zoi'][-1])}"}
     if np.isfinite(curve.axial).any():
         largest = curve.axial[np.nanargmax(np.abs(curve.axial))] * e.factor
-        name = "gauge axial" if "axial" in run.gauges else f"mean {run.axial}"
+        name = curve.figures.strain or run.axial
         found[f"largest {name}"] = f"{largest:.4g} {e.name}"
     return found
 
@@ -215,7 +217,7 @@ def _about_parts(run: RunFolder) -> Html:
 def _about_curves(curve: EvaluatedCurve) -> Html:
     if not curve.has_load:
         return paragraph("No force is known at any instant, so there is no stress-strain curve.", "dim")
-    words = "Bands: one standard uncertainty of the mean on either side."
+    words = "Bands: one standard uncertainty on either side."
     figures = curve.figures
     if not figures.E.known:
         words += f" E is not known: {figures.E.why}."
@@ -230,8 +232,8 @@ def _about_curves(curve: EvaluatedCurve) -> Html:
 
 def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
     """The figures as text, how they were found, and why others are not known."""
-    lines = figure_lines(curve.figures, run.specimen) if curve.has_load else []
-    return [paragraph(line.strip().replace("  ", ", ")) for line in lines]
+    lines = [*figure_lines(curve.figures, run.specimen), neck_line(run, curve)] if curve.has_load else []
+    return [paragraph(line.strip().replace("  ", ", ")) for line in lines if line]
 
 
 def _sharpness_section(run: RunFolder) -> list[Html]:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from acquire.frame import Burst
+from analysis.evaluate import AreaStrain
 from analysis.field import StrainField
 from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.gauges import gauges_for
@@ -262,7 +263,8 @@ def _gauges(config: Config, field: StrainField, factor: float) -> Iterator[Gauge
     if not field.n_valid:
         return
     along = "exx" if config.specimen.first_axis == "x" else "eyy"
-    yield GaugeNoise("", factor * field.mean(along)[1])
+    region = AreaStrain.of(field)
+    yield GaugeNoise("", factor * (math.nan if region is None else region.sigma(along)))
     config = with_auto_gauges(config, field.grid)
     for gauge in gauges_for(config.gauges, config.specimen.first_axis, field.grid):
         value = gauge.measure(field)

@@ -279,7 +279,7 @@ def _floor(f: CheckFigures, target: float | None) -> CheckLine:
 def _gauges(f: CheckFigures) -> Iterator[CheckLine]:
     """Noise of the gauges and the mean: a test reports these, not one ZOI."""
     for gauge in f.gauges:
-        name = f"noise of {gauge.name}" if gauge.name else "noise of the mean"
+        name = f"noise of {gauge.name}" if gauge.name else "noise of the region"
         value = f"{gauge.sigma * 1e6:.1f} µm/m predicted (burst of {f.burst})"
         yield CheckLine(name, gauge.reason or value, not gauge.reason, "move it, or take smaller ZOIs")
 

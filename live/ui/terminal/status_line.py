@@ -22,7 +22,7 @@ Item = tuple[int, str]
 
 def status_line(s: Snapshot, width: int, words: str = "") -> str:
     """The line, at most ``width`` characters; ``words`` name what the run waits for."""
-    return fitted([*_test(s), (3, words), *_strain(s.time_step), *_machine(s)], width)
+    return fitted([*_test(s), (3, words), *_strain(s.time_step), _assumed(s), *_machine(s)], width)
 
 
 def fitted(items: Sequence[Item], width: int) -> str:
@@ -47,6 +47,11 @@ def _strain(i: TimeStep | None) -> list[Item]:
     items = [(5 if number == 0 else 10, text) for number, text in enumerate(gauge_texts(i))]
     items[-1] = items[-1][0], f"{items[-1][1]} µm/m"
     return [*items, (5, share_text(i.area_share)), (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
+
+
+def _assumed(s: Snapshot) -> Item:
+    """That the direction of the load is not known, once there are strains whose axis it would be."""
+    return 11, f"axis {s.axis} assumed" if s.axis_assumed and s.time_step is not None else ""
 
 
 def _machine(s: Snapshot) -> list[Item]:

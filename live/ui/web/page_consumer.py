@@ -283,7 +283,12 @@ def _measured(s: Snapshot) -> dict[str, Any]:
     if i is None:
         return {}
     return {
-        "axial": {"name": s.axial_name, "value": s.axial, "sigma": s.sigma_axial},
+        "axial": {
+            "name": s.axial_name,
+            "value": s.axial,
+            "sigma": s.sigma_axial,
+            "assumed": "axis assumed" if s.axis_assumed else "",
+        },
         "gauges": _gauges(i),
         "valid": s.valid,
         "zois": s.zois,

@@ -9,8 +9,9 @@ from types import SimpleNamespace
 
 import pytest
 
+from acquire.system import lower_priority
 from live.pipeline import queues
-from live.pipeline.latency import LatencyMonitor, LatencySample, ProcessorUse, lower_priority, processor_use
+from live.pipeline.latency import LatencyMonitor, LatencySample, ProcessorUse, processor_use
 from live.pipeline.queues import BoundedQueue, LatestQueue
 from tests.live.ui.waiting import LONG_S
 

@@ -71,7 +71,8 @@ def test_a_laminate_has_no_proof_strength() -> None:
     history, loads = kept(composite())
     text = "\n".join(figure_lines(evaluate(history, loads, specimen), specimen))
     assert "Rp0.2" not in text
-    assert "At = 1.19" in text and "(gauge length 50 mm)" in text
+    assert "At = 1.19" in text and "(gauge length 50 mm, elongation " in text
+    assert "elongation 0.5999 ± " in text and " mm at break)" in text
 
 
 @pytest.mark.parametrize(

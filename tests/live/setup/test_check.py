@@ -151,10 +151,10 @@ def test_the_snapshot_and_the_gauges(capsys: pytest.CaptureFixture[str], tmp_pat
     assert "l_10% mm" in output
     noise = {
         name: float(re.search(rf"noise of {name} +([0-9.]+) µm/m", output)[1])  # type: ignore[index]
-        for name in ("the mean", "axial", "transverse", "area")
+        for name in ("the region", "extension", "width", "area")
     }
     one = float(re.search(r"strain noise +(\d+) µm/m measured", output)[1])  # type: ignore[index]
-    assert noise["the mean"] < one
+    assert noise["the region"] < one
     assert noise["area"] < one
     drawn = cv2.imread(str(shot))
     assert (drawn == np.array(GOOD)).all(axis=2).sum() > 500

@@ -14,7 +14,8 @@ from acquire.errors import DataError, DeviceError, PhasedicError
 from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
 from acquire.printable import brief, printable
-from live.pipeline.latency import OUTPUT, lower_priority
+from acquire.system import lower_priority
+from live.pipeline.latency import OUTPUT
 from live.setup.devices import at_rest, open_rig
 from live.ui.web.setup.config_draft import ConfigDraft
 

@@ -112,7 +112,7 @@ function over(u, parts, ink) {
     for (const [k, p] of points.map(at).entries()) k ? ctx.lineTo(...p) : ctx.moveTo(...p);
     ctx.stroke();
     if (points.length > 1) continue;
-    const [x, y] = at(points[0]), right = x > bbox.left + bbox.width / 2;
+    const [x, y] = at(points[0]), right = x > bbox.left + 0.75 * bbox.width;
     ctx.beginPath();
     ctx.arc(x, y, 5 * ratio, 0, 7);
     ctx.fill();

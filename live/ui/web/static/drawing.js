@@ -58,7 +58,7 @@ export function beginDrawing(stage) {
 // Gauges of the same names are replaced: only when confirmed.
 $("place").addEventListener("click", async () => {
   const names = Object.keys(state.gauges ?? {});
-  if (names.length && !(await ask("Place the gauges anew?", "Gauges with the names axial, transverse and area are replaced. Undo brings them back.", "Place gauges"))) return;
+  if (names.length && !(await ask("Place the gauges anew?", "Gauges with the names extension, width and area are replaced. Undo brings them back.", "Place gauges"))) return;
   change({ do: "place" });
 });
 

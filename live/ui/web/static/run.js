@@ -66,7 +66,7 @@ const withPart = (text, part) => (part ? `${text} ${t(part)}` : text);
 
 function showStrains(value) {
   const unit = strainUnit(), axial = value.axial, [text, sigma] = withSigma(axial?.value, axial?.sigma, unit);
-  put($("axialname"), withPart(axial?.name ?? "", value.part));
+  put($("axialname"), withPart(withPart(axial?.name ?? "", axial?.assumed), value.part));
   put($("axial"), text);
   put($("axialsigma"), sigma ? `± ${sigma} ${unit.name}` : "");
   const gauges = (value.gauges ?? []).map((one, k) => ({ ...one, k })), list = $("others");

@@ -36,6 +36,8 @@ from tests.live.replay.batch.running import (
     until,
 )
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def progress(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Running]:

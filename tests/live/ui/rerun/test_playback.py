@@ -84,6 +84,7 @@ def test_the_gauges_are_drawn_where_they_lie(run: RunFolder, tmp_path: Path) -> 
         assert not view_setup(plain).with_load
 
 
+@pytest.mark.slow
 def test_all_of_it_is_drawn_and_every_zoi_shows_its_values(
     folder: Path, tmp_path: Path, run: RunFolder
 ) -> None:
@@ -156,6 +157,7 @@ def test_refusals(
     assert says in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_damaged_results_end_it_with_a_message(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

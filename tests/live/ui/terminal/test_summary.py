@@ -62,7 +62,7 @@ def test_verbose_has_all(tmp_path: Path) -> None:
     run_state, screen = run_of(PULLED), Said()
     print_summary(screen, run_state, SECTION, tmp_path, [], verbose=True)
     text = "\n".join(screen.lines)
-    assert "last mean strain: exx" in text and "lag of the load behind the frames" in text
+    assert "last strain of the region: exx" in text and "lag of the load behind the frames" in text
 
 
 @pytest.mark.parametrize(

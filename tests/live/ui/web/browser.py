@@ -39,7 +39,10 @@ class Program:
     def __init__(self, folder: Path, *words: str) -> None:
         self._log = (folder / "err.txt").open("w")
         command = [sys.executable, "-m", "live.cli", *words]
-        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        environment = {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
+        }
         self.process = subprocess.Popen(
             command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=self._log, text=True
         )

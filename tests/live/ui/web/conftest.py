@@ -16,7 +16,7 @@ OPTIONS = ["--zoi", "32", "--section", "20,2", "--scale", "0.1", "--no-view", "-
 Start = Callable[..., Page]
 
 
-@pytest.fixture(scope="package")
+@pytest.fixture(scope="session")
 def browser() -> Iterator[Any]:
     """One browser; every page has a context of its own."""
     path = chromium()

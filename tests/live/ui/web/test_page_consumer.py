@@ -97,7 +97,7 @@ def test_the_state_of_a_run(config: Config) -> None:
     state = received["run"]
     assert isinstance(state, dict)
     assert state["force_N"] == -400 and state["peak_N"] == 500 and state["stress_Pa"] == pytest.approx(-1e7)
-    assert state["axial"] == {"name": "axial", "value": 0.001, "sigma": 2e-6}
+    assert state["axial"] == {"name": "axial", "value": 0.001, "sigma": 2e-6, "assumed": ""}
     assert state["gauges"][1] == {"name": "b", "value": None, "sigma": None, "reason": "lost", "part": ""}
     assert state["part"] == state["gauges"][0]["part"] == "of 83 % of the area"
     assert state["events"][0]["level"] == "error" and "\x1b" not in state["events"][0]["text"]

@@ -76,7 +76,7 @@ def test_set_up_changed_saved_and_started(at: PageSession, tmp_path: Path) -> No
     session = at.controller.session
     assert session is not None
     until(lambda: session.region.drawn is not None and bool(session.draft.config.gauges))
-    assert set(session.draft.config.gauges) == {"axial", "transverse", "area"}, "placed, as the rig asks for"
+    assert set(session.draft.config.gauges) == {"extension", "width", "area"}, "placed, as the rig asks for"
     assert at.command("tare").startswith("no:") and at.command("next").startswith("no:")
     assert at.change(do="draw", strokes=[{"tool": "rectangle", "points": [[20, 20], [200, 170]]}]) == "ok"
     assert at.change(do="draw", strokes=[{"tool": "brush", "points": []}]).startswith("no:")
@@ -88,16 +88,16 @@ def test_set_up_changed_saved_and_started(at: PageSession, tmp_path: Path) -> No
     assert at.change(do="draw", strokes=[{"tool": "rectangle", "points": [[20, 20], [30, 30]]}]) == "ok"
     assert at.command("start").startswith("no:"), "no ZOI fits into this"
     assert at.change(do="undo") == "ok"
-    assert at.change(do="gauge", name="axial", gauge={"kind": "zoi", "at": [-900, 20]}) == "ok"
-    assert "axial" in at.command("start"), "the gauge lies nowhere"
+    assert at.change(do="gauge", name="extension", gauge={"kind": "zoi", "at": [-900, 20]}) == "ok"
+    assert "extension" in at.command("start"), "the gauge lies nowhere"
     assert at.change(do="place") == "ok"
     assert at.change(do="gauge", name="tip", was="area", gauge={"kind": "zoi", "at": [100, 90]}) == "ok"
-    assert at.change(do="gauge", name="tip", was="axial", gauge={"kind": "zoi", "at": [1, 1]}).startswith(
+    assert at.change(do="gauge", name="tip", was="extension", gauge={"kind": "zoi", "at": [1, 1]}).startswith(
         "no:"
     )
     assert at.change(do="gauge", kind="line", points=[[50.04, 40], [50, 120]]) == "ok"
-    assert at.change(do="gauge", name="axial2", points=[[60, 40], [60, 130]]) == "ok", "moved by its handles"
-    assert at.change(do="gauge", name="long", was="axial2") == "ok"
+    assert at.change(do="gauge", name="axial", points=[[60, 40], [60, 130]]) == "ok", "moved by its handles"
+    assert at.change(do="gauge", name="long", was="axial") == "ok"
     assert session.draft.config.gauges["long"] == {"kind": "line", "start": (60, 40), "end": (60, 130)}
     drawn = session.state()["gauges"]["long"]
     assert drawn["handles"] == ((60, 40), (60, 130)) and drawn["outline"][0] == [(60, 40), (60, 130)]
@@ -111,7 +111,7 @@ def test_set_up_changed_saved_and_started(at: PageSession, tmp_path: Path) -> No
         assert at.change(do="gauge", **{"kind": "line", "points": [[1, 2], [3, 4]], **wrong}).startswith(
             "no:"
         )
-    assert at.change(do="gauge", name="long", was=["axial"], gauge=3).startswith("no:")
+    assert at.change(do="gauge", name="long", was=["extension"], gauge=3).startswith("no:")
     assert at.change(do="gauge", name="long", gauge=None) == "ok"
     assert at.change(do="set", key="measure.zoi", value=4).startswith("no:")
     assert at.change(do="set", key="output.dir", value="/").startswith("no:")
@@ -125,7 +125,7 @@ def test_set_up_changed_saved_and_started(at: PageSession, tmp_path: Path) -> No
     assert at.change(do="save") == "ok"
     saved = load_config(at.rig, {})
     assert saved.output.dir is None, "where the files go today is not of the rig"
-    assert "# bench 3" in at.rig.read_text() and set(saved.gauges) == {"axial", "transverse", "tip"}
+    assert "# bench 3" in at.rig.read_text() and set(saved.gauges) == {"extension", "width", "tip"}
     assert saved.scale.px_per_mm == pytest.approx(20) and saved.measure.roi is not None
     assert at.command("start") == "ok"
     config = at.has_ended()
@@ -201,7 +201,7 @@ def recorded(folder: Path, count: int) -> Path:
     return shots
 
 
-@pytest.mark.parametrize("count", [3, 12])
+@pytest.mark.parametrize("count", [3, pytest.param(12, marks=pytest.mark.slow)])
 def test_recorded_pictures_are_checked_too(tmp_path: Path, count: int) -> None:
     rig = tmp_path / "rig.toml"
     rig.write_text(
