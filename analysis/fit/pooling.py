@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from analysis.fit.assembly import MIN_NOISE_GAIN
 from analysis.fit.kernel_args import CONVERGED, OutArgs, PooledError, ReferenceArgs
-from analysis.fit.validity import LOST_SHARE
+from analysis.fit.validity import COLOURED, LOST_SHARE
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.intp] | slice
@@ -71,7 +71,8 @@ def pooled(
     middle = [float(np.median(contrast[group])) for group in groups]
     usual = [float(np.median(ratio[group])) for group in groups]
     scatter = MAD * float(np.median(np.abs(ratio / np.interp(contrast, middle, usual) - 1)))
-    if given and min(usual) > AGREES[0] and max(usual) < AGREES[1]:
+    agrees = given and min(usual) > AGREES[0] and max(usual) < AGREES[1]
+    if agrees:
         usual = [1.0] * len(usual)
     spread = np.sqrt(2 / np.maximum(own.pixels[matched], 1))
     lowest = [_lowest(ratio[group], spread[group]) for group in groups]
@@ -79,10 +80,10 @@ def pooled(
     trend = np.interp(known.signal, middle, usual)
     error = expected * trend[places] / np.maximum(gain, MIN_NOISE_GAIN) ** 2
     shares = found.cubic[matched] / (error[:, None] * own.unit)[matched]
-    colour = np.median(shares, axis=0) / known.white
-    return PooledError(
-        trend, np.interp(known.signal, middle, common), scatter, _shrunk(colour, count * known.independent)
-    )
+    colour = _shrunk(np.median(shares, axis=0) / known.white, count * known.independent)
+    if agrees and np.all(np.abs(np.log(colour)) < np.log(COLOURED)):
+        colour = np.ones(2)
+    return PooledError(trend, np.interp(known.signal, middle, common), scatter, colour)
 
 
 def _matched(found: OutArgs, left: Floats, expected: Floats, own: ReferenceArgs) -> NDArray[np.bool_]:

@@ -131,7 +131,7 @@ def test_noise_model_scales_with_the_burst() -> None:
     single = kernel.measure(noisy(1, u=0.2), noise=one)
     burst = kernel.measure(noisy(16, u=0.2), noise=one.averaged(16))
     ratio = single.sigma("u", "current") / burst.sigma("u", "current")
-    assert np.allclose(ratio, 4, rtol=0.06)  # what 36 ZOIs show of the colour of the noise is part of it
+    assert np.allclose(ratio, 4, rtol=0.02)
     assert np.allclose(single.sigma("u", "reference"), burst.sigma("u", "reference"), rtol=0.02)
 
 
