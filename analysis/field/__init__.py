@@ -23,6 +23,7 @@ from analysis.field.uncertainty import (
     fixed_sums,
     products,
     strain_tensor,
+    stretched,
     variance_of_sum,
 )
 
@@ -53,5 +54,6 @@ __all__ = [
     "products",
     "profile",
     "strain_tensor",
+    "stretched",
     "variance_of_sum",
 ]

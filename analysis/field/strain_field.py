@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.field.common import CommonError
 from analysis.field.grid import Window, ZoiGrid
 from analysis.field.motion import Motion
+from analysis.field.picture_error import PictureError
 from analysis.field.status import Status
 from analysis.field.uncertainty import (
     PAIR_INDEX,
@@ -110,6 +111,8 @@ class StrainField:
         Makes the uncertainty of means right where neighbours nearly cancel (gradients on dense grids).
     common : CommonError, optional
         Of a correction that all ZOIs have; in the uncertainties, not in ``covariance``.
+    picture : PictureError, optional
+        What the picture leaves beyond its noise; it is part of the uncertainties.
     blur : (2, R, C) float32, px^2, optional
         Growth of the variance of the blur since the last reference, mean of x and y, negative where the picture
         is sharper; and its standard uncertainty.
@@ -129,6 +132,7 @@ class StrainField:
     measure: Measure = "small"
     sums: Sums | None = None
     common: CommonError | None = None
+    picture: PictureError | None = None
     blur: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:

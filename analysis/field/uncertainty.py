@@ -20,6 +20,8 @@ Floats = NDArray[np.float64]
 Item = TypeVar("Item")
 Measure = Literal["small", "engineering", "green", "hencky"]
 U, DU_DX, DU_DY, V, DV_DX, DV_DY = range(6)
+STRETCH = 0.01
+"""Largest gradient up to which u and v are as uncertain as the step of the fit."""
 PARTIAL_SUMS = 64
 """Sums that run side by side in ``fixed_sum``."""
 _PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]
@@ -61,6 +63,34 @@ def products(name: str) -> tuple[tuple[int, float], ...]:
     """The variance of a named value as (which of the 21 covariances, factor); raises as ``combination``."""
     terms = combination(name).items()
     return tuple((PAIR_INDEX[i, j], a * b) for i, a in terms for j, b in terms)
+
+
+def stretched(covariance: NDArray[np.float32], parameters: Floats) -> NDArray[np.float32]:
+    """Covariances of the fit, (21, R, C), as those of u, v and their gradients.
+
+    The fit is made where the warped picture differs: its step of (u, v), and of their gradients, moves by
+    F = I + grad u in the deformed picture. Below ``STRETCH`` nothing is done.
+
+    Parameters
+    ----------
+    covariance : (21, R, C)
+    parameters : (6, R, C)
+        u, du_dx, du_dy, v, dv_dx, dv_dy.
+    """
+    gradients = parameters[[DU_DX, DU_DY, DV_DX, DV_DY]]
+    if not np.nanmax(np.abs(gradients), initial=0) > STRETCH:
+        return covariance
+    f = np.asarray(gradients + np.array([1, 0, 0, 1])[:, None, None], np.float32).reshape(
+        2, 2, *gradients.shape[1:]
+    )
+    out = np.empty_like(covariance)
+    for pair, (i, j) in enumerate(_PAIRS):
+        (row, first), (column, second) = divmod(i, 3), divmod(j, 3)
+        out[pair] = sum(
+            f[row, a] * f[column, b] * covariance[PAIR_INDEX[3 * a + first, 3 * b + second]]
+            for a in (0, 1) for b in (0, 1)
+        )  # fmt: skip
+    return out
 
 
 class Sums(Protocol):

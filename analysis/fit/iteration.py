@@ -255,7 +255,7 @@ def _track_share(picture: Any, table: Any, fit: Any, stop: Any, out: Any, counte
 @helper
 def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: int, end: int) -> None:
     """``track`` for some ZOIs; a function of its own, since numba takes long over the body of a parallel loop."""
-    p, left, bending, nuisance = out.p, out.left, out.bending, out.nuisance
+    p, left, bending, cubic, nuisance = out.p, out.left, out.bending, out.cubic, out.nuisance
     state, iterations = out.state, out.iterations
     count = fit.inverse.shape[1]
     modes = p.shape[1]
@@ -280,7 +280,8 @@ def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: 
         _fetch_all(fit.inverse, z + 2)
         _fetch_all(fit.cross, z + 2)
         state[z], iterations[z] = RUNNING, 0
-        left[z] = bending[z] = nuisance[z, 0] = nuisance[z, 1] = nuisance[z, 2] = np.nan
+        left[z] = bending[z] = cubic[z, 0] = cubic[z, 1] = nuisance[z, 0] = nuisance[z, 1] = np.nan
+        nuisance[z, 2] = np.nan
         for iteration in range(stop.max_iterations):
             if not _within(picture, q, fit.order, first + reach, top + reach, reach):
                 state[z] = LEFT_IMAGE
@@ -295,8 +296,10 @@ def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: 
             nuisance[z, 1] = step[modes + 3]
             nuisance[z, 2] = (step[modes + 6] + step[modes + 7]) / gain
             gain = min(max(gain, GAIN_RANGE[0]), GAIN_RANGE[1])
-            bends = bent(bent_by, fit.cross, z, step, fit.squares[z, 0], fit.squares[z, 1], solved)
+            bends = bent(bent_by, fit.cross, z, step, fit.squares[z, 0], fit.squares[z, 1], solved, cubic[z])
             bending[z] = bends / gain**2
+            cubic[z, 0] /= gain**2
+            cubic[z, 1] /= gain**2
             longest = 0.0
             for i in range(modes):
                 longest = max(longest, abs(step[i]) / gain)

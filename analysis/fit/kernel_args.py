@@ -142,6 +142,8 @@ class OutArgs(NamedTuple):
         Weighted sum of squared differences after the fit.
     bending : (A,) float64, px^2
         What the fit leaves of a displacement that bends or jumps (``shapes.bent``).
+    cubic : (A, 2) float64, px^2
+        The part of it of third degree, of u and of v.
     nuisance : (A, 3) float64
         Gain, offset in GL, and growth of the variance of the blur in px^2.
     state, iterations : (A,) uint8
@@ -150,6 +152,7 @@ class OutArgs(NamedTuple):
     p: Floats
     left: Floats
     bending: Floats
+    cubic: Floats
     nuisance: Floats
     state: NDArray[np.uint8]
     iterations: NDArray[np.uint8]
@@ -159,7 +162,7 @@ class OutArgs(NamedTuple):
         """Arrays for the results of ZOIs that start from ``guess`` (A, modes), which is copied."""
         count = len(guess)
         return cls(
-            guess.copy(), np.empty(count), np.empty(count), np.empty((count, 3)),
+            guess.copy(), np.empty(count), np.empty(count), np.empty((count, 2)), np.empty((count, 3)),
             np.empty(count, np.uint8), np.empty(count, np.uint8),
         )  # fmt: skip
 
@@ -167,7 +170,7 @@ class OutArgs(NamedTuple):
     def unmeasured(cls, count: int, modes: int) -> OutArgs:
         """Of ZOIs that were not iterated: NaN."""
         empty = cls.starting(np.full((count, modes), np.nan))
-        for array in (empty.left, empty.bending, empty.nuisance):
+        for array in (empty.left, empty.bending, empty.cubic, empty.nuisance):
             array[:] = np.nan
         empty.state[:] = empty.iterations[:] = 0
         return empty
@@ -175,13 +178,13 @@ class OutArgs(NamedTuple):
     def put(self, places: NDArray[np.intp], other: OutArgs) -> None:
         """Copy what ``other`` holds of the ZOIs ``places``."""
         self.p[places], self.left[places], self.bending[places] = other.p, other.left, other.bending
-        self.nuisance[places] = other.nuisance
+        self.cubic[places], self.nuisance[places] = other.cubic, other.nuisance
         self.state[places], self.iterations[places] = other.state, other.iterations
 
     def at(self, places: NDArray[np.intp]) -> OutArgs:
         """Those of some ZOIs."""
         return OutArgs(
-            self.p[places], self.left[places], self.bending[places], self.nuisance[places],
+            self.p[places], self.left[places], self.bending[places], self.cubic[places], self.nuisance[places],
             self.state[places], self.iterations[places],
         )  # fmt: skip
 
@@ -199,12 +202,55 @@ class ReferenceArgs(NamedTuple):
         Variance of u and of v from noise of 1 GL, of a ZOI without anything else to find.
     centre : (A,), px per GL
         Standard deviation of the worse of u and v from noise of 1 GL, as it is found.
+    white : (2,)
+        ``white_noise.white_cubic`` of the kernel.
+    independent : float
+        ZOIs that a ZOI counts for, since neighbours share pixels; at most 1.
     """
 
     signal: Floats
     pixels: Floats
     unit: Floats
     centre: Floats
+    white: Floats
+    independent: float
+
+    def at(self, places: NDArray[np.intp] | slice) -> ReferenceArgs:
+        """That of some ZOIs."""
+        return self._replace(
+            signal=self.signal[places], pixels=self.pixels[places], unit=self.unit[places],
+            centre=self.centre[places],
+        )  # fmt: skip
+
+
+class PooledError(NamedTuple):
+    """What the fits of one picture leave in common (``pooling.pooled``).
+
+    Attributes
+    ----------
+    ratio : (A,)
+        Variance that a ZOI of this contrast leaves, over that expected from the noise as stated.
+    forgiven : (A,)
+        The same where it is the common state of the picture; 1 where that is as stated.
+    scatter : float
+        Standard deviation of what a single ZOI leaves over that.
+    colour : (2,)
+        Variance of u and of v over that of white noise of the same variance a pixel.
+    """
+
+    ratio: Floats
+    forgiven: Floats
+    scatter: float
+    colour: Floats
+
+    @classmethod
+    def none(cls, count: int) -> PooledError:
+        """Of ``count`` ZOIs that leave what is expected."""
+        return cls(np.ones(count), np.ones(count), 0.0, np.ones(2))
+
+    def at(self, places: NDArray[np.intp] | slice) -> PooledError:
+        """That of some ZOIs."""
+        return self._replace(ratio=self.ratio[places], forgiven=self.forgiven[places])
 
 
 class VerdictArgs(NamedTuple):

@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.field import ZoiGrid
 from analysis.picture.splines import LINE
 
+ROUNDING_SAMPLE = 8192
+"""Pixels that show the step between the grey levels of an image."""
+
 
 @dataclass(frozen=True, slots=True)
 class NoiseModel:
@@ -89,6 +92,15 @@ class _PlainNoise(NoiseModel):
     @property
     def floor(self) -> float:
         return self.read**2
+
+
+def rounding_variance(image: NDArray[Any]) -> float:
+    """Variance that rounding leaves in an image of whole grey levels a step apart, step^2/12, GL^2; else 0."""
+    sample = image.ravel()[:: max(1, image.size // ROUNDING_SAMPLE)].astype(np.float64)
+    if not np.array_equal(sample, np.rint(sample)):
+        return 0.0
+    step = np.gcd.reduce((sample - sample[0]).astype(np.int64))
+    return float(step) ** 2 / 12
 
 
 def padded(*images: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -17,6 +17,7 @@ from analysis.compiled.forked import FORK_GUARD
 from analysis.field import Motion, StrainField, ZoiGrid
 from analysis.follow.renewal import taken
 from analysis.kernel.images import Noise, as_image, as_model, as_recorded, clipped_pixels
+from analysis.kernel.lines import mend
 from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.repeating import periods
 from analysis.kernel.result import PredictedMotion, field_of
@@ -175,11 +176,13 @@ class PhaseKernel:
         saturated = clipped_pixels(image, clipped, model)
         if start is None:
             solution = Solution(reference, image, model, reference.searched(image))
+            mend(solution)
             retry_lost(solution, None, saturated)
             return field_of(solution)
         before, carried = self._before(start), self._carried_motion(start)
         predicted = before + carried.ahead
         solution = Solution(reference, image, model, reference.local(predicted))
+        mend(solution)
         retry_lost(solution, reference.local(before), saturated)
         return field_of(solution, PredictedMotion(predicted, carried))
 

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from analysis.field import Roi, Status, StrainField, ZoiGrid, profile
 from analysis.fit.kernel_args import StopArgs
 from analysis.follow.renewal import Placement, place
-from analysis.kernel.images import Noise, NoiseModel, as_model, check_fit, clipped_pixels
+from analysis.kernel.images import Noise, NoiseModel, as_model, check_fit, clipped_pixels, rounding_variance
 from analysis.kernel.prepared import PatternError, PreparedReference, prepare_reference
 from analysis.kernel.quadrature import Sensors, make_sensors
 from analysis.kernel.settings import KernelSettings
+from analysis.kernel.white_noise import white_cubic
+from analysis.picture.impulses import without_impulses
 from analysis.picture.splines import Box
 
 if TYPE_CHECKING:
@@ -71,6 +73,12 @@ class ReferencePicture:
         Of u and v if nothing else were sought, for a noise of 1 GL.
     sums : MeanNoise or None
         Of the sensor form.
+    rounding : float, GL^2
+        Variance that rounding to whole grey levels leaves.
+    white : (2,) float64
+        ``white_noise.white_cubic``.
+    cleaned : bool
+        Whether it had wild pixels, which were replaced; later pictures are then cleaned, too.
     period : (A,) float64, px
         Smallest displacement at which a ZOI looks like itself (``repeating.periods``); infinite: none.
     """
@@ -90,6 +98,9 @@ class ReferencePicture:
     unit_sigma: Floats
     share_variance: Floats
     sums: MeanNoise | None
+    rounding: float
+    white: Floats
+    cleaned: bool
     period: Floats
 
     @classmethod
@@ -108,9 +119,11 @@ class ReferencePicture:
         origins = np.stack([grid.first_y[rows], grid.first_x[columns]], axis=1).astype(np.int64)
         model = None if noise is None else as_model(noise)
         saturated = clipped_pixels(image, clipped, model)
-        prepared = prepare_reference(image, origins, grid.size, settings, model, saturated)
+        cleaned = without_impulses(image)
+        whole = image if cleaned is None else cleaned
+        prepared = prepare_reference(whole, origins, grid.size, settings, model, saturated)
         _check_pattern(prepared.status)
-        return _laid_out(image, grid, settings, model, prepared)
+        return _laid_out(whole, grid, settings, model, prepared, cleaned is not None)
 
     def renewed(
         self,
@@ -124,10 +137,12 @@ class ReferencePicture:
         model = None if noise is None else as_model(noise)
         placement = place(field, self.index, self.modes, self.prepared.shape)
         saturated = clipped_pixels(image, clipped, model)
-        prepared = prepare_reference(image, placement.origins, size, settings, model, saturated)
+        cleaned = without_impulses(image)
+        whole = image if cleaned is None else cleaned
+        prepared = prepare_reference(whole, placement.origins, size, settings, model, saturated)
         gone = placement.status != Status.OK
         prepared = replace(prepared, status=np.where(gone, placement.status, prepared.status))
-        made = _laid_out(image, self.grid, settings, model, prepared, placement)
+        made = _laid_out(whole, self.grid, settings, model, prepared, cleaned is not None, placement)
         return replace(made, period=self.period)
 
     @property
@@ -223,6 +238,7 @@ def _laid_out(
     settings: KernelSettings,
     model: NoiseModel | None,
     prepared: PreparedReference,
+    cleaned: bool,
     placement: Placement | None = None,
 ) -> ReferencePicture:
     """What every frame needs of a prepared picture, once."""
@@ -235,6 +251,7 @@ def _laid_out(
     index = np.flatnonzero(grid.active)
     lengths, slopes = (np.sqrt(np.maximum(prepared.covariance[:, k].astype(np.float64), 0)) for k in _AFFINE)
     unit_covariance = np.ascontiguousarray(_spread(prepared.covariance, index, grid.shape, 0))
+    share_variance = 1 / np.maximum(prepared.weight * sharpness * prepared.energy, 1e-12)
     return ReferencePicture(
         grid=grid,
         settings=settings,
@@ -249,8 +266,11 @@ def _laid_out(
         sharpness=sharpness,
         unit_covariance=unit_covariance,
         unit_sigma=np.stack([lengths.min(1), slopes.min(1), lengths.max(1)]),
-        share_variance=1 / np.maximum(prepared.weight * sharpness * prepared.energy, 1e-12),
+        share_variance=share_variance,
         sums=None if sensors is not None else _sums(grid, settings, index, prepared, unit_covariance),
+        rounding=rounding_variance(image),
+        white=white_cubic(prepared, grid.size, settings.order, share_variance),
+        cleaned=cleaned,
         period=np.full(len(index), np.inf),
     )
 

@@ -11,14 +11,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Status, profile
-from analysis.fit.kernel_args import LEFT_IMAGE, FitArgs, OutArgs, PictureArgs, ReferenceArgs, VerdictArgs
+from analysis.fit.kernel_args import (
+    LEFT_IMAGE,
+    FitArgs,
+    OutArgs,
+    PictureArgs,
+    PooledError,
+    ReferenceArgs,
+    VerdictArgs,
+)
 from analysis.fit.validity import CENTRE_VARIANCE, CLIPPED_SHARE
-from analysis.kernel.images import NoiseModel
+from analysis.kernel.images import NoiseModel, rounding_variance
 from analysis.kernel.quadrature import Sensors
 from analysis.kernel.reference import SPILL_PX, Places, ReferencePicture
 from analysis.picture.splines import Box, prefilter_taps, tap_table
 
 Floats = NDArray[np.float64]
+
+DISTURBED_RATIO, DISTURBED_SHARE = 2.0, 0.02
+"""Of what is left over what the noise explains, and of the ZOIs that are refused: from here on wild pixels of the
+image are looked for."""
 
 
 class Solution:
@@ -40,6 +52,10 @@ class Solution:
     status : (A,) uint8
     tolerance : StopArgs
         Where the iteration may stop.
+    common : PooledError or None
+        What the fits leave in common; None: of too few ZOIs to be taken.
+    had_lines : bool
+        Whether bands or lines were taken off the image (``lines.mend``).
     """
 
     def __init__(
@@ -47,10 +63,12 @@ class Solution:
     ) -> None:
         prepared = reference.prepared
         self.reference = reference
-        self.image = image
         self.noise = noise
         self.guess = guess
-        self.picture = self._picture(reference.reached(guess))
+        self.rounding = reference.rounding + rounding_variance(image)
+        self.common: PooledError | None = None
+        self.had_lines = False
+        self._take(_cleaned(image) if reference.cleaned else image)
         self.table = tap_table(reference.settings.interpolant)
         self.tolerance = reference.tolerance(self._current_std())
         self._noise, current = self.variances(np.s_[:], np.ones(len(guess)))
@@ -58,11 +76,39 @@ class Solution:
         able = prepared.status == Status.OK
         known = np.isfinite(guess.sum()) or np.isfinite(guess @ np.ones(guess.shape[1]))  # as a rule all
         which = np.flatnonzero(able & known)
+        self._places = which, able & ~known
+        self._solve(*self._places)
+
+    def _take(self, image: NDArray[Any]) -> None:
+        """Measure in ``image``."""
+        self.image = image
+        self.common = None
+        self.picture = self._picture(self.reference.reached(self.guess))
+
+    def measure_in(self, image: NDArray[Any]) -> None:
+        """Measure once more, in ``image``, from the same guess."""
+        self._take(image)
+        self._solve(*self._places)
+
+    @property
+    def is_disturbed(self) -> bool:
+        """Whether the image leaves much more than its noise, or many ZOIs are refused: it may have wild pixels."""
+        which = self._places[0]
+        refused = np.count_nonzero(self.status[which] != Status.OK)
+        return self.leaves_much or bool(refused > DISTURBED_SHARE * len(which))
+
+    @property
+    def leaves_much(self) -> bool:
+        """Whether the image leaves much more than its noise."""
+        return self.common is not None and float(np.median(self.common.ratio)) > DISTURBED_RATIO
+
+    def _solve(self, which: NDArray[np.intp], unknown: NDArray[np.bool_]) -> None:
+        guess = self.guess
         if len(which) == len(guess):  # as a rule: no copies
             self.found, self.status = self.solved(which, guess)
             return
         self.found = OutArgs.unmeasured(*guess.shape)
-        self.status = np.where(able & ~known, np.uint8(Status.LOST), prepared.status)
+        self.status = np.where(unknown, np.uint8(Status.LOST), self.reference.prepared.status)
         if len(which):
             self.keep(which, *self.solved(which, guess[which]))
 
@@ -148,29 +194,63 @@ class Solution:
             guess, self.tolerance.at(which),
         )  # fmt: skip
         seen = self._iterated(which, values, max_iterations=1)
-        return OutArgs(values, seen.left, seen.bending, seen.nuisance, state, iterations)
+        return seen._replace(p=values, state=state, iterations=iterations)
 
     def verdicts(self, which: Places, found: OutArgs) -> NDArray[np.uint8]:
         """The status of some ZOIs with what was found of them."""
         from analysis.fit.verdict import judge
 
         reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
-        freedom = ready.freedom[which]
-        known = ReferenceArgs(
-            ready.signal[which], freedom * reference.sharpness, reference.share_variance[which],
-            reference.unit_sigma[2, which],
-        )  # fmt: skip
-        noise_known = self.noise is not None and reference.noise_model is not None
+        known, expected = self._known(), self.expected(which, found.nuisance[:, 0])
         far = CENTRE_VARIANCE[settings.order - 1]
-        rule = VerdictArgs(noise_known, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far)
-        status = np.empty(len(freedom), np.uint8)
-        judge(found, found.left / freedom, self._expected(which, found.nuisance[:, 0]), known, rule, status)
+        rule = VerdictArgs(
+            self._is_given, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far
+        )
+        left = self._left(which, found)
+        if self.common is None:
+            self.common = self.pooled(which, found)
+        common = PooledError.none(len(known.signal)) if self.common is None else self.common
+        status = np.empty(len(expected), np.uint8)
+        judge(found, left, expected, common.at(which), known.at(which), rule, status)
         return status
 
-    def _expected(self, which: Places, gain: Floats) -> Floats:
+    def pooled(self, which: Places, found: OutArgs) -> PooledError | None:
+        """What the fits ``found`` of the ZOIs ``which`` leave in common."""
+        from analysis.fit.pooling import pooled
+
+        left, expected = self._left(which, found), self.expected(which, found.nuisance[:, 0])
+        return pooled(found, left, expected, self._known(), which, self._is_given)
+
+    @property
+    def noise_taken(self) -> Floats:
+        """Variance a pixel of the reference, (A,), whose bias the fits have taken off (``noise_bias``), GL^2."""
+        return np.asarray(self._noise * np.minimum(np.maximum(self.found.left, 0) / self._noise_left, 1))
+
+    @property
+    def _is_given(self) -> bool:
+        """Whether the noise of both images was given."""
+        return self.noise is not None and self.reference.noise_model is not None
+
+    def _known(self) -> ReferenceArgs:
+        reference, ready = self.reference, self.reference.prepared
+        pixels = ready.freedom * reference.sharpness
+        return ReferenceArgs(
+            ready.signal,
+            pixels,
+            reference.share_variance,
+            reference.unit_sigma[2],
+            reference.white,
+            min(1.0, (2 * reference.grid.step / reference.grid.size) ** 2),
+        )
+
+    def _left(self, which: Places, found: OutArgs) -> Floats:
+        """Variance a pixel that the fit leaves, GL^2; rounding leaves something where the images are equal, too."""
+        return np.maximum(found.left / self.reference.prepared.freedom[which], self.rounding)
+
+    def expected(self, which: Places, gain: Floats) -> Floats:
         """Variance a pixel that noise alone leaves in the difference of the images, GL^2."""
         reference, current = self.variances(which, gain)
-        return np.asarray(np.minimum(gain**2, 25.0) * reference + current)
+        return np.asarray(np.maximum(np.minimum(gain**2, 25.0) * reference + current, self.rounding))
 
     def variances(self, which: Places, gain: Floats) -> tuple[Floats, Floats]:
         """Variance a pixel of the reference and of the image at some ZOIs, GL^2; the reference's where not known."""
@@ -183,3 +263,10 @@ class Solution:
         if own is None:
             return reference, reference
         return reference, own.variance(level if own.slope == 0 else level * np.maximum(gain, 0))
+
+
+def _cleaned(image: NDArray[Any]) -> NDArray[Any]:
+    from analysis.picture.impulses import without_impulses
+
+    cleaned = without_impulses(image)
+    return image if cleaned is None else cleaned

@@ -17,9 +17,10 @@ import numpy as np
 from acquire.events import Event, EventKind, EventSink, Level, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
-from analysis.field import Blur, part_of
+from analysis.field import part_of
 from analysis.optics import ASSUMED_TILT, SCALE, PlateFit, ShutterCorrection, choose_model, trouble
-from live.pipeline.measurement import Measurement, PlateReading, TimeStep
+from live.pipeline.guards import BlurGuard, DilatationGuard, PictureGuard, StrainGuard
+from live.pipeline.measurement import Measurement, PlateReading
 from live.pipeline.reference import Correction, averaged, repetition_text, unchanged
 
 if TYPE_CHECKING:
@@ -27,14 +28,6 @@ if TYPE_CHECKING:
     from analysis.evaluate import Gauge
     from analysis.field import Measure, StrainField
     from analysis.optics import Model
-
-
-MAX_ELASTIC, FALSE_STRAIN, NU_DOUBT = 1e-3, 2e-5, 0.02
-"""Of the check by Poisson's ratio: largest strain, smallest false strain, and doubt about nu, which adds to it."""
-MAX_ROTATION, MAX_STRAIN = math.radians(0.5), 0.02
-"""Limits of small strains, rad and 1: the error is then 40 um/m by the rotation and 200 um/m by the strain."""
-MAX_BLUR_PX, CERTAIN, CALM = 0.5, 3.0, 0.8
-"""A blur beyond this gives an event, by so many of its sigmas; below this share of it the picture is well again."""
 
 
 class Tracker:
@@ -107,38 +100,6 @@ def _renewal(burst: Burst, *, automatic: bool) -> Event:
     return Event(burst.t, EventKind.REFERENCE, "measurement", text, level, data | {"renewed": True})
 
 
-class StrainGuard:
-    """Checks each field of small strains, and warns once where another measure is more exact.
-
-    A rotation by r changes small strains by r^2/2 (3 degrees: 1400 µm/m); they differ from the other measures
-    by about e^2/2 at a strain e.
-
-    Parameters
-    ----------
-    measure : str
-        Measure of the reported strains; only small strains are checked.
-    on_event : callable taking an Event
-    """
-
-    def __init__(self, measure: Measure, on_event: EventSink) -> None:
-        self._on_event, self._warned = on_event, measure != "small"
-
-    def check(self, field: StrainField, t: float) -> None:
-        """Check a field, measured at ``t`` (s)."""
-        if self._warned or not field.ok.any():
-            return
-        turned = abs(float(np.nanmedian(field.rotation)))
-        strained = max(abs(float(np.nanmedian(values))) for values in (field.du_dx, field.dv_dy))
-        if turned > MAX_ROTATION or strained > MAX_STRAIN:
-            self._warned = True
-            text = (
-                f"turned by {math.degrees(turned):.1f} degrees, strained by {strained:.1%}: small strains are off by"
-                f" about {(turned**2 + strained**2) / 2 * 1e6:.0f} µm/m; measure with --strain engineering"
-            )
-            data = {"rotation": turned, "strain": strained}
-            self._on_event(Event(t, EventKind.MEASUREMENT, "strain", text, "warning", data))
-
-
 class PlateCorrection:
     """Removes the apparent motion of plates from each field; an error event where that stops.
 
@@ -197,84 +158,11 @@ class PlateCorrection:
         self._on_event(Event(burst.t, EventKind.MEASUREMENT, "plates", text, cast(Level, level)))
 
 
-class DilatationGuard:
-    """Checks the strains of a uniaxial elastic test for motion off the plane, and warns once.
-
-    Motion along the optical axis adds the same strain d to both: across + nu axial = (1 + nu) d. Only below
-    ``MAX_ELASTIC``, since plastic flow changes the ratio.
-
-    Parameters
-    ----------
-    nu : float or None
-        Poisson's ratio; None: nothing is checked.
-    stand_off_mm : float or None, mm
-        For the message.
-    on_event : callable taking an Event
-    """
-
-    def __init__(self, nu: float | None, stand_off_mm: float | None, on_event: EventSink) -> None:
-        self._nu, self._stand_off_mm, self._on_event = nu, stand_off_mm, on_event
-        self._warned = False
-
-    def check(self, step: TimeStep) -> None:
-        """Check the strains of the region at one time."""
-        if self._warned or self._nu is None:
-            return
-        strains = (step.exx, step.sigma_exx), (step.eyy, step.sigma_eyy)
-        (across, sigma_across), (axial, sigma_axial) = sorted(strains, key=lambda one: abs(one[0]))
-        if not abs(axial) < MAX_ELASTIC:
-            return
-        false = (across + self._nu * axial) / (1 + self._nu)
-        sigma = math.hypot(sigma_across, self._nu * sigma_axial) / (1 + self._nu)
-        if abs(false) > FALSE_STRAIN + NU_DOUBT * abs(axial) + 4 * sigma:
-            self._warned = True
-            data = {"strain": false, "sigma": sigma}
-            text = self._text(false, self._nu)
-            self._on_event(Event(step.t, EventKind.MEASUREMENT, "strain", text, "warning", data))
-
-    def _text(self, false: float, nu: float) -> str:
-        way = "towards" if false > 0 else "away from"
-        far = "" if self._stand_off_mm is None else f" by {abs(false) * self._stand_off_mm:.2f} mm"
-        return (
-            f"the strains along and across do not fit nu = {nu:g}: {false * 1e6:+.0f} um/m in both is as from"
-            f" motion{far} {way} the camera, and no strain; E is off by it too (docs/optics.md)"
-        )
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class NewReference:
     """A command among the bursts: this burst becomes the reference; results stay composed."""
 
     burst: Burst
-
-
-class BlurGuard:
-    """Checks the sharpness of each measurement; an event when the limit is passed, either way, and when it ends.
-
-    Parameters
-    ----------
-    on_event : callable taking an Event
-    limit_px : float, px
-    """
-
-    def __init__(self, on_event: EventSink, limit_px: float = MAX_BLUR_PX) -> None:
-        self._on_event, self._limit = on_event, limit_px
-        self._changed = False
-
-    def check(self, step: TimeStep) -> None:
-        """Check one time step; one whose blur is not known changes nothing."""
-        blur, size = Blur(step.blur, step.sigma_blur), abs(step.blur)
-        if not self._changed and size - CERTAIN * blur.sigma > self._limit:
-            self._changed = True
-            text = f"the picture is {blur.text} since the reference: look at focus, distance and exposure"
-            self._emit(step, text, "warning")
-        elif self._changed and size < CALM * self._limit:
-            self._changed = False
-            self._emit(step, "the picture is as sharp as the reference again", "info")
-
-    def _emit(self, step: TimeStep, text: str, level: Level) -> None:
-        data = {"blur_px": step.blur, "sigma_blur_px": step.sigma_blur}
-        self._on_event(Event(step.t, EventKind.MEASUREMENT, "sharpness", text, level, data))
 
 
 Timer = Callable[[], float]
@@ -331,7 +219,8 @@ def measure(
     Measurement
         One for each burst, in order.
     """
-    tracker, guard = Tracker(kernel, noise_GL, renew_at, on_event), StrainGuard(strain, on_event)
+    tracker = Tracker(kernel, noise_GL, renew_at, on_event)
+    guards = StrainGuard(strain, on_event), PictureGuard(on_event)
     sharpness = BlurGuard(on_event)
     number, repeats = 0, repetition_text(kernel.period)
     for item in bursts:
@@ -348,7 +237,8 @@ def measure(
         else:
             field, reading = plates.apply(upright, item, strain)
         took = timer() - began
-        guard.check(field, item.t)
+        for guard in guards:
+            guard.check(field, item.t)
         measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, reading)
         measurement = replace(measurement, as_measured=whole)
         sharpness.check(measurement.time_step)

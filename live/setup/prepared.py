@@ -16,7 +16,8 @@ from acquire.load_cell import LoadLog
 from analysis.optics import PlateFit, ShutterCorrection
 from live.config.gauges import gauges_for
 from live.config.loading import Config
-from live.pipeline.measure import DilatationGuard, NewReference, PlateCorrection, measure
+from live.pipeline.guards import DilatationGuard
+from live.pipeline.measure import NewReference, PlateCorrection, measure
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, prepare
 from live.pipeline.warm_up import picture_kinds

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.load_cell.check import LoadReport
+from analysis.picture.blocks import BLOCKS, blockiness
 from analysis.quality.exposure import Depth, Exposure, depth, exposure
 from analysis.quality.pattern import speckle_radius, zoi_pattern
 from live.config.loading import Config
@@ -99,6 +100,10 @@ class CheckFigures:
         The gauges of the test, and the mean of all ZOIs along the load.
     load : LoadReport or None
     px_per_mm : float or None
+    blocks : bool
+        Whether the picture shows the blocks of a codec.
+    picture : str
+        What else it shows beyond its noise, in words; "": nothing.
     """
 
     region: Region
@@ -119,6 +124,8 @@ class CheckFigures:
     gauges: tuple[GaugeNoise, ...] = ()
     load: LoadReport | None = None
     px_per_mm: float | None = None
+    blocks: bool = False
+    picture: str = ""
 
     @property
     def automatic(self) -> tuple[str, ...]:
@@ -213,6 +220,8 @@ def figures_of(
         gauges=measured.predicted.gauges,
         load=load,
         px_per_mm=check_region.config.scale.px_per_mm,
+        blocks=blockiness(sample.raw) > BLOCKS,
+        picture=measured.predicted.picture,
     )
 
 

@@ -21,6 +21,7 @@ from analysis.evaluate import AreaStrain
 from analysis.field import StrainField
 from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.gauges import gauges_for
+from live.pipeline.guards import picture_words
 from live.pipeline.reference import averaged, prepare, repetition_text
 from live.setup.check.sample import CheckSample
 from live.setup.placement import with_auto_gauges
@@ -211,12 +212,15 @@ class PredictedNoise:
         Of each ZOI, mean of exx and eyy; NaN without pattern.
     gauges : tuple of GaugeNoise
         The gauges of the test, and the mean of all ZOIs along the load; empty without pattern.
+    picture : str
+        What the picture shows beyond its noise, in words; "": nothing.
     repetition : str
         What repeats in the pattern, and what that allows; empty where nothing does.
     """
 
     sigma: NDArray[np.float64]
     gauges: tuple[GaugeNoise, ...]
+    picture: str = ""
     repetition: str = ""
 
     @property
@@ -237,6 +241,7 @@ def predict_noise(sample: CheckSample) -> PredictedNoise:
     return PredictedNoise(
         sigma,
         tuple(_gauges(sample.check_region.config, replace(field, grid=grid), factor)),
+        picture_words(field),
         repetition,
     )
 

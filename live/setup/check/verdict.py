@@ -103,6 +103,11 @@ def _camera(f: CheckFigures) -> Iterator[CheckLine]:
     if f.removed is not None:
         value = f"dark and flat corrected {f.removed:.2f} GL; the rest is not visible in a still picture"
     yield CheckLine("fixed pattern", value)
+    if f.blocks:
+        value = "blocks of 8 px: strain is less certain than below once the specimen moves; the test states by how much"
+        yield CheckLine("compression", value)
+    elif f.picture:
+        yield CheckLine("picture", f.picture)
 
 
 def _bits(f: CheckFigures) -> CheckLine:

@@ -20,8 +20,9 @@ from analysis import KernelSettings, Roi, ZoiGrid
 from analysis.evaluate import GaugeValue
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
+from live.pipeline.guards import BlurGuard
 from live.pipeline.history import SHORT, AxisFinder, History, curve_of
-from live.pipeline.measure import BlurGuard, NewReference, measure
+from live.pipeline.measure import NewReference, measure
 from live.pipeline.measurement import HOLD_S, ForceMatching, TimeStep, ordered_mean
 from live.pipeline.reference import averaged, frame_noise, motion_between, prepare
 from live.run.measuring import SmearGuard
@@ -86,10 +87,12 @@ def test_a_renewed_reference_stays_composed(speckle: Speckle, on_demand: bool) -
     if on_demand:
         steps = [burst(images[0], 1), NewReference(burst(images[0], 2)), burst(images[1], 3)]
     else:
-        # Another pattern fades in: the first reference no longer fits the last picture.
+        # On the left another pattern fades in: the first reference no longer fits the last picture there.
+        left = np.arange(SHAPE[1]) < 96
         other = Speckle(SHAPE, radius=2.0, seed=6)
         fading = zip((0.96, 0.92), ({"u": 2.0, "du_dx": 0.02}, {"u": 3.0, "du_dx": 0.03}), strict=True)
-        mixed = [w * picture(speckle, **g) + (1 - w) * picture(other, **g) for w, g in fading]
+        shares = ((np.where(left, w, 1), g) for w, g in fading)
+        mixed = [w * picture(speckle, **g) + (1 - w) * picture(other, **g) for w, g in shares]
         steps = [burst(image, i) for i, image in enumerate(mixed, 1)]
     found = list(measure(steps, kernel, LoadLog(), noise_GL=noise, renew_at=0.2, on_event=told.append))
     renewals = [event for event in told if event.kind is EventKind.REFERENCE]
@@ -193,6 +196,21 @@ def test_a_blurred_picture_is_told_with_its_width_and_changes_no_strain(speckle:
     assert found[1].time_step.blur == pytest.approx(0.8, abs=0.1)
     assert abs(found[1].time_step.exx) < 30e-6
     assert [event.source for event in told] == ["sharpness"] and told[0].t == 2.0
+
+
+def test_what_the_picture_has_become_is_told_once_with_its_cost_and_when_it_ends(speckle: Speckle) -> None:
+    rng = np.random.default_rng(3)
+    noises = (1.0, 1.0, 5.0, 5.0, 1.0, 5.0)
+    bursts = [burst(picture(speckle) + rng.normal(0, s, SHAPE), k) for k, s in enumerate(noises)]
+    kernel, noise = prepare(bursts[0], GRID, KernelSettings(), 1.0)
+    told: list[Event] = []
+    found = list(measure(bursts[1:], kernel, LoadLog(), noise_GL=noise, renew_at=0.1, on_event=told.append))
+    assert [(event.level, event.t) for event in told] == [("warning", 2.0), ("info", 4.0), ("warning", 5.0)]
+    assert told[0].data["cause"] == "noise" and told[0].data["factor"] == pytest.approx(13**0.5, rel=0.1)
+    costs = [float(np.nanmedian(m.field.sigma_exx)) * 1e6 for m in found[:2]]
+    words = told[0].text.split()
+    assert [int(words[words.index("by") + 1]), int(words[-1])] == pytest.approx([costs[1], costs[0]], rel=0.1)
+    assert all(m.field.ok.all() for m in found)
 
 
 @pytest.mark.parametrize("size", [1, 7, 945, 15_129])

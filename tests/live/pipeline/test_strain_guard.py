@@ -15,7 +15,7 @@ from analysis import Roi, StrainField, ZoiGrid
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
-from live.pipeline.measure import DilatationGuard, StrainGuard
+from live.pipeline.guards import DilatationGuard, StrainGuard
 from live.results import Strain
 from tests.live.made_up import make_measurement
 

@@ -13,9 +13,8 @@ from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import EventLog
-from live.pipeline.frame_counts import FrameCounts
 from live.pipeline.history import History
-from live.pipeline.run_state import RunState
+from live.pipeline.run_state import FrameCounts, RunState
 from live.results.figures import alignment_line, budget_rows, elastic_lines, evaluate, figure_lines, lag_line
 from live.results.summary import summary_lines
 from tests.analysis.curves import Truth, composite, noisy, ramberg_osgood

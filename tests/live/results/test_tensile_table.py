@@ -16,8 +16,7 @@ from hw_mocks.machine import PowerLaw
 from live.config.loading import load_config
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import EventLog
-from live.pipeline.frame_counts import FrameCounts
-from live.pipeline.run_state import RunState
+from live.pipeline.run_state import FrameCounts, RunState
 from live.replay.batch.row import COLUMNS
 from live.replay.batch.row import _figures as batch_figures
 from live.results.figures import TensileRow, evaluate, figure_lines, headline, tensile_table

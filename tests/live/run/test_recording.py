@@ -12,7 +12,7 @@ from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from live.pipeline.event_log import EventLog
-from live.pipeline.frame_counts import FrameCounts
+from live.pipeline.run_state import FrameCounts
 from live.run.control import START, STOP, ControlRefused
 from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
 from live.run.recorder import Recorder

@@ -359,6 +359,15 @@ def test_a_pattern_that_repeats_is_named_with_its_period() -> None:
     assert text.startswith("LOOK") and "repeats every 9.0 px" in text and "move by 3.6 px" in text
 
 
+def test_the_blocks_of_a_codec_are_named_and_leave_the_pattern(taken: FrameStack) -> None:
+    coded = [cv2.imencode(".jpg", one, [cv2.IMWRITE_JPEG_QUALITY, 80])[1] for one in taken.frames]
+    shots = shots_of(np.stack([cv2.imdecode(one, cv2.IMREAD_GRAYSCALE) for one in coded]), 8)
+    assert "blocks of 8 px" in line_text(shots, "compression")
+    assert line_text(shots, "ZOIs without pattern").split()[-3] == "0.0%"
+    with pytest.raises(StopIteration):
+        line_text(taken, "compression")
+
+
 def test_automatic_controls_by_name_and_value() -> None:
     controls = {
         "auto_exposure": "Aperture Priority Mode",

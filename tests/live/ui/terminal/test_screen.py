@@ -11,8 +11,8 @@ import pytest
 
 from acquire.events import Event, EventKind
 from live.pipeline.event_log import EventLog, sentence
-from live.pipeline.frame_counts import FrameCounts
 from live.pipeline.measurement import TimeStep
+from live.pipeline.run_state import FrameCounts
 from live.pipeline.snapshot import Snapshot
 from live.results.figures import value_text
 from live.ui.terminal.screen import TerminalScreen
