@@ -94,7 +94,7 @@ class DilatationGuard:
         way = "towards" if false > 0 else "away from"
         far = "" if self._stand_off_mm is None else f" by {abs(false) * self._stand_off_mm:.2f} mm"
         return (
-            f"the strains along and across do not fit nu = {nu:g}: {false * 1e6:+.0f} um/m in both is as from"
+            f"the strains along and across do not fit nu = {nu:g}: {false * 1e6:+.0f} µm/m in both is as from"
             f" motion{far} {way} the camera, and no strain; E is off by it too (docs/optics.md)"
         )
 

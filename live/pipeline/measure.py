@@ -140,7 +140,7 @@ class PlateCorrection:
         chosen = choose_model(self._fit, whole, self._focal_px)
         text = (
             f"plates {', '.join(self._fit.layout.plates)}: {chosen.model} is corrected; in the mean strain that leaves"
-            f" {chosen.noise * 1e6:.1f} um/m by noise of one burst and {chosen.unseen * 1e6:.1f} um/m by a tilt of"
+            f" {chosen.noise * 1e6:.1f} µm/m by noise of one burst and {chosen.unseen * 1e6:.1f} µm/m by a tilt of"
             f" {math.degrees(ASSUMED_TILT):.1g} degrees"
         )
         data = {"model": chosen.model, "noise": chosen.noise, "unseen": chosen.unseen}

@@ -232,7 +232,7 @@ def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
     yield CheckLine("drift", f"{s.drift_px:.4f} px and {strain.drift * 1e6:+.0f} µm/m in {s.u.seconds:.3g} s",
                s.drift_px <= max_px, "keep specimen and camera still")  # fmt: skip
     if s.dilatation:
-        yield CheckLine("distance", f"exx and eyy drift alike, {s.dilatation * 1e6:+.0f} um/m: it changes by"
+        yield CheckLine("distance", f"exx and eyy drift alike, {s.dilatation * 1e6:+.0f} µm/m: it changes by"
                    f" {abs(s.dilatation):.1e} of the stand-off", abs(s.dilatation) < MAX_DILATATION,
                    "warm up the camera, clamp grips and tripod, or hang plates (docs/optics.md)")  # fmt: skip
     shake = s.worse

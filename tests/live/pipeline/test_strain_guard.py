@@ -105,13 +105,13 @@ def test_strains_that_do_not_fit_nu_are_motion_off_the_plane() -> None:
     steps(events, 0.33, grown)
     assert [(event.t, event.level) for event in events] == [(1.0, "warning")]
     assert events[0].data["strain"] == pytest.approx(0.3 * 200e-6, rel=1e-9)
-    assert "+60 um/m in both is as from motion by 0.03 mm towards the camera" in events[0].text
+    assert "+60 µm/m in both is as from motion by 0.03 mm towards the camera" in events[0].text
 
 
 def test_motion_away_along_x_without_a_distance() -> None:
     events: list[Event] = []
     steps(events, 0.3, [(500e-6 - 150e-6, -150e-6 - 150e-6)], None)
-    assert "-150 um/m in both is as from motion away from the camera" in events[0].text
+    assert "-150 µm/m in both is as from motion away from the camera" in events[0].text
 
 
 @pytest.mark.parametrize(
