@@ -207,7 +207,9 @@ class Solution:
             self._is_given, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far
         )
         left = self._left(which, found)
-        if self.common is None and 2 * len(expected) > len(self._places[0]):  # some that are retried forgive nothing
+        if self.common is None and 2 * len(expected) > len(
+            self._places[0]
+        ):  # some that are retried forgive nothing
             self.common = self.pooled(which, found)
         common = PooledError.none(len(known.signal)) if self.common is None else self.common
         status = np.empty(len(expected), np.uint8)

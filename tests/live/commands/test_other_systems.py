@@ -9,7 +9,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from urllib.request import urlopen
+from urllib.request import HTTPCookieProcessor, build_opener
 
 import pytest
 
@@ -73,7 +73,7 @@ def test_the_page(hidden: Path) -> None:
     words = ["page", "--camera", f"session:{RECORDED}", "--load", "none:", "--no-view", "--no-rrd"]
     program = Program(hidden, *words, "--page-port", "0")
     try:
-        with urlopen(program.address, timeout=60) as answer:
+        with build_opener(HTTPCookieProcessor()).open(program.address, timeout=60) as answer:
             assert answer.status == 200 and b"phasedic" in answer.read()
         assert "Traceback" not in program.output
     finally:

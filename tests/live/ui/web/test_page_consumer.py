@@ -25,7 +25,7 @@ from live.pipeline.run_state import RunState
 from live.results.maps.field_maps import FIELD_MAPS
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.curve_history import MAX_POINTS, CurveHistory
-from live.ui.web.page_consumer import PageConsumer, axial_length_mm
+from live.ui.web.page_consumer import PageConsumer, elongation_length
 from tests.live.made_up import make_frame, make_measurement
 from tests.live.ui.waiting import until
 from tests.live.ui.web.sentences import (
@@ -269,10 +269,13 @@ def test_the_map_at_the_highest_force(config: Config) -> None:
 
 def test_the_length_of_an_elongation() -> None:
     line = {"gauges.axial": {"kind": "line", "start": [10, 20], "end": [10, 120]}}
-    given = {"specimen.gauge_length_mm": 50.0}
-    assert axial_length_mm(load_config(None, {**line, "scale.mm_per_px": 0.1})) == pytest.approx(10.0)
-    assert axial_length_mm(load_config(None, line | given)) == 50.0
-    assert axial_length_mm(load_config(None, line)) is None
+    strips = {"gauges.whole": {"kind": "extension", "box": [10, 20, 60, 120], "along": "y"}}
+    given, scale = {"specimen.gauge_length_mm": 50.0}, {"scale.mm_per_px": 0.1}
+    assert elongation_length(load_config(None, {**strips, **line, **scale})) == ("axial", pytest.approx(10.0))
+    # Between the middles of the first and the last sixth.
+    assert elongation_length(load_config(None, {**strips, **scale})) == ("whole", pytest.approx(10.0))
+    assert elongation_length(load_config(None, line | given)) == ("", 50.0)
+    assert elongation_length(load_config(None, line)) == ("", None)
 
 
 def test_every_text_of_the_page_is_translated() -> None:
