@@ -21,6 +21,8 @@ Places = NDArray[np.intp] | slice
 
 MIN_POOLED = 25
 """ZOIs from which on their common error is taken in place of the noise as stated."""
+MAX_POOLED = 1500
+"""ZOIs that are enough; of more, one in so many is taken."""
 MIN_MATCHED = 0.5
 """Share of the ZOIs that must explain their pattern: of an unrelated picture no common error is taken."""
 CLEAR_SIGMA = 0.15
@@ -32,7 +34,7 @@ COLOUR_SPREAD = 1.0
 SAME = 1e-3
 """What is left over what the noise as stated explains, below which the picture is its own reference: no noise shows."""
 LOWEST, LOWEST_DEVIATION = 5, 0.84
-"""One ZOI in so many leaves less than its group by these standard deviations; if these few ..."""
+"""One ZOI in so many leaves less than its group by these standard deviations; if these few, in most groups, ..."""
 AS_STATED = 1.1
 """... leave no more than this of what the noise as stated explains, what the others leave more is their own: blur or
 glare on a part of the picture."""
@@ -50,7 +52,7 @@ def pooled(
     Parameters
     ----------
     found : OutArgs
-        Of B ZOIs.
+        Of B ZOIs, some of the A.
     left, expected : (B,), GL^2
         Variance a pixel that the fit leaves, and that the noise as stated explains.
     known : ReferenceArgs
@@ -68,22 +70,29 @@ def pooled(
         return None
     ratio, contrast = left[matched] / expected[matched], own.signal[matched]
     groups = _alike(contrast)
-    middle = [float(np.median(contrast[group])) for group in groups]
-    usual = [float(np.median(ratio[group])) for group in groups]
-    scatter = MAD * float(np.median(np.abs(ratio / np.interp(contrast, middle, usual) - 1)))
-    agrees = given and min(usual) > AGREES[0] and max(usual) < AGREES[1]
+    middle, usual = np.median(contrast[groups], axis=1), np.median(ratio[groups], axis=1)
+    scatter = MAD * float(np.median(np.abs(ratio / _at(contrast, middle, usual) - 1)))
+    agrees = given and usual.min() > AGREES[0] and usual.max() < AGREES[1]
     if agrees:
-        usual = [1.0] * len(usual)
+        usual = np.ones(len(usual))
     spread = np.sqrt(2 / np.maximum(own.pixels[matched], 1))
-    lowest = [_lowest(ratio[group], spread[group]) for group in groups]
-    common = [min(most, 1.0) if low < AS_STATED else most for low, most in zip(lowest, usual, strict=True)]
-    trend = np.interp(known.signal, middle, usual)
+    lowest = _lowest(ratio[groups], spread[groups])
+    as_stated = (lowest < AS_STATED) | (np.median(lowest) < AS_STATED)
+    common = np.where(as_stated, np.minimum(usual, 1.0), usual)
+    trend = _at(known.signal, middle, usual)
     error = expected * trend[places] / np.maximum(gain, MIN_NOISE_GAIN) ** 2
     shares = found.cubic[matched] / (error[:, None] * own.unit)[matched]
     colour = _shrunk(np.median(shares, axis=0) / known.white, count * known.independent)
     if agrees and np.all(np.abs(np.log(colour)) < np.log(COLOURED)):
         colour = np.ones(2)
-    return PooledError(trend, np.interp(known.signal, middle, common), scatter, colour)
+    return PooledError(trend, _at(known.signal, middle, common), scatter, colour)
+
+
+def _at(contrast: Floats, middle: Floats, values: Floats) -> Floats:
+    """What holds for groups of middle contrasts, at each contrast."""
+    if values.min() == values.max():
+        return np.full(len(contrast), values[0])
+    return np.asarray(np.interp(contrast, middle, values))
 
 
 def _matched(found: OutArgs, left: Floats, expected: Floats, own: ReferenceArgs) -> NDArray[np.bool_]:
@@ -98,16 +107,17 @@ def _matched(found: OutArgs, left: Floats, expected: Floats, own: ReferenceArgs)
     return np.asarray(matched & enough)
 
 
-def _alike(contrast: Floats) -> list[NDArray[np.intp]]:
-    """Groups of ZOIs of like contrast (N,)."""
-    order = np.argsort(contrast, kind="stable")
-    return np.array_split(order, max(1, min(MAX_GROUPS, len(order) // GROUP)))
+def _alike(contrast: Floats) -> NDArray[np.intp]:
+    """Groups of ZOIs of like contrast, (G, N); a few of the highest are left over."""
+    count = max(1, min(MAX_GROUPS, len(contrast) // GROUP))
+    size = len(contrast) // count
+    return np.argsort(contrast, kind="stable")[: count * size].reshape(count, size)
 
 
-def _lowest(ratio: Floats, spread: Floats) -> float:
-    """The common ratio of (N,) ZOIs, as their lowest show it: where many are spoilt these are not."""
-    at = len(ratio) // LOWEST
-    return float(np.partition(ratio / (1 - LOWEST_DEVIATION * spread), at)[at])
+def _lowest(ratio: Floats, spread: Floats) -> Floats:
+    """The common ratio of groups (G, N), (G,), as their lowest show it: where many are spoilt these are not."""
+    at = ratio.shape[1] // LOWEST
+    return np.asarray(np.partition(ratio / (1 - LOWEST_DEVIATION * spread), at, axis=1)[:, at])
 
 
 def _shrunk(colour: Floats, count: float) -> Floats:

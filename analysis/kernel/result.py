@@ -17,6 +17,8 @@ from analysis.kernel.solve import Solution
 Floats = NDArray[np.float64]
 Covariance = NDArray[np.float32]
 
+FEW_REFUSED = 0.98
+"""Share of valid ZOIs from which on what all fits leave in common is that of the valid ones."""
 MIN_SHARE = 0.04
 """Share of the common error that the deformed image has at least, however noisy the reference was said to be."""
 
@@ -123,7 +125,9 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     """The noise of the two images: together what the fits leave, of which the reference has what was given."""
     gain, white = solution.found.nuisance[:, 0], np.ones(2)
     reference, current = solution.variances(np.s_[:], gain)
-    common = solution.pooled(which := np.flatnonzero(ok), solution.found.at(which))
+    common = solution.common
+    if common is None or solution.retried or np.count_nonzero(ok) < FEW_REFUSED * len(ok):
+        common = solution.pooled(np.flatnonzero(ok))
     if common is not None:
         blurred = abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR
         # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.

@@ -54,6 +54,8 @@ class Solution:
         Where the iteration may stop.
     common : PooledError or None
         What the fits leave in common; None: of too few ZOIs to be taken.
+    retried : bool
+        Whether ``keep`` has changed some ZOIs since.
     had_lines : bool
         Whether bands or lines were taken off the image (``lines.mend``).
     """
@@ -67,6 +69,7 @@ class Solution:
         self.guess = guess
         self.rounding = reference.rounding + rounding_variance(image)
         self.common: PooledError | None = None
+        self.retried = False
         self.had_lines = False
         self._take(_cleaned(image) if reference.cleaned else image)
         self.table = tap_table(reference.settings.interpolant)
@@ -111,6 +114,7 @@ class Solution:
         self.status = np.where(unknown, np.uint8(Status.LOST), self.reference.prepared.status)
         if len(which):
             self.keep(which, *self.solved(which, guess[which]))
+        self.retried = False
 
     def _picture(self, box: Box) -> PictureArgs:
         from analysis.picture.prefilter import coefficients
@@ -143,6 +147,7 @@ class Solution:
 
     def keep(self, which: NDArray[np.intp], found: OutArgs, status: NDArray[np.uint8]) -> None:
         """Take over what was found of the ZOIs ``which``."""
+        self.retried = True
         self.status[which] = status
         self.found.put(which, found)
 
@@ -216,12 +221,16 @@ class Solution:
         judge(found, left, expected, common.at(which), known.at(which), rule, status)
         return status
 
-    def pooled(self, which: Places, found: OutArgs) -> PooledError | None:
-        """What the fits ``found`` of the ZOIs ``which`` leave in common."""
-        from analysis.fit.pooling import pooled
+    def pooled(self, which: Places, found: OutArgs | None = None) -> PooledError | None:
+        """What the fits of the ZOIs ``which`` leave in common, from so many of them; None: as they are kept."""
+        from analysis.fit.pooling import MAX_POOLED, pooled
 
-        left, expected = self._left(which, found), self.expected(which, found.nuisance[:, 0])
-        return pooled(found, left, expected, self._known(), which, self._is_given)
+        places = np.arange(len(self.guess))[which]
+        every = 1 + len(places) // MAX_POOLED
+        chosen = places[::every]
+        some = self.found.at(chosen) if found is None else found.at(np.arange(0, len(places), every))
+        left, expected = self._left(chosen, some), self.expected(chosen, some.nuisance[:, 0])
+        return pooled(some, left, expected, self._known(every), chosen, self._is_given)
 
     @property
     def noise_taken(self) -> Floats:
@@ -233,7 +242,8 @@ class Solution:
         """Whether the noise of both images was given."""
         return self.noise is not None and self.reference.noise_model is not None
 
-    def _known(self) -> ReferenceArgs:
+    def _known(self, every: int = 1) -> ReferenceArgs:
+        """For the verdict; of each ZOI, or where one in ``every`` counts."""
         reference, ready = self.reference, self.reference.prepared
         pixels = ready.freedom * reference.sharpness
         return ReferenceArgs(
@@ -242,7 +252,7 @@ class Solution:
             reference.share_variance,
             reference.unit_sigma[2],
             reference.white,
-            min(1.0, (2 * reference.grid.step / reference.grid.size) ** 2),
+            min(1.0, every * (2 * reference.grid.step / reference.grid.size) ** 2),
         )
 
     def _left(self, which: Places, found: OutArgs) -> Floats:
