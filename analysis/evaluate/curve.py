@@ -39,6 +39,8 @@ class Curve:
         How much ``elastic`` varies over its area, rms.
     misfit : (N,) float64 or None
         That over what noise makes of it.
+    lens : (N,) float64 or None
+        Standard uncertainty of the strain by the correction of a lens.
     source, elastic_source : str
         What ``strain`` and ``elastic`` are, in words.
     """
@@ -50,12 +52,15 @@ class Curve:
     elastic: Floats | None = None
     uneven: Floats | None = None
     misfit: Floats | None = None
+    lens: Floats | None = None
     source: str = ""
     elastic_source: str = ""
 
     def __post_init__(self) -> None:
         n = len(self.t)
-        for values in (self.strain, self.stress, self.transverse, self.elastic, self.uneven, self.misfit):
+        for values in (
+            self.strain, self.stress, self.transverse, self.elastic, self.uneven, self.misfit, self.lens
+        ):  # fmt: skip
             if values is not None and values.shape != (n,):
                 raise ValueError(f"a curve needs arrays of one length, got {values.shape} beside {n} times")
 
@@ -66,7 +71,7 @@ class Loading:
 
     Attributes
     ----------
-    t, strain, stress, transverse, elastic, uneven, misfit : (M,) float64
+    t, strain, stress, transverse, elastic, uneven, misfit, lens : (M,) float64
         As of the ``Curve``; NaN where unknown.
     level, course : (M,) float64
         Running means of stress and strain, to find places by; never a figure.
@@ -87,6 +92,7 @@ class Loading:
     elastic: Floats
     uneven: Floats
     misfit: Floats
+    lens: Floats
     level: Floats
     course: Floats
     noise_strain: float
@@ -103,16 +109,16 @@ class Loading:
         elastic = curve.strain if curve.elastic is None else curve.elastic
         known = np.isfinite(curve.strain[:stop]) & np.isfinite(curve.stress[:stop])
         nothing = np.full(len(curve.t), math.nan)
-        t, strain, stress, across, elastic, uneven, misfit = (
+        t, strain, stress, across, elastic, uneven, misfit, lens = (
             (nothing if a is None else a)[:stop][known]
             for a in (
-                curve.t, curve.strain, curve.stress, curve.transverse, elastic, curve.uneven, curve.misfit
+                curve.t, curve.strain, curve.stress, curve.transverse, elastic, curve.uneven, curve.misfit, curve.lens
             )
         )  # fmt: skip
         top = int(np.argmax(stress)) if len(stress) else 0
         half = min(top // _PARTS, _WIDEST)
         return cls(
-            t, strain, stress, across, elastic, uneven, misfit, smoothed(stress, half), smoothed(strain, half),
+            t, strain, stress, across, elastic, uneven, misfit, lens, smoothed(stress, half), smoothed(strain, half),
             noise(strain), noise(stress), half, top, end is not None,
         )  # fmt: skip
 

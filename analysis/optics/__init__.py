@@ -2,27 +2,36 @@
 
 ``plane`` is the apparent motion of a rigid plane in pictures, ``layout`` places the ZOIs of plates beside those of the
 specimen, ``plates`` measures the apparent motion on them. ``shutter`` removes
-what reading line by line adds.
+what reading line by line adds, ``lens`` the distortion, which ``shifts`` finds.
 """
 
 from analysis.optics.layout import Box, PlateLayout, without_plates
+from analysis.optics.lens import LENS_NAMES, LensCorrection, LensModel, LensReading, strain_of_shift
 from analysis.optics.plane import MODELS, NAMES, SCALE, ApparentMotion, Model
 from analysis.optics.plates import ASSUMED_TILT, ChosenModel, PlateFit, choose_model, trouble
+from analysis.optics.shifts import LensFit, lens_of_shifts
 from analysis.optics.shutter import ShutterCorrection
 
 __all__ = [
     "ASSUMED_TILT",
+    "LENS_NAMES",
     "MODELS",
     "NAMES",
     "SCALE",
     "ApparentMotion",
     "Box",
     "ChosenModel",
+    "LensCorrection",
+    "LensFit",
+    "LensModel",
+    "LensReading",
     "Model",
     "PlateFit",
     "PlateLayout",
     "ShutterCorrection",
     "choose_model",
+    "lens_of_shifts",
+    "strain_of_shift",
     "trouble",
     "without_plates",
 ]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from acquire.events import EventSink
 from acquire.frame import Burst, CameraInfo
 from acquire.load_cell import LoadLog
-from analysis.optics import PlateFit, ShutterCorrection
+from analysis.optics import LensCorrection, LensModel, PlateFit, ShutterCorrection
 from live.config.gauges import gauges_for
 from live.config.loading import Config
 from live.pipeline.guards import DilatationGuard
@@ -23,6 +23,7 @@ from live.pipeline.reference import Correction, prepare
 from live.pipeline.warm_up import picture_kinds
 from live.setup.compiling import compile_ahead
 from live.setup.grid import grid_for, kernel_settings, plates_for
+from live.setup.lens import lens_for
 from live.setup.pictures import correction
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ class MeasurePlan:
     grid : ZoiGrid
     gauges : tuple of Gauge
     plates : PlateFit or None
+    lens : LensModel or None
     settings : KernelSettings
     correct : callable
         Corrects the fixed pattern of the sensor in a burst.
@@ -56,6 +58,7 @@ class MeasurePlan:
     grid: ZoiGrid
     gauges: tuple[Gauge, ...]
     plates: PlateFit | None
+    lens: LensModel | None
     settings: KernelSettings
     correct: Correction
     width: int
@@ -75,14 +78,21 @@ class MeasurePlan:
         layout = plates_for(config, grid, camera.width, camera.height)
         middle = ((camera.width - 1) / 2, (camera.height - 1) / 2)
         plates = None if layout is None else PlateFit(layout, middle)
+        lens = lens_for(config, camera.width, camera.height, grid if layout is None else layout.whole)
         settings, correct = kernel_settings(config), correction(config, camera)
-        return cls(config, mask, grid, gauges, plates, settings, correct, camera.width, camera.height)
+        return cls(config, mask, grid, gauges, plates, lens, settings, correct, camera.width, camera.height)
 
     @property
     def shutter(self) -> ShutterCorrection | None:
         """A new correction of the rolling shutter; None without its readout time."""
         readout_ms = self.config.camera.readout_ms
         return None if not readout_ms else ShutterCorrection(1e-3 * readout_ms, self.height)
+
+    @property
+    def lens_correction(self) -> LensCorrection | None:
+        """The correction of the lens; None where there is none to correct."""
+        layout = None if self.plates is None else self.plates.layout
+        return None if self.lens is None else LensCorrection(self.lens, self.kernel_grid, layout)
 
     @property
     def focal_px(self) -> float:
@@ -143,6 +153,7 @@ class PreparedKernel:
             correct=self.plan.correct,
             gauges=self.plan.gauges,
             shutter=self.plan.shutter,
+            lens=self.plan.lens_correction,
             plates=None if plates is None else PlateCorrection(plates, self.plan.focal_px, on_event),
             renew_at=settings.renew_at,
             strain=cast(Any, settings.strain),

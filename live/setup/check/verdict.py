@@ -221,6 +221,8 @@ def _sssig(f: CheckFigures) -> CheckLine:
 
 
 def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
+    if f.lens:
+        yield CheckLine("lens", f.lens)
     s = f.still
     if f.stack.few:
         yield from (_not_measured(f, what) for what in ("drift", "vibration"))
