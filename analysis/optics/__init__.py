@@ -2,13 +2,14 @@
 
 ``plane`` is the apparent motion of a rigid plane in pictures, ``layout`` places the ZOIs of plates beside those of the
 specimen, ``plates`` measures the apparent motion on them. ``shutter`` removes
-what reading line by line adds, ``lens`` the distortion, which ``shifts`` finds.
+what reading line by line adds, for the time that ``readout`` finds; ``lens`` the distortion, which ``shifts`` finds.
 """
 
 from analysis.optics.layout import Box, PlateLayout, without_plates
 from analysis.optics.lens import LENS_NAMES, LensCorrection, LensModel, LensReading, strain_of_shift
 from analysis.optics.plane import MODELS, NAMES, SCALE, ApparentMotion, Model
 from analysis.optics.plates import ASSUMED_TILT, ChosenModel, PlateFit, choose_model, trouble
+from analysis.optics.readout import Readout, readout_of_bands, readout_of_motion
 from analysis.optics.shifts import LensFit, lens_of_shifts
 from analysis.optics.shutter import ShutterCorrection
 
@@ -28,9 +29,12 @@ __all__ = [
     "Model",
     "PlateFit",
     "PlateLayout",
+    "Readout",
     "ShutterCorrection",
     "choose_model",
     "lens_of_shifts",
+    "readout_of_bands",
+    "readout_of_motion",
     "strain_of_shift",
     "trouble",
     "without_plates",

@@ -76,9 +76,10 @@ def add_help_all(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(HELP_ALL, action="help", help="this help, with the options for experts")
 
 
-def add_config_file(parser: argparse.ArgumentParser) -> None:
+def add_config_file(
+    parser: argparse.ArgumentParser, words: str = "TOML file of the configuration; options override it"
+) -> None:
     """Add --config."""
-    words = "TOML file of the configuration; options override it"
     parser.add_argument("--config", metavar="FILE", help=words)
 
 

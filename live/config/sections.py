@@ -48,6 +48,7 @@ class CameraConfig:
     readout_ms: float | None = key(number(0, 10_000), None,
         "time of a rolling shutter from the first line of the picture to the last, ms: the strain that motion shows"
         " by it is removed")
+    sigma_readout_ms: float | None = key(number(0, 10_000), None, "standard uncertainty of readout_ms")
     dark: str | None = key(TEXT, None,
         "dark frame (TIFF), subtracted from every burst", Option("dark", "FILE", expert=True))
     flat: str | None = key(TEXT, None,

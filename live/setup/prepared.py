@@ -85,8 +85,8 @@ class MeasurePlan:
     @property
     def shutter(self) -> ShutterCorrection | None:
         """A new correction of the rolling shutter; None without its readout time."""
-        readout_ms = self.config.camera.readout_ms
-        return None if not readout_ms else ShutterCorrection(1e-3 * readout_ms, self.height)
+        readout_ms, sigma_ms = self.config.camera.readout_ms, self.config.camera.sigma_readout_ms or 0.0
+        return None if not readout_ms else ShutterCorrection(1e-3 * readout_ms, self.height, 1e-3 * sigma_ms)
 
     @property
     def lens_correction(self) -> LensCorrection | None:
