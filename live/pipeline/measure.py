@@ -27,7 +27,7 @@ from analysis.optics import (
     choose_model,
     trouble,
 )
-from live.pipeline.guards import BlurGuard, DilatationGuard, PictureGuard, StrainGuard
+from live.pipeline.guards import BlurGuard, DilatationGuard, PictureGuard, StrainGuard, TiltGuard
 from live.pipeline.measurement import Measurement, PlateReading
 from live.pipeline.reference import Correction, averaged, repetition_text, unchanged
 
@@ -190,6 +190,7 @@ def measure(
     renew_at: float = 1.0,
     strain: Measure = "small",
     dilatation: DilatationGuard | None = None,
+    tilt: TiltGuard | None = None,
     on_event: EventSink = ignore_event,
     timer: Timer = lambda: 0.0,
 ) -> Iterator[Measurement]:
@@ -220,6 +221,7 @@ def measure(
     strain : "small", "engineering", "green" or "hencky"
         The measure of strain of the fields and means.
     dilatation : DilatationGuard, optional
+    tilt : TiltGuard, optional
     on_event : callable taking an Event
         Called when the reference is renewed, and where a guard warns.
     timer : callable
@@ -256,5 +258,7 @@ def measure(
         sharpness.check(measurement.time_step)
         if dilatation is not None:
             dilatation.check(measurement.time_step)
+        if tilt is not None:
+            tilt.check(field, measurement.time_step)
         yield measurement
         number += 1

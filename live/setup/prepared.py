@@ -16,7 +16,7 @@ from acquire.load_cell import LoadLog
 from analysis.optics import LensCorrection, LensModel, PlateFit, ShutterCorrection
 from live.config.gauges import gauges_for
 from live.config.loading import Config
-from live.pipeline.guards import DilatationGuard
+from live.pipeline.guards import DilatationGuard, TiltGuard
 from live.pipeline.measure import NewReference, PlateCorrection, measure
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, prepare
@@ -97,10 +97,8 @@ class MeasurePlan:
     @property
     def focal_px(self) -> float:
         """Distance of the camera over the size of a pixel on the specimen; assumed where it is not known."""
-        scale = self.config.scale
-        if scale.mm_per_px is None or scale.stand_off_mm is None:
-            return ASSUMED_FOCAL * self.width
-        return scale.stand_off_mm / scale.mm_per_px
+        known = _focal_px(self.config)
+        return ASSUMED_FOCAL * self.width if known is None else known
 
     @property
     def kernel_grid(self) -> ZoiGrid:
@@ -158,6 +156,15 @@ class PreparedKernel:
             renew_at=settings.renew_at,
             strain=cast(Any, settings.strain),
             dilatation=DilatationGuard(config.specimen.nu, stand_off, on_event),
+            tilt=TiltGuard(_focal_px(config), on_event, dilatation=config.specimen.nu is None),
             on_event=on_event,
             timer=self.timer,
         )
+
+
+def _focal_px(config: Config) -> float | None:
+    """Distance of the camera over the size of a pixel on the specimen, px; None where it is not known."""
+    scale = config.scale
+    if scale.mm_per_px is None or scale.stand_off_mm is None:
+        return None
+    return scale.stand_off_mm / scale.mm_per_px
