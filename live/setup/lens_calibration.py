@@ -119,13 +119,14 @@ def from_boards(pictures: Iterable[NDArray[Any]], board: Board, *, k3: bool = Fa
             f"{len(found)} of {count} pictures show the board; it takes {MIN_BOARDS}, at many places and tilted by 10"
             " to 30 degrees in all directions; look at the numbers of its corners, focus and light"
         )
-    fit = _fitted(found, size, k3)
+    fit = lens_of_corners(found, size, k3)
     kind = "ChArUco board" if board.marker_mm else "checkerboard"
     method = f"{kind}, {sum(len(one.px) for one in found)} corners in {len(found)} of {count} pictures"
     return LensCalibration(fit, size, _box(np.concatenate([one.px for one in found])), method)
 
 
-def _fitted(found: Sequence[Corners], size: tuple[int, int], k3: bool) -> LensFit:
+def lens_of_corners(found: Sequence[Corners], size: tuple[int, int], k3: bool = False) -> LensFit:
+    """The lens from corners of a board in several pictures of ``size`` (width, height) px; raises DataError."""
     cv2 = load_cv2()
     flat = [np.column_stack([one.mm, np.zeros(len(one.mm))]).astype(np.float32) for one in found]
     seen = [one.px.astype(np.float32)[:, None] for one in found]

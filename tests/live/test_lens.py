@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
 from analysis import Roi, ZoiGrid
-from analysis.optics import LensModel, strain_of_shift
+from analysis.field import StrainField
+from analysis.optics import LensCorrection, LensModel, strain_of_shift
 from hw_mocks.deformation import Affine
 from hw_mocks.optics import Lens as TrueLens
 from hw_mocks.optics import Optics, PlaneMotion, Seen
@@ -23,8 +24,8 @@ from live.config.rig_file import write_rig
 from live.results.reader import Strain
 from live.results.run_folder import open_run
 from live.setup.lens import lens_for
-from live.setup.lens_calibration import from_boards
-from live.setup.scale import Board
+from live.setup.lens_calibration import from_boards, lens_of_corners
+from live.setup.scale import Board, Corners
 
 WIDTH, HEIGHT, DISTORTION = 400, 300, -0.005
 QUIET = ["--no-view", "--no-rrd"]
@@ -249,6 +250,30 @@ def test_boards_show_the_lens_with_honest_uncertainty(tmp_path: Path) -> None:
     stored = lens_for(load_config(tmp_path / "lens.toml", {}), 480, 360, grid)
     assert stored is not None
     np.testing.assert_array_equal(stored.parameters, lens.parameters)
+
+
+def test_the_stated_uncertainty_of_boards_covers_the_truth() -> None:
+    """Errors of the strain that 15 px of motion make, over their sigma, with noise of the corners of 0.1 px."""
+    rng, row_column = np.random.default_rng(5), np.mgrid[:6, :8].reshape(2, -1).T
+    mm = 10.0 * row_column[:, ::-1] - [35.0, 25.0]
+    camera = np.array([[FOCAL, 0, MIDDLE[0]], [0, FOCAL, MIDDLE[1]], [0, 0, 1]])
+    flat = np.column_stack([mm, np.zeros(len(mm))])
+    exact = [
+        cv2.projectPoints(flat, np.radians(turn), np.array(place, float), camera, TRUE.parameters[3:])[0][
+            :, 0
+        ]
+        for turn, place in VIEWS
+    ]
+    grid = ZoiGrid.cover(Roi(60, 60, 150, 120), 40, 20)
+    moved = StrainField.from_values(grid, {"u": np.full(grid.shape, 10.0), "v": np.full(grid.shape, 11.0)})
+    truth = LensCorrection(TRUE, grid).apply(moved)[1]
+    errors = []
+    for _ in range(60):
+        corners = [Corners(mm, px + rng.normal(0, 0.1, px.shape)) for px in exact]
+        read = LensCorrection(lens_of_corners(corners, (480, 360)).lens, grid).apply(moved)[1]
+        errors += [(read.exx - truth.exx) / read.sigma_exx, (read.eyy - truth.eyy) / read.sigma_eyy]
+    assert 0.8 < np.sqrt(np.mean(np.square(errors))) < 1.2
+    assert np.mean(np.abs(errors) < 1.96) > 0.9
 
 
 def test_boards_that_are_too_few_are_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
