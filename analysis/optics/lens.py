@@ -25,7 +25,7 @@ from analysis.optics.plane import affine_values
 Floats = NDArray[np.float64]
 LENS_NAMES = ("focal_px", "x0", "y0", "k1", "k2", "p1", "p2", "k3")
 """The parameters of a lens in their order; k and p are dimensionless, the others px."""
-_ROUNDS, _MORE_ROUNDS = 6, 2  # of Newton: from the place itself, and from the place with nearly the same lens
+_ROUNDS, _MORE_ROUNDS = 6, 1  # of Newton: from the place itself, and from the place with nearly the same lens
 
 
 class Straightened(NamedTuple):

@@ -193,14 +193,16 @@ class _Step:
     @classmethod
     def of(cls, picture: _Picture, parameters: Floats, free: list[int], motion: Floats) -> _Step:
         weight = 1 / np.sqrt(picture.variance)
-        left = _left(picture, parameters, motion)
-
-        def taken(lens: Floats, moved: Floats) -> Floats:
-            return np.asarray(weight * (left - _left(picture, parameters + lens, motion + moved)) / _STEP)
-
-        still, steps = np.zeros(len(parameters)), _STEP * np.eye(len(parameters))
-        by_lens = np.stack([taken(steps[k], np.zeros(len(motion))) for k in free], axis=1)
-        by_motion = np.stack([taken(still, step[: len(motion)]) for step in steps[: len(motion)]], axis=1)
+        seen = picture.seen(_lens(parameters))
+        left, changes = _left(seen, parameters, motion), _STEP * np.eye(len(parameters))
+        of_lens = [
+            _left(picture.seen(_lens(parameters + changes[k])), parameters + changes[k], motion) for k in free
+        ]
+        of_motion = [_left(seen, parameters, motion + one[: len(motion)]) for one in changes[: len(motion)]]
+        by_lens, by_motion = (
+            np.stack([weight * (left - other) / _STEP for other in others], axis=1)
+            for others in (of_lens, of_motion)
+        )
         lens = by_lens - by_motion @ np.linalg.lstsq(by_motion, by_lens, rcond=None)[0]
         return cls(weight * left, lens, by_lens, by_motion, weight)
 
@@ -211,10 +213,14 @@ class _Step:
         )
 
 
-def _left(picture: _Picture, parameters: Floats, motion: Floats) -> Floats:
-    """What a lens and a motion leave of the displacements, (2 N,) px."""
-    seen, before = picture.seen(LensModel(parameters, np.zeros((0, 0))))
+def _lens(parameters: Floats) -> LensModel:
+    return LensModel(parameters, np.zeros((0, 0)))
+
+
+def _left(seen: tuple[Floats, Floats], parameters: Floats, motion: Floats) -> Floats:
+    """What a motion leaves of what a lens shows (``_Picture.seen``), (2 N,) px."""
+    displacement, before = seen
     centre = float(parameters[1]), float(parameters[2])
     x, y = (before - np.array(centre)[:, None]) / parameters[0]
     apparent = ApparentMotion(np.pad(motion, (0, 8 - len(motion))), centre, float(parameters[0]))
-    return np.asarray((seen - apparent.at(x, y)[::3]).ravel())
+    return np.asarray((displacement - apparent.at(x, y)[::3]).ravel())
