@@ -49,10 +49,10 @@ class PlasticPart:
     def of(cls, loading: Loading, line: FittedLine, nu: float) -> PlasticPart:
         """With the elastic part of both strains taken away by the elastic ``line`` and Poisson's ratio."""
         part = slice(line.last, loading.top + 1)
-        strain = loading.elastic[part] - line.strain0
+        strain = loading.strain[part] - line.strain0
         stress = loading.stress[part] * (1 + strain)
         elastic = stress / line.slope
-        across = np.log1p(loading.transverse[part]) + nu * elastic
+        across = np.log1p(loading.narrowing[part]) + nu * elastic
         return cls(np.log1p(strain) - elastic, across, stress, elastic)
 
     @property
@@ -106,6 +106,16 @@ def hardening(loading: Loading, line: FittedLine) -> Figure:
         return Figure.none(_few(int(np.count_nonzero(used)), low, min(high, reached)))
     slope, sigma, n = _slope(np.log(part.along[used]), np.log(part.stress[used]))
     return Figure.about(slope, sigma, n - 2, _over(low, min(high, reached)))
+
+
+def true_at_top(strength: Figure, strain: Figure) -> tuple[Figure, Figure]:
+    """True stress (Pa) and logarithmic strain of the highest stress and the extension there, where a neck begins.
+
+    Volume is kept, and the strain is uniform up to there. Both must be known.
+    """
+    stretch = strain.minus(-1.0)
+    stress = Figure(strength.value * stretch.value, strength.low * stretch.low, strength.high * stretch.high)
+    return stress, Figure(math.log(stretch.value), math.log(stretch.low), math.log(stretch.high))
 
 
 @dataclass(frozen=True, slots=True)
