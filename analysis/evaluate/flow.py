@@ -160,13 +160,10 @@ def neck(before: StrainField, after: StrainField, axis: Literal["x", "y"]) -> Ne
     k, elsewhere = int(np.argmax(mean)), float(np.median(mean))
     if mean[k] - elsewhere < max(_CLEAR_SIGMA * sigma[k], _CLEAR_SHARE * abs(elsewhere), _CLEAR_STRAIN):
         return None
-    rows, columns = np.nonzero(
-        both
-        & (np.arange(both.shape[1 - across]) == np.flatnonzero(known)[k]).reshape(
-            (1, -1) if across == 0 else (-1, 1)
-        )
-    )
-    grid = before.grid
+    grid, at = before.grid, np.flatnonzero(known)[k]
+    section = np.zeros(grid.shape, np.bool_)
+    section[(slice(None), at) if across == 0 else (at, slice(None))] = True
+    rows, columns = np.nonzero(section & grid.active)
     return Neck(float(grid.x[columns].mean()), float(grid.y[rows].mean()), float(mean[k]), elsewhere)
 
 
