@@ -17,9 +17,10 @@ from live.results.run_folder import RunFolder
 def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
     """Add the ``[gauges.NAME]`` of a TOML file to ``run`` while it is open; its files stay as they are.
 
-    Values are those that a replay with this file would give, and so are the uncertainties of extensometers and single
-    ZOIs. That of an area includes only the overlap of the windows (6 % low at a step of a quarter of a ZOI, a third at
-    most). A gauge replaces an existing one of the same name.
+    Values are those that a replay with this file would give, to the digits of the maps, and so are the uncertainties of
+    extensometers and single ZOIs. That of an area includes only the overlap of the windows (6 % low at a step of a
+    quarter of a ZOI, a third at most). Files of earlier versions have no normal matrices: there the ZOIs of an area
+    weigh as those of a pattern that is everywhere alike. A gauge replaces an existing one of the same name.
 
     Raises
     ------

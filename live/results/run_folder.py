@@ -33,7 +33,7 @@ from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.results.pictures import Image, Pictures, of_images, of_session
 from live.results.reader import Strain
 from live.results.row import gauge_columns
-from live.results.stored_fields import length_between, read_field
+from live.results.stored_fields import StoredPattern, length_between, read_field, stored_pattern
 
 Item = TypeVar("Item")
 SESSION, STRAIN = "session.h5", "strain.h5"
@@ -72,6 +72,7 @@ class RunFolder(Closing):
         self.path, self.strain = path, strain
         self._sessions: list[Session] = []
         self._notes: dict[str, None] = {}  # in their order, each once
+        self._patterns: dict[int, StoredPattern] = {}  # the last
 
     @cached_property
     def session(self) -> Session | None:
@@ -244,7 +245,12 @@ class RunFolder(Closing):
         DataError
             There is no such instant, or it cannot be read.
         """
-        return read_field(self.strain, row)
+        field, number = read_field(self.strain, row), self.strain.reference(row)
+        if number is None:
+            return field
+        if number not in self._patterns:
+            self._patterns = {number: stored_pattern(self.strain, number)}
+        return replace(field, sums=self._patterns[number])
 
     @property
     def force(self) -> NDArray[np.float64]:
