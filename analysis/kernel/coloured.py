@@ -41,9 +41,18 @@ def error_cause(solution: Solution, ok: NDArray[np.bool_]) -> Cause:
         return "bands"
     if abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR:
         return "blur"
+    return "noise" if _is_white(left) else "filter"
+
+
+def leaves_white(solution: Solution, ok: NDArray[np.bool_]) -> bool:
+    """Whether neighbouring pixels of what the fits of the ZOIs ``ok`` (A,) leave have nothing in common."""
+    return _is_white(left_by_fit(solution, some(ok, SAMPLE)))
+
+
+def _is_white(left: Floats) -> bool:
     within = inner(left)
     beside = (np.mean(within[:, 1:] * within[:, :-1]) + np.mean(within[:, :, 1:] * within[:, :, :-1])) / 2
-    return "noise" if abs(beside) < NEIGHBOURS * np.mean(within**2) else "filter"
+    return bool(abs(beside) < NEIGHBOURS * np.mean(within**2))
 
 
 def coloured_bias(

@@ -8,6 +8,7 @@ from itertools import chain, count
 from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
+from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
 from live.pipeline.screen import Screen
 from live.results.export.atomic_file import check_free, new_file
@@ -15,7 +16,7 @@ from live.results.quantities import Display
 from live.results.report.comparison import compare, tests_of, write_table
 from live.results.report.report import Report, ReportRequest, make_report
 from live.results.report.saving import NO_BROWSER, find_browser, save_figures, save_page, save_pdf
-from live.results.run_folder import RunFolder, add_gauges, open_run
+from live.results.run_folder import RunFolder, open_run
 from live.ui.terminal.screen import TerminalScreen
 
 
