@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.field.picture_error import Cause, PictureError
+from analysis.field.picture_error import Cause
 from analysis.kernel.lines import inner, left_by_fit, lines_along, some
 from analysis.kernel.prepared import PreparedReference
 from analysis.kernel.solve import Solution
@@ -56,7 +56,7 @@ def _is_white(left: Floats) -> bool:
 
 
 def coloured_bias(
-    solution: Solution, ok: NDArray[np.bool_], error: PictureError | None, share: float
+    solution: Solution, ok: NDArray[np.bool_], cause: Cause, share: float
 ) -> tuple[Floats, Floats]:
     """What to add to the parameters (A, modes) and to the growth of the variance of the blur (A,), px^2.
 
@@ -64,8 +64,8 @@ def coloured_bias(
     ----------
     solution : Solution
     ok : (A,) bool
-    error : PictureError or None
-        Without a cause nothing is added.
+    cause : str
+        Of the error.
     share : float
         Of the error of both pictures that is the reference's, as stated.
     """
@@ -73,11 +73,9 @@ def coloured_bias(
 
     reference, ready, found = solution.reference, solution.reference.prepared, solution.found
     modes = reference.modes
-    if error is None or not error.cause or reference.sensors is not None:
-        return np.zeros((1, modes)), np.zeros(1)
     which = some(ok, SPECTRA // reference.grid.size**2)
     own = _own_error(ready, left_by_fit(solution, which), which)
-    own *= 0.5 if error.cause in BOTH_ALIKE else share
+    own *= 0.5 if cause in BOTH_ALIKE else share
     more = ready.weight * (own - solution.noise_taken[:, None] * ready.pattern.own_noise)
     inverse = ready.inverse[:-1, :, [modes, -3, -2]]  # with the columns f, f_xx and f_yy
     step = np.einsum("apk,ak->ap", inverse, more) / found.nuisance[:, :1]
