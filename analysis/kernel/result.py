@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 
 from analysis.field import Motion, Status, StrainField, stretched
 from analysis.field.picture_error import LIMIT, PictureError
+from analysis.fit.kernel_args import PooledError
+from analysis.fit.validity import COLOURED
 from analysis.follow.renewal import UNSHARED, Placement
 from analysis.kernel.coloured import BLUR, coloured_bias, error_cause, leaves_white
 from analysis.kernel.solve import Solution
+from analysis.picture.blocks import BLOCKS, blockiness
 
 Floats = NDArray[np.float64]
 Covariance = NDArray[np.float32]
@@ -132,8 +135,8 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
         blurred = abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR
         # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
         colour = np.maximum(common.colour, 1) if blurred else common.colour
-        if common.is_as_given and colour.max() > 1 and leaves_white(solution, ok):
-            colour = white  # a strain that bends within the ZOIs shows in the shapes, too
+        if not blurred and _only_bent(solution, ok, common):
+            colour = white
         whole = common.ratio * solution.expected(np.s_[:], gain)
         return _Noise(
             *_parted(whole, reference * gain**2, gain, solution),
@@ -146,6 +149,14 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     found = max(float(np.median(left[ok])), solution.rounding)
     whole = np.full(len(ok), found)
     return _Noise(*_parted(whole, reference, np.ones(len(ok)), solution), white, float("nan"))
+
+
+def _only_bent(solution: Solution, ok: NDArray[np.bool_], common: PooledError) -> bool:
+    """Whether what the shapes show is no coloured noise: a strain that bends within the ZOIs shows in them, too."""
+    # Less may come of a reference that is filtered for another noise than the picture has.
+    if common.colour.max() <= COLOURED or not leaves_white(solution, ok):
+        return False
+    return common.is_as_given or blockiness(solution.image) <= BLOCKS
 
 
 def _parted(whole: Floats, reference: Floats, gain: Floats, solution: Solution) -> tuple[Floats, Floats]:

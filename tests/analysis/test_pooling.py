@@ -63,12 +63,13 @@ def bent(noise: float, seed: int, amplitude: float, correlated_px: float = 0.0) 
     return (level + noise * added / added.std()).astype(np.float32)
 
 
-def test_a_strain_that_bends_within_the_zois_is_no_coloured_noise() -> None:
+@pytest.mark.parametrize("given", [0.25, None])
+def test_a_strain_that_bends_within_the_zois_is_no_coloured_noise(given: float | None) -> None:
     zois = ZoiGrid.cover(Roi(16, 16, 288, 288), 64, 8)
-    kernel = PhaseKernel(bent(0.25, 1, 0.0), zois, noise=0.25)
-    still, strained = (kernel.measure(bent(0.25, 2, by), noise=0.25) for by in (0.0, 0.018))
+    kernel = PhaseKernel(bent(0.25, 1, 0.0), zois, noise=given)
+    still, strained = (kernel.measure(bent(0.25, 2, by), noise=given) for by in (0.0, 0.018))
     assert strained.picture is not None and strained.picture.colour == (1.0, 1.0)
-    assert strained.sigma_v == pytest.approx(still.sigma_v, rel=1e-3)
+    assert np.median(strained.sigma_v / still.sigma_v) == pytest.approx(1, abs=0.1)
 
 
 def test_coloured_noise_of_the_strength_given_keeps_its_colour() -> None:
