@@ -7,7 +7,7 @@ a test and the noise floor in it. ``deconvolution`` removes the blur of the ZOI 
 """
 
 from analysis.evaluate.area import AreaStrain, Unevenness
-from analysis.evaluate.curve import Curve, true_curve
+from analysis.evaluate.curve import Course, Curve, TwoSides, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import LoadAxis, load_axis, principal_direction
 from analysis.evaluate.extensometers import ExtensionGauge, LineGauge, TransverseGauge, extension_of
@@ -28,6 +28,7 @@ __all__ = [
     "AreaStrain",
     "Band",
     "CircleGauge",
+    "Course",
     "Curve",
     "ExtensionGauge",
     "Figure",
@@ -46,6 +47,7 @@ __all__ = [
     "TensileOptions",
     "Track",
     "TransverseGauge",
+    "TwoSides",
     "Unevenness",
     "ZeroBy",
     "ZoiGauge",
