@@ -1,11 +1,11 @@
-# make demo | test | lint | docs | bench | accuracy | mutants | newest | lowest | v4l2-test | genicam-test | pylon-test |
-# bare-test ; each sets up its own .venv first.
+# make demo | test | test-all | lint | docs | bench | accuracy | mutants | newest | lowest | v4l2-test | genicam-test |
+# pylon-test | bare-test; each sets up its own .venv first.
 PYTHON ?= python3
 VENV   := .venv
 BIN    := $(VENV)/bin
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 
-.PHONY: demo test lint format docs bench accuracy mutants newest lowest constraints v4l2-test genicam-test pylon-test bare-test clean
+.PHONY: demo test test-all lint format docs bench accuracy mutants newest lowest constraints v4l2-test genicam-test pylon-test bare-test clean
 .DEFAULT_GOAL := demo
 
 $(VENV)/base: pyproject.toml constraints.txt
@@ -30,13 +30,24 @@ $(VENV)/docs: $(VENV)/base
 demo: $(VENV)/base
 	@$(BIN)/phasedic demo
 
+# Side by side, a file a process; tests in real time then one after another, with the machine to themselves.
+PARALLEL := -n auto --dist loadfile
+
 test: $(VENV)/test
-	@$(BIN)/python -m pytest
+	@$(BIN)/python -m pytest $(PARALLEL) -m "not slow and not timed"
+	@$(BIN)/python -m pytest -m "timed and not slow"
+
+# And those that take long.
+test-all: test
+	@$(BIN)/python -m pytest $(PARALLEL) -m "slow and not timed"
+	@$(BIN)/python -m pytest -m "slow and timed"
 
 lint: $(VENV)/dev
 	@$(BIN)/ruff check .
 	@$(BIN)/ruff format --check .
 	@$(BIN)/mypy
+	@$(BIN)/mypy --platform win32
+	@$(BIN)/mypy --platform darwin
 
 format: $(VENV)/dev
 	@$(BIN)/ruff check --fix-only --quiet .

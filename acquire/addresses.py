@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -242,6 +242,8 @@ class Registry(Generic[Device]):
         Entry point group of what lists the devices that are there, by scheme; "": none.
     lists : mapping of scheme to "module:function"
         Those of our own; a function without arguments that gives a list.
+    elsewhere : sequence of str
+        Schemes that the program opens without this registry; for messages.
     """
 
     def __init__(
@@ -253,7 +255,9 @@ class Registry(Generic[Device]):
         *,
         lists_group: str = "",
         lists: Mapping[str, str] | None = None,
+        elsewhere: Sequence[str] = (),
     ) -> None:
+        self._elsewhere = elsewhere
         self._what, self._group, self._fallback = what, group, fallback
         self._lists_group, self._lists = lists_group, dict(lists or {})
         self._openers: dict[str, str | Opener[Device]] = dict(builtin)
@@ -286,7 +290,9 @@ class Registry(Generic[Device]):
         if opener is None:
             opener = self._fallback
         if opener is None:
-            known = ", ".join(f"{scheme}:" if scheme else "/dev/..." for scheme in self.schemes())
+            known = ", ".join(
+                f"{scheme}:" if scheme else "/dev/..." for scheme in [*self.schemes(), *self._elsewhere]
+            )
             raise ConfigError(
                 f"{address.text}: no {self._what} has the scheme {address.scheme}:; known: {known}"
             )

@@ -159,6 +159,10 @@ class CameraInfo:
         What a person should know before trusting the picture.
     settings : tuple of CameraSetting
         What of the address can be changed in a live picture, with its bounds; in no file.
+    formats : tuple of str
+        What ``format=`` of the address can be; empty: it has none. In no file.
+    rates : tuple of float, 1/s
+        Offered for ``fps=`` with this format and size, or the ends of a range; empty: not known. In no file.
     white_level : int or None, GL
         Where a sample is saturated; None: at ``2**bits - 1``.
     pause_s : float or None, s
@@ -178,6 +182,8 @@ class CameraInfo:
     controls: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
     settings: tuple[CameraSetting, ...] = ()
+    formats: tuple[str, ...] = ()
+    rates: tuple[float, ...] = ()
     white_level: int | None = None
     pause_s: float | None = None
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 
 # Control characters of both kinds (but for line feed and tab), halves of surrogate pairs, marks that turn the
@@ -45,3 +46,10 @@ def _escaped(found: re.Match[str]) -> str:
     if 0xDC80 <= code <= 0xDCFF:  # a byte that Python could not decode
         code -= 0xDC00
     return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+
+
+def share_text(share: float) -> str:
+    """What marks a value whose area lost a block: "of 83 % of the area"; empty where it stands for all of it."""
+    return (
+        "" if share == 1 else f"of {min(math.floor(100 * share + 1e-4), 99)} % of the area"
+    )  # float32 may be below

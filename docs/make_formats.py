@@ -92,7 +92,7 @@ def strain_maps() -> str:
 
 def means() -> str:
     """The columns of strain.csv."""
-    names = (*COLUMNS, *_INFO.extras, "gauge_NAME", "sigma_gauge_NAME")
+    names = (*COLUMNS, *_INFO.extras, "gauge_NAME", "sigma_gauge_NAME", "share_gauge_NAME")
     quantities = ((name, quantity_of(name)) for name in names)
     return table(("column", "unit", "meaning"), ((f"`{n}`", q.unit, q.words) for n, q in quantities))
 

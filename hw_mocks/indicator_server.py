@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import logging
 import os
-import pty
 import select
 import tempfile
 import threading
 import time
-import tty
 from collections.abc import Callable
 from pathlib import Path
 
 from acquire.closing import Closing
+from acquire.system import open_pty
 from hw_mocks.faults import FaultPlan
 from hw_mocks.indicator import Indicator
 from hw_mocks.indicator_output import IndicatorOutput, Sensing
@@ -52,10 +51,8 @@ class PtyPort:
         """Make the port appear (again)."""
         if self.plugged:
             return
-        self._master, self._slave = pty.openpty()
-        tty.setraw(self._slave)
-        os.set_blocking(self._master, False)
-        self._link.symlink_to(os.ttyname(self._slave))
+        self._master, self._slave, name = open_pty()
+        self._link.symlink_to(name)
 
     def unplug(self) -> None:
         """Pull it out: whoever has it open gets an error, and the name is gone."""

@@ -9,6 +9,7 @@
   a controller.
 - ``FlowCurve``: elastic, then plastic with Voce and linear hardening; uniaxial and rate independent. Nothing here
   unloads.
+- ``PowerLaw``: a sheet metal of given r and n at large strains.
 """
 
 from __future__ import annotations
@@ -209,6 +210,8 @@ class TestClock:
 
 PLASTIC_NU = 0.5  # plastic flow keeps the volume
 NEWTON_STEPS = 20
+BISECTIONS = 60
+YIELD_PLASTIC = 0.002  # plastic strain where the power law begins
 
 
 @dataclass(frozen=True, slots=True)
@@ -264,3 +267,58 @@ class FlowCurve:
         """Transverse strain at an axial strain >= 0."""
         plastic = self.plastic_strain(strain)
         return np.asarray(-self.nu * (np.asarray(strain, float) - plastic) - PLASTIC_NU * plastic)
+
+
+@dataclass(frozen=True, slots=True)
+class PowerLaw:
+    """Sheet metal that hardens as ``C ep^n`` in true stress and true plastic strain ep, at strains of any size.
+
+    It flows at its yield stress until the power law passes that, at a plastic strain of 0.2 %.
+
+    Attributes
+    ----------
+    n : float
+        Strain hardening exponent; the highest force comes near a true strain of n.
+    r : float
+        Plastic anisotropy: true plastic strain of the width over that of the thickness.
+    E : float, Pa
+    nu : float
+        Elastic Poisson's ratio.
+    yield_stress : float, Pa
+    """
+
+    n: float
+    r: float = 1.0
+    E: float = 70e9
+    nu: float = 0.33
+    yield_stress: float = 140e6
+
+    @property
+    def yield_strain(self) -> float:
+        """Axial strain where plastic flow begins."""
+        return self.yield_stress / self.E
+
+    def plastic_strain(self, strain: ArrayLike) -> Array:
+        """True plastic strain at an axial engineering strain >= 0, by bisection."""
+        total = np.log1p(np.asarray(strain, float))
+        low, high = np.zeros_like(total), np.maximum(total, 0.0)
+        for _ in range(BISECTIONS):
+            middle = (low + high) / 2
+            above = middle + self._flow_stress(middle) / self.E > total
+            low, high = np.where(above, low, middle), np.where(above, middle, high)
+        return np.asarray(np.where(total * self.E <= self.yield_stress, 0.0, (low + high) / 2))
+
+    def _flow_stress(self, plastic: Array) -> Array:
+        return np.asarray(self.yield_stress * np.maximum(plastic / YIELD_PLASTIC, 1.0) ** self.n)
+
+    def _true_stress(self, strain: ArrayLike) -> Array:
+        return np.asarray(self.E * (np.log1p(np.asarray(strain, float)) - self.plastic_strain(strain)))
+
+    def stress(self, strain: ArrayLike) -> Array:
+        """Force over the first section, Pa, at an axial engineering strain >= 0."""
+        return np.asarray(self._true_stress(strain) / (1 + np.asarray(strain, float)))
+
+    def transverse(self, strain: ArrayLike) -> Array:
+        """Engineering strain of the width at an axial engineering strain >= 0."""
+        elastic = -self.nu * self._true_stress(strain) / self.E
+        return np.asarray(np.expm1(elastic - self.r / (1 + self.r) * self.plastic_strain(strain)))

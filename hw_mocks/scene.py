@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.addresses import Options
 from acquire.frame import frozen
+from hw_mocks.optics import Optics
 from hw_mocks.specimen import VirtualSpecimen
 from hw_mocks.speckle import Hole, Speckle
 
@@ -33,35 +35,43 @@ class Scene:
     contrast : float
         Standard deviation of the pattern, part of full scale.
     seed : int
+    optics : Optics, optional
     """
 
     def __init__(
-        self, specimen: VirtualSpecimen, radius: float = 2.0, contrast: float = 0.18, seed: int = 0
+        self,
+        specimen: VirtualSpecimen,
+        radius: float = 2.0,
+        contrast: float = 0.18,
+        seed: int = 0,
+        optics: Optics | None = None,
     ) -> None:
-        self.specimen = specimen
+        self.specimen, self.optics = specimen, optics or Optics()
         shape, modes = (specimen.height, specimen.width), specimen.modes
         hole = Hole(modes.x0, modes.y0, specimen.hole_radius_px) if specimen.kind == "hole" else None
-        margin = math.ceil(FRINGE + _travel(specimen))
+        margin = math.ceil(FRINGE + _travel(specimen, self.optics))
         self.speckle = Speckle(shape, radius, contrast=contrast, seed=seed, margin=margin, hole=hole)
         self._modes = modes.at(self.speckle.blobs.x, self.speckle.blobs.y)
 
     def render(self, t: float) -> NDArray[np.float32]:
         """The picture ``t`` seconds since the start, (H, W), part of full scale, without noise."""
+        if not self.optics.plain:
+            return self.speckle.fast(self.optics.seen(self.specimen, t))
         motion = self.specimen.at(t)
         u, v = motion.displaced(self._modes)
         blobs = self.speckle.blobs
         return self.speckle.fast_at(blobs.x + u, blobs.y + v, motion.strained(self._modes), motion)
 
     def exact(self, t: float) -> NDArray[np.float64]:
-        """The same by the exact road of ``Speckle``, slowly."""
-        return self.speckle.exact(self.specimen.at(t))
+        """The same by the exact road of ``Speckle``, slowly; raises ValueError at the edges of plates."""
+        return self.speckle.exact(self.optics.seen(self.specimen, t))
 
 
-def _travel(specimen: VirtualSpecimen) -> float:
+def _travel(specimen: VirtualSpecimen, optics: Optics) -> float:
     """The furthest that a corner of the image moves during the test, px."""
     x, y = np.array([0.0, 0.0, 1.0, 1.0]) * specimen.width, np.array([0.0, 1.0, 0.0, 1.0]) * specimen.height
-    u, v = specimen.at(specimen.duration_s).displacement(x, y)
-    return float(np.max(np.hypot(u, v)))
+    ways = (optics.seen(specimen, t).displacement(x, y) for t in (0.0, specimen.duration_s))
+    return max(float(np.max(np.hypot(u, v))) for u, v in ways)
 
 
 BITS = (8, 10, 12, 16)
@@ -129,6 +139,16 @@ class Sensor:
             Mean signal, part of full scale.
         """
         return math.sqrt(self.gain * self.top * level + self.read_noise**2 + 1 / 12)
+
+
+def take_sensor(options: Options) -> Sensor:
+    """Take the keys of the sensor out of an address's settings; raises ConfigError for an impossible value."""
+    return Sensor.with_noise(
+        int(options.choice("bits", tuple(map(str, BITS)), "12")),
+        options.number("noise", 0.5, minimum=0, maximum=20) / 100,
+        fixed_pattern=options.number("fpn", 0.0, minimum=0, maximum=20) / 100,
+        brightness=options.number("brightness", 1.0, minimum=0.01, maximum=10),
+    )
 
 
 @lru_cache(maxsize=1)

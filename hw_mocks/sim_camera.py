@@ -25,7 +25,8 @@ from acquire.errors import DeviceError
 from acquire.events import EventSink, device_event
 from acquire.frame import CameraInfo, CameraSetting, Clock, Frame, frozen
 from hw_mocks.faults import CAMERA_FAULTS, FaultPlan, Planned, parse_faults, plan_frames
-from hw_mocks.scene import BITS, Exposer, Scene, Sensor
+from hw_mocks.optics import Optics, take_optics
+from hw_mocks.scene import Exposer, Scene, Sensor, take_sensor
 from hw_mocks.specimen import VirtualSpecimen, take_specimen
 
 log = logging.getLogger(__name__)
@@ -58,6 +59,7 @@ class SimCameraSettings:
     offset_s : float, s
         Nominal time of the start (lock step).
     faults : FaultPlan
+    optics : Optics
     """
 
     sensor: Sensor
@@ -69,6 +71,11 @@ class SimCameraSettings:
     buffers: int = 4
     offset_s: float = 0.0
     faults: FaultPlan = field(default_factory=FaultPlan)
+    optics: Optics = field(default_factory=Optics)
+
+    def scene(self, specimen: VirtualSpecimen) -> Scene:
+        """What the camera sees of ``specimen``."""
+        return Scene(specimen, self.radius_px, self.contrast, self.seed, self.optics)
 
 
 class Ring:
@@ -138,7 +145,7 @@ class SimCamera(Closing):
         self.specimen, self._settings, self._on_event = specimen, settings, on_event
         self._clock, self._stopped = clock, threading.Event()
         self._sleep = sleep or self._stopped.wait
-        self._scene = Scene(specimen, settings.radius_px, settings.contrast, settings.seed)
+        self._scene = settings.scene(specimen)
         self._exposer = Exposer(settings.sensor, (specimen.height, specimen.width), settings.seed + 1)
         self._plan = plan_frames(specimen.duration_s, settings.fps, settings.faults)
         self._ring = Ring(settings.buffers)
@@ -312,7 +319,9 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
     yield_MPa, section_mm2, px_per_mm, axis, hole, cell, overstrain, drift_x, drift_y,
     rotation_deg, lockstep, machine): fps (a number, or auto: what this machine renders with ease), bits, noise
     (% of full scale at mid-grey), fpn (%), brightness, exposure_us, radius (px), contrast (%), seed,
-    buffers, offset (s), faults.
+    buffers, offset (s), faults. Of the view (``hw_mocks.optics``): stand_off_mm (none: telecentric), distortion
+    (% at the corner), tilt_x_deg, tilt_y_deg, settle_mm, settle_x_deg, settle_y_deg (reached at the largest load),
+    plates (x,y,width,height;...), plate_strain, readout_ms, side (front or back).
 
     Raises
     ------
@@ -330,7 +339,7 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
 
 def affordable_fps(specimen: VirtualSpecimen, settings: SimCameraSettings) -> float:
     """The highest rate of ``AUTO_FPS`` at which rendering leaves most of the machine to the measurement."""
-    scene = Scene(specimen, settings.radius_px, settings.contrast, settings.seed)
+    scene = settings.scene(specimen)
     exposer = Exposer(settings.sensor, (specimen.height, specimen.width), 0)
     exposer.expose(scene.render(0.0))  # compiles
     taken = []
@@ -353,7 +362,7 @@ def _take_camera(options: Options) -> SimCameraSettings:
     else:
         fps = options.number("fps", 60.0, minimum=0.1, maximum=10_000)
     return SimCameraSettings(
-        sensor=_take_sensor(options),
+        sensor=take_sensor(options),
         fps=fps,
         exposure_s=options.number("exposure_us", min(2000.0, 5e5 / fps), minimum=0, maximum=1e6 / fps) * 1e-6,
         radius_px=options.number("radius", 2.0, minimum=0.7, maximum=64),
@@ -362,13 +371,5 @@ def _take_camera(options: Options) -> SimCameraSettings:
         buffers=options.integer("buffers", 4, minimum=1, maximum=1000),
         offset_s=options.number("offset", 0.0, minimum=0),
         faults=parse_faults(options.text("faults", ""), CAMERA_FAULTS, options.address.text),
-    )
-
-
-def _take_sensor(options: Options) -> Sensor:
-    return Sensor.with_noise(
-        int(options.choice("bits", tuple(map(str, BITS)), "12")),
-        options.number("noise", 0.5, minimum=0, maximum=20) / 100,
-        fixed_pattern=options.number("fpn", 0.0, minimum=0, maximum=20) / 100,
-        brightness=options.number("brightness", 1.0, minimum=0.01, maximum=10),
+        optics=take_optics(options),
     )

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from acquire.addresses import Address, Options
 from acquire.errors import ConfigError
 from hw_mocks.deformation import Gradient, SpecimenDeformation
-from hw_mocks.machine import FlowCurve, Machine, Programme, TestClock
+from hw_mocks.machine import FlowCurve, Machine, PowerLaw, Programme, TestClock
 from hw_mocks.strain_modes import Axis, Kind, StrainModes
 
 Array = NDArray[np.float64]
@@ -29,6 +29,8 @@ SPECIMEN_KEYS = frozenset(
         "E_GPa",
         "nu",
         "yield_MPa",
+        "n",
+        "r",
         "seconds",
         "hold",
         "end",
@@ -58,7 +60,7 @@ class VirtualSpecimen:
         See ``hw_mocks.strain_modes``.
     width, height : int, px
         The field of view.
-    material : FlowCurve
+    material : FlowCurve or PowerLaw
     programme : Programme
     axis : "y" | "x"
         Direction of the load in the image.
@@ -83,7 +85,7 @@ class VirtualSpecimen:
     kind: Kind = "uniform"
     width: int = 640
     height: int = 512
-    material: FlowCurve = field(default_factory=FlowCurve)
+    material: FlowCurve | PowerLaw = field(default_factory=FlowCurve)
     programme: Programme = field(default_factory=Programme)
     axis: Axis = "y"
     area_m2: float = 40e-6
@@ -226,15 +228,18 @@ def _kind(address: Address) -> Kind:
     raise ConfigError(f"{address.text}: there is no simulated specimen {wanted!r}; known: {', '.join(KINDS)}")
 
 
-def _take_material(options: Options) -> FlowCurve:
-    return FlowCurve(
-        E=options.number("E_GPa", 70.0, minimum=1e-3) * 1e9,
-        nu=options.number("nu", 0.33, minimum=0, maximum=0.5),
-        yield_stress=options.number("yield_MPa", 140.0, minimum=1e-3) * 1e6,
-    )
+def _take_material(options: Options) -> FlowCurve | PowerLaw:
+    """Sheet metal of given n and r, where one of them is given."""
+    modulus = options.number("E_GPa", 70.0, minimum=1e-3) * 1e9
+    nu = options.number("nu", 0.33, minimum=0, maximum=0.5)
+    strength = options.number("yield_MPa", 140.0, minimum=1e-3) * 1e6
+    n, r = options.number("n", minimum=0.01, maximum=0.9), options.number("r", minimum=0.05, maximum=10)
+    if n is None and r is None:
+        return FlowCurve(E=modulus, nu=nu, yield_stress=strength)
+    return PowerLaw(0.2 if n is None else n, 1.0 if r is None else r, modulus, nu, strength)
 
 
-def _take_programme(options: Options, material: FlowCurve, clock: TestClock) -> Programme:
+def _take_programme(options: Options, material: FlowCurve | PowerLaw, clock: TestClock) -> Programme:
     seconds = options.number("seconds", 20.0, minimum=0.1)
     # A short test keeps its parts in proportion unless they are given.
     hold = options.number("hold", min(2.0, 0.1 * seconds), minimum=0)
@@ -251,7 +256,7 @@ def _take_programme(options: Options, material: FlowCurve, clock: TestClock) -> 
     )
 
 
-def _machine(options: Options, material: FlowCurve, clock: TestClock) -> Machine | None:
+def _machine(options: Options, material: FlowCurve | PowerLaw, clock: TestClock) -> Machine | None:
     """The machine that another program drives over this port, where there is one."""
     port = options.integer("machine", minimum=0, maximum=65535)
     return None if port is None else Machine(port, material.yield_strain, clock.elapsed)

@@ -14,12 +14,11 @@ from typing import TextIO
 from acquire.errors import ConfigError, DataError, PhasedicError
 from acquire.printable import brief, printable
 from live.commands.arguments import Command, parse
+from live.commands.environment import check_environment
 from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.signals import ended_by_sigterm
 from live.commands.streams import nonblocking_streams
 
-_LEAST = {"NUMBA_NUM_THREADS": 1, "SOURCE_DATE_EPOCH": 0}
-"""Whole numbers in the environment for which numba ends the program where they are none."""
 _WRONG_PATH = {errno.ENAMETOOLONG, errno.EINVAL, errno.ELOOP}
 
 
@@ -91,7 +90,7 @@ class _PrintableFormatter(logging.Formatter):
 def _run(command: Command, arguments: argparse.Namespace) -> int:
     """Run the command; an exception becomes a message and an exit code."""
     try:
-        _check_environment()
+        check_environment()
         return command(arguments)
     except PhasedicError as error:
         return _refused(error)
@@ -105,15 +104,6 @@ def _run(command: Command, arguments: argparse.Namespace) -> int:
     except Exception:
         logging.getLogger("live").exception("a defect of phasedic; please report it with this traceback")
         return 1
-
-
-def _check_environment() -> None:
-    for name, least in _LEAST.items():
-        value = os.environ.get(name, "1")
-        if not (value.isascii() and value.isdecimal() and int(value) >= least):
-            raise ConfigError(
-                f"{name}={value} is not possible; give a whole number from {least}, or unset the variable"
-            )
 
 
 def _system_error(error: OSError) -> PhasedicError:

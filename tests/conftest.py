@@ -12,16 +12,28 @@ MEASURING = {"accuracy", "adversary", "analysis", "bench", "contracts", "live"}
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
+    """Compile what the tests need; for the processes of ``-n``, ``pytest_xdist_setupnodes`` has done it."""
+    tests = Path(__file__).parent
+    measuring = any(item.path.relative_to(tests).parts[0] in MEASURING for item in session.items)
+    if measuring and not hasattr(session.config, "workerinput"):
+        compile_all()
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes() -> None:
+    """Compile once for all processes (pytest-xdist), before they start."""
+    compile_all()
+
+
+def compile_all() -> None:
     """Compile in processes of their own, as every command does.
 
     The process that compiles a loop may get another last digit than those that load it, and some tests compare bits.
     """
-    tests = Path(__file__).parent
-    if any(item.path.relative_to(tests).parts[0] in MEASURING for item in session.items):
-        from analysis import PICTURE_KINDS
-        from live.setup.compiling import compile_ahead
+    from analysis import PICTURE_KINDS
+    from live.setup.compiling import compile_ahead
 
-        compile_ahead(PICTURE_KINDS, phase=True)
+    compile_ahead(PICTURE_KINDS, phase=True)
 
 
 TRIED_AGAIN = pytest.StashKey[list[str]]()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,19 +20,29 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.addresses import Registry, expanded, parse_address
+from acquire.addresses import Address, Registry, expanded, parse_address
 from acquire.camera.contract import Camera
+from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
 from acquire.frame import CameraInfo, Frame, frozen
 from acquire.record_mode import Crop, RecordMode
 
 log = logging.getLogger(__name__)
 
+
+def without_v4l2(address: Address, on_event: EventSink) -> Camera:
+    """Refuse a camera by its device where there is no V4L2."""
+    raise ConfigError(
+        f"{address.text}: cameras by their device need Linux (V4L2); choose opencv:0, genicam: or files:"
+    )
+
+
+HAS_V4L2 = sys.platform == "linux"
 CAMERAS: Registry[Camera] = Registry(
     "camera",
     "phasedic.cameras",
     {
-        "": "acquire.v4l2.camera:open_v4l2",
+        "": "acquire.v4l2.camera:open_v4l2" if HAS_V4L2 else "acquire.camera.opening:without_v4l2",
         "genicam": "acquire.genicam.camera:open_genicam",
         "pylon": "acquire.pylon.camera:PylonCamera",
         "opencv": "acquire.opencv.webcam:open_opencv",
@@ -40,11 +51,9 @@ CAMERAS: Registry[Camera] = Registry(
         "session": "acquire.session.devices:open_session_camera",
     },
     lists_group="phasedic.camera_lists",
-    lists={
-        "": "acquire.v4l2.listing:list_cameras",
-        "genicam": "acquire.genicam.listing:list_cameras",
-        "pylon": "acquire.pylon.camera:list_cameras",
-    },
+    elsewhere=["sim"],
+    lists=({"": "acquire.v4l2.listing:list_cameras"} if HAS_V4L2 else {})
+    | {"genicam": "acquire.genicam.listing:list_cameras", "pylon": "acquire.pylon.camera:list_cameras"},
 )
 
 

@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -156,11 +156,11 @@ def _owns_stderr() -> bool:
 
 
 @cache
-def _capture_file() -> BinaryIO:
+def _capture_file() -> IO[bytes]:
     return tempfile.TemporaryFile("w+b", buffering=0)
 
 
-def _take_reports(capture: BinaryIO) -> list[str]:
+def _take_reports(capture: IO[bytes]) -> list[str]:
     """The decoders' lines; those of others go to standard error."""
     size = os.fstat(capture.fileno()).st_size
     if not size:

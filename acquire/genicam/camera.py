@@ -120,6 +120,7 @@ class GenicamCamera(CameraBase):
             controls=setup.controls,
             warnings=setup.warnings,
             settings=setup.settings,
+            formats=setup.formats,
             white_level=setup.white,
             pause_s=self._pause_s(),
         )

@@ -68,9 +68,14 @@ FORMATS: dict[str, MonoFormat] = {
 }
 
 
+def readable(offered: list[str]) -> list[str]:
+    """Those of the offered formats that can be read, the best first."""
+    return [name for name in FORMATS if name in offered]
+
+
 def preferred(offered: list[str]) -> str | None:
     """The best of the offered formats; None if none can be read."""
-    return next((name for name in FORMATS if name in offered), None)
+    return next(iter(readable(offered)), None)
 
 
 def decode(

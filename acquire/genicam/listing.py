@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from acquire.camera import CameraListing
 from acquire.genicam.device import GenicamDevice
 from acquire.genicam.finding import FoundCamera, find_cameras
-from acquire.genicam.formats import FORMATS, preferred
+from acquire.genicam.formats import preferred, readable
 from acquire.genicam.library import Aravis, GenicamError, has_aravis, load_aravis
 
 
@@ -35,8 +35,7 @@ def _look_at(library: Aravis, found: FoundCamera) -> CameraListing:
 
 
 def _details(device: GenicamDevice) -> Iterator[str]:
-    readable = [name for name in device.choices("PixelFormat") if name in FORMATS]
-    yield f"format={', '.join(readable)}"
+    yield f"format={', '.join(readable(device.choices('PixelFormat')))}"
     size, most = ([of(name) for name in ("Width", "Height")] for of in (device.integer, device.highest))
     yield f"{size[0]}x{size[1]} of {most[0]}x{most[1]}"
     for what, key in (("frame_rate", "fps"), ("exposure_time", "exposure_us"), ("gain", "gain")):

@@ -12,7 +12,7 @@ from acquire.camera.timing import Bounded, exposure_and_gain
 from acquire.errors import ConfigError, DeviceError
 from acquire.frame import CameraSetting
 from acquire.genicam.device import NO_ADJUSTMENT, GenicamDevice
-from acquire.genicam.formats import FORMATS, MonoFormat, preferred
+from acquire.genicam.formats import FORMATS, MonoFormat, preferred, readable
 from acquire.genicam.library import GenicamError
 from acquire.genicam.settings import KEYS, NO_TRIGGER, GenicamSettings
 
@@ -47,6 +47,7 @@ class GenicamSetup:
     bits, white : int, int or None
     controls : mapping of str to JSON value
     settings : tuple of CameraSetting
+    formats : tuple of str
     warnings : tuple of str
     """
 
@@ -62,6 +63,7 @@ class GenicamSetup:
     white: int | None
     controls: dict[str, Any]
     settings: tuple[CameraSetting, ...]
+    formats: tuple[str, ...]
     warnings: tuple[str, ...]
 
     @property
@@ -145,7 +147,7 @@ def _set_feature(device: GenicamDevice, feature: str, value: str, where: str) ->
 
 def _choose_format(device: GenicamDevice, asked: str | None, where: str) -> MonoFormat:
     offered = device.choices("PixelFormat")
-    usable = [name for name in FORMATS if name in offered]
+    usable = readable(offered)
     if not usable:
         raise DeviceError(
             f"{where}: offers {', '.join(offered) or 'nothing'}, none of them grey levels we can read"
@@ -259,6 +261,7 @@ def _in_force(
         settings=exposure_and_gain(
             _bounded(device, "exposure_time", exposure_us), _bounded(device, "gain", gain), fps
         ),
+        formats=tuple(readable(device.choices("PixelFormat"))),
         warnings=tuple(_warnings(device, settings, fps)),
     )
 

@@ -4,7 +4,15 @@
 and forecasts the free space, ``declared`` checks what a file holds.
 """
 
-from acquire.hdf5.damage import PaddedFile, abandon_file, check_size, probe, read_superblock, reason
+from acquire.hdf5.damage import (
+    PaddedFile,
+    abandon_file,
+    check_size,
+    create_file,
+    probe,
+    read_superblock,
+    reason,
+)
 from acquire.hdf5.declared import (
     Declared,
     JsonField,
@@ -19,7 +27,7 @@ from acquire.hdf5.declared import (
     stored_rows,
 )
 from acquire.hdf5.disk import DiskSync, FlushTimer, forecast, free_bytes, network_share
-from acquire.hdf5.pictures import PictureReader, PictureStack, compile_loops
+from acquire.hdf5.pictures import COMPRESSED, PictureReader, PictureStack, compile_loops
 from acquire.hdf5.tables import (
     NO_UNIT,
     GrowingDataset,
@@ -32,6 +40,7 @@ from acquire.hdf5.tables import (
 )
 
 __all__ = [
+    "COMPRESSED",
     "NO_UNIT",
     "Declared",
     "DiskSync",
@@ -48,6 +57,7 @@ __all__ = [
     "check_object",
     "check_size",
     "compile_loops",
+    "create_file",
     "forecast",
     "free_bytes",
     "network_share",

@@ -6,6 +6,8 @@
 - ``abandon_file`` closes a file whose disk takes no more. While closing, HDF5 tries to write once more; when that
   fails too, it crashes the process. So the file is first swapped for the null device, and what stands on the
   disk stays as the last complete flush left it.
+- ``create_file`` makes a file in memory first: where the disk is full, HDF5 objects that are closed print
+  tracebacks.
 """
 
 from __future__ import annotations
@@ -15,7 +17,7 @@ import logging
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -56,7 +58,8 @@ def reason(error: Exception) -> str:
     """HDF5's own words, shortened to the part a person can use."""
     text = " ".join(str(error).split())
     _, _, words = text.partition("error message = '")
-    return words.partition("'")[0] or text[:200]
+    plain = error.strerror if isinstance(error, OSError) else ""
+    return words.partition("'")[0] or (plain or text)[:200]
 
 
 log = logging.getLogger(__name__)
@@ -73,6 +76,45 @@ def abandon_file(file: h5py.File) -> None:
         file.close()
     except (OSError, RuntimeError) as error:
         log.debug("abandoning a file: %s", error)
+
+
+_BOUNDS = ("v110", "v110")  # the format that survives SIGKILL; older ones promise nothing
+
+
+CACHE_BYTES, METADATA_BYTES = 32 << 10, 2 << 20
+"""Of values of each dataset, and of the structure of a file, that HDF5 keeps in memory."""
+
+
+def create_file(path: Path, declare: Callable[[h5py.File], object]) -> h5py.File:
+    """Make a file with what ``declare`` puts into it, open to append while others read (SWMR).
+
+    Its caches are bounded. By default HDF5 keeps up to 1 MiB of each dataset, and 32 MiB of a file's structure: a file
+    with some hundred columns then takes more memory for an hour.
+
+    Raises
+    ------
+    FileExistsError
+    OSError
+        It cannot be written; nothing is left of it.
+    """
+    with h5py.File(path.name, "w", libver=_BOUNDS, driver="core", backing_store=False) as head:
+        declare(head)
+        head.flush()
+        content = head.id.get_file_image()
+    stream = path.open("xb")
+    try:
+        with stream:
+            stream.write(content)
+    except OSError:
+        path.unlink(missing_ok=True)
+        raise
+    file = h5py.File(path, "r+", libver=_BOUNDS, rdcc_nbytes=CACHE_BYTES)
+    cache = file.id.get_mdc_config()
+    cache.max_size = METADATA_BYTES
+    cache.flash_incr_mode = 0  # or it grows for one large piece
+    file.id.set_mdc_config(cache)
+    file.swmr_mode = True
+    return file
 
 
 SIGNATURE = b"\x89HDF\r\n\x1a\n"

@@ -15,6 +15,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+from acquire.system import forget_pages, to_disk
+
 
 def free_bytes(path: str | os.PathLike[str]) -> int:
     """Bytes free for this user on the disk that holds ``path``.
@@ -145,6 +147,6 @@ class DiskSync:
 
     def _bring(self) -> None:
         size = os.fstat(self._file).st_size
-        getattr(os, "fdatasync", os.fsync)(self._file)
-        if hasattr(os, "posix_fadvise") and size > KEPT_BYTES:
-            os.posix_fadvise(self._file, 0, size - KEPT_BYTES, os.POSIX_FADV_DONTNEED)
+        to_disk(self._file)
+        if size > KEPT_BYTES:
+            forget_pages(self._file, size - KEPT_BYTES)

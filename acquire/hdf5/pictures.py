@@ -8,12 +8,16 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import zlib
 from functools import cache
 from typing import Any
 
 import h5py
 import numpy as np
 from numpy.typing import NDArray
+
+COMPRESSED: dict[str, Any] = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+"""For ``create_dataset``: what ``PictureStack`` then does itself, outside the library's lock."""
 
 _WORTH_NUMBA = 400  # pictures read, after which loading numba pays where it is not loaded yet
 
@@ -34,11 +38,12 @@ class PictureStack:
     Parameters
     ----------
     dataset : h5py.Dataset
-        Its only filter may be Fletcher-32.
+        Its filters may be Fletcher-32, and before that shuffle and gzip together (``COMPRESSED``).
     """
 
     def __init__(self, dataset: h5py.Dataset) -> None:
-        if dataset.chunks != (1, *dataset.shape[1:]) or dataset.compression is not None or dataset.shuffle:
+        self._deflated = bool(dataset.shuffle) and dataset.compression == "gzip"
+        if dataset.chunks != (1, *dataset.shape[1:]) or (_has_filters(dataset) and not self._deflated):
             raise ValueError(f"{dataset.name}: a chunk is not just one picture")
         self._id = dataset.id
         self._shape: tuple[int, ...] = dataset.shape[1:]
@@ -46,7 +51,9 @@ class PictureStack:
         self.dtype: np.dtype[Any] = dataset.dtype
         self.length = int(dataset.shape[0])
         self.row_bytes = int(np.prod(self._shape)) * self.dtype.itemsize
-        self._chunk = np.empty(self.row_bytes + 4 * self._checked, np.uint8)
+        # Deflated noise is a little larger than before.
+        room = self.row_bytes + (self.row_bytes >> 10) + 64 if self._deflated else self.row_bytes
+        self._chunk = np.empty(room + 4 * self._checked, np.uint8)
         self._picture = self._chunk[: self.row_bytes].view(self.dtype).reshape(self._shape)
         if self._checked:
             from acquire.hdf5.checksum_loops import scratch
@@ -63,18 +70,31 @@ class PictureStack:
             From HDF5, on a full disk among others.
         """
         np.copyto(self._picture, picture, casting="same_kind")
+        size = self._deflate() if self._deflated else self.row_bytes
         if self._checked:
-            self._seal()
+            size = self._seal(size)
         self._id.set_extent((self.length + 1, *self._shape))
-        self._id.write_direct_chunk((self.length, *(0 for _ in self._shape)), self._chunk)
+        self._id.write_direct_chunk((self.length, *(0 for _ in self._shape)), self._chunk[:size])
         self.length += 1
 
-    def _seal(self) -> None:
-        """Put the checksum behind the picture, low byte first as the format wants it."""
+    def _deflate(self) -> int:
+        """Shuffle and deflate the picture in its place, as HDF5's filters do; its bytes then."""
+        planes = self._chunk[: self.row_bytes].reshape(-1, self.dtype.itemsize).T
+        packed = zlib.compress(planes.tobytes(), COMPRESSED["compression_opts"])
+        self._chunk[: len(packed)] = np.frombuffer(packed, np.uint8)
+        return len(packed)
+
+    def _seal(self, size: int) -> int:
+        """Put the checksum behind ``size`` bytes, low byte first as the format wants it; the bytes then."""
         from acquire.hdf5.checksum_loops import fletcher32
 
-        content = self._chunk[: self.row_bytes]
-        self._chunk[self.row_bytes :].view("<u4")[0] = fletcher32(content, *self._scratch)
+        checksum = int(fletcher32(self._chunk[:size], *self._scratch))
+        self._chunk[size : size + 4] = np.frombuffer(checksum.to_bytes(4, "little"), np.uint8)
+        return size + 4
+
+
+def _has_filters(dataset: h5py.Dataset) -> bool:
+    return dataset.compression is not None or bool(dataset.shuffle)
 
 
 class PictureReader:

@@ -158,6 +158,14 @@ class LoadReport:
         """Whether a test can begin with it."""
         return self.good > 0 and not self.remarks
 
+    @property
+    def mean_text(self) -> str:
+        """The mean in N, to a hundredth of the noise of one reading."""
+        if not self.noise_N > 0:
+            return f"{self.mean_N:.6g}"
+        digits = min(max(2 - math.floor(math.log10(self.noise_N)), 0), 6)
+        return f"{self.mean_N:z.{digits}f}"
+
 
 @dataclass(frozen=True, slots=True)
 class ListenResult:
@@ -288,7 +296,7 @@ def report_lines(found: LoadReport) -> list[str]:
         lines += [
             f"rate     {found.rate:.4g} 1/s, jitter {found.jitter_s * 1e3:.2f} ms,"
             f" longest gap {found.longest_s * 1e3:.0f} ms",
-            f"force    mean {found.mean_N:.6g} N, from {found.lowest_N:.6g} to {found.highest_N:.6g} N"
+            f"force    mean {found.mean_text} N, from {found.lowest_N:.6g} to {found.highest_N:.6g} N"
             + ("" if found.of_capacity is None else f" ({found.of_capacity:.1%} of the capacity)"),
             f"noise    {found.noise_N:.3g} N (one reading), {found.unique} different values, step {found.step_N:.3g} N",
             f"moved    {found.moved_N:.3g} N (means of a tenth of the time)",

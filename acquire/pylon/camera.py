@@ -21,7 +21,7 @@ from acquire.camera.timing import DEAD, Bounded, exposure_and_gain
 from acquire.errors import ConfigError, DataError, DeviceError
 from acquire.events import EventSink, Level, device_event
 from acquire.frame import CameraInfo, Frame
-from acquire.genicam.formats import FORMATS, decode, preferred
+from acquire.genicam.formats import FORMATS, decode, preferred, readable
 from acquire.opening_thread import open_again
 
 SLICE_MS, CLOSE_S = 100, 0.3
@@ -146,6 +146,7 @@ class PylonCamera(CameraBase):
             pixel_format=self._format.name,
             controls={key: node.ToString() for key, node in nodes.items() if node is not None} | self._asked,
             settings=exposure_and_gain(_bounded(exposure), _bounded(nodes["gain"]), fps),
+            formats=tuple(readable(list(camera.PixelFormat.Symbolics))),
             white_level=self._white,
             pause_s=stall_s or longest_pause_s(fps, exposure_s),
         )

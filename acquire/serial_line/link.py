@@ -162,9 +162,10 @@ class Link:
         if self._short == 1:
             self._report("error", f"lost ({error}); {self._last_words()}; trying to reach it again")
         elif self._short == 2:
-            text = f"lost again at once ({error}): the other side hangs up; phasedic tries again ever"
             self._report(
-                "error", f"{text} less often (up to every {SELDOM_S:g} s), with an event when it stays"
+                "error",
+                f"lost again at once ({error}): the other side hangs up; phasedic tries again ever less often "
+                f"(up to every {SELDOM_S:g} s), with an event when it stays",
             )
         self._missed = True
 
@@ -314,8 +315,11 @@ class FloodGuard:
             return False
         if now - self._reported > AGAIN_S:
             rate = self._lines / (now - self._begun)
-            text = f"lines come faster than they are read ({rate:.0f}/s); what waits is skipped and flagged STALE:"
-            self._report("warning", f"{text} have the device send fewer")
+            self._report(
+                "warning",
+                f"lines come faster than they are read ({rate:.0f}/s); what waits is skipped and flagged STALE: "
+                "have the device send fewer",
+            )
         self._reported = now
         return True
 

@@ -12,18 +12,9 @@ from urllib.parse import parse_qsl, urlsplit
 
 from acquire.errors import ConfigError, DeviceError
 from acquire.serial_line.byte_ports import WRITE_S, Port, Rfc2217Port, TcpPort, TtyPort, line_settings
+from acquire.system import TERMINAL_ERRORS, group_of
 
-
-def _terminal_errors() -> tuple[type[Exception], ...]:
-    """termios.error is no OSError; Windows has none."""
-    try:
-        import termios
-    except ImportError:
-        return ()
-    return (termios.error,)
-
-
-LINE_ERRORS: tuple[type[Exception], ...] = (OSError, *_terminal_errors())
+LINE_ERRORS: tuple[type[Exception], ...] = (OSError, *TERMINAL_ERRORS)
 PORT_ERRORS: tuple[type[Exception], ...] = (*LINE_ERRORS, TypeError, ValueError)
 """What a port that is gone raises; TypeError and ValueError come from one closed while it is read."""
 
@@ -121,6 +112,18 @@ class LineSettings:
         return (1 + self.bytesize + (self.parity != "N") + self.stopbits) / self.baud
 
 
+def check_present(url: str) -> None:
+    """Refuse a port that is not there without opening it, which can reset a device.
+
+    Raises
+    ------
+    DeviceError
+        Lists the ports there are.
+    """
+    if url.startswith("/dev/") and not Path(url).exists():
+        raise DeviceError(f"{url}: there is no such port; {ports_line()}")
+
+
 def open_port(line: LineSettings) -> Port:
     """Open a port.
 
@@ -188,7 +191,7 @@ def _why(url: str, error: Exception) -> str:
     if code == errno.EACCES:
         return (
             f"{url}: this user may not open it; add yourself to the group that owns it"
-            f" (sudo usermod -aG {_group(url)} $USER), then log in again"
+            f" (sudo usermod -aG {group_of(Path(url)) or 'dialout'} $USER), then log in again"
         )
     if code in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
         return f"{url}: another program has it open (a serial monitor?); close that one"
@@ -197,10 +200,3 @@ def _why(url: str, error: Exception) -> str:
     if "://" not in url and not Path(url).exists():
         return f"{url}: there is no such port; {ports_line()}"
     return f"{url}: cannot be opened ({error}); {ports_line()}"
-
-
-def _group(url: str) -> str:
-    try:
-        return Path(url).group()
-    except (OSError, KeyError):
-        return "dialout"

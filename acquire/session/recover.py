@@ -13,6 +13,7 @@ from typing import TypeVar
 from acquire.clock import ClockPair
 from acquire.errors import DataError
 from acquire.events import Event, EventKind, Level
+from acquire.printable import counted
 from acquire.session.layout import SessionInfo
 from acquire.session.part import SessionPart
 from acquire.session.writer import SessionWriter
@@ -47,7 +48,11 @@ class Recovered:
             f"{self.path}: {self.frames} frames, {self.bursts} bursts, {self.load_samples} load samples,"
             f" {self.events} events"
         )
-        return f"{saved}; {len(self.unreadable)} things could not be read" if self.unreadable else saved
+        return (
+            f"{saved}; {counted(len(self.unreadable), 'thing')} could not be read"
+            if self.unreadable
+            else saved
+        )
 
 
 def recover(source: str | os.PathLike[str], target: str | os.PathLike[str] | None = None) -> Recovered:

@@ -31,6 +31,7 @@ from acquire.hdf5 import (
     PictureStack,
     RowTable,
     abandon_file,
+    create_file,
     free_bytes,
     reason,
     to_json,
@@ -93,13 +94,13 @@ class SessionWriter(Closing):
         self._line_end = 0
         self.unflushed_frames = 0
         self._written_bytes = 0
-        self._file: h5py.File | None = _create(self.path)
+        self._file: h5py.File | None = _create(
+            self.path, lambda file: layout.create(file, recorded, checksum)
+        )
         self._to_disk = DiskSync(self.path)
         try:
             with self._guarded() as file:
-                layout.create(file, recorded, checksum)
                 self._find_datasets(file["entry"])
-                file.swmr_mode = True
             self.write_clock(info.start)
             self.flush()
         except BaseException:
@@ -288,16 +289,14 @@ class SessionWriter(Closing):
             raise DataError(_write_failure(self.path, error)) from error
 
 
-def _create(path: Path) -> h5py.File:
+def _create(path: Path, declare: Callable[[h5py.File], object]) -> h5py.File:
     try:
-        return h5py.File(path, "x", libver=("v110", "v110"))
+        return create_file(path, declare)
     except FileExistsError as error:
         raise DataError(f"{path} exists already and is not overwritten; choose another name") from error
     except OSError as error:
-        if path.exists() and path.stat().st_size > 0:
-            raise DataError(f"{path} exists already and is not overwritten; choose another name") from error
         raise DataError(
-            f"{path} cannot be created ({reason(error)}); choose a folder that exists and is writable"
+            f"{path} cannot be created ({reason(error)}); choose a folder that exists, is writable and has room"
         ) from error
 
 

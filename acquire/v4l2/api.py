@@ -12,6 +12,7 @@ import fcntl
 import mmap
 import os
 import select
+import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -280,12 +281,18 @@ SOURCE_MASK, SOURCE_START_OF_EXPOSURE = 0x70000, 0x10000
 QUANTIZATION_FULL = 1
 
 
+_LINUX_ONLY = "cameras by their device need Linux"
+
+
 class Kernel:
     """The calls into the kernel; nothing above this class touches a device otherwise."""
 
     def open(self, path: str) -> int:
         """A descriptor of the node."""
-        return os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
+        if sys.platform == "linux":
+            return os.open(path, os.O_RDWR | os.O_NONBLOCK | os.O_CLOEXEC)
+        else:
+            raise OSError(errno.ENOSYS, _LINUX_ONLY)
 
     def close(self, fd: int) -> None:
         """Give it back."""
@@ -293,22 +300,31 @@ class Kernel:
 
     def ioctl(self, fd: int, request: int, argument: Any) -> None:
         """One request; again when a signal interrupts it."""
-        while True:
-            try:
-                fcntl.ioctl(fd, request, argument)
-            except InterruptedError:
-                continue
-            return
+        if sys.platform == "linux":
+            while True:
+                try:
+                    fcntl.ioctl(fd, request, argument)
+                except InterruptedError:
+                    continue
+                return
+        else:
+            raise OSError(errno.ENOSYS, _LINUX_ONLY)
 
     def mmap(self, fd: int, length: int, offset: int) -> Any:
         """A buffer of the driver, readable."""
-        return mmap.mmap(fd, length, mmap.MAP_SHARED, mmap.PROT_READ | mmap.PROT_WRITE, offset=offset)
+        if sys.platform == "linux":
+            return mmap.mmap(fd, length, mmap.MAP_SHARED, mmap.PROT_READ | mmap.PROT_WRITE, offset=offset)
+        else:
+            raise OSError(errno.ENOSYS, _LINUX_ONLY)
 
     def poll(self, fd: int, timeout_s: float) -> bool:
         """Whether there is something to fetch (a picture or an error)."""
-        poller = select.poll()
-        poller.register(fd, select.POLLIN)
-        return bool(poller.poll(timeout_s * 1000))
+        if sys.platform == "linux":
+            poller = select.poll()
+            poller.register(fd, select.POLLIN)
+            return bool(poller.poll(timeout_s * 1000))
+        else:
+            raise OSError(errno.ENOSYS, _LINUX_ONLY)
 
     def nodes(self) -> list[str]:
         """All video nodes there are."""

@@ -133,6 +133,8 @@ class V4L2Camera(CameraBase):
             controls=setup.controls,
             warnings=setup.warnings,
             settings=setup.settings,
+            formats=setup.formats,
+            rates=setup.rates,
             white_level=self._settings.white,
             pause_s=self.stall_s(),
         )

@@ -100,4 +100,4 @@ def _holders(path: str) -> str:
 def cameras_here(kernel: Kernel) -> str:
     """All cameras there are, for messages."""
     found = [f"{node} ({identity.card})" for node, identity in identities(kernel, kernel.nodes()).items()]
-    return "cameras here: " + (", ".join(found) or "none") + "; `phasedic devices` tells more"
+    return "cameras here: " + (", ".join(found) or "none") + "; see phasedic devices"

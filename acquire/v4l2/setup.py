@@ -63,6 +63,8 @@ class Setup:
     controls : mapping of str to JSON value
     exposure_s : float or None, s
     settings : tuple of CameraSetting
+    formats : tuple of str
+    rates : tuple of float, 1/s
     warnings : tuple of str
     """
 
@@ -71,6 +73,8 @@ class Setup:
     controls: dict[str, Any]
     exposure_s: float | None
     settings: tuple[CameraSetting, ...]
+    formats: tuple[str, ...]
+    rates: tuple[float, ...]
     warnings: tuple[str, ...]
 
 
@@ -174,5 +178,7 @@ def _in_force(device: V4L2Device, settings: V4L2Settings, controls: dict[int, Co
         controls={control.name: control.shown() for control in controls.values()},
         exposure_s=exposure_s(controls),
         settings=changeable(controls, mode.fps),
+        formats=tuple(offer.fourcc for offer in device.formats() if offer.fourcc in FORMATS),
+        rates=tuple(device.rates(mode.fourcc, mode.width, mode.height)),
         warnings=tuple(text for text in warnings if text),
     )

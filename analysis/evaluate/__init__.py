@@ -1,18 +1,19 @@
 """Figures from fields: what a test engineer or a map needs.
 
 ``gauge_kinds`` are virtual ``gauges`` and extensometers on a field, by the ``extension`` of two ends. ``tensile``
-evaluates a test: a ``curve`` by one of the ``standards``, its ``elastic`` line and its ``strengths``, each a
-``figure`` with an interval. ``lag`` is the delay of the load beside the frames. ``floor`` has the still phase of
-a test and the noise floor in it. ``deconvolution`` removes the blur of the ZOI from a map.
+evaluates a test: a ``curve`` by one of the ``standards``, its ``elastic`` line, its ``strengths``, its plastic
+``flow``, each a ``figure`` with an interval. ``lag`` is the delay of the load beside the frames. ``floor`` has the
+still phase of a test and the noise floor in it. ``deconvolution`` removes the blur of the ZOI from a map.
 """
 
-from analysis.evaluate.area import AreaStrain, Unevenness
+from analysis.evaluate.area.strain import AreaStrain, Unevenness
 from analysis.evaluate.curve import Course, Curve, TwoSides, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
-from analysis.evaluate.elastic import LoadAxis, load_axis, principal_direction
+from analysis.evaluate.elastic import ErrorLimits, LoadAxis, load_axis, principal_direction
 from analysis.evaluate.extensometers import ExtensionGauge, LineGauge, TransverseGauge, extension_of
 from analysis.evaluate.figure import CONFIDENCE, Figure
 from analysis.evaluate.floor import MIN_STILL_INSTANTS, NoiseFloor, evenly, noise_floor, still_phase
+from analysis.evaluate.flow import Neck, neck
 from analysis.evaluate.gauge_kinds import GAUGE_KINDS, AreaGauge, CircleGauge, StripGauge, ZoiGauge
 from analysis.evaluate.gauges import Gauge, GaugeValue, Parameter, inside_polygon
 from analysis.evaluate.lag import Track, find_lag
@@ -30,6 +31,7 @@ __all__ = [
     "CircleGauge",
     "Course",
     "Curve",
+    "ErrorLimits",
     "ExtensionGauge",
     "Figure",
     "Gauge",
@@ -37,6 +39,7 @@ __all__ = [
     "Interval",
     "LineGauge",
     "LoadAxis",
+    "Neck",
     "NoiseFloor",
     "Parameter",
     "Span",
@@ -60,6 +63,7 @@ __all__ = [
     "free",
     "inside_polygon",
     "load_axis",
+    "neck",
     "noise_floor",
     "principal_direction",
     "still_phase",

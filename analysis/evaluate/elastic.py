@@ -69,10 +69,37 @@ class FittedLine:
             self.scatter / math.sqrt(self.n), (stress - self.middle) / self.slope * self.sigma / self.slope
         )
 
-    @property
-    def modulus(self) -> Figure:
-        """The slope with its interval, Pa."""
-        return Figure.about(self.slope, self.sigma, self.n - 2)
+    def modulus(self, beyond: float = 0.0) -> Figure:
+        """The slope with its interval, Pa; ``beyond`` the scatter, a relative standard uncertainty counts too.
+
+        Degrees of freedom by Welch and Satterthwaite (JCGM 100:2008, G.4).
+        """
+        sigma = math.hypot(self.sigma, beyond * self.slope)
+        dof = (self.n - 2) * (sigma / self.sigma) ** 4 if self.sigma > 0 else math.inf
+        return Figure.about(self.slope, sigma, dof)
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorLimits:
+    """What a modulus is uncertain by beyond the scatter: limits of error, between which all values are as likely.
+
+    Attributes
+    ----------
+    force, section : float or None
+        Relative; None: not stated.
+    strain : float or None
+        Of what comes with the load over the elastic interval: motion off the plane, lens, alignment.
+    """
+
+    force: float | None = None
+    section: float | None = None
+    strain: float | None = None
+
+    def shares(self, strain: float) -> dict[str, float]:
+        """Relative standard uncertainties (JCGM 100:2008, 4.3.7) of a slope over ``strain``; of what is stated."""
+        relative = None if self.strain is None else self.strain / strain
+        limits = {"load cell": self.force, "section": self.section, "strain": relative}
+        return {name: limit / math.sqrt(3) for name, limit in limits.items() if limit is not None}
 
 
 def line_through(loading: Loading, first: int, last: int) -> FittedLine | None:
@@ -116,8 +143,11 @@ def between(course: Floats, low: float, high: float) -> tuple[int, int]:
     return (int(below[-1]) + 1 if len(below) else 0), stop
 
 
-def chord(loading: Loading, line: FittedLine) -> Figure:
-    """The modulus by the two ends of the interval of ``line``, each read from a tenth of its points."""
+def chord(loading: Loading, line: FittedLine, beyond: float = 0.0) -> Figure:
+    """The modulus by the two ends of the interval of ``line``, each read from a tenth of its points.
+
+    ``beyond`` is a relative standard uncertainty that counts beside that of the ends.
+    """
     (e0, e1), (s0, s1) = (
         _ends(values, line, sigma)
         for values, sigma in (
@@ -129,7 +159,7 @@ def chord(loading: Loading, line: FittedLine) -> Figure:
     if not (rise > 0 and run > 0):
         return Figure.none("the two ends of the interval do not differ")
     share = math.hypot(math.hypot(e0.sigma, e1.sigma) / run, math.hypot(s0.sigma, s1.sigma) / rise)
-    return Figure.about(rise / run, rise / run * share)
+    return Figure.about(rise / run, rise / run * math.hypot(share, beyond))
 
 
 def poisson(loading: Loading, line: FittedLine) -> Figure:
@@ -153,6 +183,29 @@ def poisson(loading: Loading, line: FittedLine) -> Figure:
     sigma = math.sqrt(float(rest @ rest) / (n - 2) / sss)
     nu = slope * line.slope
     return Figure.about(nu, math.hypot(sigma * line.slope, nu * line.sigma / line.slope), n - 2)
+
+
+def poisson_between(loading: Loading, low: float, high: float) -> Figure:
+    """Poisson's ratio between two strains along the load, or up to the highest stress: the slope of one over the other.
+
+    The noise of the strain along the load is taken out of its variance.
+    """
+    along, across = (values[: loading.top + 1] for values in (loading.elastic, loading.transverse))
+    used = (along >= low) & (along <= high) & np.isfinite(across)
+    n, reached = int(used.sum()), float(np.nanmax(along))
+    if n < MIN_POINTS:
+        return Figure.none(
+            f"{n} points between the strains {100 * low:g} and {100 * high:g} %, {MIN_POINTS} are needed"
+            f" (the strain reaches {100 * reached:.2g} %)"
+        )
+    x, y = along[used] - along[used].mean(), across[used] - across[used].mean()
+    sxx = float(x @ x) - (n - 1) * noise(loading.elastic) ** 2
+    if not sxx > 0:
+        return Figure.none("the strain does not rise above its noise there")
+    slope = float(x @ y) / sxx
+    rest = y - slope * x
+    words = f"strains {100 * low:g} to {100 * min(high, reached):.3g} %"
+    return Figure.about(-slope, math.sqrt(float(rest @ rest) / (n - 2) / sxx), n - 2, words)
 
 
 def not_uniform(loading: Loading, line: FittedLine) -> str:

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from analysis.evaluate.affine import Places
+from analysis.evaluate.area.affine import Places
 from analysis.evaluate.gauges import (
     Box,
     Gauge,
@@ -147,6 +147,13 @@ class ExtensionGauge(TransverseGauge):
         side = self.box[2 if self.along == "x" else 3]
         ends = ends_of(self.box, self.along, max(_STRIP, grid.step / side))
         return tuple(zois_inside(grid, corners_of(box)) for box in ends)
+
+    @property
+    def length(self) -> float:
+        """From the middle of one strip to that of the other, px."""
+        k = 0 if self.along == "x" else 1
+        first, last = (box[k] + box[k + 2] / 2 for box in ends_of(self.box, self.along, _STRIP))
+        return last - first
 
     def measure(self, field: StrainField) -> GaugeValue:
         return read_strips(self.zois(field.grid), field, self.along)

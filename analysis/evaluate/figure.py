@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 CONFIDENCE = 0.95
-"""Of all intervals here; they hold the scatter of strain and force, not the section or the load cell's class."""
+"""Of all intervals here; they hold the scatter of strain and force, and that of E the stated limits of error."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,14 +11,14 @@ import math
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate.area import GRADIENTS, AreaStrain
-from analysis.field import PAIR_INDEX, VALUES, Status, StrainField, ZoiGrid, variance_of_sum
+from analysis.evaluate.area.strain import GRADIENTS, AreaStrain
+from analysis.field import PAIR_INDEX, VALUES, Status, StrainField, ZoiGrid, area_share, variance_of_sum
 
 Point = tuple[float, float]
 Box = tuple[float, float, float, float]
@@ -73,11 +73,14 @@ class GaugeValue:
         Strain, or the unit of the gauge's value; NaN where there is none.
     reason : str
         Why there is none; empty where there is one.
+    share : float
+        Of its area that the value stands for, at either end (``analysis.field.area_share``).
     """
 
     value: float
     sigma: float
     reason: str = ""
+    share: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +154,11 @@ class Gauge(ABC):
                 raise ValueError(f"a gauge of kind {cls.kind!r} needs {key!r}")
         return cls(name, **(by_axis | given))
 
+    def read(self, field: StrainField) -> GaugeValue:
+        """Its value with the share of its area that the value stands for."""
+        share = min(area_share(field, mask) for mask in self.zois(field.grid))
+        return replace(self.measure(field), share=share)
+
     def zois(self, grid: ZoiGrid) -> tuple[Mask, ...]:
         """The active ZOIs that it takes, (R, C) bool: one mask, or one for each of its two ends."""
         return tuple(mask & grid.active for mask in self.select(grid))
@@ -189,15 +197,21 @@ def read_ends(chosen: Sequence[Mask], field: StrainField) -> GaugeValue:
 
 
 def read_strips(chosen: Sequence[Mask], field: StrainField, along: str) -> GaugeValue:
-    """``read_ends`` of two strips, each where the other has values too, so that their line is not tilted."""
+    """``read_ends`` of two strips, each where the other has values too, so that their line is not tilted.
+
+    Strips that hardly face each other, as those of a specimen that leans, are read whole.
+    """
+    side = 1 if along == "x" else 0
+    sides = [end.any(axis=side) for end in chosen]
+    if np.sum(sides[0] & sides[1]) < MIN_SHARE * min(one.sum() for one in sides):
+        return read_ends(chosen, field)
     for number, end in enumerate(chosen, 1):
         if missing := _missing(end, field):
             return GaugeValue(math.nan, math.nan, f"end {number}: {missing}")
-    side = 1 if along == "x" else 0
     first, second = ((end & field.ok).any(axis=side, keepdims=True) for end in chosen)
     both = first & second & field.ok
     if not both.any():
-        return GaugeValue(math.nan, math.nan, "the two ends do not face each other; move or widen the gauge")
+        return GaugeValue(math.nan, math.nan, "the ZOIs with a value at its two ends do not face each other")
     return read_ends([end & both for end in chosen], field)
 
 
@@ -208,7 +222,7 @@ def _missing(chosen: Mask, field: StrainField) -> str:
         grid = field.grid
         return (
             f"no ZOI is there; their centres reach from {grid.x[0]:g}, {grid.y[0]:g} to {grid.x[-1]:g},"
-            f" {grid.y[-1]:g} px"
+            f" {grid.y[-1]:g} px; move the gauge there"
         )
     status = field.status[chosen]
     lost = Counter(Status(s) for s in status[status != Status.OK].tolist())
@@ -335,6 +349,10 @@ def extension(field: StrainField, ends: Ends) -> Extension:
     strain = float(moved @ (2 * before + moved)) / (now + length) / length
     spread = np.where(used, share * _sigma_along(field, (before + moved) / now), 0.0)
     variance = variance_of_sum(spread, "u", field.grid, field.window)
+    if field.common is not None:
+        along = np.zeros((6, *field.grid.shape))
+        along[_U], along[_V] = np.multiply.outer((before + moved) / now, share)
+        variance += field.common.variance_of_sum(along)
     return Extension(strain, math.sqrt(max(variance, 0.0)) / length, length)
 
 

@@ -55,6 +55,8 @@ class Standard:
     interval : Interval
     brittle : tuple (strain, low, high) or None
         Where the highest stress comes before this strain, the interval is this share of that strain.
+    poisson : tuple (low, high) or None
+        Strains that Poisson's ratio is taken between, up to the highest stress; None: the elastic interval.
     rates_elastic, rates_plastic : tuple of Band
         Allowed up to the yield strength, and after it; empty where the standard has none.
     seconds_to_break : tuple (low, high) or None
@@ -65,6 +67,7 @@ class Standard:
     name: str
     interval: Interval
     brittle: tuple[float, float, float] | None = None
+    poisson: tuple[float, float] | None = None
     rates_elastic: tuple[Band, ...] = ()
     rates_plastic: tuple[Band, ...] = ()
     seconds_to_break: tuple[float, float] | None = None
@@ -81,10 +84,12 @@ STANDARDS = {
         Standard(
             "iso6892", Interval("yield", 0.1, 0.4), rates_elastic=_RANGES[:2], rates_plastic=_RANGES[1:]
         ),
+        # Poisson's ratio from 0.3 % on, before yield.
         # 3.9: between the strains 0.05 % and 0.25 %, chord or regression; 9.6 with table 1: 1 % a minute, 20 %.
         Standard(
             "iso527",
             Interval("strain", 0.0005, 0.0025),
+            poisson=(0.003, 0.015),
             rates_elastic=(_about("1 %/min", 0.01 * PER_MINUTE),),
             flow=False,
         ),

@@ -7,23 +7,26 @@ strain is an option that the result names.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
-from typing import Literal
-
-import numpy as np
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal
 
 from analysis.evaluate.curve import Curve, Loading, first_crossing, noise, reading
 from analysis.evaluate.elastic import (
     MIN_POINTS,
+    ErrorLimits,
     FittedLine,
     between,
     chord,
     line_through,
     not_uniform,
     poisson,
+    poisson_between,
 )
 from analysis.evaluate.figure import Figure
-from analysis.evaluate.standards import STANDARDS, Band, Standard
+from analysis.evaluate.flow import anisotropy, hardening
+from analysis.evaluate.rates import midway, seconds_of, strain_rate
+from analysis.evaluate.standards import STANDARDS, Standard
 from analysis.evaluate.strengths import (
     Yield,
     proof_strength,
@@ -49,11 +52,14 @@ class TensileOptions:
         Strain counts as measured, from where the elastic line has no stress (toe compensation), or from
         where the stress first reaches ``preload``.
     preload : float, Pa
+    limits : ErrorLimits
+        Of what E is uncertain by beyond the scatter.
     """
 
     standard: Standard = STANDARDS["iso6892"]
     zero: ZeroBy = "raw"
     preload: float = 0.0
+    limits: ErrorLimits = field(default_factory=ErrorLimits)
 
     def __post_init__(self) -> None:
         if self.zero not in ("raw", "toe", "preload"):
@@ -96,6 +102,8 @@ class TensileFigures:
     Rm : Figure, Pa
     Agt, Ag, At, A : Figure
         Total and plastic strain at the highest stress, and at break; not in percent.
+    r, n : Figure
+        Plastic anisotropy and strain hardening; ``why`` has the interval.
     rate_elastic, rate_plastic : Figure, 1/s
         Strain rate over ``span``, and over the second half of the strain from there to the highest
         stress; ``why`` holds it against the standard.
@@ -104,6 +112,8 @@ class TensileFigures:
     span : Span or None
     zero : StrainZero
     standard : str
+    budget : mapping of str to float
+        Relative standard uncertainties that the interval of E is made of, by their causes; empty without E.
     strain, elastic_strain : str
         What the strain of the curve is, and that of E and nu, in words.
     """
@@ -122,6 +132,8 @@ class TensileFigures:
     Ag: Figure
     At: Figure
     A: Figure
+    r: Figure
+    n: Figure
     rate_elastic: Figure
     rate_plastic: Figure
     seconds: Figure
@@ -130,6 +142,7 @@ class TensileFigures:
     standard: str
     strain: str = ""
     elastic_strain: str = ""
+    budget: Mapping[str, float] = field(default_factory=dict)
 
 
 def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> TensileFigures:
@@ -153,7 +166,9 @@ def evaluate_test(curve: Curve, options: TensileOptions | None = None) -> Tensil
 def _evaluated(curve: Curve, options: TensileOptions) -> TensileFigures:
     loading, strength = Loading.of(curve), tensile_strength(curve)
     if loading.n < MIN_POINTS or loading.stress[loading.top] <= 0:
-        words = f"strain and a tensile stress are known together at {loading.n} points"
+        words = (
+            f"strain and a tensile stress are known together at {loading.n} points, {MIN_POINTS} are needed"
+        )
         return replace(_nothing(words, options), Rm=strength)
     elastic = _elastic(loading, options)
     if isinstance(elastic, str):
@@ -223,11 +238,15 @@ def _with_line(
     region = replace(loading, strain=loading.elastic, noise_strain=noise(loading.elastic))
     slope = line_through(region, line.first, line.last) or line
     remark = not_uniform(loading, slope)
+    strained = float(loading.course[line.last - 1] - loading.course[line.first])
+    shares = options.limits.shares(strained)
+    nu = _poisson(loading, slope, options.standard)
     figures = TensileFigures(
-        E=slope.modulus.remarked(remark),
-        E_chord=chord(region, slope),
+        E=slope.modulus(math.hypot(*shares.values())).remarked(remark),
+        E_chord=chord(region, slope, math.hypot(*shares.values())),
+        budget={"scatter": slope.sigma / slope.slope, **shares},
         r2=slope.r2,
-        nu=poisson(loading, slope).remarked(remark),
+        nu=nu.remarked(remark),
         Rp01=rp01,
         Rp02=rp02,
         Rp1=rp1,
@@ -238,9 +257,13 @@ def _with_line(
         Ag=_plastic(agt, ends[0], line),
         At=at,
         A=_plastic(at, ends[1], line),
-        rate_elastic=_rate(loading, line.first, line.last, options.standard.rates_elastic),
-        rate_plastic=_rate(loading, _midway(loading, line), loading.top + 1, options.standard.rates_plastic),
-        seconds=_seconds(loading, options.standard),
+        r=anisotropy(loading, slope, nu),
+        n=hardening(loading, slope),
+        rate_elastic=strain_rate(loading, line.first, line.last, options.standard.rates_elastic),
+        rate_plastic=strain_rate(
+            loading, midway(loading, line), loading.top + 1, options.standard.rates_plastic
+        ),
+        seconds=seconds_of(loading, options.standard),
         span=_span(loading, line, zero),
         zero=elastic.zero,
         standard=options.standard.name,
@@ -248,9 +271,17 @@ def _with_line(
     return figures if options.standard.flow else _without_flow(figures)
 
 
+def _poisson(loading: Loading, line: FittedLine, standard: Standard) -> Figure:
+    if standard.poisson is None:
+        return poisson(loading, line)
+    return poisson_between(loading, *standard.poisson)
+
+
 def _without_flow(figures: TensileFigures) -> TensileFigures:
     none = Figure.none(f"not a figure of {figures.standard}")
-    return replace(figures, Rp01=none, Rp02=none, Rp1=none, ReH=none, ReL=none, Ag=none, A=none)
+    return replace(
+        figures, Rp01=none, Rp02=none, Rp1=none, ReH=none, ReL=none, Ag=none, A=none, r=none, n=none
+    )
 
 
 def _without_line(loading: Loading, options: TensileOptions, why: str) -> TensileFigures:
@@ -260,19 +291,20 @@ def _without_line(loading: Loading, options: TensileOptions, why: str) -> Tensil
         _nothing(f"no elastic line: {why}", options),
         Agt=_from_zero(strain_at_top(loading), zero),
         At=_from_zero(strain_at_break(loading), zero),
-        seconds=_seconds(loading, options.standard),
+        seconds=seconds_of(loading, options.standard),
         zero=StrainZero(zero, how),
     )
 
 
 def _nothing(why: str, options: TensileOptions) -> TensileFigures:
-    texts = {
+    texts: dict[str, Any] = {
         "span": None,
         "zero": StrainZero(0.0, "as measured"),
         "standard": options.standard.name,
         "r2": math.nan,
         "strain": "",
         "elastic_strain": "",
+        "budget": {},
     }
     names = [f.name for f in fields(TensileFigures) if f.name not in texts]
     return TensileFigures(**dict.fromkeys(names, Figure.none(why)), **texts)  # type: ignore[arg-type]
@@ -292,47 +324,3 @@ def _span(loading: Loading, line: FittedLine, zero: float) -> Span:
     ends = [line.first, line.last - 1]
     strain, stress = loading.course[ends] - zero, loading.level[ends]
     return Span((float(strain[0]), float(strain[1])), (float(stress[0]), float(stress[1])), line.n)
-
-
-def _rate(loading: Loading, first: int, last: int, bands: tuple[Band, ...]) -> Figure:
-    """The slope of strain over time, held against the bands of a standard."""
-    t, strain = loading.t[first:last], loading.strain[first:last]
-    if len(t) < 3 or np.ptp(t) == 0:
-        return Figure.none(f"{len(t)} points of that part are known")
-    dt, de = t - t.mean(), strain - strain.mean()
-    stt = float(dt @ dt)
-    slope = float(dt @ de) / stt
-    rest = de - slope * dt
-    found = Figure.about(slope, math.sqrt(float(rest @ rest) / (len(t) - 2) / stt), len(t) - 2)
-    return replace(found, why=_against(slope, bands))
-
-
-def _midway(loading: Loading, line: FittedLine) -> int:
-    """Where half the strain between the elastic interval and the highest stress has gone."""
-    first, last = line.last - 1, loading.top
-    if last <= first:
-        return last + 1
-    half = 0.5 * (loading.course[first] + loading.course[last])
-    return first + int(np.argmax(loading.course[first:] >= half))
-
-
-def _against(rate: float, bands: tuple[Band, ...]) -> str:
-    if not bands:
-        return ""
-    inside = [band for band in bands if band.low <= rate <= band.high]
-    if inside:
-        return f"within {inside[0].name}"
-    allowed = ", ".join(f"{band.name} {band.low:.2g} to {band.high:.2g} 1/s" for band in bands)
-    return f"outside the standard ({allowed})"
-
-
-def _seconds(loading: Loading, standard: Standard) -> Figure:
-    begins = first_crossing(loading.level, 0.02 * float(loading.stress[loading.top]))
-    start = loading.t[0] if math.isnan(begins) else np.interp(begins, np.arange(loading.n), loading.t)
-    last = loading.n - 1 if loading.broke else loading.top
-    value, step = float(loading.t[last] - start), float(np.median(np.diff(loading.t)))
-    wanted, words = standard.seconds_to_break, ""
-    if wanted and loading.broke:
-        inside = wanted[0] <= value <= wanted[1]
-        words = f"{'within' if inside else 'outside'} {wanted[0]:g} to {wanted[1]:g} s of the standard"
-    return Figure(value, value - step, value + step, words)

@@ -1,11 +1,15 @@
 """Measured fields on a grid, with their uncertainty.
 
 ``grid`` places the ZOIs and weighs their pixels, ``strain_field`` is the result with its ``status``,
-``uncertainty`` has sigmas of values and means, ``motion`` predicts the next field.
+``uncertainty`` has sigmas of values and means, ``motion`` predicts the next field, ``blocks`` are what is missing.
 """
 
+from analysis.field.blocks import area_share, in_blocks
+from analysis.field.blur import Blur, blur_maps, mean_blur
+from analysis.field.common import CommonError
 from analysis.field.grid import WINDOWS, Roi, Window, ZoiGrid, profile
 from analysis.field.motion import Motion
+from analysis.field.part import Block, part_of
 from analysis.field.status import Status
 from analysis.field.strain_field import StrainField
 from analysis.field.uncertainty import (
@@ -13,11 +17,13 @@ from analysis.field.uncertainty import (
     VALUES,
     Measure,
     StrainTensor,
-    WeightedSum,
+    Sums,
     combination,
+    fixed_sum,
     fixed_sums,
     products,
     strain_tensor,
+    stretched,
     variance_of_sum,
 )
 
@@ -25,19 +31,29 @@ __all__ = [
     "PAIR_INDEX",
     "VALUES",
     "WINDOWS",
+    "Block",
+    "Blur",
+    "CommonError",
     "Measure",
     "Motion",
     "Roi",
     "Status",
     "StrainField",
     "StrainTensor",
-    "WeightedSum",
+    "Sums",
     "Window",
     "ZoiGrid",
+    "area_share",
+    "blur_maps",
     "combination",
+    "fixed_sum",
     "fixed_sums",
+    "in_blocks",
+    "mean_blur",
+    "part_of",
     "products",
     "profile",
     "strain_tensor",
+    "stretched",
     "variance_of_sum",
 ]

@@ -17,6 +17,7 @@ class Status(IntEnum):
     NOT_CONVERGED = 6
     POOR_MATCH = 7
     UNEVEN = 8
+    AMBIGUOUS = 9
 
     @property
     def text(self) -> str:
@@ -34,4 +35,5 @@ _TEXTS = {
     Status.NOT_CONVERGED: "the iteration did not settle",
     Status.POOR_MATCH: "the picture does not fit the reference here (crack, edge, glare or blur)",
     Status.UNEVEN: "the displacement jumps or bends inside the ZOI (crack, edge, steep strain): take smaller ZOIs",
+    Status.AMBIGUOUS: "the pattern repeats, and nothing decides where this is: smaller steps between pictures",
 }

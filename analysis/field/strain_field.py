@@ -8,6 +8,7 @@ Strains, rotation and principal values are derived here from the displacement gr
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, Protocol, Self, overload
@@ -15,8 +16,10 @@ from typing import Literal, Protocol, Self, overload
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.field.common import CommonError
 from analysis.field.grid import Window, ZoiGrid
 from analysis.field.motion import Motion
+from analysis.field.picture_error import PictureError
 from analysis.field.status import Status
 from analysis.field.uncertainty import (
     PAIR_INDEX,
@@ -106,6 +109,13 @@ class StrainField:
         What ``exx``, ``eyy``, ``exy`` and their means are; the uncertainties are those of the small strains.
     sums : Sums, optional
         Makes the uncertainty of means right where neighbours nearly cancel (gradients on dense grids).
+    common : CommonError, optional
+        Of a correction that all ZOIs have; in the uncertainties, not in ``covariance``.
+    picture : PictureError, optional
+        What the picture leaves beyond its noise; it is part of the uncertainties.
+    blur : (2, R, C) float32, px^2, optional
+        Growth of the variance of the blur since the last reference, mean of x and y, negative where the picture
+        is sharper; and its standard uncertainty.
     """
 
     grid: ZoiGrid
@@ -121,10 +131,13 @@ class StrainField:
     motion: Motion | None = None
     measure: Measure = "small"
     sums: Sums | None = None
+    common: CommonError | None = None
+    picture: PictureError | None = None
+    blur: NDArray[np.float32] | None = None
 
     def __post_init__(self) -> None:
         for name in ("parameters", "covariance", "covariance_reference", "residual", "status",
-                     "iterations", "gain"):  # fmt: skip
+                     "iterations", "gain", "blur"):  # fmt: skip
             array = getattr(self, name)
             if array is not None:
                 array.flags.writeable = False
@@ -242,6 +255,8 @@ class StrainField:
             variance = self._variance(name, self.covariance) - self._variance(name, self.covariance_reference)
         else:
             variance = self._variance(name, self.covariance if part == "all" else self.covariance_reference)
+        if self.common is not None and part != "reference":
+            variance += self.common.variance(name)
         return np.asarray(np.sqrt(np.maximum(variance, 0, out=variance), out=variance))
 
     def _variance(self, name: str, covariance: NDArray[np.float32]) -> Floats:
@@ -272,8 +287,15 @@ class StrainField:
             return float("nan"), float("nan")
         value = fixed_sum(self.value(name)[chosen]) / count
         # A ZOI without predicted noise (sigma NaN) leaves the mean without a sigma, not without a value.
-        variance = variance_of_sum(np.where(chosen, self.sigma(name), 0.0), name, self.grid, self.window)
-        return value, float(np.sqrt(max(variance, 0.0)) / count) * self._beyond_overlap(name, where)
+        own = np.sqrt(np.maximum(self._variance(name, self.covariance), 0))
+        variance = variance_of_sum(np.where(chosen, own, 0.0), name, self.grid, self.window)
+        sigma = float(np.sqrt(max(variance, 0.0)) / count) * self._beyond_overlap(name, where)
+        if self.common is None:
+            return value, sigma
+        shares = np.zeros((6, *self.grid.shape))
+        for i, share in combination(name).items():
+            shares[i] = share * chosen / count
+        return value, math.hypot(sigma, math.sqrt(self.common.variance_of_sum(shares)))
 
     def _beyond_overlap(self, name: str, where: ArrayLike | None) -> float:
         """Noise of a mean that the pattern of the ZOIs makes, over that which follows from their overlap."""

@@ -6,10 +6,10 @@ Also the finite strain measures, since the names of values refer to them: small,
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Hashable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, Protocol
+from typing import Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,11 @@ from numpy.typing import NDArray
 from analysis.field.grid import Window, ZoiGrid, overlap
 
 Floats = NDArray[np.float64]
+Item = TypeVar("Item")
 Measure = Literal["small", "engineering", "green", "hencky"]
 U, DU_DX, DU_DY, V, DV_DX, DV_DY = range(6)
+STRETCH = 0.01
+"""Largest gradient up to which u and v are as uncertain as the step of the fit."""
 PARTIAL_SUMS = 64
 """Sums that run side by side in ``fixed_sum``."""
 _PAIRS = [(i, j) for i in range(6) for j in range(i, 6)]
@@ -62,9 +65,32 @@ def products(name: str) -> tuple[tuple[int, float], ...]:
     return tuple((PAIR_INDEX[i, j], a * b) for i, a in terms for j, b in terms)
 
 
-WeightedSum = Callable[[NDArray[np.bool_]], tuple[Floats, Floats]]
-"""Takes the ZOIs that can be measured (R, C); gives weights of the six affine parameters, (6, R, C), and of the
-variances of u and v, (2, R, C)."""
+def stretched(covariance: NDArray[np.float32], parameters: Floats) -> NDArray[np.float32]:
+    """Covariances of the fit, (21, R, C), as those of u, v and their gradients.
+
+    The fit is made where the warped picture differs: its step of (u, v), and of their gradients, moves by
+    F = I + grad u in the deformed picture. Below ``STRETCH`` nothing is done.
+
+    Parameters
+    ----------
+    covariance : (21, R, C)
+    parameters : (6, R, C)
+        u, du_dx, du_dy, v, dv_dx, dv_dy.
+    """
+    gradients = parameters[[DU_DX, DU_DY, DV_DX, DV_DY]]
+    if not np.nanmax(np.abs(gradients), initial=0) > STRETCH:
+        return covariance
+    f = np.asarray(gradients + np.array([1, 0, 0, 1])[:, None, None], np.float32).reshape(
+        2, 2, *gradients.shape[1:]
+    )
+    out = np.empty_like(covariance)
+    for pair, (i, j) in enumerate(_PAIRS):
+        (row, first), (column, second) = divmod(i, 3), divmod(j, 3)
+        out[pair] = sum(
+            f[row, a] * f[column, b] * covariance[PAIR_INDEX[3 * a + first, 3 * b + second]]
+            for a in (0, 1) for b in (0, 1)
+        )  # fmt: skip
+    return out
 
 
 class Sums(Protocol):
@@ -74,8 +100,23 @@ class Sums(Protocol):
         """Standard deviation of the mean of ``name`` over a gauge (R, C), over that of ``variance_of_sum``."""
         ...
 
-    def ratio(self, name: str, area: NDArray[np.bool_], made: WeightedSum) -> float:
-        """Standard deviation of the affine ``name`` of an area (R, C), over that of the overlap of windows."""
+    def information(self, at: NDArray[np.intp]) -> Floats:
+        """Inverse covariance of the six affine values of ZOIs at flat places (n,), up to a factor, (6, 6, n).
+
+        Zero where a ZOI has no pattern.
+        """
+        ...
+
+    def variance(self, at: NDArray[np.intp], weights: Floats) -> float:
+        """Variance of a sum of the six affine values of ZOIs by ``weights`` (6, n), for noise of 1 GL."""
+        ...
+
+    def unit_variances(self, at: NDArray[np.intp]) -> Floats:
+        """Variances of u and v of ZOIs, (2, n), for noise of 1 GL."""
+        ...
+
+    def kept(self, key: Hashable, make: Callable[[], Item]) -> Item:
+        """What ``make`` gives, remembered as long as the reference holds."""
         ...
 
 

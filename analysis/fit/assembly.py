@@ -45,22 +45,22 @@ def weigh(
 
 
 @parallel
-def scale(unit: Any, from_reference: Any, whole: Any, out_reference: Any, out: Any) -> None:
-    """The unit covariances (21, N) times two variances (N,) each, written to the last two."""
+def scale(unit: Any, colour: Any, from_reference: Any, whole: Any, out_reference: Any, out: Any) -> None:
+    """The unit covariances (21, N) times ``colour`` (21,) and two variances (N,) each, written to the last two."""
     count = unit.shape[1]
     for run in prange((count + RUN - 1) // RUN):
         a = run * RUN
         b = min(a + RUN, count)
         for k in range(len(unit)):
-            _products(unit[k, a:b], from_reference[a:b], out_reference[k, a:b])
-            _products(unit[k, a:b], whole[a:b], out[k, a:b])
+            _products(unit[k, a:b], colour[k], from_reference[a:b], out_reference[k, a:b])
+            _products(unit[k, a:b], colour[k], whole[a:b], out[k, a:b])
 
 
 @helper
-def _products(a: Any, b: Any, out: Any) -> None:
+def _products(a: Any, factor: Any, b: Any, out: Any) -> None:
     for n in range(out.size):
         i = np.uintp(n)
-        out[i] = a[i] * b[i]
+        out[i] = factor * a[i] * b[i]
 
 
 def clipped_share(

@@ -21,6 +21,7 @@ from analysis.compiled.vectors import LANES, fetch_later, fetch_soon
 from analysis.fit.kernel_args import (
     CONVERGED,
     DIVERGED,
+    IMAGES,
     LEFT_IMAGE,
     RUNNING,
     FitArgs,
@@ -156,8 +157,10 @@ def _moments(
         )  # fmt: skip
     energy = difference_moments(columns, rows, line, sums)
     x, xx = mix[1, 1], mix[2, 2]
-    for k in range(CHANNELS):
-        n = k * half if k < 2 else len(m) - 12 + 3 * k
+    for k in range(4, CHANNELS):
+        m[2 * half + 2 + k] = sums[k, 0, 0]
+    for k in range(4):
+        n = k * half if k < 2 else 2 * half + 3 * (k - 2)
         m[n], m[n + 1], m[n + 2] = sums[k, 0, 0], sums[k, 0, 1] / x, sums[k, 1, 0] / x
         if k < 2:
             shares(sums, k, bent_by)
@@ -169,13 +172,20 @@ def _moments(
 
 
 @inlined
-def _solve(inverse: Any, z: int, m: Any, step: Any, energy: Any, solved: Any) -> Any:
-    """Parameters of one linear fit, of ZOI ``z``, and the weighted sum of squares it leaves."""
-    weighted_rows(inverse, np.uintp(z * len(m) * len(m)), m, len(m), solved)
+def _solve(fit: Any, z: int, m: Any, step: Any, energy: Any, solved: Any) -> Any:
+    """Parameters of one linear fit, of ZOI ``z``, and the weighted sum of squares it leaves.
+
+    What noise adds is taken off as far as there is noise: a picture that is its own reference has none.
+    """
+    weighted_rows(fit.inverse, np.uintp(z * len(m) * len(m)), m, len(m), solved)
     left = energy
     for i in range(len(m)):
-        step[i] = solved[i]
-        left -= step[i] * m[i]
+        left -= solved[i] * m[i]
+    if left < 0:  # by rounding
+        left = 0.0
+    share = f4(min(left, fit.expected[z]) / fit.expected[z] * fit.noise[z])
+    for i in range(len(m)):
+        step[i] = solved[i] + share * fit.bias[z, i]
     return left
 
 
@@ -192,7 +202,7 @@ def _fetch(picture: Any, fit: Any, z: int, q: Any) -> None:
     for x in range(size - fresh + LANES - 1, size + LANES - 1, LANES):
         column = origin[1] + min(x, size - 1)
         for y in range(origin[0] + size - fresh, origin[0] + size):
-            for k in range(4):
+            for k in range(IMAGES):
                 fetch_later(fit.images, np.uintp(y * fit.pitch + column + k * fit.samples))
             fetch_later(picture.c, np.uintp((y + down) * (picture.width + 2 * PAD) + column + right))
 
@@ -204,7 +214,7 @@ def _fetch_rows(picture: Any, fit: Any, next_one: Any, y: int, count: int) -> No
     fresh = min(fit.spacing, fit.size)
     for row in range(top + y, top + y + count):
         for x in range(left + fit.size - fresh + LANES - 1, left + fit.size + LANES - 1, LANES):
-            for k in range(4):
+            for k in range(IMAGES):
                 fetch_soon(fit.images, np.uintp(row * fit.pitch + x + k * fit.samples))
             fetch_soon(picture.c, np.uintp((row + down) * (picture.width + 2 * PAD) + x + right))
 
@@ -245,7 +255,7 @@ def _track_share(picture: Any, table: Any, fit: Any, stop: Any, out: Any, counte
 @helper
 def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: int, end: int) -> None:
     """``track`` for some ZOIs; a function of its own, since numba takes long over the body of a parallel loop."""
-    p, left, bending, nuisance = out.p, out.left, out.bending, out.nuisance
+    p, left, bending, cubic, nuisance = out.p, out.left, out.bending, out.cubic, out.nuisance
     state, iterations = out.state, out.iterations
     count = fit.inverse.shape[1]
     modes = p.shape[1]
@@ -270,7 +280,8 @@ def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: 
         _fetch_all(fit.inverse, z + 2)
         _fetch_all(fit.cross, z + 2)
         state[z], iterations[z] = RUNNING, 0
-        left[z] = bending[z] = nuisance[z, 0] = nuisance[z, 1] = np.nan
+        left[z] = bending[z] = cubic[z, 0] = cubic[z, 1] = nuisance[z, 0] = nuisance[z, 1] = np.nan
+        nuisance[z, 2] = np.nan
         for iteration in range(stop.max_iterations):
             if not _within(picture, q, fit.order, first + reach, top + reach, reach):
                 state[z] = LEFT_IMAGE
@@ -279,13 +290,16 @@ def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: 
             motion = int(q[half]) + PAD + BEYOND, int(q[0]) + PAD + BEYOND
             next_one = (coming[0] if iteration == 0 else -1, coming[1], *motion)
             energy = _moments(picture, table, fit, top, first, q, buffers, next_one, m, bent_by)
-            left[z] = _solve(fit.inverse, z, m, step, energy, solved)
+            left[z] = _solve(fit, z, m, step, energy, solved)
             gain: Any = 1 + step[modes]
             nuisance[z, 0] = gain
             nuisance[z, 1] = step[modes + 3]
+            nuisance[z, 2] = (step[modes + 6] + step[modes + 7]) / gain
             gain = min(max(gain, GAIN_RANGE[0]), GAIN_RANGE[1])
-            bends = bent(bent_by, fit.cross, z, step, fit.squares[z, 0], fit.squares[z, 1], solved)
+            bends = bent(bent_by, fit.cross, z, step, fit.squares[z, 0], fit.squares[z, 1], solved, cubic[z])
             bending[z] = bends / gain**2
+            cubic[z, 0] /= gain**2
+            cubic[z, 1] /= gain**2
             longest = 0.0
             for i in range(modes):
                 longest = max(longest, abs(step[i]) / gain)

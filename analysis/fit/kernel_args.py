@@ -16,6 +16,10 @@ from analysis.picture.splines import TAPS, Box
 
 Floats = NDArray[np.float64]
 
+IMAGES = 4
+"""Of a reference (``PreparedReference.images``)."""
+NUISANCES, BLURS = 9, 3
+"""Columns of J beside those of the displacement; the last of them, f_xx, f_yy and f_xy, are blur."""
 RUNNING, CONVERGED, LEFT_IMAGE, DIVERGED = 0, 1, 2, 3
 """How the iteration of a ZOI ended (``OutArgs.state``)."""
 
@@ -60,7 +64,7 @@ class FitArgs(NamedTuple):
     Attributes
     ----------
     images : flat float32, ``samples`` of each, ``pitch`` a row
-        Filtered reference f_x, f_y, f and the reference as it was recorded (``Prepared.images``).
+        See ``PreparedReference.images``.
     origins : (A, 2) int64
         First row and column of each ZOI.
     size : int, px
@@ -75,6 +79,12 @@ class FitArgs(NamedTuple):
         Sums of w f_x^2 and w f_y^2.
     units : (modes,) float64
         Of the parameters, in px (``sensitivity.parameter_scale``).
+    bias : (A, P) float32
+        See ``noise_bias``.
+    noise : (A,) float64, GL^2
+        Variance a pixel of the reference.
+    expected : (A,) float64, GL^2
+        The weighted sum of squares that the noise of both images leaves.
     """
 
     images: NDArray[np.float32]
@@ -90,6 +100,9 @@ class FitArgs(NamedTuple):
     cross: NDArray[np.float32]
     squares: Floats
     units: Floats
+    bias: NDArray[np.float32]
+    noise: Floats
+    expected: Floats
 
 
 class StopArgs(NamedTuple):
@@ -129,14 +142,17 @@ class OutArgs(NamedTuple):
         Weighted sum of squared differences after the fit.
     bending : (A,) float64, px^2
         What the fit leaves of a displacement that bends or jumps (``shapes.bent``).
-    nuisance : (A, 2) float64
-        Gain, and offset in GL.
+    cubic : (A, 2) float64, px^2
+        The part of it of third degree, of u and of v.
+    nuisance : (A, 3) float64
+        Gain, offset in GL, and growth of the variance of the blur in px^2.
     state, iterations : (A,) uint8
     """
 
     p: Floats
     left: Floats
     bending: Floats
+    cubic: Floats
     nuisance: Floats
     state: NDArray[np.uint8]
     iterations: NDArray[np.uint8]
@@ -146,7 +162,7 @@ class OutArgs(NamedTuple):
         """Arrays for the results of ZOIs that start from ``guess`` (A, modes), which is copied."""
         count = len(guess)
         return cls(
-            guess.copy(), np.empty(count), np.empty(count), np.empty((count, 2)),
+            guess.copy(), np.empty(count), np.empty(count), np.empty((count, 2)), np.empty((count, 3)),
             np.empty(count, np.uint8), np.empty(count, np.uint8),
         )  # fmt: skip
 
@@ -154,7 +170,7 @@ class OutArgs(NamedTuple):
     def unmeasured(cls, count: int, modes: int) -> OutArgs:
         """Of ZOIs that were not iterated: NaN."""
         empty = cls.starting(np.full((count, modes), np.nan))
-        for array in (empty.left, empty.bending, empty.nuisance):
+        for array in (empty.left, empty.bending, empty.cubic, empty.nuisance):
             array[:] = np.nan
         empty.state[:] = empty.iterations[:] = 0
         return empty
@@ -162,13 +178,13 @@ class OutArgs(NamedTuple):
     def put(self, places: NDArray[np.intp], other: OutArgs) -> None:
         """Copy what ``other`` holds of the ZOIs ``places``."""
         self.p[places], self.left[places], self.bending[places] = other.p, other.left, other.bending
-        self.nuisance[places] = other.nuisance
+        self.cubic[places], self.nuisance[places] = other.cubic, other.nuisance
         self.state[places], self.iterations[places] = other.state, other.iterations
 
     def at(self, places: NDArray[np.intp]) -> OutArgs:
         """Those of some ZOIs."""
         return OutArgs(
-            self.p[places], self.left[places], self.bending[places], self.nuisance[places],
+            self.p[places], self.left[places], self.bending[places], self.cubic[places], self.nuisance[places],
             self.state[places], self.iterations[places],
         )  # fmt: skip
 
@@ -186,12 +202,55 @@ class ReferenceArgs(NamedTuple):
         Variance of u and of v from noise of 1 GL, of a ZOI without anything else to find.
     centre : (A,), px per GL
         Standard deviation of the worse of u and v from noise of 1 GL, as it is found.
+    white : (2,)
+        ``white_noise.white_cubic`` of the kernel.
+    independent : float
+        ZOIs that a ZOI counts for, since neighbours share pixels; at most 1.
     """
 
     signal: Floats
     pixels: Floats
     unit: Floats
     centre: Floats
+    white: Floats
+    independent: float
+
+    def at(self, places: NDArray[np.intp] | slice) -> ReferenceArgs:
+        """That of some ZOIs."""
+        return self._replace(
+            signal=self.signal[places], pixels=self.pixels[places], unit=self.unit[places],
+            centre=self.centre[places],
+        )  # fmt: skip
+
+
+class PooledError(NamedTuple):
+    """What the fits of one picture leave in common (``pooling.pooled``).
+
+    Attributes
+    ----------
+    ratio : (A,)
+        Variance that a ZOI of this contrast leaves, over that expected from the noise as stated.
+    forgiven : (A,)
+        The same where it is the common state of the picture; 1 where that is as stated.
+    scatter : float
+        Standard deviation of what a single ZOI leaves over that.
+    colour : (2,)
+        Variance of u and of v over that of white noise of the same variance a pixel.
+    """
+
+    ratio: Floats
+    forgiven: Floats
+    scatter: float
+    colour: Floats
+
+    @classmethod
+    def none(cls, count: int) -> PooledError:
+        """Of ``count`` ZOIs that leave what is expected."""
+        return cls(np.ones(count), np.ones(count), 0.0, np.ones(2))
+
+    def at(self, places: NDArray[np.intp] | slice) -> PooledError:
+        """That of some ZOIs."""
+        return self._replace(ratio=self.ratio[places], forgiven=self.forgiven[places])
 
 
 class VerdictArgs(NamedTuple):
@@ -224,9 +283,10 @@ class ReferenceImages(NamedTuple):
     Attributes
     ----------
     plain : flat float32, ``samples`` of each, ``pitch`` a row
-        f_x, f_y (GL/px) and f of the filtered reference.
+        f_x, f_y (GL/px), f of the filtered reference, (not read,) and its f_xx, f_yy, f_xy (GL/px^2).
     by_level : flat float32, or empty
-        The same times the grey level, then the level, for a noise that grows with it; empty: not wanted.
+        The same times the grey level, the level itself in the fourth place, for a noise that grows with it;
+        empty: not wanted.
     """
 
     plain: NDArray[np.float32]
@@ -268,6 +328,10 @@ class NormalArgs(NamedTuple):
         Sum of the weights less what the fit takes: expected weighted residual per GL^2 of noise.
     energy : (A, 4) float32
         Over the window: mean of f_x^2 and f_y^2, (GL/px)^2, variance (GL^2) and mean (GL) of f.
+    taken : (A, P) float32
+        What each column takes of it, Gaussian windows: 0.5 for 1, 0.25 for x.
+    blur : (A,) float32, px^4 per GL^2
+        Variance of the blur for noise of variance 1 GL^2.
     """
 
     inverse: NDArray[np.float32]
@@ -276,6 +340,8 @@ class NormalArgs(NamedTuple):
     covariance_level: NDArray[np.float32]
     freedom: NDArray[np.float32]
     energy: NDArray[np.float32]
+    taken: NDArray[np.float32]
+    blur: NDArray[np.float32]
 
     @classmethod
     def empty(cls, count: int, columns: int, shapes: int, by_level: bool) -> NormalArgs:
@@ -287,4 +353,5 @@ class NormalArgs(NamedTuple):
             inverse, cross, np.empty((count, 21), np.float32),
             np.empty((count if by_level else 0, 21), np.float32),
             np.empty(count, np.float32), np.empty((count, 4), np.float32),
+            np.empty((count, columns), np.float32), np.empty(count, np.float32),
         )  # fmt: skip

@@ -1,7 +1,7 @@
 """How a ZOI answers to its modes: the normal matrix, its inverse and the unit covariances.
 
-With the filtered reference f and its gradient, the columns of J are f_x b, f_y b for the
-monomials b of the shape function, and the nuisances f, x f, y f, 1, x, y. Everything the iteration
+With the filtered reference f and its derivatives, the columns of J are f_x b, f_y b for the
+monomials b of the shape function, and the nuisances f, x f, y f, 1, x, y, f_xx, f_yy, f_xy. Everything the iteration
 needs is (J' w J)^-1 and the moments J' w d of the difference image d (docs/method.md): the
 "sensors" of a ZOI are never stored, only the images they are made of. Coordinates are scaled to
 -1..1 over the ZOI. Compiled loops.
@@ -18,13 +18,13 @@ from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper, parallel
 from analysis.compiled.threads import SHARES, caller, keep_apart, next_piece
-from analysis.fit.kernel_args import NormalArgs, ReferenceImages, WindowRows
+from analysis.fit.kernel_args import BLURS, NUISANCES, NormalArgs, ReferenceImages, WindowRows
 from analysis.fit.shapes import N_PRODUCTS, PRODUCT, PRODUCT_ROWS, SQUARE_ROWS, cross_moments, product_moments
 
 CHUNK = 32
 """ZOIs that a thread takes at a time."""
-RIDGE = 1e-7
-"""Added to the unit diagonal of the scaled normal matrix."""
+RIDGE, BLUR_RIDGE = 1e-7, 1e-3
+"""Added to the unit diagonal of the scaled normal matrix; in a pattern of one frequency blur and gain are alike."""
 
 
 def columns(order: int) -> NDArray[np.int64]:
@@ -32,7 +32,7 @@ def columns(order: int) -> NDArray[np.int64]:
     powers = [(0, 0), (1, 0), (0, 1)] + ([(2, 0), (1, 1), (0, 2)] if order == 2 else [])
     linear = [(0, 0), (1, 0), (0, 1)]
     table = [(0, *p) for p in powers] + [(1, *p) for p in powers]
-    table += [(2, *p) for p in linear] + [(3, *p) for p in linear]
+    table += [(2, *p) for p in linear] + [(3, *p) for p in linear] + [(c, 0, 0) for c in (4, 5, 6)]
     return np.array(table, np.int64)
 
 
@@ -61,7 +61,7 @@ def _assemble(moments: Any, table: Any, out: Any) -> None:
 
 @helper
 def _invert(matrix: Any, low: Any, inverse: Any) -> bool:
-    """Inverse of a symmetric positive matrix by Cholesky after scaling to a unit diagonal, ridged."""
+    """Inverse of a symmetric positive matrix by Cholesky after scaling to a unit diagonal, ridged; blur stands last."""
     n = len(matrix)
     scale = np.empty(n)
     for i in range(n):
@@ -72,7 +72,7 @@ def _invert(matrix: Any, low: Any, inverse: Any) -> bool:
         for j in range(i + 1):
             total = matrix[i, j] * scale[i] * scale[j]
             if i == j:
-                total += RIDGE
+                total += RIDGE if i < n - BLURS else BLUR_RIDGE
             for k in range(j):
                 total -= low[i, k] * low[j, k]
             if i == j:
@@ -173,8 +173,9 @@ def _prepare_some(
 ) -> None:
     """``prepare`` for CHUNK ZOIs; a function of its own, since numba takes long over the body of a parallel loop."""
     count = len(table)
-    order = 1 if count == 12 else 2
-    affine = np.array([0, 1, 2, (count - 6) // 2, (count - 6) // 2 + 1, (count - 6) // 2 + 2])
+    half = (count - NUISANCES) // 2
+    order = 1 if half == 3 else 2
+    affine = np.array([0, 1, 2, half, half + 1, half + 2])
     down, end, o = np.uintp(images.pitch), np.uintp(3 * images.samples), np.uintp(0)
     one = np.ones(rows.powers.shape[1], np.float32)
     columns = np.empty((PRODUCT_ROWS + SQUARE_ROWS, rows.powers.shape[1]), np.float32)
@@ -201,13 +202,15 @@ def _prepare_some(
             out.inverse[z].fill(0)
             out.cross[z].fill(0)
             out.covariance[z].fill(0)
-            out.freedom[z] = 0
+            out.taken[z].fill(0)
+            out.freedom[z] = out.blur[z] = 0
             continue
         _copy(inv, out.inverse[z])
         cross_moments(of_w, table, rows.mix, out.cross[z])
         _assemble(of_q, table, middle)
         _sandwich(inv, middle, affine, units, out.covariance[z])
-        out.freedom[z] = total - _taken(inv, middle)
+        out.freedom[z] = total - _taken(inv, middle, out.taken[z])
+        out.blur[z] = _of_sum(inv, middle, count - 3, count - 2)
         if images.by_level.size:
             product_moments(
                 images.by_level, images.plain, images.by_level, end + at, down, one, np.uintp(images.samples),
@@ -225,10 +228,23 @@ def _copy(matrix: Any, to: Any) -> None:
 
 
 @helper
-def _taken(inverse: Any, middle: Any) -> Any:
-    """Trace of inverse @ middle, both symmetric."""
+def _of_sum(inverse: Any, middle: Any, i: int, j: int) -> Any:
+    """Variance of the sum of the parameters i and j: of inverse @ middle @ inverse."""
     out = 0.0
-    for i in range(len(inverse)):
-        for j in range(len(inverse)):
-            out += inverse[i, j] * middle[i, j]
+    for k in range(len(inverse)):
+        for n in range(len(inverse)):
+            out += (inverse[i, k] + inverse[j, k]) * middle[k, n] * (inverse[i, n] + inverse[j, n])
     return out
+
+
+@helper
+def _taken(inverse: Any, middle: Any, out: Any) -> Any:
+    """The diagonal of inverse @ middle, both symmetric, written to ``out``; returns its sum."""
+    whole = 0.0
+    for i in range(len(inverse)):
+        part = 0.0
+        for j in range(len(inverse)):
+            part += inverse[i, j] * middle[i, j]
+        out[i] = part
+        whole += part
+    return whole

@@ -9,21 +9,23 @@ overlap of windows contains: on dense grids the mean scatters up to 1.5 times as
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.compiled.loops import helper
-from analysis.field import WeightedSum, Window, ZoiGrid, combination, profile, variance_of_sum
+from analysis.field import Window, ZoiGrid, combination, profile, variance_of_sum
 from analysis.fit.sensitivity import columns, parameter_scale
+from analysis.fit.shapes import CHANNELS
 
 Floats = NDArray[np.float64]
+Item = TypeVar("Item")
 
-CHANNELS, MONOMIALS = 4, ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
-"""f_x, f_y, f and 1, each times 1, x, y, x^2, xy, y^2."""
+MONOMIALS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
+"""1, x, y, x^2, xy, y^2, with which a channel is multiplied."""
 MAX_CACHED = 64
 """Gauges whose factors are remembered."""
 
@@ -43,8 +45,8 @@ class MeanNoise:
         Flat places of the active ZOIs on the grid.
     origins : (A, 2) int64
         First row and column of each.
-    images : (>= 3, H, W) float32
-        f_x, f_y and f of the filtered reference.
+    images : (4, H, W) float32
+        See ``PreparedReference.images``.
     inverse : (>= A, P, P) float32
         (J' w J)^-1 of each ZOI.
     unit_covariance : (21, R, C) float32
@@ -59,39 +61,57 @@ class MeanNoise:
     images: NDArray[np.float32]
     inverse: NDArray[np.float32]
     unit_covariance: NDArray[np.float32]
-    _factors: dict[tuple[str, bytes], float] = field(default_factory=dict, repr=False)
+    _made: dict[Hashable, Any] = field(default_factory=dict, repr=False)
 
     def factor(self, name: str, where: NDArray[np.bool_]) -> float:
         """Standard deviation of the mean of ``name`` over a gauge (R, C), over that of overlapping windows.
 
         Of all its ZOIs that can be measured: one that is lost does not change it. 1 where there are too few.
         """
-        return self._kept((name, np.packbits(where).tobytes()), lambda: self._factor(name, where))
+        return self.kept((name, np.packbits(where).tobytes()), lambda: self._factor(name, where))
 
-    def ratio(self, name: str, area: NDArray[np.bool_], made: WeightedSum) -> float:
-        """Standard deviation of the affine ``name`` of an area (R, C), over that of overlapping windows.
+    def kept(self, key: Hashable, make: Callable[[], Item]) -> Item:
+        """What ``make`` gives, remembered for the last ``MAX_CACHED`` keys."""
+        if key not in self._made:
+            if len(self._made) >= MAX_CACHED:
+                self._made.pop(next(iter(self._made)))
+            self._made[key] = make()
+        found: Item = self._made[key]
+        return found
 
-        Of all its ZOIs that can be measured, as ``factor``; 1 where there are none.
+    def information(self, at: NDArray[np.intp]) -> Floats:
+        """(J' w J) of the six affine values of the ZOIs at flat places (n,), all others eliminated, (6, 6, n).
+
+        Zero where a ZOI cannot be measured.
         """
-        return self._kept((f"affine {name}", np.packbits(area).tobytes()), lambda: self._ratio(area, made))
+        which = self._which(at)
+        places, units = self._affine()
+        found = self.inverse[which][:, places][:, :, places] * np.outer(units, units)
+        found[~self.able[which]] = np.eye(6)
+        normal = np.linalg.inv(found.astype(np.float64))
+        normal[~self.able[which]] = 0
+        return np.ascontiguousarray(np.moveaxis(normal, 0, 2))
 
-    def _kept(self, key: tuple[str, bytes], factor: Callable[[], float]) -> float:
-        if key not in self._factors:
-            if len(self._factors) >= MAX_CACHED:
-                self._factors.clear()
-            self._factors[key] = factor()
-        return self._factors[key]
+    def variance(self, at: NDArray[np.intp], weights: Floats) -> float:
+        """Variance of a sum of the six affine values of ZOIs by ``weights`` (6, n), for noise of 1 GL."""
+        which = self._which(at)
+        used = self.able[which]
+        return self._variance(weights.T[used], which[used])
 
-    def _ratio(self, area: NDArray[np.bool_], made: WeightedSum) -> float:
-        measurable = np.zeros(self.grid.shape, bool)
-        measurable.ravel()[self.index[self.able]] = True
-        which = np.flatnonzero(self.able & area.ravel()[self.index])
-        if not len(which):
-            return 1.0
-        weights, noise = made(measurable)
-        expected = float(np.sum(noise * self.unit_covariance[[0, 15]]))
-        found = self._variance(weights.reshape(6, -1)[:, self.index[which]].T, which)
-        return math.sqrt(found / expected) if expected > 0 and math.isfinite(found) else 1.0
+    def unit_variances(self, at: NDArray[np.intp]) -> Floats:
+        """Variances of u and v of ZOIs, (2, n), for noise of 1 GL."""
+        return self.unit_covariance.reshape(21, -1)[[0, 15]][:, at].astype(np.float64)
+
+    def _which(self, at: NDArray[np.intp]) -> NDArray[np.intp]:
+        """The numbers of the active ZOIs at flat places of the grid."""
+        return np.searchsorted(self.index, at)
+
+    def _affine(self) -> tuple[NDArray[np.intp], Floats]:
+        """Where the six affine values stand among the parameters of the fit, and their units."""
+        units = parameter_scale(self.order, self.grid.size)
+        half = len(units) // 2
+        places = np.array([0, 1, 2, half, half + 1, half + 2])
+        return places, units[places]
 
     def _factor(self, name: str, where: NDArray[np.bool_]) -> float:
         which = np.flatnonzero(self.able & where.ravel()[self.index])
@@ -120,11 +140,9 @@ class MeanNoise:
         return float(np.cumsum(np.cumsum(out**2, axis=1)[:, -1])[-1])
 
     def _weights(self, shares: Floats, which: NDArray[np.intp]) -> Floats:
-        """The rows of the inverse that make these sums, by channel and monomial, (B, 4, 6)."""
-        half = self.inverse.shape[1] // 2 - 3
-        units = parameter_scale(self.order, self.grid.size)
-        at = np.array([0, 1, 2, half, half + 1, half + 2])
-        row = np.einsum("bk,bkp->bp", shares * units[at], self.inverse[which][:, at])
+        """The rows of the inverse that make these sums, by channel and monomial, (B, 7, 6)."""
+        places, units = self._affine()
+        row = np.einsum("bk,bkp->bp", shares * units, self.inverse[which][:, places])
         out = np.zeros((len(which), CHANNELS, len(MONOMIALS)))
         for j, (channel, x, y) in enumerate(columns(self.order)):
             out[:, channel, MONOMIALS.index((int(x), int(y)))] = row[:, j]
@@ -136,6 +154,13 @@ def unit_variance(name: str, covariance: NDArray[np.float32]) -> Floats:
     from analysis.field import products
 
     return np.asarray(sum(share * covariance[pair].astype(np.float64) for pair, share in products(name)))
+
+
+@helper
+def blurred(f: Any, i: int, pitch: int, along_x: Any, along_y: Any, across: Any) -> Any:
+    """The second differences of an image at one pixel (``images.second_differences``), each with its factor."""
+    out = along_x * (f[i - 1] + f[i + 1] - 2 * f[i]) + along_y * (f[i - pitch] + f[i + pitch] - 2 * f[i])
+    return out + across * (f[i + pitch + 1] + f[i - pitch - 1] - f[i + pitch - 1] - f[i - pitch + 1]) / 4
 
 
 @helper
@@ -159,7 +184,8 @@ def scatter(
             d0 = a[3, 0] + eta * a[3, 2]
             for x in range(size):
                 xi = along[x]
-                value = images[at + x] * (x0 + xi * (x1 + xi * a[0, 3]))
+                value = blurred(images, 2 * samples + at + x, pitch, a[4, 0], a[5, 0], a[6, 0])
+                value += images[at + x] * (x0 + xi * (x1 + xi * a[0, 3]))
                 value += images[samples + at + x] * (y0 + xi * (y1 + xi * a[1, 3]))
                 value += images[2 * samples + at + x] * (f0 + xi * a[2, 1])
                 to[x] += line[y] * line[x] * (value + d0 + xi * a[3, 1])

@@ -1,7 +1,8 @@
 """Which ZOIs are valid: the limits of what a fit may leave, and which ZOIs have a pattern at all.
 
-Each ZOI is judged by its own numbers alone (``verdict``), so that a verdict depends neither on threads nor on
-neighbours. Tried and rejected (of 75 wrong ZOIs accepted before the shares were added, 34 are left):
+Each ZOI is judged by its own numbers and by what all leave in common (``verdict``, ``pooling``), so that a verdict
+depends neither on threads nor on neighbours. Tried and rejected (of 75 wrong ZOIs accepted before the shares were
+added, 34 are left):
 
 - squares of the two shares, or powers of 1.5: found 14 and 28 of the 75, their sum 39;
 - half of MODEL_SHARE: found 46, but real pictures (an open hole, noise estimated) come to 0.87 of the present one;
@@ -24,6 +25,8 @@ CHANCE = 4.0
 """... deviations of such a variance more ..."""
 UNKNOWN_NOISE_FACTOR = 5.0
 """(in place of both where nobody gave the noise: its guess from the spectrum misses coloured noise) ..."""
+POOLED_NOISE_FACTOR = 3.5
+"""(or this, where the ZOIs together show that it does not) ..."""
 MODEL_SHARE = 0.002
 """... plus this share of the variance of the pattern, for what no noise explains."""
 LOST_SHARE = 0.5
@@ -33,6 +36,8 @@ BENDING_CHANCE = 5.0
 BENDING_SHARE = 0.15
 """... beyond the squares of a limit in px and of this share of the displacement that the strain makes in
 the ZOI, which a crack exceeds."""
+COLOURED = 1.5
+"""Variance of u or v over that of white noise from which on bending is allowed as much more noise."""
 CENTRE_VARIANCE = (4.0, 16.0)
 """The shares of the two limits above that a ZOI uses up are added and must not exceed 1: cracks, blur and glare often
 show a little in both (of 645,000 good simulated ZOIs 10 are lost so, of 295 wrong ones that pass both limits 157

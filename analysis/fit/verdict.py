@@ -10,11 +10,12 @@ from typing import Any
 
 from analysis.compiled.loops import helper
 from analysis.field import Status
-from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, ReferenceArgs, VerdictArgs
+from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, PooledError, ReferenceArgs, VerdictArgs
 from analysis.fit.validity import (
     BENDING_CHANCE,
     BENDING_SHARE,
     CHANCE,
+    COLOURED,
     EMPTY_SHARES,
     EMPTY_SIGMA,
     LOST_SHARE,
@@ -23,6 +24,7 @@ from analysis.fit.validity import (
     MIN_GAIN,
     MODEL_SHARE,
     NOISE_FACTOR,
+    POOLED_NOISE_FACTOR,
     SLOW_SIGMA,
     UNKNOWN_NOISE_FACTOR,
 )
@@ -34,8 +36,8 @@ NO_PATTERN = int(Status.NO_PATTERN)
 
 @helper
 def judge(
-    found: OutArgs, left: Any, expected: Any, known: ReferenceArgs, rule: VerdictArgs, out: Any
-) -> None:
+    found: OutArgs, left: Any, expected: Any, common: PooledError, known: ReferenceArgs, rule: VerdictArgs, out: Any
+) -> None:  # fmt: skip
     """Write a status for each measured ZOI.
 
     Parameters
@@ -43,32 +45,43 @@ def judge(
     found : OutArgs
         Of the iteration.
     left, expected : (A,), GL^2
-        Variance a pixel that the fit leaves, and expected from the noise of both images.
+        Variance a pixel that the fit leaves, and expected from the noise of both images as stated.
+    common : PooledError
+        A ZOI that leaves no more than its like is not refused for it.
     known : ReferenceArgs
     rule : VerdictArgs
     out : (A,) uint8, written
     """
+    colour = max(common.colour[0], common.colour[1])
+    if colour < COLOURED:
+        colour = 1.0
     for z in range(len(out)):
         gain = found.nuisance[z, 0]
-        chance = NOISE_FACTOR + CHANCE * math.sqrt(2 / max(known.pixels[z], 1.0))
+        spread = math.sqrt(2 / max(known.pixels[z], 1.0))
+        chance = NOISE_FACTOR + CHANCE * spread
         if not rule.noise_known:
-            chance = max(chance, UNKNOWN_NOISE_FACTOR)
-        allowed = chance * expected[z]
+            chance = max(chance, UNKNOWN_NOISE_FACTOR if common.scatter == 0 else POOLED_NOISE_FACTOR)
+            chance *= min(common.ratio[z], 1.0)
         pattern = known.signal[z] * min(gain, 1.0) ** 2
+        error, allowed = common.forgiven[z] * expected[z], chance * expected[z]
+        if common.forgiven[z] > 1:
+            usual = error * (NOISE_FACTOR + CHANCE * max(common.scatter, spread))
+            allowed = max(allowed, min(usual, LOST_SHARE * pattern))
         if found.state[z] == LEFT_IMAGE:
             out[z] = OUTSIDE
         elif not left[z] <= allowed + LOST_SHARE * pattern:
             out[z] = LOST
         elif found.state[z] != CONVERGED or _slow(found, z, known, expected[z]):
             out[z] = NOT_CONVERGED
-        elif _is_empty(left[z] / expected[z]) and _sigma(known, z, expected[z]) > EMPTY_SIGMA:
+        elif _is_empty(left[z], min(expected[z], error)) and _sigma(known, z, expected[z]) > EMPTY_SIGMA:
             out[z] = NO_PATTERN
         elif not (MIN_GAIN < gain < MAX_GAIN and left[z] <= allowed + MODEL_SHARE * pattern):
             out[z] = POOR_MATCH
         else:
-            by_noise = NOISE_FACTOR * expected[z] if rule.noise_known else allowed
+            by_noise = NOISE_FACTOR * max(expected[z], error) if rule.noise_known else allowed
             misfit = _used(left[z], by_noise, allowed + MODEL_SHARE * pattern - by_noise)
-            bent = _bent(found, z, known, max(expected[z], left[z]), rule)
+            many = colour if common.forgiven[z] > 1 else 1.0
+            bent = _bent(found, z, known, many * max(expected[z], left[z]), rule)
             doubt = (misfit + bent) * _beyond(known, z, rule.far)
             out[z] = OK if doubt <= 1 else POOR_MATCH if misfit > bent else UNEVEN
 
@@ -80,14 +93,14 @@ def _sigma(known: Any, z: int, variance: Any) -> Any:
 
 
 @helper
-def _is_empty(left: Any) -> Any:
-    return EMPTY_SHARES[0] < left < EMPTY_SHARES[1]
+def _is_empty(left: Any, expected: Any) -> Any:
+    return EMPTY_SHARES[0] < left / expected < EMPTY_SHARES[1]
 
 
 @helper
 def _slow(found: Any, z: int, known: Any, variance: Any) -> Any:
     """Whether a weak pattern was followed in so many small steps that it may have been led away."""
-    return found.iterations[z] >= MANY_STEPS and _sigma(known, z, variance) > SLOW_SIGMA
+    return found.iterations[z] >= MANY_STEPS and known.centre[z] * math.sqrt(variance) > SLOW_SIGMA
 
 
 @helper

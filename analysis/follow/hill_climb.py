@@ -54,7 +54,7 @@ def correlation(reference: Any, deformed: Any, top: int, left: int, dy: int, dx:
 
 @parallel
 def climb(
-    reference: Any, deformed: Any, origins: Any, size: int, candidates: Any, out: Any, score: Any
+    reference: Any, deformed: Any, origins: Any, size: int, candidates: Any, moves: int, out: Any, score: Any
 ) -> None:
     """Best whole-pixel displacement (x, y) of each ZOI.
 
@@ -63,6 +63,8 @@ def climb(
     reference, deformed : (H, W) float32
     origins : (A, 2) int64
     candidates : (A, K, 2) int64, (x, y)
+    moves : int
+        Uphill from the best of them at most.
     out : (A, 2) int64 and score : (A,) float64, written; score -2 where nothing lies in the image
     """
     for z in prange(len(origins)):
@@ -78,7 +80,7 @@ def climb(
             value = correlation(reference, deformed, top, left, cy, cx, size)
             if value > best:
                 best, x, y = value, cx, cy
-        for _ in range(MAX_MOVES):
+        for _ in range(moves):
             sx = 0
             sy = 0
             for ny in range(-1, 2):

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Roi
-from analysis.follow.hill_climb import climb
+from analysis.follow.hill_climb import MAX_MOVES, climb
 
 Image = NDArray[np.float32]
 MIN_SIDE = 48
@@ -67,7 +67,7 @@ def search(
     found = np.zeros((len(centre), 2), np.int64)
     climb(
         reference - offset, deformed - offset, origins, size,
-        np.ascontiguousarray(candidates), found, np.zeros(len(centre)),
+        np.ascontiguousarray(candidates), MAX_MOVES, found, np.zeros(len(centre)),
     )  # fmt: skip
     out[:, [0, 3]] = found
     return out

@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.field import ZoiGrid
 from analysis.picture.splines import LINE
 
+ROUNDING_SAMPLE = 8192
+"""Pixels that show the step between the grey levels of an image."""
+
 
 @dataclass(frozen=True, slots=True)
 class NoiseModel:
@@ -91,18 +94,57 @@ class _PlainNoise(NoiseModel):
         return self.read**2
 
 
+def rounding_variance(image: NDArray[Any]) -> float:
+    """Variance that rounding leaves in an image of whole grey levels a step apart, step^2/12, GL^2; else 0."""
+    sample = image.ravel()[:: max(1, image.size // ROUNDING_SAMPLE)].astype(np.float64)
+    if not np.array_equal(sample, np.rint(sample)):
+        return 0.0
+    step = np.gcd.reduce((sample - sample[0]).astype(np.int64))
+    return float(step) ** 2 / 12
+
+
 def padded(*images: NDArray[np.float32]) -> NDArray[np.float32]:
     """Images of one size with zeros behind each row and below each image, (K, H + 1, pitch).
 
-    A row takes an odd number of cache lines: with an even one, and worst with a power of two, the
-    rows of a ZOI compete for the same places in the cache.
+    At least two behind each row. A row takes an odd number of cache lines: with an even one, and worst with a power of
+    two, the rows of a ZOI compete for the same places in the cache.
     """
     height, width = images[0].shape
-    lines = width // LINE + 1
+    lines = (width + 1) // LINE + 1
     out = np.zeros((len(images), height + 1, LINE * (lines + 1 - lines % 2)), np.float32)
     for to, image in zip(out, images, strict=True):
         to[:height, :width] = image
     return out
+
+
+def continue_rim(images: NDArray[np.float32], which: int, shape: tuple[int, ...]) -> None:
+    """Let the image ``which`` > 0 of ``padded`` ones go on by a pixel beyond its edges, in place.
+
+    Left of a row is the end of the row before, and above the image the end of the image before.
+    """
+    (height, width), pitch = shape, images.shape[2]
+    image, flat = images[which], images.reshape(-1)
+    first = which * image.size
+    image[:, width] = image[:, width - 1]
+    image[height] = image[height - 1]
+    flat[first - pitch : first - pitch + width + 1] = image[0, : width + 1]
+    flat[first - pitch - 1 : first + image.size - 1 : pitch] = np.append(image[0, 0], image[:, 0])
+
+
+def second_differences(images: NDArray[np.float32]) -> NDArray[np.float32]:
+    """f_xx, f_yy and f_xy of the third of ``padded`` images by differences of pixels, (3, H + 1, pitch), GL/px^2.
+
+    At high frequencies they fall behind the derivatives, as the spectrum of a real blur does behind its series.
+    """
+    pitch, size, flat = images.shape[2], images[0].size, images.reshape(-1)
+
+    def moved(by: int) -> NDArray[np.float32]:
+        return flat[2 * size + by : 3 * size + by]
+
+    twice = 2 * moved(0)
+    along_x, along_y = moved(1) + moved(-1) - twice, moved(pitch) + moved(-pitch) - twice
+    across = (moved(pitch + 1) + moved(-pitch - 1) - moved(pitch - 1) - moved(1 - pitch)) / 4
+    return np.stack([along_x, along_y, across]).reshape(3, *images.shape[1:])
 
 
 def as_image(image: ArrayLike, what: str) -> NDArray[np.float32]:

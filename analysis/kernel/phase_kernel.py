@@ -8,6 +8,7 @@ numbers for a ZOI depend on the two images, the settings and that ZOI's own star
 from __future__ import annotations
 
 from copy import copy
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,10 +17,13 @@ from analysis.compiled.forked import FORK_GUARD
 from analysis.field import Motion, StrainField, ZoiGrid
 from analysis.follow.renewal import taken
 from analysis.kernel.images import Noise, as_image, as_model, as_recorded, clipped_pixels
+from analysis.kernel.lines import mend
 from analysis.kernel.reference import ReferencePicture
+from analysis.kernel.repeating import periods
 from analysis.kernel.result import PredictedMotion, field_of
+from analysis.kernel.retry import retry_lost
 from analysis.kernel.settings import Estimator, KernelSettings
-from analysis.kernel.solve import Solution, retry_lost
+from analysis.kernel.solve import Solution
 from analysis.self_test import SelfTestCase, check
 
 Floats = NDArray[np.float64]
@@ -70,8 +74,14 @@ class PhaseKernel:
     ) -> None:
         FORK_GUARD.check()
         image = as_image(reference, "the reference")
-        self.reference = ReferencePicture.first(image, grid, settings or KernelSettings(), noise, clipped)
+        made = ReferencePicture.first(image, grid, settings or KernelSettings(), noise, clipped)
+        self.reference = replace(made, period=periods(made))
         check_machine(self.settings, grid.size)
+
+    @property
+    def period(self) -> Floats:
+        """Smallest displacement at which a ZOI looks like itself, (R, C), px; infinite: none, NaN: not active."""
+        return np.asarray(self.reference.spread(self.reference.period[:, None])[0])
 
     @property
     def grid(self) -> ZoiGrid:
@@ -166,11 +176,13 @@ class PhaseKernel:
         saturated = clipped_pixels(image, clipped, model)
         if start is None:
             solution = Solution(reference, image, model, reference.searched(image))
+            mend(solution)
             retry_lost(solution, None, saturated)
             return field_of(solution)
         before, carried = self._before(start), self._carried_motion(start)
         predicted = before + carried.ahead
         solution = Solution(reference, image, model, reference.local(predicted))
+        mend(solution)
         retry_lost(solution, reference.local(before), saturated)
         return field_of(solution, PredictedMotion(predicted, carried))
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from analysis.field import Status, profile
 from analysis.fit.kernel_args import NormalArgs, ReferenceImages, WindowRows
+from analysis.fit.noise_bias import noise_bias
 from analysis.fit.validity import CLIPPED_SHARE, has_pattern
-from analysis.kernel.images import NoiseModel, padded
+from analysis.kernel.images import NoiseModel, continue_rim, padded, second_differences
 from analysis.kernel.settings import KernelSettings
 from analysis.picture.spectrum import Pattern, filtered_pattern
 
@@ -32,8 +33,8 @@ class PreparedReference:
     shape : (H, W)
     pattern : Pattern
     images : (4, H + 1, pitch) float32
-        Gradients and level of the filtered reference, f_x, f_y, f, and the reference less its mean; zero
-        beyond H rows of W, since loops read whole vectors.
+        Gradients and level of the filtered reference, f_x, f_y, f, and the reference less its mean, with padding
+        beyond H rows of W, since loops read whole vectors; f goes on by a pixel beyond its edges.
     origins : (A, 2) int64
         First row and column of each ZOI.
     inverse : (A + 1, P, P) float32
@@ -53,6 +54,10 @@ class PreparedReference:
         Mean grey level.
     status : (A,) uint8
         OK, NO_PATTERN or CLIPPED.
+    blur : (A,) float32, px^4 per GL^2
+        Variance of the blur for noise of variance 1 GL^2.
+    bias : (A, P) float32
+        See ``noise_bias``.
     """
 
     shape: tuple[int, int]
@@ -70,6 +75,8 @@ class PreparedReference:
     signal: NDArray[np.float64]
     level: NDArray[np.float64]
     status: NDArray[np.uint8]
+    blur: NDArray[np.float32]
+    bias: NDArray[np.float32]
 
 
 def prepare_reference(
@@ -96,9 +103,11 @@ def prepare_reference(
     pattern = filtered_pattern(image, std, settings.interpolant)
     line = profile(settings.window, size)
     images = padded(pattern.grad_x, pattern.grad_y, pattern.level, image - np.float32(mean))
+    continue_rim(images, 2, image.shape)
     pattern = _within(pattern, images, image.shape)
-    by_level = _by_level(images, pattern, mean, noise)
-    out, shapes = _fits(images, by_level, origins, line, settings.order)
+    channels = np.concatenate([images, second_differences(images)])
+    by_level = _by_level(channels, pattern, mean, noise)
+    out, shapes = _fits(channels, by_level, origins, line, settings.order)
     energy = out.energy
     status = _measurable(pattern, out.covariance, energy)
     if clipped is not None and clipped.any():
@@ -121,6 +130,8 @@ def prepare_reference(
         signal=np.maximum(energy[:, 2].astype(np.float64), 0),
         level=energy[:, 3].astype(np.float64) + mean,
         status=status,
+        blur=out.blur,
+        bias=noise_bias(out.inverse[:-1], out.taken, pattern.own_noise, float(line.sum() ** 2), size),
     )
 
 
@@ -169,12 +180,12 @@ def _measurable(
 def _by_level(
     images: NDArray[np.float32], pattern: Pattern, mean: float, noise: NoiseModel | None
 ) -> NDArray[np.float32]:
-    """f_x, f_y, f times the grey level and the level itself, for a noise that grows with it; else empty."""
+    """Images times the grey level, the fourth the level itself, for a noise that grows with it; else empty."""
     if noise is None or noise.slope <= 0:
         return np.empty(0, np.float32)
     level = np.maximum(pattern.level + np.float32(mean), 0)
     height, width = level.shape
     out = np.zeros_like(images)
-    out[:3, :height, :width] = images[:3, :height, :width] * level
+    out[:, :height, :width] = images[:, :height, :width] * level
     out[3, :height, :width] = level
     return out

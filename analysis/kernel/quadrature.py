@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from analysis.field import PAIR_INDEX
 from analysis.fit.kernel_args import PictureArgs, StopArgs
+from analysis.kernel.images import second_differences
 from analysis.kernel.prepared import PreparedReference
 
 BAND = 0.30
@@ -80,13 +81,13 @@ def make_sensors(ready: PreparedReference, line: NDArray[np.float64], size: int)
     line : (n,)
         The least-squares weight along one axis.
     """
-    basis = _basis(line)
+    basis, channels = _basis(line), np.concatenate([ready.images, second_differences(ready.images)])
     count = len(ready.origins)
     weights = np.zeros((count, 7, size, size), np.float32)
     covariance = np.zeros((count, 21), np.float32)
     for first in range(0, count, CHUNK):
         part = slice(first, min(first + CHUNK, count))
-        level, modes = _zois(ready, ready.origins[part], size)
+        level, modes = _zois(channels, ready.origins[part], size)
         weights[part] = _sensors_of(basis, level, modes, ready.pattern.noise)
     flat = weights[:, :6].reshape(count, 6, -1)
     for (i, j), k in PAIR_INDEX.items():
@@ -119,13 +120,13 @@ def _basis(line: NDArray[np.float64]) -> _Basis:
 
 
 def _zois(
-    ready: PreparedReference, origins: NDArray[np.int64], size: int
+    channels: NDArray[np.float32], origins: NDArray[np.int64], size: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Filtered level (B, n, n) and its derivatives along the six modes (B, 6, n, n) of some ZOIs."""
+    """Filtered level (B, n, n) of some ZOIs, and its changes by the six modes and by blur (B, 9, n, n)."""
     x = (np.arange(size) - (size - 1) / 2).astype(np.float32)
-    fx, fy, level = (zois_of(image, origins, size) for image in ready.images[:3])
+    fx, fy, level, _, *blurred = (zois_of(image, origins, size) for image in channels)
     modes = [g * b for g in (fx, fy) for b in (np.float32(1), x, x[:, None])]
-    return level, np.stack(modes, axis=1)
+    return level, np.stack([*modes, *blurred], axis=1)
 
 
 def zois_of(image: NDArray[np.float32], origins: NDArray[np.int64], size: int) -> NDArray[np.float32]:
@@ -138,21 +139,21 @@ def zois_of(image: NDArray[np.float32], origins: NDArray[np.int64], size: int) -
 def _sensors_of(
     basis: _Basis, level: NDArray[np.float32], modes: NDArray[np.float32], noise: float
 ) -> NDArray[np.float32]:
-    """Sensors (B, 7, n, n): joint least squares of all phases in quadrature."""
+    """Sensors (B, 7, n, n): joint least squares of all phases in quadrature, blur among what is solved for."""
     level = level - np.sum(level * basis.mean, axis=(1, 2), keepdims=True)
     modes = modes - np.sum(modes * basis.mean, axis=(2, 3), keepdims=True)
     reference = basis.spectra(level)
     power = np.abs(reference) ** 2
     chosen = basis.used & (power > MIN_POWER * noise**2)
     unit = np.where(chosen, reference / np.sqrt(np.maximum(power, 1e-20)), 0).astype(np.complex64)
-    sensitivity = np.imag(np.conj(unit)[:, None] * basis.spectra(modes))  # (B, 6, 3, Ky, Kx)
+    sensitivity = np.imag(np.conj(unit)[:, None] * basis.spectra(modes))  # (B, 9, 3, Ky, Kx)
     flat = sensitivity.reshape(*sensitivity.shape[:2], -1).astype(np.float64)
     normal = np.einsum("bik,bjk->bij", flat, flat)
     scale = 1 / np.sqrt(np.maximum(np.einsum("bii->bi", normal), 1e-30))
-    normal = normal * scale[:, :, None] * scale[:, None, :] + 1e-6 * np.eye(6)
-    solved = np.linalg.solve(normal, flat * scale[:, :, None]) * scale[:, :, None]
+    normal = normal * scale[:, :, None] * scale[:, None, :] + 1e-6 * np.eye(flat.shape[1])
+    solved = (np.linalg.solve(normal, flat * scale[:, :, None]) * scale[:, :, None])[:, :6]
     # Im(conj(unit) G) is the real part of <-i unit, G>: its adjoint gives the sensor.
-    phases = solved.reshape(sensitivity.shape).astype(np.float32) * (1j * unit)[:, None]
+    phases = solved.reshape(sensitivity[:, :6].shape).astype(np.float32) * (1j * unit)[:, None]
     out = np.empty((len(level), 7, *level.shape[1:]), np.float32)
     out[:, :6] = basis.images(phases.astype(np.complex64))
     total = np.maximum(np.sum(np.where(chosen, power, 0), axis=(1, 2, 3)), 1e-20)

@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from analysis.field import Roi, Status, StrainField, ZoiGrid, profile
 from analysis.fit.kernel_args import StopArgs
 from analysis.follow.renewal import Placement, place
-from analysis.kernel.images import Noise, NoiseModel, as_model, check_fit, clipped_pixels
+from analysis.kernel.images import Noise, NoiseModel, as_model, check_fit, clipped_pixels, rounding_variance
 from analysis.kernel.prepared import PatternError, PreparedReference, prepare_reference
 from analysis.kernel.quadrature import Sensors, make_sensors
 from analysis.kernel.settings import KernelSettings
+from analysis.kernel.white_noise import white_cubic
+from analysis.picture.impulses import without_impulses
 from analysis.picture.splines import Box
 
 if TYPE_CHECKING:
@@ -71,6 +73,14 @@ class ReferencePicture:
         Of u and v if nothing else were sought, for a noise of 1 GL.
     sums : MeanNoise or None
         Of the sensor form.
+    rounding : float, GL^2
+        Variance that rounding to whole grey levels leaves.
+    white : (2,) float64
+        ``white_noise.white_cubic``.
+    cleaned : bool
+        Whether it had wild pixels, which were replaced; later pictures are then cleaned, too.
+    period : (A,) float64, px
+        Smallest displacement at which a ZOI looks like itself (``repeating.periods``); infinite: none.
     """
 
     grid: ZoiGrid
@@ -88,6 +98,10 @@ class ReferencePicture:
     unit_sigma: Floats
     share_variance: Floats
     sums: MeanNoise | None
+    rounding: float
+    white: Floats
+    cleaned: bool
+    period: Floats
 
     @classmethod
     def first(
@@ -105,9 +119,11 @@ class ReferencePicture:
         origins = np.stack([grid.first_y[rows], grid.first_x[columns]], axis=1).astype(np.int64)
         model = None if noise is None else as_model(noise)
         saturated = clipped_pixels(image, clipped, model)
-        prepared = prepare_reference(image, origins, grid.size, settings, model, saturated)
+        cleaned = without_impulses(image)
+        whole = image if cleaned is None else cleaned
+        prepared = prepare_reference(whole, origins, grid.size, settings, model, saturated)
         _check_pattern(prepared.status)
-        return _laid_out(image, grid, settings, model, prepared)
+        return _laid_out(whole, grid, settings, model, prepared, cleaned is not None)
 
     def renewed(
         self,
@@ -121,10 +137,13 @@ class ReferencePicture:
         model = None if noise is None else as_model(noise)
         placement = place(field, self.index, self.modes, self.prepared.shape)
         saturated = clipped_pixels(image, clipped, model)
-        prepared = prepare_reference(image, placement.origins, size, settings, model, saturated)
+        cleaned = without_impulses(image)
+        whole = image if cleaned is None else cleaned
+        prepared = prepare_reference(whole, placement.origins, size, settings, model, saturated)
         gone = placement.status != Status.OK
         prepared = replace(prepared, status=np.where(gone, placement.status, prepared.status))
-        return _laid_out(image, self.grid, settings, model, prepared, placement)
+        made = _laid_out(whole, self.grid, settings, model, prepared, cleaned is not None, placement)
+        return replace(made, period=self.period)
 
     @property
     def modes(self) -> int:
@@ -193,6 +212,21 @@ class ReferencePicture:
         origins, deformed = self.prepared.origins, image.astype(np.float32)
         return self.all_modes(search(self.image, deformed, offset, self.region, origins, self.grid.size))
 
+    def searched_near(self, image: NDArray[Any], which: NDArray[np.intp], reach: float) -> Floats:
+        """The same for some ZOIs (B,) that are not farther than ``reach`` px from where they were, (B, modes)."""
+        from analysis.follow.search import search
+
+        origins, size = self.prepared.origins[which], self.grid.size
+        first, last = origins.min(axis=0), origins.max(axis=0) + size
+        top, left = np.maximum(first - int(reach), 0)
+        bottom, right = last + int(reach)
+        part = np.s_[top:bottom, left:right]
+        box = Roi(int(first[1] - left), int(first[0] - top), *(int(n) for n in (last - first)[::-1]))
+        offset = np.float32(self.prepared.pattern.mean)
+        deformed = np.ascontiguousarray(image[part], np.float32)
+        reference = np.ascontiguousarray(self.image[part])
+        return self.all_modes(search(reference, deformed, offset, box, origins - (top, left), size))
+
     def spread(self, values: NDArray[Any], empty: float = np.nan) -> NDArray[Any]:
         """(A, K) onto the grid: (K, R, C); where all ZOIs are active, the same memory."""
         return _spread(values, self.index, self.grid.shape, empty)
@@ -204,6 +238,7 @@ def _laid_out(
     settings: KernelSettings,
     model: NoiseModel | None,
     prepared: PreparedReference,
+    cleaned: bool,
     placement: Placement | None = None,
 ) -> ReferencePicture:
     """What every frame needs of a prepared picture, once."""
@@ -216,6 +251,7 @@ def _laid_out(
     index = np.flatnonzero(grid.active)
     lengths, slopes = (np.sqrt(np.maximum(prepared.covariance[:, k].astype(np.float64), 0)) for k in _AFFINE)
     unit_covariance = np.ascontiguousarray(_spread(prepared.covariance, index, grid.shape, 0))
+    share_variance = 1 / np.maximum(prepared.weight * sharpness * prepared.energy, 1e-12)
     return ReferencePicture(
         grid=grid,
         settings=settings,
@@ -230,8 +266,12 @@ def _laid_out(
         sharpness=sharpness,
         unit_covariance=unit_covariance,
         unit_sigma=np.stack([lengths.min(1), slopes.min(1), lengths.max(1)]),
-        share_variance=1 / np.maximum(prepared.weight * sharpness * prepared.energy, 1e-12),
+        share_variance=share_variance,
         sums=None if sensors is not None else _sums(grid, settings, index, prepared, unit_covariance),
+        rounding=rounding_variance(image),
+        white=white_cubic(prepared, grid.size, settings.order, share_variance),
+        cleaned=cleaned,
+        period=np.full(len(index), np.inf),
     )
 
 

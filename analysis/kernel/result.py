@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.field import Motion, Status, StrainField
+from analysis.field import Motion, Status, StrainField, stretched
+from analysis.field.picture_error import LIMIT, PictureError
 from analysis.follow.renewal import UNSHARED, Placement
+from analysis.kernel.coloured import BLUR, coloured_bias, error_cause
 from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]
 Covariance = NDArray[np.float32]
+
+FEW_REFUSED = 0.98
+"""Share of valid ZOIs from which on what all fits leave in common is that of the valid ones."""
+MIN_SHARE = 0.04
+"""Share of the common error that the deformed image has at least, however noisy the reference was said to be."""
 
 
 class PredictedMotion(NamedTuple):
@@ -23,10 +31,21 @@ class PredictedMotion(NamedTuple):
 
 
 class _Noise(NamedTuple):
-    """Variances a pixel of the reference and of the image at each ZOI, (A,), GL^2."""
+    """Variances a pixel of the reference and of the image at each ZOI, (A,), GL^2, and their share of u and of v.
+
+    ``colour`` (2,) is the variance of u and of v over that of white noise; ``over`` the standard deviation of both
+    images over that as given, NaN where it was not found.
+    """
 
     reference: Floats
     current: Floats
+    colour: Floats
+    over: float
+
+    def share(self, gain: Floats, ok: NDArray[np.bool_]) -> float:
+        """What of the variance is the reference's, median of some ZOIs."""
+        first = self.reference * gain**2
+        return float(np.median((first / (first + self.current))[ok])) if ok.any() else 0.0
 
 
 def field_of(solution: Solution, expected: PredictedMotion | None = None) -> StrainField:
@@ -45,11 +64,29 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
     gain = found.nuisance[:, 0]
     noise = _noise_parts(solution, ok)
     residual, first, whole = np.empty((3, len(ok)), np.float32)
-    weigh(ok, found.left, reference.prepared.freedom, gain, *noise, residual, first, whole)
-    covariance_reference, covariance = _covariances(solution, ok, noise, first, whole)
-    values = reference.total(found.p)
+    weigh(
+        ok,
+        found.left,
+        reference.prepared.freedom,
+        gain,
+        noise.reference,
+        noise.current,
+        residual,
+        first,
+        whole,
+    )
+    parts = _covariances(solution, ok, noise, first, whole)
+    error = _picture_error(solution, ok, noise)
+    moved, sharper = coloured_bias(solution, ok, error, noise.share(gain, ok))
+    p = found.p + moved
+    variance = np.where(ok, reference.prepared.blur * whole, np.float32(np.nan))
+    sigma_blur = np.sqrt(np.maximum(variance, 0))  # rounding may leave a little less than nothing
+    blur = np.stack([np.where(ok, found.nuisance[:, 2] + sharper, np.nan), sigma_blur]).astype(np.float32)
+    values = reference.total(p)
     if not ok.all():
         values = np.where(ok[:, None], values, np.nan)
+    gradients = reference.spread(values[:, reference.affine])
+    covariance_reference, covariance = (stretched(part, gradients) for part in parts)
     return StrainField(
         grid=reference.grid,
         parameters=reference.spread(values),
@@ -59,11 +96,22 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         status=reference.spread(solution.status[:, None], Status.NOT_MEASURED)[0],
         iterations=reference.spread(found.iterations[:, None], 0)[0],
         gain=reference.spread(gain[:, None].astype(np.float32))[0],
-        noise=_noise_found(solution, ok, noise.current),
+        noise=float(np.sqrt(np.median(noise.current[ok]))) if ok.any() else float("nan"),
         window=reference.settings.window,
         motion=None if expected is None else _motion(solution, values, expected),
         sums=reference.sums,
+        picture=error,
+        blur=reference.spread(blur.T),
     )
+
+
+def _picture_error(solution: Solution, ok: NDArray[np.bool_], noise: _Noise) -> PictureError | None:
+    if np.isnan(noise.over):
+        return None
+    error = PictureError(noise.over, (float(noise.colour[0]), float(noise.colour[1])))
+    if solution.had_lines:
+        return replace(error, cause="bands")
+    return replace(error, cause=error_cause(solution, ok)) if error.factor > LIMIT else error
 
 
 def _motion(solution: Solution, values: Floats, expected: PredictedMotion) -> Motion:
@@ -73,23 +121,39 @@ def _motion(solution: Solution, values: Floats, expected: PredictedMotion) -> Mo
     return motion_after(expected.motion, values, expected.values, solution.tolerance.trust, lever)
 
 
-def _noise_found(solution: Solution, ok: NDArray[np.bool_], current: Floats) -> float:
-    """Standard deviation of the deformed image, GL, as given or found; the median over the ZOIs."""
-    if solution.noise is not None and solution.noise.slope == 0 and ok.any():
-        return float(np.sqrt(solution.noise.floor))
-    return float(np.sqrt(np.median(current[ok]))) if ok.any() else float("nan")
-
-
 def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
-    """The noise of the two images; what is not given, from the residual."""
-    reference, current = solution.variances(np.s_[:], solution.found.nuisance[:, 0])
+    """The noise of the two images: together what the fits leave, of which the reference has what was given."""
+    gain, white = solution.found.nuisance[:, 0], np.ones(2)
+    reference, current = solution.variances(np.s_[:], gain)
+    common = solution.common
+    if common is None or solution.retried or np.count_nonzero(ok) < FEW_REFUSED * len(ok):
+        common = solution.pooled(np.flatnonzero(ok))
+    if common is not None:
+        blurred = abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR
+        # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
+        colour = np.maximum(common.colour, 1) if blurred else common.colour
+        whole = common.ratio * solution.expected(np.s_[:], gain)
+        return _Noise(
+            *_parted(whole, reference * gain**2, gain, solution),
+            colour,
+            float(np.sqrt(np.median(common.ratio[ok]))),
+        )
     if solution.noise is not None or not ok.any():
-        return _Noise(reference, current)
-    pooled = float(np.median((solution.found.left / solution.reference.prepared.freedom)[ok]))
-    if solution.reference.noise_model is None:  # shared equally
-        return _Noise(np.full(len(ok), pooled / 2), np.full(len(ok), pooled / 2))
-    rest = max(pooled - float(np.median(reference)), pooled / 4)
-    return _Noise(reference, np.full(len(ok), rest))
+        return _Noise(reference, current, white, float("nan"))
+    left = solution.found.left / solution.reference.prepared.freedom
+    found = max(float(np.median(left[ok])), solution.rounding)
+    whole = np.full(len(ok), found)
+    return _Noise(*_parted(whole, reference, np.ones(len(ok)), solution), white, float("nan"))
+
+
+def _parted(whole: Floats, reference: Floats, gain: Floats, solution: Solution) -> tuple[Floats, Floats]:
+    """A variance of both images, of which ``reference`` comes from the reference as given, as those of each."""
+    from analysis.fit.assembly import MIN_NOISE_GAIN
+
+    if solution.reference.noise_model is None:
+        reference = whole / 2
+    first = np.minimum(reference, (1 - MIN_SHARE) * whole)
+    return first / np.maximum(gain, MIN_NOISE_GAIN) ** 2, whole - first
 
 
 def _covariances(
@@ -104,10 +168,11 @@ def _covariances(
     ``first`` and ``whole`` (A,) are what scales the unit covariances (``assembly.weigh``).
     """
     reference = solution.reference
+    colour = _pairs(noise.colour)
     grows = any(m is not None and m.slope > 0 for m in (reference.noise_model, solution.noise))
     if reference.placement is None and not (grows and reference.prepared.covariance_level is not None):
-        return _scaled(solution, first, whole)
-    from_reference, from_current = _level_covariances(solution, noise)
+        return _scaled(solution, colour, first, whole)
+    from_reference, from_current = (colour * part for part in _level_covariances(solution, noise))
     if reference.placement is not None:
         from_reference, from_current = _composed(
             reference.placement, solution.found.p, from_reference, from_current
@@ -119,17 +184,23 @@ def _covariances(
     )
 
 
+def _pairs(colour: Floats) -> NDArray[np.float32]:
+    """Factors of the covariances, (21,), for variances of u and of v that are ``colour`` (2,) times as large."""
+    deviation = np.sqrt(np.repeat(colour, 3))
+    return np.array([deviation[i] * deviation[j] for i in range(6) for j in range(i, 6)], np.float32)
+
+
 def _scaled(
-    solution: Solution, first: NDArray[np.float32], whole: NDArray[np.float32]
+    solution: Solution, colour: NDArray[np.float32], first: NDArray[np.float32], whole: NDArray[np.float32]
 ) -> tuple[Covariance, Covariance]:
-    """The unit covariances times two variances of each ZOI."""
+    """The unit covariances times ``colour`` (21,) and two variances of each ZOI."""
     from analysis.fit.assembly import scale
 
     reference, unit = solution.reference, solution.reference.unit_covariance
     out = np.empty((2, *unit.shape), np.float32)
     flat = out.reshape(2, len(unit), -1)
     scale(
-        unit.reshape(len(unit), -1), reference.spread(first[:, None]).ravel(),
+        unit.reshape(len(unit), -1), colour, reference.spread(first[:, None]).ravel(),
         reference.spread(whole[:, None]).ravel(), flat[0], flat[1],
     )  # fmt: skip
     return out[0], out[1]
@@ -154,9 +225,12 @@ def _level_covariances(solution: Solution, noise: _Noise) -> tuple[Covariance, C
     by_gain = 1 / np.maximum(gain, MIN_NOISE_GAIN) ** 2
     first = noise.reference[:, None] * unit
     second = (noise.current * by_gain)[:, None] * unit
+    stated = solution.variances(np.s_[:], gain)
     if slope is not None and model is not None and model.slope > 0:
-        first = model.floor * unit + model.slope * slope
+        over = noise.reference / stated[0]
+        first = over[:, None] * (model.floor * unit + model.slope * slope)
     if slope is not None and own is not None and own.slope > 0:
+        over = by_gain * noise.current / stated[1]
         constant = own.floor + own.slope * (offset + (1 - gain) * ready.pattern.mean)
-        second = by_gain[:, None] * (constant[:, None] * unit + (own.slope * gain)[:, None] * slope)
+        second = over[:, None] * (constant[:, None] * unit + (own.slope * gain)[:, None] * slope)
     return first.astype(np.float32), second.astype(np.float32)

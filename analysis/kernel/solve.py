@@ -1,25 +1,36 @@
-"""One image measured against a reference: every ZOI iterated from a guess and judged, lost ones tried again.
+"""One image measured against a reference: every ZOI iterated from a guess and judged.
 
-A lost ZOI is tried again without extrapolation, from its neighbours, and by a search. ``result`` puts everything on
-the grid.
+``retry`` tries lost ones again, ``result`` puts everything on the grid.
 """
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field import Status, profile
-from analysis.fit.kernel_args import LEFT_IMAGE, FitArgs, OutArgs, PictureArgs, ReferenceArgs, VerdictArgs
+from analysis.fit.kernel_args import (
+    LEFT_IMAGE,
+    FitArgs,
+    OutArgs,
+    PictureArgs,
+    PooledError,
+    ReferenceArgs,
+    VerdictArgs,
+)
 from analysis.fit.validity import CENTRE_VARIANCE, CLIPPED_SHARE
-from analysis.kernel.images import NoiseModel
+from analysis.kernel.images import NoiseModel, rounding_variance
 from analysis.kernel.quadrature import Sensors
 from analysis.kernel.reference import SPILL_PX, Places, ReferencePicture
 from analysis.picture.splines import Box, prefilter_taps, tap_table
 
 Floats = NDArray[np.float64]
+
+DISTURBED_RATIO, DISTURBED_SHARE = 2.0, 0.02
+"""Of what is left over what the noise explains, and of the ZOIs that are refused: from here on wild pixels of the
+image are looked for."""
 
 
 class Solution:
@@ -41,6 +52,12 @@ class Solution:
     status : (A,) uint8
     tolerance : StopArgs
         Where the iteration may stop.
+    common : PooledError or None
+        What the fits leave in common; None: of too few ZOIs to be taken.
+    retried : bool
+        Whether ``keep`` has changed some ZOIs since.
+    had_lines : bool
+        Whether bands or lines were taken off the image (``lines.mend``).
     """
 
     def __init__(
@@ -48,22 +65,56 @@ class Solution:
     ) -> None:
         prepared = reference.prepared
         self.reference = reference
-        self.image = image
         self.noise = noise
         self.guess = guess
-        self.picture = self._picture(reference.reached(guess))
+        self.rounding = reference.rounding + rounding_variance(image)
+        self.common: PooledError | None = None
+        self.retried = False
+        self.had_lines = False
+        self._take(_cleaned(image) if reference.cleaned else image)
         self.table = tap_table(reference.settings.interpolant)
         self.tolerance = reference.tolerance(self._current_std())
+        self._noise, current = self.variances(np.s_[:], np.ones(len(guess)))
+        self._noise_left = np.maximum(prepared.freedom * (self._noise + current), 1e-9)
         able = prepared.status == Status.OK
         known = np.isfinite(guess.sum()) or np.isfinite(guess @ np.ones(guess.shape[1]))  # as a rule all
         which = np.flatnonzero(able & known)
+        self._places = which, able & ~known
+        self._solve(*self._places)
+
+    def _take(self, image: NDArray[Any]) -> None:
+        """Measure in ``image``."""
+        self.image = image
+        self.common = None
+        self.picture = self._picture(self.reference.reached(self.guess))
+
+    def measure_in(self, image: NDArray[Any]) -> None:
+        """Measure once more, in ``image``, from the same guess."""
+        self._take(image)
+        self._solve(*self._places)
+
+    @property
+    def is_disturbed(self) -> bool:
+        """Whether the image leaves much more than its noise, or many ZOIs are refused: it may have wild pixels."""
+        which = self._places[0]
+        refused = np.count_nonzero(self.status[which] != Status.OK)
+        return self.leaves_much or bool(refused > DISTURBED_SHARE * len(which))
+
+    @property
+    def leaves_much(self) -> bool:
+        """Whether the image leaves much more than its noise."""
+        return self.common is not None and float(np.median(self.common.ratio)) > DISTURBED_RATIO
+
+    def _solve(self, which: NDArray[np.intp], unknown: NDArray[np.bool_]) -> None:
+        guess = self.guess
         if len(which) == len(guess):  # as a rule: no copies
             self.found, self.status = self.solved(which, guess)
             return
         self.found = OutArgs.unmeasured(*guess.shape)
-        self.status = np.where(able & ~known, np.uint8(Status.LOST), prepared.status)
+        self.status = np.where(unknown, np.uint8(Status.LOST), self.reference.prepared.status)
         if len(which):
             self.keep(which, *self.solved(which, guess[which]))
+        self.retried = False
 
     def _picture(self, box: Box) -> PictureArgs:
         from analysis.picture.prefilter import coefficients
@@ -87,7 +138,7 @@ class Solution:
         if self._box != reference.whole and (found.state == LEFT_IMAGE).any():
             self.picture = self._picture(reference.whole)
             found = self._fitted(places, guess)
-        return found, self._verdicts(places, found)
+        return found, self.verdicts(places, found)
 
     def _fitted(self, places: Places, guess: Floats) -> OutArgs:
         if self.reference.sensors is None:
@@ -96,6 +147,7 @@ class Solution:
 
     def keep(self, which: NDArray[np.intp], found: OutArgs, status: NDArray[np.uint8]) -> None:
         """Take over what was found of the ZOIs ``which``."""
+        self.retried = True
         self.status[which] = status
         self.found.put(which, found)
 
@@ -133,7 +185,8 @@ class Solution:
             ready.images.ravel(), ready.images[0].size, ready.images.shape[2],
             ready.origins[which], grid.size, self.reference.spacing, order, ready.shapes.rows, ready.shapes.mix,
             ready.inverse[padded], ready.cross[padded],
-            ready.weight * ready.energy[which], parameter_scale(order, grid.size),
+            ready.weight * ready.energy[which], parameter_scale(order, grid.size), ready.bias[which],
+            self._noise[which], self._noise_left[which],
         )  # fmt: skip
 
     def _by_phases(self, sensors: Sensors, which: Places, guess: Floats) -> OutArgs:
@@ -146,28 +199,70 @@ class Solution:
             guess, self.tolerance.at(which),
         )  # fmt: skip
         seen = self._iterated(which, values, max_iterations=1)
-        return OutArgs(values, seen.left, seen.bending, seen.nuisance, state, iterations)
+        return seen._replace(p=values, state=state, iterations=iterations)
 
-    def _verdicts(self, which: Places, found: OutArgs) -> NDArray[np.uint8]:
+    def verdicts(self, which: Places, found: OutArgs) -> NDArray[np.uint8]:
+        """The status of some ZOIs with what was found of them."""
         from analysis.fit.verdict import judge
 
         reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
-        freedom = ready.freedom[which]
-        known = ReferenceArgs(
-            ready.signal[which], freedom * reference.sharpness, reference.share_variance[which],
-            reference.unit_sigma[2, which],
-        )  # fmt: skip
-        noise_known = self.noise is not None and reference.noise_model is not None
+        known, expected = self._known(), self.expected(which, found.nuisance[:, 0])
         far = CENTRE_VARIANCE[settings.order - 1]
-        rule = VerdictArgs(noise_known, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far)
-        status = np.empty(len(freedom), np.uint8)
-        judge(found, found.left / freedom, self._expected(which, found.nuisance[:, 0]), known, rule, status)
+        rule = VerdictArgs(
+            self._is_given, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far
+        )
+        left = self._left(which, found)
+        if self.common is None and 2 * len(expected) > len(
+            self._places[0]
+        ):  # some that are retried forgive nothing
+            self.common = self.pooled(which, found)
+        common = PooledError.none(len(known.signal)) if self.common is None else self.common
+        status = np.empty(len(expected), np.uint8)
+        judge(found, left, expected, common.at(which), known.at(which), rule, status)
         return status
 
-    def _expected(self, which: Places, gain: Floats) -> Floats:
+    def pooled(self, which: Places, found: OutArgs | None = None) -> PooledError | None:
+        """What the fits of the ZOIs ``which`` leave in common, from so many of them; None: as they are kept."""
+        from analysis.fit.pooling import MAX_POOLED, pooled
+
+        places = np.arange(len(self.guess))[which]
+        every = 1 + len(places) // MAX_POOLED
+        chosen = places[::every]
+        some = self.found.at(chosen) if found is None else found.at(np.arange(0, len(places), every))
+        left, expected = self._left(chosen, some), self.expected(chosen, some.nuisance[:, 0])
+        return pooled(some, left, expected, self._known(every), chosen, self._is_given)
+
+    @property
+    def noise_taken(self) -> Floats:
+        """Variance a pixel of the reference, (A,), whose bias the fits have taken off (``noise_bias``), GL^2."""
+        return np.asarray(self._noise * np.minimum(np.maximum(self.found.left, 0) / self._noise_left, 1))
+
+    @property
+    def _is_given(self) -> bool:
+        """Whether the noise of both images was given."""
+        return self.noise is not None and self.reference.noise_model is not None
+
+    def _known(self, every: int = 1) -> ReferenceArgs:
+        """For the verdict; of each ZOI, or where one in ``every`` counts."""
+        reference, ready = self.reference, self.reference.prepared
+        pixels = ready.freedom * reference.sharpness
+        return ReferenceArgs(
+            ready.signal,
+            pixels,
+            reference.share_variance,
+            reference.unit_sigma[2],
+            reference.white,
+            min(1.0, every * (2 * reference.grid.step / reference.grid.size) ** 2),
+        )
+
+    def _left(self, which: Places, found: OutArgs) -> Floats:
+        """Variance a pixel that the fit leaves, GL^2; rounding leaves something where the images are equal, too."""
+        return np.maximum(found.left / self.reference.prepared.freedom[which], self.rounding)
+
+    def expected(self, which: Places, gain: Floats) -> Floats:
         """Variance a pixel that noise alone leaves in the difference of the images, GL^2."""
         reference, current = self.variances(which, gain)
-        return np.asarray(np.minimum(gain**2, 25.0) * reference + current)
+        return np.asarray(np.maximum(np.minimum(gain**2, 25.0) * reference + current, self.rounding))
 
     def variances(self, which: Places, gain: Floats) -> tuple[Floats, Floats]:
         """Variance a pixel of the reference and of the image at some ZOIs, GL^2; the reference's where not known."""
@@ -182,121 +277,8 @@ class Solution:
         return reference, own.variance(level if own.slope == 0 else level * np.maximum(gain, 0))
 
 
-RETRY_ROUNDS = 40
-SEARCH_SHARE = 0.3
-"""Share of lost ZOIs from which on the whole picture is searched again."""
-_WORTH_RETRYING = np.isin(
-    list(Status), (Status.LOST, Status.NOT_CONVERGED, Status.POOR_MATCH, Status.OUTSIDE)
-)
-"""By status."""
-_DOWN, _RIGHT = (offset.ravel() - 1 for offset in np.indices((3, 3)))
-"""Rows and columns to a ZOI's neighbours, itself among them."""
+def _cleaned(image: NDArray[Any]) -> NDArray[Any]:
+    from analysis.picture.impulses import without_impulses
 
-
-def retry_lost(solution: Solution, before: Floats | None, clipped: NDArray[np.bool_] | None = None) -> None:
-    """Try lost ZOIs again from other guesses; a worse outcome does not replace a better one.
-
-    Parameters
-    ----------
-    solution : Solution
-    before : (A, modes), or None
-        Parameters of the frame before; None: the guess was searched for.
-    clipped : (H, W) bool, or None
-        Saturated pixels: a ZOI on them is refused, before it is tried again and after.
-    """
-    if clipped is not None:
-        solution.refuse_clipped(clipped)
-    lost = _lost(solution)
-    if not lost.any():
-        return
-    _retry_lost(solution, before)
-    if clipped is not None:
-        solution.refuse_clipped(clipped, lost)
-
-
-def _retry_lost(solution: Solution, before: Floats | None) -> None:
-    reference = solution.reference
-    # Without its gradients a guess is right for ZOIs beside a discontinuity.
-    displacements = np.arange(reference.modes) % (reference.modes // 2) == 0
-    _retry(solution, solution.guess * displacements if before is None else before)
-    _retry_from_neighbours(solution)
-    able = np.count_nonzero(reference.prepared.status == Status.OK)
-    if before is not None and np.count_nonzero(_lost(solution)) > SEARCH_SHARE * able:
-        _retry(solution, reference.searched(solution.image))
-        _retry_from_neighbours(solution)
-
-
-def _lost(solution: Solution) -> NDArray[np.bool_]:
-    return np.asarray(_WORTH_RETRYING[solution.status] & (solution.reference.prepared.status == Status.OK))
-
-
-def _retry(solution: Solution, guess: Floats) -> None:
-    which = np.flatnonzero(_lost(solution) & np.isfinite(guess).all(axis=1))
-    if len(which):
-        _retry_some(solution, which, guess[which])
-
-
-def _retry_some(solution: Solution, which: NDArray[np.intp], guess: Floats) -> None:
-    found, status = solution.solved(which, guess)
-    good = np.flatnonzero(status == Status.OK)
-    solution.keep(which[good], found.at(good), status[good])
-
-
-def _retry_from_neighbours(solution: Solution) -> None:
-    """Let good ZOIs lend their shape to lost neighbours, round by round."""
-    solved = np.zeros(len(solution.status), np.uint8)
-    places = _Places.of(solution.reference)
-    for _ in range(RETRY_ROUNDS):
-        lost = np.flatnonzero(_lost(solution))
-        guess, lenders = _lent_guesses(solution, places, lost)
-        fresh = np.isfinite(guess[:, 0]) & (lenders > solved[lost])
-        if not fresh.any():
-            return
-        solved[lost] = lenders
-        _retry_some(solution, lost[fresh], guess[fresh])
-
-
-class _Places(NamedTuple):
-    """Where the ZOIs lie on the grid.
-
-    Attributes
-    ----------
-    zoi : (R + 2, C + 2)
-        Which of the active ZOIs, -1 for none; the grid begins at (1, 1).
-    row, column : (A,)
-        Of each active ZOI in ``zoi``.
-    """
-
-    zoi: NDArray[np.intp]
-    row: NDArray[np.intp]
-    column: NDArray[np.intp]
-
-    @classmethod
-    def of(cls, reference: ReferencePicture) -> _Places:
-        rows, columns = reference.grid.shape
-        row, column = np.unravel_index(reference.index, (rows, columns))
-        zoi = np.full((rows + 2, columns + 2), -1, np.intp)
-        zoi[row + 1, column + 1] = np.arange(len(reference.index))
-        return cls(zoi, row + 1, column + 1)
-
-
-def _lent_guesses(
-    solution: Solution, places: _Places, lost: NDArray[np.intp]
-) -> tuple[Floats, NDArray[np.uint8]]:
-    """For each of the lost ZOIs (L,) the mean of what its good neighbours predict there, (L, modes), and their number.
-
-    Of a ZOI's shape u, du_dx, du_dy, v, dv_dx, dv_dy count, moved by the step to the neighbour.
-    """
-    reference, step = solution.reference, solution.reference.grid.step
-    good = np.append(solution.status == Status.OK, False)  # the last for "none"
-    zoi = places.zoi[places.row[lost, None] + _DOWN, places.column[lost, None] + _RIGHT]
-    to, which = np.nonzero(good[zoi])
-    lender = zoi[to, which]
-    part = reference.total(solution.found.p[lender], lender)[:, reference.affine]
-    for r in (0, 3):
-        part[:, r] -= step * (_RIGHT[which] * part[:, r + 1] + _DOWN[which] * part[:, r + 2])
-    number = np.bincount(to, minlength=len(lost))
-    total = np.stack([np.bincount(to, values, len(lost)) for values in part.T], axis=1)
-    with np.errstate(invalid="ignore"):
-        mean = np.where(number[:, None] > 0, total / np.maximum(number, 1)[:, None], np.nan)
-    return reference.local(reference.all_modes(mean), lost), number.astype(np.uint8)
+    cleaned = without_impulses(image)
+    return image if cleaned is None else cleaned

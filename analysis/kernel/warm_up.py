@@ -48,9 +48,9 @@ def _loops(phase: bool) -> list[Any]:
 
     loops = [
         sensitivity.prepare, iteration.track, hill_climb.climb, prediction.advance, verdict.judge,
-        assembly.weigh, assembly.scale, assembly.clipped_shares, sums.scatter,
+        assembly.weigh, assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
     ]  # fmt: skip
-    return loops + [iteration.warp_zois, iteration.compose_all, iteration.within_image] * phase
+    return loops + [iteration.compose_all, iteration.within_image] * phase
 
 
 def share_compiled(kinds: Sequence[str], since: float, *, phase: bool) -> float:
@@ -148,9 +148,11 @@ def _iteration() -> None:
     from analysis.fit.kernel_args import FitArgs, OutArgs, StopArgs
 
     none, no_images = np.empty(0), np.empty((0, 6, 6), np.float32)
+    no_bias = np.empty((0, 6), np.float32)
     fit = FitArgs(
         np.empty(0, np.float32), 0, 0, np.empty((0, 2), np.int64), 32, 16, 1,
         np.empty((4, 32), np.float32), np.empty((4, 4)), no_images, no_images, np.empty((0, 2)), np.empty(6),
+        no_bias, none, none,
     )  # fmt: skip
     track(
         _no_picture(),
@@ -169,11 +171,10 @@ def _no_picture() -> PictureArgs:
 
 def _phase() -> None:
     """What only the estimator by phases needs, again for no ZOI at all."""
-    from analysis.fit.iteration import compose_all, warp_zois, within_image
+    from analysis.fit.iteration import compose_all, within_image
 
     picture, origins, p = _no_picture(), np.empty((0, 2), np.int64), np.empty((0, 6))
     within_image(picture, origins, 32, p, np.empty(0, np.bool_))
-    warp_zois(picture, np.empty(18, np.float32), origins, 32, p, np.empty((0, 32, 32), np.float32))
     compose_all(p, p)
 
 
@@ -191,7 +192,8 @@ def _prefilter(kinds: Sequence[str]) -> None:
 def _rest() -> None:
     """All but the iteration, the prefilter and what only the estimator by phases needs."""
     from analysis.fit.assembly import clipped_share, scale, weigh
-    from analysis.fit.kernel_args import OutArgs, ReferenceArgs, VerdictArgs
+    from analysis.fit.iteration import warp_zois
+    from analysis.fit.kernel_args import OutArgs, PooledError, ReferenceArgs, VerdictArgs
     from analysis.fit.verdict import judge
     from analysis.follow.prediction import motion_after
     from analysis.kernel.reference import ReferencePicture
@@ -208,11 +210,14 @@ def _rest() -> None:
     clipped_share(np.zeros((32, 32), np.bool_), np.zeros((1, 2), np.int64), line)
     none, pairs, single = np.empty(0), np.empty((0, 2)), np.empty(0, np.float32)
     judge(
-        OutArgs.starting(np.empty((0, 6))), none, none, ReferenceArgs(none, none, pairs, none),
-        VerdictArgs(True, np.empty(2), 1.0, 0.05, 4.0), np.empty(0, np.uint8),
+        OutArgs.starting(np.empty((0, 6))), none, none, PooledError.none(0),
+        ReferenceArgs(none, none, pairs, none, np.ones(2), 1.0), VerdictArgs(True, np.empty(2), 1.0, 0.05, 4.0),
+        np.empty(0, np.uint8),
     )  # fmt: skip
     weigh(np.empty(0, np.bool_), none, none, np.empty((2, 2))[:, 0], none, none, single, single, single)
+    origins, p = np.empty((0, 2), np.int64), np.empty((0, 6))
+    warp_zois(_no_picture(), np.empty(18, np.float32), origins, 32, p, np.empty((0, 32, 32), np.float32))
     unit = np.empty((21, 0), np.float32)
-    scale(unit, single, single, unit, unit)
+    scale(unit, np.ones(21, np.float32), single, single, unit, unit)
     index, values = np.empty(0, np.intp), np.empty((0, 6))
     motion_after(Motion.none(index, 6), values, values, none, 1.0)

@@ -35,6 +35,8 @@ class Pattern:
         Standard deviation of the noise in the reference, as given or as its spectrum shows.
     left_gradient : float, 1/px^2
         Mean square of a filtered gradient over the variance of the noise, where there is only noise.
+    own_noise : (3,) float64
+        What the noise of a pixel puts into f, f_xx and f_yy of that pixel, shares of it.
     """
 
     level: NDArray[np.float32]
@@ -43,6 +45,7 @@ class Pattern:
     mean: float
     noise: float
     left_gradient: float
+    own_noise: NDArray[np.float64]
 
 
 def filtered_pattern(image: NDArray[np.float32], noise: float | None, degree: int) -> Pattern:
@@ -89,7 +92,16 @@ def filtered_pattern(image: NDArray[np.float32], noise: float | None, degree: in
         mean=mean,
         noise=float(np.sqrt(variance)),
         left_gradient=float(np.mean(np.abs(response * along_x) ** 2)),
+        own_noise=_at_no_lag(response, kx, ky),
     )
+
+
+def _at_no_lag(
+    response: NDArray[np.float32], kx: NDArray[np.floating], ky: NDArray[np.floating]
+) -> NDArray[np.float64]:
+    """The filters of f, f_xx and f_yy (differences of pixels) in space, at the pixel itself, (3,)."""
+    bends = (2 * np.cos(2 * np.pi * k) - 2 for k in (kx, ky))
+    return np.array([np.mean(response), *(np.mean(response * bend) for bend in bends)], np.float64)
 
 
 def radial_spectrum(image: NDArray[np.float32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -37,7 +37,6 @@ def command(arguments: argparse.Namespace) -> int:
 
     row, column = _row_and_column(arguments.zoi)
     out = Path(arguments.out)
-    drawn = figure(15, 4)
     with Session.open(arguments.session) as session:
         grid = _grid_of(session, arguments)
         rows, columns = grid.shape
@@ -49,6 +48,7 @@ def command(arguments: argparse.Namespace) -> int:
     left, top = int(grid.first_x[column]), int(grid.first_y[row])
     spectrum = zoi_spectrum(pictures[0], pictures[1], left, top, grid.size)
     where = f"ZOI {row},{column} ({grid.size} px at x {left}, y {top})"
+    drawn = figure(15, 4)
     title = f"{Path(arguments.session).name}: {where}, frame {arguments.frame}"
     draw_spectrum(drawn, spectrum, title)
     save_new(drawn, out)

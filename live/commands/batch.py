@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import threading
 from pathlib import Path
 
 from acquire.errors import ConfigError
+from acquire.system import cores
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import (
     MEASURE,
@@ -37,7 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--workers",
         type=int,
-        default=_cores(),
+        default=cores(),
         metavar="N",
         help="number of processes (default: one per core)",
     )
@@ -96,10 +96,3 @@ def _chunk_s(arguments: argparse.Namespace) -> float | None:
             "--as-measured is bit-identical to the live run and chunks are not; leave --chunk out"
         )
     return chunk_s
-
-
-def _cores() -> int:
-    try:
-        return len(os.sched_getaffinity(0))
-    except AttributeError:  # not available on every system
-        return os.cpu_count() or 1

@@ -29,7 +29,7 @@ from live.config.loading import Config
 from live.setup.check.check_list import CheckFigures, examine, table_lines
 from live.setup.check.sample import take
 from live.setup.check.verdict import DEFAULT_TARGET, check_lines
-from live.setup.devices import open_load
+from live.setup.devices import check_load_port, open_load
 from live.setup.placement import with_auto_gauges
 from live.setup.region import report_warnings
 from live.setup.specimen_drawing import Overlay, snapshot
@@ -69,6 +69,7 @@ def command(arguments: argparse.Namespace) -> int:
         raise ConfigError("no camera is given; use --camera ADDRESS (see phasedic devices)")
     if arguments.snapshot:
         require_new(Path(arguments.snapshot), *PICTURES)
+    check_load_port(config.load.address)
     target = None if arguments.target is None else arguments.target * 1e-6
     if arguments.watch:
         with interrupts() as stop:

@@ -55,7 +55,12 @@ def watch(config: Config, target: float | None, screen: Screen, stopped: Callabl
                 if stack is not None:
                     quick = checker.check(stack)
                     lines = check_lines(quick.figures, target, config.measure.reference_shift_px)
-                    shown = [*notes[-MAX_NOTES:], peak_line(quick), *(line.text() for line in lines)]
+                    shown = [
+                        *notes[-MAX_NOTES:],
+                        peak_line(quick),
+                        *blur_line(quick),
+                        *(line.text() for line in lines),
+                    ]
                     display.lines(shown, short_line(quick, lines))
                     view(rolling, quick, lines)
                 due = max(
@@ -77,6 +82,12 @@ def peak_line(quick: QuickCheck) -> str:
     full = round(BAR_LENGTH * min(quick.of_peak, 1.0))
     bar = "#" * full + "." * (BAR_LENGTH - full)
     return f"sharpness {quick.figures.sharpness:.3f} [{bar}] {quick.of_peak:.0%} of the peak {quick.peak:.3f}"
+
+
+def blur_line(quick: QuickCheck) -> list[str]:
+    """The blur since the sharpest picture; nothing where it is not known."""
+    text = quick.blur.text
+    return [f"          {text} than the sharpest picture so far"] if text else []
 
 
 def short_line(quick: QuickCheck, lines: list[CheckLine]) -> str:
@@ -163,7 +174,7 @@ def card(quick: QuickCheck, lines: list[CheckLine]) -> str:
     rows = [
         f"| {'' if line.good else '**LOOK**'} | {_cell(line.what)} | {_cell(line.value)} |" for line in lines
     ]
-    return "\n".join([f"`{peak_line(quick)}`", "", "| | | |", "|---|---|---|", *rows])
+    return "\n".join([f"`{peak_line(quick)}`", *blur_line(quick), "", "| | | |", "|---|---|---|", *rows])
 
 
 def _cell(text: str) -> str:

@@ -23,6 +23,7 @@ from live.run.control import ControlPort
 from live.run.keyboard import listen
 from live.run.live_run import INTERRUPTED, LiveRun, run_live
 from live.run.outcome import Outcome, StopSignal
+from live.setup.devices import check_load_port
 from live.setup.region import located
 from live.ui.rerun.view import has_display, rerun_command, spawn_viewer
 from live.ui.terminal.screen import TerminalScreen
@@ -52,6 +53,7 @@ def command(arguments: argparse.Namespace) -> int:
     screen, config = TerminalScreen(), configured(arguments)
     check_alarms(config)
     check_folder(config.output.dir)
+    check_load_port(config.load.address)
     with located(config, screen.print) as config:
         outcome = run_and_show_page(config, screen) if arguments.page else run_attended(config, screen)
     if not arguments.page:

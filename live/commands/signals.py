@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
 
-from acquire.signal_mask import signal_handler
+from acquire.system import HANGUP, signal_handler
 
 
 @contextlib.contextmanager
@@ -25,7 +25,7 @@ def signals(stop: Callable[[], None], print_line: Callable[[str], None]) -> Iter
         print_line("closing the files ..." if times == 1 else "still closing; a third signal ends it at once")
         stop()
 
-    with signal_handler(handle, signal.SIGINT, signal.SIGTERM), signal_handler(signal.SIG_IGN, signal.SIGHUP):
+    with signal_handler(handle, signal.SIGINT, signal.SIGTERM), signal_handler(signal.SIG_IGN, *HANGUP):
         yield
 
 

@@ -70,7 +70,8 @@ def _check_zois(gauge: Gauge, grid: ZoiGrid) -> None:
         return
     raise ConfigError(
         f"gauges.{gauge.name}: no ZOI is there; the centres of ZOIs reach from {grid.x[0]:g}, {grid.y[0]:g} to"
-        f" {grid.x[-1]:g}, {grid.y[-1]:g} px, and a mask may leave some out"
+        f" {grid.x[-1]:g}, {grid.y[-1]:g} px, and a mask may leave some out;"
+        " move or widen the gauge, or take it out of the configuration"
     )
 
 

@@ -29,6 +29,7 @@ from live.config.sections import (
     MeasureConfig,
     OperateConfig,
     OutputConfig,
+    PlateConfig,
     RecordConfig,
     ScaleConfig,
     SpecimenConfig,
@@ -62,21 +63,24 @@ class Config:
     output: OutputConfig = field(default_factory=OutputConfig)
     alarm: tuple[AlarmConfig, ...] = ()
     gauges: Mapping[str, GaugeTable] = field(default_factory=dict)
+    plate: Mapping[str, PlateConfig] = field(default_factory=dict)
     metadata: Mapping[str, Any] = field(default_factory=dict)
 
     def as_dict(self) -> dict[str, Any]:
         """Nested plain values for JSON: the keys of each section, the alarms by number."""
         plain = dataclasses.asdict(self)
+        if not self.plate:  # a section that versions before do not have
+            del plain["plate"]
         return plain | {"alarm": {str(n): alarm for n, alarm in enumerate(plain["alarm"], 1)}}
 
 
-AUTO_GAUGES = ("axial", "transverse", "area")
+AUTO_GAUGES = ("extension", "width", "area")
 """The gauges that ``live.setup.placement`` places on the specimen."""
 
 _SECTIONS: dict[str, type] = {
     f.name: f.default_factory  # type: ignore[misc]
     for f in dataclasses.fields(Config)
-    if f.name not in ("metadata", "gauges", "alarm")
+    if f.name not in ("metadata", "gauges", "alarm", "plate")
 }
 
 
@@ -163,7 +167,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
 
 
 def _build(tree: Mapping[str, Any], where: str) -> Config:
-    known = [*_SECTIONS, "alarm", "gauges", "metadata"]
+    known = [*_SECTIONS, "alarm", "gauges", "plate", "metadata"]
     parts: dict[str, Any] = {}
     px_per_mm = _px_per_mm(tree, where)
     for name, content in tree.items():
@@ -177,6 +181,8 @@ def _build(tree: Mapping[str, Any], where: str) -> Config:
             parts[name] = dict(content)
         elif name == "gauges":
             parts[name] = {gauge: _gauge(gauge, table, where, px_per_mm) for gauge, table in content.items()}
+        elif name == "plate":
+            parts[name] = {plate: _plate(plate, table, where, px_per_mm) for plate, table in content.items()}
         else:
             parts[name] = _section(_SECTIONS[name], name, content, where, px_per_mm)
     _check_metadata(parts.get("metadata", {}), where)
@@ -221,13 +227,25 @@ def _accepted(
     return values
 
 
-def _gauge(name: str, table: Any, where: str, px_per_mm: float | None) -> GaugeTable:
-    if not NAME_PATTERN.fullmatch(name):
-        raise ConfigError(
-            f"{where}: gauges.{name}: a name has up to 32 letters, digits and _, a letter first"
-        )
+def _named_table(dotted: str, table: Any, where: str) -> Mapping[str, Any]:
+    """The table ``section.NAME``; raises ConfigError for an impossible name."""
+    if not NAME_PATTERN.fullmatch(dotted.partition(".")[2]):
+        raise ConfigError(f"{where}: {dotted}: a name has up to 32 letters, digits and _, a letter first")
     if not isinstance(table, Mapping):
-        raise ConfigError(f"{where}: gauges.{name} must be a table, [gauges.{name}] with keys below it")
+        raise ConfigError(f"{where}: {dotted} must be a table, [{dotted}] with keys below it")
+    return table
+
+
+def _plate(name: str, table: Any, where: str, px_per_mm: float | None) -> PlateConfig:
+    dotted = f"plate.{name}"
+    plate = _section(PlateConfig, dotted, _named_table(dotted, table, where), where, px_per_mm)
+    if plate.box is None:
+        raise ConfigError(f"{where}: {dotted}: give box = [x, y, width, height] in px")
+    return plate
+
+
+def _gauge(name: str, table: Any, where: str, px_per_mm: float | None) -> GaugeTable:
+    table = _named_table(f"gauges.{name}", table, where)
     values = _accepted(gauge_checks(table.get("kind")), f"gauges.{name}", table, where, px_per_mm)
     return {"kind": DEFAULT_KIND, **values}
 

@@ -89,7 +89,7 @@ def _change(document: TOMLDocument, section: str, key: str, value: Any, path: Pa
     if section not in document:
         if value is None:
             return
-        document.add(section, tomlkit.table(is_super_table=section == "gauges"))
+        document.add(section, tomlkit.table(is_super_table=section in ("gauges", "plate")))
     table: Any = document[section]
     if not isinstance(table, Mapping):
         raise ConfigError(f"{path}: {section} must be a section, [{section}] with keys below it")

@@ -14,6 +14,7 @@ from live.config.values import (
     LISTEN_ADDRESS,
     NAMES,
     RECORD_MODE,
+    RECTANGLE,
     REGION,
     STRAINS,
     TEXT,
@@ -41,6 +42,9 @@ class CameraConfig:
     crop: tuple[int, int, int, int] | None = key(BOX, None,
         "x, y, width, height of the part of the picture to use, px; its corner is the origin of all coordinates",
         Option("crop", "X,Y,W,H", expert=True))
+    readout_ms: float | None = key(number(0, 10_000), None,
+        "time of a rolling shutter from the first line of the picture to the last, ms: the strain that motion shows"
+        " by it is removed")
     dark: str | None = key(TEXT, None,
         "dark frame (TIFF), subtracted from every burst", Option("dark", "FILE", expert=True))
     flat: str | None = key(TEXT, None,
@@ -81,7 +85,7 @@ class MeasureConfig:
     mask: str | None = key(TEXT, None,
         "mask image; ZOIs on its black parts are not measured", Option("mask", "FILE"))
     gauges: str = key(choice(GIVEN, AUTO), GIVEN,
-        "virtual gauges: given: those of the configuration; auto: also axial, transverse and area on the specimen",
+        "virtual gauges: given: those of the configuration; auto: also extension, width and area of the specimen",
         Option("gauges"))
     window: str = key(choice("gaussian", "uniform", "tukey", "bi-triangular"), "gaussian",
         "weight of the pixels of a ZOI in the least-squares fit: gaussian, uniform, tukey, bi-triangular",
@@ -120,6 +124,14 @@ class ScaleConfig:
     def px_per_mm(self) -> float | None:
         """None if the scale is not known."""
         return None if self.mm_per_px is None else 1 / self.mm_per_px
+
+
+@dataclass(frozen=True, slots=True)
+class PlateConfig:
+    """[plate.NAME]: a plate that moves with the specimen and is not loaded (docs/optics.md)."""
+
+    box: tuple[float, float, float, float] | None = key(RECTANGLE, None,
+        "x, y, width, height of the pattern on the plate, px")
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,6 +226,15 @@ class SpecimenConfig:
         "area of the section, mm^2; takes precedence over width, thickness and diameter")
     gauge_length_mm: float | None = key(number(1e-3, 1e6), None,
         "gauge length, mm; reported with the extensions")
+    force_error_percent: float | None = key(number(0, 100), None,
+        "limit of error of the load cell, % (its class): in the interval of E")
+    section_error_percent: float | None = key(number(0, 100), None,
+        "limit of error of the area of the section, %: in the interval of E")
+    strain_error_um_m: float | None = key(number(0, 1e5), None,
+        "limit of error of the strain that comes with the load over the elastic interval, um/m: motion off the plane"
+        " (0.1 mm at 500 mm: 200), lens, alignment; in the interval of E")
+    nu: float | None = key(number(0, 0.5), None,
+        "Poisson's ratio, where it is known: a warning where strains of an elastic test do not fit it")
     axis: str = key(choice(AUTO, "x", "y"), AUTO,
         "direction of the load in the picture; auto: the direction of the largest strain, y until it is clear",
         Option("axis"))

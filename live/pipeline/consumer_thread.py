@@ -15,10 +15,11 @@ from acquire.events import Event, EventKind
 from acquire.frame import Frame
 from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
+from acquire.system import lower_priority
 from live.pipeline.consumer import KINDS, Consumer, ConsumerReport, Policy, kinds_taken
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
-from live.pipeline.latency import OUTPUT, lower_priority
+from live.pipeline.latency import OUTPUT
 from live.pipeline.measurement import ForceMatching, Measurement, TimeStep
 
 log = logging.getLogger(__name__)

@@ -1,6 +1,6 @@
 """The latency of the measurement: a monitor that names the cause of delays, and the priorities of the threads.
 
-Processor use comes from /proc and priorities are nice values of threads; both on Linux only. Recording
+Priorities are nice values of threads, on Linux only. Recording
 needs a higher priority than measuring: with the recorder at nice +5 hundreds of frames were not recorded
 at 150 fps, at 0 none. A thread inherits the value of the thread that starts it, so the pool of the compiled
 loops has that of the measuring thread.
@@ -8,18 +8,15 @@ loops has that of the measuring thread.
 
 from __future__ import annotations
 
-import contextlib
 import math
-import os
-import sys
-import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
+
+from acquire.system import processor_times
 
 WINDOW_S = 5.0
 """The monitor judges the latencies of this time."""
@@ -54,31 +51,8 @@ class ProcessorUse:
 
 def processor_use() -> ProcessorUse | None:
     """The processor time now; None where the system does not provide it."""
-    try:
-        tick = os.sysconf("SC_CLK_TCK")
-        fields = [int(word) for word in Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:]]
-        # user, nice, system, (idle, iowait), irq, softirq
-        busy = sum(fields[i] for i in (0, 1, 2, 5, 6)) / tick
-        children = sum(_time_of(child) for child in _children()) / tick
-    except (OSError, ValueError, IndexError):
-        return None
-    return ProcessorUse(time.monotonic(), busy, time.process_time(), children)
-
-
-def _children() -> list[str]:
-    found: list[str] = []
-    for task in Path("/proc/self/task").iterdir():
-        found += (task / "children").read_text().split()
-    return found
-
-
-def _time_of(pid: str) -> int:
-    """User and system time of a process, in ticks; 0 where it has just ended."""
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    except OSError:
-        return 0
-    return int(fields[11]) + int(fields[12])
+    times = processor_times()
+    return None if times is None else ProcessorUse(time.monotonic(), times[0], time.process_time(), times[1])
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,12 +137,3 @@ class LatencyMonitor:
         if view > BUSY_CORES:
             return f"drawing takes {view:.1f} processor cores; close viewers or give --no-view"
         return "the processor is short; close what else runs, take fewer ZOIs or longer bursts"
-
-
-def lower_priority(nice: int) -> None:
-    """Raise the nice value of the calling thread by ``nice``; without privileges this cannot be undone."""
-    if sys.platform != "linux":
-        return
-    thread = threading.get_native_id()
-    with contextlib.suppress(OSError):
-        os.setpriority(os.PRIO_PROCESS, thread, os.getpriority(os.PRIO_PROCESS, thread) + nice)

@@ -10,25 +10,24 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
-from acquire.burst import LIMIT_PX
 from acquire.events import Event, EventKind, EventSink, Level, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
-from live.pipeline.measurement import Measurement
-from live.pipeline.reference import Correction, averaged, unchanged
+from analysis.field import part_of
+from analysis.optics import ASSUMED_TILT, SCALE, PlateFit, ShutterCorrection, choose_model, trouble
+from live.pipeline.guards import BlurGuard, DilatationGuard, PictureGuard, StrainGuard
+from live.pipeline.measurement import Measurement, PlateReading
+from live.pipeline.reference import Correction, averaged, repetition_text, unchanged
 
 if TYPE_CHECKING:
     from analysis import PhaseKernel
     from analysis.evaluate import Gauge
     from analysis.field import Measure, StrainField
-
-
-MAX_ROTATION, MAX_STRAIN = math.radians(0.5), 0.02
-"""Limits of small strains, rad and 1: the error is then 40 um/m by the rotation and 200 um/m by the strain."""
+    from analysis.optics import Model
 
 
 class Tracker:
@@ -101,71 +100,62 @@ def _renewal(burst: Burst, *, automatic: bool) -> Event:
     return Event(burst.t, EventKind.REFERENCE, "measurement", text, level, data | {"renewed": True})
 
 
-class SmearGuard:
-    """Checks the motion during each measured burst; an event when smear begins and when it ends.
+class PlateCorrection:
+    """Removes the apparent motion of plates from each field; an error event where that stops.
 
-    Motion v during T multiplies the contrast at wave number k by |sinc(k v T / 2)|: negligible up to
-    0.05 px. The motion is estimated with each burst (``acquire.burst.accumulate``).
-
-    Parameters
-    ----------
-    on_event : callable taking an Event
-    limit_px : float, px
-    """
-
-    def __init__(self, on_event: EventSink, limit_px: float = LIMIT_PX) -> None:
-        self._on_event, self._limit = on_event, limit_px
-        self._smeared = False
-
-    def check(self, burst: Burst) -> None:
-        """Check a burst; one whose motion is not known changes nothing."""
-        smeared = burst.motion_px > self._limit
-        # Hysteresis: a motion near the limit does not repeat the events.
-        calm = burst.motion_px < 0.8 * self._limit
-        if smeared and not self._smeared:
-            text = (
-                f"the picture moves {burst.motion_px:.2f} px during a burst of {burst.n}; take shorter bursts"
-            )
-            self._emit(burst, text, "warning")
-        elif calm and self._smeared:
-            self._emit(burst, "the picture stands still enough again during a burst", "info")
-        self._smeared = smeared or (self._smeared and not calm)
-
-    def _emit(self, burst: Burst, text: str, level: Level) -> None:
-        data = {"motion_px": burst.motion_px, "n": burst.n}
-        self._on_event(Event(burst.t, EventKind.MEASUREMENT, "burst", text, level, data))
-
-
-class StrainGuard:
-    """Checks each field of small strains, and warns once where another measure is more exact.
-
-    A rotation by r changes small strains by r^2/2 (3 degrees: 1400 µm/m); they differ from the other measures
-    by about e^2/2 at a strain e.
+    The model is chosen at the first burst. Where a plate is lost the last motion is removed until it is found
+    again; where a plate is not rigid, to the end.
 
     Parameters
     ----------
-    measure : str
-        Measure of the reported strains; only small strains are checked.
+    fit : PlateFit
+    focal_px : float, px
+        Distance of the camera over the size of a pixel on the specimen.
     on_event : callable taking an Event
     """
 
-    def __init__(self, measure: Measure, on_event: EventSink) -> None:
-        self._on_event, self._warned = on_event, measure != "small"
+    def __init__(self, fit: PlateFit, focal_px: float, on_event: EventSink) -> None:
+        self._fit, self._focal_px, self._on_event = fit, focal_px, on_event
+        self._model: Model | None = None
+        self._last = fit.nothing()
+        self._loaded, self._trouble = "", ""
 
-    def check(self, field: StrainField, t: float) -> None:
-        """Check a field, measured at ``t`` (s)."""
-        if self._warned or not field.ok.any():
+    def apply(self, whole: StrainField, burst: Burst, measure: Measure) -> tuple[StrainField, PlateReading]:
+        """The field of the specimen, corrected, and what the plates measured; ``whole`` has both."""
+        words, not_rigid = trouble(self._fit, whole)
+        self._loaded = self._loaded or (words if not_rigid else "")
+        words = self._loaded or words
+        self._report(words, burst)
+        if not words:
+            self._model = self._model or self._choose(whole, burst)
+            self._last = self._fit.motion(whole, self._model)
+        motion, covariance = self._last
+        layout = self._fit.layout
+        raw = replace(part_of(whole, layout.here, layout.specimen), measure=measure)
+        field = replace(motion.removed_from(raw), common=self._fit.error(raw, covariance).beside(raw.common))
+        sigma = math.sqrt(float(covariance[SCALE, SCALE]))
+        return field, PlateReading(raw, motion, sigma, not words)
+
+    def _choose(self, whole: StrainField, burst: Burst) -> Model:
+        chosen = choose_model(self._fit, whole, self._focal_px)
+        text = (
+            f"plates {', '.join(self._fit.layout.plates)}: {chosen.model} is corrected; in the mean strain that leaves"
+            f" {chosen.noise * 1e6:.1f} µm/m by noise of one burst and {chosen.unseen * 1e6:.1f} µm/m by a tilt of"
+            f" {math.degrees(ASSUMED_TILT):.1g} degrees"
+        )
+        data = {"model": chosen.model, "noise": chosen.noise, "unseen": chosen.unseen}
+        self._on_event(Event(burst.t, EventKind.MEASUREMENT, "plates", text, "info", data))
+        return chosen.model
+
+    def _report(self, words: str, burst: Burst) -> None:
+        if bool(words) is bool(self._trouble):
             return
-        turned = abs(float(np.nanmedian(field.rotation)))
-        strained = max(abs(float(np.nanmedian(values))) for values in (field.du_dx, field.dv_dy))
-        if turned > MAX_ROTATION or strained > MAX_STRAIN:
-            self._warned = True
-            text = (
-                f"turned by {math.degrees(turned):.1f} degrees, strained by {strained:.1%}: small strains are off by"
-                f" about {(turned**2 + strained**2) / 2 * 1e6:.0f} µm/m; measure with --strain engineering"
-            )
-            data = {"rotation": turned, "strain": strained}
-            self._on_event(Event(t, EventKind.MEASUREMENT, "strain", text, "warning", data))
+        text, level = "the plates are measured again, and the correction goes on", "info"
+        if words:
+            level = "error"
+            text = f"{words}; the correction by plates has stopped: motion off the plane reads as strain from here on"
+        self._trouble = words
+        self._on_event(Event(burst.t, EventKind.MEASUREMENT, "plates", text, cast(Level, level)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,8 +176,11 @@ def measure(
     noise_GL: float | None = None,
     correct: Correction = unchanged,
     gauges: Sequence[Gauge] = (),
+    shutter: ShutterCorrection | None = None,
+    plates: PlateCorrection | None = None,
     renew_at: float = 1.0,
     strain: Measure = "small",
+    dilatation: DilatationGuard | None = None,
     on_event: EventSink = ignore_event,
     timer: Timer = lambda: 0.0,
 ) -> Iterator[Measurement]:
@@ -206,13 +199,18 @@ def measure(
         Removes the fixed pattern of the sensor from a burst.
     gauges : sequence of Gauge
         Read on every field.
+    shutter : ShutterCorrection, optional
+        Corrects every field, before the plates.
+    plates : PlateCorrection, optional
+        Corrects every field; ``kernel`` then measures the ZOIs of its plates too.
     renew_at : float
         The reference is renewed when more than this share of the ZOIs is lost from one burst to
         the next, and renewing finds most of them again; 1 for never.
     strain : "small", "engineering", "green" or "hencky"
         The measure of strain of the fields and means.
+    dilatation : DilatationGuard, optional
     on_event : callable taking an Event
-        Called when the reference is renewed.
+        Called when the reference is renewed, and where a guard warns.
     timer : callable
         Gives seconds; only for ``Measurement.measure_s``.
 
@@ -221,15 +219,30 @@ def measure(
     Measurement
         One for each burst, in order.
     """
-    tracker, guard = Tracker(kernel, noise_GL, renew_at, on_event), StrainGuard(strain, on_event)
-    number = 0
+    tracker = Tracker(kernel, noise_GL, renew_at, on_event)
+    guards = StrainGuard(strain, on_event), PictureGuard(on_event)
+    sharpness = BlurGuard(on_event)
+    number, repeats = 0, repetition_text(kernel.period)
     for item in bursts:
         if isinstance(item, NewReference):
             tracker.renew_on_demand(correct(item.burst))
             continue
+        if number == 0 and repeats:
+            on_event(Event(item.t, EventKind.MEASUREMENT, "pattern", repeats, "warning"))
         began = timer()
-        field = replace(tracker.measure(correct(item)), measure=strain)
+        whole, reading = tracker.measure(correct(item)), None
+        upright = whole if shutter is None else shutter.apply(whole, item.t)
+        if plates is None:
+            field = replace(upright, measure=strain)
+        else:
+            field, reading = plates.apply(upright, item, strain)
         took = timer() - began
-        guard.check(field, item.t)
-        yield Measurement.of(number, item, field, loads.force_at(item.t), took, gauges)
+        for guard in guards:
+            guard.check(field, item.t)
+        measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, reading)
+        measurement = replace(measurement, as_measured=whole)
+        sharpness.check(measurement.time_step)
+        if dilatation is not None:
+            dilatation.check(measurement.time_step)
+        yield measurement
         number += 1

@@ -15,7 +15,8 @@ import numpy as np
 
 from acquire.frame import Burst
 from analysis.evaluate import AreaStrain, Gauge, GaugeValue, extension_of
-from analysis.field import StrainField
+from analysis.field import StrainField, area_share, mean_blur
+from analysis.optics import ApparentMotion
 
 AXIAL, TRANSVERSE = "axial", "transverse"
 """Gauges of these names are the strain along and across the load."""
@@ -63,6 +64,10 @@ class TimeStep:
         Variation of the strain over the region (``analysis.evaluate.Unevenness``).
     misfit : float
         That variation over what noise makes of it.
+    blur, sigma_blur : float, px
+        Of the picture since its reference (``analysis.field.Blur``); negative: sharper.
+    area_share : float
+        Of the region that its strains stand for, where a block of ZOIs was lost (``analysis.field.area_share``).
     """
 
     t: float
@@ -93,6 +98,14 @@ class TimeStep:
     uneven_exx: float = math.nan
     uneven_eyy: float = math.nan
     misfit: float = math.nan
+    blur: float = math.nan
+    sigma_blur: float = math.nan
+    area_share: float = 1.0
+
+    @property
+    def least_share(self) -> float:
+        """The smallest share of an area that the strains of the region and of the gauges stand for."""
+        return min(self.area_share, *(gauge.share for gauge in self.gauges.values() if not gauge.reason), 1.0)
 
     def axial(self, axis: str) -> tuple[float, float]:
         """Strain along the load, which runs along ``axis`` ("x" or "y"), and its standard uncertainty."""
@@ -136,6 +149,7 @@ def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: floa
     """The strains of ``field``, measured from ``burst``."""
     valid = field.ok
     values = np.concatenate([field.exx[valid], field.eyy[valid]])
+    blur = mean_blur(field)
     return TimeStep(
         t=burst.t,
         force=force,
@@ -149,6 +163,9 @@ def time_step_of(burst: Burst, field: StrainField, force: float, measure_s: floa
         refused=", ".join(f"{n} {status.name}" for status, n in field.refused.items()),
         noise_GL=burst.noise,
         measure_s=measure_s,
+        blur=blur.px,
+        sigma_blur=blur.sigma,
+        area_share=area_share(field),
     )
 
 
@@ -158,6 +175,33 @@ def ordered_mean(values: np.ndarray) -> float:
     The order of numpy's own sum depends on the alignment of the values.
     """
     return float(np.cumsum(values, dtype=np.float64)[-1]) / values.size if values.size else math.nan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlateReading:
+    """What plates measured of the camera's part in one burst.
+
+    Attributes
+    ----------
+    raw : StrainField
+        Of the specimen, before the correction.
+    motion : ApparentMotion
+        What was removed.
+    sigma_scale : float
+        Standard uncertainty of its scale.
+    corrected : bool
+        False: the plates could not be used, and the last motion was removed.
+    """
+
+    raw: StrainField
+    motion: ApparentMotion
+    sigma_scale: float
+    corrected: bool
+
+    def raw_strain(self, name: str) -> float:
+        """A strain of the region before the correction; NaN where no ZOI has a value."""
+        area = AreaStrain.of(self.raw)
+        return math.nan if area is None else area.value(name)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,24 +215,31 @@ class Measurement:
     burst : Burst
     field : StrainField
     time_step : TimeStep
+    plates : PlateReading or None
+        Where there are plates, and ``field`` is corrected by them.
+    as_measured : StrainField or None
+        What the kernel gave, of specimen and plates, before any correction.
     """
 
     number: int
     burst: Burst
     field: StrainField
     time_step: TimeStep
+    plates: PlateReading | None = None
+    as_measured: StrainField | None = None
 
     @classmethod
     def of(
         cls, number: int, burst: Burst, field: StrainField, force: float, measure_s: float = 0.0,
-        gauges: Sequence[Gauge] = (),
+        gauges: Sequence[Gauge] = (), plates: PlateReading | None = None,
     ) -> Measurement:  # fmt: skip
         """Compute the means and the values of ``gauges``.
 
         ``force`` (N) is NaN where it is not known, ``measure_s`` (s) the time of the kernel.
         """
-        values = {gauge.name: gauge.measure(field) for gauge in gauges}
-        return cls(number, burst, field, replace(time_step_of(burst, field, force, measure_s), gauges=values))
+        values = {gauge.name: gauge.read(field) for gauge in gauges}
+        step = replace(time_step_of(burst, field, force, measure_s), gauges=values)
+        return cls(number, burst, field, step, plates)
 
     @property
     def t(self) -> float:

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquire.burst import BurstAccumulator
 from acquire.errors import ConfigError, DataError, MachineUnfit, PhasedicError
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 MIN_FOUND = 0.2  # a background of noise may be the larger part of the picture
+MIN_REPEATING = 0.02
+"""Share of the ZOIs from which on it is reported: some at an edge repeat along it, and their neighbours decide."""
 
 
 def numerics_error(error: ValueError, what: str) -> PhasedicError:
@@ -111,6 +114,26 @@ def motion_between(
     motion = np.hypot(b.u - a.u, b.v - a.v)
     found, usable = np.isfinite(motion), ~np.isin(a.status, (Status.NOT_MEASURED, Status.NO_PATTERN))
     return float(np.median(motion[found])) if found.sum() > MIN_FOUND * usable.sum() else math.nan
+
+
+def repetition_text(period: NDArray[np.float64]) -> str:
+    """What repeats and what that allows; empty where hardly any ZOI repeats.
+
+    Parameters
+    ----------
+    period : (R, C) float64, px
+        ``PhaseKernel.period``: NaN where a ZOI is not active, infinite where its pattern does not repeat.
+    """
+    from analysis.kernel.repeating import ALLOWED_PERIODS
+
+    able, repeats = int(np.count_nonzero(~np.isnan(period))), np.isfinite(period)
+    if repeats.sum() <= MIN_REPEATING * able:
+        return ""
+    known = period[repeats]
+    return (
+        f"the pattern repeats every {np.median(known):.1f} px in {known.size} of {able} ZOIs; it may move by"
+        f" {ALLOWED_PERIODS * known.min():.1f} px between two pictures, and to the first one"
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -29,10 +29,16 @@ class Snapshot:
         The force of largest magnitude so far, with its sign.
     axial_name : str
         What ``axial`` is: a gauge, "exx" or "eyy".
+    axis : "x" or "y"
+        Of the load.
+    axis_assumed : bool
+        It is neither given nor found yet.
     axial, sigma_axial : float
         Strain along the load and its standard uncertainty.
     valid, zois : int
         ZOIs with a value, and all.
+    area_share : float
+        The smallest share of an area that the strains stand for (``TimeStep.least_share``).
     latency_p95_s : float, s
         Of the last seconds.
     disk_s : float, s
@@ -53,10 +59,13 @@ class Snapshot:
     stress_Pa: float = math.nan
     peak_N: float = math.nan
     axial_name: str = ""
+    axis: str = "y"
+    axis_assumed: bool = False
     axial: float = math.nan
     sigma_axial: float = math.nan
     valid: int = 0
     zois: int = 0
+    area_share: float = 1.0
     latency_p95_s: float = math.nan
     disk_s: float = math.inf
     alarms: tuple[str, ...] = ()

@@ -26,6 +26,8 @@ from live.setup.pictures import read_mask
 from live.setup.prepared import MeasurePlan, PreparedKernel
 from live.setup.region import FirstLook, located_on
 
+_FORMER_AUTO_GAUGES = ("axial", "transverse")  # of recordings made before November 2026
+
 
 @contextmanager
 def open_session_source(
@@ -53,7 +55,7 @@ def _with_fitting_gauges(
     grid, axis = grid_for(config, camera.width, camera.height, mask), config.specimen.first_axis
     given = settings_in(request.config_file) if request.config_file else {}
     gauges = dict(config.gauges)
-    for name in AUTO_GAUGES:
+    for name in (*AUTO_GAUGES, *_FORMER_AUTO_GAUGES):
         if name not in gauges or f"gauges.{name}" in given:
             continue
         try:

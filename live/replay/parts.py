@@ -35,7 +35,7 @@ _BURST = np.dtype(
     [("n", "i8"), ("noise", "f8"), ("bits", "i8"), ("t", "f8"), ("duration", "f8"), ("first_index", "i8"),
      ("last_index", "i8"), ("lost", "i8"), ("clock", "U8"), ("motion_px", "f8"), ("field_noise", "f8")]
 )  # fmt: skip
-_ARRAYS = ("parameters", "covariance", "residual", "gain", "status", "iterations")
+_ARRAYS = ("parameters", "covariance", "residual", "gain", "blur", "status", "iterations")
 _NO_PICTURE = frozen(np.zeros((0, 0), np.float32))
 _NOT_CLIPPED = frozen(np.zeros((0, 0), np.bool_))
 
@@ -83,7 +83,7 @@ def measure_part(request: ReplayRequest, file: IO[bytes], run_in: int, screen: S
 def _put(m: Measurement, file: IO[bytes]) -> None:
     names = [name for name in _BURST.names or () if name != "field_noise"]
     described = (*(getattr(m.burst, name) for name in names), m.field.noise)
-    for array in (np.array(described, _BURST), *(getattr(m.field, name) for name in _ARRAYS)):
+    for array in (np.array(described, _BURST), *(getattr(m.as_measured, name) for name in _ARRAYS)):
         np.save(file, array, allow_pickle=False)
 
 
@@ -123,6 +123,11 @@ class StoredResults:
         """The field of the next burst."""
         return self._fields.popleft()
 
+    @property
+    def period(self) -> NDArray[np.float64]:
+        """Where the pattern of the reference repeats; see ``PhaseKernel.period``."""
+        return self._ready.kernel.period
+
     def renewed(self, *_: object, **__: object) -> PhaseKernel:
         """Always raises: no part has a renewed reference."""
         raise ValueError("no reference was renewed")
@@ -142,7 +147,7 @@ def _stored(described: NDArray[Any], arrays: dict[str, Any], ready: PreparedKern
     values = dict(zip(_BURST.names or (), described.item(), strict=True))
     noise = values.pop("field_noise")
     field = StrainField(
-        grid=ready.plan.grid,
+        grid=ready.plan.kernel_grid,
         covariance_reference=np.zeros_like(arrays["covariance"]),  # only a renewal asks for it
         noise=noise,
         window=ready.kernel.reference.settings.window,

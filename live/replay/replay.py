@@ -24,9 +24,8 @@ from live.config.values import AUTO
 from live.pipeline.consumer import Compose, RunInfo
 from live.pipeline.consumer_thread import Outputs
 from live.pipeline.event_log import EventLog
-from live.pipeline.frame_counts import FrameCounts
 from live.pipeline.history import History
-from live.pipeline.run_state import RunState
+from live.pipeline.run_state import FrameCounts, RunState
 from live.pipeline.screen import Screen
 from live.replay.forces import read_forces
 from live.replay.opening import open_session_source, prepare_replay

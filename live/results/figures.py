@@ -13,6 +13,7 @@ from acquire.load_cell import LoadLog
 from analysis.evaluate import (
     CONFIDENCE,
     STANDARDS,
+    ErrorLimits,
     Figure,
     Interval,
     LoadAxis,
@@ -23,13 +24,16 @@ from analysis.evaluate import (
     find_lag,
     free,
 )
+from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
+from live.pipeline.measurement import AXIAL
 
 HEADLINE = ("E", "nu", "Rp02", "Rm")
 """The figures that are shown first, and compared between tests."""
 _STRENGTHS = ("Rp01", "Rp02", "Rp1", "ReH", "ReL", "Rm")
-_EXTENSIONS = ("Ag", "Agt", "A", "At")
+_EXTENSIONS, _FLOW = ("Ag", "Agt", "A", "At"), ("r", "n")
+_REMARKED = ("E", "nu", *_FLOW)
 
 _PLAIN, _PERCENT, _MPA, _GPA, _KN = ("", 1.0), ("%", 0.01), ("MPa", 1e6), ("GPa", 1e9), ("kN", 1e3)
 _STRENGTH_SUFFIXES = dict(zip(_STRENGTHS, ("p0.1", "p0.2", "p1", "eH", "eL", "m"), strict=True))
@@ -84,12 +88,21 @@ class TensileRow:
         return max(self.figure.high - self.figure.value, self.figure.value - self.figure.low)
 
     @property
-    def text(self) -> str:
-        """Value, interval and unit for a person, and a remark; forces below 2 kN in N."""
-        remark = f" ({self.figure.why})" if self.remarked and self.figure.known and self.figure.why else ""
+    def remark(self) -> str:
+        """What must be shown with the figure; mostly nothing."""
+        return self.figure.why if self.remarked and self.figure.known else ""
+
+    @property
+    def number(self) -> str:
+        """Value, interval and unit for a person; forces below 2 kN in N."""
         if self.unit == "kN" and abs(self.figure.value) < _SMALL_KN:
-            return figure_text(self.figure, 1e-3, "N") + remark
-        return figure_text(self.figure, 1.0, self.unit) + remark
+            return figure_text(self.figure, 1e-3, "N")
+        return figure_text(self.figure, 1.0, self.unit)
+
+    @property
+    def text(self) -> str:
+        """The number and the remark."""
+        return self.number + (f" ({self.remark})" if self.remark else "")
 
 
 def tensile_table(figures: TensileFigures, *, stresses: bool) -> dict[str, TensileRow]:
@@ -105,9 +118,9 @@ def tensile_table(figures: TensileFigures, *, stresses: bool) -> dict[str, Tensi
     stiffness, strength = (_GPA, _MPA) if stresses else (_KN, _KN)
     names = {"E": (modulus, stiffness), "E_chord": (f"{modulus} by chord", stiffness), "nu": ("nu", _PLAIN)}
     names |= {key: (letter + end, strength) for key, end in _STRENGTH_SUFFIXES.items()}
-    names |= {key: (key, _PERCENT) for key in _EXTENSIONS}
+    names |= {key: (key, _PERCENT) for key in _EXTENSIONS} | {key: (key, _PLAIN) for key in _FLOW}
     return {
-        key: TensileRow(name, unit, getattr(figures, key).over(one), key in ("E", "nu"))
+        key: TensileRow(name, unit, getattr(figures, key).over(one), key in _REMARKED)
         for key, (name, (unit, one)) in names.items()
     }
 
@@ -127,9 +140,61 @@ def evaluate(history: History, loads: LoadLog, specimen: SpecimenConfig) -> Tens
 def tensile_options(specimen: SpecimenConfig) -> TensileOptions:
     """The options of the evaluation from the configuration; a preload (MPa) is ignored without a section."""
     standard = STANDARDS.get(specimen.standard) or free(Interval("strain", *specimen.modulus_between))
+    limits = ErrorLimits(
+        _times(specimen.force_error_percent, 0.01),
+        _times(specimen.section_error_percent, 0.01) if specimen.area_m2 else None,
+        _times(specimen.strain_error_um_m, 1e-6),
+    )
     if specimen.zero == "preload" and specimen.area_m2 is not None:
-        return TensileOptions(standard, "preload", specimen.preload_MPa * 1e6)
-    return TensileOptions(standard, "toe" if specimen.zero == "toe" else "raw")
+        return TensileOptions(standard, "preload", specimen.preload_MPa * 1e6, limits)
+    return TensileOptions(standard, "toe" if specimen.zero == "toe" else "raw", limits=limits)
+
+
+def _times(value: float | None, unit: float) -> float | None:
+    return None if value is None else unit * value
+
+
+@dataclass(frozen=True, slots=True)
+class BudgetRow:
+    """One cause of the uncertainty of E, or all together: standard uncertainties, and the key that states it.
+
+    Attributes
+    ----------
+    cause : str
+    strain : float
+        At the end of the elastic interval; NaN where it is not stated.
+    modulus : float, Pa (N of a force)
+    key : str
+    """
+
+    cause: str
+    strain: float
+    modulus: float
+    key: str = ""
+
+
+_CAUSES = {
+    "load cell": "specimen.force_error_percent",
+    "section": "specimen.section_error_percent",
+    "strain": "specimen.strain_error_um_m",
+}
+
+
+def budget_rows(figures: TensileFigures, *, stresses: bool) -> list[BudgetRow]:
+    """The budget of E, the combined uncertainty last; empty where E is not known.
+
+    ``stresses``: the section is known.
+    """
+    if figures.span is None or not figures.budget:
+        return []
+    strain, E = figures.span.strain[1], figures.E.value
+    causes = [cause for cause in ("scatter", *_CAUSES) if stresses or cause != "section"]
+    shares = {**dict.fromkeys(causes, math.nan), **figures.budget}
+    rows = [
+        BudgetRow(cause, share * strain, share * E, _CAUSES.get(cause, "")) for cause, share in shares.items()
+    ]
+    combined = math.hypot(*figures.budget.values())
+    return [*rows, BudgetRow("combined", combined * strain, combined * E)]
 
 
 def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
@@ -158,14 +223,24 @@ def tare_line(history: History, loads: LoadLog) -> list[str]:
     ]
 
 
+def sharpness_line(blur: Sequence[float], sigma: Sequence[float]) -> list[str]:
+    """How the sharpness of the picture changed, from its blur and sigma over time, px; nothing where not known."""
+    known = [one for one in map(Blur, blur, sigma) if one.text]
+    if not known:
+        return []
+    largest = max(known, key=lambda one: abs(one.px))
+    return [f"sharpness since the reference: {largest.text} at most, {known[-1].text} in the last picture"]
+
+
 def alignment_line(history: History, specimen: SpecimenConfig) -> list[str]:
     """The angle from the axis of the load to the largest strain; nothing where it is not known."""
     if not history.time_steps:
         return []
     load = history.axis(specimen.axis)
     words = axis_text(load)
-    stays = load.found and load.axis != specimen.first_axis and history.gauge("axial") is not None
-    return [words + ("; the gauge axial keeps its place" if stays else "")] if words else []
+    turned = load.found and load.axis != specimen.first_axis
+    placed = [name for name in (AXIAL, "extension") if turned and history.gauge(name) is not None]
+    return [words + "".join(f"; the gauge {name} keeps its place" for name in placed)] if words else []
 
 
 def axis_text(load: LoadAxis) -> str:
@@ -188,7 +263,9 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
     rows = _rows(figures, specimen)
     hint = "" if specimen.area_m2 else " (give [specimen] width_mm and thickness_mm for E)"
     of = f" of {figures.elastic_strain}" if figures.elastic_strain else ""
-    words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, ±: {CONFIDENCE:.0%} interval)"
+    stated = [cause for cause in figures.budget if cause in _CAUSES]
+    beyond = f", of E with limits of {', '.join(stated)}" if stated else ""
+    words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, ±: {CONFIDENCE:.0%} interval{beyond})"
     return [_text(rows, "E") + hint + words, _known_texts(rows, _STRENGTHS)]
 
 
@@ -217,12 +294,26 @@ def figure_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]
             f" {rows['E_chord'].text}; strain{_named(figures.strain)} counts {figures.zero.how}"
         )
     if extensions := _known_texts(rows, _EXTENSIONS):
-        length = f"  (gauge length {specimen.gauge_length_mm:g} mm)" if specimen.gauge_length_mm else ""
-        lines.append(extensions + length)
+        lines.append(extensions + _elongation(figures, specimen.gauge_length_mm))
+    if flow := _known_texts(rows, _FLOW):
+        lines.append(flow)
     if figures.rate_elastic.known:
         words = f" ({figures.rate_elastic.why})" if figures.rate_elastic.why else ""
         lines.append(f"strain rate {figures.rate_elastic.value:.3g} 1/s in the elastic part{words}")
     return lines + _unknown_lines(rows)
+
+
+def _elongation(figures: TensileFigures, length_mm: float | None) -> str:
+    """The elongation at the highest force and at break, mm; empty without a gauge length."""
+    if not length_mm:
+        return ""
+    totals = (("at the highest force", figures.Agt), ("at break", figures.At))
+    known = [f"{figure_text(one.over(1 / length_mm), 1, 'mm')} {when}" for when, one in totals if one.known]
+    return (
+        "  ("
+        + ", ".join([f"gauge length {length_mm:g} mm", *(f"elongation {words}" for words in known)])
+        + ")"
+    )
 
 
 def _named(strain: str) -> str:
@@ -232,7 +323,7 @@ def _named(strain: str) -> str:
 def _unknown_lines(rows: Mapping[str, TensileRow]) -> list[str]:
     """The figures of the standard that are not known: one line for each reason."""
     reasons: dict[str, list[str]] = {}
-    for key in ("E", *_STRENGTHS, *_EXTENSIONS, "nu"):
+    for key in ("E", *_STRENGTHS, *_EXTENSIONS, "nu", *_FLOW):
         figure = rows[key].figure
         if not figure.known and not figure.why.startswith("not a figure of"):
             reasons.setdefault(figure.why, []).append(rows[key].name)

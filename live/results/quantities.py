@@ -63,6 +63,7 @@ _FIELDS = (
     Quantity("eyy", UNITLESS, "normal strain along y"),
     Quantity("exy", UNITLESS, "shear strain, tensor component: half of the engineering shear gamma_xy"),
     Quantity("residual", UNITLESS, "variance left by the fit over that expected from the noise; about 1"),
+    Quantity("blur", "px", "standard deviation of the blur since the reference; negative: sharper"),
     Quantity("status", UNITLESS, "0 where the ZOI has a value, else the reason why it has none"),
     Quantity("iterations", UNITLESS, "iterations of the fit"),
 )
@@ -90,8 +91,30 @@ _INSTANTS = (
     Quantity("uneven_exx", UNITLESS, "variation of exx over the region, rms, up to the second degree"),
     Quantity("uneven_eyy", UNITLESS, "variation of eyy over the region, rms, up to the second degree"),
     Quantity("misfit", UNITLESS, "that variation over what noise makes of it; about 1 in a uniform strain"),
+    Quantity(
+        "area_share",
+        UNITLESS,
+        "share of the region that its strains stand for; below 1 where a block was lost",
+    ),
     Quantity("force_raw", "N", "force as stamped, not corrected for the lag of the load"),
     Quantity("zero", "N", "sum of the tares before, subtracted from the force"),
+    *(
+        Quantity(f"raw_{e}", UNITLESS, f"{e} of the region before the correction by plates")
+        for e in ("exx", "eyy", "exy")
+    ),
+    Quantity(
+        "corrected", UNITLESS, "1 where the plates were measured, 0 where their last motion was removed"
+    ),
+    Quantity("plate_shift_x", UNITLESS, "motion of the plates along x over half the diagonal of all ZOIs"),
+    Quantity("plate_shift_y", UNITLESS, "the same along y"),
+    Quantity("plate_scale", UNITLESS, "change of scale of the plates"),
+    Quantity("plate_turn", UNITLESS, "rotation of the plates, rad, clockwise"),
+    Quantity(
+        "plate_keystone_x", UNITLESS, "change of their scale along x over half the diagonal of all ZOIs"
+    ),
+    Quantity("plate_keystone_y", UNITLESS, "the same along y"),
+    Quantity("plate_stretch", UNITLESS, "half the difference of their strains along x and y"),
+    Quantity("plate_shear", UNITLESS, "their shear strain"),
     Quantity("n_valid", UNITLESS, "ZOIs with a value"),
     Quantity("n_zoi", UNITLESS, "ZOIs to measure"),
     Quantity("noise", "GL", "temporal standard deviation of one frame; nan for a burst of one"),
@@ -103,13 +126,14 @@ _INSTANTS = (
     Quantity("kernel", "s", "time that the kernel took; nan where it was not measured"),
     Quantity("latency", "s", "from the stamp of the last frame of the burst to the result; nan in a replay"),
 )
-_GAUGE = "gauge_"
+_GAUGE, _SHARE = "gauge_", "share_gauge_"
 _KNOWN = {q.name: q for q in (*_FIELDS, *_PLACES, *_INSTANTS)}
 
 MEANS = {
     "time_s": "time", "force_N": "force", "stress_Pa": "stress", "true_stress_Pa": "true_stress",
     "force_raw_N": "force_raw", "zero_N": "zero", "noise_GL": "noise",
     "duration_s": "duration", "kernel_s": "kernel", "latency_s": "latency", "u_px": "u", "v_px": "v",
+    "blur_px": "blur", "sigma_blur_px": "sigma_blur",
 }  # fmt: skip
 """Column of ``Strain.values`` with the unit in its name -> quantity; other columns have the name of their quantity."""
 
@@ -120,6 +144,9 @@ def quantity_of(name: str) -> Quantity:
     if plain in _KNOWN:
         return _KNOWN[plain]
     gauge = plain.removeprefix("sigma_")
+    if plain.startswith(_SHARE):
+        words = f"share of its area that {plain.removeprefix('share_')} stands for, at either end"
+        return Quantity(plain, UNITLESS, words)
     if gauge.startswith(_GAUGE):
         words = f"strain of the virtual gauge {gauge.removeprefix(_GAUGE)!r}; nan where it was lost"
         return Quantity(
@@ -137,7 +164,7 @@ def mean_name(name: str) -> str:
     if plain.removeprefix("sigma_").startswith(_GAUGE):
         return plain
     of = plain.removeprefix("sigma_")
-    averaged = (quantity_of(of).is_strain and of not in _EXTENSIONS) or plain in ("u", "v")
+    averaged = (quantity_of(of).is_strain and of not in _EXTENSIONS) or of in ("u", "v", "blur")
     return f"mean_{plain}" if averaged else plain
 
 

@@ -79,7 +79,7 @@ class Strain(Closing):
             read_object(item[()], f"{path}: {name}")
             for name, item in open_datasets(entry, layout.TEXTS).items()
         )
-        self.names = layout.MAPS
+        self.names = (*layout.MAPS, *(name for name in layout.ADDED_MAPS if name in strain))
         self._maps = open_datasets(strain, {n: layout.map_declared(n, self.grid.shape) for n in self.names})
         columns = _columns(mean)
         self.n = _rows(path, [*self._maps.values(), *columns.values()], whole=not unfinished)
@@ -126,7 +126,8 @@ class Strain(Closing):
         if name not in self.names:
             raise DataError(f"{self.path}: no map {name!r}; there are {', '.join(self.names)}")
         if isinstance(row, int) and not -self.n <= row < self.n:
-            raise DataError(f"{self.path}: no row {row}; there are {self.n}")
+            there = f"no row {row}; there are {self.n}" if self.n else "holds no measurement"
+            raise DataError(f"{self.path}: {there}")
         rows = range(self.n)[row]
         dataset = self._maps[name]
         try:

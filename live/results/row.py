@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal
 from numpy.typing import NDArray
 
 from analysis.evaluate import AreaStrain
+from analysis.field import blur_maps
+from analysis.optics import NAMES
 from live.pipeline.measurement import AXIAL, extension_along, strains_along
 
 if TYPE_CHECKING:
@@ -20,7 +22,11 @@ if TYPE_CHECKING:
 StrainMeasure = Literal["small", "engineering", "green", "hencky"]
 STRAINS = ("exx", "eyy", "exy")
 EXTENSIONS = ("extension_x", "extension_y", "sigma_extension_x", "sigma_extension_y")
+BLUR = ("blur", "sigma_blur")
 UNEVEN = ("uneven_exx", "uneven_eyy", "misfit")
+RAW = ("raw_exx", "raw_eyy", "raw_exy")
+PLATES = (*RAW, "corrected", *(f"plate_{name}" for name in NAMES), "sigma_plate_scale")
+"""Columns of a test with plates: strains as measured, whether the plates were good, and their motion."""
 GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
 
 
@@ -44,6 +50,8 @@ class ResultsInfo:
         The virtual gauges, each as it was described.
     axis : "x", "y" or "auto"
         Of the load; auto: found from the means, y until then.
+    plates : bool
+        Plates correct the strains; rows have the strains as measured and the motion of the plates too.
     lagged : bool
         The force is corrected for a lag of the load; rows have the force as stamped too.
     """
@@ -59,12 +67,14 @@ class ResultsInfo:
     gauges: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     axis: str = "y"
     lagged: bool = False
+    plates: bool = False
 
     @property
     def extras(self) -> tuple[str, ...]:
         """The columns that only some tests have, without those of gauges."""
         stress = ("stress_Pa", "true_strain", "true_stress_Pa") if self.area_m2 is not None else ()
-        return (*stress, *(("force_raw_N",) if self.lagged else ()))
+        plates = PLATES if self.plates else ()
+        return (*stress, *(("force_raw_N",) if self.lagged else ()), *plates)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +85,7 @@ class StrainRow:
     ----------
     maps : mapping of name to (R, C) array
         u, v (px), gradients and strains (dimensionless), sigma_* of each, residual, status,
-        iterations.
+        iterations; blur and its sigma (px).
     values : mapping of name to number
         One a row, in the order of the columns of ``strain.csv``.
     """
@@ -90,9 +100,9 @@ class StrainRow:
         return cls(maps, _values(measurement, maps, info, axis))
 
 
-def gauge_columns(name: str) -> tuple[str, str]:
-    """The names that value and standard uncertainty of a virtual gauge have in files."""
-    return f"gauge_{name}", f"sigma_gauge_{name}"
+def gauge_columns(name: str) -> tuple[str, str, str]:
+    """The names that value, standard uncertainty and share of the area of a virtual gauge have in files."""
+    return f"gauge_{name}", f"sigma_gauge_{name}", f"share_gauge_{name}"
 
 
 def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any]]:
@@ -102,6 +112,7 @@ def maps_of(field: StrainField, measure: StrainMeasure) -> dict[str, NDArray[Any
     maps |= {name: getattr(strain, name) for name in STRAINS}
     maps |= {f"sigma_{name}": getattr(field, f"sigma_{name}") for name in (*plain, *STRAINS)}
     maps |= {name: getattr(field, name) for name in ("residual", "status", "iterations")}
+    maps |= dict(zip(BLUR, blur_maps(field), strict=True))
     return maps
 
 
@@ -130,16 +141,30 @@ def _values(
         "latency_s": time_step.latency_s,
         "kernel_s": time_step.measure_s or math.nan,
         "zero_N": time_step.zero,
+        "blur_px": time_step.blur,
+        "sigma_blur_px": time_step.sigma_blur,
+        "area_share": time_step.area_share,
     }
     for name, gauge in time_step.gauges.items():
-        values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma), strict=True))
+        values |= dict(zip(gauge_columns(name), (gauge.value, gauge.sigma, gauge.share), strict=True))
     if info.area_m2 is not None:
         values["stress_Pa"] = stress = time_step.force / info.area_m2
         stretch = _stretch(measurement, info.strain_measure, axis)
         values |= {"true_strain": math.log(stretch), "true_stress_Pa": stress * stretch}
     if info.lagged:
         values["force_raw_N"] = time_step.force_raw
+    if info.plates:
+        values |= _plates(measurement)
     return values
+
+
+def _plates(measurement: Measurement) -> dict[str, float]:
+    read = measurement.plates
+    if read is None:
+        return dict.fromkeys(PLATES, math.nan)
+    values = [*(read.raw_strain(name) for name in STRAINS), float(read.corrected)]
+    values += [*read.motion.parameters.tolist(), read.sigma_scale]
+    return dict(zip(PLATES, values, strict=True))
 
 
 def _strains(measurement: Measurement, measure: StrainMeasure) -> dict[str, float]:

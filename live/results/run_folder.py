@@ -214,7 +214,7 @@ class RunFolder(Closing):
         names = [name for name in names if gauge_columns(name)[0] in values]
         tracks = {}
         for name in names:
-            value, sigma = (np.asarray(values[column], np.float64) for column in gauge_columns(name))
+            value, sigma = (np.asarray(values[column], np.float64) for column in gauge_columns(name)[:2])
             stored = described.get(name)
             keys = stored.items() if isinstance(stored, dict) else ()
             tracks[name] = GaugeTrack(value, sigma, {key: item for key, item in keys if item is not None})
@@ -359,7 +359,7 @@ def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
     stored = run.section("gauges")
     strain.config["gauges"] = {**stored, **config.gauges}
     for k, gauge in enumerate(gauges):
-        strain.values |= dict(zip(gauge_columns(gauge.name), (values[:, k], sigmas[:, k]), strict=True))
+        strain.values |= dict(zip(gauge_columns(gauge.name)[:2], (values[:, k], sigmas[:, k]), strict=True))
     run.__dict__.pop("gauges", None)  # the cached value is out of date
     return tuple(gauge.name for gauge in gauges)
 

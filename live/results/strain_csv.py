@@ -12,10 +12,10 @@ from live.results.row import EXTENSIONS, UNEVEN, StrainRow, gauge_columns
 COLUMNS = (
     *("frame", "time_s", "force_N", "exx", "eyy", "exy", "sigma_exx", "sigma_eyy", "sigma_exy"),
     *("n_valid", "n_zoi", "noise_GL", "n_frames", "last_frame", "lost", "duration_s", "u_px", "v_px"),
-    *("latency_s", "kernel_s", "zero_N", *EXTENSIONS, *UNEVEN),
+    *("latency_s", "kernel_s", "zero_N", *EXTENSIONS, *UNEVEN, "blur_px", "sigma_blur_px", "area_share"),
 )
-"""Of all valid ZOIs; strains are dimensionless. Then come those of ``ResultsInfo.extras``, and value and
-sigma of each virtual gauge."""
+"""Of all valid ZOIs; strains are dimensionless. Then come those of ``ResultsInfo.extras``, and value,
+sigma and share of each virtual gauge."""
 
 
 class CsvWriter:

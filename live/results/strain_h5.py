@@ -9,14 +9,16 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.hdf5 import FlushTimer, PictureStack, RowTable, abandon_file, reason
+from acquire.hdf5 import COMPRESSED, FlushTimer, PictureStack, RowTable, abandon_file, create_file, reason
+from acquire.printable import counted
 from analysis.evaluate import load_axis
 from live.results import layout
 from live.results.quantities import quantity_of
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
     from analysis.field import ZoiGrid
     from live.results.row import ResultsInfo
 
+VALUE_BITS, SIGMA_BITS = 9, 9
+"""Binary digits kept: of a value below its standard uncertainty; of an uncertainty."""
 FLUSH_S = 0.25  # a row of a live test waits for its flush no longer than this
 _WORDS = {
     "u": "displacement along x (right)",
@@ -40,7 +44,9 @@ _WORDS = {
     "residual": "residual chi^2 (about 1 when all is well)",
     "status": "status of the ZOI (0 = ok)",
     "iterations": "iterations",
+    "blur": "blur since the reference, negative: sharper",
 }
+_MAPS = (*layout.MAPS, *layout.ADDED_MAPS)
 
 
 class StrainWriter:
@@ -74,9 +80,9 @@ class StrainWriter:
         self._path, self.failed, self._axis = path, False, info.axis
         self._flushed = 0  # rows
         self._timer = FlushTimer(flush_s, now)
-        self._file = self._guard(lambda: _create(path, grid, info))
+        self._file = self._guard(lambda: create_file(path, lambda file: _declare(file, grid, info)))
         entry = self._file["entry"]
-        self._maps = {n: PictureStack(entry["strain"][n]) for n in layout.MAPS}
+        self._maps = {n: PictureStack(entry["strain"][n]) for n in _MAPS}
         self._values = RowTable(entry["mean"], _value_names(info))
 
     def write(self, row: StrainRow) -> None:
@@ -109,8 +115,8 @@ class StrainWriter:
 
     def _append(self, row: StrainRow) -> None:
         values = self._values.row(row.values)
-        for name, stack in self._maps.items():
-            stack.append(row.maps[name])
+        for name, stored in rounded(row.maps).items():
+            self._maps[name].append(stored)
         self._values.hold(values)
 
     def _flush(self) -> None:
@@ -143,21 +149,41 @@ class StrainWriter:
             raise self._trouble(error) from error
 
     def _trouble(self, error: Exception) -> DataError:
+        kept = f"; {counted(self._flushed, 'row')} before can be read" if self._flushed else ""
         return DataError(
-            f"{self._path}: cannot be written ({reason(error)}); make room on the disk or choose another --out. "
-            f"The {self._flushed} rows before are safe"
+            f"{self._path}: cannot be written ({reason(error)}){kept}; make room on the disk or choose another --out"
         )
+
+
+def rounded(maps: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """The maps without the digits that are noise, which no compression makes smaller.
+
+    A value keeps the binary digits down to 1/512 of its standard uncertainty (so it changes by 1/1024 of it at
+    most), a standard uncertainty and the residual keep nine significant ones (0.2 %). Values without an
+    uncertainty stay as they are.
+    """
+    stored = dict(maps)
+    for name in (*layout.PLAIN_MAPS, "blur"):
+        sigma = maps[f"sigma_{name}"]
+        stored[name] = _to_digit(maps[name], np.frexp(sigma)[1] - 1 - VALUE_BITS, sigma)
+    for name in (*(f"sigma_{name}" for name in (*layout.PLAIN_MAPS, "blur")), "residual"):
+        stored[name] = _to_digit(maps[name], np.frexp(maps[name])[1] - SIGMA_BITS, maps[name])
+    return stored
+
+
+def _to_digit(values: NDArray[Any], digit: NDArray[Any], scale: NDArray[Any]) -> NDArray[Any]:
+    """Round to multiples of 2**digit, where ``scale``, from which the digit is, is a number above 0."""
+    with np.errstate(invalid="ignore", over="ignore"):
+        multiple = np.ldexp(np.rint(np.ldexp(values, -digit)), digit)
+        return np.where(np.isfinite(multiple) & (scale > 0) & np.isfinite(scale), multiple, values)
 
 
 def _value_names(info: ResultsInfo) -> tuple[str, ...]:
     return layout.column_names(info.gauges, info.extras)
 
 
-def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
-    import h5py
-
-    # These bounds give the format that survives SIGKILL; older ones promise nothing.
-    file = h5py.File(path, "x", libver=("v110", "v110"))
+def _declare(file: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
+    """Everything but the rows."""
     file.attrs.update(
         NX_class="NXroot",
         default="entry",
@@ -175,9 +201,6 @@ def _create(path: Path, grid: ZoiGrid, info: ResultsInfo) -> Any:
     _add_mean(entry, info)
     _add_gauges(entry, info)
     _add_notes(entry, info)
-    file.flush()
-    file.swmr_mode = True
-    return file
 
 
 def _slice_of(row: int) -> Any:
@@ -192,7 +215,14 @@ def _group(parent: Any, name: str, nx_class: str, **attrs: Any) -> Any:
 
 
 def _add_mean(entry: Any, info: ResultsInfo) -> None:
-    mean = _group(entry, "mean", "NXdata", signal="eyy", axes=["time_s"], title="Means over the valid ZOIs")
+    mean = _group(
+        entry,
+        "mean",
+        "NXdata",
+        signal="eyy",
+        axes=["time_s"],
+        title="Strains of the region",
+    )
     mean.attrs["auxiliary_signals"] = ["exx", "exy"]
     mean.attrs["load_axis"] = np.array("x" if info.axis == "x" else "y", "S1")
     mean.attrs["load_angle_deg"] = np.float64(math.nan)
@@ -217,7 +247,7 @@ def _add_gauges(entry: Any, info: ResultsInfo) -> None:
     group = _group(entry, "gauges", "NXdata", signal=first, axes=["time_s"], title="Virtual gauges")
     group["time_s"] = entry["mean/time_s"]
     for name, described in info.gauges.items():
-        column, sigma = gauge_columns(name)
+        column, sigma, _ = gauge_columns(name)
         group[name], group[f"sigma_{name}"] = entry["mean"][column], entry["mean"][sigma]
         group[f"{name}{layout.ERRORS}"] = entry["mean"][sigma]
         entry["mean"][column].attrs.update(uncertainties=sigma, gauge=json.dumps(described))
@@ -233,9 +263,9 @@ def _add_strain(entry: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
         title=f"Strain maps, {info.strain_measure} strain",
         default_slice=_slice_of(0),
     )
-    for name in layout.MAPS:
+    for name in _MAPS:
         _add_map(strain, name, grid.shape)
-    for name in layout.PLAIN_MAPS:
+    for name in (*layout.PLAIN_MAPS, "blur"):
         strain[f"{name}{layout.ERRORS}"] = strain[f"sigma_{name}"]
     for name, values in (("x", grid.x), ("y", grid.y)):
         strain[name] = np.asarray(values, np.float64)
@@ -251,10 +281,10 @@ def _add_map(strain: Any, name: str, shape: tuple[int, int]) -> None:
     kind = layout.map_declared(name, shape).dtype
     dataset = strain.create_dataset(
         name, (0, *shape), kind, maxshape=(None, *shape), chunks=(1, *shape), fillvalue=_fill(kind),
-        fletcher32=True,
+        fletcher32=True, **COMPRESSED,
     )  # fmt: skip
     plain = name.removeprefix("sigma_")
-    unit = "px" if plain in ("u", "v") else ""
+    unit = quantity_of(plain).unit
     words = _WORDS[plain] if plain == name else f"standard uncertainty of {_WORDS[plain]}"
     dataset.attrs.update(units=unit, long_name=f"{words} ({unit})" if unit else words, interpretation="image")
     if name == "status":

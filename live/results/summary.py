@@ -8,12 +8,21 @@ from pathlib import Path
 import numpy as np
 
 from acquire.load_cell import LoadLog
-from acquire.printable import brief
+from acquire.printable import brief, share_text
+from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import Snapshot
-from live.results.figures import alignment_line, elastic_lines, evaluate, figure_lines, lag_line, tare_line
+from live.results.figures import (
+    alignment_line,
+    elastic_lines,
+    evaluate,
+    figure_lines,
+    lag_line,
+    sharpness_line,
+    tare_line,
+)
 
 _CARD_EVERY_S = 1.0  # of the test
 
@@ -25,9 +34,7 @@ def noise_line(history: History) -> str:
     picture = f"one frame {np.median(noise):.3g} GL, " if noise.size else ""
     one = np.nanmedian(history.column("zoi_sigma")) * 1e6
     mean = np.nanmedian(history.column("sigma_eyy")) * 1e6
-    return (
-        f"noise: {picture}strain of one ZOI {one:.3g} µm/m, of the mean {mean:.2g} µm/m (predicted, 1 sigma)"
-    )
+    return f"noise: {picture}strain of one ZOI {one:.3g} µm/m, of the region {mean:.2g} µm/m (predicted, 1 sigma)"
 
 
 def latency_lines(history: History) -> list[str]:
@@ -61,12 +68,16 @@ def summary_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     last, strains = history.time_steps[int(valid[-1])], history.column("largest")[valid]
     largest = strains[np.argmax(np.abs(strains))]
     refused = f" ({last.refused})" if last.refused else ""
+    part = share_text(last.least_share)
     lines = [
         f"measured {len(history.time_steps)} bursts, {last.n_valid} of {last.n_zoi} ZOIs valid in the last{refused}",
-        f"last mean strain: exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m;"
+        "last strain of the region:"
+        f" exx {last.exx * 1e6:+.1f}  eyy {last.eyy * 1e6:+.1f}  exy {last.exy * 1e6:+.1f} µm/m"
+        f"{f' {part}' if part else ''};"
         f" largest of any ZOI {largest * 1e6:+.0f} µm/m",
         noise_line(history),
     ]
+    lines += sharpness_line(history.column("blur").tolist(), history.column("sigma_blur").tolist())
     lines += latency_lines(history)
     figures = figure_lines(evaluate(history, run_state.loads, specimen), specimen)
     if figures:
@@ -105,8 +116,14 @@ class StatusCard:
         i, frames, lost = history.time_steps[-1], snapshot.frames, snapshot.lost
         lines = [
             f"**{i.n_valid} of {i.n_zoi}** ZOIs valid" + (f" ({i.refused})" if i.refused else ""),
-            f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, mean **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
+            f"one ZOI **{i.zoi_sigma * 1e6:.3g}** µm/m, region **{i.sigma_eyy * 1e6:.2g}** µm/m (1 σ)",
         ]
+        blur = Blur(i.blur, i.sigma_blur).text
+        lines += [f"{blur} since the reference"] * bool(blur)
+        if part := share_text(i.least_share):
+            lines.append(f"strain **{part}**")
+        if snapshot.axis_assumed:
+            lines.append(f"axis of the load **{snapshot.axis}**, assumed")
         figures = evaluate(history, self._loads, self._specimen)
         lines += [line.replace("  ", ", ") for line in elastic_lines(figures, self._specimen)]
         lines.append(

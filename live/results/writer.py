@@ -149,6 +149,7 @@ def write_results(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
         gauges=dict(config.gauges),
         axis=config.specimen.axis,
         lagged=config.load.lag_s != 0,
+        plates=bool(config.plate),
     )
     return [
         ResultsConsumer(

@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from acquire.frame import Burst
-from live.pipeline.frame_counts import FrameCounts
 from live.pipeline.measure import NewReference
 from live.pipeline.reference import ReferenceBurst
+from live.pipeline.run_state import FrameCounts
 from live.run.grabber import Grabber
 
 POLL_S = 0.2

@@ -5,15 +5,14 @@ from __future__ import annotations
 import codecs
 import contextlib
 import math
-import os
-import select
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import Any, TextIO
+from typing import TextIO
 
 from live.pipeline.screen import Screen
 from live.run.control import ENDED, Controls, answer
+from live.run.terminal import Terminal, terminal_of
 
 HELP = (
     "keys: r new reference, t tare (T whatever the load does, u undo it), p pause/go on, s start recording,"
@@ -106,7 +105,7 @@ class Keyboard:
         self._controls, self._stream, self._screen = controls, stream, screen
         self._closed = threading.Event()
         self._thread = threading.Thread(target=self._work, name="keyboard", daemon=True)
-        self._terminal = _Terminal.of(stream)
+        self._terminal = terminal_of(stream)
 
     def start(self) -> None:
         """Show the keys, and begin to read."""
@@ -136,18 +135,17 @@ class Keyboard:
             if text.strip() and (reply := answer(text, self._controls)) != "ok":
                 self._screen.print(reply)
 
-    def _take_keys(self, terminal: _Terminal) -> None:
+    def _take_keys(self, terminal: Terminal) -> None:
         keys = Keys(self._controls, self._screen)
         for text in self._typed(terminal):
             keys.type(text)
 
-    def _typed(self, terminal: _Terminal) -> Iterator[str]:
+    def _typed(self, terminal: Terminal) -> Iterator[str]:
         decoder = codecs.getincrementaldecoder("utf-8")("replace")
         while not self._closed.is_set():
             if not terminal.set_single_keys():
                 self._closed.wait(_POLL_S)  # another program has the terminal
-            elif select.select([terminal.descriptor], [], [], _POLL_S)[0] and terminal.in_foreground:
-                data = os.read(terminal.descriptor, 256)
+            elif (data := terminal.read(_POLL_S)) is not None:
                 if not data:
                     return
                 yield decoder.decode(data)
@@ -160,57 +158,3 @@ def listen(controls: Controls, stream: TextIO | None, screen: Screen) -> Keyboar
     keyboard = Keyboard(controls, stream, screen)
     keyboard.start()
     return keyboard
-
-
-class _Terminal:
-    """A terminal that gives each key at once and without echo while the program is in the foreground.
-
-    A shell that stopped the program (Ctrl-Z) changes the terminal and leaves it so when the program
-    continues: it is set again. In the background the terminal is not changed: that would stop the program.
-    """
-
-    def __init__(self, descriptor: int, before: Any) -> None:
-        self.descriptor, self._before = descriptor, before
-
-    @classmethod
-    def of(cls, stream: TextIO) -> _Terminal | None:
-        """The terminal of ``stream``, set to single keys; None where that is not possible."""
-        try:
-            import termios
-        except ImportError:  # another system
-            return None
-        try:
-            terminal = cls(stream.fileno(), termios.tcgetattr(stream.fileno()))
-        except (OSError, ValueError, termios.error):
-            return None
-        return terminal if terminal.set_single_keys() else None
-
-    @property
-    def in_foreground(self) -> bool:
-        """Whether the program is in the foreground."""
-        try:
-            return os.tcgetpgrp(self.descriptor) == os.getpgrp()
-        except OSError:
-            return False
-
-    def set_single_keys(self) -> bool:
-        """Set it to single keys, where it is not; whether it is then."""
-        import termios
-        import tty
-
-        if not self.in_foreground:
-            return False
-        try:
-            if termios.tcgetattr(self.descriptor)[tty.LFLAG] & termios.ICANON:
-                tty.setcbreak(self.descriptor, termios.TCSADRAIN)
-        except (OSError, ValueError, termios.error):
-            return False
-        return True
-
-    def restore(self) -> None:
-        """Set it as it was before."""
-        import termios
-
-        if self.in_foreground:
-            with contextlib.suppress(OSError, ValueError, termios.error):
-                termios.tcsetattr(self.descriptor, termios.TCSADRAIN, self._before)

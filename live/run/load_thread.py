@@ -10,8 +10,9 @@ import time
 from acquire.errors import PhasedicError
 from acquire.events import EventKind
 from acquire.load_cell import LoadCell
+from acquire.system import lower_priority
 from live.pipeline.consumer_thread import Outputs
-from live.pipeline.latency import LOAD, lower_priority
+from live.pipeline.latency import LOAD
 from live.pipeline.run_state import RunState
 from live.run.control import TareControl
 from live.run.pre_trigger import PreTriggerBuffer

@@ -9,12 +9,13 @@ import threading
 import time
 from collections.abc import Callable
 
+from acquire.burst import LIMIT_PX
 from acquire.errors import PhasedicError
-from acquire.events import Event, EventKind
+from acquire.events import Event, EventKind, EventSink, Level
 from acquire.frame import Burst
+from acquire.system import lower_priority
 from live.pipeline.consumer_thread import Outputs
-from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample, lower_priority
-from live.pipeline.measure import SmearGuard
+from live.pipeline.latency import MEASURE, LatencyMonitor, LatencySample
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import ReferenceBurst, motion_between
 from live.pipeline.run_state import RunState
@@ -119,6 +120,41 @@ def _motion(ready: PreparedKernel, reference: ReferenceBurst) -> float:
 
 def _or_none(value: float) -> float | None:
     return value if math.isfinite(value) else None
+
+
+class SmearGuard:
+    """Checks the motion during each measured burst; an event when smear begins and when it ends.
+
+    Motion v during T multiplies the contrast at wave number k by |sinc(k v T / 2)|: negligible up to
+    0.05 px. The motion is estimated with each burst (``acquire.burst.accumulate``).
+
+    Parameters
+    ----------
+    on_event : callable taking an Event
+    limit_px : float, px
+    """
+
+    def __init__(self, on_event: EventSink, limit_px: float = LIMIT_PX) -> None:
+        self._on_event, self._limit = on_event, limit_px
+        self._smeared = False
+
+    def check(self, burst: Burst) -> None:
+        """Check a burst; one whose motion is not known changes nothing."""
+        smeared = burst.motion_px > self._limit
+        # Hysteresis: a motion near the limit does not repeat the events.
+        calm = burst.motion_px < 0.8 * self._limit
+        if smeared and not self._smeared:
+            text = (
+                f"the picture moves {burst.motion_px:.2f} px during a burst of {burst.n}; take shorter bursts"
+            )
+            self._emit(burst, text, "warning")
+        elif calm and self._smeared:
+            self._emit(burst, "the picture stands still enough again during a burst", "info")
+        self._smeared = smeared or (self._smeared and not calm)
+
+    def _emit(self, burst: Burst, text: str, level: Level) -> None:
+        data = {"motion_px": burst.motion_px, "n": burst.n}
+        self._on_event(Event(burst.t, EventKind.MEASUREMENT, "burst", text, level, data))
 
 
 class MeasureThread:

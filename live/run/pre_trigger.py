@@ -16,7 +16,7 @@ from acquire.events import Event, EventKind
 from acquire.frame import Burst, Frame
 from acquire.load_sample import LoadSample
 from live.pipeline.event_log import EventLog
-from live.pipeline.frame_counts import FrameCounts
+from live.pipeline.run_state import FrameCounts
 from live.run.control import START, ControlRefused
 
 _SMALL = 512  # bytes counted for an event

@@ -71,7 +71,7 @@ def set_up(config: Config, rig: Rig, event_log: EventLog, screen: Screen, stop: 
     if took > 0:
         screen.print(f"everything is compiled ({took:.0f} s)")
     compile_loops()
-    dry_run(camera, plan.grid, plan.settings, bursts)
+    dry_run(camera, plan.kernel_grid, plan.settings, bursts)
     folder = make_folder(config.output.dir, datetime.datetime.now(datetime.UTC))
     in_force = with_flat_field(with_mask(config, plan.mask, folder), folder)
     return PreparedRun(rig, replace(plan, config=in_force), bursts, folder, _time_zero(rig, event_log))

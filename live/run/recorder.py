@@ -23,9 +23,8 @@ from acquire.load_sample import LoadSample
 from acquire.record_mode import RecordMode
 from acquire.session import RotatingWriter, SessionInfo, SessionWriter
 from live.pipeline.event_log import EventLog
-from live.pipeline.frame_counts import FrameCounts
 from live.pipeline.queues import BoundedQueue
-from live.pipeline.run_state import Health, RunState
+from live.pipeline.run_state import FrameCounts, Health, RunState
 from live.pipeline.screen import Screen
 from live.results.folder import versions
 from live.run.outcome import StopSignal

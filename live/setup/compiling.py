@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 from types import FrameType
 
 from acquire.errors import ConfigError, Interrupted
-from acquire.signal_mask import blocked_signals, signal_handler, unblock_signals
+from acquire.system import blocked_signals, signal_handler, unblock_signals
 
 log = logging.getLogger(__name__)
 _POLL_S = 0.25

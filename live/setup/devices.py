@@ -68,6 +68,15 @@ def open_rig(
     return Rig(camera, load, specimen if _simulated(camera_address) else None)
 
 
+def check_load_port(address: str) -> None:
+    """Refuse a serial port that is not there, before a camera is opened; raises DeviceError."""
+    parsed = parse_address(address)
+    if not parsed.scheme:
+        from acquire.serial_line.ports import check_present
+
+        check_present(parsed.target)
+
+
 def at_rest(address: str) -> str:
     """The address for a look at the rig before a test: a simulated test would begin by itself."""
     if not _simulated(address):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.errors import ConfigError
+from analysis.optics import Box, PlateLayout, without_plates
 from live.config.loading import Config
 from live.config.values import AUTO
 from live.pipeline.reference import numerics_error
@@ -38,9 +39,33 @@ def grid_for(config: Config, width: int, height: int, mask: NDArray[np.bool_] | 
             f" allowed: x + width <= {width}, y + height <= {height}"
         )
     try:
-        return ZoiGrid.cover(Roi(x, y, w, h), size=m.zoi, step=m.step, mask=mask)
+        grid = ZoiGrid.cover(Roi(x, y, w, h), size=m.zoi, step=m.step, mask=mask)
     except ValueError as error:
         raise ConfigError(f"measure: {error}") from None
+    return without_plates(grid, _boxes(config)) if config.plate else grid
+
+
+def plates_for(config: Config, grid: ZoiGrid, width: int, height: int) -> PlateLayout | None:
+    """The ZOIs of the plates beside those of ``grid`` (``grid_for``); None without plates.
+
+    Raises
+    ------
+    ConfigError
+        A plate leaves the picture of ``width`` x ``height`` px, or no ZOIs fit.
+    """
+    for name, (x, y, w, h) in _boxes(config).items():
+        if x + w > width or y + h > height:
+            raise ConfigError(f"plate.{name}: the box leaves the picture of {width} x {height} px; move it")
+    if not config.plate:
+        return None
+    try:
+        return PlateLayout.of(grid, _boxes(config))
+    except ValueError as error:
+        raise ConfigError(f"plate: {error}") from None
+
+
+def _boxes(config: Config) -> dict[str, Box]:
+    return {name: plate.box for name, plate in config.plate.items() if plate.box is not None}
 
 
 def whole_picture(width: int, height: int, zoi: int) -> tuple[int, int, int, int]:

@@ -13,19 +13,24 @@ from numpy.typing import NDArray
 from acquire.events import EventSink
 from acquire.frame import Burst, CameraInfo
 from acquire.load_cell import LoadLog
+from analysis.optics import PlateFit, ShutterCorrection
 from live.config.gauges import gauges_for
 from live.config.loading import Config
-from live.pipeline.measure import NewReference, measure
+from live.pipeline.guards import DilatationGuard
+from live.pipeline.measure import NewReference, PlateCorrection, measure
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, prepare
 from live.pipeline.warm_up import picture_kinds
 from live.setup.compiling import compile_ahead
-from live.setup.grid import grid_for, kernel_settings
+from live.setup.grid import grid_for, kernel_settings, plates_for
 from live.setup.pictures import correction
 
 if TYPE_CHECKING:
     from analysis import KernelSettings, PhaseKernel, ZoiGrid
     from analysis.evaluate import Gauge
+
+ASSUMED_FOCAL = 4.0
+"""Distance of the camera over the width of its view, where the stand-off is not given."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,17 +43,23 @@ class MeasurePlan:
     mask : (H, W) bool or None
     grid : ZoiGrid
     gauges : tuple of Gauge
+    plates : PlateFit or None
     settings : KernelSettings
     correct : callable
         Corrects the fixed pattern of the sensor in a burst.
+    width, height : int, px
+        Of the picture.
     """
 
     config: Config
     mask: NDArray[np.bool_] | None
     grid: ZoiGrid
     gauges: tuple[Gauge, ...]
+    plates: PlateFit | None
     settings: KernelSettings
     correct: Correction
+    width: int
+    height: int
 
     @classmethod
     def of(cls, config: Config, camera: CameraInfo, mask: NDArray[np.bool_] | None) -> MeasurePlan:
@@ -61,7 +72,30 @@ class MeasurePlan:
         """
         grid = grid_for(config, camera.width, camera.height, mask)
         gauges = gauges_for(config.gauges, config.specimen.first_axis, grid)
-        return cls(config, mask, grid, gauges, kernel_settings(config), correction(config, camera))
+        layout = plates_for(config, grid, camera.width, camera.height)
+        middle = ((camera.width - 1) / 2, (camera.height - 1) / 2)
+        plates = None if layout is None else PlateFit(layout, middle)
+        settings, correct = kernel_settings(config), correction(config, camera)
+        return cls(config, mask, grid, gauges, plates, settings, correct, camera.width, camera.height)
+
+    @property
+    def shutter(self) -> ShutterCorrection | None:
+        """A new correction of the rolling shutter; None without its readout time."""
+        readout_ms = self.config.camera.readout_ms
+        return None if not readout_ms else ShutterCorrection(1e-3 * readout_ms, self.height)
+
+    @property
+    def focal_px(self) -> float:
+        """Distance of the camera over the size of a pixel on the specimen; assumed where it is not known."""
+        scale = self.config.scale
+        if scale.mm_per_px is None or scale.stand_off_mm is None:
+            return ASSUMED_FOCAL * self.width
+        return scale.stand_off_mm / scale.mm_per_px
+
+    @property
+    def kernel_grid(self) -> ZoiGrid:
+        """The ZOIs that the kernel measures: those of the test, and of plates."""
+        return self.grid if self.plates is None else self.plates.layout.whole
 
     def compile(
         self, camera: CameraInfo, show: Callable[[str], object], stopped: Callable[[], bool]
@@ -73,7 +107,7 @@ class MeasurePlan:
     def on(self, reference: Burst, what: str = "the reference") -> PreparedKernel:
         """The kernel on ``reference``, named ``what`` in errors; raises as ``live.pipeline.reference.prepare``."""
         stated = self.config.measure.noise_GL
-        kernel, noise_GL = prepare(reference, self.grid, self.settings, stated, self.correct, what)
+        kernel, noise_GL = prepare(reference, self.kernel_grid, self.settings, stated, self.correct, what)
         return PreparedKernel(self, kernel, noise_GL)
 
 
@@ -99,7 +133,8 @@ class PreparedKernel:
         self, bursts: Iterable[Burst | NewReference], loads: LoadLog, on_event: EventSink
     ) -> Iterator[Measurement]:
         """The measurement of each burst (``live.pipeline.measure.measure``)."""
-        settings = self.plan.config.measure
+        config, plates = self.plan.config, self.plan.plates
+        settings, stand_off = config.measure, config.scale.stand_off_mm
         return measure(
             bursts,
             self.kernel,
@@ -107,8 +142,11 @@ class PreparedKernel:
             noise_GL=self.noise_GL,
             correct=self.plan.correct,
             gauges=self.plan.gauges,
+            shutter=self.plan.shutter,
+            plates=None if plates is None else PlateCorrection(plates, self.plan.focal_px, on_event),
             renew_at=settings.renew_at,
             strain=cast(Any, settings.strain),
+            dilatation=DilatationGuard(config.specimen.nu, stand_off, on_event),
             on_event=on_event,
             timer=self.timer,
         )

@@ -197,7 +197,7 @@ def _measure(p: Proposal, mask: Path | None) -> Iterator[str]:
     yield f"zoi = {m.zoi}{_comment('side of a ZOI, px: smaller ones resolve more and are noisier (phasedic check)')}"
     yield f"step = {m.step}{_comment('from one ZOI to the next, px')}"
     if mask is None:
-        yield f'gauges = "auto"{_comment("axial, transverse and area on the specimen, besides those given below")}'
+        yield f'gauges = "auto"{_comment("extension, width and area of the specimen, besides those given below")}'
 
 
 def _gauges(p: Proposal, fixed: bool) -> Iterator[str]:

@@ -168,6 +168,6 @@ def _legend(o: Overlay) -> str:
     known = o.sigma[o.grid.active]
     good = int((known <= o.target).sum())
     return (
-        f"{good} of {known.size} ZOIs of {o.grid.size} px within {o.target * 1e6:.0f} um/m (green);"
+        f"{good} of {known.size} ZOIs of {o.grid.size} px within {o.target * 1e6:.0f} µm/m (green);"
         " to twice that yellow, more red, cross: no pattern"
     )

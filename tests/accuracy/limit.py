@@ -31,7 +31,7 @@ def noise_limit(
     line : (n,), the weight along one axis
     """
     size = len(line)
-    fy, fx = (_derivative(level, axis) for axis in (0, 1))
+    fy, fx = (derivative(level, axis) for axis in (0, 1))
     x = np.arange(size) - (size - 1) / 2
     ones = np.ones((size, size))
     modes = [ones, ones * x, ones * x[:, None]]
@@ -47,7 +47,7 @@ def noise_limit(
     return dict(zip(NAMES, values, strict=True))
 
 
-def _derivative(level: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+def derivative(level: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
     """Spectral derivative of a padded image; exact for a band-limited pattern away from its edges."""
     n = level.shape[axis]
     padded = np.concatenate([level, np.flip(level, axis)], axis=axis)

@@ -21,11 +21,15 @@ JITTER = 0.25
 
 @dataclass(frozen=True)
 class Speckle:
-    """A pattern of unlimited extent (within +-span px); intensities are shares of full scale."""
+    """A pattern of unlimited extent (within +-span px); intensities are shares of full scale.
+
+    ``blur`` is the standard deviation of a Gaussian that blurs it, px: a blob stays one, wider and weaker.
+    """
 
     radius: float
     seed: int = 0
     span: int = 1400
+    blur: float = 0.0
 
     def at(self, x: Array, y: Array) -> Array:
         """The pattern at material points, values in 0..1, mean 0.5, std 0.18."""
@@ -34,7 +38,9 @@ class Speckle:
         rng = np.random.default_rng(self.seed)
         shift = rng.uniform(-JITTER, JITTER, (cells, cells, 2))
         sign = rng.choice([-1.0, 1.0], (cells, cells)) * rng.uniform(0.9, 1.1, (cells, cells))
-        out = _sum_blobs(np.ascontiguousarray(x), np.ascontiguousarray(y), spacing, self.radius, shift, sign)
+        wide = float(np.hypot(self.radius, self.blur))
+        out = _sum_blobs(np.ascontiguousarray(x), np.ascontiguousarray(y), spacing, wide, shift, sign)
+        out *= (self.radius / wide) ** 2
         mean_square = np.mean(sign**2) * np.pi / SPACING**2
         return 0.5 + CONTRAST * out / np.sqrt(mean_square)
 

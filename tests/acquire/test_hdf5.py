@@ -5,6 +5,8 @@ from __future__ import annotations
 import errno
 import math
 import os
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,15 +16,63 @@ import pytest
 from numpy.typing import NDArray
 
 from acquire.errors import DataError
-from acquire.hdf5 import DiskSync, PictureReader, PictureStack, compile_loops
+from acquire.hdf5 import COMPRESSED, DiskSync, PictureReader, PictureStack, compile_loops, create_file
 from acquire.hdf5 import disk as pace_module
 from acquire.hdf5.disk import forecast, free_bytes, network_share
 from tests.acquire.session.fixtures import frame, writer
 from tests.live.ui.waiting import until
 
+ROOT = Path(__file__).parents[2]
+
 
 def test_free_bytes_of_what_does_not_exist_yet(tmp_path: Path) -> None:
     assert free_bytes(tmp_path / "a" / "b" / "session.h5") > 0
+
+
+DECLARED = """
+import resource, sys
+from pathlib import Path
+from acquire.hdf5 import create_file
+limit = int(sys.argv[2])
+resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+def declare(file):
+    for k in range(40):
+        file.create_group(f"a{k}").create_dataset("b", (0,), "f8", maxshape=(None,), chunks=(256,)).attrs["units"] = "m"
+try:
+    create_file(Path(sys.argv[1]), declare).close()
+except OSError as error:
+    print(error.strerror)
+"""
+
+
+@pytest.mark.parametrize("limit", [0, 900, 5000, 20_000])
+def test_a_file_without_room_for_its_groups_leaves_nothing(tmp_path: Path, limit: int) -> None:
+    """HDF5 objects that were open on a full disk printed a traceback each."""
+    path = tmp_path / "a.h5"
+    done = subprocess.run(
+        [sys.executable, "-c", DECLARED, path, str(limit)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.stdout, done.stderr) == ("File too large\n", "")
+    assert not path.exists()
+
+
+def test_a_new_file_is_read_while_it_grows_and_replaces_none(tmp_path: Path) -> None:
+    path = tmp_path / "a.h5"
+    file = create_file(path, lambda head: head.create_dataset("b", (0,), "f8", maxshape=(None,), chunks=(4,)))
+    with file, h5py.File(path, "r", swmr=True) as reader:
+        file["b"].resize((3,))
+        file["b"][:] = [1.0, 2.0, 3.0]
+        file.flush()
+        reader["b"].refresh()
+        assert reader["b"][:].tolist() == [1.0, 2.0, 3.0]
+    content = path.read_bytes()
+    with pytest.raises(FileExistsError):
+        create_file(path, lambda head: head.create_group("other"))
+    assert path.read_bytes() == content
 
 
 def test_forecast(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -93,6 +143,24 @@ def test_the_bytes_are_those_of_hdf5(tmp_path: Path, shape: tuple[int, ...], dty
             assert chunks[0] == chunks[1]
             assert len(chunks[0][1]) == picture.nbytes + 4
             np.testing.assert_array_equal(file["ours"][k], picture)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.uint32])
+@pytest.mark.parametrize("shape", SIZES, ids=str)
+def test_compressed_pictures_come_back_through_the_library(
+    tmp_path: Path, shape: tuple[int, ...], dtype: Any
+) -> None:
+    with h5py.File(tmp_path / "small.h5", "w") as file:
+        stack = PictureStack(new_stack(file, "image", shape, dtype, **COMPRESSED))
+        for picture in pictures(shape, dtype):
+            stack.append(picture)
+    with h5py.File(tmp_path / "small.h5") as file:
+        reader = PictureReader(file["image"])
+        for k, picture in enumerate(pictures(shape, dtype)):
+            np.testing.assert_array_equal(file["image"][k], picture, strict=True)
+            np.testing.assert_array_equal(reader[k], picture, strict=True)
+        if picture.nbytes > 1000:
+            assert file["image"].id.get_chunk_info(1).size < picture.nbytes / 50
 
 
 def test_a_flipped_bit_is_seen_by_hdf5(tmp_path: Path) -> None:

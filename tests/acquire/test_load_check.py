@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import random
 from collections.abc import Iterator
@@ -47,6 +48,21 @@ def test_a_healthy_cell() -> None:
     assert found.mean_N == pytest.approx(100.1, abs=0.01)
     assert set(found.lines) == {b"0", b"1", b"2"}
     assert any("50 1/s" in line for line in report_lines(found))
+
+
+@pytest.mark.parametrize(
+    ("mean", "noise", "text"),
+    [
+        (0.00440252, 0.968, "0.004"),
+        (-0.023013, 1.03, "-0.02"),
+        (-0.001, 1.03, "0.00"),
+        (12345.678, 140.0, "12346"),
+        (2.5, 0.0, "2.5"),
+        (2.5, math.nan, "2.5"),
+    ],
+)
+def test_the_mean_has_no_more_digits_than_the_noise_allows(mean: float, noise: float, text: str) -> None:
+    assert dataclasses.replace(report(steady()), mean_N=mean, noise_N=noise).mean_text == text
 
 
 def test_a_drift_is_no_noise() -> None:

@@ -26,7 +26,9 @@ from analysis.fit.sensitivity import square_rows
 from analysis.fit.shapes import (
     CHANNELS,
     DEGREES,
+    DEGREES_OF,
     DIFFERENCE_ROWS,
+    N_PRODUCTS,
     PRODUCT,
     PRODUCT_ROWS,
     SQUARE_ROWS,
@@ -35,6 +37,7 @@ from analysis.fit.shapes import (
     product_moments,
     shapes_of,
 )
+from analysis.kernel.images import second_differences
 
 PARTS = 64
 
@@ -232,7 +235,7 @@ def test_whole_vectors(size: int, rounded: int) -> None:
 
 @pytest.mark.parametrize("size", [9, 32, 57])
 def test_moments_of_the_difference(size: int) -> None:
-    images = RNG.normal(size=(CHANNELS, HEIGHT, PITCH)).astype(np.float32)
+    images = RNG.normal(size=(4, HEIGHT, PITCH)).astype(np.float32)
     top, left, line = 5, 7, whole(size)
     g = np.full((size, line), 1e3, np.float32)  # what lies beyond the ZOI must not count
     g[:, :size] = RNG.normal(size=(size, size))
@@ -241,10 +244,11 @@ def test_moments_of_the_difference(size: int) -> None:
     energy = of_the_difference(
         images.ravel(), HEIGHT * PITCH, top * PITCH + left, PITCH, g.ravel(), line, size, shapes.rows, columns, out
     )  # fmt: skip
+    second = second_differences(images)[:, top : top + size, left : left + size].astype(float)
     fx, fy, f, raw = images[:, top : top + size, left : left + size].astype(float)
     d, rows = g[:, :size] - raw, shapes.rows[:, :size].astype(float)
     assert energy == pytest.approx(rows[0] @ d**2 @ rows[0], rel=1e-5)
-    for channel, (image, degrees) in enumerate(((fx, 4), (fy, 4), (f, 2), (1.0, 2))):
+    for channel, (image, degrees) in enumerate(zip((fx, fy, f, 1.0, *second), DEGREES_OF, strict=True)):
         expected = rows @ (d * image) @ rows.T
         for j in range(degrees):
             for i in range(degrees - j):
@@ -254,21 +258,22 @@ def test_moments_of_the_difference(size: int) -> None:
 @pytest.mark.parametrize("order", [1, 2])
 def test_moments_of_products(order: int) -> None:
     size = 25
-    images = RNG.normal(size=(3, HEIGHT, PITCH)).astype(np.float32)
+    images = RNG.normal(size=(CHANNELS, HEIGHT, PITCH)).astype(np.float32)
     top, left, line = 11, 3, whole(size)
     window = profile("gaussian", size)
     powers, squares = shapes_of(window, line).powers, square_rows(window, line)
-    of_w, of_q = np.zeros((10, PRODUCT_ROWS, PRODUCT_ROWS)), np.zeros((10, PRODUCT_ROWS, PRODUCT_ROWS))
+    of_w, of_q = np.zeros((2, N_PRODUCTS, PRODUCT_ROWS, PRODUCT_ROWS))
     one = np.ones(line, np.float32)
     columns = np.zeros((PRODUCT_ROWS + SQUARE_ROWS, line), np.float32)
     product_moments(
         images.ravel(), images.ravel(), one, 0, 0, one, HEIGHT * PITCH, top * PITCH + left, PITCH, size,
         powers, squares, order, columns, of_w, of_q,
     )  # fmt: skip
-    parts = [*images[:, top : top + size, left : left + size].astype(float), np.ones((size, size))]
+    parts = images[:, top : top + size, left : left + size].astype(float)
+    parts[3] = 1
     w, q = powers[:, :size].astype(float), squares[:, :size].astype(float)
-    for a in range(4):
-        for b in range(a, 4):
+    for a in range(CHANNELS):
+        for b in range(a, CHANNELS):
             product = parts[a] * parts[b]
             for found, rows, most in ((of_w, w, 3 + order), (of_q, q, 2 * order)):
                 expected = rows @ product @ rows.T

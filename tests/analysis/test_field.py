@@ -212,6 +212,7 @@ def test_the_numbers_of_a_status_are_those_in_files() -> None:
         "NOT_CONVERGED",
         "POOR_MATCH",
         "UNEVEN",
+        "AMBIGUOUS",
     ]
     assert [(s.name, s.value) for s in Status] == [(n, k) for k, n in enumerate(names)]
 

@@ -12,7 +12,8 @@ from analysis import KernelSettings, PatternError, PhaseKernel, Roi, Status, Zoi
 from analysis.kernel.images import as_model
 from analysis.kernel.prepared import PatternError as Raised
 from analysis.kernel.reference import ReferencePicture
-from analysis.kernel.solve import Solution, retry_lost
+from analysis.kernel.retry import retry_lost
+from analysis.kernel.solve import Solution
 from tests.analysis.speckle import SHAPE, picture
 
 GRID = ZoiGrid.cover(Roi(8, 8, 160, 128), size=32, step=16)

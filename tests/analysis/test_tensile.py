@@ -11,6 +11,7 @@ import pytest
 from analysis.evaluate import (
     STANDARDS,
     Curve,
+    ErrorLimits,
     Figure,
     Interval,
     TensileFigures,
@@ -22,7 +23,8 @@ from analysis.evaluate import (
     load_axis,
     principal_direction,
 )
-from analysis.evaluate.curve import broken_at
+from analysis.evaluate.curve import Loading, broken_at
+from analysis.evaluate.elastic import line_through
 from tests.analysis.curves import Truth, composite, linear, lueders, noisy, ramberg_osgood
 
 SEEDS = 60
@@ -73,6 +75,37 @@ def test_without_noise_the_figures_are_exact() -> None:
     assert found.nu.value == pytest.approx(0.33, rel=1e-6)
     assert found.Rp02.value == pytest.approx(250e6, rel=1e-4)
     assert found.r2 == pytest.approx(1)
+
+
+def test_stated_limits_of_error_are_in_the_interval_of_e() -> None:
+    curve = noisy(linear(), 3)
+    interval = free(Interval("strain", 0.0005, 0.0025))
+    plain = evaluate_test(curve, TensileOptions(interval))
+    limits = ErrorLimits(force=0.01, section=0.005, strain=20e-6)
+    found = evaluate_test(curve, TensileOptions(interval, limits=limits))
+    assert plain.span is not None
+    assert list(plain.budget) == ["scatter"]
+    span = plain.span.strain[1] - plain.span.strain[0]
+    parts = {"load cell": 0.01, "section": 0.005, "strain": 20e-6 / span}
+    assert {k: v for k, v in found.budget.items() if k != "scatter"} == pytest.approx(
+        {cause: limit / math.sqrt(3) for cause, limit in parts.items()}, rel=2e-2
+    )
+    assert found.budget["scatter"] == plain.budget["scatter"]
+    combined = math.hypot(*found.budget.values())
+    # So little of it is scatter that there are degrees of freedom without end.
+    assert found.E.high - found.E.value == pytest.approx(1.96 * combined * found.E.value, rel=1e-3)
+    assert found.E.value == plain.E.value
+    assert found.E_chord.high - found.E_chord.value > found.E.high - found.E.value
+    assert found.nu == plain.nu
+
+
+def test_few_points_keep_their_degrees_of_freedom() -> None:
+    line = line_through(Loading.of(noisy(linear(fps=1.0), 3)), 4, 12)
+    assert line is not None
+    assert line.n == 8
+    assert line.modulus().high - line.slope == pytest.approx(2.447 * line.sigma, rel=1e-3)  # t of 6
+    both = line.modulus(line.sigma / line.slope)  # as much again: 24 degrees of freedom
+    assert both.high - line.slope == pytest.approx(2.064 * math.sqrt(2) * line.sigma, rel=1e-3)
 
 
 def test_noise_of_the_strain_does_not_flatten_the_line() -> None:

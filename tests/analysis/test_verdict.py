@@ -8,11 +8,12 @@ import pytest
 from analysis import KernelSettings, NoiseModel, PhaseKernel, Roi, Status, ZoiGrid
 from analysis.evaluate import AreaGauge
 from analysis.field import StrainField
-from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, ReferenceArgs, VerdictArgs
+from analysis.fit.kernel_args import CONVERGED, LEFT_IMAGE, OutArgs, PooledError, ReferenceArgs, VerdictArgs
 from analysis.fit.verdict import judge
 from analysis.kernel.images import as_model
+from analysis.kernel.neighbours import Neighbours
 from analysis.kernel.reference import ReferencePicture
-from analysis.kernel.solve import Solution, _lent_guesses, _Places
+from analysis.kernel.solve import Solution
 from tests.analysis.speckle import SHAPE, picture
 
 PIXELS, SIGNAL, EXPECTED = 200.0, 1e4, 4.0
@@ -23,12 +24,14 @@ ALLOWED = (1.05 + 4 * np.sqrt(2 / PIXELS)) * EXPECTED
 def verdict(left: float, *, gain: float = 1.0, noise_known: bool = True, **changed: int) -> Status:
     """The status of one ZOI that leaves a variance of ``left`` GL^2 where the noise has EXPECTED."""
     found = OutArgs.starting(np.zeros((1, 6)))
-    found.left[:], found.bending[:], found.nuisance[:] = left, 0, (gain, 0)
+    found.left[:], found.bending[:], found.nuisance[:] = left, 0, (gain, 0, 0)
     found.state[:], found.iterations[:] = changed.get("state", CONVERGED), changed.get("iterations", 3)
-    known = ReferenceArgs(np.full(1, SIGNAL), np.full(1, PIXELS), np.full((1, 2), 1e-6), np.full(1, 1e-3))
+    known = ReferenceArgs(
+        np.full(1, SIGNAL), np.full(1, PIXELS), np.full((1, 2), 1e-6), np.full(1, 1e-3), np.ones(2), 1.0
+    )
     rule = VerdictArgs(noise_known, np.array([1.0, 1.0]), 32 / 6, 0.05, 4.0)
     out = np.empty(1, np.uint8)
-    judge(found, found.left, np.full(1, EXPECTED), known, rule, out)
+    judge(found, found.left, np.full(1, EXPECTED), PooledError.none(1), known, rule, out)
     return Status(int(out[0]))
 
 
@@ -117,7 +120,9 @@ def test_a_neighbour_lends_what_it_predicts_at_the_place_of_the_lost_zoi() -> No
     for lost in (GRID.shape[1] + 1, 0, len(field) - 1):
         solution.status[:] = Status.OK
         solution.status[lost] = Status.LOST
-        guess, lenders = _lent_guesses(solution, _Places.of(reference), np.array([lost]))
+        guess, lenders = Neighbours.of(reference).lent(
+            solution, np.array([lost]), solution.status == Status.OK
+        )
         assert guess[0] == pytest.approx(field[lost], abs=1e-9)
         assert lenders[0] == (8 if lost == GRID.shape[1] + 1 else 3)
 
@@ -133,8 +138,15 @@ def test_a_gauge_has_a_value_while_half_of_its_zois_have_one(lost: int, known: b
 
 
 def test_poor_match_needs_no_picture_of_another_specimen() -> None:
-    """A tenth of another pattern in each ZOI: neither lost nor valid."""
+    """A tenth of another pattern in a third of the ZOIs: neither lost nor valid; in all, the picture's own error."""
     kernel = PhaseKernel(picture(), GRID, noise=2.0)
-    mixed = 0.9 * picture().astype(float) + 0.1 * picture(v=60.0).astype(float)
-    status = kernel.measure(mixed.astype(np.float32), noise=2.0).status
-    assert np.mean(status == Status.POOR_MATCH) > 0.9
+    mixed = 0.9 * picture().astype(np.float32) + 0.1 * picture(v=60.0).astype(np.float32)
+    everywhere = kernel.measure(mixed, noise=2.0)
+    mixed[:, 80:] = picture()[:, 80:]
+    status = kernel.measure(mixed, noise=2.0).status
+    inside = GRID.x + 16 < 80
+    assert inside.sum() >= 3
+    assert np.mean(status[:, inside] == Status.POOR_MATCH) > 0.9
+    assert (status[:, GRID.x - 16 >= 80] == Status.OK).all()
+    still = kernel.measure(picture(), noise=2.0)
+    assert np.nanmedian(everywhere.sigma_u) > 3 * np.nanmedian(still.sigma_u)

@@ -27,6 +27,7 @@ ANALYSIS = {
     "analysis.picture": "analysis.field analysis.compiled",
     "analysis.follow": "analysis.field analysis.compiled",
     "analysis.evaluate": "analysis.field",
+    "analysis.optics": "analysis.field analysis.evaluate",
     "analysis.paper_estimator": "analysis.field",
     "analysis.quality": "analysis.field analysis.picture",
     "analysis.fit": "analysis.field analysis.compiled analysis.picture",
@@ -64,8 +65,8 @@ LAYERS = {
         )
         for i, layer in enumerate(LIVE)
     },
-    "live.cli": "acquire.errors acquire.printable live.commands.arguments live.commands.exit_codes"
-    " live.commands.signals live.commands.streams",
+    "live.cli": "acquire.errors acquire.printable live.commands.arguments live.commands.environment"
+    " live.commands.exit_codes live.commands.signals live.commands.streams",
 }
 # One module opens the simulated devices. The characterisation and the demo compare with their truth.
 EXCEPTIONS = {

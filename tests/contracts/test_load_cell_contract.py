@@ -24,6 +24,7 @@ from hw_mocks.sim_load_cell import open_sim_load
 from hw_mocks.specimen import specimen_from
 from tests.acquire.session import fixtures as session_fixtures
 from tests.contracts.entry_points import install_example
+from tests.live.ui.waiting import LONG_S
 
 LOAD_N = 25.0
 Opener = Callable[[Path, ExitStack, list[Event]], LoadCell]
@@ -168,7 +169,7 @@ def test_closing_twice_and_unentered(
 def test_tare_makes_the_load_zero_and_is_an_event(
     name: str, tmp_path: Path, stack: ExitStack, events: list[Event]
 ) -> None:
-    until = time.monotonic() + 5
+    until = time.monotonic() + LONG_S
     with opened(name, tmp_path, stack, events) as cell:
         for count, sample in enumerate(cell):
             if count == 4:

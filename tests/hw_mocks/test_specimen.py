@@ -10,7 +10,7 @@ import pytest
 from acquire.addresses import parse_address
 from acquire.errors import ConfigError
 from hw_mocks.deformation import Affine, Deformation, SpecimenDeformation, Wave
-from hw_mocks.machine import FlowCurve, Programme, TestClock
+from hw_mocks.machine import FlowCurve, PowerLaw, Programme, TestClock
 from hw_mocks.specimen import VirtualSpecimen, specimen_from
 
 DEFORMATIONS: dict[str, Deformation] = {
@@ -165,3 +165,16 @@ def test_clock_begins_once() -> None:
 def test_bad_address_says_what_is_allowed(address: str, word: str) -> None:
     with pytest.raises(ConfigError, match=word):
         specimen_from(parse_address(address))
+
+
+def test_a_power_law_has_its_exponent_and_its_anisotropy() -> None:
+    metal = PowerLaw(0.2, 1.6)
+    strain = np.linspace(0.01, 0.3, 30)
+    true_stress, plastic = metal.stress(strain) * (1 + strain), metal.plastic_strain(strain)
+    np.testing.assert_allclose(np.diff(np.log(true_stress)) / np.diff(np.log(plastic)), 0.2, rtol=1e-9)
+    np.testing.assert_allclose(np.log1p(strain), plastic + true_stress / metal.E, rtol=1e-12)
+    width = np.log1p(metal.transverse(strain)) + metal.nu * true_stress / metal.E
+    np.testing.assert_allclose(width / (-plastic - width), 1.6, rtol=1e-9)
+    below = np.linspace(0, 0.99 * metal.yield_strain, 9)
+    np.testing.assert_allclose(metal.stress(below) * (1 + below), metal.E * np.log1p(below), rtol=1e-12)
+    assert specimen_from(parse_address("sim:uniform?n=0.2&r=1.6&max_strain=0.3")).material == metal

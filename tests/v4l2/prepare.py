@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from tests.accuracy.truth import Speckle, affine, digitise
 
 SHAPE = (480, 640)
+MEASURED = ("--zoi", "64", "--step", "64", "--burst", "2", "--reference-burst", "2", "--roi", "all")
 SHIFT_PX = {"u": 0.37, "v": -0.21}
 STRAIN = {"du_dx": -3e-4, "dv_dy": 1e-3}
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from acquire.errors import ConfigError, DataError, PhasedicError
+from acquire.printable import counted
 from live.config.loading import load_config
 from live.pipeline.screen import Screen
 from live.replay.batch.cluster import Cluster, check_scheduler
@@ -162,7 +163,7 @@ def run_campaign(wanted: CampaignRequest, screen: Screen, stopping: threading.Ev
         _sweep(wanted.out, rows, tasks)
         ready = len(wanted.tests) - len(tasks)
         screen.print(
-            f"{len(wanted.tests)} tests: {ready} as they are, {len(tasks)} to replay into {wanted.out}"
+            f"{counted(len(wanted.tests), 'test')}: {ready} done before, {len(tasks)} to replay into {wanted.out}"
         )
         if tasks:
             _work(wanted, longest_first(tasks), rows, screen, stopping, processes)

@@ -16,7 +16,7 @@ from live.config.loading import Config
 from live.pipeline.history import History
 from live.replay.replay import Replayed
 from live.results import Strain, still_phase_of
-from live.results.figures import evaluate, headline
+from live.results.figures import HEADLINE, evaluate, tensile_table
 
 Value = str | int | float | None
 COLUMNS: dict[str, type] = {
@@ -25,6 +25,7 @@ COLUMNS: dict[str, type] = {
     "instants": int, "zois": int, "valid_last": int,
     **{f"{name}{end}": float for name in ("E_GPa", "nu", "Rp0.2_MPa", "Rm_MPa", "EA_kN", "Fp0.2_kN", "Fm_kN")
        for end in ("", "_low", "_high")},
+    "strain_of_E": str, **{f"{name}{end}": float for name in ("r", "n") for end in ("", "_low", "_high")},
     "noise_GL": float, "strain_noise": float, "mean_strain_noise": float,
     "still_instants": int, "strain_noise_measured": float,
     "frames_lost": int, "pictures_left_out": int, "seconds": float,
@@ -116,15 +117,21 @@ def _counts(history: History) -> dict[str, Any]:
     return found if last is None else {**found, "zois": last.n_zoi, "valid_last": last.n_valid}
 
 
-def _figures(figures: TensileFigures, config: Config) -> dict[str, float]:
-    """Stresses where the section is known, else forces."""
-    rows = headline(figures, stresses=config.specimen.area_m2 is not None)
+def _figures(figures: TensileFigures, config: Config) -> dict[str, Any]:
+    """Stresses where the section is known, else forces; and the strain that E and nu are from."""
+    table = tensile_table(figures, stresses=config.specimen.area_m2 is not None)
     parts = {"": "value", "_low": "low", "_high": "high"}
-    return {row.column + end: getattr(row.figure, part) for row in rows for end, part in parts.items()}
+    found: dict[str, Any] = {
+        table[key].column + end: getattr(table[key].figure, part)
+        for key in (*HEADLINE, "r", "n")
+        for end, part in parts.items()
+    }
+    remark = f" ({figures.E.why})" if figures.E.known and figures.E.why else ""
+    return found | {"strain_of_E": figures.elastic_strain + remark}
 
 
 def _noise(history: History) -> dict[str, float]:
-    """Medians over the test: noise of one frame, predicted noise of one ZOI's strain and of the mean strain."""
+    """Medians over the test: noise of one frame, predicted noise of the strain of one ZOI and of the region."""
     columns = {"noise_GL": "noise_GL", "strain_noise": "zoi_sigma", "mean_strain_noise": "sigma_eyy"}
     return {name: _median(history, column) for name, column in columns.items()}
 

@@ -170,6 +170,9 @@ def perform(task: Task, on_progress: OnProgress = _no_progress) -> BatchRow:
     try:
         make(staging)
         row = _measured(task, staging, on_progress) if task.numbers else _replayed(task, staging, on_progress)
+        row = BatchRow.of(
+            {**row.values, "error": _as_published(task, staging, str(row.values["error"] or ""))}
+        )
         (staging / ROW_FILE).write_text(
             json.dumps({"key": task.key, "row": row.values}, indent=1), encoding="utf-8"
         )
@@ -188,7 +191,12 @@ def perform(task: Task, on_progress: OnProgress = _no_progress) -> BatchRow:
 def _not_done(task: Task, staging: Path, words: str, code: int) -> BatchRow:
     """The row of another caller that was faster; else that of a failure."""
     remove(staging)
-    return row_done(task) or failed(task.title, task.source, words, code)
+    return row_done(task) or failed(task.title, task.source, _as_published(task, staging, words), code)
+
+
+def _as_published(task: Task, staging: Path, words: str) -> str:
+    """An error with the path of the results in place of that of the staging folder."""
+    return words.replace(str(staging), str(task.folder))
 
 
 def _replayed(task: Task, staging: Path, on_progress: OnProgress) -> BatchRow:

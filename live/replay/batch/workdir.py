@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from acquire.errors import DataError
+from acquire.system import is_running
 
 _SUFFIX = ".part"
 
@@ -31,7 +32,7 @@ class StagingDir:
     @property
     def is_stale(self) -> bool:
         """Whether it is of a process of this machine that has ended."""
-        return self.host == _host() and not _is_running(self.pid)
+        return self.host == _host() and not is_running(self.pid)
 
 
 def staging_dir(folder: Path) -> Path:
@@ -86,22 +87,3 @@ def remove(staging: Path) -> None:
 
 def _host() -> str:
     return platform.node().replace(".", "-") or "host"
-
-
-def _is_running(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except (PermissionError, OverflowError):
-        return True
-    return not _is_zombie(pid)
-
-
-def _is_zombie(pid: int) -> bool:
-    """Whether the process has ended and was not reaped; False without /proc."""
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2]
-    except OSError:
-        return False
-    return state.split()[:1] == ["Z"]

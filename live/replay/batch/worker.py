@@ -21,7 +21,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TextIO
 
-from acquire.signal_mask import unblock_signals
+from acquire.system import unblock_signals
 from analysis import PICTURE_KINDS, not_compiled
 from live.replay.batch.keys import deciding_versions
 from live.replay.batch.task import Task, TaskProgress, perform

@@ -17,7 +17,7 @@ import threading
 from collections import deque
 from collections.abc import Callable, Sequence
 
-from acquire.signal_mask import blocked_signals
+from acquire.system import blocked_signals
 from live.replay.batch.row import BatchRow, failed
 from live.replay.batch.task import Task, TaskProgress
 from live.replay.batch.worker import ONE_THREAD

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DataError
 from analysis.field import Status
 from live.pipeline.screen import Screen
 from live.results.quantities import Display
@@ -145,6 +145,8 @@ def chosen_rows(strain: Strain, start_s: float | None, end_s: float | None) -> t
     ------
     ConfigError
         There is none.
+    DataError
+        The run holds no measurement.
     """
     t = strain.time_s
     low, high = -np.inf if start_s is None else start_s, np.inf if end_s is None else end_s
@@ -152,7 +154,7 @@ def chosen_rows(strain: Strain, start_s: float | None, end_s: float | None) -> t
     if rows:
         return rows
     if not len(t):
-        raise ConfigError(f"{strain.path}: holds no measurement, there is nothing to export")
+        raise DataError(f"{strain.path}: holds no measurement, there is nothing to export")
     raise ConfigError(
         f"--from, --until: no measurement between {low:g} and {high:g} s; the test has {t[0]:.6g} to {t[-1]:.6g} s"
     )

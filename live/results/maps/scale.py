@@ -28,7 +28,8 @@ _WITHIN = 98.0  # percent of the values lie within the colours
 _NOISE = 4.0  # sigma that the colours reach at least
 _SHRINK, _SHRINK_AFTER = 0.55, 20
 _SAMPLE = 25  # instants that give the range of a run
-_UNITS = {"u": "px", "v": "px", "sigma_u": "px", "sigma_v": "px", "residual": "chi\u00b2", "iterations": ""}
+_UNITS = dict.fromkeys(("u", "v", "blur", "sigma_u", "sigma_v", "sigma_blur"), "px")
+_UNITS |= {"residual": "chi\u00b2", "iterations": ""}
 
 
 def range_kind(name: str) -> Kind:
@@ -165,6 +166,7 @@ _STATUSES = {
     Status.NOT_CONVERGED: (255, 127, 14),
     Status.POOR_MATCH: (31, 119, 180),
     Status.UNEVEN: (140, 86, 75),
+    Status.AMBIGUOUS: (227, 119, 194),
 }
 _UNKNOWN = (60, 60, 60)
 

@@ -88,13 +88,15 @@ def write_table(tests: Sequence[ComparedTest], file: TextIO) -> None:
     """The figures as CSV, each beside half of its interval: a line a test, then mean, standard deviation and n."""
     figures = _rows(tests)
     heads = [f"{end}{row.column}" for row, *_ in figures for end in ("", "half_")]
-    file.write(f"test,path,{','.join(heads)}\n")
+    file.write(f"test,path,{','.join(heads)},strain of E and nu\n")
     for k, test in enumerate(tests):
         values = ",".join(f"{rows[k].figure.value:.8g},{rows[k].half:.8g}" for rows in figures)
-        file.write(f"{_quoted(test.title)},{_quoted(test.path)},{values}\n")
+        file.write(
+            f"{_quoted(test.title)},{_quoted(test.path)},{values},{_quoted(test.curve.figures.elastic_strain)}\n"
+        )
     found = [summary([row.figure.value for row in rows]) for rows in figures]
     for name, part in (("mean", 0), ("standard deviation", 1), ("n", 2)):
-        file.write(f"{name},,{','.join(f'{one[part]:.8g},' for one in found)}\n")
+        file.write(f"{name},,{','.join(f'{one[part]:.8g},' for one in found)},\n")
 
 
 def _quoted(words: str) -> str:
@@ -120,15 +122,19 @@ def _together(tests: Sequence[ComparedTest]) -> Plot:
 
 def _table(tests: Sequence[ComparedTest]) -> Html:
     figures = _rows(tests)
-    heads = ["", *(row.column.replace("_", ", ") for row, *_ in figures)]
+    heads = ["", *(row.column.replace("_", ", ") for row, *_ in figures), "strain of E and nu"]
     rows: list[list[object]] = [
-        [f"{k + 1} {test.title}", *(_cell(of_tests[k]) for of_tests in figures)]
+        [
+            f"{k + 1} {test.title}",
+            *(_cell(of_tests[k]) for of_tests in figures),
+            test.curve.figures.elastic_strain,
+        ]
         for k, test in enumerate(tests)
     ]
     found = [summary([row.figure.value for row in of_tests]) for of_tests in figures]
-    rows.append(["mean", *(_number(mean) for mean, _, _ in found)])
-    rows.append(["standard deviation", *(_number(deviation) for _, deviation, _ in found)])
-    rows.append(["n", *(str(n) for _, _, n in found)])
+    rows.append(["mean", *(_number(mean) for mean, _, _ in found), ""])
+    rows.append(["standard deviation", *(_number(deviation) for _, deviation, _ in found), ""])
+    rows.append(["n", *(str(n) for _, _, n in found), ""])
     return joined([table(heads, rows, tuple(range(1, len(heads))))])
 
 

@@ -71,7 +71,7 @@ def _straight(curve: EvaluatedCurve, label: str, offset: float, e: Unit, load: U
 
 
 def mean_strains(run: RunFolder) -> Plot:
-    """Mean strains against time, each in a band of one standard uncertainty."""
+    """Strains of the region against time, each in a band of one standard uncertainty."""
     values, t = run.strain.values, run.strain.time_s
     found = [np.asarray(values[name], np.float64) for name in _NAMES]
     e = strain_unit(*found)
@@ -80,7 +80,12 @@ def mean_strains(run: RunFolder) -> Plot:
         for colour, (name, mean) in enumerate(zip(_NAMES, found, strict=True))
     )
     return Plot(
-        "strain-time", "Mean strains", "time, s", f"strain, {e.name}", curves, x_range=time_range(run)
+        "strain-time",
+        "Strains of the region",
+        "time, s",
+        f"strain, {e.name}",
+        curves,
+        x_range=time_range(run),
     )
 
 
@@ -121,6 +126,22 @@ def valid_share(run: RunFolder) -> Plot:
     curve = PlotLine("", run.strain.time_s, share, colour=2)
     return Plot(
         "valid-time", "ZOIs with a value", "time, s", "share, %", (curve,), (), time_range(run), (0.0, 105.0)
+    )
+
+
+def parts(run: RunFolder) -> str:
+    """When the strains of the region and of gauges stand for a part of their area; empty where they never do."""
+    names = [name for name in run.strain.values if name == "area_share" or name.startswith("share_gauge_")]
+    shares = np.min(
+        [np.asarray(run.strain.values[name], np.float64) for name in names] or [np.ones(1)], axis=0
+    )
+    rows = np.flatnonzero(shares < 1)
+    if not rows.size:
+        return ""
+    first, last = (float(run.strain.time_s[row]) for row in (rows[0], rows[-1]))
+    return (
+        f"A block of ZOIs had no value at {rows.size} of {len(shares)} instants, between {first:.4g} and {last:.4g} s:"
+        f" the strains there stand for part of their area, {100 * shares.min():.0f} % at the least."
     )
 
 

@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate import Figure, TensileFigures, Track, evaluate_test, find_lag
+from analysis.evaluate import Figure, TensileFigures, Track, evaluate_test, find_lag, neck
 from live.results.figures import tensile_options
 from live.results.run_folder import RunFolder
 
 Array = NDArray[np.float64]
+_BROKEN = 0.02  # of the highest force: below it there is no specimen any more
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,7 +24,7 @@ class EvaluatedCurve:
     Attributes
     ----------
     axial, transverse : (T,) float64
-        Strains of the gauges of these names, else mean strains.
+        Extension of the test, and the strain across: of the gauges of these names, else of the region.
     load : (T,) float64
         Stress, Pa, or force, N, where the section is not known; NaN where no force is known.
     is_stress : bool
@@ -109,6 +110,24 @@ def _yield_row(curve: EvaluatedCurve) -> int:
     plastic = curve.axial - (curve.load - curve.intercept) / curve.figures.E.value
     beyond = np.flatnonzero((plastic >= 0.002) & (curve.load >= 0.98 * curve.figures.Rp02.value))
     return int(beyond[0]) if len(beyond) else int(np.nanargmax(curve.load))
+
+
+def neck_line(run: RunFolder, curve: EvaluatedCurve) -> str:
+    """Where the specimen necked, from the maps at the highest force and at the last instant before the break."""
+    known = np.flatnonzero(np.isfinite(curve.load) & (np.asarray(run.strain.values["n_valid"]) > 0))
+    if not len(known) or not curve.figures.Ag.known:
+        return ""
+    top = int(known[np.argmax(curve.load[known])])
+    last = int(known[curve.load[known] > _BROKEN * curve.load[top]][-1])
+    found = neck(run.field(top), run.field(last), run.load_axis.axis) if last > top else None
+    if found is None:
+        return ""
+    scale, (begin, end) = run.mm_per_px, (run.strain.time_s[row] for row in (top, last))
+    mm = f" ({found.x * scale:.1f}, {found.y * scale:.1f} mm)" if scale else ""
+    return (
+        f"neck at x, y = {found.x:.0f}, {found.y:.0f} px{mm}: from the highest force at {begin:.4g} s to {end:.4g} s"
+        f" the strain there grew by {100 * found.growth:.2g} %, elsewhere by {100 * found.elsewhere:.2g} %"
+    )
 
 
 def nearest_rows(run: RunFolder, times: Sequence[float]) -> dict[int, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,10 +11,10 @@ import numpy as np
 from acquire.errors import DataError
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
-from live.results.figures import axis_text, figure_lines, headline
+from live.results.figures import axis_text, budget_rows, figure_lines, headline, sharpness_line
 from live.results.noise_floor import StillPhase, still_phase_of
 from live.results.report import curves
-from live.results.report.evaluation import EvaluatedCurve, nearest_rows, time_steps
+from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
 from live.results.report.maps import MapPictures, map_pictures, maps, statuses
 from live.results.report.page import (
     Html,
@@ -122,12 +123,14 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
     return [
         _head(run, content.curve),
         section("Specimen and rig", facts(_rig(run, pictures))),
-        section("Curves", plots(content.figures), _about_curves(content.curve)),
+        section("Curves", plots(content.figures), _about_parts(run), _about_curves(content.curve)),
         section("Figures of the test", *figure_table(run, content.curve)),
+        section("Budget of E", *budget_table(run, content.curve)),
         section("Virtual gauges", gauges(run)),
         section("Lag and latency", times(run)),
         section("Maps", *(maps(run, name, chosen, pictures, side) for name in fields)),
         section("Noise floor", *_noise_section(content)),
+        *_sharpness_section(run),
         section("Status of the ZOIs", statuses(run, max(chosen), pictures, min(side, 480))),
         section("Frame counts and events", frame_counts(run), events(run), *_unreadable(run)),
         section("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
@@ -157,7 +160,9 @@ def _head(run: RunFolder, curve: EvaluatedCurve) -> Html:
 def tensile(curve: EvaluatedCurve) -> dict[str, str]:
     """E, nu and the strengths by name, each with its uncertainty; without those that are not known."""
     rows = headline(curve.figures, stresses=curve.is_stress)
-    return {row.name: row.text for row in rows if row.figure.known}
+    found = {row.name: row.text for row in rows if row.figure.known}
+    strain = {f"strain of {rows[0].name}, nu": curve.figures.elastic_strain} if rows[0].figure.known else {}
+    return found | strain
 
 
 def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
@@ -165,7 +170,7 @@ def _extent(run: RunFolder, curve: EvaluatedCurve) -> dict[str, str]:
     found = {"ZOIs with a value, last": f"{int(values['n_valid'][-1])} of {int(values['n_zoi'][-1])}"}
     if np.isfinite(curve.axial).any():
         largest = curve.axial[np.nanargmax(np.abs(curve.axial))] * e.factor
-        name = "gauge axial" if "axial" in run.gauges else f"mean {run.axial}"
+        name = curve.figures.strain or run.axial
         found[f"largest {name}"] = f"{largest:.4g} {e.name}"
     return found
 
@@ -206,10 +211,15 @@ def plots(figures: tuple[Plot, ...]) -> Html:
     return element("div", joined(found), class_="plots")
 
 
+def _about_parts(run: RunFolder) -> Html:
+    words = curves.parts(run)
+    return paragraph(words, "warning") if words else Html("")
+
+
 def _about_curves(curve: EvaluatedCurve) -> Html:
     if not curve.has_load:
         return paragraph("No force is known at any instant, so there is no stress-strain curve.", "dim")
-    words = "Bands: one standard uncertainty of the mean on either side."
+    words = "Bands: one standard uncertainty on either side."
     figures = curve.figures
     if not figures.E.known:
         words += f" E is not known: {figures.E.why}."
@@ -224,8 +234,41 @@ def _about_curves(curve: EvaluatedCurve) -> Html:
 
 def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
     """The figures as text, how they were found, and why others are not known."""
-    lines = figure_lines(curve.figures, run.specimen) if curve.has_load else []
-    return [paragraph(line.strip().replace("  ", ", ")) for line in lines]
+    lines = [*figure_lines(curve.figures, run.specimen), neck_line(run, curve)] if curve.has_load else []
+    return [paragraph(line.strip().replace("  ", ", ")) for line in lines if line]
+
+
+def _sharpness_section(run: RunFolder) -> list[Html]:
+    """Nothing for results of earlier versions, which do not have the blur."""
+    values = run.strain.values
+    if "blur_px" not in values:
+        return []
+    lines = sharpness_line(values["blur_px"].tolist(), values["sigma_blur_px"].tolist())
+    return [section("Sharpness", *(paragraph(line.replace("+-", "±")) for line in lines))] * bool(lines)
+
+
+def budget_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
+    """What the interval of E is made of, and what is not stated."""
+    rows = budget_rows(curve.figures, stresses=curve.is_stress)
+    if not rows:
+        return [paragraph("E is not known, so it has no budget.", "open")]
+    unit, one = ("GPa", 1e9) if curve.is_stress else ("kN", 1e3)
+    cells = [
+        (row.cause, f"{row.strain * 1e6:.3g}", f"{row.modulus / one:.3g}")
+        if math.isfinite(row.modulus)
+        else (row.cause, f"not stated: {row.key}", "")
+        for row in rows
+    ]
+    words = (
+        "Standard uncertainties, of the strain at the end of the elastic interval and of E, combined as the GUM"
+        " (JCGM 100:2008) has it; stated limits of error are taken as even distributions."
+    )
+    plates = (
+        "Motion off the plane is removed by plates; their noise is in the scatter."
+        if run.section("plate")
+        else ("Motion off the plane, the lens and a rolling shutter are in no row but strain.")
+    )
+    return [paragraph(f"{words} {plates}"), table(("", "µm/m", unit), cells, (1, 2))]
 
 
 def _noise_section(content: _Content) -> list[Html]:

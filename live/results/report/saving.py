@@ -76,12 +76,10 @@ def _run(page: Path, target: Path, arguments: list[str]) -> None:
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            raise DataError(
-                f"{target}: {browser} did not finish within {_TIMEOUT_S} s; print the page from it"
-            ) from None
+            raise DataError(f"{browser} did not finish {target.name} within {_TIMEOUT_S} s") from None
     if not target.exists() or not target.stat().st_size:
         words = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
-        raise DataError(f"{target}: {browser} failed on {page} ({' '.join(words)}); print the page from it")
+        raise DataError(f"{browser} failed on {page.name} ({' '.join(words)})")
 
 
 def save_page(report: Report, path: Path) -> None:
@@ -93,7 +91,10 @@ def save_page(report: Report, path: Path) -> None:
 def save_pdf(page: Path, path: Path) -> None:
     """The page printed by a headless browser; raises ConfigError where there is none."""
     with new_file(path) as part:
-        to_pdf(page, part)
+        try:
+            to_pdf(page, part)
+        except DataError as error:
+            raise DataError(f"{path}: {error}; open {page} in a browser and print it") from error
 
 
 def save_figures(figures: Sequence[Plot], folder: Path, screen: Screen) -> None:

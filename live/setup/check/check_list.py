@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.load_cell.check import LoadReport
+from analysis.picture.blocks import BLOCKS, blockiness
 from analysis.quality.exposure import Depth, Exposure, depth, exposure
 from analysis.quality.pattern import speckle_radius, zoi_pattern
 from live.config.loading import Config
@@ -89,6 +90,8 @@ class CheckFigures:
     floors : tuple of ZoiFloor
     zoi, order, burst : int
         Settings of the test.
+    repetition : str
+        What repeats in the pattern, and what that allows; empty where nothing does.
     noise_stated : bool
         Whether the noise was given; else too few frames take it from the spectrum of the picture.
     removed : float or None, GL
@@ -97,6 +100,10 @@ class CheckFigures:
         The gauges of the test, and the mean of all ZOIs along the load.
     load : LoadReport or None
     px_per_mm : float or None
+    blocks : bool
+        Whether the picture shows the blocks of a codec.
+    picture : str
+        What else it shows beyond its noise, in words; "": nothing.
     """
 
     region: Region
@@ -111,11 +118,14 @@ class CheckFigures:
     zoi: int
     order: int
     burst: int
+    repetition: str = ""
     noise_stated: bool = False
     removed: float | None = None
     gauges: tuple[GaugeNoise, ...] = ()
     load: LoadReport | None = None
     px_per_mm: float | None = None
+    blocks: bool = False
+    picture: str = ""
 
     @property
     def automatic(self) -> tuple[str, ...]:
@@ -204,11 +214,14 @@ def figures_of(
         zoi=m.zoi,
         order=m.order,
         burst=sample.burst,
+        repetition=measured.predicted.repetition,
         noise_stated=m.noise_GL is not None,
         removed=None if same else float((sample.picture.mean - sample.raw)[check_region.inside].std()),
         gauges=measured.predicted.gauges,
         load=load,
         px_per_mm=check_region.config.scale.px_per_mm,
+        blocks=blockiness(sample.raw) > BLOCKS,
+        picture=measured.predicted.picture,
     )
 
 

@@ -17,10 +17,12 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from acquire.frame import Burst
+from analysis.evaluate import AreaStrain
 from analysis.field import StrainField
 from analysis.picture.pattern import gauge_length, l10_strain
 from live.config.gauges import gauges_for
-from live.pipeline.reference import averaged, prepare
+from live.pipeline.guards import picture_words
+from live.pipeline.reference import averaged, prepare, repetition_text
 from live.setup.check.sample import CheckSample
 from live.setup.placement import with_auto_gauges
 
@@ -210,10 +212,16 @@ class PredictedNoise:
         Of each ZOI, mean of exx and eyy; NaN without pattern.
     gauges : tuple of GaugeNoise
         The gauges of the test, and the mean of all ZOIs along the load; empty without pattern.
+    picture : str
+        What the picture shows beyond its noise, in words; "": nothing.
+    repetition : str
+        What repeats in the pattern, and what that allows; empty where nothing does.
     """
 
     sigma: NDArray[np.float64]
     gauges: tuple[GaugeNoise, ...]
+    picture: str = ""
+    repetition: str = ""
 
     @property
     def measurable(self) -> NDArray[np.bool_]:
@@ -224,34 +232,39 @@ class PredictedNoise:
 def predict_noise(sample: CheckSample) -> PredictedNoise:
     """Predict the strain noise of each ZOI and gauge of the test."""
     grid = sample.check_region.grid
-    field = _half_on_half(sample)
+    field, repetition = _half_on_half(sample)
     if field is None:
         return PredictedNoise(np.full(grid.shape, np.nan), ())
     factor = math.sqrt((1 / sample.reference + 1 / sample.burst) / (2 / sample.half))
     both = np.sqrt((field.sigma_exx**2 + field.sigma_eyy**2) / 2)
     sigma = np.where(field.ok, factor * both, np.nan)
     return PredictedNoise(
-        sigma, tuple(_gauges(sample.check_region.config, replace(field, grid=grid), factor))
+        sigma,
+        tuple(_gauges(sample.check_region.config, replace(field, grid=grid), factor)),
+        picture_words(field),
+        repetition,
     )
 
 
-def _half_on_half(sample: CheckSample) -> StrainField | None:
-    """The second half of the frames against the first; None without pattern."""
+def _half_on_half(sample: CheckSample) -> tuple[StrainField | None, str]:
+    """The second half of the frames against the first, None without pattern; and what repeats in the pattern."""
     first, second = sample.halves()
     try:
         kernel, _ = prepare(first, sample.check_region.zois, sample.settings, sample.noise)
     except DataError:
-        return None
+        return None, ""
     # The specimen stands still: the fit begins at zero motion, and only failed ZOIs are searched.
     still = StrainField.from_values(kernel.grid, {})
-    return kernel.measure(second.mean, start=still, noise=averaged(sample.noise, sample.half))
+    field = kernel.measure(second.mean, start=still, noise=averaged(sample.noise, sample.half))
+    return field, repetition_text(kernel.period)
 
 
 def _gauges(config: Config, field: StrainField, factor: float) -> Iterator[GaugeNoise]:
     if not field.n_valid:
         return
     along = "exx" if config.specimen.first_axis == "x" else "eyy"
-    yield GaugeNoise("", factor * field.mean(along)[1])
+    region = AreaStrain.of(field)
+    yield GaugeNoise("", factor * (math.nan if region is None else region.sigma(along)))
     config = with_auto_gauges(config, field.grid)
     for gauge in gauges_for(config.gauges, config.specimen.first_axis, field.grid):
         value = gauge.measure(field)

@@ -10,10 +10,12 @@ from typing import Self
 
 from acquire.camera import Camera
 from acquire.frame import Frame
+from analysis.field import Blur
 from live.config.loading import Config
 from live.setup.check.check_list import CheckFigures, KernelFigures, examine, figures_of, find_region
 from live.setup.check.noise_floor import predict_noise
 from live.setup.check.sample import MIN_FRAMES, CheckRegion, CheckSample, FrameStack, stack_of
+from live.setup.check.sharpness import SharpestPicture
 from live.setup.check.stillness import stillness
 from live.setup.region import Region
 
@@ -94,10 +96,11 @@ class RollingFrames:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class QuickCheck:
-    """The figures of some frames, and the highest sharpness since the specimen was found."""
+    """The figures of some frames, the highest sharpness since the specimen was found, and the blur since then."""
 
     figures: CheckFigures
     peak: float
+    blur: Blur
 
     @property
     def of_peak(self) -> float:
@@ -116,7 +119,7 @@ class QuickChecker:
         self._config = config
         self._check_region: CheckRegion | None = None
         self._measured: KernelFigures | None = None
-        self._peak = 0.0
+        self._peak, self._sharpest = 0.0, SharpestPicture()
         self._checks = 0
 
     def check(self, stack: FrameStack) -> QuickCheck:
@@ -129,7 +132,8 @@ class QuickChecker:
         figures = figures_of(sample, measured)
         if math.isfinite(figures.sharpness):
             self._peak = max(self._peak, figures.sharpness)
-        return QuickCheck(figures, self._peak)
+        blur = self._sharpest.compare(sample, measured.predicted.measurable, figures.sharpness)
+        return QuickCheck(figures, self._peak, blur)
 
     def full(self, stack: FrameStack) -> CheckFigures:
         """All figures with the table of strain noise."""
@@ -144,6 +148,7 @@ class QuickChecker:
             if now is None or not _same_region(region, now.region, now):
                 now = CheckRegion.of(region, self._config, stack.camera)
                 self._check_region, self._measured = now, None
+                self._sharpest = SharpestPicture()
         return now
 
     def _renewed(self, sample: CheckSample, turn: int) -> KernelFigures:

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 FIRST_FRAMES = 4  # frames averaged as the reference of the motion
 MAX_ZOIS = 64
+DRIFT_OVER_NOISE = 1.5
+"""A drift is clear beyond this times the noise of one frame: 3 to 5 of its standard deviations from 30 frames on."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +47,13 @@ class PictureStillness:
     def drift_px(self) -> float:
         """Drift of the region, px."""
         return math.hypot(self.u.drift, self.v.drift)
+
+    @property
+    def dilatation(self) -> float:
+        """Drift that exx and eyy have in common, as from a changing distance; 0 where they differ or are noise."""
+        both, half = (self.exx.drift + self.eyy.drift) / 2, abs(self.exx.drift - self.eyy.drift) / 2
+        clear = abs(both) > max(2 * half, DRIFT_OVER_NOISE * max(self.exx.noise, self.eyy.noise))
+        return both if clear else 0.0
 
     @property
     def worse(self) -> Steadiness:
@@ -92,10 +101,10 @@ def light(sample: CheckSample) -> Steadiness:
 
 def _fields(sample: CheckSample, grid: ZoiGrid) -> list[StrainField]:
     """The strain field of every frame, on the necessary part of the picture."""
-    check_region, middle = sample.check_region, _middle(grid)
-    cut = around(_covered(middle, check_region.at_zois.shape))
+    check_region, chosen = sample.check_region, middle(grid)
+    cut = around(covered(chosen, check_region.at_zois.shape))
     correct = correction(check_region.config, check_region.camera, cut)
-    stack, grid = sample.stack.cut(*cut), moved(middle, cut)
+    stack, grid = sample.stack.cut(*cut), moved(chosen, cut)
     try:
         kernel, _ = prepare(correct(stack.mean(0, FIRST_FRAMES)), grid, sample.settings, sample.noise)
     except DataError:
@@ -107,7 +116,7 @@ def _fields(sample: CheckSample, grid: ZoiGrid) -> list[StrainField]:
     return fields[1:]
 
 
-def _middle(grid: ZoiGrid) -> ZoiGrid:
+def middle(grid: ZoiGrid) -> ZoiGrid:
     """A grid of the ZOIs nearest to the middle, side by side rather than overlapping."""
     spread = math.ceil(math.sqrt(grid.n_active / MAX_ZOIS))
     thin = grid.subset(every=max(1, min(spread, math.ceil(grid.size / grid.step))))
@@ -124,7 +133,7 @@ def _middle(grid: ZoiGrid) -> ZoiGrid:
     return replace(grid, roi=Roi(x, y, width, height), active=part)
 
 
-def _covered(grid: ZoiGrid, shape: tuple[int, ...]) -> NDArray[np.bool_]:
+def covered(grid: ZoiGrid, shape: tuple[int, ...]) -> NDArray[np.bool_]:
     """(H, W) bool: the pixels of the active ZOIs."""
     found = np.zeros(shape, bool)
     for row, column in np.argwhere(grid.active):

@@ -21,6 +21,7 @@ MAX_SATURATED, MAX_DARK, MAX_PILED = 1e-4, 0.01, 1e-3
 MIN_LIGHT = 0.3  # of full scale, 99th percentile
 MIN_CONTRAST = 0.05  # of full scale
 MAX_FLICKER, MAX_WITHOUT_PATTERN, MIN_SHARPNESS_RATIO = 0.01, 0.02, 0.7
+MAX_DILATATION = 5e-5  # common drift of exx and eyy
 MAX_NOISE_PX = 0.05  # of one ZOI in one frame
 MAX_OVER_PREDICTED = 1.5  # measured over predicted noise
 DEFAULT_TARGET = 1e-3
@@ -102,6 +103,11 @@ def _camera(f: CheckFigures) -> Iterator[CheckLine]:
     if f.removed is not None:
         value = f"dark and flat corrected {f.removed:.2f} GL; the rest is not visible in a still picture"
     yield CheckLine("fixed pattern", value)
+    if f.blocks:
+        value = "blocks of 8 px: strain is less certain than below once the specimen moves; the test states by how much"
+        yield CheckLine("compression", value)
+    elif f.picture:
+        yield CheckLine("picture", f.picture)
 
 
 def _bits(f: CheckFigures) -> CheckLine:
@@ -168,6 +174,9 @@ def _pattern(f: CheckFigures) -> Iterator[CheckLine]:
     words = "finer speckle or a wider field of view" if f.radius > high else "coarser speckle, or focus"
     radius = f"{f.radius:.2f} px" if math.isfinite(f.radius) else "none is visible"
     yield CheckLine("speckle radius", f"{radius} (from {low:g} to {high:g})", low <= f.radius <= high, words)
+    if f.repetition:
+        words = "a random pattern; else more pictures a second: displacements may be wrong by a period"
+        yield CheckLine("repetition", f.repetition, False, words)
     yield _sharpness(f)
     yield _sssig(f)
     share, n = z.without_pattern, z.grid.n_active
@@ -222,6 +231,10 @@ def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
     strain = max((s.exx, s.eyy), key=lambda one: abs(one.drift))
     yield CheckLine("drift", f"{s.drift_px:.4f} px and {strain.drift * 1e6:+.0f} µm/m in {s.u.seconds:.3g} s",
                s.drift_px <= max_px, "keep specimen and camera still")  # fmt: skip
+    if s.dilatation:
+        yield CheckLine("distance", f"exx and eyy drift alike, {s.dilatation * 1e6:+.0f} µm/m: it changes by"
+                   f" {abs(s.dilatation):.1e} of the stand-off", abs(s.dilatation) < MAX_DILATATION,
+                   "warm up the camera, clamp grips and tripod, or hang plates (docs/optics.md)")  # fmt: skip
     shake = s.worse
     yield CheckLine("vibration", f"{_vibration(shake, 1, 'px', 4)}, {_vibration(s.worse_strain, 1e6, 'µm/m', 0)}",
                shake.vibration <= max_px, "a stiffer tripod, a quiet floor, no fan on the bench")  # fmt: skip
@@ -241,7 +254,7 @@ def _vibration(s: Steadiness, unit: float, name: str, digits: int) -> str:
 
 def _load(f: CheckFigures) -> Iterator[CheckLine]:
     if f.load is not None:
-        value = f"{f.load.rate:.4g} 1/s, noise {f.load.noise_N:.3g} N, mean {f.load.mean_N:.5g} N"
+        value = f"{f.load.rate:.4g} 1/s, noise {f.load.noise_N:.3g} N, mean {f.load.mean_text} N"
         yield CheckLine("load cell", value, f.load.ready, "; ".join(f.load.remarks))
 
 
@@ -271,7 +284,7 @@ def _floor(f: CheckFigures, target: float | None) -> CheckLine:
 def _gauges(f: CheckFigures) -> Iterator[CheckLine]:
     """Noise of the gauges and the mean: a test reports these, not one ZOI."""
     for gauge in f.gauges:
-        name = f"noise of {gauge.name}" if gauge.name else "noise of the mean"
+        name = f"noise of {gauge.name}" if gauge.name else "noise of the region"
         value = f"{gauge.sigma * 1e6:.1f} µm/m predicted (burst of {f.burst})"
         yield CheckLine(name, gauge.reason or value, not gauge.reason, "move it, or take smaller ZOIs")
 

@@ -91,7 +91,7 @@ For 20 megapixels, slicing takes 0.7 ms of the test, sending them whole 4 ms, an
 COLUMNS = {Kind.MEANS: 1 + 2 * len(STRAINS), Kind.LOADS: 2, Kind.POINTS: 2, Kind.GAUGE: 3}
 """Columns: t and mean, sigma of each strain; t and N; strain and N; t and strain, sigma of a gauge."""
 
-_NUMBERS = ("t", "axial", "sigma_axial", "force_N", "stress_Pa")
+_NUMBERS = ("t", "axial", "sigma_axial", "force_N", "stress_Pa", "area_share")
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,8 +23,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from acquire.events import Level
-from acquire.signal_mask import blocked_signals
-from live.pipeline.latency import OUTPUT, lower_priority
+from acquire.system import HANGUP, KILLED, blocked_signals, lower_priority, send_some, start_with_socket
+from live.pipeline.latency import OUTPUT
 from live.ui.rerun.messages import ViewTarget
 from live.ui.rerun.outbox import Outbox
 from live.ui.rerun.wire import Kind, Message, Reader, WireError, encoded
@@ -59,15 +59,10 @@ class RenderProcess:
     """
 
     def __init__(self) -> None:
-        ours, its = socket.socketpair()
-        with its, blocked_signals(signal.SIGINT, signal.SIGHUP):
+        with blocked_signals(signal.SIGINT, *HANGUP):
             # The process unblocks them once it ignores them.
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", _MODULE],
-                stdin=its.fileno(),
-                stdout=subprocess.DEVNULL,
-                env=_environment(),
-            )
+            command = [sys.executable, "-P", "-m", _MODULE]
+            self._process, ours = start_with_socket(command, _environment())
         with contextlib.suppress(OSError):
             ours.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, _SEND_BYTES)
         ours.setblocking(False)
@@ -91,7 +86,7 @@ class RenderProcess:
         """
         while self._pending:
             try:
-                sent = self._socket.sendmsg(list(self._pending)[:16])
+                sent = send_some(self._socket, list(self._pending))
             except BlockingIOError:
                 return False
             self.progress_t = time.monotonic()
@@ -133,7 +128,7 @@ class RenderProcess:
             self._process.kill()
         with contextlib.suppress(subprocess.TimeoutExpired):
             return self._process.wait(_KILLED_S)
-        return -signal.SIGKILL
+        return KILLED
 
 
 def _environment() -> dict[str, str]:

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TextIO
 
-from acquire.printable import duration, printable
+from acquire.printable import duration, printable, share_text
 from live.pipeline.screen import Screen
 from live.ui.terminal.status_line import GAP, force_text, gauge_texts, status_line
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from live.pipeline.snapshot import Snapshot
 
 _TERMINAL_EVERY_S, _FILE_EVERY_S = 0.25, 5.0
+_IN_ASCII = str.maketrans({"µ": "u", "±": "+-"})
 _UNKNOWN_WIDTH, _FILE_WIDTH = 119, 1000
 
 
@@ -102,14 +103,17 @@ class TerminalScreen(Screen):
             of, left = f" of {expected}", f"  {duration(elapsed_s / done * (expected - done))} left"
         if elapsed_s > 0:
             rate = f"  {done * i.n_zoi / elapsed_s:.0f} ZOI/s"
-        self.status(
-            f"{done}{of} bursts{_force(i)}  {GAP.join(gauge_texts(i))} µm/m  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}"
-        )
+        strains = f"{GAP.join(gauge_texts(i))} µm/m  {share_text(i.area_share)}".rstrip()
+        self.status(f"{done}{of} bursts{_force(i)}  {strains}  {i.n_valid}/{i.n_zoi} ZOIs{rate}{left}")
 
     def _write(self, text: str) -> None:
         encoding = getattr(self._stream, "encoding", None) or "utf-8"
         try:
-            self._stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
+            text.encode(encoding)
+        except UnicodeEncodeError:
+            text = text.translate(_IN_ASCII).encode(encoding, "backslashreplace").decode(encoding)
+        try:
+            self._stream.write(text)
             self._stream.flush()
         except (OSError, ValueError):
             self._quiet = True

@@ -6,9 +6,10 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from acquire.printable import duration
+from acquire.printable import duration, share_text
 
 if TYPE_CHECKING:
+    from analysis.evaluate import GaugeValue
     from live.pipeline.measurement import TimeStep
     from live.pipeline.snapshot import Snapshot
 
@@ -21,7 +22,7 @@ Item = tuple[int, str]
 
 def status_line(s: Snapshot, width: int, words: str = "") -> str:
     """The line, at most ``width`` characters; ``words`` name what the run waits for."""
-    return fitted([*_test(s), (3, words), *_strain(s.time_step), *_machine(s)], width)
+    return fitted([*_test(s), (3, words), *_strain(s.time_step), _assumed(s), *_machine(s)], width)
 
 
 def fitted(items: Sequence[Item], width: int) -> str:
@@ -45,7 +46,12 @@ def _strain(i: TimeStep | None) -> list[Item]:
         return []
     items = [(5 if number == 0 else 10, text) for number, text in enumerate(gauge_texts(i))]
     items[-1] = items[-1][0], f"{items[-1][1]} µm/m"
-    return [*items, (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
+    return [*items, (5, share_text(i.area_share)), (8, f"{i.n_valid}/{i.n_zoi} ZOIs")]
+
+
+def _assumed(s: Snapshot) -> Item:
+    """That the direction of the load is not known, once there are strains whose axis it would be."""
+    return 11, f"axis {s.axis} assumed" if s.axis_assumed and s.time_step is not None else ""
 
 
 def _machine(s: Snapshot) -> list[Item]:
@@ -80,7 +86,10 @@ def gauge_texts(i: TimeStep) -> list[str]:
             f"{name} {strain_text(getattr(i, name), getattr(i, f'sigma_{name}'))}"
             for name in ("eyy", "exx", "exy")
         ]
-    return [
-        f"{name} lost" if gauge.reason else f"{name} {strain_text(gauge.value, gauge.sigma)}"
-        for name, gauge in list(i.gauges.items())[:MAX_GAUGES]
-    ]
+    return [_gauge_text(name, gauge) for name, gauge in list(i.gauges.items())[:MAX_GAUGES]]
+
+
+def _gauge_text(name: str, gauge: GaugeValue) -> str:
+    if gauge.reason:
+        return f"{name} lost"
+    return f"{name} {strain_text(gauge.value, gauge.sigma)} {share_text(gauge.share)}".rstrip()

@@ -19,6 +19,7 @@ from live.results.figures import alignment_line, elastic_lines, evaluate, figure
 from live.results.summary import file_lines, noise_line, summary_lines, why_nothing
 from live.ui.terminal.status_line import strain_text
 
+SMALL_MB = 10.0  # below it with a decimal
 TURNED = math.radians(5)  # off the axis of the load, from which on the summary shows it
 
 
@@ -101,4 +102,4 @@ def _files(folder: Path) -> str:
     """Where the files are."""
     files = [path for path in sorted(folder.iterdir()) if path.is_file() and path.stat().st_size]
     total = sum(path.stat().st_size for path in files) / 1e6
-    return f"files: {folder} ({', '.join(path.name for path in files)}; {total:,.0f} MB)"
+    return f"files: {folder} ({', '.join(path.name for path in files)}; {total:,.{0 if total >= SMALL_MB else 1}f} MB)"

@@ -16,8 +16,8 @@ from typing import Any, Protocol
 
 from acquire.events import Event, EventKind
 from acquire.frame import Frame
-from acquire.printable import printable
-from analysis.evaluate import LineGauge
+from acquire.printable import printable, share_text
+from analysis.evaluate import ExtensionGauge, LineGauge
 from live.config.gauges import complete_gauges
 from live.config.loading import Config
 from live.pipeline.channel_values import ChannelValues
@@ -105,7 +105,7 @@ class PageConsumer(Consumer):
         self._t0 = math.nan
         self._channels: ChannelValues | None = None
         self._rate = math.nan
-        self._length_mm = axial_length_mm(config)
+        self._elongation_gauge, self._length_mm = elongation_length(config)
         self._due = {"state": 0.0, "picture": 0.0}
 
     def attach(self, running: Running) -> None:
@@ -211,7 +211,7 @@ class PageConsumer(Consumer):
             "peak_N": s.peak_N,
             "stress_Pa": s.stress_Pa,
             "strain_rate": self._rate,
-            "elongation_mm": None if self._length_mm is None else s.axial * self._length_mm,
+            "elongation_mm": self._elongation(s),
             "points": self.curve.position,
             "picture": {
                 "n": self._shown,
@@ -237,6 +237,12 @@ class PageConsumer(Consumer):
         stress = step.force / area if area else math.nan
         return replace(s, force_N=step.force, stress_Pa=stress, peak_N=self._peak_N, latency_p95_s=math.nan)
 
+    def _elongation(self, s: Snapshot) -> float | None:
+        if self._length_mm is None:
+            return None
+        gauge = s.time_step and s.time_step.gauges.get(self._elongation_gauge)
+        return self._length_mm * (gauge.value if gauge else s.axial)
+
     def _state_name(self, s: Snapshot) -> str:
         if self._running is None:
             return "opening"
@@ -256,18 +262,32 @@ class PageConsumer(Consumer):
         self._shown += 1
 
 
-def axial_length_mm(config: Config) -> float | None:
-    """The length over which the axial strain is an elongation, mm: of the gauge ``axial``, else as given."""
-    px_per_mm = config.scale.px_per_mm
-    for gauge in complete_gauges(config.gauges, config.specimen.first_axis):
-        if gauge.name == AXIAL and isinstance(gauge, LineGauge) and px_per_mm:
-            return math.dist(gauge.start, gauge.end) / px_per_mm
-    return config.specimen.gauge_length_mm
+def elongation_length(config: Config) -> tuple[str, float | None]:
+    """The gauge whose strain over its length is the elongation, "" for the axial strain, and the length in mm.
+
+    The line ``axial``, else the first ``extension``, where the scale is known; else the axial strain over the gauge
+    length as given.
+    """
+    if px_per_mm := config.scale.px_per_mm:
+        gauges = list(complete_gauges(config.gauges, config.specimen.first_axis))
+        for gauge in gauges:
+            if isinstance(gauge, LineGauge) and gauge.name == AXIAL:
+                return gauge.name, math.dist(gauge.start, gauge.end) / px_per_mm
+        for gauge in gauges:
+            if isinstance(gauge, ExtensionGauge):
+                return gauge.name, gauge.length / px_per_mm
+    return "", config.specimen.gauge_length_mm
 
 
 def _gauges(step: TimeStep) -> list[dict[str, Any]]:
     return [
-        {"name": name, "value": gauge.value, "sigma": gauge.sigma, "reason": gauge.reason}
+        {
+            "name": name,
+            "value": gauge.value,
+            "sigma": gauge.sigma,
+            "reason": gauge.reason,
+            "part": share_text(gauge.share),
+        }
         for name, gauge in step.gauges.items()
     ]
 
@@ -277,10 +297,16 @@ def _measured(s: Snapshot) -> dict[str, Any]:
     if i is None:
         return {}
     return {
-        "axial": {"name": s.axial_name, "value": s.axial, "sigma": s.sigma_axial},
+        "axial": {
+            "name": s.axial_name,
+            "value": s.axial,
+            "sigma": s.sigma_axial,
+            "assumed": "axis assumed" if s.axis_assumed else "",
+        },
         "gauges": _gauges(i),
         "valid": s.valid,
         "zois": s.zois,
         "refused": i.refused,
+        "part": share_text(s.area_share),
         "kernel_s": i.measure_s,
     }

@@ -31,11 +31,20 @@ def run_result(run_state: RunState, specimen: SpecimenConfig, folder: Path, word
     return {
         "folder": str(folder),
         "words": words,
-        "figures": [] if figures is None else [_figure(row) for row in _rows(figures, specimen)],
+        "figures": [] if figures is None else _figures(figures, specimen),
         "lines": [] if figures is None else list(_lines(run_state, specimen, figures)),
         "ledger": run_state.frame_counts.line(),
         "troubles": troubles if measured else [*troubles, why_nothing(run_state)],
     }
+
+
+def _figures(figures: TensileFigures, specimen: SpecimenConfig) -> list[dict[str, Any]]:
+    found = [_figure(row) for row in _rows(figures, specimen)]
+    if figures.E.known and figures.elastic_strain:
+        found.append(
+            {"name": "strain of E and nu", "text": figures.elastic_strain, "interval": "", "words": True}
+        )
+    return found
 
 
 def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> list[TensileRow]:
@@ -47,10 +56,15 @@ def _rows(figures: TensileFigures, specimen: SpecimenConfig) -> list[TensileRow]
 def _figure(row: TensileRow) -> dict[str, Any]:
     if not row.figure.known:
         return {"name": row.name, "text": None, "why": row.figure.why}
-    value, between, interval = row.text.partition(" ± ")
+    value, between, interval = row.number.partition(" ± ")
     number, _, unit = (interval or value).partition(" ")
     text = f"{value} {unit}".strip() if between else value
-    return {"name": row.name, "text": text, "interval": f"± {number}" if between else ""}
+    return {
+        "name": row.name,
+        "text": text,
+        "interval": f"± {number}" if between else "",
+        "remark": row.remark,
+    }
 
 
 def _lines(

@@ -22,8 +22,9 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from acquire.errors import DeviceError
+from acquire.system import lower_priority
 from live.config.listen_address import listening_socket
-from live.pipeline.latency import OUTPUT, lower_priority
+from live.pipeline.latency import OUTPUT
 from live.ui.web.authorization import HttpError, RequestGuard
 from live.ui.web.broadcaster import Broadcaster, json_bytes
 

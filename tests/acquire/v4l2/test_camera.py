@@ -402,6 +402,11 @@ def test_what_can_be_changed_has_the_bounds_of_the_driver() -> None:
     assert gain == CameraSetting("gain", 16, 0, 100, 4)
 
 
+def test_formats_and_rates_are_those_of_the_driver_that_can_be_read() -> None:
+    info = CameraRig(FakeCamera(formats=("GREY", "RGB3", "MJPG"), fourcc="GREY")).open().info
+    assert info.formats == ("GREY", "MJPG") and info.rates == tuple(sorted(info.rates, reverse=True)) != ()
+
+
 def test_what_an_automatic_control_holds_cannot_be_changed() -> None:
     rig = CameraRig(FakeCamera(controls=exposure_controls()), address="/dev/video0?manual=no")
     assert rig.open().info.settings == ()

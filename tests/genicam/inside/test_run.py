@@ -148,5 +148,6 @@ def test_from_the_devices_to_the_report(
         assert "saturated pixels" in capsys.readouterr().out
         run = ["run", "--config", "rig.toml", "--seconds", "3", "--burst", "2", "--reference-burst", "4"]
         assert main([*run, "--no-view", "--no-rrd", "--out", "run", "--report"]) in (0, 5)
-        assert "the test ends: the time is over" in capsys.readouterr().out
+    with Session.open(tmp_path / "run" / "session.h5") as session:
+        assert "the test ends: the time is over" in [event.text for event in session.events()]
     assert "GV01" in (tmp_path / "run" / "report.html").read_text(encoding="utf-8")

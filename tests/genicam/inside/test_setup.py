@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import ctypes as c
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,7 +13,13 @@ import pytest
 from acquire.camera.opening import list_cameras, open_camera
 from acquire.errors import ConfigError, DeviceError
 from acquire.genicam.library import load_aravis
+from live.config.loading import load_config
+from live.ui.web.broadcaster import Broadcaster
+from live.ui.web.setup.config_draft import ConfigDraft
+from live.ui.web.setup.draft_changes import CHANGES
+from live.ui.web.setup.setup_session import SetupSession
 from tests.genicam.inside.fakes import FakeCameraProcess, FrameWatch
+from tests.live.ui.waiting import until
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +37,27 @@ def test_it_is_listed_with_what_it_offers(fake: FakeCameraProcess) -> None:
     assert found.trouble == ""
     assert "Mono12Packed" in found.text() and "exposure_us=" in found.text()
     open_camera(found.address).close()
+
+
+def test_it_is_in_the_lists_of_the_page_with_its_formats(fake: FakeCameraProcess, tmp_path: Path) -> None:
+    rig = tmp_path / "rig.toml"
+    rig.write_text('[camera]\naddress = "sim:?width=64&height=64"\n')
+    with SetupSession(ConfigDraft(load_config(rig, {}), rig, {}), Broadcaster()) as session:
+        until(lambda: session.preview.info is not None)
+        session.devices.search()
+        until(
+            lambda: any(
+                one["address"].startswith("genicam:") for one in session.state()["devices"]["cameras"]
+            )
+        )
+        listed = session.state()["devices"]["cameras"]
+        (found,) = [one for one in listed if one["address"].startswith("genicam:")]
+        assert "Fake" in found["name"] and found["trouble"] == ""
+        CHANGES["address"](session, {"value": found["address"]})
+        camera = session.state()["camera"]
+        assert camera["format"] == "Mono12p" == camera["formats"][0] and "Mono8" in camera["formats"]
+        CHANGES["option"](session, {"key": "format", "value": "Mono8"})
+        assert session.state()["camera"]["bits"] == 8
 
 
 @pytest.mark.parametrize("target", ["", "GV01", "Fake", "Aravis-Fake-GV01", "127.0.0.1"])
@@ -53,7 +81,7 @@ def test_automatics_are_off_and_the_white_level_is_the_cameras(fake: FakeCameraP
         info = camera.info
     assert info.controls["GainAuto"] == "Off"
     assert (info.white_level, info.saturation) == (4080, 4080)
-    assert not [text for text in info.warnings if "by itself" in text]
+    assert not [text for text in info.warnings if "changing by itself" in text]
     watch = FrameWatch(f"genicam:127.0.0.1?{SMALL}&fps=20&white=4000&GainAuto=Continuous")
     assert watch.first(1)[0].saturation == 4000
     assert any("GainAuto" in text for text in watch.camera.info.warnings)

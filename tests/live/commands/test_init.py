@@ -39,13 +39,13 @@ def test_a_simulated_rig(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     config = load_config(rig, {})
     assert (config.measure.roi, config.measure.gauges, config.measure.zoi) == ("auto", "auto", 32)
     assert config.specimen.area_m2 == pytest.approx(20e-6)
-    assert "# [gauges.transverse]" in rig.read_text()
+    assert "# [gauges.width]" in rig.read_text()
     shown = cv2.imread(str(tmp_path / "rig.png"))
     assert shown is not None
     found = gauges_of_run(rig, tmp_path / "run")
-    for name in ("axial", "transverse", "area"):
+    for name in ("extension", "width", "area"):
         assert np.isfinite(found[name]).all()
-    assert found["axial"][-1] > 1e-3 > found["transverse"][-1]
+    assert found["extension"][-1] > 1e-3 > found["width"][-1]
 
 
 def test_what_is_commented_out_is_right(tmp_path: Path) -> None:
@@ -57,14 +57,14 @@ def test_what_is_commented_out_is_right(tmp_path: Path) -> None:
     rig.write_text(text)
     config = load_config(rig, {})
     assert isinstance(config.measure.roi, tuple)
-    assert list(config.gauges) == ["axial", "transverse", "area"]
+    assert list(config.gauges) == ["extension", "width", "area"]
 
 
 def test_fixed(tmp_path: Path) -> None:
     rig = made(tmp_path, "--camera", SIM, "--fixed", "--scale", "0.05")
     config = load_config(rig, {})
     assert config.measure.mask == str(tmp_path / "rig-mask.png")
-    assert list(config.gauges) == ["axial", "transverse", "area"]
+    assert list(config.gauges) == ["extension", "width", "area"]
     assert config.scale.mm_per_px == 0.05
     assert not cv2.imread(config.measure.mask, cv2.IMREAD_GRAYSCALE)[160, 160]
 
@@ -115,7 +115,7 @@ def test_pictures(tmp_path: Path, wide: bool) -> None:
     assert config.specimen.axis == ("x" if wide else "y")
     assert (config.measure.zoi, config.load.address) == (16, "none:")
     found = gauges_of_run(rig, tmp_path / "run", "--reference-burst", "1")
-    assert np.abs(found["axial"]).max() < 1e-4
+    assert np.abs(found["extension"]).max() < 1e-4
 
 
 @pytest.mark.parametrize("level", [0, 128, 255])

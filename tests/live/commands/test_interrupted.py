@@ -44,6 +44,7 @@ def interrupted(
 
 
 @pytest.mark.slow
+@pytest.mark.timed
 @pytest.mark.parametrize(
     "words",
     [f"run --camera {CAMERA} --no-view --no-rrd --out out", "batch run/session.h5 --out out --workers 1"],
@@ -73,6 +74,7 @@ def command_of(pid: int) -> str:
 
 
 @pytest.mark.slow
+@pytest.mark.timed
 def test_while_workers_load(tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     (tmp_path / "run" / "session.h5").write_bytes(b"nothing of a session")
@@ -112,10 +114,9 @@ def test_whoever_handles_a_signal_hears_of_it(
     never_ending(monkeypatch)
     heard: list[int] = []
     before = signal.signal(number, lambda number, frame: heard.append(number))
-    threading.Timer(0.5, os.kill, (os.getpid(), number)).start()
     try:
         with pytest.raises(Interrupted, match="what is compiled is kept"):
-            compile_ahead(("uint8",))
+            compile_ahead(("uint8",), show=lambda text: os.kill(os.getpid(), number))
         assert heard == [number]
         signal.raise_signal(number)
         assert heard == [number, number], "the handler is not back"
@@ -126,9 +127,8 @@ def test_whoever_handles_a_signal_hears_of_it(
 def test_ctrl_c_in_a_command_without_a_handler(monkeypatch: pytest.MonkeyPatch) -> None:
     """As ``demo`` and ``warm-up``: it says what is kept."""
     never_ending(monkeypatch)
-    threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
     with pytest.raises(Interrupted, match="what is compiled is kept"):
-        compile_ahead(("uint8",))
+        compile_ahead(("uint8",), show=lambda text: os.kill(os.getpid(), signal.SIGINT))
 
 
 def test_it_was_stopped_before(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,16 +5,20 @@ from __future__ import annotations
 import errno
 import os
 import signal
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hw_mocks.specimen import KINDS
 from live import cli
 from live.cli import main
 from live.commands import arguments as arguments_module
 from live.commands.arguments import COMMANDS
+from live.commands.demo import SPECIMENS
 from live.commands.signals import ended_by_sigterm, interrupts
 from live.results.report import saving
 from live.results.report.svg import Plot, PlotLine
@@ -163,6 +167,90 @@ def test_an_environment_that_ends_numba(
     monkeypatch.setenv(name, value)
     code, said = refused(capsys, "devices")
     assert code == 2 and f"{name}={value} is not possible" in said
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("NUMBA_THREADING_LAYER", "zz"),
+        ("NUMBA_THREADING_LAYER", ""),
+        ("NUMBA_THREADING_LAYER_PRIORITY", "omp"),
+    ],
+)
+def test_a_threading_layer_that_numba_cannot_load(name: str, value: str) -> None:
+    """In a process of its own: numba chooses its layer once."""
+    done = subprocess.run(
+        [sys.executable, "-m", "live.cli", "devices"],
+        cwd=ROOT, env={**os.environ, name: value}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith(f"phasedic: {name}={value} is not possible (")
+    assert done.stderr.endswith("); give omp or workqueue, or unset it\n")
+
+
+REFUSED_SOON = [
+    "run",
+    "run --camera firewire:0",
+    "run --camera /dev/video77",
+    "run --camera sim: --load /dev/ttyUSB77",
+    "run --camera sim: --zoi 3",
+    "check --camera sim: --load /dev/ttyUSB77",
+    "demo --specimen xx",
+    "demo --out .",
+    "replay nowhere.h5",
+    "replay files:nowhere/*.tif",
+    "batch nowhere.h5 --out x",
+    "study nowhere.h5",
+    "map nowhere a.png",
+    "show nowhere",
+    "export nowhere --to csv",
+    "report nowhere",
+    "inspect nowhere.h5 --zoi 1,1 --frame 0",
+    "load-check --load /dev/ttyUSB77",
+    "recover nowhere.h5 --out r.h5",
+]
+AND_LIBRARIES = """
+import sys
+from live.cli import main
+for line in sys.argv[1:]:
+    try:
+        code = main(line.split())
+    except SystemExit as ended:
+        code = ended.code
+    print(f"{line}: {code}", *({"numba", "scipy", "matplotlib", "rerun"} & set(sys.modules)))
+"""
+
+
+def test_refusals_load_no_slow_library(tmp_path: Path) -> None:
+    """Each of them takes half a second or more to load, which is how long a refusal may take."""
+    (tmp_path / "strain.h5").touch()
+    done = subprocess.run(
+        [sys.executable, "-c", AND_LIBRARIES, *REFUSED_SOON],
+        cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    endings = [line.rpartition(": ")[2] for line in done.stdout.splitlines() if ": " in line]
+    assert len(endings) == len(REFUSED_SOON), done.stderr
+    assert set(endings) <= {"2", "3", "4"}, done.stdout
+
+
+@pytest.mark.parametrize("name", ["run", "check"])
+def test_a_port_that_is_not_there_is_refused_before_the_camera_opens(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    opened: list[object] = []
+    monkeypatch.setattr("live.setup.devices.open_camera", lambda *words: opened.append(words))
+    code, said = refused(capsys, name, "--camera", "/dev/video0", "--load", "/dev/ttyUSB77?unit=N")
+    assert code == 3 and "/dev/ttyUSB77: there is no such port; " in said
+    assert opened == []
+
+
+def test_the_specimens_of_the_demo_are_those_of_the_simulator() -> None:
+    assert set(SPECIMENS) == set(KINDS)
+
+
+def test_the_simulated_camera_is_among_the_known_ones(capsys: pytest.CaptureFixture[str]) -> None:
+    code, said = refused(capsys, "run", "--camera", "firewire:0")
+    assert code == 2 and "known: /dev/..., files:, genicam:, opencv:, pylon:, session:, video:, sim:" in said
 
 
 @pytest.mark.parametrize("limit", ["0", "nan", "-1", "inf"])

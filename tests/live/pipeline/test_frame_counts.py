@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from live.pipeline.frame_counts import FrameCounts
+from live.pipeline.run_state import FrameCounts
 
 SOUND = {"grabbed": 100, "recorded": 90, "unrecorded": 4, "thinned": 6,
          "reference": 8, "measured": 60, "skipped": 30, "left_out": 2}  # fmt: skip

@@ -9,6 +9,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from acquire.burst.accumulate import burst_of
 from acquire.events import Event, EventKind
@@ -19,10 +20,12 @@ from analysis import KernelSettings, Roi, ZoiGrid
 from analysis.evaluate import GaugeValue
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
-from live.pipeline.history import AxisFinder, History
-from live.pipeline.measure import NewReference, SmearGuard, measure
+from live.pipeline.guards import BlurGuard
+from live.pipeline.history import SHORT, AxisFinder, History, curve_of
+from live.pipeline.measure import NewReference, measure
 from live.pipeline.measurement import HOLD_S, ForceMatching, TimeStep, ordered_mean
 from live.pipeline.reference import averaged, frame_noise, motion_between, prepare
+from live.run.measuring import SmearGuard
 from tests.live.fakes import frame
 from tests.live.made_up import START, make_loads, make_measurement
 
@@ -84,10 +87,12 @@ def test_a_renewed_reference_stays_composed(speckle: Speckle, on_demand: bool) -
     if on_demand:
         steps = [burst(images[0], 1), NewReference(burst(images[0], 2)), burst(images[1], 3)]
     else:
-        # Another pattern fades in: the first reference no longer fits the last picture.
+        # On the left another pattern fades in: the first reference no longer fits the last picture there.
+        left = np.arange(SHAPE[1]) < 96
         other = Speckle(SHAPE, radius=2.0, seed=6)
         fading = zip((0.96, 0.92), ({"u": 2.0, "du_dx": 0.02}, {"u": 3.0, "du_dx": 0.03}), strict=True)
-        mixed = [w * picture(speckle, **g) + (1 - w) * picture(other, **g) for w, g in fading]
+        shares = ((np.where(left, w, 1), g) for w, g in fading)
+        mixed = [w * picture(speckle, **g) + (1 - w) * picture(other, **g) for w, g in shares]
         steps = [burst(image, i) for i, image in enumerate(mixed, 1)]
     found = list(measure(steps, kernel, LoadLog(), noise_GL=noise, renew_at=0.2, on_event=told.append))
     renewals = [event for event in told if event.kind is EventKind.REFERENCE]
@@ -108,6 +113,25 @@ def test_a_blank_picture_does_not_end_the_measurement(speckle: Speckle) -> None:
     assert np.isfinite(found[1].field.u).all()
     assert found[1].field.mean("u")[0] == pytest.approx(0.4, abs=1e-3)
     assert "was not renewed" in told[0].text
+
+
+def test_a_pattern_that_repeats_is_an_event_at_the_first_burst(speckle: Speckle) -> None:
+    told: list[Event] = []
+    y, x = np.mgrid[: SHAPE[0], : SHAPE[1]]
+    k = 2 * np.pi / 8
+    for image, words in (
+        (120 + 40 * (np.sin(k * x) + np.sin(k * y)), ["every 8.0 px"]),
+        (picture(speckle), []),
+    ):
+        kernel, noise = prepare(burst(image, 0), GRID, KernelSettings(), 1.0)
+        told.clear()
+        list(
+            measure(
+                [burst(image, 1), burst(image, 2)], kernel, LoadLog(), noise_GL=noise, on_event=told.append
+            )
+        )
+        assert len(told) == len(words) and all(word in told[0].text for word in words)
+        assert all(event.level == "warning" and event.t == 1.0 for event in told)
 
 
 def time_steps(count: int) -> list[TimeStep]:
@@ -147,6 +171,46 @@ def test_smear_is_told_when_it_begins_and_ends() -> None:
     assert [event.level for event in told] == ["warning", "info", "warning"]
     assert "0.20 px during a burst of 2" in told[0].text
     assert told[0].data == {"motion_px": 0.2, "n": 2}
+
+
+def test_a_change_of_sharpness_is_told_once_and_when_it_ends() -> None:
+    told: list[Event] = []
+    guard, step = BlurGuard(told.append), make_measurement(0).time_step
+    # Not known, small, not certain, certain, still, nearly well, well, sharper.
+    changes = [(math.nan, math.nan), (0.4, 0.01), (0.55, 0.05), (0.62, 0.02), (0.9, 0.02), (0.45, 0.02), (0.1, 0.02),
+               (-0.7, 0.02)]  # fmt: skip
+    for blur, sigma in changes:
+        guard.check(replace(step, blur=blur, sigma_blur=sigma))
+    assert [event.level for event in told] == ["warning", "info", "warning"]
+    assert "less sharp by 0.62 ± 0.02 px" in told[0].text and "sharper by 0.70 ± 0.02 px" in told[2].text
+    assert told[0].data == {"blur_px": 0.62, "sigma_blur_px": 0.02}
+
+
+def test_a_blurred_picture_is_told_with_its_width_and_changes_no_strain(speckle: Speckle) -> None:
+    still = picture(speckle)
+    bursts = [burst(gaussian_filter(still, blur), k) for k, blur in enumerate((0.0, 0.0, 0.8))]
+    kernel, noise = prepare(bursts[0], GRID, KernelSettings(), 1.0)
+    told: list[Event] = []
+    found = list(measure(bursts[1:], kernel, LoadLog(), noise_GL=noise, on_event=told.append))
+    assert abs(found[0].time_step.blur) < 0.02
+    assert found[1].time_step.blur == pytest.approx(0.8, abs=0.1)
+    assert abs(found[1].time_step.exx) < 30e-6
+    assert [event.source for event in told] == ["sharpness"] and told[0].t == 2.0
+
+
+def test_what_the_picture_has_become_is_told_once_with_its_cost_and_when_it_ends(speckle: Speckle) -> None:
+    rng = np.random.default_rng(3)
+    noises = (1.0, 1.0, 5.0, 5.0, 1.0, 5.0)
+    bursts = [burst(picture(speckle) + rng.normal(0, s, SHAPE), k) for k, s in enumerate(noises)]
+    kernel, noise = prepare(bursts[0], GRID, KernelSettings(), 1.0)
+    told: list[Event] = []
+    found = list(measure(bursts[1:], kernel, LoadLog(), noise_GL=noise, renew_at=0.1, on_event=told.append))
+    assert [(event.level, event.t) for event in told] == [("warning", 2.0), ("info", 4.0), ("warning", 5.0)]
+    assert told[0].data["cause"] == "noise" and told[0].data["factor"] == pytest.approx(13**0.5, rel=0.1)
+    costs = [float(np.nanmedian(m.field.sigma_exx)) * 1e6 for m in found[:2]]
+    words = told[0].text.split()
+    assert [int(words[words.index("by") + 1]), int(words[-1])] == pytest.approx([costs[1], costs[0]], rel=0.1)
+    assert all(m.field.ok.all() for m in found)
 
 
 @pytest.mark.parametrize("size", [1, 7, 945, 15_129])
@@ -203,10 +267,20 @@ def some(i: int) -> TimeStep:
     return TimeStep(**numbers, refused=f"{i % 4} LOST", gauges=gauges)
 
 
+def as_kept(time_step: TimeStep) -> TimeStep:
+    """With seven digits of the uncertainties and of what is for information."""
+    short = {name: float(np.float32(getattr(time_step, name))) for name in SHORT}
+    gauges = {
+        name: replace(gauge, share=float(np.float32(gauge.share))) for name, gauge in time_step.gauges.items()
+    }
+    return replace(time_step, **short, gauges=gauges)
+
+
 def test_what_goes_in_comes_out() -> None:
     history, put = History(), [some(i) for i in range(40)]
     for time_step in put:
         history.add(time_step)
+    put = [as_kept(time_step) for time_step in put]
     assert len(history.time_steps) == 40
     assert [repr(time_step) for time_step in history.time_steps] == [repr(time_step) for time_step in put]
     assert repr(history.time_steps[-1]) == repr(put[-1]) and isinstance(history.time_steps[-1].n_zoi, int)
@@ -221,7 +295,7 @@ def test_what_goes_in_comes_out() -> None:
 
 
 def test_a_gauge_that_comes_and_goes() -> None:
-    history, late = History(), {"late": GaugeValue(1.0, 0.1)}
+    history, late = History(), {"late": GaugeValue(1.0, 0.125)}
     for gauges in ({}, late, {}):
         history.add(replace(some(0), gauges=gauges))
     assert [dict(time_step.gauges) for time_step in history.time_steps] == [{}, late, {}]
@@ -243,4 +317,12 @@ def test_little_memory() -> None:
         history.add(some(i))
     grown = tracemalloc.get_traced_memory()[0] / 20_000
     tracemalloc.stop()
-    assert grown < 320, "bytes an instant with two gauges"
+    assert grown < 250, "bytes an instant with two gauges"
+
+
+def test_the_means_of_an_old_file_are_not_called_strains_of_the_region() -> None:
+    """Before the extension had columns, exx and eyy were means of the gradients."""
+    values = {"exx": np.zeros(3), "eyy": np.arange(3.0)}
+    for old, words in ((True, "mean eyy"), (False, "eyy of the region")):
+        held = values if old else values | {"extension_y": np.full(3, np.nan)}
+        assert curve_of(held.get, (), "y", np.arange(3.0), np.zeros(3)).source == words

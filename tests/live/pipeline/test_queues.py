@@ -9,9 +9,11 @@ from types import SimpleNamespace
 
 import pytest
 
+from acquire.system import lower_priority
 from live.pipeline import queues
-from live.pipeline.latency import LatencyMonitor, LatencySample, ProcessorUse, lower_priority, processor_use
+from live.pipeline.latency import LatencyMonitor, LatencySample, ProcessorUse, processor_use
 from live.pipeline.queues import BoundedQueue, LatestQueue
+from tests.live.ui.waiting import LONG_S
 
 
 def test_newest_wins_and_the_rest_is_counted() -> None:
@@ -104,7 +106,7 @@ def test_closing_frees_a_waiting_producer() -> None:
     thread = threading.Thread(target=box.put, args=(2,))
     thread.start()
     box.close()
-    thread.join(5)
+    thread.join(LONG_S)
     assert not thread.is_alive()
     assert box.take_skipped() == [2]
 

@@ -17,6 +17,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.measurement import TimeStep
 from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import Snapshot, peak_force
+from live.results.summary import StatusCard
 from live.ui.terminal.status_line import status_line
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.page_consumer import PageConsumer
@@ -89,7 +90,7 @@ def test_the_snapshot_of_a_run() -> None:
     run_state.history.add(i)
     now = run_state.snapshot(5.0)
     assert (now.elapsed_s, now.force_N, now.stress_Pa) == (5.0, 900.0, pytest.approx(900 / 40e-6))
-    assert (now.axial_name, now.axial, now.sigma_axial) == ("eyy", 1e-3, 2e-6)
+    assert (now.axial_name, now.axial, now.sigma_axial) == ("eyy", 1e-3, pytest.approx(2e-6))
     assert (now.valid, now.zois, now.lost) == (i.n_valid, i.n_zoi, 3)
     assert now.alarms == ("a: too much",) and now.time_step is not None and now.time_step.t == i.t
     run_state.frame_counts.add(lost=5)
@@ -122,3 +123,21 @@ def test_before_anything_is_measured_the_page_can_be_told() -> None:
     assert page.state()["state"] == "opening" and page.state()["elapsed_s"] == 0.0
     assert math.isnan(Snapshot(0.0).axial)
     json.dumps(on_the_page(loaded(1.0)))
+
+
+def test_an_axis_that_is_only_assumed_shows_everywhere() -> None:
+    """The axis was silently y, where the picture's load ran along x."""
+    still = time_step(exx=1e-6, eyy=0.0, exy=0.0)
+    for axis, assumed in (("auto", True), ("x", False)):
+        run_state = loaded(100.0, axis=axis)
+        run_state.history.add(still)
+        assert run_state.snapshot(5.0).axis_assumed is assumed
+        assert ("axis y assumed" in status_line(run_state.snapshot(5.0), 300)) is assumed
+        assert on_the_page(run_state)["axial"]["assumed"] == ("axis assumed" if assumed else "")
+        card = StatusCard(run_state.specimen, run_state.loads).written(
+            run_state.snapshot(5.0), run_state.history
+        )
+        assert ("axis of the load **y**, assumed" in card) is assumed
+    pulled = loaded(100.0, axis="auto")
+    pulled.history.add(time_step(exx=24_812e-6, eyy=-7_236e-6, exy=0.0))
+    assert not pulled.snapshot(5.0).axis_assumed and pulled.snapshot(5.0).axis == "x"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -14,8 +15,9 @@ from analysis import Roi, StrainField, ZoiGrid
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
 from live.cli import main
-from live.pipeline.measure import StrainGuard
+from live.pipeline.guards import DilatationGuard, StrainGuard
 from live.results import Strain
+from tests.live.made_up import make_measurement
 
 SHAPE, TURN, STRAIN, NU = (160, 192), math.radians(3), 0.01, 0.3
 
@@ -85,3 +87,44 @@ def test_the_warning_comes_once_and_only_for_small_strains() -> None:
         for number, one in enumerate(seen):
             guard.check(one, number + 1.0)
         assert [event.t for event in told] == times
+
+
+def steps(
+    events: list[Event], nu: float | None, strains: list[tuple[float, float]], stand_off: float | None = 500.0
+) -> None:
+    guard = DilatationGuard(nu, stand_off, events.append)
+    for t, (exx, eyy) in enumerate(strains):
+        sigmas = {"sigma_exx": 5e-6, "sigma_eyy": 5e-6}
+        step = make_measurement(number=t).time_step
+        guard.check(replace(step, t=float(t), exx=exx, eyy=eyy, **sigmas))
+
+
+def test_strains_that_do_not_fit_nu_are_motion_off_the_plane() -> None:
+    events: list[Event] = []
+    grown = [(k * (-0.33e-3 + 200e-6), k * (1e-3 + 200e-6)) for k in (0.1, 0.3, 0.6, 0.8)]
+    steps(events, 0.33, grown)
+    assert [(event.t, event.level) for event in events] == [(1.0, "warning")]
+    assert events[0].data["strain"] == pytest.approx(0.3 * 200e-6, rel=1e-9)
+    assert "+60 µm/m in both is as from motion by 0.03 mm towards the camera" in events[0].text
+
+
+def test_motion_away_along_x_without_a_distance() -> None:
+    events: list[Event] = []
+    steps(events, 0.3, [(500e-6 - 150e-6, -150e-6 - 150e-6)], None)
+    assert "-150 µm/m in both is as from motion away from the camera" in events[0].text
+
+
+@pytest.mark.parametrize(
+    ("nu", "exx", "eyy"),
+    [
+        (0.33, -0.3e-3, 0.95e-3),  # a ratio of 0.316
+        (None, 0.2e-3, 0.2e-3),
+        (0.33, -0.9e-3, 2e-3),  # plastic flow
+        (0.33, 30e-6, 20e-6),  # noise
+        (0.33, math.nan, math.nan),
+    ],
+)
+def test_no_warning_where_strains_may_be_right(nu: float | None, exx: float, eyy: float) -> None:
+    events: list[Event] = []
+    steps(events, nu, [(exx, eyy)])
+    assert not events

@@ -11,6 +11,7 @@ from acquire.errors import ConfigError
 from live.cli import main
 from live.config.loading import load_config
 from live.replay.study import StudyResult, StudySetting, recommended
+from live.results.report import saving
 
 SIZE = "lockstep=yes&seconds=6&fps=10&width=320&height=288&bits=12&hole=24&hold=2&end=1"
 PLAIN = ["--reference-burst", "6", "--burst", "2", "--zoi", "32", "--step", "16", "--no-view", "--no-rrd"]
@@ -61,6 +62,23 @@ def test_windows_given_and_missing(session: Path, tmp_path: Path, capsys: pytest
     assert main([*words, "--loaded", "100,101"]) == 4
     assert "0 bursts from 100 to 101 s, 2 are needed; give --loaded" in capsys.readouterr().err
     assert not (tmp_path / "b").exists()
+
+
+def test_a_browser_that_does_not_work_costs_the_png_alone(
+    session: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It lost table and recommendation of a whole study."""
+    browser = tmp_path / "chromium"
+    browser.write_text("#!/bin/sh\necho no display here >&2\nexit 1\n")
+    browser.chmod(0o755)
+    monkeypatch.setattr(saving, "find_browser", lambda: str(browser))
+    out = tmp_path / "study"
+    assert main(["study", str(session), "--zoi", "48,64", "--roi", "all", "--out", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert f"SVG and CSV without PNG: {browser} failed on noise.svg (no display here)" in printed
+    assert "px ZOIs, step" in printed and "Traceback" not in printed
+    assert len(rows(out)) == 2 and (out / "measure.toml").exists()
+    assert {path.suffix for path in (out / "figures").iterdir()} == {".svg", ".csv"}
 
 
 def test_without_a_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

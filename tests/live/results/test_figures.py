@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -12,10 +13,9 @@ from acquire.load_cell import LoadLog
 from acquire.load_sample import LoadSample
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import EventLog
-from live.pipeline.frame_counts import FrameCounts
 from live.pipeline.history import History
-from live.pipeline.run_state import RunState
-from live.results.figures import alignment_line, elastic_lines, evaluate, figure_lines, lag_line
+from live.pipeline.run_state import FrameCounts, RunState
+from live.results.figures import alignment_line, budget_rows, elastic_lines, evaluate, figure_lines, lag_line
 from live.results.summary import summary_lines
 from tests.analysis.curves import Truth, composite, noisy, ramberg_osgood
 from tests.live.made_up import START, make_measurement
@@ -66,12 +66,35 @@ def test_a_metal_by_its_standard() -> None:
     assert "not known: ReH, ReL (no yield point" in text
 
 
+def test_the_interval_of_e_names_the_limits_in_it() -> None:
+    history, loads = kept(ramberg_osgood())
+    assert "interval)" in figure_lines(evaluate(history, loads, FLAT), FLAT)[0]
+    stated = replace(FLAT, force_error_percent=1.0, strain_error_um_m=200.0)
+    figures = evaluate(history, loads, stated)
+    assert "interval, of E with limits of load cell, strain)" in figure_lines(figures, stated)[0]
+    *rows, combined = budget_rows(figures, stresses=True)
+    assert [row.cause for row in rows] == ["scatter", "load cell", "section", "strain"]
+    assert figures.span is not None
+    assert rows[1].modulus == pytest.approx(0.01 / 3**0.5 * figures.E.value)
+    assert rows[1].strain == pytest.approx(0.01 / 3**0.5 * figures.span.strain[1])
+    assert math.isnan(rows[2].modulus)
+    assert rows[2].key == "specimen.section_error_percent"
+    assert combined.modulus == pytest.approx(
+        math.hypot(*(row.modulus for row in (rows[0], rows[1], rows[3])))
+    )
+    assert figures.E.high - figures.E.value == pytest.approx(1.96 * combined.modulus, rel=1e-2)
+    forces = replace(stated, width_mm=None, thickness_mm=None, section_error_percent=1.0)
+    found = budget_rows(evaluate(history, loads, forces), stresses=False)
+    assert [row.cause for row in found] == ["scatter", "load cell", "strain", "combined"]
+
+
 def test_a_laminate_has_no_proof_strength() -> None:
     specimen = replace(FLAT, standard="astm-d3039", gauge_length_mm=50.0)
     history, loads = kept(composite())
     text = "\n".join(figure_lines(evaluate(history, loads, specimen), specimen))
     assert "Rp0.2" not in text
-    assert "At = 1.19" in text and "(gauge length 50 mm)" in text
+    assert "At = 1.19" in text and "(gauge length 50 mm, elongation " in text
+    assert "elongation 0.5999 ± " in text and " mm at break)" in text
 
 
 @pytest.mark.parametrize(
@@ -99,7 +122,7 @@ def test_without_a_section_forces_stand_for_stresses() -> None:
 def test_the_lag_of_the_load_is_told() -> None:
     history, loads = kept(ramberg_osgood(), lag=0.15)
     (line,) = lag_line(history, loads, FLAT)
-    found = float(line.split(": ")[1].split(" +-")[0])
+    found = float(line.split(": ")[1].split(" ±")[0])
     assert abs(found - 150) < 40
     assert lag_line(history, LoadLog(), FLAT) == []
     (refused,) = lag_line(History(), loads, FLAT)

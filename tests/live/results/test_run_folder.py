@@ -147,8 +147,8 @@ def test_they_are_those_of_the_test(run_dir: Path, toml: Path, tmp_path: Path) -
         assert run.gauges == {}
         assert add_gauges(run, toml) == ("axial", "shear")
         for name, gauge in with_gauges.gauges.items():
-            np.testing.assert_allclose(run.gauges[name].value, gauge.value, atol=1e-9)
-            np.testing.assert_allclose(run.gauges[name].sigma, gauge.sigma, rtol=1e-5)
+            np.testing.assert_allclose(run.gauges[name].value, gauge.value, atol=2e-9)  # as maps are stored
+            np.testing.assert_allclose(run.gauges[name].sigma, gauge.sigma, rtol=2**-8)  # as maps are stored
         assert run.gauges["axial"].described["start"] == (64.0, 20.0)
         np.testing.assert_array_equal(run.axial_strain, run.gauges["axial"].value)
     with open_run(run_dir) as again:

@@ -12,12 +12,14 @@ import numpy as np
 import pytest
 
 from analysis.evaluate import Curve, Figure, evaluate_test
+from hw_mocks.machine import PowerLaw
+from live.config.loading import load_config
 from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import EventLog
-from live.pipeline.frame_counts import FrameCounts
-from live.pipeline.run_state import RunState
+from live.pipeline.run_state import FrameCounts, RunState
 from live.replay.batch.row import COLUMNS
-from live.results.figures import TensileRow, headline, tensile_table
+from live.replay.batch.row import _figures as batch_figures
+from live.results.figures import TensileRow, evaluate, figure_lines, headline, tensile_table
 from live.results.report import comparison
 from live.results.report.evaluation import EvaluatedCurve as RunCurve
 from live.results.report.report import tensile
@@ -25,7 +27,7 @@ from live.results.run_folder import open_run
 from live.results.summary import summary_lines
 from live.ui.web.run_result import run_result
 from tests.analysis.curves import noisy, ramberg_osgood
-from tests.live.made_run import CONFIG, PULLED, make_run
+from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run
 from tests.live.results.test_figures import AREA_M2, FLAT, kept
 
 FORCES = {**CONFIG, "specimen": {"axis": "y"}}
@@ -50,7 +52,7 @@ def test_names_and_units(stresses: bool) -> None:
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(12.345, "12.345 +- 0.020 kN"), (1.2345, "1234 +- 20 N"), (math.nan, "not known")]
+    ("value", "text"), [(12.345, "12.345 ± 0.020 kN"), (1.2345, "1234 ± 20 N"), (math.nan, "not known")]
 )
 def test_small_forces_are_shown_in_newtons(value: float, text: str) -> None:
     assert TensileRow("Fm", "kN", Figure(value, value - 0.02, value + 0.01)).text == text
@@ -60,7 +62,7 @@ def test_small_forces_are_shown_in_newtons(value: float, text: str) -> None:
 def test_summary_and_page_agree(specimen: SpecimenConfig) -> None:
     history, loads = kept(ramberg_osgood())
     run_state = RunState(EventLog(), FrameCounts(), loads, history)
-    summary = "\n".join(summary_lines(run_state, specimen)).replace("+-", "±")
+    summary = "\n".join(summary_lines(run_state, specimen))
     figures = run_result(run_state, specimen, Path("runs"), "")["figures"]
     shown = [one for one in figures if re.search(rf"(?<!\w){re.escape(one['name'])} = ", summary)]
     assert len(shown) >= 5 and "nu" in {one["name"] for one in shown}
@@ -92,7 +94,7 @@ def test_a_comparison_has_no_mean_of_half_widths(tmp_path: Path) -> None:
             if figure.figure.known:
                 assert float(row[figure.column]) == pytest.approx(figure.figure.value)
                 assert float(row[f"half_{figure.column}"]) == pytest.approx(figure.half)
-                value, _, unit = figure.text.partition(" +- ")[2].partition(" ")
+                value, _, unit = figure.text.partition(" ± ")[2].partition(" ")
                 assert f"± {value}" in html and unit != "not"
     mean = next(row for row in rows if row["test"] == "mean")
     assert float(mean["E_GPa"]) == pytest.approx(np.mean([float(row["E_GPa"]) for row in rows[:2]]))
@@ -108,10 +110,12 @@ def test_a_comparison_has_what_the_single_report_has(tmp_path: Path, config: dic
     for folder, row in zip(folders, rows, strict=False):
         with open_run(folder) as run:
             found = tensile(RunCurve.of(run))
-        assert list(found) == [name]
+        assert list(found) == [name], "no modulus, and no strain that made it"
         shown, unit = found[name].split(" ±")[0].split()[0], found[name].split()[-1]
         assert float(row[column]) * (1e3 if unit == "N" else 1) == pytest.approx(float(shown), rel=0.01)
-    assert 'title="strain and a tensile stress are known together at 3 points">not known<' in html
+    assert (
+        'title="strain and a tensile stress are known together at 3 points, 8 are needed">not known<' in html
+    )
 
 
 def test_without_a_modulus_the_summary_has_the_strength_and_the_reason() -> None:
@@ -122,3 +126,40 @@ def test_without_a_modulus_the_summary_has_the_strength_and_the_reason() -> None
     text = "\n".join(summary_lines(RunState(EventLog(), FrameCounts(), loads, few), FLAT))
     assert "Rm = " in text
     assert "not known: E, " in text
+
+
+def test_the_strain_of_e_is_named_wherever_e_shows(tmp_path: Path) -> None:
+    folders = [make_run(tmp_path / "region"), make_run(tmp_path / "own", config={**CONFIG, "gauges": GAUGES})]
+    rows, html = read(folders)
+    for folder, row, strain in zip(folders, rows, ("eyy of the region", "gauge axial"), strict=False):
+        with open_run(folder) as run:
+            curve = RunCurve.of(run)
+            assert curve.figures.elastic_strain == strain
+            assert tensile(curve)["strain of E, nu"] == strain
+            assert f"points of {strain}," in "\n".join(figure_lines(curve.figures, run.specimen))
+        assert row["strain of E and nu"] == strain and strain in html
+    history, loads = kept(ramberg_osgood())
+    page = run_result(RunState(EventLog(), FrameCounts(), loads, history), FLAT, Path("runs"), "")["figures"]
+    assert [one["text"] for one in page if one["name"] == "strain of E and nu"] == ["eyy of the region"]
+    config = load_config(None, {"specimen.width_mm": 20.0, "specimen.thickness_mm": 2.0})
+    batch = batch_figures(evaluate(history, loads, FLAT), config)
+    assert (
+        batch["strain_of_E"] == "eyy of the region"
+        and {"r", "r_low", "n_high"} <= batch.keys() & COLUMNS.keys()
+    )
+
+
+def test_r_and_n_have_their_interval_and_the_elongation_its_length() -> None:
+    metal, strain = (
+        PowerLaw(0.2, 1.5),
+        np.concatenate([np.linspace(0, 3e-3, 200), np.linspace(3e-3, 0.3, 600)]),
+    )
+    curve = Curve(np.arange(800) / 10, strain, metal.stress(strain), metal.transverse(strain))
+    figures = evaluate_test(curve)
+    rows = tensile_table(figures, stresses=True)
+    assert rows["r"].text.endswith("(plastic strains 2 to 20 %)") and rows["r"].text.startswith("1.50")
+    text = "\n".join(figure_lines(figures, SpecimenConfig(area_mm2=40.0, gauge_length_mm=50.0)))
+    length = 50 * figures.Agt.value
+    assert f"gauge length 50 mm, elongation {length:.1f}" in text and "mm at the highest force" in text
+    assert f"r = {rows['r'].text}  n = {rows['n'].text}" in text
+    assert rows["n"].figure.value == pytest.approx(0.2, rel=2e-3)

@@ -20,10 +20,13 @@ import pytest
 
 from acquire.errors import DataError
 from acquire.hdf5 import damage as child
+from analysis import Roi, ZoiGrid
+from live.pipeline.measurement import Measurement
 from live.results import Results, ResultsInfo, Strain
-from live.results.row import StrainRow
+from live.results.layout import MAPS, PLAIN_MAPS
+from live.results.row import StrainRow, maps_of
 from live.results.strain_csv import COLUMNS
-from live.results.strain_h5 import FLUSH_S, StrainWriter
+from live.results.strain_h5 import FLUSH_S, StrainWriter, rounded
 from tests.clock import Clock
 from tests.live.made_up import CAMERA, START, make_grid, make_measurement
 
@@ -63,10 +66,90 @@ def test_what_was_written_comes_back(tmp_path: Path) -> None:
         np.testing.assert_allclose(strain.values["eyy"], 1e-3 * np.arange(5))
         field = make_measurement(4, 4e-3).field
         for name in ("u", "v", "dv_dy", "exx", "eyy", "exy", "sigma_eyy", "sigma_u", "residual"):
-            np.testing.assert_array_equal(strain.maps(name, 4), getattr(field, name).astype(np.float32), name)
+            expected = rounded(maps_of(field, "small"))[name].astype(np.float32)
+            np.testing.assert_array_equal(strain.maps(name, 4), expected, name)
         np.testing.assert_array_equal(strain.maps("status", 4), field.status)
         assert strain.maps("exx").shape == (5, *strain.grid.shape)
         assert len(strain.maps("exx", slice(1, 3))) == 2
+
+
+def noisy_row(side: int) -> StrainRow:
+    """Maps as a measurement gives them: a strain with noise, uncertainties that differ by a few percent."""
+    rng = np.random.default_rng(5)
+    row = StrainRow.of(make_measurement(1, 1e-3), INFO)
+    maps = dict(row.maps)
+    for name in (*PLAIN_MAPS, "blur"):
+        sigma = 1e-4 * rng.normal(1, 0.05, (side, side)).astype(np.float32)
+        maps[f"sigma_{name}"], maps[name] = sigma, (2e-3 + sigma * rng.normal(size=sigma.shape)).astype("f4")
+    maps["residual"] = rng.normal(1, 0.1, (side, side)).astype(np.float32)
+    maps |= {name: np.zeros((side, side), np.uint8) for name in ("status", "iterations")}
+    return dataclasses.replace(row, maps=maps)
+
+
+def test_rounding_is_far_below_the_uncertainty() -> None:
+    maps = noisy_row(32).maps
+    sigma = maps["sigma_exx"]
+    sigma[0, :4], maps["exx"][1, :2] = (0.0, math.nan, math.inf, -1.0), (math.nan, math.inf)
+    stored = rounded(maps)
+    np.testing.assert_array_equal(stored["exx"][0, :4], maps["exx"][0, :4])
+    np.testing.assert_array_equal(stored["exx"][1, :2], maps["exx"][1, :2])
+    np.testing.assert_array_equal(stored["sigma_exx"][0, :4], sigma[0, :4])
+    change = np.abs(stored["exx"][2:] - maps["exx"][2:]) / sigma[2:]
+    assert 1 / 4096 < change.max() <= 1 / 1024
+    change = np.abs(stored["sigma_exx"][2:] / sigma[2:] - 1)
+    assert 0.0005 < change.max() <= 2**-9
+    assert np.abs(stored["residual"] / maps["residual"] - 1).max() <= 2**-9
+    assert all(stored[name].dtype == maps[name].dtype for name in maps)
+
+
+def test_the_maps_take_half_of_their_bytes(tmp_path: Path) -> None:
+    row, side = noisy_row(32), 32
+    grid = ZoiGrid.cover(Roi(0, 0, 32 * side, 32 * side), 32, 32)
+    writer = StrainWriter(tmp_path / "strain.h5", grid, INFO)
+    for _ in range(3):
+        writer.write(row)
+    writer.close()
+    with h5py.File(tmp_path / "strain.h5") as file:
+        stored = sum(file["entry/strain"][name].id.get_chunk_info(2).size for name in MAPS)
+    assert 0.2 < stored / sum(row.maps[name].nbytes for name in MAPS) < 0.5
+
+
+def blurred(number: int) -> Measurement:
+    """With a blur of 0.5 px that is known to 0.1 px^2 in each ZOI."""
+    m = make_measurement(number)
+    blur = np.stack([np.where(m.field.ok, value, np.nan) for value in (0.25, 0.1)]).astype(np.float32)
+    return dataclasses.replace(
+        m,
+        field=dataclasses.replace(m.field, blur=blur),
+        time_step=dataclasses.replace(m.time_step, blur=0.5, sigma_blur=0.02),
+    )
+
+
+def test_the_blur_comes_back_and_files_without_it_open(tmp_path: Path) -> None:
+    with open_results(tmp_path) as results:
+        results.add(blurred(0))
+    path = tmp_path / "strain.h5"
+    with Strain.open(path) as strain:
+        ok = strain.maps("status", 0) == 0
+        assert (
+            strain.maps("blur", 0)[ok] == pytest.approx(0.5) and np.isnan(strain.maps("blur", 0)[~ok]).all()
+        )
+        assert strain.maps("sigma_blur", 0)[ok] == pytest.approx(
+            (math.sqrt(0.35) - math.sqrt(0.15)) / 2, rel=2**-9
+        )
+        assert (strain.values["blur_px"][0], strain.values["sigma_blur_px"][0]) == (0.5, 0.02)
+    with h5py.File(path, "r+") as file:
+        for name in (
+            "strain/blur",
+            "strain/sigma_blur",
+            "strain/blur_errors",
+            "mean/blur_px",
+            "mean/sigma_blur_px",
+        ):
+            del file["entry"][name]
+    with Strain.open(path) as strain:
+        assert "blur" not in strain.names and "blur_px" not in strain.values
+        assert np.isfinite(strain.maps("eyy", 0)[ok]).all()
 
 
 def test_the_table_has_the_columns_scripts_rely_on(tmp_path: Path) -> None:
@@ -129,7 +212,9 @@ def test_a_disk_that_takes_no_more_is_told_and_spoils_nothing(
 
     with monkeypatch.context() as patch:
         patch.setattr(h5py.File, "flush", full)
-        with pytest.raises(DataError, match=r"strain\.h5: cannot be written .*no space.* 1 rows"):
+        with pytest.raises(
+            DataError, match=r"strain\.h5: cannot be written .*no space.*; 1 row before can be read"
+        ):
             results.add(make_measurement(1))
             time.sleep(results.flush_when_due())
             results.flush_when_due()
@@ -243,7 +328,7 @@ def test_rows_are_flushed_together_and_on_time(tmp_path: Path, flush_s: float) -
     assert writer.flush_when_due() == math.inf
     with Strain.open(tmp_path / "strain.h5") as strain:
         assert strain.n == 3
-        np.testing.assert_array_equal(strain.maps("v", 2), rows[2].maps["v"].astype(np.float32))
+        np.testing.assert_array_equal(strain.maps("v", 2), rounded(rows[2].maps)["v"].astype(np.float32))
     writer.close()
 
 

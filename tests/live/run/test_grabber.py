@@ -29,10 +29,9 @@ from live.cli import main
 from live.commands.consumers import standard_consumers
 from live.config.loading import load_config
 from live.pipeline.consumer import Consumer
-from live.pipeline.frame_counts import FrameCounts
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import ReferenceBurst, ReferenceTaker
-from live.pipeline.run_state import RunState
+from live.pipeline.run_state import FrameCounts, RunState
 from live.run import live_run as live_module
 from live.run.grabber import Grabber, GrabPlan
 from live.run.live_run import run_live

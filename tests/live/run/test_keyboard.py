@@ -17,6 +17,7 @@ from live.run.control import ENDED, FORCED, UNDO
 from live.run.keyboard import Keys, listen
 from live.ui.terminal.screen import TerminalScreen
 from tests.live.run.test_control import FakeLive
+from tests.live.ui.waiting import LONG_S
 
 
 class Terminal(io.StringIO):
@@ -28,7 +29,7 @@ def test_what_nobody_knows_is_answered_with_the_orders() -> None:
     live, screen = FakeLive(), io.StringIO()
     thread = listen(live, Terminal("\nx\nn\n?\n"), TerminalScreen(screen))
     assert thread is not None
-    thread.join(5)
+    thread.join(LONG_S)
     assert live.calls == []
     lines = screen.getvalue().splitlines()
     assert lines[0].startswith("keys (with Enter)")
@@ -41,7 +42,7 @@ def test_only_a_terminal_is_listened_to() -> None:
     live = FakeLive()
     thread = listen(live, Terminal("q\n"), TerminalScreen(io.StringIO()))
     assert thread is not None
-    thread.join(5)
+    thread.join(LONG_S)
     assert live.calls == [("stop", ENDED)]
 
 

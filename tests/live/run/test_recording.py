@@ -12,11 +12,12 @@ from acquire.errors import DataError
 from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from live.pipeline.event_log import EventLog
-from live.pipeline.frame_counts import FrameCounts
+from live.pipeline.run_state import FrameCounts
 from live.run.control import START, STOP, ControlRefused
 from live.run.pre_trigger import PreTrigger, PreTriggerBuffer
 from live.run.recorder import Recorder
 from tests.live.fakes import frame
+from tests.live.ui.waiting import LONG_S
 
 
 class FakeWriter:
@@ -263,7 +264,7 @@ class TellingRecorder(FakeRecorder):
         event = Event(0.0, EventKind.RECORDER, "session.h5", "the disk is full in 20 s", "warning")
         thread = threading.Thread(target=self.pre_trigger.event, args=(event,), daemon=True)
         thread.start()
-        thread.join(5.0)
+        thread.join(LONG_S)
         assert not thread.is_alive(), "it waits for whoever waits for it"
 
     def frame(self, item: Any) -> None:

@@ -31,6 +31,7 @@ from live.run.strain_output import LineFormat, SerialOut, TcpOut, UdpOut
 from tests.live.made_up import START, make_measurement
 from tests.live.run.test_tcp_lines import Caller
 from tests.live.test_end_to_end import SIM, live_run
+from tests.live.ui.waiting import LONG_S
 
 CHANNELS = ("time_s", "frame", "axial", "force_N", "stress_MPa", "lost_share", "latency_s")
 
@@ -116,7 +117,7 @@ def test_to_a_serial_port_that_is_pulled_out_and_comes_back(monkeypatch: pytest.
 
 
 def read(port: PtyPort, lines: int) -> list[str]:
-    got, until = b"", time.monotonic() + 5
+    got, until = b"", time.monotonic() + LONG_S
     while got.count(b"\n") < lines and time.monotonic() < until:
         got += port.read(0.1)
     return got.decode().split()

@@ -50,6 +50,7 @@ def test_a_good_picture_is_ready(capsys: pytest.CaptureFixture[str]) -> None:
         ("&noise=0", (), "LOOK  noise"),
         ("", ("--target", "5"), "more than the 5.0 µm/m asked for: "),
         ("&hold=0.01&end=0.1&drift_x=40", (), "LOOK  drift"),
+        ("&hold=0.01&end=0.1&max_strain=1e-8&stand_off_mm=100&settle_mm=5", (), "LOOK  distance"),
     ],
 )
 def test_a_bad_picture_is_not(
@@ -151,10 +152,10 @@ def test_the_snapshot_and_the_gauges(capsys: pytest.CaptureFixture[str], tmp_pat
     assert "l_10% mm" in output
     noise = {
         name: float(re.search(rf"noise of {name} +([0-9.]+) µm/m", output)[1])  # type: ignore[index]
-        for name in ("the mean", "axial", "transverse", "area")
+        for name in ("the region", "extension", "width", "area")
     }
     one = float(re.search(r"strain noise +(\d+) µm/m measured", output)[1])  # type: ignore[index]
-    assert noise["the mean"] < one
+    assert noise["the region"] < one
     assert noise["area"] < one
     drawn = cv2.imread(str(shot))
     assert (drawn == np.array(GOOD)).all(axis=2).sum() > 500
@@ -346,6 +347,25 @@ def test_what_surrounds_the_specimen_decides_nothing(taken: FrameStack) -> None:
     bad = [line.text() for line in check_lines(found) if not line.good]
     assert bad == []
     assert found.noise == pytest.approx(examine(taken, config, table=False).noise, rel=0.05)
+
+
+def test_a_pattern_that_repeats_is_named_with_its_period() -> None:
+    rng = np.random.default_rng(0)
+    k = 2 * np.pi / 9
+    y, x = np.mgrid[:240, :320]
+    grid = 120 + 40 * (np.sin(k * x) + np.sin(k * y))
+    frames = np.rint(grid + rng.normal(0, 1, (16, *grid.shape))).astype(np.uint8)
+    text = line_text(shots_of(frames, 8), "repetition")
+    assert text.startswith("LOOK") and "repeats every 9.0 px" in text and "move by 3.6 px" in text
+
+
+def test_the_blocks_of_a_codec_are_named_and_leave_the_pattern(taken: FrameStack) -> None:
+    coded = [cv2.imencode(".jpg", one, [cv2.IMWRITE_JPEG_QUALITY, 80])[1] for one in taken.frames]
+    shots = shots_of(np.stack([cv2.imdecode(one, cv2.IMREAD_GRAYSCALE) for one in coded]), 8)
+    assert "blocks of 8 px" in line_text(shots, "compression")
+    assert line_text(shots, "ZOIs without pattern").split()[-3] == "0.0%"
+    with pytest.raises(StopIteration):
+        line_text(taken, "compression")
 
 
 def test_automatic_controls_by_name_and_value() -> None:

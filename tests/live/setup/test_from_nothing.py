@@ -97,7 +97,7 @@ def gone_through(folder: Path, camera: str, *arguments: str, ready: int = 0) -> 
     assert main(["run", "--config", rig, "--no-view", "--no-rrd", "--out", str(out)]) == 0
     with h5py.File(out / "strain.h5") as file:
         gauges = file["entry/gauges"]
-        return {name: gauges[name][()] for name in ("axial", "transverse", "area")}
+        return {name: gauges[name][()] for name in ("extension", "width", "area")}
 
 
 def played(folder: Path, paths: Sequence[Path], noise: float, light: float) -> str:
@@ -117,8 +117,8 @@ def test_the_simulated_rig(tmp_path: Path) -> None:
     sim = "sim:hole?seconds=10&hold=5&fps=15&width=320&height=320&hole=30"
     found = gone_through(tmp_path, sim, "--section", "10,2", "--zoi", "48")
     assert all(np.isfinite(values).all() for values in found.values())
-    assert found["axial"][-1] > 1e-3
-    assert found["transverse"][-1] < 0
+    assert found["extension"][-1] > 1e-3
+    assert found["width"][-1] < 0
 
 
 @pytest.mark.data
@@ -131,10 +131,10 @@ def test_the_open_hole(tmp_path: Path, data_dir: Path, capsys: pytest.CaptureFix
     assert [line.split()[1:3] for line in looks] == [["speckle", "radius"]]
     pulled = {name: values[-len(paths) + 1 :] for name, values in found.items()}
     assert all(np.isfinite(values).all() for values in found.values())
-    assert np.abs(found["axial"][: -len(paths) + 1]).max() < 5e-5
-    assert (np.diff(pulled["axial"]) > 0).all()
-    assert pulled["area"][-1] == pytest.approx(pulled["axial"][-1], rel=0.3)
-    assert pulled["transverse"][-1] < -5e-4
+    assert np.abs(found["extension"][: -len(paths) + 1]).max() < 5e-5
+    assert (np.diff(pulled["extension"]) > 0).all()
+    assert pulled["area"][-1] == pytest.approx(pulled["extension"][-1], rel=0.3)
+    assert pulled["width"][-1] < -5e-4
 
 
 @pytest.mark.data
@@ -145,7 +145,7 @@ def test_the_polymer_bar(tmp_path: Path, data_dir: Path) -> None:
     arguments = ["--noise", "6", "--crop", "260,230,330,1340"]
     found = gone_through(tmp_path, played(tmp_path, paths, 1.0, 0.9), *arguments)
     assert all(np.isfinite(values).all() for values in found.values())
-    assert found["axial"][-1] == pytest.approx(0.031, abs=0.002)
-    assert found["area"][-1] == pytest.approx(found["axial"][-1], rel=0.03)
-    poisson = -found["transverse"][-1] / found["axial"][-1]
+    assert found["extension"][-1] == pytest.approx(0.031, abs=0.002)
+    assert found["area"][-1] == pytest.approx(found["extension"][-1], rel=0.03)
+    poisson = -found["width"][-1] / found["extension"][-1]
     assert 0.3 < poisson < 0.55

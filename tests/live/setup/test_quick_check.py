@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import io
+import math
 import os
 import signal
 import threading
@@ -16,9 +17,10 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
+from analysis.field import Blur
 from live.cli import main
 from live.commands import check_watch as check_watch
-from live.commands.check_watch import RenewedLines, card, peak_line
+from live.commands.check_watch import RenewedLines, blur_line, card, peak_line
 from live.config.loading import load_config
 from live.setup.check.check_list import examine
 from live.setup.check.quick_check import RENEW_EVERY, SEARCH_EVERY, QuickCheck, QuickChecker
@@ -50,6 +52,10 @@ def test_the_peak_is_held() -> None:
     assert f"{values[3] / values[2]:.0%} of the peak" in peak_line(found[3])
     assert peak_line(found[3]).count("#") == round(30 * values[3] / values[2])
     assert found[0].figures.floors == ()
+    # Of each against the sharpest before: the second is sharper by more than can be measured, and takes its place.
+    assert abs(found[0].blur.px) < 0.01 and math.isnan(found[1].blur.px) and found[2].blur.px < 0
+    assert found[3].blur.px == pytest.approx(1.5, rel=0.35)
+    assert "less sharp by" in blur_line(found[3])[0] and blur_line(found[3])[0] in card(found[3], [])
 
 
 class FakeView:
@@ -190,7 +196,7 @@ def test_lines_are_renewed_in_place(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_the_card_is_a_table() -> None:
-    quick: Any = type("G", (), {"of_peak": float("nan")})()
+    quick: Any = type("G", (), {"of_peak": math.nan, "blur": Blur(math.nan, math.nan)})()
     text = card(quick, [CheckLine("a|b", "1"), CheckLine("c", "2", False)])
     assert "| a/b | 1 |" in text
     assert "| **LOOK** | c | 2 |" in text

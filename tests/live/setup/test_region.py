@@ -13,6 +13,7 @@ import pytest
 
 from acquire.errors import ConfigError
 from analysis import Roi, ZoiGrid
+from analysis.evaluate import extension_of
 from live.cli import main
 from live.config.gauges import gauges_for
 from live.config.loading import load_config
@@ -54,7 +55,7 @@ def test_a_run_without_a_region_finds_the_specimen(
     assert main(["replay", str(live / "session.h5"), *arguments]) == 0
     assert "the specimen was found" in capsys.readouterr().out
     with h5py.File(third / "strain.h5") as file:
-        assert set(file["entry/gauges"]) >= {"axial", "transverse", "area"}
+        assert set(file["entry/gauges"]) >= {"extension", "width", "area"}
 
 
 def pictures(folder: Path) -> str:
@@ -169,21 +170,38 @@ def grid_on(mask: np.ndarray, size: int = 32, step: int = 8) -> ZoiGrid:
     return ZoiGrid.cover(Roi(x, y, int(columns[-1]) + 1 - x, int(rows[-1]) + 1 - y), size, step, mask)
 
 
-def test_axial_spans_four_fifths_of_the_specimen_in_its_middle() -> None:
-    gauges = auto_gauges(grid_on(strip()), "y")
-    axial = gauges["axial"]
-    assert axial["end"][1] - axial["start"][1] == pytest.approx(0.8 * 500, abs=8)
-    assert axial["start"][0] == axial["end"][0] == pytest.approx(159.5, abs=4)
-    assert list(gauges) == ["axial", "transverse", "area"]
+def test_extension_and_area_have_all_zois_of_the_specimen() -> None:
+    grid = grid_on(strip())
+    gauges = auto_gauges(grid, "y")
+    assert list(gauges) == ["extension", "width", "area"]
+    assert gauges["extension"]["box"] == gauges["area"]["box"]
+    ends, (everywhere,) = (
+        gauges_for({name: gauges[name]}, "y", grid)[0].zois(grid) for name in ("extension", "area")
+    )
+    assert everywhere.sum() == grid.n_active
+    rows, columns = grid.shape
+    for mask, first in zip(ends, (0, rows - round(rows / 6)), strict=True):
+        assert mask.any(axis=0).sum() == columns, "as wide as the specimen"
+        assert np.flatnonzero(mask.any(axis=1))[0] == pytest.approx(first, abs=1)
+        assert mask.any(axis=1).sum() == pytest.approx(rows / 6, abs=1)
+
+
+def test_the_automatic_extension_is_that_of_the_region() -> None:
+    grid = grid_on(strip((160, 290, 40)))
+    field, (gauge,) = (
+        make_field(grid, 1e-3),
+        gauges_for({"e": auto_gauges(grid, "y")["extension"]}, "y", grid),
+    )
+    assert gauge.measure(field) == extension_of(field, "y")
 
 
 @pytest.mark.parametrize("axis", ["x", "y"])
 @pytest.mark.parametrize(
-    "mask",
-    [strip(), strip((160, 290, 40)), strip((160, 90, 30)), strip(slope=0.3)],
+    ("mask", "slope"),
+    [(strip(), 0), (strip((160, 290, 40)), 0), (strip((160, 90, 30)), 0), (strip(slope=0.3), 0.3)],
     ids=["plain", "hole", "hole at an end", "leaning"],
 )
-def test_all_are_on_zois_and_read_the_strain(mask: np.ndarray, axis: str) -> None:
+def test_all_are_on_zois_and_read_the_strain(mask: np.ndarray, slope: float, axis: str) -> None:
     mask = mask if axis == "y" else mask.T
     grid = grid_on(mask)
     config = load_config(None, {"measure.gauges": "auto", "specimen.axis": axis})
@@ -193,16 +211,17 @@ def test_all_are_on_zois_and_read_the_strain(mask: np.ndarray, axis: str) -> Non
     across = "exx" if axis == "y" else "eyy"
     along = "eyy" if axis == "y" else "exx"
     values = {g.name: g.measure(field) for g in gauges_for(config.gauges, config.specimen.first_axis, grid)}
-    assert list(values) == ["axial", "transverse", "area"]
+    assert list(values) == ["extension", "width", "area"]
     assert values["area"].value == pytest.approx(field.mean(along)[0], abs=1e-9)
-    # The ends of a line on a leaning strip stand aslant.
-    assert values["transverse"].value == pytest.approx(field.mean(across)[0], rel=0.03)
-    assert values["axial"].value == pytest.approx(field.mean(along)[0], rel=0.15)
+    # The line between the ends of a leaning strip stands aslant.
+    assert values["width"].value == pytest.approx(field.mean(across)[0], rel=0.03)
+    aslant = (field.mean(along)[0] + slope**2 * field.mean(across)[0]) / (1 + slope**2)
+    assert values["extension"].value == pytest.approx(aslant, rel=0.03)
 
 
-def test_the_transverse_one_keeps_off_a_hole() -> None:
+def test_the_width_keeps_off_a_hole() -> None:
     grid = grid_on(strip((160, 290, 40)))
-    box = auto_gauges(grid, "y")["transverse"]["box"]
+    box = auto_gauges(grid, "y")["width"]["box"]
     assert box is not None
     _, y, _, height = box
     assert y > 290 + 40 or y + height < 290 - 40
@@ -210,16 +229,16 @@ def test_the_transverse_one_keeps_off_a_hole() -> None:
 
 def test_what_is_given_stays(tmp_path: Any) -> None:
     own = {"kind": "area", "box": [120, 100, 60, 60]}
-    config = load_config(None, {"measure.gauges": "auto", "gauges.axial": own, "gauges.mine": own})
+    config = load_config(None, {"measure.gauges": "auto", "gauges.extension": own, "gauges.mine": own})
     placed = with_auto_gauges(config, grid_on(strip()))
-    assert placed.gauges["axial"]["kind"] == "area"
-    assert list(placed.gauges) == ["axial", "transverse", "area", "mine"]
+    assert placed.gauges["extension"]["kind"] == "area"
+    assert list(placed.gauges) == ["extension", "width", "area", "mine"]
     assert with_auto_gauges(placed, grid_on(strip())) is placed
 
 
-def test_a_narrow_specimen_has_no_transverse_one() -> None:
+def test_a_narrow_specimen_has_no_width() -> None:
     grid = ZoiGrid.cover(Roi(10, 10, 36, 200), 32, 8)
-    assert list(auto_gauges(grid, "y")) == ["axial", "area"]
+    assert list(auto_gauges(grid, "y")) == ["extension", "area"]
 
 
 def test_too_short_a_specimen_is_refused() -> None:

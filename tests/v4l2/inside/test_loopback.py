@@ -68,7 +68,10 @@ def test_numbers_and_stamps_are_those_of_the_kernel() -> None:
     assert all(abs(frame.raw_t - now) < 30 for frame in frames)  # the same clock as ours
     for earlier, later in pairwise(frames):
         assert later.lost_before == later.index - earlier.index - 1
-        assert (later.raw_t - earlier.raw_t) / (later.index - earlier.index) == pytest.approx(1 / 15, rel=0.2)
+        assert later.raw_t > earlier.raw_t
+    # One stamp may be late in a slow machine; the pace of the kernel's camera makes up for it.
+    first, last = frames[0], frames[-1]
+    assert (last.raw_t - first.raw_t) / (last.index - first.index) == pytest.approx(1 / 15, rel=0.2)
 
 
 @pytest.mark.v4l2

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from acquire.session.reader import Session
 from tests.v4l2.inside import running, vivid
+from tests.v4l2.prepare import MEASURED
 
 LOAD = "/dev/ttyACM0?protocol=ascii&baud=115200&unit=N"
 
@@ -23,11 +24,10 @@ def test_a_known_motion_is_measured_end_to_end(
 ) -> None:
     """Reference, shift, strain on the screen; what was recorded is measured outside as well."""
     camera = f"/dev/video0?input=1&format={fourcc}"
-    measured = ("--zoi", "64", "--step", "64", "--burst", "2", "--reference-burst", "2")
     with (
         vivid.looped(fourcc, pictures[f"reference_{bits}"], fps=50) as screen,
         running.Indicator(10.0) as indicator,
-        running.Run(tmp_path / f"motion_{bits}", camera, LOAD, *measured) as run,
+        running.Run(tmp_path / f"motion_{bits}", camera, LOAD, *MEASURED) as run,
     ):
         run.until_rows(3)
         screen.show(pictures[f"shifted_{bits}"])

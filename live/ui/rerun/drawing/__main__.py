@@ -5,12 +5,12 @@ from __future__ import annotations
 import signal
 import sys
 
-from acquire.signal_mask import unblock_signals
+from acquire.system import HANGUP, unblock_signals
 
 if __name__ == "__main__":
-    for number in (signal.SIGINT, signal.SIGHUP):
+    for number in (signal.SIGINT, *HANGUP):
         signal.signal(number, signal.SIG_IGN)
-    unblock_signals(signal.SIGINT, signal.SIGHUP)  # blocked by live.ui.rerun.supervisor
+    unblock_signals(signal.SIGINT, *HANGUP)  # blocked by live.ui.rerun.supervisor
 
     from live.ui.rerun.drawing.process import main
 

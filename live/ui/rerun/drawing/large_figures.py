@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
+from acquire.printable import share_text
 from live.pipeline.snapshot import Snapshot
 from live.ui.rerun.drawing.shapes import BACKGROUND
 
@@ -66,7 +67,9 @@ def _line(s: Snapshot) -> str:
     if not s.zois:
         return "nothing measured yet"
     lost = s.zois - s.valid
-    return f"{s.valid} of {s.zois} ZOIs" + (f", {lost} LOST" if lost else "")
+    part = share_text(s.area_share)
+    words = f"{s.valid} of {s.zois} ZOIs" + (f", {lost} LOST" if lost else "")
+    return f"{words}; strain {part}" if part else words
 
 
 def _write(

@@ -7,17 +7,12 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import os
-import resource
-import select
-import signal
 import socket
-import sys
 import threading
 import time
-from pathlib import Path
 from typing import Any
 
+from acquire.system import inherited_socket, kill_this_process, lowest_priority, memory_MiB, wait_until_closed
 from live.ui.rerun.drawing.scene import ViewScene
 from live.ui.rerun.drawing.sinks import FINISHED_MIB, RerunSink, serve, write
 from live.ui.rerun.messages import (
@@ -40,7 +35,7 @@ MAX_MIB = 640
 GRACE_S = 5.0
 """To draw what waits and to close the file after the test has ended."""
 
-_POLL_S, _NICE = 2.0, 19
+_POLL_S = 2.0
 
 
 class ReplyChannel:
@@ -62,8 +57,7 @@ class ReplyChannel:
 
 def main() -> int:
     """Draw until the test ends; the exit code."""
-    parent = socket.socket(fileno=os.dup(0))
-    parent.setblocking(True)
+    parent = inherited_socket()
     channel, reader = ReplyChannel(parent), Reader(parent)
     end_with(parent)
     try:
@@ -72,7 +66,7 @@ def main() -> int:
         if not sinks:
             return 3
         # Only now: with a low priority a busy machine takes long to load rerun.
-        os.nice(_NICE - os.nice(0))
+        lowest_priority()
         _draw(reader, ViewScene(sinks, setup), channel, MAX_MIB + FINISHED_MIB * setup.finished)
     except EOFError:
         return 1
@@ -150,22 +144,10 @@ def _show(scene: ViewScene, message: Message) -> None:
 
 def end_with(parent: socket.socket) -> None:
     """End this process ``GRACE_S`` after the other end of ``parent`` is closed, even where it hangs."""
-    threading.Thread(target=_end_with, args=(parent.fileno(),), name="guard", daemon=True).start()
+    threading.Thread(target=_end_with, args=(parent,), name="guard", daemon=True).start()
 
 
-def _end_with(number: int) -> None:
-    poll = select.poll()
-    poll.register(number, 0)  # a closed end is reported in any case
-    poll.poll()
+def _end_with(parent: socket.socket) -> None:
+    wait_until_closed(parent)
     threading.Event().wait(GRACE_S)
-    os.kill(os.getpid(), signal.SIGKILL)  # a hanging thread does not stop this
-
-
-def memory_MiB() -> float:
-    """Resident memory of this process (its peak where the system does not report the current value)."""
-    try:
-        pages = int(Path("/proc/self/statm").read_text().split()[1])
-        return pages * resource.getpagesize() / 2**20
-    except (OSError, ValueError, IndexError):
-        peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-        return peak / 2**20 if sys.platform == "darwin" else peak / 2**10
+    kill_this_process()

@@ -14,7 +14,8 @@ from acquire.errors import DataError, DeviceError, PhasedicError
 from acquire.events import Event
 from acquire.frame import CameraInfo, Frame
 from acquire.printable import brief, printable
-from live.pipeline.latency import OUTPUT, lower_priority
+from acquire.system import lower_priority
+from live.pipeline.latency import OUTPUT
 from live.setup.devices import at_rest, open_rig
 from live.ui.web.setup.config_draft import ConfigDraft
 
@@ -117,8 +118,13 @@ class CameraPreview:
         if info is None:
             raise DataError("the camera has given no picture yet")
         with self._lock:
-            n = self._needed(info) if info.live else len(self._first)
-            self._collected = deque([] if info.live else self._first, maxlen=max(n, 1))
+            self._collected = deque(maxlen=max(self._needed(info), 1))
+            if self._whole:
+                self._collect_first()
+
+    def _collect_first(self) -> None:
+        """Of a recording: its first frames are those of the check."""
+        self._collected = deque(self._first, maxlen=len(self._first))
 
     @property
     def collecting(self) -> bool:
@@ -214,6 +220,8 @@ class CameraPreview:
             raise DataError("the recording has no picture that can be used")
         with self._lock:
             self._whole = True
+            if self._collected is not None:  # asked for while they were read
+                self._collect_first()
         due = 0.0
         while not self._over:
             if time.monotonic() >= due:

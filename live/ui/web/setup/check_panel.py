@@ -41,6 +41,9 @@ def camera_values(info: CameraInfo) -> dict[str, Any]:
         "height": info.height,
         "bits": info.bits,
         "fps": info.fps,
+        "format": printable(info.pixel_format),
+        "formats": [printable(name) for name in info.formats],
+        "rates": info.rates,
         "sliders": [asdict(setting) for setting in info.settings],
         "warnings": [printable(text) for text in info.warnings],
     }

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import logging
-import re
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from acquire.addresses import parse_address
 from acquire.camera import CameraListing, list_cameras
 from acquire.errors import PhasedicError
 from acquire.printable import brief, printable
@@ -19,7 +17,6 @@ from acquire.serial_line.ports import PortInfo, list_serial_ports
 log = logging.getLogger(__name__)
 
 MAX_SESSIONS = 20
-_FORMAT = re.compile(r"^format=(\S+)")
 Cameras = Callable[[], list[CameraListing]]
 Ports = Callable[[], list[PortInfo]]
 
@@ -52,15 +49,11 @@ class DeviceLists:
         """Listen on a serial port for a load cell; nothing is sent."""
         self._begin(lambda: self._identify(port))
 
-    def state(self, camera: str) -> dict[str, Any]:
-        """The lists as the page shows them; formats are those of the camera at the address ``camera``."""
-        target = parse_address(camera).target if camera else ""
-        same = [one for one in self._cameras if target in _device(one)]
-        lines = (line for one in same for line in one.details)
+    def state(self) -> dict[str, Any]:
+        """The lists as the page shows them."""
         return {
             "cameras": [_shown(one) for one in self._cameras],
             "loads": self._loads,
-            "formats": [found[1] for line in lines if (found := _FORMAT.match(line))],
             "finding": self._finding,
         }
 
@@ -84,8 +77,8 @@ class DeviceLists:
         recorded = [CameraListing(address, "recorded session") for address in self._sessions()]
         simulated = [CameraListing("sim:", "simulated"), CameraListing("sim:hole", "simulated")]
         self._cameras = [*self._list_cameras(), *recorded, *simulated]
-        ports = [_port(one) for one in self._list_ports()]
-        self._loads = [*ports, {"address": "sim:", "name": "simulated"}, {"address": "none:", "name": "none"}]
+        others = [*recorded, CameraListing("sim:", "simulated"), CameraListing("none:", "none")]
+        self._loads = [*(_port(one) for one in self._list_ports()), *map(_shown, others)]
         self._finding = ""
 
     def _sessions(self) -> Iterator[str]:
@@ -101,11 +94,6 @@ class DeviceLists:
                 self._finding = f"found: {finding.protocol}; choose it in the list"
                 return
         self._finding = "nothing recognised: check cable and power, or write the address"
-
-
-def _device(listing: CameraListing) -> set[str]:
-    """The names of the device of a camera."""
-    return {parse_address(one).target for one in (listing.address, listing.stable_address) if one}
 
 
 def _shown(one: CameraListing) -> dict[str, str]:

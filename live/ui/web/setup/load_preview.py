@@ -17,7 +17,8 @@ from acquire.load_cell import LoadCell
 from acquire.load_cell.check import ListenResult, LoadReport, report, stillness
 from acquire.load_sample import LoadCellInfo, LoadSample
 from acquire.printable import brief, printable
-from live.pipeline.latency import OUTPUT, lower_priority
+from acquire.system import lower_priority
+from live.pipeline.latency import OUTPUT
 from live.setup.devices import open_load
 from live.ui.web.setup.config_draft import ConfigDraft
 

@@ -133,7 +133,7 @@ class SetupSession:
             "camera": None if info is None else camera_values(info),
             "address": config.camera.address,
             "load": self.load.state(),
-            "devices": self.devices.state(config.camera.address),
+            "devices": self.devices.state(),
             "picture": self._shown,
             "overlays": self.overlays,
             "region": region,

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from acquire.errors import PhasedicError
 from acquire.frame import CameraInfo, Frame
 from acquire.printable import brief, printable
+from acquire.system import lower_priority
 from live.config.sections import DEFAULT_REFERENCE_BURST
 from live.config.values import AUTO
-from live.pipeline.latency import OUTPUT, lower_priority
+from live.pipeline.latency import OUTPUT
 from live.pipeline.warm_up import picture_kinds
 from live.setup.check.check_list import CheckFigures, examine
 from live.setup.check.quick_check import QuickChecker
@@ -193,4 +194,6 @@ class SpecimenCheck:
             names = ", ".join(self._region.ready(self._folder).gauges)
         except PhasedicError as error:
             return CheckLine("gauges", str(error), False, "move it onto the region")
-        return CheckLine("gauges", f"placed: {names}" if names else "none: the mean strain is reported")
+        return CheckLine(
+            "gauges", f"placed: {names}" if names else "none: the strain of the region is reported"
+        )

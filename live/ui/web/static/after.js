@@ -37,8 +37,10 @@ function row(one) {
   if (one.head) return heads(one.head);
   const name = el("th", { text: one.name.includes(" ") ? t(one.name) : one.name, scope: "row" });
   if (one.text == null) return el("tr", { class: "unknown" }, name, el("td", { text: t(one.why), title: t(one.why), colSpan: 2 }));
-  return el("tr", {}, name, el("td", { text: one.text }), el("td", { text: one.interval }));
+  return el("tr", {}, name, el("td", { text: one.words ? t(one.text) : withRemark(one) }), el("td", { text: one.interval }));
 }
+
+const withRemark = (one) => (one.remark ? `${one.text} (${t(one.remark)})` : one.text);
 
 function gaugeRow(one) {
   if (one.head) return heads(one.head);

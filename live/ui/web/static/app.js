@@ -26,6 +26,7 @@ const handlers = {
     if (!changed) return;
     if (!value.words) put($("answer"), "");
     pause();
+    $(value.stage)?.focus({ preventScroll: true });
     if (value.stage === "run") beginRun(value);
     if (value.stage === "setup") beginSetup(value);
   },

@@ -30,8 +30,6 @@ export function fill(list, values, make) {
   list.replaceChildren(...values.map(make));
 }
 
-const DONE = "{} ✓";
-
 export async function post(path, value) {
   let answer;
   try {
@@ -42,14 +40,14 @@ export async function post(path, value) {
   } catch {
     answer = "no: NO LINK";
   }
-  showAnswer(answer, value.line ?? value.do ?? value.of ?? "");
+  showAnswer(answer);
   return answer;
 }
 
-export function showAnswer(answer, what) {
+function showAnswer(answer) {
   const refused = answer.startsWith("no");
   const [, words] = /^(?:no|ok): (.*)$/s.exec(answer) ?? [];
-  put($("answer"), words ? t(words) : DONE.replace("{}", what));
+  put($("answer"), words ? t(words) : `${t("done")} ✓`);
   $("answer").classList.toggle("no", refused);
 }
 

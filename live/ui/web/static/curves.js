@@ -1,5 +1,6 @@
 // The curves: stress or force against the axial strain, and all gauges against time. Dragging zooms, a double click
-// shows everything again, and the point next to the pointer is read out.
+// shows everything again, and the point next to the pointer is read out. With the keyboard arrows go from point to
+// point, + zooms about it and - shows everything.
 import { $, el, fill, put } from "./base.js";
 import { colourOf, fixed, short, strainUnit } from "./numbers.js";
 import { t } from "./words.js";
@@ -13,7 +14,36 @@ class Plot {
     this.labels = labels;  // function: texts of both axes
     this.drawn = null;
     this.straight = [];    // lines and marks over the curve, in shown units
-    place.addEventListener("dblclick", () => { this.zoomed = false; this.show(this.data, this.colours); });
+    place.addEventListener("dblclick", () => this.showAll());
+    place.addEventListener("keydown", (event) => { if (this.drawn && this.key(event)) event.preventDefault(); });
+  }
+
+  showAll() { this.zoomed = false; this.show(this.data, this.colours); }
+
+  // Whether a key was used.
+  key(event) {
+    const step = { ArrowLeft: -1, ArrowRight: 1 }[event.key], last = this.data[0].length - 1;
+    if (step) this.at = Math.min(Math.max((this.at ?? last) + step * (event.shiftKey ? 10 : 1), 0), last);
+    else if (event.key === "+" || event.key === "=") this.zoom();
+    else if (event.key === "-") this.showAll();
+    else return false;
+    const [x, y] = this.point();
+    this.drawn.setCursor({ left: this.drawn.valToPos(x, "x"), top: this.drawn.valToPos(y, "y") });
+    return true;
+  }
+
+  // The point that the keyboard has reached.
+  point() {
+    const at = Math.min(this.at ?? Infinity, this.data[0].length - 1);
+    return [this.data[0][at], this.data[1][at]];
+  }
+
+  zoom() {
+    this.zoomed = true;
+    for (const [k, axis] of ["x", "y"].entries()) {
+      const { min, max } = this.drawn.scales[axis], middle = this.point()[k], half = (max - min) / 4;
+      this.drawn.setScale(axis, { min: middle - half, max: middle + half });
+    }
   }
 
   destroy() { this.drawn?.destroy(); this.drawn = null; this.zoomed = false; }
@@ -82,12 +112,12 @@ function over(u, parts, ink) {
     for (const [k, p] of points.map(at).entries()) k ? ctx.lineTo(...p) : ctx.moveTo(...p);
     ctx.stroke();
     if (points.length > 1) continue;
-    const [x, y] = at(points[0]), right = x > bbox.left + bbox.width / 2;
+    const [x, y] = at(points[0]), right = x > bbox.left + 0.75 * bbox.width;
     ctx.beginPath();
     ctx.arc(x, y, 5 * ratio, 0, 7);
     ctx.fill();
     ctx.textAlign = right ? "right" : "left";
-    ctx.fillText(words, x + (right ? -10 : 10) * ratio, Math.min(y + 14 * ratio, bbox.top + bbox.height - 8 * ratio));
+    ctx.fillText(words, x + (right ? -10 : 10) * ratio, right ? Math.max(y - 14 * ratio, bbox.top + 8 * ratio) : Math.min(y + 14 * ratio, bbox.top + bbox.height - 8 * ratio));
   }
   ctx.restore();
 }

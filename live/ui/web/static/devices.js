@@ -1,21 +1,27 @@
 // Camera and load cell by hand: lists of what there is, addresses, format and rate; the live force and its zero.
 import { $, change, el, fill, put } from "./base.js";
-import { fixed, withSigma } from "./numbers.js";
+import { fixed, short, withSigma } from "./numbers.js";
 import { t } from "./words.js";
 
 const OTHER = "another address …", LABELS = { simulated: "simulated", session: "recorded session", none: "none", other: OTHER };
 let shown = {};
 
-for (const [select, kind] of [["cameras", "address"], ["loads", "load"]]) {
-  $(select).addEventListener("change", (event) => {
-    if (event.target.value) change({ do: kind, value: event.target.value });
-    else $(kind === "load" ? "loadaddress" : "cameraaddress").focus();
-    event.target.blur();
-  });
+// A choice with the mouse acts at once; with the keyboard on Enter or when the focus leaves, not on the way there.
+function onChoice(select, act) {
+  let isTyped = false, isPending = false;
+  const finish = () => { if (isPending) act(select.value); isPending = false; };
+  select.addEventListener("pointerdown", () => { isTyped = false; });
+  select.addEventListener("keydown", (event) => { isTyped = true; if (event.key === "Escape") isPending = false; if (event.key === "Enter" && isPending) { event.preventDefault(); finish(); } });
+  select.addEventListener("change", () => { isPending = true; if (!isTyped) { finish(); select.blur(); } });
+  select.addEventListener("blur", finish);
+}
+
+for (const [select, kind, other] of [["cameras", "address", "cameraaddress"], ["loads", "load", "loadaddress"]]) {
+  onChoice($(select), (value) => { if (value) change({ do: kind, value }); else $(other).focus(); });
 }
 $("cameraform").addEventListener("submit", (event) => { event.preventDefault(); change({ do: "address", value: $("cameraaddress").value.trim() }); document.activeElement.blur(); });
 $("loadform").addEventListener("submit", (event) => { event.preventDefault(); change({ do: "load", value: $("loadaddress").value.trim() }); document.activeElement.blur(); });
-$("format").addEventListener("change", (event) => { change({ do: "option", key: "format", value: event.target.value }); event.target.blur(); });
+onChoice($("format"), (value) => change({ do: "option", key: "format", value }));
 $("rate").addEventListener("change", (event) => { change({ do: "option", key: "fps", value: event.target.value }); event.target.blur(); });
 $("identify").addEventListener("click", () => change({ do: "identify", port: $("loadaddress").value.split("?")[0] }));
 $("tab-devices").addEventListener("click", () => { if (!shown.cameras?.length) change({ do: "devices" }); });
@@ -28,10 +34,10 @@ export function showDevices(value) {
   keep($("cameraaddress"), value.address);
   keep($("loadaddress"), load.address);
   const query = new URLSearchParams(value.address.split("?")[1] ?? "");
-  keep($("format"), query.get("format") ?? "");
+  offerFormats(value.camera?.formats ?? [], value.camera?.format ?? "", query.get("format") ?? "");
   keep($("rate"), query.get("fps") ?? "");
-  $("rate").placeholder = value.camera?.fps ?? "";
-  fill($("formats"), devices.formats, (name) => el("option", { value: name }));
+  $("rate").placeholder = short(value.camera?.fps);
+  fill($("rates"), value.camera?.rates ?? [], (rate) => el("option", { value: rate }));
   fill($("camerawarnings"), value.camera?.warnings ?? [], (text) => el("li", { text: t(text) }));
   put($("finding"), t(devices.finding));
   showLoad(load);
@@ -42,13 +48,23 @@ function showLoad(load) {
   put($("setupforce"), none ? t("none") : load.force_N == null ? "–" : `${force} N`);
   put($("forcenoise"), none || load.noise_N == null ? "–" : `${noise || fixed(load.noise_N, 1)} N`);
   put($("loadtrouble"), t(load.trouble));
-  put($("loadname"), none ? t("no load cell: no force, no stress, no modulus") : load.rate == null ? load.name : `${load.name}, ${load.rate.toPrecision(3)} 1/s`);
+  put($("loadname"), none ? t("no load cell: no force, no stress, no modulus") : load.rate == null ? t(load.name) : `${t(load.name)}, ${load.rate.toPrecision(3)} 1/s`);
   put($("zero"), load.zero_N ? `${t("zero")} ${fixed(load.zero_N, 1)} N` : "");
   $("setupforce").classList.toggle("bad", Boolean(load.trouble));
 }
 
 function keep(input, value) {
   if (input !== document.activeElement && input.value !== value) input.value = value;
+}
+
+// The formats of the camera; without one in the address the camera is opened with the best.
+function offerFormats(formats, now, asked) {
+  const select = $("format");
+  if (select === document.activeElement) return;
+  select.disabled = !formats.length;
+  const best = formats.length && !asked ? `${t("automatic")} (${now})` : t(formats.length ? "automatic" : "none");
+  fill(select, [{ value: "", text: best }, ...formats.map((name) => ({ value: name, text: name }))], (one) => el("option", one));
+  select.value = asked;
 }
 
 // The address in force is in the list, whether or not it was found.

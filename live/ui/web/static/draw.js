@@ -1,5 +1,5 @@
 // Shapes over the picture. Coordinates are px of the picture; the centre of the first pixel is 0, 0.
-import { colourOf } from "./numbers.js";
+import { colourOf, inkOf } from "./numbers.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -39,7 +39,7 @@ export function drawGauges(svg, gauges, width, height, handles) {
   const all = Object.entries(gauges), places = namePlaces(all, size, width, height), parts = [], names = [], dots = [];
   all.forEach(([name, gauge], k) => {
     const colour = colourOf(k), [x, y] = places[k];
-    const text = make("text", { class: "gaugename", x, y, "font-size": size, fill: colour });
+    const text = make("text", { class: "gaugename", x, y, "font-size": size, fill: inkOf(k) });
     text.textContent = name;
     parts.push(...outline(gauge, colour));
     names.push(text);
@@ -55,20 +55,47 @@ export function position(svg, event) {
   return [p.x, p.y];
 }
 
-// The wheel zooms a picture about the pointer; 0 and a double click show all of it again.
-export function zoomable(content) {
-  const frame = content.parentElement;
+// A place after an arrow key, 1 px or with Shift 10 px on, within the picture; null for another key.
+const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
+export function moved(event, at, width = Infinity, height = Infinity) {
+  const arrow = ARROWS[event.key], step = event.shiftKey ? 10 : 1, low = width === Infinity ? -Infinity : 0;
+  if (!arrow) return null;
+  return [width, height].map((size, k) => Math.min(Math.max(at[k] + step * arrow[k], low), size - 1));
+}
+
+// The cross that the keyboard moves, over everything else; null removes it.
+export function showCross(svg, at) {
+  svg.querySelector(".cross")?.remove();
+  if (!at) return;
+  const [x, y] = at, r = svg.viewBox.baseVal.width / 30;
+  svg.append(make("path", { class: "cross", d: `M${x - r} ${y}h${2 * r}M${x} ${y - r}v${2 * r}` }));
+}
+
+// The wheel zooms a picture about the pointer, + and - about the place that the keyboard has; a double click shows
+// all of it again.
+export function zoomable(content, place) {
+  const frame = content.parentElement, svg = content.querySelector("svg");
   let scale = 1, x = 0, y = 0;
   const show = () => { content.style.transform = scale === 1 ? "" : `translate(${x}px, ${y}px) scale(${scale})`; };
   const reset = () => { scale = 1; x = y = 0; show(); };
-  frame.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    const box = frame.getBoundingClientRect(), px = event.clientX - box.left, py = event.clientY - box.top;
-    const next = Math.min(Math.max(scale * (event.deltaY < 0 ? 1.25 : 0.8), 1), 16), of = next / scale;
+  const zoom = (factor, clientX, clientY) => {
+    const box = frame.getBoundingClientRect(), px = clientX - box.left, py = clientY - box.top;
+    const next = Math.min(Math.max(scale * factor, 1), 16), of = next / scale;
     x = Math.min(0, Math.max(px - (px - x) * of, box.width * (1 - next)));
     y = Math.min(0, Math.max(py - (py - y) * of, box.height * (1 - next)));
     scale = next;
     show();
+  };
+  frame.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    zoom(event.deltaY < 0 ? 1.25 : 0.8, event.clientX, event.clientY);
   }, { passive: false });
+  svg.addEventListener("keydown", (event) => {
+    const factor = { "+": 1.25, "=": 1.25, "-": 0.8 }[event.key];
+    if (!factor) return;
+    const { width, height } = svg.viewBox.baseVal, at = place() ?? [width / 2, height / 2];
+    const { x: clientX, y: clientY } = new DOMPoint(...at).matrixTransform(svg.getScreenCTM());
+    zoom(factor, clientX, clientY);
+  });
   return reset;
 }

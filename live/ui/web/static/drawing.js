@@ -1,11 +1,12 @@
-// Drawing on the picture during set-up: region, gauges and scale, with the mouse or the keyboard.
+// Drawing on the picture during set-up: region, gauges and scale, with the mouse or the keyboard. The keyboard moves a
+// cross; Space presses and releases there what the mouse would.
 import { $, change, el, put } from "./base.js";
 import { ask } from "./press.js";
-import { drawGauges, make, position, zoomable } from "./draw.js";
+import { drawGauges, make, moved, position, showCross, zoomable } from "./draw.js";
 import { t } from "./words.js";
 
 const svg = $("drawing");
-let state = {}, tool = "rectangle", points = [], drag = null, pending = null, kinds = {};
+let state = {}, tool = "rectangle", points = [], drag = null, pending = null, kinds = {}, cross = null;
 
 const HINTS = {
   rectangle: "Drag a rectangle over the specimen; with Shift it is added.",
@@ -15,21 +16,24 @@ const HINTS = {
   move: "Drag the handles; with the keyboard Tab and the arrows.",
   scale: "Click two points whose distance is known.",
   board: "Hold the board where the specimen will be. Of a checkerboard count the inner corners, of a ChArUco board the squares.",
+  keys: "Arrows move the cross, with Shift by 10 px; Space sets a point or begins and ends a stroke; + and - zoom.",
 };
 const isDragged = () => tool === "rectangle" || ["line", "box"].includes(kinds[tool]?.gesture);
 const isClicked = () => kinds[tool]?.gesture === "click";
-zoomable(svg.parentElement);
+zoomable(svg.parentElement, () => cross);
 
 function choose(name) {
   tool = name;
   points = [];
   drag = null;
   for (const button of document.querySelectorAll("[data-tool]")) button.setAttribute("aria-pressed", String(button.dataset.tool === name));
-  hint(HINTS[name] ?? kinds[name].hint);
+  hint(words());
   svg.style.cursor = name === "move" ? "default" : "crosshair";
   sketch();
 }
 for (const button of document.querySelectorAll("[data-tool]")) button.addEventListener("click", () => choose(button.dataset.tool));
+
+const words = () => HINTS[tool] ?? kinds[tool].hint;
 
 function hint(words) {
   $("hint").dataset.t = words;
@@ -54,7 +58,7 @@ export function beginDrawing(stage) {
 // Gauges of the same names are replaced: only when confirmed.
 $("place").addEventListener("click", async () => {
   const names = Object.keys(state.gauges ?? {});
-  if (names.length && !(await ask("Place the gauges anew?", "Gauges with the names axial, transverse and area are replaced. Undo brings them back.", "Place gauges"))) return;
+  if (names.length && !(await ask("Place the gauges anew?", "Gauges with the names extension, width and area are replaced. Undo brings them back.", "Place gauges"))) return;
   change({ do: "place" });
 });
 
@@ -62,21 +66,28 @@ $("place").addEventListener("click", async () => {
 
 svg.addEventListener("pointerdown", (event) => {
   if (event.button !== 0 || !state.camera) return;
-  const at = position(svg, event), handle = event.target.dataset?.handle;
+  const handle = event.target.dataset?.handle;
+  cross = null;
   if (handle && (tool === "move" || tool in kinds)) {
     const [name, index] = handle.split(" ");
     drag = { name, index: Number(index) };
     pending = state.gauges[name];
-  } else if (tool === "polygon" || isClicked() || tool === "scale") {
+  } else {
+    press(position(svg, event));
+  }
+  if (drag) svg.setPointerCapture(event.pointerId);
+  sketch();
+});
+
+function press(at) {
+  if (tool === "polygon" || isClicked() || tool === "scale") {
     points.push(at);
     if (isClicked() || (tool === "scale" && points.length === 2)) finish(false);
   } else if (tool !== "move") {
     points = [at];
     drag = { tool };
   }
-  if (drag) svg.setPointerCapture(event.pointerId);
-  sketch();
-});
+}
 
 svg.addEventListener("pointermove", (event) => {
   if (!drag) return;
@@ -95,9 +106,10 @@ function dragTo(at) {
   }
 }
 
-svg.addEventListener("pointerup", (event) => {
-  if (!drag) return;
-  dragTo(position(svg, event));
+svg.addEventListener("pointerup", (event) => { if (drag) release(position(svg, event), event.shiftKey); });
+
+function release(at, add) {
+  dragTo(at);
   const was = drag;
   drag = null;
   if (was.name) {
@@ -105,10 +117,10 @@ svg.addEventListener("pointerup", (event) => {
     state.gauges[was.name] = pending;
     pending = null;
   } else {
-    finish(event.shiftKey);
+    finish(add);
   }
   sketch();
-});
+}
 svg.addEventListener("dblclick", () => { if (tool === "polygon") { points.pop(); finish(false); } });
 
 function finish(add) {
@@ -203,6 +215,7 @@ function sketch() {
     group.append(preview(kinds[tool]?.gesture ?? "box", [points[0], last]));
   }
   if (group.children.length) svg.append(group);
+  showCross(svg, cross);
 }
 
 // The dragged shape, until the server sends its outline.
@@ -213,15 +226,8 @@ function preview(gesture, at) {
 }
 
 // Handles the keys of the set-up; true where one was used.
-const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] };
 export function setupKeys(event) {
-  const handle = document.activeElement?.dataset?.handle, arrow = ARROWS[event.key];
-  if (handle && arrow) {
-    const [name, index] = handle.split(" "), step = event.shiftKey ? 10 : 1, gauge = state.gauges[name];
-    const handles = gauge.handles.map((p, i) => (i === Number(index) ? p.map((v, k) => v + step * arrow[k]) : p));
-    state.gauges[name] = { ...gauge, handles };
-    change({ do: "gauge", name, points: handles });
-    showGauges();
+  if (document.activeElement?.dataset?.handle ? moveHandle(event) : event.target === svg && moveCross(event)) {
     event.preventDefault();
     return true;
   }
@@ -229,6 +235,32 @@ export function setupKeys(event) {
   if (event.key === "Escape") { points = []; drag = pending = scaled = null; asking = false; showScale(); sketch(); return true; }
   return false;
 }
+
+function moveHandle(event) {
+  const [name, index] = document.activeElement.dataset.handle.split(" "), gauge = state.gauges[name];
+  const at = moved(event, gauge.handles[index]);
+  if (!at) return false;
+  const handles = gauge.handles.map((p, i) => (i === Number(index) ? at : p));
+  state.gauges[name] = { ...gauge, handles };
+  change({ do: "gauge", name, points: handles });
+  showGauges();
+  return true;
+}
+
+function moveCross(event) {
+  if (!state.camera) return false;
+  const { width, height } = state.camera, at = cross ?? [width >> 1, height >> 1];
+  const next = event.key === " " ? at : moved(event, at, width, height);
+  if (!next) return false;
+  cross = next;
+  if (event.key !== " ") { if (drag) dragTo(cross); }
+  else if (drag) release(cross, event.shiftKey);
+  else if (tool !== "move") press(cross);
+  sketch();
+  return true;
+}
+svg.addEventListener("focus", () => { if (svg.matches(":focus-visible")) hint(HINTS.keys); });
+svg.addEventListener("blur", () => { cross = null; hint(words()); sketch(); });
 
 export function showDrawing(value) {
   const dragged = drag?.name ? state.gauges[drag.name] : null;

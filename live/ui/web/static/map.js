@@ -1,13 +1,14 @@
 // The map over the picture of a running test: its colours with a histogram, its range, the value under the pointer.
 import { $, el, fill, post, put } from "./base.js";
-import { drawGauges, make, position, zoomable } from "./draw.js";
+import { drawGauges, make, moved, position, showCross, zoomable } from "./draw.js";
 import { fixed, short, strainText, strainUnit } from "./numbers.js";
 import { t } from "./words.js";
 
 const READ_MS = 150;
-let loading = false, shownPicture = 0, picture = null, reading = 0;
-const reset = zoomable($("gaugemap").parentElement);
-$("gaugemap").addEventListener("dblclick", reset);
+const svg = $("gaugemap");
+let loading = false, shownPicture = 0, picture = null, reading = 0, cross = null;
+const reset = zoomable(svg.parentElement, () => cross);
+svg.addEventListener("dblclick", reset);
 
 export function beginMap(stage) {
   shownPicture = 0;
@@ -44,7 +45,9 @@ export function showMap(value) {
   const mark = picture?.n !== value.n;
   picture = value;
   if (mark) showLegend();
-  if (value.width) drawGauges($("gaugemap"), value.gauges, value.width, value.height);
+  if (!value.width) return;
+  drawGauges(svg, value.gauges, value.width, value.height);
+  if (cross) { showCross(svg, cross); read(...cross); }
 }
 addEventListener("unit", () => { if (picture) showLegend(); });
 
@@ -67,15 +70,24 @@ function showLegend() {
   $("histogram").replaceChildren(...bars.map((n, k) => make("rect", { x: k, y: 1 - n / most, width: 1, height: n / most })));
 }
 
-// The value under the pointer.
-$("gaugemap").addEventListener("pointermove", async (event) => {
+// The value under the pointer, or at the cross that the arrow keys move.
+async function read(x, y) {
   const now = performance.now();
   if (!picture?.width || now - reading < READ_MS) return;
   reading = now;
-  const [x, y] = position($("gaugemap"), event);
   const response = await fetch(`/value?x=${x.toFixed(1)}&y=${y.toFixed(1)}`);
   if (!response.ok) return;
   const found = await response.json(), place = `x ${x.toFixed(0)}, y ${y.toFixed(0)} px`;
   put($("readout"), found.value == null ? `${place}: ${t(found.status)}` : `${place}: ${picture.strain ? strainText(found.value, found.sigma) : `${fixed(found.value, 4)} ${picture.unit ?? ""}`}`);
+}
+svg.addEventListener("pointermove", (event) => read(...position(svg, event)));
+svg.addEventListener("pointerleave", () => put($("readout"), ""));
+svg.addEventListener("keydown", (event) => {
+  const { width, height } = picture ?? {}, next = width && moved(event, cross ?? [width >> 1, height >> 1], width, height);
+  if (!next) return;
+  event.preventDefault();
+  cross = next;
+  showCross(svg, cross);
+  read(...cross);
 });
-$("gaugemap").addEventListener("pointerleave", () => put($("readout"), ""));
+svg.addEventListener("blur", () => { cross = null; showCross(svg, null); put($("readout"), ""); });

@@ -49,3 +49,5 @@ const COLOURS = [
 ];
 // The colour of a gauge, in the curves, in the lists and on the picture.
 export const colourOf = (k) => COLOURS[k % COLOURS.length];
+// The same, dark enough for letters on white.
+export const inkOf = (k) => `color-mix(in srgb, ${colourOf(k)} 70%, black)`;

@@ -61,9 +61,12 @@ function rate(value) {
   return `${fixed(value / 10 ** power, 1)}·10${digits}`;
 }
 
+// A value whose area lost a block stands for a part of it.
+const withPart = (text, part) => (part ? `${text} ${t(part)}` : text);
+
 function showStrains(value) {
   const unit = strainUnit(), axial = value.axial, [text, sigma] = withSigma(axial?.value, axial?.sigma, unit);
-  put($("axialname"), axial?.name ?? "");
+  put($("axialname"), withPart(withPart(axial?.name ?? "", axial?.assumed), value.part));
   put($("axial"), text);
   put($("axialsigma"), sigma ? `± ${sigma} ${unit.name}` : "");
   const gauges = (value.gauges ?? []).map((one, k) => ({ ...one, k })), list = $("others");
@@ -73,7 +76,7 @@ function showStrains(value) {
     const [key, name, number] = list.children[i].children;
     key.style.background = colourOf(one.k);
     put(name, one.name);
-    put(number, one.reason || one.value == null ? t("lost") : strainText(one.value, one.sigma));
+    put(number, one.reason || one.value == null ? t("lost") : withPart(strainText(one.value, one.sigma), one.part));
     number.title = one.reason ? t(one.reason) : "";
   });
 }
@@ -89,6 +92,7 @@ function showStrip(value) {
   fill(box, CELLS, (name) => el("div", {}, el("dt", { t: name }), el("dd")));
   values.forEach((text, i) => put(box.children[i].lastChild, text));
   box.children[5].lastChild.classList.toggle("bad", lost > 0);
+  box.children[0].lastChild.classList.toggle("bad", Boolean(value.part));
 }
 
 const disk = (minutes) => (minutes > 600 ? `${fixed(minutes / 60)} h` : `${fixed(minutes)} min`);

@@ -46,8 +46,8 @@ export function showSetup(value) {
   put($("sigma"), value.sigma == null ? "–" : strainText(value.sigma).replace("+", ""));
   $("sharp").value = value.peak ? (value.sharpness ?? 0) / value.peak : 0;
   const c = value.camera;
-  put($("camera"), c ? `${c.name}, ${c.width} × ${c.height} px, ${c.bits} bit${c.fps ? `, ${short(c.fps)} fps` : ""}` : "");
-  put($("region"), value.region ? `${t(value.region.words)}${value.zois == null ? "" : ` · ${value.zois} ZOIs`}` : "");
+  put($("camera"), c ? `${t(c.name)}, ${c.width} × ${c.height} px, ${c.bits} ${t("bits")}${c.fps ? `, ${short(c.fps)} 1/s` : ""}` : "");
+  put($("region"), value.region ? `${t(value.region.words)}${value.zois == null ? "" : ` · ${value.zois} ${t("ZOIs")}`}` : "");
   put($("file"), `${value.file} · ${t(value.unsaved.length ? "not saved" : "saved")}`);
   showPicture(value);
   showDrawing(value);

@@ -1,10 +1,12 @@
 // The texts of the page and the messages of the program in the language of the operator. The keys of the catalogue
-// are the English texts; {} stands for any words, which are translated where the catalogue has them.
+// are the English texts; {} stands for any words, which are translated where the catalogue has them. Names of files,
+// devices and settings before a message stay as they are.
 const response = await fetch("/static/catalogue.json");
 const catalogue = await response.json();
 const patterns = Object.keys(catalogue).filter((key) => key.includes("{}"))
-  .map((key) => ({ key, weak: key.replaceAll("{}", "").length < 12, form: new RegExp(`^${key.split("{}").map(escaped).join("(.+?)")}$`, "s") }))
+  .map((key) => ({ key, weak: key.replaceAll("{}", "").length < 12, form: new RegExp(`^${key.split("{}").map(escaped).join("(.*?)")}$`, "s") }))
   .sort((a, b) => b.key.length - a.key.length);
+const SPACED = { fr: " " };  // before a colon and a semicolon
 let chosen = "en", found = new Map();
 
 // What was shown without a translation; the tests read it.
@@ -17,40 +19,57 @@ function escaped(text) {
 
 export function t(text) {
   if (chosen === "en" || !text) return text ?? "";
+  const words = translated(text);
+  if (words == null) missing.add(text);
+  return words ?? text;
+}
+
+function translated(text) {
+  if (!/[A-Za-z]{2}/.test(text)) return text;
   if (!found.has(text)) {
     if (found.size > 5000) found = new Map();
-    const words = translated(text);
-    if (words == null && /[A-Za-z]{2}/.test(text)) missing.add(text);
-    found.set(text, words ?? text);
+    found.set(text, lookedUp(text));
   }
   return found.get(text);
 }
 
-// A whole text, then one that a long pattern fits, then both sides of a separator, then any pattern.
-function translated(text) {
-  return catalogue[text]?.[chosen] ?? filled(text, false) ?? separated(text) ?? filled(text, true);
+// A whole text, then one after a name, then one that a long pattern fits, then both sides of a separator, then one
+// that a short pattern fits with all its parts, then one after any words, such as the name of a camera.
+function lookedUp(text) {
+  return catalogue[text]?.[chosen] ?? named(text, isName) ?? filled(text, false) ?? separated(text) ?? filled(text, true)
+    ?? named(text, () => true);
 }
 
 function filled(text, weak) {
   for (const { key, form } of patterns.filter((one) => one.weak === weak)) {
-    const parts = form.exec(text);
-    if (!parts) continue;
-    let k = 0;
-    return catalogue[key][chosen].replace(/\{\}/g, () => part(parts[++k]));
+    const parts = form.exec(text)?.slice(1);
+    if (!parts || (weak && parts.some((one) => !areNames(one) && translated(one) == null))) continue;
+    return catalogue[key][chosen].replace(/\{\}/g, () => part(parts.shift()));
   }
   return null;
+}
+
+const isName = (text) => !text.includes(" ") || /[/:]/.test(text);
+
+const areNames = (text) => text.split(", ").every((one) => isName(one.replace(/[\d.]+/g, "").trim()));
+
+function named(text, isName) {
+  const at = text.indexOf(": "), left = text.slice(0, Math.max(at, 0));
+  return at > 0 && isName(left) && !(left in catalogue) ? joined(left, ": ", translated(text.slice(at + 2))) : null;
 }
 
 function separated(text) {
   for (const between of ["; ", ": "]) {
     for (let at = text.indexOf(between); at >= 0; at = text.indexOf(between, at + 1)) {
-      const left = translated(text.slice(0, at)), right = left == null ? null : translated(text.slice(at + between.length));
-      if (right != null) return `${left}${between}${right}`;
+      const left = translated(text.slice(0, at));
+      const whole = left == null ? null : joined(left, between, translated(text.slice(at + between.length)));
+      if (whole != null) return whole;
     }
   }
   return null;
 }
 
+const joined = (left, between, right) => (right == null ? null : `${left}${SPACED[chosen] ?? ""}${between}${right}`);
 const part = (text) => translated(text) ?? text;
 
 export function translate(root = document) {

@@ -47,7 +47,8 @@ def test_as_the_whole(whole: Path, cut: Path) -> None:
         for name in ("u", "exx", "eyy", "exy"):
             sigma = np.nanmedian(one.maps(f"sigma_{name}"))
             assert np.nanmax(np.abs(other.maps(name) - one.maps(name))) < 0.005 * sigma, name
-            np.testing.assert_allclose(other.maps(f"sigma_{name}"), one.maps(f"sigma_{name}"), rtol=1e-4)
+            # They are stored to 0.2 %.
+            np.testing.assert_allclose(other.maps(f"sigma_{name}"), one.maps(f"sigma_{name}"), rtol=4e-3)
         for name in ("exx", "eyy", "exy"):
             error = other.values[f"sigma_{name}"] / one.values[f"sigma_{name}"] - 1
             assert np.abs(error).max() < 1e-3  # of the means, which the kernel knows more of

@@ -177,7 +177,7 @@ def test_broken_files_end_in_words(tmp_path: Path, capsys: pytest.CaptureFixture
 
 def test_a_run_without_measurements(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     make_run(tmp_path, [], session=False)
-    assert main(["export", str(tmp_path), "--to", "csv"]) == 2
+    assert main(["export", str(tmp_path), "--to", "csv"]) == 4
     assert "holds no measurement" in capsys.readouterr().err
 
 

@@ -90,7 +90,8 @@ def test_it_holds_what_a_report_must(text: str, run_dir: Path) -> None:
     for words in (
         "Rp0.2 = 210.2 MPa",  # drawn on the curve
         "first: t =", "elastic: t =", "yield (0.2 %)", "highest force", "last: t =",
-        "Figures of the test", "iso6892: strains", "no break was seen", "lag corrected in the force",
+        "Figures of the test", "Budget of E", "not stated: specimen.force_error_percent",
+        "iso6892: strains", "no break was seen", "lag corrected in the force",
         "Noise floor", "POOR_MATCH", "grabbed", str(8 * len(PULLED)), "reference: 8 frames",
         "not recorded (phasedic run --meta aperture=...)", "50 mm", "6.4 x 4.8 mm", "0.05 mm/px",
         "half of the engineering shear", "numpy",

@@ -108,6 +108,7 @@ def test_it_serves_on_the_next_port_when_the_wanted_one_is_taken(make: Callable[
         assert url(watched.view.port or 0) in watched.view.instructions
 
 
+@pytest.mark.slow
 def test_killed_it_is_restarted_on_its_port_with_the_past_data(
     make: Callable[..., ViewRecord], tmp_path: Path
 ) -> None:
@@ -127,6 +128,7 @@ def test_killed_it_is_restarted_on_its_port_with_the_past_data(
     assert "started 2 times" in view.report
 
 
+@pytest.mark.slow
 @pytest.mark.timed
 def test_stopped_it_is_replaced_and_delays_nothing(
     make: Callable[..., ViewRecord], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -156,6 +158,7 @@ def test_stopped_it_is_replaced_and_delays_nothing(
     assert rows_in(tmp_path / "view-2.rrd")["/strain/eyy"] == k + 1
 
 
+@pytest.mark.slow
 def test_at_the_end_a_stopped_one_is_killed_and_reported(
     make: Callable[..., ViewRecord], tmp_path: Path
 ) -> None:
@@ -183,6 +186,7 @@ PARENT = """
 """
 
 
+@pytest.mark.slow
 def test_it_ends_with_the_test_however_that_ends(tmp_path: Path) -> None:
     code = textwrap.dedent(PARENT)
     root = str(Path(__file__).parents[4])

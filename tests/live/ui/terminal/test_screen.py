@@ -11,8 +11,8 @@ import pytest
 
 from acquire.events import Event, EventKind
 from live.pipeline.event_log import EventLog, sentence
-from live.pipeline.frame_counts import FrameCounts
 from live.pipeline.measurement import TimeStep
+from live.pipeline.run_state import FrameCounts
 from live.pipeline.snapshot import Snapshot
 from live.results.figures import value_text
 from live.ui.terminal.screen import TerminalScreen
@@ -50,16 +50,26 @@ def test_the_progress_of_a_replay_is_one_line() -> None:
     screen.progress(time_step(), 21, 20, 2.5)
     screen.progress(time_step(), 1, 100_000, 1.0)
     assert stream.getvalue().splitlines() == [
-        "5 of 20 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 µm/m  8/10 ZOIs  20 ZOI/s  0:08 left",
-        "5 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 µm/m  8/10 ZOIs",
-        "21 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 µm/m  8/10 ZOIs  84 ZOI/s",
-        "1 of 100000 bursts  7.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 µm/m  8/10 ZOIs  10 ZOI/s  27:46:39 left",
+        "5 of 20 bursts  7.0 N  eyy -2,000 ± 0.6  exx +100 ± 12  exy +0 ± 0.0 µm/m  8/10 ZOIs  20 ZOI/s  0:08 left",
+        "5 bursts  7.0 N  eyy -2,000 ± 0.6  exx +100 ± 12  exy +0 ± 0.0 µm/m  8/10 ZOIs",
+        "21 bursts  7.0 N  eyy -2,000 ± 0.6  exx +100 ± 12  exy +0 ± 0.0 µm/m  8/10 ZOIs  84 ZOI/s",
+        "1 of 100000 bursts  7.0 N  eyy -2,000 ± 0.6  exx +100 ± 12  exy +0 ± 0.0 µm/m  8/10 ZOIs  10 ZOI/s"
+        "  27:46:39 left",
     ]
 
 
 def time_step() -> TimeStep:
     numbers = {f.name: 0.0 for f in dataclasses.fields(TimeStep) if f.default is dataclasses.MISSING}
-    values: Any = {**numbers, "force": 7.0, "exx": 1e-4, "eyy": -2e-4, "n_valid": 8, "n_zoi": 10}
+    values: Any = {
+        **numbers,
+        "force": 7.0,
+        "exx": 1e-4,
+        "eyy": -2e-3,
+        "exy": -1e-7,
+        "n_valid": 8,
+        "n_zoi": 10,
+    }
+    values |= {"sigma_eyy": 6.4e-7, "sigma_exx": 1.24e-5}
     return TimeStep(**values)
 
 
@@ -73,7 +83,7 @@ def snapshot(**more: Any) -> Snapshot:
 
 def test_a_wide_status_line_has_everything() -> None:
     assert status_line(snapshot(peak_N=1500.0), 200) == (
-        "REC  1:15  1234.5 N  30.9 MPa  peak 1500.0 N  eyy -200 +- 0  exx +100 +- 0  exy +0 +- 0 µm/m  8/10 ZOIs"
+        "REC  1:15  1234.5 N  30.9 MPa  peak 1500.0 N  eyy -2,000 ± 0.6  exx +100 ± 12  exy +0 ± 0.0 µm/m  8/10 ZOIs"
         "  30 fps  measured 120  skipped 8  lost 0  p95 42 ms  disk 120 min"
     )
 
@@ -84,7 +94,13 @@ def test_the_status_line_fits_any_width_and_force_and_alarm_go_last(width: int) 
     assert len(line) <= width
     assert width < 40 or line.startswith("ALARM axial: axial is 0.021")
     assert width < 40 or "1234.5 N" in line
-    assert "eyy -200" in line or width < 80
+    assert "eyy -2,000" in line or width < 80
+
+
+def test_an_ascii_terminal_gets_other_letters() -> None:
+    stream = io.TextIOWrapper(io.BytesIO(), encoding="ascii")
+    TerminalScreen(stream).print("-2,000 ± 0.6 µm/m of Prüfung")
+    assert stream.buffer.getvalue() == b"-2,000 +- 0.6 um/m of Pr\\xfcfung\n"
 
 
 def test_what_is_typed_is_not_overwritten() -> None:
@@ -154,10 +170,10 @@ def test_late_listeners_get_every_event_once() -> None:
 @pytest.mark.parametrize(
     ("value", "sigma", "text"),
     [
-        (70.123456, 0.0234, "70.123 +- 0.023 GPa"),
+        (70.123456, 0.0234, "70.123 ± 0.023 GPa"),
         (70.1, math.nan, "70.1 GPa"),
         (math.nan, 1.0, "not known"),
-        (123456.0, 1200.0, "123456 +- 1200 GPa"),
+        (123456.0, 1200.0, "123456 ± 1200 GPa"),
     ],
 )
 def test_quantities_have_digits_by_their_sigma(value: float, sigma: float, text: str) -> None:

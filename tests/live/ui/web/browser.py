@@ -21,7 +21,7 @@ from live.results.report.saving import find_browser
 
 ROOT = Path(__file__).parents[4]
 FLAGS = ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
-TIMEOUT_S = 60.0
+TIMEOUT_S = 120.0
 
 
 def chromium() -> str:
@@ -39,7 +39,10 @@ class Program:
     def __init__(self, folder: Path, *words: str) -> None:
         self._log = (folder / "err.txt").open("w")
         command = [sys.executable, "-m", "live.cli", *words]
-        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+        environment = {
+            **os.environ,
+            "PYTHONPATH": os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")]),
+        }
         self.process = subprocess.Popen(
             command, cwd=folder, env=environment, stdout=subprocess.PIPE, stderr=self._log, text=True
         )

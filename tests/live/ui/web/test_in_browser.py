@@ -12,31 +12,16 @@ import numpy as np
 import pytest
 
 from live.config.loading import load_config
-from live.setup.compiling import compile_ahead
 from live.setup.pictures import read_mask
 from live.ui.web.authorization import RequestGuard
 from tests.live.setup.test_scale import CHARUCO, seen
-from tests.live.ui.web.browser import FLAGS, Page, Program, chromium
+from tests.live.ui.web.browser import Page, Program
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
 WIDTH, HEIGHT = 480, 384
 CAMERA = f"sim:uniform?width={WIDTH}&height={HEIGHT}&fps=15&seconds=42&hold=16&end=1&buffers=64"
 WATCH_LAYOUT = """() => { window.moved = []; new PerformanceObserver(list => window.moved.push(...list.getEntries()
     .filter(e => !e.hadRecentInput).map(e => e.value))).observe({ type: "layout-shift" }); }"""
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
-    path = chromium()
-    compile_ahead(("uint16", "float32"))  # here, so that the time limits of the tests need not cover it
-    from playwright.sync_api import sync_playwright
-
-    with sync_playwright() as driver:
-        opened = driver.chromium.launch(
-            executable_path=path, headless=True, chromium_sandbox=False, args=FLAGS
-        )
-        yield opened
-        opened.close()
 
 
 @pytest.fixture
@@ -218,7 +203,7 @@ def test_the_scale_from_a_board(browser: Any, tmp_path: Path, start: Callable[..
         page.page.fill(f"#scale [name={name}]", str(value))
     page.page.click("#scale button")
     page.until(lambda: page.text("scale").startswith("9.00 px/mm"), "the scale is shown")
-    assert page.text("answer") == "board ✓" and not page.errors
+    assert page.text("answer") == "done ✓" and not page.errors
 
 
 def test_a_page_that_is_killed_changes_nothing(browser: Any, start: Callable[..., Program]) -> None:

@@ -25,16 +25,17 @@ from live.pipeline.run_state import RunState
 from live.results.maps.field_maps import FIELD_MAPS
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.curve_history import MAX_POINTS, CurveHistory
-from live.ui.web.page_consumer import PageConsumer, axial_length_mm
+from live.ui.web.page_consumer import PageConsumer, elongation_length
 from tests.live.made_up import make_frame, make_measurement
 from tests.live.ui.waiting import until
 from tests.live.ui.web.sentences import (
     LANGUAGES,
     STATIC,
+    Translator,
     catalogue,
+    of_the_devices,
     of_the_page,
     of_the_program,
-    translated,
 )
 
 
@@ -83,7 +84,8 @@ def test_the_state_of_a_run(config: Config) -> None:
     consumer.attach(run)
     m = measurement()
     i = replace(
-        m.time_step, gauges={"axial": GaugeValue(0.001, 2e-6), "b": GaugeValue(math.nan, math.nan, "lost")}
+        m.time_step,
+        gauges={"axial": GaugeValue(0.001, 2e-6, share=0.83), "b": GaugeValue(math.nan, math.nan, "lost")},
     )
     consumer.measurement(replace(m, time_step=i))
     run.run_state.history.add(i)
@@ -95,8 +97,9 @@ def test_the_state_of_a_run(config: Config) -> None:
     state = received["run"]
     assert isinstance(state, dict)
     assert state["force_N"] == -400 and state["peak_N"] == 500 and state["stress_Pa"] == pytest.approx(-1e7)
-    assert state["axial"] == {"name": "axial", "value": 0.001, "sigma": 2e-6}
-    assert state["gauges"][1] == {"name": "b", "value": None, "sigma": None, "reason": "lost"}
+    assert state["axial"] == {"name": "axial", "value": 0.001, "sigma": 2e-6, "assumed": ""}
+    assert state["gauges"][1] == {"name": "b", "value": None, "sigma": None, "reason": "lost", "part": ""}
+    assert state["part"] == state["gauges"][0]["part"] == "of 83 % of the area"
     assert state["events"][0]["level"] == "error" and "\x1b" not in state["events"][0]["text"]
 
 
@@ -266,23 +269,38 @@ def test_the_map_at_the_highest_force(config: Config) -> None:
 
 def test_the_length_of_an_elongation() -> None:
     line = {"gauges.axial": {"kind": "line", "start": [10, 20], "end": [10, 120]}}
-    given = {"specimen.gauge_length_mm": 50.0}
-    assert axial_length_mm(load_config(None, {**line, "scale.mm_per_px": 0.1})) == pytest.approx(10.0)
-    assert axial_length_mm(load_config(None, line | given)) == 50.0
-    assert axial_length_mm(load_config(None, line)) is None
+    strips = {"gauges.whole": {"kind": "extension", "box": [10, 20, 60, 120], "along": "y"}}
+    given, scale = {"specimen.gauge_length_mm": 50.0}, {"scale.mm_per_px": 0.1}
+    assert elongation_length(load_config(None, {**strips, **line, **scale})) == ("axial", pytest.approx(10.0))
+    # Between the middles of the first and the last sixth.
+    assert elongation_length(load_config(None, {**strips, **scale})) == ("whole", pytest.approx(10.0))
+    assert elongation_length(load_config(None, line | given)) == ("", 50.0)
+    assert elongation_length(load_config(None, line)) == ("", None)
 
 
 def test_every_text_of_the_page_is_translated() -> None:
-    known = catalogue()
-    missing = {text for text in of_the_page() if not translated(text, known)}
+    known, translator = catalogue(), Translator()
+    missing = {text for text in of_the_page() if not translator.knows(text)}
     served = {word for kind in GAUGE_KINDS.values() for word in (kind.label, kind.hint)}
     missing |= {text for text in {*FIELD_MAPS, *served} if text not in known}
     assert not missing
 
 
 def test_every_message_of_the_program_is_translated() -> None:
-    known, texts = catalogue(), set(of_the_program())
-    assert len(texts) > 100 and not {text for text in texts if not translated(text, known)}
+    translator, texts = Translator(), set(of_the_program())
+    assert len(texts) > 100 and not {text for text in texts if not translator.knows(text)}
+
+
+def test_every_message_of_a_device_or_file_is_translated() -> None:
+    translator, texts = Translator(), of_the_devices()
+    assert len(texts) > 400
+    assert not {f"{module}: {text}" for text, module in texts.items() if not translator.knows(text)}
+
+
+def test_a_pattern_with_words_that_are_not_translated_does_not_count() -> None:
+    translator = Translator()
+    assert translator.knows("burst {}") and not translator.knows("burst {} fell off the table")
+    assert translator.knows("{}: no picture for {} s") and not translator.knows("{}: the moon is {}")
 
 
 @pytest.mark.parametrize("name", LANGUAGES)

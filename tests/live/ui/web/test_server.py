@@ -15,7 +15,7 @@ import pytest
 from live.ui.web import server
 from live.ui.web.broadcaster import MAX_PAGES, Broadcaster
 from live.ui.web.server import PageServer, json_response
-from tests.live.ui.waiting import until
+from tests.live.ui.waiting import LONG_S, until
 
 
 @pytest.fixture
@@ -51,7 +51,7 @@ def fetch(
     if method == "POST":
         own |= {"Origin": guard.origin, "Content-Type": "application/json"}
     sent = {key: value for key, value in (own | dict(headers or {})).items() if value}
-    connection = http.client.HTTPConnection("127.0.0.1", guard.port, timeout=5)
+    connection = http.client.HTTPConnection("127.0.0.1", guard.port, timeout=LONG_S)
     try:
         connection.putrequest(method, path, skip_host=True)
         for key, value in sent.items():
@@ -162,7 +162,7 @@ def test_no_preflight_is_answered(page: PageServer) -> None:
 
 
 def stream(page: PageServer) -> http.client.HTTPResponse:
-    connection = http.client.HTTPConnection("127.0.0.1", page.guard.port, timeout=5)
+    connection = http.client.HTTPConnection("127.0.0.1", page.guard.port, timeout=LONG_S)
     connection.request("GET", "/events", headers={"Cookie": page.guard.cookie.partition(";")[0]})
     return connection.getresponse()
 

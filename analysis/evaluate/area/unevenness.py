@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.evaluate.affine import Places, covariance_of
+from analysis.evaluate.area.affine import Places, covariance_of
 from analysis.field import fixed_sums
 
 Floats = NDArray[np.float64]

@@ -1,0 +1,305 @@
+"""What differs between operating systems: signals, processes, priorities, processor and memory use, disk and ports.
+
+No other module asks which system this is, but for the terminal (``live.run.terminal``) and V4L2, which is Linux.
+Where there is no /proc, processor and memory use are read by psutil; without it they are not known.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from types import FrameType
+
+_START_S = 10.0  # for the memory of another process's socket
+_CLOSED_POLL_S = 0.5
+
+if sys.platform == "win32":
+    HANGUP: tuple[signal.Signals, ...] = ()
+    KILLED = 1
+else:
+    HANGUP = (signal.SIGHUP,)
+    KILLED = -signal.SIGKILL
+"""Signals of a closed terminal; the exit code of a killed process."""
+
+
+def _terminal_errors() -> tuple[type[Exception], ...]:
+    if sys.platform == "win32":
+        return ()
+    else:
+        try:
+            import termios
+        except ImportError:
+            return ()
+        return (termios.error,)
+
+
+TERMINAL_ERRORS = _terminal_errors()
+"""What ports raise besides OSError."""
+
+
+# -- signals ----------------------------------------------------------------------------------
+
+
+@contextlib.contextmanager
+def blocked_signals(*signals: signal.Signals) -> Iterator[None]:
+    """A process started inside receives ``signals`` only after its own ``unblock_signals``: no early Ctrl-C."""
+    if sys.platform == "win32":  # it cannot; the process ignores them from its start on
+        yield
+    else:
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def unblock_signals(*signals: signal.Signals) -> None:
+    """Deliver what ``blocked_signals`` of the parent process keeps back; called by the child."""
+    if sys.platform != "win32":
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, signals)
+
+
+@contextlib.contextmanager
+def signal_handler(
+    handler: Callable[[int, FrameType | None], object] | signal.Handlers, *signals: int
+) -> Iterator[None]:
+    """``signals`` call ``handler`` within the context, and then what they called before; in the main thread only."""
+    before = {number: signal.signal(number, handler) for number in signals}
+    try:
+        yield
+    finally:
+        for number, earlier in before.items():
+            signal.signal(number, earlier)
+
+
+# -- processes --------------------------------------------------------------------------------
+
+
+def start_with_socket(
+    command: Sequence[str], environment: Mapping[str, str]
+) -> tuple[subprocess.Popen[bytes], socket.socket]:
+    """A process, which gets its end by ``inherited_socket``, and our end of the connection to it."""
+    ours, its = socket.socketpair()
+    with its:
+        if sys.platform == "win32":
+            process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, env=environment
+            )
+            process.communicate(its.share(process.pid), timeout=_START_S)
+        else:
+            process = subprocess.Popen(
+                command, stdin=its.fileno(), stdout=subprocess.DEVNULL, env=environment
+            )
+    return process, ours
+
+
+def inherited_socket() -> socket.socket:
+    """The socket from ``start_with_socket``, blocking."""
+    if sys.platform == "win32":
+        ours = socket.fromshare(sys.stdin.buffer.read())
+    else:
+        ours = socket.socket(fileno=os.dup(0))
+    ours.setblocking(True)
+    return ours
+
+
+def send_some(connection: socket.socket, pieces: Sequence[memoryview]) -> int:
+    """Send as much of ``pieces`` as fits now; the bytes sent. Raises BlockingIOError where nothing does."""
+    if sys.platform == "win32":
+        return connection.send(pieces[0])
+    else:
+        return connection.sendmsg(pieces[:16])
+
+
+def wait_until_closed(connection: socket.socket) -> None:
+    """Return once the other end of ``connection`` is closed; what it sends stays to be read."""
+    if sys.platform == "win32":
+        with contextlib.suppress(OSError):
+            while connection.recv(1, socket.MSG_PEEK):
+                threading.Event().wait(_CLOSED_POLL_S)
+    else:
+        poll = select.poll()
+        poll.register(connection, 0)  # a closed end is reported in any case
+        poll.poll()
+
+
+def kill_this_process() -> None:
+    """End this process at once; a thread that hangs does not stop that."""
+    if sys.platform == "win32":
+        os.kill(os.getpid(), signal.SIGTERM)  # there this ends a process at once
+    else:
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+def is_running(pid: int) -> bool:
+    """Whether there is a process ``pid`` that has not ended."""
+    if sys.platform == "win32":  # os.kill(pid, 0) would send it Ctrl-C
+        found = subprocess.run(
+            ["tasklist", "/fi", f"pid eq {pid}", "/fo", "csv", "/nh"], capture_output=True, check=False
+        )
+        return f'"{pid}"'.encode() in found.stdout
+    else:
+        try:
+            os.kill(pid, 0)
+        except ProcessLookupError:
+            return False
+        except (PermissionError, OverflowError):
+            return True
+        return not _has_ended(pid)
+
+
+def _has_ended(pid: int) -> bool:
+    """Whether the process has ended and was not reaped; False without /proc."""
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8").rpartition(")")[2]
+    except OSError:
+        return False
+    return state.split()[:1] == ["Z"]
+
+
+# -- priorities, processors and memory --------------------------------------------------------
+
+
+def cores() -> int:
+    """Processor cores that this process may use."""
+    if sys.platform == "linux":
+        return len(os.sched_getaffinity(0))
+    else:
+        return os.cpu_count() or 1
+
+
+def lower_priority(nice: int) -> None:
+    """Raise the nice value of the calling thread by ``nice``; without privileges this cannot be undone.
+
+    Only on Linux a thread has a nice value of its own.
+    """
+    if sys.platform == "linux":
+        thread = threading.get_native_id()
+        with contextlib.suppress(OSError):
+            os.setpriority(os.PRIO_PROCESS, thread, os.getpriority(os.PRIO_PROCESS, thread) + nice)
+
+
+def lowest_priority(nice: int = 19) -> None:
+    """Give this process the nice value ``nice``; on Windows that has no effect."""
+    if sys.platform != "win32":
+        os.nice(nice - os.nice(0))
+
+
+def processor_times() -> tuple[float, float] | None:
+    """Processor time of all programs, and of our child processes, so far, s; None where it is not known."""
+    if sys.platform == "linux":
+        try:
+            tick = os.sysconf("SC_CLK_TCK")
+            fields = [int(word) for word in Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:]]
+            # user, nice, system, (idle, iowait), irq, softirq
+            return sum(fields[i] for i in (0, 1, 2, 5, 6)) / tick, sum(map(_ticks, _children())) / tick
+        except (OSError, ValueError, IndexError):
+            return None
+    else:
+        return _times_by_psutil()
+
+
+def _children() -> list[str]:
+    found: list[str] = []
+    for task in Path("/proc/self/task").iterdir():
+        found += (task / "children").read_text().split()
+    return found
+
+
+def _ticks(pid: str) -> int:
+    """User and system time of a process, in ticks; 0 where it has just ended."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0
+    return int(fields[11]) + int(fields[12])
+
+
+def _times_by_psutil() -> tuple[float, float] | None:
+    try:
+        import psutil
+    except ImportError:
+        return None
+    used = psutil.cpu_times()
+    children = 0.0
+    for child in psutil.Process().children():
+        with contextlib.suppress(psutil.Error):  # it has just ended
+            times = child.cpu_times()
+            children += times.user + times.system
+    return sum(used) - used.idle - getattr(used, "iowait", 0.0), children
+
+
+def memory_MiB() -> float:
+    """Resident memory of this process; NaN where it is not known."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        return pages * _page_bytes() / 2**20
+    except (OSError, ValueError, IndexError):
+        return _memory_by_psutil()
+
+
+def _page_bytes() -> int:
+    if sys.platform == "win32":
+        return 4096  # never asked: it has no /proc
+    else:
+        return os.sysconf("SC_PAGE_SIZE")
+
+
+def _memory_by_psutil() -> float:
+    try:
+        import psutil
+    except ImportError:
+        return float("nan")
+    return float(psutil.Process().memory_info().rss / 2**20)
+
+
+# -- disk and ports ---------------------------------------------------------------------------
+
+
+def to_disk(file: int) -> None:
+    """Bring the content of the open file ``file`` (a descriptor) to its disk; raises OSError where that fails."""
+    getattr(os, "fdatasync", os.fsync)(file)
+
+
+def forget_pages(file: int, size: int) -> None:
+    """Free the memory that holds the first ``size`` bytes of a file, where the system can."""
+    if sys.platform == "linux":
+        os.posix_fadvise(file, 0, size, os.POSIX_FADV_DONTNEED)
+
+
+def open_pty() -> tuple[int, int, str]:
+    """A pseudo-terminal that passes bytes as they are: our descriptor, the port's and the port's name.
+
+    Raises
+    ------
+    OSError
+        The system has none.
+    """
+    if sys.platform == "win32":
+        raise OSError("a simulated serial port needs pseudo-terminals (Linux, macOS); choose the load none:")
+    else:
+        import tty
+
+        ours, port = os.openpty()
+        tty.setraw(port)
+        os.set_blocking(ours, False)
+        return ours, port, os.ttyname(port)
+
+
+def group_of(path: Path) -> str:
+    """The group that owns a file; "" where there is none."""
+    if sys.platform == "win32":
+        return ""
+    else:
+        try:
+            return path.group()
+        except (OSError, KeyError):
+            return ""

@@ -1,0 +1,1 @@
+"""The strain of an area: one affine displacement field through all its ZOIs."""

@@ -1,0 +1,24 @@
+"""The blocks that a codec leaves in a picture (JPEG, MJPG, MPEG-4)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+BLOCK_PX = 8
+BLOCKS = 1.3
+"""Blockiness from which on a picture was compressed: JPEG 80 has 1.9, JPEG 50 2.7, raw pictures 0.98 to 1.06."""
+
+
+def blockiness(image: NDArray[Any]) -> float:
+    """Third differences of an image (H, W) across the borders of blocks of 8 px over those elsewhere; about 1."""
+    worst = 1.0
+    if min(image.shape) < 4 * BLOCK_PX:
+        return worst
+    for axis in (0, 1):
+        steps = np.abs(np.diff(image.astype(np.float32), n=3, axis=axis)).mean(axis=1 - axis)
+        means = [float(steps[k::BLOCK_PX].mean()) for k in range(BLOCK_PX)]
+        worst = max(worst, max(means) / max(float(np.median(means)), 1e-6))
+    return worst

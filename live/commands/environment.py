@@ -1,0 +1,34 @@
+"""Environment variables of numba and of reproducible builds: those that are not possible are refused first."""
+
+from __future__ import annotations
+
+import os
+
+from acquire.errors import ConfigError
+
+_LEAST = {"NUMBA_NUM_THREADS": 1, "SOURCE_DATE_EPOCH": 0}
+"""Whole numbers in the environment for which numba ends the program where they are none."""
+_LAYERS = ("NUMBA_THREADING_LAYER", "NUMBA_THREADING_LAYER_PRIORITY")
+
+
+def check_environment() -> None:
+    """Refuse what numba would end the program for, or raise while it measures; raises ConfigError."""
+    for name, least in _LEAST.items():
+        value = os.environ.get(name, "1")
+        if not (value.isascii() and value.isdecimal() and int(value) >= least):
+            raise ConfigError(
+                f"{name}={value} is not possible; give a whole number from {least}, or unset the variable"
+            )
+    if given := [f"{name}={os.environ[name]}" for name in _LAYERS if name in os.environ]:
+        _check_threading_layer(" ".join(given))
+
+
+def _check_threading_layer(given: str) -> None:
+    """Start numba's threads: it raises where it cannot load the layer that the environment names."""
+    from analysis import threading_library
+
+    try:
+        threading_library()
+    except (ValueError, ImportError) as error:
+        why = str(error).splitlines()[0].rstrip(".")
+        raise ConfigError(f"{given} is not possible ({why}); give omp or workqueue, or unset it") from error

@@ -1,0 +1,176 @@
+"""Guards: they look at each measurement, and warn where it is not valid as it stands."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from acquire.events import Event, EventKind, EventSink, Level
+from analysis.field import Blur
+from analysis.field.picture_error import LIMIT, PictureError
+from live.pipeline.measurement import TimeStep
+
+if TYPE_CHECKING:
+    from analysis.field import Measure, StrainField
+
+MAX_ELASTIC, FALSE_STRAIN, NU_DOUBT = 1e-3, 2e-5, 0.02
+"""Of the check by Poisson's ratio: largest strain, smallest false strain, and doubt about nu, which adds to it."""
+MAX_ROTATION, MAX_STRAIN = math.radians(0.5), 0.02
+"""Limits of small strains, rad and 1: the error is then 40 um/m by the rotation and 200 um/m by the strain."""
+MAX_BLUR_PX, CERTAIN, CALM = 0.5, 3.0, 0.8
+"""A blur beyond this gives an event, by so many of its sigmas; below this share of it the picture is well again."""
+
+
+class StrainGuard:
+    """Checks each field of small strains, and warns once where another measure is more exact.
+
+    A rotation by r changes small strains by r^2/2 (3 degrees: 1400 µm/m); they differ from the other measures
+    by about e^2/2 at a strain e.
+
+    Parameters
+    ----------
+    measure : str
+        Measure of the reported strains; only small strains are checked.
+    on_event : callable taking an Event
+    """
+
+    def __init__(self, measure: Measure, on_event: EventSink) -> None:
+        self._on_event, self._warned = on_event, measure != "small"
+
+    def check(self, field: StrainField, t: float) -> None:
+        """Check a field, measured at ``t`` (s)."""
+        if self._warned or not field.ok.any():
+            return
+        turned = abs(float(np.nanmedian(field.rotation)))
+        strained = max(abs(float(np.nanmedian(values))) for values in (field.du_dx, field.dv_dy))
+        if turned > MAX_ROTATION or strained > MAX_STRAIN:
+            self._warned = True
+            text = (
+                f"turned by {math.degrees(turned):.1f} degrees, strained by {strained:.1%}: small strains are off by"
+                f" about {(turned**2 + strained**2) / 2 * 1e6:.0f} µm/m; measure with --strain engineering"
+            )
+            data = {"rotation": turned, "strain": strained}
+            self._on_event(Event(t, EventKind.MEASUREMENT, "strain", text, "warning", data))
+
+
+class DilatationGuard:
+    """Checks the strains of a uniaxial elastic test for motion off the plane, and warns once.
+
+    Motion along the optical axis adds the same strain d to both: across + nu axial = (1 + nu) d. Only below
+    ``MAX_ELASTIC``, since plastic flow changes the ratio.
+
+    Parameters
+    ----------
+    nu : float or None
+        Poisson's ratio; None: nothing is checked.
+    stand_off_mm : float or None, mm
+        For the message.
+    on_event : callable taking an Event
+    """
+
+    def __init__(self, nu: float | None, stand_off_mm: float | None, on_event: EventSink) -> None:
+        self._nu, self._stand_off_mm, self._on_event = nu, stand_off_mm, on_event
+        self._warned = False
+
+    def check(self, step: TimeStep) -> None:
+        """Check the strains of the region at one time."""
+        if self._warned or self._nu is None:
+            return
+        strains = (step.exx, step.sigma_exx), (step.eyy, step.sigma_eyy)
+        (across, sigma_across), (axial, sigma_axial) = sorted(strains, key=lambda one: abs(one[0]))
+        if not abs(axial) < MAX_ELASTIC:
+            return
+        false = (across + self._nu * axial) / (1 + self._nu)
+        sigma = math.hypot(sigma_across, self._nu * sigma_axial) / (1 + self._nu)
+        if abs(false) > FALSE_STRAIN + NU_DOUBT * abs(axial) + 4 * sigma:
+            self._warned = True
+            data = {"strain": false, "sigma": sigma}
+            text = self._text(false, self._nu)
+            self._on_event(Event(step.t, EventKind.MEASUREMENT, "strain", text, "warning", data))
+
+    def _text(self, false: float, nu: float) -> str:
+        way = "towards" if false > 0 else "away from"
+        far = "" if self._stand_off_mm is None else f" by {abs(false) * self._stand_off_mm:.2f} mm"
+        return (
+            f"the strains along and across do not fit nu = {nu:g}: {false * 1e6:+.0f} µm/m in both is as from"
+            f" motion{far} {way} the camera, and no strain; E is off by it too (docs/optics.md)"
+        )
+
+
+CAUSES = {
+    "noise": "more noise than the reference or --noise has; more light",
+    "compression": "the blocks of a compressed picture; record uncompressed",
+    "bands": "bands or lines; a steady lamp, or an exposure of whole periods of the mains",
+    "blur": "another sharpness than the reference; focus, motion, distance",
+    "filter": "the filters of a camera (denoising, sharpening) or of a format; switch them off",
+}
+"""What an error of the picture looks like (``PictureError.cause``), and what to do."""
+
+
+class PictureGuard:
+    """Checks what each picture leaves beyond its noise; an event when it exceeds the limit, and when that ends.
+
+    Parameters
+    ----------
+    on_event : callable taking an Event
+    """
+
+    def __init__(self, on_event: EventSink) -> None:
+        self._on_event, self._cause = on_event, ""
+
+    def check(self, field: StrainField, t: float) -> None:
+        """Check a field, measured at ``t`` (s); one of too few ZOIs changes nothing."""
+        error = field.picture
+        if error is None or not field.ok.any():
+            return
+        if error.cause and not self._cause:
+            self._emit(t, picture_words(field), "warning", error)
+            self._cause = error.cause
+        elif self._cause and not error.cause and error.factor < 0.85 * LIMIT:
+            self._emit(t, "the picture leaves what its noise explains again", "info", error)
+            self._cause = ""
+
+    def _emit(self, t: float, text: str, level: Level, error: PictureError) -> None:
+        data = {"cause": error.cause, "factor": error.factor, "over_noise": error.over_noise}
+        self._on_event(Event(t, EventKind.MEASUREMENT, "picture", text, level, data))
+
+
+def picture_words(field: StrainField) -> str:
+    """What the picture of a field has become and what that costs, in words; "" where its noise explains it."""
+    error = field.picture
+    if error is None or not error.cause:
+        return ""
+    sigma = float(np.nanmedian(np.hypot(field.sigma_exx, field.sigma_eyy))) / math.sqrt(2) * 1e6
+    text = f"the picture shows {CAUSES[error.cause]}: strain of a ZOI is uncertain by {sigma:.0f} µm/m"
+    return f"{text} in place of {sigma / error.factor:.0f}" if error.factor > 1 else text
+
+
+class BlurGuard:
+    """Checks the sharpness of each measurement; an event when the limit is passed, either way, and when it ends.
+
+    Parameters
+    ----------
+    on_event : callable taking an Event
+    limit_px : float, px
+    """
+
+    def __init__(self, on_event: EventSink, limit_px: float = MAX_BLUR_PX) -> None:
+        self._on_event, self._limit = on_event, limit_px
+        self._changed = False
+
+    def check(self, step: TimeStep) -> None:
+        """Check one time step; one whose blur is not known changes nothing."""
+        blur, size = Blur(step.blur, step.sigma_blur), abs(step.blur)
+        if not self._changed and size - CERTAIN * blur.sigma > self._limit:
+            self._changed = True
+            text = f"the picture is {blur.text} since the reference: look at focus, distance and exposure"
+            self._emit(step, text, "warning")
+        elif self._changed and size < CALM * self._limit:
+            self._changed = False
+            self._emit(step, "the picture is as sharp as the reference again", "info")
+
+    def _emit(self, step: TimeStep, text: str, level: Level) -> None:
+        data = {"blur_px": step.blur, "sigma_blur_px": step.sigma_blur}
+        self._on_event(Event(step.t, EventKind.MEASUREMENT, "sharpness", text, level, data))

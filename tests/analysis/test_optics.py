@@ -1,0 +1,259 @@
+"""The apparent motion of plates: exact on projected planes, with the uncertainty of its noise; what is refused."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from analysis import Roi, ZoiGrid
+from analysis.evaluate import AreaStrain, LineGauge
+from analysis.field import PAIR_INDEX, Block, CommonError, Status, StrainField, part_of, profile
+from analysis.optics import (
+    ApparentMotion,
+    Model,
+    PlateFit,
+    PlateLayout,
+    choose_model,
+    trouble,
+    without_plates,
+)
+from hw_mocks.optics import Optics, PlaneMotion
+from hw_mocks.specimen import VirtualSpecimen
+
+SPECIMEN = VirtualSpecimen(width=640, height=480)
+AXIS, FOCAL = (319.5, 239.5), 500 * 20.0
+TWO = {"left": (20.0, 40.0, 100.0, 400.0), "right": (520.0, 40.0, 100.0, 400.0)}
+ONE = {"left": (20.0, 40.0, 240.0, 400.0)}
+GRID = ZoiGrid.cover(Roi(280, 40, 160, 400), 64, 16)
+NAMES = ("u", "du_dx", "du_dy", "v", "dv_dx", "dv_dy")
+END = SPECIMEN.duration_s
+AXIAL, ACROSS = float(SPECIMEN.axial_strain(END)), float(SPECIMEN.transverse_strain(END))
+
+
+def fit_of(boxes: dict[str, tuple[float, float, float, float]]) -> PlateFit:
+    return PlateFit(PlateLayout.of(GRID, boxes), AXIS)
+
+
+def seen(fit: PlateFit, boxes: dict[str, tuple[float, float, float, float]], optics: Optics) -> StrainField:
+    """What a perfect kernel measures on a specimen that looks as ``optics`` show it at rest."""
+    optics = replace(optics, plates=tuple(boxes.values()))
+    before, after = optics.seen(SPECIMEN, 0.0), optics.seen(SPECIMEN, END)
+    x, y = np.meshgrid(fit.layout.whole.x, fit.layout.whole.y)
+    flat_x, flat_y = x.copy(), y.copy()  # places of the plane that are seen at the ZOIs
+    for _ in range(6):
+        u, v = before.displacement(flat_x, flat_y)
+        flat_x, flat_y = x - u, y - v
+    u, v = after.displacement(flat_x, flat_y)
+    first, last = (_matrix(one.gradient(flat_x, flat_y)) for one in (before, after))
+    gradient = np.moveaxis(last @ np.linalg.inv(first) - np.eye(2), (-2, -1), (0, 1))
+    values = (flat_x + u - x, gradient[0, 0], gradient[0, 1], flat_y + v - y, gradient[1, 0], gradient[1, 1])
+    return StrainField.from_values(fit.layout.whole, dict(zip(NAMES, values, strict=True)), 1e-3)
+
+
+def _matrix(gradient: tuple[NDArray[np.float64], ...]) -> NDArray[np.float64]:
+    a, b, c, d = gradient
+    return np.moveaxis(np.array([[1 + a, b], [c, 1 + d]]), (0, 1), (-2, -1))
+
+
+def corrected(fit: PlateFit, field: StrainField, model: Model) -> tuple[float, float]:
+    """Errors of exx and eyy of the specimen."""
+    motion, _ = fit.motion(field, model)
+    area = AreaStrain.of(motion.removed_from(part_of(field, fit.layout.here, fit.layout.specimen)))
+    assert area is not None
+    return area.value("exx") - ACROSS, area.value("eyy") - AXIAL
+
+
+def settling(towards: float, tilt: float) -> Optics:
+    return Optics(500.0, settling=PlaneMotion(towards, math.radians(tilt), math.radians(tilt)))
+
+
+def test_without_correction_a_tenth_of_a_millimetre_is_200_um_m() -> None:
+    fit = fit_of(TWO)
+    raw = AreaStrain.of(part_of(seen(fit, TWO, settling(0.1, 0.0)), fit.layout.here, fit.layout.specimen))
+    assert raw is not None
+    assert raw.value("eyy") - AXIAL == pytest.approx(0.1 / 499.9 * (1 + AXIAL), rel=1e-9)
+
+
+@pytest.mark.parametrize("model", ["scale", "pose", "homography"])
+def test_every_model_removes_motion_along_the_axis(model: Model) -> None:
+    fit = fit_of(ONE)
+    assert corrected(fit, seen(fit, ONE, settling(0.1, 0.0)), model) == pytest.approx((0, 0), abs=1e-12)
+
+
+def test_scale_needs_plates_on_both_sides_against_tilt_and_pose_does_not() -> None:
+    both, one = fit_of(TWO), fit_of(ONE)
+    tilted = settling(0.1, 0.1)
+    assert np.abs(corrected(both, seen(both, TWO, tilted), "scale")).max() < 22e-6  # 40 px off their middle
+    assert min(corrected(one, seen(one, ONE, tilted), "scale")) > 35e-6
+    assert corrected(one, seen(one, ONE, tilted), "pose") == pytest.approx((0, 0), abs=2.5e-6)
+
+
+def test_a_camera_that_is_not_square_needs_the_homography() -> None:
+    fit = fit_of(ONE)
+    square = PlaneMotion(0, 0, math.radians(2.0))
+    field = seen(fit, ONE, replace(settling(0.1, 0.1), still=square))
+    assert np.abs(corrected(fit, field, "pose")).max() > 30e-6
+    # What is left is the strain itself, seen at an angle: 2 degrees change 1 % of strain by cos^2.
+    assert corrected(fit, field, "homography") == pytest.approx((0, 0), abs=1e-5)
+
+
+def test_removal_is_exact_for_a_large_homography_and_keeps_rigid_fields_at_zero() -> None:
+    motion = ApparentMotion(np.array([0.02, -0.03, 0.01, 0.05, 0.004, -0.006, 0.003, 0.002]), AXIS, 300.0)
+    still = StrainField.from_values(GRID, {})
+    values = motion.at(*motion.places(still))
+    moved = StrainField.from_values(GRID, dict(zip(NAMES, values, strict=True)))
+    np.testing.assert_allclose(motion.removed_from(moved).parameters, 0, atol=1e-11)
+
+
+def noisy(fit: PlateFit, rng: np.random.Generator) -> StrainField:
+    """What white noise of the pixels makes of every ZOI, by the moments under its window."""
+    grid = fit.layout.whole
+    line = profile("gaussian", grid.size)
+    x = np.arange(grid.size) - (grid.size - 1) / 2
+    even, odd = line / line.sum(), line * x / (line @ x**2)
+    values = []
+    for _ in range(2):
+        pixels = rng.standard_normal((480, 640))
+        down, lean = (np.array([w @ pixels[y : y + grid.size] for y in grid.first_y]) for w in (even, odd))
+
+        def across(rows: NDArray[np.float64], w: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.array([rows[:, x : x + grid.size] @ w for x in grid.first_x]).T
+
+        values += [across(down, even), across(down, odd), across(lean, even)]
+    sigma = float(even @ even)
+    return StrainField.from_values(grid, dict(zip(NAMES, values, strict=True)), sigma)
+
+
+@pytest.mark.parametrize(("boxes", "model"), [(TWO, "pose"), (ONE, "homography")])
+def test_covariance_is_that_of_the_noise(
+    boxes: dict[str, tuple[float, float, float, float]], model: Model
+) -> None:
+    fit, rng = fit_of(boxes), np.random.default_rng(1)
+    covariance = fit.motion(noisy(fit, rng), model)[1]
+    drawn = np.array([fit.motion(noisy(fit, rng), model)[0].parameters for _ in range(60)])
+    for k in range({"scale": 4, "pose": 6, "homography": 8}[model]):
+        assert drawn[:, k].std() == pytest.approx(math.sqrt(covariance[k, k]), rel=0.3)
+
+
+def test_the_error_of_the_plates_is_common_to_all_zois() -> None:
+    field = StrainField.from_values(GRID, {}, 1e-3)
+    fit = fit_of(TWO)
+    covariance = np.zeros((8, 8))
+    covariance[2, 2] = 25e-12  # 5 um/m of scale, in all ZOIs alike
+    with_error = replace(field, common=fit.error(field, covariance))
+    own, area = AreaStrain.of(field), AreaStrain.of(with_error)
+    assert own is not None
+    assert area is not None
+    assert area.sigma("exx") == pytest.approx(math.hypot(own.sigma("exx"), 5e-6), rel=1e-9)
+    assert area.sigma("exy") == pytest.approx(own.sigma("exy"), rel=1e-9)
+    assert with_error.mean("eyy")[1] == pytest.approx(math.hypot(field.mean("eyy")[1], 5e-6), rel=1e-9)
+    np.testing.assert_allclose(with_error.sigma_exx, math.hypot(1e-3, 5e-6), rtol=1e-6)
+    line = LineGauge("axial", (360.0, 80.0), (360.0, 400.0))
+    before, after = line.measure(field).sigma, line.measure(with_error).sigma
+    assert after == pytest.approx(math.hypot(before, 5e-6), rel=1e-6)
+
+
+def test_a_part_of_a_field_has_its_values_and_no_others() -> None:
+    grid = ZoiGrid.cover(Roi(10, 20, 100, 80), 20, 10)
+    u = np.arange(grid.shape[0] * grid.shape[1], dtype=float).reshape(grid.shape)
+    common = CommonError(np.ones((1, 6, *grid.shape)), np.ones((1, 1)))
+    field = replace(StrainField.from_values(grid, {"u": u}), common=common)
+    block = Block(slice(1, 4), slice(2, 5))
+    part = part_of(field, block)
+    np.testing.assert_array_equal(part.u, u[1:4, 2:5])
+    np.testing.assert_array_equal([part.grid.x, part.grid.y], [grid.x[2:5], grid.y[1:4]])
+    assert part.common is not None
+    assert part.common.shapes.shape == (1, 6, 3, 3)
+    fewer = part_of(field, block, part.grid.subset(active=np.eye(3, dtype=bool)))
+    assert np.isnan(fewer.u).sum() == 6
+    assert fewer.refused == {}
+    assert fewer.status[0, 1] == Status.NOT_MEASURED
+
+
+def test_the_model_follows_from_the_uncertainty_it_leaves() -> None:
+    both, one = fit_of(TWO), fit_of(ONE)
+    quiet, coarse = (
+        replace(seen(one, ONE, Optics(500.0)), covariance=covariance(one, sigma)) for sigma in (1e-5, 3e-2)
+    )
+    assert choose_model(one, quiet, FOCAL).model == "homography"
+    assert choose_model(one, coarse, FOCAL).model == "scale"
+    field = replace(seen(both, TWO, Optics(500.0)), covariance=covariance(both, 1e-2))
+    chosen = choose_model(both, field, FOCAL)
+    assert chosen.model in ("scale", "pose")
+    assert chosen.total < 25e-6
+    assert chosen.total == pytest.approx(math.hypot(chosen.noise, chosen.unseen))
+
+
+def covariance(fit: PlateFit, sigma_px: float) -> NDArray[np.float32]:
+    shape = fit.layout.whole.shape
+    out = np.zeros((21, *shape), np.float32)
+    for i in range(6):
+        out[PAIR_INDEX[i, i]] = (sigma_px if i % 3 == 0 else sigma_px / 15) ** 2
+    return out
+
+
+def test_a_rigid_plate_is_no_trouble_even_where_it_tilts() -> None:
+    fit = fit_of(TWO)
+    assert trouble(fit, seen(fit, TWO, settling(0.5, 0.5))) == ("", False)
+
+
+def test_a_loaded_plate_is_named() -> None:
+    fit = fit_of(TWO)
+    words, not_rigid = trouble(fit, seen(fit, TWO, replace(settling(0.1, 0.1), plate_strain=0.3)))
+    assert not_rigid
+    assert "plate left is loaded" in words
+
+
+def test_a_lost_plate_is_named_and_may_come_back() -> None:
+    fit = fit_of(TWO)
+    field = seen(fit, TWO, settling(0.1, 0.1))
+    status = field.status.copy()
+    status[fit.layout.plates["right"].at][:12] = Status.POOR_MATCH
+    parameters = np.where(status == Status.OK, field.parameters, np.nan)
+    words, not_rigid = trouble(fit, replace(field, status=status, parameters=parameters))
+    assert "plate right is lost or shaded: 30 of 66" in words
+    assert not not_rigid
+
+
+def test_half_of_the_zois_of_a_plate_give_the_same_motion() -> None:
+    fit = fit_of(TWO)
+    field = seen(fit, TWO, settling(0.1, 0.1))
+    status = field.status.copy()
+    status[fit.layout.plates["right"].at][::3] = Status.LOST
+    parameters = np.where(status == Status.OK, field.parameters, np.nan)
+    partly = replace(field, status=status, parameters=parameters)
+    assert corrected(fit, partly, "pose") == pytest.approx(corrected(fit, field, "pose"), abs=1e-6)
+
+
+def test_the_zois_of_plates_lie_on_the_lattice_of_the_test() -> None:
+    layout = PlateLayout.of(GRID, TWO)
+    assert layout.whole.roi == Roi(24, 40, 592, 400)
+    assert part_of(StrainField.from_values(layout.whole, {}), layout.here).grid.roi == GRID.roi
+    assert {name: block.of(layout.whole).shape for name, block in layout.plates.items()} == {
+        "left": (22, 3),
+        "right": (22, 3),
+    }
+    assert layout.whole.n_active == GRID.n_active + 2 * 66
+
+
+def test_zois_that_touch_a_plate_are_not_of_the_specimen() -> None:
+    grid = without_plates(GRID, {"over": (400.0, 0.0, 200.0, 100.0)})
+    assert not grid.active[:4, 4:].any()  # ZOIs from x = 344 on reach 400
+    assert grid.active[4:].all()
+    assert grid.active[:, :4].all()
+
+
+@pytest.mark.parametrize(
+    ("boxes", "words"),
+    [
+        ({"small": (0.0, 0.0, 70.0, 400.0)}, "plate small of 70 x 400 px has no room"),
+        ({"a": (0.0, 0.0, 200.0, 200.0), "b": (100.0, 0.0, 160.0, 200.0)}, "two plates overlap"),
+    ],
+)
+def test_impossible_plates(boxes: dict[str, tuple[float, float, float, float]], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        PlateLayout.of(GRID, boxes)

@@ -1,0 +1,229 @@
+"""The common error of a picture: noise, verdict and uncertainty from what all fits leave; wild pixels; its cause."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+import pytest
+
+from analysis import PhaseKernel, Roi, Status, StrainField, ZoiGrid
+from analysis.field import mean_blur
+from analysis.fit.kernel_args import CONVERGED, OutArgs, ReferenceArgs
+from analysis.fit.pooling import pooled
+from analysis.kernel.images import rounding_variance
+from analysis.kernel.white_noise import white_cubic
+from analysis.picture.blocks import BLOCKS, blockiness
+from analysis.picture.impulses import without_impulses
+from tests.accuracy.truth import Speckle, affine
+
+SHAPE = (320, 320)
+GRID = ZoiGrid.cover(Roi(16, 16, 288, 288), 32, 16)
+MOTION = {"u": 0.4, "v": -0.3}
+
+
+def picture(noise: float, seed: int, **motion: float) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    level = 128 + 200 * (Speckle(2.0, 3, span=400).at(*affine(SHAPE, **motion)) - 0.5)
+    return np.clip(np.rint(level + rng.normal(0, noise, SHAPE)), 0, 255).astype(np.uint8)
+
+
+def jpeg(image: np.ndarray, quality: int) -> np.ndarray:
+    return np.asarray(
+        cv2.imdecode(
+            cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, quality])[1], cv2.IMREAD_GRAYSCALE
+        )
+    )
+
+
+def predicted_over_observed(field: StrainField, name: str, truth: float) -> float:
+    off = field.value(name)[field.ok] - truth
+    return float(np.sqrt(np.mean(field.sigma(name)[field.ok] ** 2) / np.mean(off**2)))
+
+
+@pytest.mark.parametrize("stated", [None, 1.0, 4.0])
+@pytest.mark.parametrize(("first", "second"), [(1.0, 4.0), (4.0, 1.0)])
+def test_noise_other_than_stated_is_found_and_refuses_nothing(
+    first: float, second: float, stated: float | None
+) -> None:
+    kernel = PhaseKernel(picture(first, 1), GRID, noise=stated)
+    field = kernel.measure(picture(second, 2, **MOTION), noise=stated)
+    assert field.ok.mean() > 0.99
+    for name in ("u", "v"):
+        assert predicted_over_observed(field, name, MOTION[name]) == pytest.approx(1, abs=0.15)
+
+
+def test_a_compressed_picture_is_measured_with_the_uncertainty_that_it_has() -> None:
+    images = [jpeg(picture(1.5, k, **(MOTION if k else {})), 70) for k in (0, 1)]
+    field = PhaseKernel(images[0], GRID).measure(images[1])
+    assert field.ok.mean() > 0.97
+    within = [np.abs(field.value(n) - MOTION[n])[field.ok] < field.sigma(n)[field.ok] for n in MOTION]
+    assert 0.55 < np.mean(within) < 0.8
+    assert field.picture is not None and field.picture.cause == "compression"
+
+
+def test_what_a_part_of_the_picture_leaves_is_not_forgiven() -> None:
+    later = picture(1, 2, **MOTION).astype(np.float32)
+    soft = cv2.GaussianBlur(later, (0, 0), 2.5)
+    later[:, 100:] = soft[:, 100:]
+    field = PhaseKernel(picture(1, 1), GRID, noise=1.04).measure(later, noise=1.04)
+    assert field.ok[:, GRID.x < 70].all()
+    assert not field.ok[:, GRID.x > 130].any()
+
+
+def test_of_an_unrelated_picture_no_common_error_is_taken() -> None:
+    other = 128 + 200 * (Speckle(2.0, 77, span=400).at(*affine(SHAPE)) - 0.5)
+    field = PhaseKernel(picture(1, 1), GRID).measure(other.astype(np.uint8))
+    assert field.n_valid == 0 and field.picture is None
+
+
+def zois(count: int, left: np.ndarray, signal: np.ndarray) -> tuple[OutArgs, ReferenceArgs]:
+    found = OutArgs.starting(np.zeros((count, 6)))
+    found.state[:], found.nuisance[:], found.left[:] = CONVERGED, 1, left
+    found.cubic[:] = 0.02 * left[:, None]
+    known = ReferenceArgs(
+        signal,
+        np.full(count, 300.0),
+        np.full((count, 2), 1e-4),
+        np.full(count, 0.01),
+        np.array([100.0, 50.0]),
+        1.0,
+    )
+    return found, known
+
+
+def test_the_common_error_follows_the_contrast_and_ignores_those_that_stand_out() -> None:
+    rng = np.random.default_rng(1)
+    signal = rng.uniform(500, 1500, 800)
+    left = 2 + 0.01 * signal
+    left[::10] *= 9
+    found, known = zois(800, left, signal)
+    common = pooled(found, left, np.ones(800), known, np.s_[:], given=True)
+    assert common is not None
+    assert common.ratio == pytest.approx(2 + 0.01 * signal, rel=0.12)
+    assert common.colour == pytest.approx([2.0, 4.0], rel=0.02)
+    assert np.array_equal(common.forgiven, common.ratio)
+
+
+def test_given_noise_stands_where_what_is_left_agrees_and_few_zois_decide_nothing() -> None:
+    signal = np.full(200, 900.0)
+    found, known = zois(200, np.full(200, 0.9), signal)
+    agreed = pooled(found, found.left, np.ones(200), known, np.s_[:], given=True)
+    assert agreed is not None and (agreed.ratio == 1).all()
+    free = pooled(found, found.left, np.ones(200), known, np.s_[:], given=False)
+    assert free is not None and free.ratio == pytest.approx(np.full(200, 0.9))
+    few, of_few = zois(20, np.full(20, 9.0), np.full(20, 900.0))
+    assert pooled(few, few.left, np.ones(20), of_few, np.s_[:], given=True) is None
+    unlike, of_unlike = zois(200, np.full(200, 800.0), signal)
+    assert pooled(unlike, unlike.left, np.ones(200), of_unlike, np.s_[:], given=True) is None
+
+
+def test_the_answer_of_the_shapes_to_white_noise_is_that_of_many_pictures() -> None:
+    clean = picture(0, 1).astype(np.float32)
+    kernel = PhaseKernel(clean, GRID, noise=0.1)
+    reference, rng, found = kernel.reference, np.random.default_rng(3), []
+    from analysis.kernel.images import as_model
+    from analysis.kernel.solve import Solution
+
+    for _ in range(12):
+        noisy = clean + rng.normal(0, 2, SHAPE).astype(np.float32)
+        solution = Solution(reference, noisy, as_model(2.0), np.zeros((len(reference.index), 6)))
+        found.append(solution.found.cubic / (4 * reference.share_variance))
+    expected = white_cubic(reference.prepared, 32, 1, reference.share_variance)
+    assert np.median(np.concatenate(found), axis=0) == pytest.approx(expected, rel=0.08)
+
+
+def test_noise_is_not_below_the_rounding_of_the_picture() -> None:
+    step = 16 * np.arange(64, dtype=np.uint8).reshape(8, 8) // 4
+    assert rounding_variance(step) == pytest.approx(16 / 12)
+    assert rounding_variance(step + np.float32(0.5)) == 0
+    image = picture(0, 1)
+    field = PhaseKernel(image, GRID).measure(image)
+    assert np.abs(field.u).max() < 1e-5
+    shared = PhaseKernel(image, GRID, noise=12**-0.5).measure(image, noise=12**-0.5)
+    assert field.sigma_u == pytest.approx(shared.sigma_u, rel=0.2)
+
+
+def test_an_uncertainty_grows_with_the_stretch() -> None:
+    stretch = {"du_dx": 0.4, "dv_dy": -0.1}
+    x, y = np.meshgrid(GRID.x - 159.5, GRID.y - 159.5)
+    inner = GRID.subset(active=(np.abs(x) < 70) & (np.abs(y) < 120))
+    start = StrainField.from_values(inner, {"u": 0.4 * x, "v": -0.1 * y, "du_dx": 0.4, "dv_dy": -0.1})
+    first, still = picture(2, 1), picture(2, 2)
+    kernel = PhaseKernel(first, inner, noise=2.02)
+    stretched = kernel.measure(picture(2, 3, **stretch), start=start, noise=2.02)
+    unmoved = kernel.measure(still, noise=2.02)
+    assert stretched.ok[inner.active].mean() > 0.95
+    both = stretched.ok & unmoved.ok
+    for name, factor in {"u": 1.4, "du_dy": 1.4, "v": 0.9, "dv_dy": 0.9}.items():
+        ratio = np.median(stretched.sigma(name)[both] / unmoved.sigma(name)[both])
+        assert ratio == pytest.approx(factor, rel=0.1), name
+
+
+@pytest.mark.parametrize("kind", [np.uint8, np.float32])
+def test_wild_pixels_are_replaced(kind: type) -> None:
+    clean, rng = picture(1, 1), np.random.default_rng(4)
+    assert without_impulses(clean) is None
+    where = rng.random(SHAPE) < 0.003
+    spoilt = np.where(where, np.uint8(255), clean).astype(kind)
+    found = without_impulses(spoilt)
+    assert found is not None and found.dtype == kind
+    assert np.mean(np.abs(found.astype(float) - clean)[where] < 25) > 0.9
+    assert np.mean(found[~where] == spoilt[~where]) > 0.9998
+
+
+def test_hot_pixels_that_stand_still_do_not_pull() -> None:
+    hot = np.random.default_rng(4).random(SHAPE) < 0.003
+    images = [np.where(hot, np.uint8(255), picture(1, k, **(MOTION if k else {}))) for k in (0, 1)]
+    field = PhaseKernel(images[0], GRID).measure(images[1])
+    assert field.ok.mean() > 0.97
+    assert np.sqrt(np.mean((field.u - MOTION["u"])[field.ok] ** 2)) < 0.02
+
+
+def test_blocks_are_seen_wherever_they_begin() -> None:
+    raw = picture(1, 1)
+    assert blockiness(raw) < 1.1
+    assert blockiness(jpeg(raw, 80)[3:, 5:]) > BLOCKS
+
+
+def lines(image: np.ndarray, seed: int) -> np.ndarray:
+    return image + np.random.default_rng(seed).normal(0, 4, (SHAPE[0], 1))
+
+
+@pytest.mark.parametrize(
+    ("cause", "spoilt"),
+    [
+        ("noise", lambda image: image + np.random.default_rng(9).normal(0, 5, SHAPE)),
+        (
+            "filter",
+            lambda image: (
+                image + 4 * cv2.GaussianBlur(np.random.default_rng(9).normal(0, 3, SHAPE), (0, 0), 1)
+            ),
+        ),
+    ],
+)
+def test_the_cause_of_an_error_is_named(cause: str, spoilt) -> None:
+    later = spoilt(picture(1, 2, **MOTION).astype(np.float64)).astype(np.float32)
+    field = PhaseKernel(picture(1, 1), GRID, noise=1.04).measure(later, noise=1.04)
+    assert field.picture is not None and field.picture.cause == cause
+    assert field.picture.factor > 1.5
+    assert np.mean(field.status == Status.OK) > 0.97
+
+
+def test_bands_and_lines_are_taken_off_whatever_way_they_run() -> None:
+    first, clean = picture(1, 1), picture(1, 2, **MOTION).astype(np.float32)
+    kernel = PhaseKernel(first, GRID, noise=1.04)
+    wave = 10 * np.sin(2 * np.pi * np.arange(SHAPE[0]) / 23).astype(np.float32)
+    for later in (clean + wave[:, None], clean + wave, lines(clean, 9).astype(np.float32)):
+        field = kernel.measure(later, noise=1.04)
+        assert field.picture is not None and field.picture.cause == "bands" and field.picture.factor < 3
+        assert field.ok.mean() > 0.99
+        off = np.hypot(field.u - MOTION["u"], field.v - MOTION["v"])[field.ok]
+        assert np.sqrt(np.mean(off**2)) < 0.02
+
+
+def test_mean_strain_and_sharpness_of_compressed_pictures() -> None:
+    images = [jpeg(picture(1.5, k, **(MOTION if k else {})), 50) for k in (0, 1)]
+    field = PhaseKernel(images[0], GRID).measure(images[1])
+    means = [field.mean(name) for name in ("exx", "eyy")]
+    assert all(abs(mean) < 3 * sigma for mean, sigma in means)
+    assert abs(mean_blur(field).px) < 0.2

@@ -1,0 +1,55 @@
+"""A rolling shutter is removed by the measured velocity, exactly for rigid motion and with its uncertainty."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis import Roi, StrainField, ZoiGrid
+from analysis.optics import ShutterCorrection
+from hw_mocks.deformation import Affine
+from hw_mocks.optics import RolledShutter
+
+GRID = ZoiGrid.cover(Roi(40, 100, 200, 800), 64, 16)
+READOUT, HEIGHT = 0.033, 1001
+NAMES = ("u", "du_dx", "du_dy", "v", "dv_dx", "dv_dy")
+
+
+def seen(t: float, sigma: float = 1e-3) -> StrainField:
+    """Strained by 1000 um/m, and moving at 4 px/s to the right and 10 px/s down."""
+    place = RolledShutter(lambda at: Affine(4 * at, 10 * at, dv_dy=1e-3, x0=140, y0=500), t, READOUT, HEIGHT)
+    x, y = np.meshgrid(GRID.x, GRID.y)
+    (u, v), (a, b, c, d) = place.displacement(x, y), place.gradient(x, y)
+    return StrainField.from_values(GRID, dict(zip(NAMES, (u, a, b, v, c, d), strict=True)), sigma)
+
+
+def test_velocity_no_longer_shows_as_strain() -> None:
+    correction = ShutterCorrection(READOUT, HEIGHT)
+    raw = seen(0.1)
+    assert raw.mean("eyy")[0] - 1e-3 == pytest.approx(330e-6, rel=3e-3)
+    assert raw.mean("gamma_xy")[0] == pytest.approx(4 * READOUT / 1000, rel=3e-3)
+    assert correction.apply(raw, 0.1) is raw  # nothing is known of the velocity yet
+    field = correction.apply(seen(0.2), 0.2)
+    assert field.mean("eyy")[0] == pytest.approx(1e-3, abs=0.5e-6)
+    assert field.mean("gamma_xy")[0] == pytest.approx(0, abs=0.5e-6)
+    assert field.mean("v")[0] == pytest.approx(2.0 + 1e-3 * (np.mean(GRID.y) - 500), abs=2e-5)
+
+
+def test_the_noise_of_the_velocity_is_in_the_strain() -> None:
+    correction = ShutterCorrection(READOUT, HEIGHT)
+    first, second = seen(0.1, 0.5), seen(0.2, 0.5)
+    correction.apply(first, 0.1)
+    found = correction.apply(second, 0.2)
+    velocity = 2**0.5 * second.mean("v")[1] / 0.1
+    expected = np.hypot(second.mean("eyy")[1], velocity * READOUT / 1000)
+    assert found.mean("eyy")[1] == pytest.approx(expected, rel=3e-3)
+    assert found.mean("eyy")[1] > second.mean("eyy")[1]
+
+
+def test_a_lost_picture_and_a_time_that_stands_change_nothing() -> None:
+    correction = ShutterCorrection(READOUT, HEIGHT)
+    correction.apply(seen(0.1), 0.1)
+    lost = StrainField.from_values(GRID, {}, status=np.full(GRID.shape, 5))
+    assert correction.apply(lost, 0.15) is lost
+    again = seen(0.1)
+    assert correction.apply(again, 0.1) is again

@@ -1,0 +1,138 @@
+"""The view of the simulated camera against closed forms of projection, distortion and rolling shutter."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from acquire.addresses import Options, parse_address
+from acquire.errors import ConfigError
+from hw_mocks.deformation import Affine
+from hw_mocks.optics import Optics, PlaneMotion, RolledShutter, take_optics
+from hw_mocks.scene import Scene
+from hw_mocks.specimen import VirtualSpecimen
+
+SPECIMEN = VirtualSpecimen(width=201, height=161)  # 20 px/mm
+END = SPECIMEN.duration_s
+X0, Y0 = 100.0, 80.0
+
+
+def seen(optics: Optics, x: float, y: float, t: float = END) -> tuple[float, float]:
+    """Where a place of an unstrained specimen is seen, px from the middle."""
+    unloaded = VirtualSpecimen(width=201, height=161)
+    away = optics.seen(unloaded, t)
+    strain, across = float(unloaded.axial_strain(t)), float(unloaded.transverse_strain(t))
+    x, y = x / (1 + across), y / (1 + strain)  # so that the strained place is (x, y)
+    u, v = away.displacement(X0 + x, Y0 + y)
+    return float(u) + x, float(v) + y
+
+
+def test_motion_towards_the_camera_scales_by_the_distance() -> None:
+    x, y = seen(Optics(500.0, settling=PlaneMotion(0.1)), 60, -40)
+    assert (x, y) == pytest.approx((60 * 500 / 499.9, -40 * 500 / 499.9), abs=1e-9)
+
+
+def test_tilt_projects_the_turned_plane() -> None:
+    angle, away = math.radians(2.0), 500 * 20.0
+    x, y = seen(Optics(500.0, settling=PlaneMotion(0, 0, angle)), 60, -40)
+    depth = 1 - 60 * math.sin(angle) / away
+    assert (x, y) == pytest.approx((60 * math.cos(angle) / depth, -40 / depth), abs=1e-9)
+
+
+def test_settling_grows_with_the_load_and_not_with_time() -> None:
+    early = SPECIMEN.programme.hold_s + 1.0
+    share = float(SPECIMEN.force(early) / SPECIMEN.force(END))
+    assert 0.01 < share < 0.5
+    x, _ = seen(Optics(500.0, settling=PlaneMotion(0.1)), 60, 0, early)
+    assert x == pytest.approx(60 / (1 - share * 0.1 / 500), abs=1e-9)
+
+
+def test_distortion_is_a_share_of_the_radius_at_the_corner() -> None:
+    x, y = seen(Optics(distortion=0.003), X0, Y0, 0.0)
+    assert (x, y) == pytest.approx((1.003 * X0, 1.003 * Y0), abs=1e-9)
+    x, _ = seen(Optics(distortion=0.003), 0.5 * math.hypot(X0, Y0), 0, 0.0)
+    assert x == pytest.approx(0.5 * math.hypot(X0, Y0) * (1 + 0.003 / 4), abs=1e-9)
+
+
+@pytest.mark.parametrize("rolled", [0.0, 0.5])
+def test_gradient_is_the_derivative_of_the_displacement(rolled: float) -> None:
+    optics = Optics(
+        100.0,
+        0.01,
+        PlaneMotion(0, 0.05, -0.02),
+        PlaneMotion(1.0, 0.02, 0.03),
+        readout_s=rolled,
+        plates=((0, 0, 1, 1),),
+    )
+    deformation = optics.seen(SPECIMEN, 8.0)
+    x, y, h = np.array([20.0, 90, 180]), np.array([30.0, 100, 140]), 1e-4
+    a, b, c, d = deformation.gradient(x, y)
+    (u1, v1), (u0, v0) = deformation.displacement(x + h, y), deformation.displacement(x - h, y)
+    np.testing.assert_allclose([a, c], [(u1 - u0) / 2 / h, (v1 - v0) / 2 / h], atol=2e-8)
+    (u1, v1), (u0, v0) = deformation.displacement(x, y + h), deformation.displacement(x, y - h)
+    np.testing.assert_allclose([b, d], [(u1 - u0) / 2 / h, (v1 - v0) / 2 / h], atol=2e-8)
+
+
+def test_plates_share_the_rigid_motion_only() -> None:
+    specimen = VirtualSpecimen(width=201, height=161, drift_px=(3.0, -2.0))
+    u, v = Optics(plates=((10, 20, 30, 40),)).seen(specimen, END).displacement([20.0, 100.0], [30.0, 120.0])
+    assert (u[0], v[0]) == pytest.approx((3.0, -2.0), abs=1e-12)
+    assert v[1] == pytest.approx(-2.0 + 40 * 8e-3, abs=1e-9)
+    _, clamped = (
+        Optics(plates=((10, 20, 30, 40),), plate_strain=0.5).seen(specimen, END).displacement(20.0, 30.0)
+    )
+    assert float(clamped) == pytest.approx(-2.0 - 50 * 0.5 * 8e-3, abs=1e-9)
+
+
+def test_a_rolling_shutter_shows_velocity_as_strain() -> None:
+    # 10 px/s, 33 ms, 1001 lines: 330 um/m, and 2 px/s across shear it by 66 um/m.
+    rolled = RolledShutter(lambda t: Affine(2.0 * t, 10.0 * t), 0.0, 0.033, 1001)
+    _, b, _, d = rolled.gradient([5.0, 7.0], [0.0, 900.0])
+    np.testing.assert_allclose(d, 330e-6, rtol=4e-4)
+    np.testing.assert_allclose(b, 66e-6, rtol=4e-4)
+    u, v = rolled.displacement(0.0, 1000.0)
+    assert (float(u), float(v)) == pytest.approx((0.033, 0.165), rel=1e-3)
+
+
+def test_the_back_sees_the_motion_from_behind() -> None:
+    moved = PlaneMotion(0.1, 0.001, 0.002)
+    front = seen(Optics(500.0, settling=moved), 50, 30)
+    back = seen(Optics(500.0, settling=moved, behind=True), -50, 30)
+    # The same place is nearer by what it was farther from the other side.
+    assert back[0] / -50 - 1 == pytest.approx(-(front[0] / 50 - 1), abs=8e-6)
+    assert front[1] / 30 - 1 == pytest.approx(200e-6 + 13e-6, abs=8e-6)
+    assert back[1] / 30 - 1 == pytest.approx(-213e-6, abs=8e-6)
+
+
+def test_the_picture_is_that_of_the_exact_road() -> None:
+    optics = Optics(500.0, 0.003, PlaneMotion(0, 0.01, 0.01), PlaneMotion(0.1, 0.002, 0.002), readout_s=0.03)
+    scene = Scene(VirtualSpecimen(width=96, height=80), optics=optics)
+    np.testing.assert_allclose(scene.render(8.0), scene.exact(8.0), atol=3e-4)
+
+
+@pytest.mark.parametrize("setting", ["plates=1,2,3", "plates=0,0,0,5", "plates=a,b,c,d", "side=top"])
+def test_impossible_views_are_refused(setting: str) -> None:
+    with pytest.raises(ConfigError, match=setting.partition("=")[0]):
+        take_optics(Options(parse_address(f"sim:?{setting}")))
+
+
+def test_all_keys_of_an_address() -> None:
+    keys = "stand_off_mm=500&distortion=0.3&tilt_x_deg=1&tilt_y_deg=2&settle_mm=0.1&settle_x_deg=3&settle_y_deg=4"
+    options = Options(
+        parse_address(f"sim:?{keys}&plates=1,2,3,4;5,6,7,8&plate_strain=0.5&readout_ms=33&side=back")
+    )
+    found = take_optics(options)
+    options.done()
+    one, two, three, four = (math.radians(angle) for angle in (1, 2, 3, 4))
+    assert found == Optics(
+        500.0,
+        0.003,
+        PlaneMotion(0, one, two),
+        PlaneMotion(0.1, three, four),
+        ((1, 2, 3, 4), (5, 6, 7, 8)),
+        0.5,
+        0.033,
+        True,
+    )

@@ -1,0 +1,72 @@
+"""Queues and histories of hours, in fast motion: what run, page and display keep grows by little, or not at all."""
+
+from __future__ import annotations
+
+import tracemalloc
+from dataclasses import replace
+
+import pytest
+
+from acquire.load_sample import LoadSample
+from live.pipeline.measurement import TimeStep
+from live.pipeline.run_state import RunState
+from live.ui.rerun.messages import ViewSetup
+from live.ui.rerun.outbox import Outbox, Pending
+from live.ui.rerun.wire import Kind
+from live.ui.web.curve_history import CurveHistory
+from tests.live.made_up import make_grid, make_measurement
+
+LOAD_HZ = 10
+STEP = make_measurement(0, 1e-3).time_step
+
+
+class Kept:
+    """All that is kept of each frame and of each load sample."""
+
+    def __init__(self) -> None:
+        self.run_state, self.curve = RunState.new(0.25), CurveHistory(["t", "force", "axial", "exx"])
+        self.pending = Pending()
+        self.outbox = Outbox(ViewSetup("long", 640, 480, 8, make_grid(), 0.0), self.pending)
+
+    def frame(self, t: float) -> None:
+        step = changed(t)
+        self.run_state.history.add(step)
+        self.curve.add([t, 1e3 * t, step.exx, step.exx])
+        self.pending.row(Kind.MEANS, (t, step.exx, 1e-5, step.eyy, 1e-5, step.exy, 1e-5))
+        self.pending.row(Kind.POINTS, (step.exx, 1e3 * t))
+        while self.outbox.next(t) is not None:
+            pass
+
+    def load(self, t: float) -> None:
+        self.run_state.loads.append(LoadSample(t, 1e3 * t))
+        self.pending.row(Kind.LOADS, (t, 1e3 * t))
+
+
+def changed(t: float) -> TimeStep:
+    return replace(STEP, t=t, exx=1e-6 * t, eyy=2e-6 * t, force=1e3 * t, latency_s=1e-3 * t)
+
+
+@pytest.mark.parametrize(
+    ("hours", "fps"), [(10, 1), pytest.param(2, 30, marks=pytest.mark.slow)], ids=["1 fps", "30 fps"]
+)
+def test_memory_of_hours(hours: float, fps: int) -> None:
+    kept, frames, half = Kept(), round(hours * 3600 * fps), 0
+    every = max(fps // LOAD_HZ, 1)
+    tracemalloc.start()
+    try:
+        for i in range(frames):
+            kept.frame(i / fps)
+            if i % every == 0:
+                kept.load(i / fps)
+            if i == frames // 2:
+                half = tracemalloc.get_traced_memory()[0]
+        grown = tracemalloc.get_traced_memory()[0] - half
+    finally:
+        tracemalloc.stop()
+    assert len(kept.run_state.history.time_steps) == frames, "nothing is thinned that figures are from"
+    # 16 bytes a load sample; a list that grows has room for a sixteenth more.
+    assert grown / (frames / 2) < 1.07 * (160 + 16 / every) + 20
+    per_minute = grown / (hours * 60 / 2) / 2**20
+    assert per_minute < 0.3 * fps / 20
+    assert len(kept.curve.since(-1, 0)["rows"]) <= 4001
+    assert kept.pending.dropped == 0
