@@ -74,6 +74,8 @@ class Optics:
         From the first line of the picture to the last; a frame is stamped at its middle line.
     behind : bool
         The camera looks at the back.
+    bending : float
+        Strain of the front over the mean of both sides, less 1; the back has as much less.
     """
 
     stand_off_mm: float = math.inf
@@ -84,6 +86,7 @@ class Optics:
     plate_strain: float = 0.0
     readout_s: float = 0.0
     behind: bool = False
+    bending: float = 0.0
 
     @property
     def plain(self) -> bool:
@@ -100,6 +103,9 @@ class Optics:
         most = float(specimen.force(specimen.duration_s))
         share = float(specimen.force(t)) / most if most > 0 else 0.0
         motion, flat = self.still.plus(self.settling, share), specimen.at(t)
+        if self.bending:
+            side = 1 - self.bending if self.behind else 1 + self.bending
+            flat = replace(flat, axial=side * flat.axial, transverse=side * flat.transverse)
         if self.behind:
             motion = PlaneMotion(-motion.towards_mm, -motion.tilt_x, motion.tilt_y)
             flat = replace(flat, angle=-flat.angle, shift=(-flat.shift[0], flat.shift[1]))
@@ -279,6 +285,7 @@ def take_optics(options: Options) -> Optics:
         plate_strain=options.number("plate_strain", 0.0, minimum=-1, maximum=2),
         readout_s=options.number("readout_ms", 0.0, minimum=0, maximum=1000) * 1e-3,
         behind=options.choice("side", ("front", "back"), "front") == "back",
+        bending=options.number("bending", 0.0, minimum=-100, maximum=100) / 100,
     )
 
 

@@ -152,6 +152,7 @@ class SimCamera(Closing):
         self._thread: threading.Thread | None = None
         self._error: Exception | None = None
         self._last_index, self._trouble = -1, ""
+        self._entered_s = 0.0
         self.dropped = 0
         self.info = self._describe(address)
         specimen.clock.claimed = True
@@ -203,7 +204,8 @@ class SimCamera(Closing):
 
     def __enter__(self) -> Self:
         if self._thread is None and not self._stopped.is_set():
-            self.specimen.clock.begin(self._settings.offset_s if self.specimen.nominal else self._clock())
+            now = self._settings.offset_s if self.specimen.nominal else self._clock()
+            self._entered_s = now - self.specimen.clock.begin(now)  # 0, unless another camera began the test
             if not self.specimen.nominal:
                 self._thread = threading.Thread(target=self._work, name="sim-camera", daemon=True)
                 self._thread.start()
@@ -261,7 +263,10 @@ class SimCamera(Closing):
             for planned in self._plan:
                 if self._stopped.is_set():
                     break
-                self._serve(planned)
+                if planned.t < self._entered_s:
+                    self._last_index = planned.index
+                else:
+                    self._serve(planned)
         except Exception as error:
             log.exception("the simulated camera failed")
             self._error = error
@@ -321,7 +326,8 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
     (% of full scale at mid-grey), fpn (%), brightness, exposure_us, radius (px), contrast (%), seed,
     buffers, offset (s), faults. Of the view (``hw_mocks.optics``): stand_off_mm (none: telecentric), distortion
     (% at the corner), tilt_x_deg, tilt_y_deg, settle_mm, settle_x_deg, settle_y_deg (reached at the largest load),
-    plates (x,y,width,height;...), plate_strain, readout_ms, side (front or back).
+    plates (x,y,width,height;...), plate_strain, readout_ms, side (front or back), bending (%: strain of the front
+    over the mean, less 1).
 
     Raises
     ------

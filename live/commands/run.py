@@ -7,19 +7,20 @@ import contextlib
 import queue
 import sys
 import webbrowser
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from live.commands.consumers import standard_consumers
 from live.commands.exit_codes import EXIT_WORDS
-from live.commands.options import add_measure, add_options, configured
+from live.commands.options import add_measure, add_options, configured, overrides
 from live.commands.signals import signals
 from live.config.loading import Config
+from live.config.sides import side_configs
 from live.pipeline.consumer import Consumer
 from live.pipeline.screen import Screen
 from live.results.folder import check_folder
 from live.run.alarms import check_alarms
-from live.run.control import ControlPort
+from live.run.control import ControlPort, Controls
 from live.run.keyboard import listen
 from live.run.live_run import INTERRUPTED, LiveRun, run_live
 from live.run.outcome import Outcome, StopSignal
@@ -32,7 +33,7 @@ from live.ui.terminal.summary import print_summary, trouble_lines
 if TYPE_CHECKING:
     from live.ui.web.page_controller import PageController
 
-RECORDING = ("camera", "load", "no-record", "record", "armed", "start-above", "dark", "flat", "crop")
+RECORDING = ("camera", "back", "load", "no-record", "record", "armed", "start-above", "dark", "flat", "crop")
 VIEWER_OPENS_S = 1.5  # a viewer that cannot open ends sooner
 OTHER_PROGRAMS = ("orders", "strain-out", "strain-format", "strain-channels", "token-file")
 
@@ -54,6 +55,10 @@ def command(arguments: argparse.Namespace) -> int:
     check_alarms(config)
     check_folder(config.output.dir)
     check_load_port(config.load.address)
+    if config.camera.back is not None:
+        from live.commands.two_cameras import run_sides
+
+        return run_sides(side_configs(config, overrides(arguments)), screen)
     with located(config, screen.print) as config:
         outcome = run_and_show_page(config, screen) if arguments.page else run_attended(config, screen)
     if not arguments.page:
@@ -106,24 +111,34 @@ def run_attended(
     attend: Callable[[LiveRun], None] = lambda live: None,
 ) -> Outcome:
     """Run with signals, keyboard and remote commands; ``attend`` may add controls of its own."""
-    stop, ports = StopSignal(), config.operate
+    stop, made = StopSignal(), standard_consumers(screen, consumers)
+    with attended(config, screen, stop) as attach:
+
+        def on_start(live: LiveRun) -> None:
+            attach(live)
+            attend(live)
+
+        return run_live(config, screen, stop=stop, consumers=made, on_start=on_start)
+
+
+@contextlib.contextmanager
+def attended(config: Config, screen: Screen, stop: StopSignal) -> Iterator[Callable[[Controls], None]]:
+    """Signals end a test by ``stop``; what is yielded attaches keyboard and remote commands to one that has begun."""
+    ports = config.operate
     with contextlib.ExitStack() as stack:
         port = ControlPort(ports.orders, ports.token_file, screen) if ports.orders else None
 
-        def on_start(live: LiveRun) -> None:
-            keyboard = listen(live, sys.stdin, screen)
+        def attach(controls: Controls) -> None:
+            keyboard = listen(controls, sys.stdin, screen)
             if keyboard is not None:
                 stack.callback(keyboard.close)
             if port is not None:
-                port.open(live)
-            attend(live)
+                port.open(controls)
 
         if port is not None:
             stack.callback(port.close)
         stack.enter_context(signals(lambda: stop.request(INTERRUPTED), screen.print))
-        return run_live(
-            config, screen, stop=stop, consumers=standard_consumers(screen, consumers), on_start=on_start
-        )
+        yield attach
 
 
 def print_outcome(outcome: Outcome, screen: Screen, *, verbose: bool = False) -> None:

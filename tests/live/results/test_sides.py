@@ -64,7 +64,7 @@ def test_the_mean_has_neither_bending_nor_motion(tmp_path: Path, monkeypatch: py
     front, back = runs(tmp_path, monkeypatch, config)
     with open_run(front) as one, open_run(back) as other:
         assert other.start_monotonic - one.start_monotonic == pytest.approx(LATER_S)
-        sides = SidesOfTest.of(one, other)
+        sides = SidesOfTest.of_folders(one, other)
     axial = sides.courses["axial"]
     for values, share in ((axial.mean, 1.0), (axial.bending, BENT + TOWARDS)):
         rest = values - share * truth
@@ -98,6 +98,6 @@ def test_what_is_not_of_one_test_is_refused(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr(made_run, "START", made_run.START + 500.0)
     elsewhere = make_run(tmp_path / "elsewhere")
     with open_run(front) as one, open_run(without) as other, pytest.raises(DataError, match="no recording"):
-        SidesOfTest.of(one, other)
+        SidesOfTest.of_folders(one, other)
     with open_run(front) as one, open_run(elsewhere) as other, pytest.raises(DataError, match="500 s apart"):
-        SidesOfTest.of(one, other)
+        SidesOfTest.of_folders(one, other)
