@@ -46,8 +46,9 @@ class SharedLoadCell:
     def stop(self, reader: LoadReader) -> None:
         """``reader`` needs no more samples."""
         with self._lock:
+            last = self._reading == {reader}
             self._reading.discard(reader)
-            if not self._reading:
+            if last:
                 self.cell.stop()
 
     def close(self, reader: LoadReader) -> None:

@@ -18,6 +18,9 @@ _BROKEN = 0.02  # of the highest stress: below it there is no specimen any more
 _FALL = 5.0  # times what is usual from one sample to the next
 _PARTS, _WIDEST = 60, 4  # of a loading: half the width of its running means, and the most, samples
 _MEDIAN_OF_NORMAL = 0.6745
+TILT = math.radians(0.1)
+"""Of the specimen beside one of two cameras that face one another; both then see it short by half its square."""
+_SIGMA_OF_TILT = TILT**2 / 2 / math.sqrt(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -284,7 +287,7 @@ class TwoSides:
     bending : (N,) float64
         Strain of the front minus the mean: positive where the front is the longer side.
     sigma : (N,) float64
-        Standard uncertainty of either; the noise of the cameras is independent.
+        Standard uncertainty of either: the noise of the cameras, which is independent, and a tilt of up to 0.1 degree.
     """
 
     t: Floats
@@ -296,5 +299,5 @@ class TwoSides:
     def of(cls, front: Course, back: Course, max_gap_s: float) -> TwoSides:
         """Mean and bending; NaN where either side is not known."""
         other = back.at(front.t, max_gap_s)
-        sigma = np.hypot(front.sigma, other.sigma) / 2
+        sigma = np.hypot(np.hypot(front.sigma, other.sigma) / 2, _SIGMA_OF_TILT)
         return cls(front.t, (front.value + other.value) / 2, (front.value - other.value) / 2, sigma)

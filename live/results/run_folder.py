@@ -31,6 +31,7 @@ from analysis.field import PAIR_INDEX, WINDOWS, Measure, StrainField, Window
 from live.config.gauges import gauges_for
 from live.config.loading import from_dict, load_config
 from live.config.sections import SpecimenConfig
+from live.config.sides import SIDES
 from live.pipeline.history import curve_of
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.results.pictures import Image, Pictures, of_images, of_session
@@ -296,17 +297,13 @@ class RunFolder(Closing):
 
 
 def open_run(path: str | os.PathLike[str]) -> RunFolder:
-    """Open the folder of a run, or a ``strain.h5`` in it.
-
-    Raises
-    ------
-    DataError
-        There is no ``strain.h5``, or it cannot be read.
-    """
+    """Open the folder of a run, or a ``strain.h5`` in it; raises DataError where there is none that can be read."""
     path = Path(path)
     file = path / STRAIN if path.is_dir() else path
     if not file.exists():
-        raise DataError(f"{path}: no {STRAIN} there; give the folder that phasedic run or replay wrote")
+        sides = [path / side for side in SIDES if (path / side / STRAIN).exists()]
+        wanted = sides[0] if sides else "the folder that phasedic run or replay wrote"
+        raise DataError(f"{path}: no {STRAIN} there; give {wanted}")
     return RunFolder(file.parent, Strain.open(file))
 
 

@@ -23,7 +23,7 @@ from live.config.sides import SIDES
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.pipeline.run_state import RunState
 from live.results.figures import headline, tensile_options
-from live.results.run_folder import STRAIN, RunFolder
+from live.results.run_folder import SESSION, STRAIN, RunFolder
 
 LONGEST_GAP = 5.0  # times the usual distance of the instants of the back
 CLOCKS_AGREE_S = 2.0  # the clock of the day may have been set in between
@@ -181,9 +181,9 @@ def shift_s(front: RunFolder, back: RunFolder) -> float:
     DataError
         A recording is missing, or they are of different machines: the two clocks of each disagree.
     """
-    if front.strain.start_utc == back.strain.start_utc:
-        return 0.0
     for run in (front, back):
+        if run.session is None and front.strain.start_utc == back.strain.start_utc:
+            return 0.0
         if run.session is None:
             raise DataError(f"{run.path}: no recording, whose clock is needed; give the folders of two runs")
     by_machine = back.start_monotonic - front.start_monotonic
@@ -230,6 +230,11 @@ def _mean_of(front: Curve, back: Curve) -> Curve:
 def has_sides(folder: Path) -> bool:
     """Whether ``folder`` is that of a test with two cameras."""
     return not (folder / STRAIN).exists() and all((folder / side / STRAIN).is_file() for side in SIDES)
+
+
+def has_recorded_sides(folder: Path) -> bool:
+    """Whether ``folder`` has the recordings of both sides."""
+    return all((folder / side / SESSION).is_file() for side in SIDES)
 
 
 def write_sides(sides: SidesOfTest, file: TextIO) -> None:

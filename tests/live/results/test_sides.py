@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Mapping
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +17,7 @@ from analysis.evaluate import Course, TwoSides, evaluate_test
 from live.cli import main
 from live.results.figures import tensile_options
 from live.results.run_folder import open_run
-from live.results.sides import SidesOfTest
+from live.results.sides import SidesOfTest, shift_s
 from tests.live import made_run
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run, noisy
 
@@ -52,7 +54,10 @@ def test_mean_bending_and_their_sigma() -> None:
     both = TwoSides.of(front, back, 2.0)
     assert both.mean.tolist() == [100, 100, 100]
     assert both.bending.tolist() == [10, 10, 10]
-    assert both.sigma.tolist() == [2.5, 2.5, 2.5]
+    assert both.sigma.tolist() == pytest.approx([2.5, 2.5, 2.5])
+    exact = Course(t, t, np.zeros(3))
+    # Both see cos(0.1 degree): short by 1.5 um/m at most.
+    assert TwoSides.of(exact, exact, 2.0).sigma == pytest.approx(1.523e-6 / math.sqrt(3), rel=1e-3)
 
 
 def test_the_mean_has_neither_bending_nor_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,9 +99,13 @@ def test_the_command_writes_a_table(
 
 def test_what_is_not_of_one_test_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     front = make_run(tmp_path / "front")
+    same = make_run(tmp_path / "same", session=False)  # by its time: of one run with two cameras
+    monkeypatch.setattr(made_run, "START", made_run.START + 501.0)
+    monkeypatch.setattr(made_run, "UTC_START", made_run.UTC_START + timedelta(seconds=1))
     without = make_run(tmp_path / "without", session=False)
-    monkeypatch.setattr(made_run, "START", made_run.START + 500.0)
     elsewhere = make_run(tmp_path / "elsewhere")
+    with open_run(front) as one, open_run(same) as other:
+        assert shift_s(one, other) == 0
     with open_run(front) as one, open_run(without) as other, pytest.raises(DataError, match="no recording"):
         SidesOfTest.of_folders(one, other)
     with open_run(front) as one, open_run(elsewhere) as other, pytest.raises(DataError, match="500 s apart"):
