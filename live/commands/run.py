@@ -58,7 +58,7 @@ def command(arguments: argparse.Namespace) -> int:
     if config.camera.back is not None:
         from live.commands.two_cameras import run_sides
 
-        return run_sides(side_configs(config, overrides(arguments)), screen)
+        return run_sides(side_configs(config, overrides(arguments)), screen, page=arguments.page)
     with located(config, screen.print) as config:
         outcome = run_and_show_page(config, screen) if arguments.page else run_attended(config, screen)
     if not arguments.page:

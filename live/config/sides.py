@@ -43,8 +43,8 @@ def side_configs(config: Config, overrides: Mapping[str, Any]) -> dict[str, Conf
 
 
 def _of_address(front: Config, address: str) -> Config:
-    """Plates and mask of the front are at other places in this picture; so they are left out."""
-    measure = replace(front.measure, mask=None)
+    """Plates and mask of the front are at other places in this picture: the specimen is found again."""
+    measure = front.measure if front.measure.mask is None else replace(front.measure, mask=None, roi=None)
     return replace(front, camera=CameraConfig(address=address), measure=measure, plate={})
 
 

@@ -79,6 +79,11 @@ class BothRuns:
         return [run for _, run in every if run.grabber.running] or [run for _, run in every]
 
     @property
+    def states(self) -> dict[str, RunState]:
+        """Of each side."""
+        return {name: run.run_state for name, run in self.runs.items()}
+
+    @property
     def paused(self) -> bool:
         """Whether measuring is paused."""
         return self._running[0].paused
