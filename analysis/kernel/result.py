@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis.field import Motion, Status, StrainField, stretched
 from analysis.field.picture_error import LIMIT, PictureError
 from analysis.follow.renewal import UNSHARED, Placement
-from analysis.kernel.coloured import BLUR, coloured_bias, error_cause
+from analysis.kernel.coloured import BLUR, coloured_bias, error_cause, leaves_white
 from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]
@@ -132,6 +132,8 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
         blurred = abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR
         # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
         colour = np.maximum(common.colour, 1) if blurred else common.colour
+        if common.is_as_given and colour.max() > 1 and leaves_white(solution, ok):
+            colour = white  # a strain that bends within the ZOIs shows in the shapes, too
         whole = common.ratio * solution.expected(np.s_[:], gain)
         return _Noise(
             *_parted(whole, reference * gain**2, gain, solution),

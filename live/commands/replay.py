@@ -27,8 +27,11 @@ if TYPE_CHECKING:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic replay``."""
-    words = "session.h5, a folder (of pictures, or of a test with two cameras), 'files:shots/*.tif' or 'video:file.mp4'"
-    parser.add_argument("source", help=words)
+    parser.add_argument(
+        "source",
+        help="folder of a run (of one camera or two), session.h5, pictures in a folder, 'files:shots/*.tif' or"
+        " 'video:file.mp4'",
+    )
     add_as_measured(parser)
     add_time_span(parser)
     parser.add_argument("--reference", metavar="FILE", help="reference picture (default: the first)")
