@@ -32,8 +32,6 @@ from hw_mocks.specimen import VirtualSpecimen, take_specimen
 log = logging.getLogger(__name__)
 POLL_S = 0.1
 FORMATS = {8: "GREY", 10: "Y10", 12: "Y12", 16: "Y16"}
-
-
 AUTO_FPS = (30.0, 25.0, 20.0, 15.0, 10.0, 5.0)
 """What fps=auto chooses from."""
 RENDER_SHARE = 0.4
@@ -252,10 +250,7 @@ class SimCamera(Closing):
     def _numbered(self, frame: Frame) -> Frame:
         """The frame, knowing what was lost before it."""
         lost, self._last_index = frame.index - self._last_index - 1, frame.index
-        if not lost:
-            return frame
-        image, damaged = frame.image, frame.damaged
-        return Frame(image, frame.index, frame.t, frame.clock, lost, frame.bits, frame.raw_t, damaged)
+        return replace(frame, lost_before=lost) if lost else frame
 
     def _work(self) -> None:
         """The thread: each frame at its time into the ring."""
@@ -301,10 +296,8 @@ class SimCamera(Closing):
         return planned.fate in ("good", "damaged")
 
     def _shoot(self, planned: Planned) -> Frame:
-        image = self._exposer.expose(self._scene.render(planned.t))
-        damaged = planned.fate == "damaged"
-        if damaged:
-            image = _half(image)
+        image, damaged = self._exposer.expose(self._scene.render(planned.t)), planned.fate == "damaged"
+        image = _half(image) if damaged else image
         t = self._start() + planned.t
         raw = t if self.specimen.nominal else t + self._settings.exposure_s / 2
         return Frame(image, planned.index, t, self.info.clock, 0, self.info.bits, raw, damaged)

@@ -10,11 +10,12 @@ from typing import Any
 
 from acquire.errors import PhasedicError
 from acquire.printable import brief
+from live.commands.attended import open_page
 from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.init import find_devices
 from live.commands.options import OUTPUT, add_measure, add_options, overrides
 from live.commands.report import write_report
-from live.commands.run import OTHER_PROGRAMS, RECORDING, open_page, run_with_page
+from live.commands.run import OTHER_PROGRAMS, RECORDING, run_with_page
 from live.commands.signals import signals
 from live.config.loading import Config, load_config
 from live.config.sides import side_configs

@@ -46,7 +46,7 @@ def command(arguments: argparse.Namespace) -> int:
     from live.commands.report import write_report
     from live.replay.replay import replay
     from live.replay.source import ReplayRequest
-    from live.results.sides import has_recorded_sides
+    from live.results.sides.folder import has_recorded_sides
 
     request = ReplayRequest(
         source=arguments.source,

@@ -20,7 +20,7 @@ from live.results.report.report import Report, ReportRequest, make_report
 from live.results.report.saving import NO_BROWSER, find_browser, save_figures, save_page, save_pdf
 from live.results.report.sides import report_of_sides
 from live.results.run_folder import RunFolder, open_run
-from live.results.sides import has_sides
+from live.results.sides.folder import has_sides
 from live.ui.terminal.screen import TerminalScreen
 
 

@@ -5,28 +5,24 @@ from __future__ import annotations
 import argparse
 import contextlib
 import queue
-import sys
-import webbrowser
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from live.commands.attended import attended, open_page
 from live.commands.consumers import standard_consumers
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_measure, add_options, configured, overrides
-from live.commands.signals import signals
 from live.config.loading import Config
 from live.config.sides import side_configs
 from live.pipeline.consumer import Consumer
 from live.pipeline.screen import Screen
 from live.results.folder import check_folder
 from live.run.alarms import check_alarms
-from live.run.control import ControlPort, Controls
-from live.run.keyboard import listen
-from live.run.live_run import INTERRUPTED, LiveRun, run_live
+from live.run.live_run import LiveRun, run_live
 from live.run.outcome import Outcome, StopSignal
 from live.setup.devices import check_load_port
 from live.setup.region import located
-from live.ui.rerun.view import has_display, rerun_command, spawn_viewer
+from live.ui.rerun.view import rerun_command, spawn_viewer
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.terminal.summary import print_summary, trouble_lines
 
@@ -87,13 +83,6 @@ def run_with_page(controller: PageController, config: Config, screen: Screen) ->
     return outcome
 
 
-def open_page(controller: PageController, screen: Screen) -> None:
-    """Open the page if there is a display, and print its address."""
-    if has_display() and webbrowser.open(controller.address):
-        screen.print("the page opens in the browser")
-    screen.print(f"the page: {controller.address}")
-
-
 def _open_viewer(port: int) -> str:
     """Open the viewer in its own window; returns "ok", or "no: " and the reason."""
     trouble: queue.Queue[str] = queue.Queue()
@@ -119,26 +108,6 @@ def run_attended(
             attend(live)
 
         return run_live(config, screen, stop=stop, consumers=made, on_start=on_start)
-
-
-@contextlib.contextmanager
-def attended(config: Config, screen: Screen, stop: StopSignal) -> Iterator[Callable[[Controls], None]]:
-    """Signals end a test by ``stop``; what is yielded attaches keyboard and remote commands to one that has begun."""
-    ports = config.operate
-    with contextlib.ExitStack() as stack:
-        port = ControlPort(ports.orders, ports.token_file, screen) if ports.orders else None
-
-        def attach(controls: Controls) -> None:
-            keyboard = listen(controls, sys.stdin, screen)
-            if keyboard is not None:
-                stack.callback(keyboard.close)
-            if port is not None:
-                port.open(controls)
-
-        if port is not None:
-            stack.callback(port.close)
-        stack.enter_context(signals(lambda: stop.request(INTERRUPTED), screen.print))
-        yield attach
 
 
 def print_outcome(outcome: Outcome, screen: Screen, *, verbose: bool = False) -> None:

@@ -14,7 +14,7 @@ from live.pipeline.screen import Screen
 from live.ui.terminal.screen import TerminalScreen
 
 if TYPE_CHECKING:
-    from live.results.sides import SidesOfTest
+    from live.results.sides.together import SidesOfTest
 
 TABLE = "strain.csv"
 """Of both sides, in the folder of a test with two cameras."""
@@ -50,7 +50,7 @@ def put_together(front: Path, back: Path, out: Path, screen: Screen) -> None:
     """
     from live.results.export.atomic_file import new_file
     from live.results.run_folder import open_run
-    from live.results.sides import SidesOfTest, write_sides
+    from live.results.sides.together import SidesOfTest, write_sides
 
     with open_run(front) as one, open_run(back) as other:
         sides, stresses = SidesOfTest.of_folders(one, other), one.specimen.area_m2 is not None

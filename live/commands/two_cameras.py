@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from acquire.errors import PhasedicError
+from live.commands.attended import attended, open_page
 from live.commands.consumers import standard_consumers
 from live.commands.exit_codes import EXIT_WORDS, LOSS
-from live.commands.run import attended, open_page
 from live.commands.sides import TABLE, put_together
 from live.config.loading import Config
 from live.config.sides import BACK, FRONT

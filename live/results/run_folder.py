@@ -311,6 +311,7 @@ def open_run(path: str | os.PathLike[str]) -> RunFolder:
     file = path / STRAIN if path.is_dir() else path
     if not file.exists():
         sides = [path / side for side in SIDES if (path / side / STRAIN).exists()]
-        wanted = sides[0] if sides else "the folder that phasedic run or replay wrote"
-        raise DataError(f"{path}: no {STRAIN} there; give {wanted}")
+        if sides:
+            raise DataError(f"{path}: a test with two cameras; give the folder of one side, {sides[0]}")
+        raise DataError(f"{path}: no {STRAIN} there; give the folder that phasedic run or replay wrote")
     return RunFolder(file.parent, Strain.open(file))

@@ -22,7 +22,7 @@ from live.config.sides import side_configs
 from live.pipeline.screen import Screen
 from live.results.reader import Strain
 from live.results.run_folder import open_run
-from live.results.sides import SidesOfTest, newest
+from live.results.sides.together import SidesOfTest, newest
 from live.results.writer import write_results
 from live.run.control import ControlRefused
 from live.run.live_run import TIME_IS_OVER
@@ -138,7 +138,7 @@ def test_the_report_has_both_sides(good: Path, tmp_path: Path, capsys: pytest.Ca
     assert (folder / "sides.csv").read_bytes() == (good / "strain.csv").read_bytes()
     capsys.readouterr()
     assert main(["show", str(folder)]) == 4
-    assert f"give {folder / 'front'}" in capsys.readouterr().err
+    assert f"give the folder of one side, {folder / 'front'}" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("side", ["front", "back"])

@@ -36,7 +36,7 @@ class SidesScreen:
 
     def show(self, name: str, snapshot: Snapshot, words: str) -> None:
         """Renew the status line; ``snapshot`` is of the side ``name``."""
-        from live.results.sides import newest
+        from live.results.sides.together import newest
 
         self._snapshots[name] = snapshot
         sides = {side: self._snapshots[side] for side in SIDES if side in self._snapshots}

@@ -17,7 +17,8 @@ from analysis.evaluate import Course, TwoSides, evaluate_test
 from live.cli import main
 from live.results.figures import tensile_options
 from live.results.run_folder import open_run
-from live.results.sides import SidesOfTest, shift_s
+from live.results.sides.folder import shift_s
+from live.results.sides.together import SidesOfTest
 from tests.live import made_run
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run, noisy
 

@@ -9,8 +9,6 @@ import csv
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from datetime import datetime
-from pathlib import Path
 from typing import TextIO
 
 import numpy as np
@@ -23,10 +21,10 @@ from live.config.sides import SIDES
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.pipeline.run_state import RunState
 from live.results.figures import headline, tensile_options
-from live.results.run_folder import SESSION, STRAIN, RunFolder
+from live.results.run_folder import RunFolder
+from live.results.sides.folder import shift_s
 
 LONGEST_GAP = 5.0  # times the usual distance of the instants of the back
-CLOCKS_AGREE_S = 2.0  # the clock of the day may have been set in between
 _RECENT = 12  # time steps of each side that the newest instant of both is found in
 
 
@@ -173,30 +171,6 @@ def _recent(state: RunState) -> dict[str, Course]:
     return {name: Course(t, *np.array(values, np.float64).T) for name, values in pairs.items()}
 
 
-def shift_s(front: RunFolder, back: RunFolder) -> float:
-    """What to add to times of the back for times of the front, s; 0 where one run made both.
-
-    Raises
-    ------
-    DataError
-        A recording is missing, or they are of different machines: the two clocks of each disagree.
-    """
-    for run in (front, back):
-        if run.session is None and front.strain.start_utc == back.strain.start_utc:
-            return 0.0
-        if run.session is None:
-            raise DataError(f"{run.path}: no recording, whose clock is needed; give the folders of two runs")
-    by_machine = back.start_monotonic - front.start_monotonic
-    begun = (datetime.fromisoformat(run.strain.start_utc) for run in (back, front))
-    by_day = (next(begun) - next(begun)).total_seconds()
-    if abs(by_machine - by_day) > CLOCKS_AGREE_S:
-        raise DataError(
-            f"{front.path} and {back.path}: their clocks are {abs(by_machine - by_day):.0f} s apart; record both on one"
-            " machine, without a restart in between"
-        )
-    return by_machine
-
-
 def _at_the_front(front: Curve, back: Curve, gap: float) -> Curve:
     """The strains of the back over the stress of the front, at its instants."""
 
@@ -208,6 +182,7 @@ def _at_the_front(front: Curve, back: Curve, gap: float) -> Curve:
     return replace(
         back, t=front.t, strain=strain, stress=front.stress, transverse=moved(back.transverse),
         elastic=moved(back.elastic), uneven=moved(back.uneven), misfit=moved(back.misfit),
+        narrowing=moved(back.narrowing),
     )  # fmt: skip
 
 
@@ -221,20 +196,11 @@ def _mean_of(front: Curve, back: Curve) -> Curve:
 
     strain = (front.strain + back.strain) / 2
     transverse, elastic = mean(front.transverse, back.transverse), mean(front.elastic, back.elastic)
+    narrowing = mean(front.narrowing, back.narrowing)
     return Curve(
-        front.t, strain, front.stress, transverse, elastic,
+        front.t, strain, front.stress, transverse, elastic, narrowing=narrowing,
         source=f"mean of both sides: {front.source}", elastic_source=front.elastic_source,
     )  # fmt: skip
-
-
-def has_sides(folder: Path) -> bool:
-    """Whether ``folder`` is that of a test with two cameras."""
-    return not (folder / STRAIN).exists() and all((folder / side / STRAIN).is_file() for side in SIDES)
-
-
-def has_recorded_sides(folder: Path) -> bool:
-    """Whether ``folder`` has the recordings of both sides."""
-    return all((folder / side / SESSION).is_file() for side in SIDES)
 
 
 def write_sides(sides: SidesOfTest, file: TextIO) -> None:
