@@ -177,10 +177,23 @@ class RunFolder(Closing):
     @property
     def mm_per_px(self) -> float | None:
         """The scale that was configured; None where there is none."""
-        scale = self.section("scale").get("mm_per_px")
-        if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0 < scale < math.inf:
+        return self._number("scale", "mm_per_px") or None
+
+    @property
+    def stand_off_mm(self) -> float | None:
+        """Distance from the camera to the specimen, mm; None where it was not configured."""
+        return self._number("scale", "stand_off_mm") or None
+
+    @property
+    def readout_ms(self) -> float | None:
+        """Time of the rolling shutter, ms, 0 without one; None where it was not configured."""
+        return self._number("camera", "readout_ms")
+
+    def _number(self, section: str, key: str) -> float | None:
+        value = self.section(section).get(key)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < math.inf:
             return None
-        return float(scale)
+        return float(value)
 
     @property
     def title(self) -> str:

@@ -45,7 +45,9 @@ def report_of_sides(front: RunFolder, back: RunFolder, reports: dict[str, str]) 
         section("Curves", plots(figures)),
         section("Figures of the test", _figures(sides, stresses)),
         section("Strains at the end", _strains(sides)),
-        section("Budget of E of the mean", *budget_table(front, _evaluated(sides, stresses))),
+        section(
+            "Budget of E of the mean", *budget_table(front, _evaluated(sides, stresses), both_sides=True)
+        ),
         section("The sides", *links),
     ]
     return Report(page(f"{front.title}: phasedic report of two cameras", parts), figures)
