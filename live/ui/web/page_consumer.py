@@ -28,7 +28,7 @@ from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import Snapshot, peak_force
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.curve_history import CurveHistory
-from live.ui.web.map_view import MapView, gauge_shapes
+from live.ui.web.map_view import MapView, gauge_shapes, plate_shapes
 from live.ui.web.painting import as_jpeg, shrunk
 from live.ui.web.sides import SidesPanel
 
@@ -263,7 +263,8 @@ class PageConsumer(Consumer):
         elif frame is not None:
             height, width = frame.image.shape
             self.picture = as_jpeg(shrunk(frame.image, frame.bits)[0])
-            self._scale = {"width": width, "height": height, "gauges": gauge_shapes(self._config)}
+            shapes = gauge_shapes(self._config) | plate_shapes(self._config)
+            self._scale = {"width": width, "height": height, "gauges": shapes}
         self._shown += 1
 
 
