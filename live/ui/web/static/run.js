@@ -89,10 +89,10 @@ function showSides(sides) {
     rows.push([`${t("mean")}: ${one.name}`, strainText(one.mean, one.sigma)]);
     rows.push([t("front minus mean"), strainText(one.bending, one.sigma)]);
   }
-  for (const one of sides?.figures ?? []) rows.push([`${one.name}, ${t(one.side)}`, one.text]);
   for (const one of sides?.cameras ?? []) {
     rows.push([t(one.side), `${one.valid} / ${one.zois}, ${t("skipped")} ${one.skipped}, ${t("lost")} ${one.lost}`]);
   }
+  for (const one of sides?.figures ?? []) rows.push([`${one.name}, ${t(one.side)}`, one.text]);
   $("sides").hidden = !rows.length;
   fill($("sides"), rows, ([name, text]) => el("li", {}, el("span", { text: name }), el("b", { text })));
 }
