@@ -78,7 +78,10 @@ def beside_strain(solution: Solution, ok: NDArray[np.bool_]) -> float | None:
     free = 2 * left[..., 0].size
     explained = np.sum(left**2) - np.sum(rest**2) - free * noise
     excess = np.sum(left**2) - left.size * noise
-    if explained < max(EXPLAINED * excess, 3 * noise * (2 * free) ** 0.5) or not _is_white(_joined(rest)):
+    by_chance = 3 * noise * (2 * left.size) ** 0.5
+    if abs(excess) < by_chance:
+        return 1.0 if _is_white(_joined(left)) else None
+    if excess < 0 or explained < EXPLAINED * excess or not _is_white(_joined(rest)):
         return None
     return float(np.sum(rest**2) / (left.size - free) / noise)
 

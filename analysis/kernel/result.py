@@ -145,7 +145,8 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     if common is not None:
         colour, ratio = common.colour, common.ratio
         over = common.usual if ok.all() else float(np.median(ratio[ok]))
-        rest = beside_strain(solution, ok) if max(colour.max(), over) > DOUBTFUL else None
+        doubtful = max(colour.max(), over) > DOUBTFUL and not solution.had_lines
+        rest = beside_strain(solution, ok) if doubtful else None
         if rest is not None:
             over = 1.0 if solution.is_given and AGREES[0] < rest < AGREES[1] else rest
             colour, ratio = white, np.full(len(ok), over)
