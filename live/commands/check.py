@@ -71,6 +71,8 @@ def command(arguments: argparse.Namespace) -> int:
     if arguments.snapshot:
         require_new(Path(arguments.snapshot), *PICTURES)
     check_load_port(config.load.address)
+    if config.camera.back is not None:
+        screen.print(f"this checks the front; check the back on its own: {config.camera.back}")
     target = None if arguments.target is None else arguments.target * 1e-6
     if arguments.watch:
         with interrupts() as stop:

@@ -43,7 +43,7 @@ class BudgetRow:
 
 
 @dataclass(frozen=True, slots=True)
-class View:
+class CameraView:
     """What is known of a camera's view of the specimen.
 
     Attributes
@@ -63,13 +63,13 @@ class View:
     both_sides: bool = False
 
     @classmethod
-    def of(cls, camera: CameraConfig, scale: ScaleConfig, *, plates: bool) -> View:
+    def of(cls, camera: CameraConfig, scale: ScaleConfig, *, plates: bool) -> CameraView:
         """As configured."""
         return cls(scale.stand_off_mm, camera.readout_ms, plates)
 
 
 def budget_rows(
-    shares: Mapping[str, float], strain: float, modulus: float, view: View, *, stresses: bool
+    shares: Mapping[str, float], strain: float, modulus: float, view: CameraView, *, stresses: bool
 ) -> list[BudgetRow]:
     """The budget of E, the combined uncertainty last.
 
@@ -81,7 +81,7 @@ def budget_rows(
         End of the elastic interval.
     modulus : float
         E in any unit.
-    view : View
+    view : CameraView
     stresses : bool
         The section is known.
     """
@@ -97,7 +97,7 @@ def budget_rows(
     return [*rows, *optics, BudgetRow("combined", combined * strain, combined * modulus)]
 
 
-def _optics(view: View, *, stated: bool) -> Iterator[tuple[str, str]]:
+def _optics(view: CameraView, *, stated: bool) -> Iterator[tuple[str, str]]:
     """What the view adds to strains, in words: removed, in the row strain where that is ``stated``, or not counted."""
     yield "motion off the plane", _motion(view, stated=stated)
     yield "lens", "in strain" if stated else "not stated: specimen.strain_error_um_m"
@@ -105,7 +105,7 @@ def _optics(view: View, *, stated: bool) -> Iterator[tuple[str, str]]:
     yield "rolling shutter", shutter if view.readout_ms != 0 else "none"
 
 
-def _motion(view: View, *, stated: bool) -> str:
+def _motion(view: CameraView, *, stated: bool) -> str:
     if view.both_sides:
         return "not in the mean of both sides"
     if view.plates:

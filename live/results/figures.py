@@ -29,7 +29,7 @@ from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
 from live.pipeline.measurement import AXIAL
-from live.results.budget import BudgetRow, View, budget_rows
+from live.results.budget import BudgetRow, CameraView, budget_rows
 
 HEADLINE = ("E", "nu", "Rp02", "Rm")
 """The figures that are shown first, and compared between tests."""
@@ -156,7 +156,7 @@ def _times(value: float | None, unit: float) -> float | None:
     return None if value is None else unit * value
 
 
-def budget_of(figures: TensileFigures, view: View, *, stresses: bool) -> list[BudgetRow]:
+def budget_of(figures: TensileFigures, view: CameraView, *, stresses: bool) -> list[BudgetRow]:
     """The budget of E; empty where E is not known. ``stresses``: the section is known."""
     if figures.span is None or not figures.budget:
         return []

@@ -10,7 +10,7 @@ import numpy as np
 from acquire.errors import DataError
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
-from live.results.budget import View
+from live.results.budget import CameraView
 from live.results.figures import axis_text, budget_of, figure_lines, headline, sharpness_line
 from live.results.report import curves
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
@@ -251,7 +251,7 @@ def _sharpness_section(run: RunFolder) -> list[Html]:
 
 def budget_table(run: RunFolder, curve: EvaluatedCurve, *, both_sides: bool = False) -> list[Html]:
     """What the interval of E is made of, and what is not stated; ``both_sides``: of the mean of front and back."""
-    view = View(run.stand_off_mm, run.readout_ms, bool(run.section("plate")), both_sides)
+    view = CameraView(run.stand_off_mm, run.readout_ms, bool(run.section("plate")), both_sides)
     rows = budget_of(curve.figures, view, stresses=curve.is_stress)
     if not rows:
         return [paragraph("E is not known, so it has no budget.", "open")]

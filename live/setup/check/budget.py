@@ -6,7 +6,7 @@ import math
 
 from live.config.loading import Config
 from live.pipeline.measurement import AXIAL
-from live.results.budget import View, budget_rows
+from live.results.budget import CameraView, budget_rows
 from live.results.figures import tensile_options
 from live.setup.check.check_list import CheckFigures
 
@@ -23,7 +23,7 @@ def budget_lines(figures: CheckFigures, config: Config) -> list[str]:
     interval = options.standard.interval
     strain = interval.high if interval.by == "strain" else ELASTIC
     shares = {"scatter": noise / strain, **options.limits.shares(strain)}
-    view = View.of(config.camera, config.scale, plates=bool(config.plate))
+    view = CameraView.of(config.camera, config.scale, plates=bool(config.plate))
     rows = budget_rows(shares, strain, 100.0, view, stresses=config.specimen.area_m2 is not None)
     head = f"budget of E, standard uncertainties, at a strain of {strain:.2%} (scatter: of one value)"
     found = [head, f"  {'':<22} {'µm/m':>8} {'% of E':>8}"]

@@ -15,7 +15,7 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.run_state import FrameCounts, RunState
-from live.results.budget import View, budget_rows
+from live.results.budget import CameraView, budget_rows
 from live.results.figures import alignment_line, budget_of, elastic_lines, evaluate, figure_lines, lag_line
 from live.results.summary import summary_lines
 from tests.analysis.curves import Truth, composite, noisy, ramberg_osgood
@@ -73,7 +73,7 @@ def test_the_interval_of_e_names_the_limits_in_it() -> None:
     stated = replace(FLAT, force_error_percent=1.0, strain_error_um_m=200.0)
     figures = evaluate(history, loads, stated)
     assert "interval, of E with limits of load cell, strain)" in figure_lines(figures, stated)[0]
-    *rows, combined = budget_of(figures, View(), stresses=True)
+    *rows, combined = budget_of(figures, CameraView(), stresses=True)
     optics = ["motion off the plane", "lens", "rolling shutter"]
     assert [row.cause for row in rows] == ["scatter", "load cell", "section", "strain", *optics]
     assert figures.span is not None
@@ -86,21 +86,21 @@ def test_the_interval_of_e_names_the_limits_in_it() -> None:
     )
     assert figures.E.high - figures.E.value == pytest.approx(1.96 * combined.modulus, rel=1e-2)
     forces = replace(stated, width_mm=None, thickness_mm=None, section_error_percent=1.0)
-    found = budget_of(evaluate(history, loads, forces), View(), stresses=False)
+    found = budget_of(evaluate(history, loads, forces), CameraView(), stresses=False)
     assert [row.cause for row in found] == ["scatter", "load cell", "strain", *optics, "combined"]
 
 
 @pytest.mark.parametrize(
     ("view", "stated", "words"),
     [
-        (View(), False, "not stated: scale.stand_off_mm"),
-        (View(500.0), False, "not counted: 0.1 mm at 500 mm is 200 µm/m"),
-        (View(500.0), True, "in strain"),
-        (View(500.0, plates=True), True, "removed by plates; their noise is in scatter"),
-        (View(500.0, both_sides=True), False, "not in the mean of both sides"),
+        (CameraView(), False, "not stated: scale.stand_off_mm"),
+        (CameraView(500.0), False, "not counted: 0.1 mm at 500 mm is 200 µm/m"),
+        (CameraView(500.0), True, "in strain"),
+        (CameraView(500.0, plates=True), True, "removed by plates; their noise is in scatter"),
+        (CameraView(500.0, both_sides=True), False, "not in the mean of both sides"),
     ],
 )
-def test_what_the_budget_says_of_motion_off_the_plane(view: View, stated: bool, words: str) -> None:
+def test_what_the_budget_says_of_motion_off_the_plane(view: CameraView, stated: bool, words: str) -> None:
     shares = {"scatter": 0.003} | ({"strain": 0.004} if stated else {})
     rows = {row.cause: row for row in budget_rows(shares, 1e-3, 70.0, view, stresses=True)}
     assert rows["motion off the plane"].words == words
@@ -110,7 +110,7 @@ def test_what_the_budget_says_of_motion_off_the_plane(view: View, stated: bool, 
 
 def test_the_budget_names_the_shutter() -> None:
     for readout, words in ((None, "not stated: camera.readout_ms"), (0.0, "none"), (33.0, "removed")):
-        rows = budget_rows({"scatter": 0.1}, 1e-3, 1.0, View(readout_ms=readout), stresses=False)
+        rows = budget_rows({"scatter": 0.1}, 1e-3, 1.0, CameraView(readout_ms=readout), stresses=False)
         assert next(row.words for row in rows if row.cause == "rolling shutter") == words
 
 
