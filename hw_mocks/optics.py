@@ -76,6 +76,8 @@ class Optics:
         The camera looks at the back.
     flicker, lamp_Hz : float, Hz
         Amplitude of the light over its mean, as the exposure leaves it, and its frequency.
+    bending : float
+        Strain of the front over the mean of both sides, less 1; the back has as much less.
     """
 
     stand_off_mm: float = math.inf
@@ -88,6 +90,8 @@ class Optics:
     behind: bool = False
     flicker: float = 0.0
     lamp_Hz: float = 100.0
+
+    bending: float = 0.0
 
     def light(self, t: float, height: int) -> Array:
         """The light on each line of a picture stamped ``t`` (s), (H, 1), over its mean."""
@@ -109,6 +113,9 @@ class Optics:
         most = float(specimen.force(specimen.duration_s))
         share = float(specimen.force(t)) / most if most > 0 else 0.0
         motion, flat = self.still.plus(self.settling, share), specimen.at(t)
+        if self.bending:
+            side = 1 - self.bending if self.behind else 1 + self.bending
+            flat = replace(flat, axial=side * flat.axial, transverse=side * flat.transverse)
         if self.behind:
             motion = PlaneMotion(-motion.towards_mm, -motion.tilt_x, motion.tilt_y)
             flat = replace(flat, angle=-flat.angle, shift=(-flat.shift[0], flat.shift[1]))
@@ -290,6 +297,7 @@ def take_optics(options: Options) -> Optics:
         flicker=options.number("flicker", 0.0, minimum=0, maximum=50) / 100,
         lamp_Hz=options.number("lamp_hz", 100.0, minimum=1, maximum=1e5),
         behind=options.choice("side", ("front", "back"), "front") == "back",
+        bending=options.number("bending", 0.0, minimum=-100, maximum=100) / 100,
     )
 
 

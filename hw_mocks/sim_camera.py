@@ -32,8 +32,6 @@ from hw_mocks.specimen import VirtualSpecimen, take_specimen
 log = logging.getLogger(__name__)
 POLL_S = 0.1
 FORMATS = {8: "GREY", 10: "Y10", 12: "Y12", 16: "Y16"}
-
-
 AUTO_FPS = (30.0, 25.0, 20.0, 15.0, 10.0, 5.0)
 """What fps=auto chooses from."""
 RENDER_SHARE = 0.4
@@ -152,6 +150,7 @@ class SimCamera(Closing):
         self._thread: threading.Thread | None = None
         self._error: Exception | None = None
         self._last_index, self._trouble = -1, ""
+        self._entered_s = 0.0
         self.dropped = 0
         self.info = self._describe(address)
         specimen.clock.claimed = True
@@ -203,7 +202,8 @@ class SimCamera(Closing):
 
     def __enter__(self) -> Self:
         if self._thread is None and not self._stopped.is_set():
-            self.specimen.clock.begin(self._settings.offset_s if self.specimen.nominal else self._clock())
+            now = self._settings.offset_s if self.specimen.nominal else self._clock()
+            self._entered_s = now - self.specimen.clock.begin(now)  # 0, unless another camera began the test
             if not self.specimen.nominal:
                 self._thread = threading.Thread(target=self._work, name="sim-camera", daemon=True)
                 self._thread.start()
@@ -250,10 +250,7 @@ class SimCamera(Closing):
     def _numbered(self, frame: Frame) -> Frame:
         """The frame, knowing what was lost before it."""
         lost, self._last_index = frame.index - self._last_index - 1, frame.index
-        if not lost:
-            return frame
-        image, damaged = frame.image, frame.damaged
-        return Frame(image, frame.index, frame.t, frame.clock, lost, frame.bits, frame.raw_t, damaged)
+        return replace(frame, lost_before=lost) if lost else frame
 
     def _work(self) -> None:
         """The thread: each frame at its time into the ring."""
@@ -261,7 +258,10 @@ class SimCamera(Closing):
             for planned in self._plan:
                 if self._stopped.is_set():
                     break
-                self._serve(planned)
+                if planned.t < self._entered_s:
+                    self._last_index = planned.index
+                else:
+                    self._serve(planned)
         except Exception as error:
             log.exception("the simulated camera failed")
             self._error = error
@@ -296,10 +296,8 @@ class SimCamera(Closing):
         return planned.fate in ("good", "damaged")
 
     def _shoot(self, planned: Planned) -> Frame:
-        image = self._exposer.expose(self._scene.render(planned.t))
-        damaged = planned.fate == "damaged"
-        if damaged:
-            image = _half(image)
+        image, damaged = self._exposer.expose(self._scene.render(planned.t)), planned.fate == "damaged"
+        image = _half(image) if damaged else image
         t = self._start() + planned.t
         raw = t if self.specimen.nominal else t + self._settings.exposure_s / 2
         return Frame(image, planned.index, t, self.info.clock, 0, self.info.bits, raw, damaged)
@@ -321,7 +319,8 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
     (% of full scale at mid-grey), fpn (%), brightness, exposure_us, radius (px), contrast (%), seed,
     buffers, offset (s), faults. Of the view (``hw_mocks.optics``): stand_off_mm (none: telecentric), distortion
     (% at the corner), tilt_x_deg, tilt_y_deg, settle_mm, settle_x_deg, settle_y_deg (reached at the largest load),
-    plates (x,y,width,height;...), plate_strain, readout_ms, flicker (%), lamp_hz, side.
+    plates (x,y,width,height;...), plate_strain, readout_ms, flicker (%), lamp_hz, side (front or back),
+    bending (%: strain of the front over the mean, less 1).
 
     Raises
     ------

@@ -97,7 +97,8 @@ def create_file(path: Path, declare: Callable[[h5py.File], object]) -> h5py.File
     OSError
         It cannot be written; nothing is left of it.
     """
-    with h5py.File(path.name, "w", libver=_BOUNDS, driver="core", backing_store=False) as head:
+    # In memory under its whole path: HDF5 refuses two files of one name, as two threads may make.
+    with h5py.File(str(path), "w", libver=_BOUNDS, driver="core", backing_store=False) as head:
         declare(head)
         head.flush()
         content = head.id.get_file_image()

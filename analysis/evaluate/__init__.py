@@ -7,7 +7,7 @@ and the noise floor in it. ``deconvolution`` removes the blur of the ZOI from a 
 """
 
 from analysis.evaluate.area.strain import AreaStrain, Unevenness
-from analysis.evaluate.curve import Curve, true_curve
+from analysis.evaluate.curve import Course, Curve, TwoSides, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import ErrorLimits, LoadAxis, load_axis, principal_direction
 from analysis.evaluate.figure import CONFIDENCE, Figure
@@ -37,6 +37,7 @@ __all__ = [
     "AreaStrain",
     "Band",
     "CircleGauge",
+    "Course",
     "Curve",
     "ErrorLimits",
     "ExtensionGauge",
@@ -57,6 +58,7 @@ __all__ = [
     "TensileOptions",
     "Track",
     "TransverseGauge",
+    "TwoSides",
     "Unevenness",
     "ZeroBy",
     "ZoiGauge",

@@ -1,8 +1,8 @@
 """The stress-strain curve of a test and what is read from noisy values over time.
 
 A curve has a part that can be evaluated (``Loading``), a break and true stresses. Its series of values have noise, a
-running mean, and a value between samples. Arrays in, arrays out; nothing is corrected here. Strain is dimensionless,
-stress in Pa (or any multiple of the force), tension positive.
+running mean, and a value between samples; those of front and back are put together. Arrays in, arrays out; nothing is
+corrected here. Strain is dimensionless, stress in Pa (or any multiple of the force), tension positive.
 """
 
 from __future__ import annotations
@@ -18,6 +18,9 @@ _BROKEN = 0.02  # of the highest stress: below it there is no specimen any more
 _FALL = 5.0  # times what is usual from one sample to the next
 _PARTS, _WIDEST = 60, 4  # of a loading: half the width of its running means, and the most, samples
 _MEDIAN_OF_NORMAL = 0.6745
+TILT = math.radians(0.1)
+"""Of the specimen beside one of two cameras that face one another; both then see it short by half its square."""
+_SIGMA_OF_TILT = TILT**2 / 2 / math.sqrt(3)
 ENOUGH = 6
 """Samples that a parabola is laid through."""
 
@@ -253,3 +256,62 @@ def first_crossing(values: Floats, level: float, start: int = 0) -> float:
         return math.nan
     k = start + int(above[0])
     return k - 1 + float((level - values[k - 1]) / (values[k] - values[k - 1]))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """A strain over time.
+
+    Attributes
+    ----------
+    t : (N,) float64, s
+        Increasing.
+    value, sigma : (N,) float64
+        With its standard uncertainty; NaN where it was lost.
+    """
+
+    t: Floats
+    value: Floats
+    sigma: Floats
+
+    def at(self, t: Floats, max_gap_s: float) -> Course:
+        """Between its instants by straight lines; NaN before, after, and in gaps longer than ``max_gap_s``."""
+        if len(self.t) < 2:
+            return Course(t, *(np.full(len(t), np.nan) for _ in range(2)))
+        k = np.clip(np.searchsorted(self.t, t, side="right") - 1, 0, len(self.t) - 2)
+        span = self.t[k + 1] - self.t[k]
+        later = (t - self.t[k]) / span
+        value = (1 - later) * self.value[k] + later * self.value[k + 1]
+        sigma = np.hypot((1 - later) * self.sigma[k], later * self.sigma[k + 1])
+        unknown = (later < 0) | (later > 1) | (span > max_gap_s)
+        return Course(t, np.where(unknown, np.nan, value), np.where(unknown, np.nan, sigma))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TwoSides:
+    """A strain on both sides of a specimen at the instants of the front.
+
+    Motion towards one of two cameras that face one another enters their strains with opposite signs, as bending does:
+    it leaves the mean, and cannot be told from bending in the difference.
+
+    Attributes
+    ----------
+    t : (N,) float64, s
+    mean : (N,) float64
+    bending : (N,) float64
+        Strain of the front minus the mean: positive where the front is the longer side.
+    sigma : (N,) float64
+        Standard uncertainty of either: the noise of the cameras, which is independent, and a tilt of up to 0.1 degree.
+    """
+
+    t: Floats
+    mean: Floats
+    bending: Floats
+    sigma: Floats
+
+    @classmethod
+    def of(cls, front: Course, back: Course, max_gap_s: float) -> TwoSides:
+        """Mean and bending; NaN where either side is not known."""
+        other = back.at(front.t, max_gap_s)
+        sigma = np.hypot(np.hypot(front.sigma, other.sigma) / 2, _SIGMA_OF_TILT)
+        return cls(front.t, (front.value + other.value) / 2, (front.value - other.value) / 2, sigma)

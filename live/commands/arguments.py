@@ -28,6 +28,7 @@ EXAMPLES = {
     "replay": "phasedic replay 'shots/*.tif' --zoi 32 --step 8 --load forces.csv --section 20,2 --out out",
     "batch": "phasedic batch 'runs/*/session.h5' --zoi 32 --step 8 --section 20,2 --workers 4 --out asked-again",
     "study": "phasedic study runs/20261122T081747Z/session.h5 --zoi 24,32,48,64,96 --order 1,2 --roi all",
+    "sides": "phasedic sides runs/front runs/back",
     "map": "phasedic map out eyy.png --field eyy --over shots/0000.tif",
     "show": "phasedic show runs/20261122T081747Z --from 2 --to 10",
     "export": "phasedic export runs/20261122T081747Z --to vtk --fields u,v,eyy --mm --scale 0.02 --y-up",
@@ -66,6 +67,7 @@ COMMANDS = {
     "replay": Entry("live.commands.replay", "measure a recorded session or a folder of pictures"),
     "batch": Entry("live.commands.batch", "replay many sessions or folders of pictures in parallel"),
     "study": Entry("live.commands.study", "measure one test with many settings: noise against resolution"),
+    "sides": Entry("live.commands.sides", "mean and bending of two runs: front and back of one specimen"),
     "map": Entry("live.commands.map", "draw a map of the results over a picture, as a PNG"),
     "show": Entry("live.commands.show", "show a finished run in the view, with a time slider"),
     "export": Entry(

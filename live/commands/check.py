@@ -27,6 +27,7 @@ from live.commands.options import (
 )
 from live.commands.signals import interrupts
 from live.config.loading import Config
+from live.setup.check.budget import budget_lines
 from live.setup.check.check_list import CheckFigures, examine, table_lines
 from live.setup.check.sample import take
 from live.setup.check.verdict import DEFAULT_TARGET, check_lines
@@ -72,6 +73,8 @@ def command(arguments: argparse.Namespace) -> int:
     if arguments.snapshot:
         require_new(Path(arguments.snapshot), *PICTURES)
     check_load_port(config.load.address)
+    if config.camera.back is not None:
+        screen.print(f"this checks the front; check the back on its own: {config.camera.back}")
     target = None if arguments.target is None else arguments.target * 1e-6
     if arguments.watch:
         with interrupts() as stop:
@@ -82,7 +85,14 @@ def command(arguments: argparse.Namespace) -> int:
         write_picture(Path(arguments.snapshot), _drawn(figures, config, target))
         screen.print(f"written: {arguments.snapshot}")
     lines = check_lines(figures, target, config.measure.reference_shift_px)
-    for line in [*(line.text() for line in lines), "", *table_lines(figures)]:
+    budget = budget_lines(figures, config)
+    for line in [
+        *(line.text() for line in lines),
+        "",
+        *table_lines(figures),
+        *([""] if budget else []),
+        *budget,
+    ]:
         screen.print(line)
     ready = all(line.good for line in lines)
     screen.print(_verdict(figures, ready))

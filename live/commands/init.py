@@ -188,6 +188,12 @@ def _print(p: Proposal, rig: Path, png: Path, screen: Screen) -> None:
         f"{grid.n_active} ZOIs of {grid.size} px, {grid.step} px apart; load along {p.config.specimen.axis}"
     )
     screen.print(f"gauges: {', '.join(p.config.gauges) or 'none'}")
+    for box in p.plates.plates:
+        screen.print(
+            f"looks like a plate: {box.text}; in {rig} behind a #: it must hang from one grip, unloaded"
+        )
+    for box in p.plates.unclear:
+        screen.print(f"a pattern beside the specimen that is not clearly a plate: {box.text}")
     screen.print(f"written: {rig}, and {png} as a picture of it")
     name = shlex.quote(str(rig))
     screen.print(f"next: phasedic check --config {name}, then phasedic run --config {name}")

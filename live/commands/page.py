@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import argparse
 import threading
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from acquire.errors import PhasedicError
 from acquire.printable import brief
+from live.commands.attended import open_page
 from live.commands.exit_codes import EXIT_INTERRUPTED
 from live.commands.init import find_devices
 from live.commands.options import OUTPUT, add_measure, add_options, overrides
 from live.commands.report import write_report
-from live.commands.run import OTHER_PROGRAMS, RECORDING, open_page, run_with_page
+from live.commands.run import OTHER_PROGRAMS, RECORDING, run_with_page
 from live.commands.signals import signals
-from live.config.loading import load_config
+from live.config.loading import Config, load_config
+from live.config.sides import side_configs
 from live.pipeline.screen import Screen
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.web.page_controller import PageController
@@ -50,26 +54,40 @@ def command(arguments: argparse.Namespace) -> int:
 
         with signals(interrupt, screen.print):
             open_page(controller, screen)
-            serve(controller, screen, interrupted)
+            serve(controller, given, screen, interrupted)
     return EXIT_INTERRUPTED if interrupted.is_set() else 0
 
 
-def serve(controller: PageController, screen: Screen, interrupted: threading.Event) -> None:
-    """One test after the other until the page or the program is ended."""
+def serve(
+    controller: PageController, given: Mapping[str, Any], screen: Screen, interrupted: threading.Event
+) -> None:
+    """One test after the other until the page or the program is ended; ``given`` are the options."""
     message = ""
     while not interrupted.is_set() and (config := controller.set_up(message)) is not None:
         try:
-            outcome = run_with_page(controller, config, screen)
+            folder, code = _run(controller, config, given, screen)
         except PhasedicError as error:
             message = brief(error)
             screen.print(f"the test did not begin: {message}")
             continue
         message = ""
-        if outcome.exit_code == EXIT_INTERRUPTED:
+        if code == EXIT_INTERRUPTED:
             interrupted.set()
             return
-        report = outcome.folder / "report.html"
-        why = "" if report.exists() else write_report(outcome.folder, screen)
+        report = folder / "report.html"
+        why = "" if report.exists() else write_report(folder, screen)
         controller.reported(report if report.exists() else None, why)
         if not controller.after():
             return
+
+
+def _run(
+    controller: PageController, config: Config, given: Mapping[str, Any], screen: Screen
+) -> tuple[Path, int]:
+    """One test, with one camera or two; its folder and exit code."""
+    if config.camera.back is not None:
+        from live.commands.two_cameras import run_sides_with_page
+
+        return run_sides_with_page(controller, side_configs(config, given), screen)
+    outcome = run_with_page(controller, config, screen)
+    return outcome.folder, outcome.exit_code

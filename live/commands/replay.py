@@ -3,22 +3,34 @@
 from __future__ import annotations
 
 import argparse
+import datetime
 import threading
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from live.commands.exit_codes import EXIT_WORDS
 from live.commands.options import add_as_measured, add_measure, add_time_span, overrides
+from live.commands.sides import TABLE, put_together
 from live.commands.signals import signals
+from live.config.sides import BACK, FRONT, SIDES
+from live.pipeline.screen import Screen
+from live.results.folder import check_folder, make_folder
 from live.ui.terminal.screen import TerminalScreen
+from live.ui.terminal.sides import SidesScreen
 from live.ui.terminal.summary import print_summary
+
+if TYPE_CHECKING:
+    from live.replay.replay import Replayed
+    from live.replay.source import ReplayRequest
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic replay``."""
     parser.add_argument(
         "source",
-        help="folder of a run, session.h5, pictures in a folder, 'files:shots/*.tif' or 'video:file.mp4'",
+        help="folder of a run (of one camera or two), session.h5, pictures in a folder, 'files:shots/*.tif' or"
+        " 'video:file.mp4'",
     )
     add_as_measured(parser)
     add_time_span(parser)
@@ -31,8 +43,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def command(arguments: argparse.Namespace) -> int:
     """``phasedic replay``."""
     from live.commands.consumers import standard_consumers
+    from live.commands.report import write_report
     from live.replay.replay import replay
     from live.replay.source import ReplayRequest
+    from live.results.sides.folder import has_recorded_sides
 
     request = ReplayRequest(
         source=arguments.source,
@@ -45,24 +59,61 @@ def command(arguments: argparse.Namespace) -> int:
         forces=Path(arguments.forces) if arguments.forces else None,
     )
     screen, stopping = TerminalScreen(), threading.Event()
+    if has_recorded_sides(Path(arguments.source)):
+        return _replay_sides(request, screen, stopping)
     with signals(stopping.set, screen.print):
         done = replay(request, screen, stopping, standard_consumers(screen))
+    report = done.config.output.report
+    _print(done, screen, verbose=arguments.verbose, with_report=report)
+    if report:
+        write_report(done.folder, screen)
+    return _ended(done.exit_code, screen)
+
+
+def _print(done: Replayed, screen: Screen, *, verbose: bool = False, with_report: bool = False) -> None:
     print_summary(
         screen,
         done.run_state,
         done.config.specimen,
         done.folder,
         done.lines,
-        verbose=arguments.verbose,
-        with_report=done.config.output.report,
+        verbose=verbose,
+        with_report=with_report,
     )
-    if done.config.output.report:
-        from live.commands.report import write_report
 
-        write_report(done.folder, screen)
-    if done.exit_code in EXIT_WORDS:
-        screen.print(f"exit code {done.exit_code}: {EXIT_WORDS[done.exit_code]}")
-    return done.exit_code
+
+def _ended(code: int, screen: Screen) -> int:
+    if code in EXIT_WORDS:
+        screen.print(f"exit code {code}: {EXIT_WORDS[code]}")
+    return code
+
+
+def _replay_sides(request: ReplayRequest, screen: Screen, stopping: threading.Event) -> int:
+    """Replay the sides of a test with two cameras, one after the other, and put them together."""
+    from live.commands.consumers import standard_consumers
+    from live.commands.report import write_report
+    from live.replay.replay import replay
+    from live.results.run_folder import SESSION
+
+    given, codes = dict(request.overrides), []
+    report = given.pop("output.report", False)
+    check_folder(given.get("output.dir"))
+    folder = make_folder(given.get("output.dir"), datetime.datetime.now(datetime.UTC))
+    with signals(stopping.set, screen.print):
+        for name in SIDES:
+            side = SidesScreen(screen).side(name)
+            own = replace(
+                request,
+                source=str(Path(request.source) / name / SESSION),
+                overrides={**given, "output.dir": str(folder / name)},
+            )
+            done = replay(own, side, stopping, standard_consumers(side))
+            _print(done, side)
+            codes.append(done.exit_code)
+    put_together(folder / FRONT, folder / BACK, folder / TABLE, screen)
+    if report:
+        write_report(folder, screen)
+    return _ended(max(codes), screen)
 
 
 def _overrides(arguments: argparse.Namespace) -> dict[str, Any]:

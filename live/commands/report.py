@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from contextlib import ExitStack
 from itertools import chain, count
 from pathlib import Path
@@ -10,13 +11,16 @@ from pathlib import Path
 from acquire.errors import ConfigError, PhasedicError
 from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
+from live.config.sides import BACK, FRONT, SIDES
 from live.pipeline.screen import Screen
 from live.results.export.atomic_file import check_free, new_file
 from live.results.quantities import Display
 from live.results.report.comparison import compare, tests_of, write_table
 from live.results.report.report import Report, ReportRequest, make_report
 from live.results.report.saving import NO_BROWSER, find_browser, save_figures, save_page, save_pdf
+from live.results.report.sides import report_of_sides
 from live.results.run_folder import RunFolder, open_run
+from live.results.sides.folder import has_sides
 from live.ui.terminal.screen import TerminalScreen
 
 
@@ -51,6 +55,8 @@ def command(arguments: argparse.Namespace) -> int:
     screen = TerminalScreen()
     if arguments.pdf and find_browser() is None:
         raise ConfigError(f"--pdf: {NO_BROWSER}")
+    if arguments.run and not arguments.compare and has_sides(Path(arguments.run)):
+        return _of_sides(Path(arguments.run), arguments, screen)
     with ExitStack() as opened:
         found = [opened.enter_context(open_run(run)) for run in runs]
         for run in found if arguments.more_gauges else ():
@@ -72,9 +78,35 @@ def command(arguments: argparse.Namespace) -> int:
     return 0
 
 
+def _of_sides(folder: Path, arguments: argparse.Namespace, screen: Screen) -> int:
+    """Report both sides of a test with two cameras, and each side where it has no report yet."""
+    if arguments.pdf or arguments.more_gauges or arguments.times or arguments.fields:
+        raise ConfigError(
+            f"{folder} has two sides; --pdf, --gauges, --at and --field are for one: {folder / FRONT}"
+        )
+    out = Path(arguments.out) if arguments.out else _first_free(folder / "report.html", arguments)
+    check_free(*_targets(out, arguments))
+    _save(_report_of_sides(folder, out, screen), out, arguments, screen)
+    return 0
+
+
+def _report_of_sides(folder: Path, out: Path, screen: Screen) -> Report:
+    pages = {side: folder / side / "report.html" for side in SIDES}
+    for side, page in pages.items():
+        if not page.exists():
+            write_report(folder / side, screen)
+    with open_run(folder / FRONT) as front, open_run(folder / BACK) as back:
+        names = {side: os.path.relpath(page, out.parent) for side, page in pages.items() if page.exists()}
+        return report_of_sides(front, back, names)
+
+
 def write_report(folder: Path, screen: Screen) -> str:
     """``report.html`` in the folder of a run; an error is printed, returned, and does not affect the run."""
     try:
+        if has_sides(folder):
+            save_page(_report_of_sides(folder, folder / "report.html", screen), folder / "report.html")
+            screen.print(f"  {folder / 'report.html'}")
+            return ""
         with open_run(folder) as run:
             save_page(
                 make_report(run, ReportRequest(mm_per_px=run.mm_per_px), screen), folder / "report.html"

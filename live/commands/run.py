@@ -5,34 +5,31 @@ from __future__ import annotations
 import argparse
 import contextlib
 import queue
-import sys
-import webbrowser
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from live.commands.attended import attended, open_page
 from live.commands.consumers import standard_consumers
 from live.commands.exit_codes import EXIT_WORDS
-from live.commands.options import add_measure, add_options, configured
-from live.commands.signals import signals
+from live.commands.options import add_measure, add_options, configured, overrides
 from live.config.loading import Config
+from live.config.sides import side_configs
 from live.pipeline.consumer import Consumer
 from live.pipeline.screen import Screen
 from live.results.folder import check_folder
 from live.run.alarms import check_alarms
-from live.run.control import ControlPort
-from live.run.keyboard import listen
-from live.run.live_run import INTERRUPTED, LiveRun, run_live
+from live.run.live_run import LiveRun, run_live
 from live.run.outcome import Outcome, StopSignal
 from live.setup.devices import check_load_port
 from live.setup.region import located
-from live.ui.rerun.view import has_display, rerun_command, spawn_viewer
+from live.ui.rerun.view import rerun_command, spawn_viewer
 from live.ui.terminal.screen import TerminalScreen
 from live.ui.terminal.summary import print_summary, trouble_lines
 
 if TYPE_CHECKING:
     from live.ui.web.page_controller import PageController
 
-RECORDING = ("camera", "load", "no-record", "record", "armed", "start-above", "dark", "flat", "crop")
+RECORDING = ("camera", "back", "load", "no-record", "record", "armed", "start-above", "dark", "flat", "crop")
 VIEWER_OPENS_S = 1.5  # a viewer that cannot open ends sooner
 OTHER_PROGRAMS = ("orders", "strain-out", "strain-format", "strain-channels", "token-file")
 
@@ -54,6 +51,10 @@ def command(arguments: argparse.Namespace) -> int:
     check_alarms(config)
     check_folder(config.output.dir)
     check_load_port(config.load.address)
+    if config.camera.back is not None:
+        from live.commands.two_cameras import run_sides
+
+        return run_sides(side_configs(config, overrides(arguments)), screen, page=arguments.page)
     with located(config, screen.print) as config:
         outcome = run_and_show_page(config, screen) if arguments.page else run_attended(config, screen)
     if not arguments.page:
@@ -82,13 +83,6 @@ def run_with_page(controller: PageController, config: Config, screen: Screen) ->
     return outcome
 
 
-def open_page(controller: PageController, screen: Screen) -> None:
-    """Open the page if there is a display, and print its address."""
-    if has_display() and webbrowser.open(controller.address):
-        screen.print("the page opens in the browser")
-    screen.print(f"the page: {controller.address}")
-
-
 def _open_viewer(port: int) -> str:
     """Open the viewer in its own window; returns "ok", or "no: " and the reason."""
     trouble: queue.Queue[str] = queue.Queue()
@@ -106,24 +100,14 @@ def run_attended(
     attend: Callable[[LiveRun], None] = lambda live: None,
 ) -> Outcome:
     """Run with signals, keyboard and remote commands; ``attend`` may add controls of its own."""
-    stop, ports = StopSignal(), config.operate
-    with contextlib.ExitStack() as stack:
-        port = ControlPort(ports.orders, ports.token_file, screen) if ports.orders else None
+    stop, made = StopSignal(), standard_consumers(screen, consumers)
+    with attended(config, screen, stop) as attach:
 
         def on_start(live: LiveRun) -> None:
-            keyboard = listen(live, sys.stdin, screen)
-            if keyboard is not None:
-                stack.callback(keyboard.close)
-            if port is not None:
-                port.open(live)
+            attach(live)
             attend(live)
 
-        if port is not None:
-            stack.callback(port.close)
-        stack.enter_context(signals(lambda: stop.request(INTERRUPTED), screen.print))
-        return run_live(
-            config, screen, stop=stop, consumers=standard_consumers(screen, consumers), on_start=on_start
-        )
+        return run_live(config, screen, stop=stop, consumers=made, on_start=on_start)
 
 
 def print_outcome(outcome: Outcome, screen: Screen, *, verbose: bool = False) -> None:

@@ -42,6 +42,10 @@ class CameraConfig:
 
     address: str = key(TEXT, "", "address of the camera: /dev/video0?format=Y12&fps=30, sim:, files:...",
         Option("camera", "ADDRESS"))
+    back: str | None = key(TEXT, None,
+        "camera behind the specimen: its rig file, whose sections camera, measure, scale, gauges and plate are those of"
+        " the back; or its address, with the settings of the front",
+        Option("back", "FILE.toml|ADDRESS"))
     crop: tuple[int, int, int, int] | None = key(BOX, None,
         "x, y, width, height of the part of the picture to use, px; its corner is the origin of all coordinates",
         Option("crop", "X,Y,W,H", expert=True))

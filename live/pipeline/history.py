@@ -76,6 +76,11 @@ class TimeSeries(Sequence[TimeStep]):
         column = self._gauges.get(name)
         return None if column is None or column.since else _copied(column.values, self._count)
 
+    def gauge_sigma(self, name: str) -> Array | None:
+        """Standard uncertainties of a gauge, (N,) float64; None as for ``gauge``."""
+        column = self._gauges.get(name)
+        return None if column is None or column.since else _copied(column.sigmas, self._count)
+
     def __len__(self) -> int:
         return self._count
 
@@ -126,7 +131,7 @@ class _GaugeColumn:
     def __init__(self, since: int) -> None:
         nothing = [math.nan] * since
         self.since = since
-        self.values, self._sigmas = array("d", nothing), array("d", nothing)
+        self.values, self.sigmas = array("d", nothing), array("d", nothing)
         self._shares = array("f", nothing)
         self._reasons, self._missing = _TextColumn(), array("b", [1] * since)
         for _ in range(since):
@@ -135,7 +140,7 @@ class _GaugeColumn:
     def append(self, value: GaugeValue | None) -> None:
         stored = value or GaugeValue(math.nan, math.nan)
         self.values.append(stored.value)
-        self._sigmas.append(stored.sigma)
+        self.sigmas.append(stored.sigma)
         self._shares.append(stored.share)
         self._reasons.append(stored.reason)
         self._missing.append(value is None)
@@ -143,7 +148,7 @@ class _GaugeColumn:
     def at(self, i: int) -> GaugeValue | None:
         if self._missing[i]:
             return None
-        return GaugeValue(self.values[i], self._sigmas[i], self._reasons[i], self._shares[i])
+        return GaugeValue(self.values[i], self.sigmas[i], self._reasons[i], self._shares[i])
 
 
 def _copied(kept: array[Any], count: int) -> Array:

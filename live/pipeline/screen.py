@@ -17,6 +17,11 @@ class Screen:
         """Whether the status line may be renewed now."""
         return False
 
+    @property
+    def width(self) -> int:
+        """Letters that a status line may have."""
+        return 0
+
     def print(self, text: str = "") -> None:
         """Print a permanent line."""
 

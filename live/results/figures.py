@@ -29,6 +29,7 @@ from analysis.field import Blur
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import History
 from live.pipeline.measurement import AXIAL
+from live.results.budget import BudgetRow, CameraView, budget_rows
 
 HEADLINE = ("E", "nu", "Rp02", "Rm")
 """The figures that are shown first, and compared between tests."""
@@ -155,50 +156,11 @@ def _times(value: float | None, unit: float) -> float | None:
     return None if value is None else unit * value
 
 
-@dataclass(frozen=True, slots=True)
-class BudgetRow:
-    """One cause of the uncertainty of E, or all together: standard uncertainties, and the key that states it.
-
-    Attributes
-    ----------
-    cause : str
-    strain : float
-        At the end of the elastic interval; NaN where it is not stated.
-    modulus : float, Pa (N of a force)
-    key : str
-    """
-
-    cause: str
-    strain: float
-    modulus: float
-    key: str = ""
-
-
-_CAUSES = {
-    "load cell": "specimen.force_error_percent",
-    "section": "specimen.section_error_percent",
-    "lens": "--lens",
-    "strain": "specimen.strain_error_um_m",
-}
-
-
-def budget_rows(figures: TensileFigures, *, stresses: bool) -> list[BudgetRow]:
-    """The budget of E, the combined uncertainty last; empty where E is not known.
-
-    ``stresses``: the section is known.
-    """
+def budget_of(figures: TensileFigures, view: CameraView, *, stresses: bool) -> list[BudgetRow]:
+    """The budget of E; empty where E is not known. ``stresses``: the section is known."""
     if figures.span is None or not figures.budget:
         return []
-    strain, E = figures.span.strain[1], figures.E.value
-    left_out = {"section"} if not stresses else set()
-    left_out |= {"lens"} - figures.budget.keys()  # measured, not stated
-    causes = [cause for cause in ("scatter", *_CAUSES) if cause not in left_out]
-    shares = {**dict.fromkeys(causes, math.nan), **figures.budget}
-    rows = [
-        BudgetRow(cause, share * strain, share * E, _CAUSES.get(cause, "")) for cause, share in shares.items()
-    ]
-    combined = math.hypot(*figures.budget.values())
-    return [*rows, BudgetRow("combined", combined * strain, combined * E)]
+    return budget_rows(figures.budget, figures.span.strain[1], figures.E.value, view, stresses=stresses)
 
 
 def lag_line(history: History, loads: LoadLog, specimen: SpecimenConfig) -> list[str]:
@@ -267,7 +229,7 @@ def elastic_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str
     rows = _rows(figures, specimen)
     hint = "" if specimen.area_m2 else " (give [specimen] width_mm and thickness_mm for E)"
     of = f" of {figures.elastic_strain}" if figures.elastic_strain else ""
-    stated = [cause for cause in figures.budget if cause in _CAUSES]
+    stated = [cause for cause in figures.budget if cause != "scatter"]
     beyond = f", of E with limits of {', '.join(stated)}" if stated else ""
     words = f"  {_text(rows, 'nu')}  ({figures.span.n} points{of}, ±: {CONFIDENCE:.0%} interval{beyond})"
     return [_text(rows, "E") + hint + words, _known_texts(rows, _STRENGTHS)]

@@ -28,6 +28,7 @@ from analysis.evaluate import Curve, LoadAxis, load_axis
 from analysis.field import StrainField
 from live.config.loading import from_dict
 from live.config.sections import SpecimenConfig
+from live.config.sides import SIDES
 from live.pipeline.history import curve_of
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.results.pictures import Image, Pictures, of_images, of_session
@@ -176,10 +177,23 @@ class RunFolder(Closing):
     @property
     def mm_per_px(self) -> float | None:
         """The scale that was configured; None where there is none."""
-        scale = self.section("scale").get("mm_per_px")
-        if isinstance(scale, bool) or not isinstance(scale, int | float) or not 0 < scale < math.inf:
+        return self._number("scale", "mm_per_px") or None
+
+    @property
+    def stand_off_mm(self) -> float | None:
+        """Distance from the camera to the specimen, mm; None where it was not configured."""
+        return self._number("scale", "stand_off_mm") or None
+
+    @property
+    def readout_ms(self) -> float | None:
+        """Time of the rolling shutter, ms, 0 without one; None where it was not configured."""
+        return self._number("camera", "readout_ms")
+
+    def _number(self, section: str, key: str) -> float | None:
+        value = self.section(section).get(key)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not 0 <= value < math.inf:
             return None
-        return float(scale)
+        return float(value)
 
     @property
     def title(self) -> str:
@@ -305,15 +319,12 @@ class RunFolder(Closing):
 
 
 def open_run(path: str | os.PathLike[str]) -> RunFolder:
-    """Open the folder of a run, or a ``strain.h5`` in it.
-
-    Raises
-    ------
-    DataError
-        There is no ``strain.h5``, or it cannot be read.
-    """
+    """Open the folder of a run, or a ``strain.h5`` in it; raises DataError where there is none that can be read."""
     path = Path(path)
     file = path / STRAIN if path.is_dir() else path
     if not file.exists():
+        sides = [path / side for side in SIDES if (path / side / STRAIN).exists()]
+        if sides:
+            raise DataError(f"{path}: a test with two cameras; give the folder of one side, {sides[0]}")
         raise DataError(f"{path}: no {STRAIN} there; give the folder that phasedic run or replay wrote")
     return RunFolder(file.parent, Strain.open(file))

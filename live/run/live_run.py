@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
-from acquire.errors import ConfigError, PhasedicError
+from acquire.errors import PhasedicError
 from acquire.events import EventKind
 from acquire.frame import Burst, Frame
 from live.config.loading import Config
@@ -22,7 +22,6 @@ from live.pipeline.latency import LatencyMonitor
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.results.writer import write_results
-from live.run.alarms import check_alarms
 from live.run.burst_queue import TAKING, BurstQueue
 from live.run.control import ControlRefused
 from live.run.grabber import Grabber, GrabPlan
@@ -30,9 +29,9 @@ from live.run.load_thread import LoadThread, tare_controls
 from live.run.measuring import MeasureThread
 from live.run.outcome import Outcome, StopSignal
 from live.run.pre_trigger import PreTriggerBuffer
-from live.run.prepared_run import PreparedRun, set_up
+from live.run.prepared_run import PreparedRun, new_run_state, set_up
 from live.run.recorder import open_recording
-from live.setup.devices import Rig, open_rig
+from live.setup.devices import open_rig
 
 _ARMED = "; nothing is recorded until the command start"
 _SILENT_S = 1.0
@@ -286,15 +285,7 @@ def run_live(
     ConfigError, DeviceError, DataError
         The start failed; whatever was recorded by then is closed and readable.
     """
-    if not config.camera.address:
-        raise ConfigError("no camera is given; use --camera ADDRESS (phasedic devices lists what is there)")
-    check_alarms(config)
-    stop, run_state = (
-        stop or StopSignal(),
-        RunState.new(config.load.max_gap_s, config.load.lag_s, config.specimen),
-    )
-    run_state.event_log.names |= device_names(config)
-    screen.print(f"opening {config.camera.address}")
+    stop, run_state = stop or StopSignal(), new_run_state(config, screen)
     rig = open_rig(
         config.camera.address,
         config.load.address,
@@ -304,39 +295,27 @@ def run_live(
     )
     try:
         prepared = set_up(config, rig, run_state.event_log, screen, stop)
-        for line in announcement(rig, prepared.folder):
-            screen.print(line)
-        about = RunInfo(
-            prepared.config,
-            prepared.folder,
-            rig.camera.info,
-            prepared.plan.grid,
-            prepared.start,
-            stop.request,
-        )
-        outputs = Outputs(
-            consumers(about, run_state), run_state.loads, run_state.event_log, run_state.history
-        )
-        code = _with_outputs(prepared, run_state, outputs, screen, stop, on_start)
+        return run_prepared(prepared, run_state, screen, stop, consumers, on_start)
     finally:
         rig.close()
-    return Outcome(prepared.folder, prepared.config, run_state, outputs, rig, prepared.plan.grid, code)
 
 
-def announcement(rig: Rig, folder: Path) -> Iterator[str]:
-    """The lines on the devices, their warnings, and the folder of the files."""
-    c, cell = rig.camera.info, rig.load.info
-    fps = f", {c.fps:g} fps" if c.fps else ""
-    yield f"camera: {c.name}, {c.width} x {c.height} px, {c.bits} bits{fps}"
-    yield f"load cell: {cell.name}"
-    yield from (f"warning: {warning}" for warning in (*c.warnings, *cell.warnings))
-    yield f"files: {folder}"
-
-
-def device_names(config: Config) -> dict[str, str]:
-    """Names of camera and load cell on the screen, by address; none where both have the same address."""
-    names = {config.load.address: "load cell", config.camera.address: "camera"}
-    return names if len(names) == 2 else {}
+def run_prepared(
+    prepared: PreparedRun,
+    run_state: RunState,
+    screen: Screen,
+    stop: StopSignal,
+    consumers: Compose,
+    on_start: Callable[[LiveRun], object],
+) -> Outcome:
+    """Run a prepared test to the closing of the files; the devices are left to the caller. As ``run_live``."""
+    rig, grid = prepared.rig, prepared.plan.grid
+    for line in prepared.announcement():
+        screen.print(line)
+    about = RunInfo(prepared.config, prepared.folder, rig.camera.info, grid, prepared.start, stop.request)
+    outputs = Outputs(consumers(about, run_state), run_state.loads, run_state.event_log, run_state.history)
+    code = _with_outputs(prepared, run_state, outputs, screen, stop, on_start)
+    return Outcome(prepared.folder, prepared.config, run_state, outputs, rig, grid, code)
 
 
 def _with_outputs(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -10,14 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.clock import ClockPair
+from acquire.errors import ConfigError
 from acquire.hdf5 import compile_loops
 from acquire.record_mode import RecordMode
 from live.config.loading import Config
 from live.config.sections import DEFAULT_BURST, DEFAULT_REFERENCE_BURST
 from live.pipeline.event_log import EventLog
+from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
 from live.pipeline.warm_up import dry_run
 from live.results.folder import make_folder
+from live.run.alarms import check_alarms
 from live.run.outcome import StopSignal
 from live.setup.devices import Rig
 from live.setup.pictures import read_mask, with_flat_field, with_mask
@@ -52,6 +56,38 @@ class PreparedRun:
     def config(self) -> Config:
         """The final configuration."""
         return self.plan.config
+
+    def announcement(self) -> Iterator[str]:
+        """The lines on the devices, their warnings, and the folder of the files."""
+        c, cell = self.rig.camera.info, self.rig.load.info
+        fps = f", {c.fps:g} fps" if c.fps else ""
+        yield f"camera: {c.name}, {c.width} x {c.height} px, {c.bits} bits{fps}"
+        yield f"load cell: {cell.name}"
+        yield from (f"warning: {warning}" for warning in (*c.warnings, *cell.warnings))
+        yield f"files: {self.folder}"
+
+
+def new_run_state(config: Config, screen: Screen) -> RunState:
+    """The state of a test whose devices are opened next.
+
+    Raises
+    ------
+    ConfigError
+        No camera is given, or an alarm is not possible.
+    """
+    if not config.camera.address:
+        raise ConfigError("no camera is given; use --camera ADDRESS (phasedic devices lists what is there)")
+    check_alarms(config)
+    run_state = RunState.new(config.load.max_gap_s, config.load.lag_s, config.specimen)
+    run_state.event_log.names |= _device_names(config)
+    screen.print(f"opening {config.camera.address}")
+    return run_state
+
+
+def _device_names(config: Config) -> dict[str, str]:
+    """Names of camera and load cell on the screen, by address; none where both have the same address."""
+    names = {config.load.address: "load cell", config.camera.address: "camera"}
+    return names if len(names) == 2 else {}
 
 
 def set_up(config: Config, rig: Rig, event_log: EventLog, screen: Screen, stop: StopSignal) -> PreparedRun:

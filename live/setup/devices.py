@@ -1,18 +1,22 @@
-"""Open camera and load cell from their addresses.
+"""Open camera and load cell from their addresses, or two cameras and one load cell.
 
-Only this module opens the simulated devices of ``hw_mocks``. Two ``sim:`` addresses share one specimen.
+Only this module opens the simulated devices of ``hw_mocks``. All ``sim:`` addresses share one specimen.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import ExitStack, closing
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from acquire.addresses import parse_address, with_setting
 from acquire.camera import Camera, CroppedCamera, open_camera
+from acquire.errors import ConfigError
 from acquire.events import EventSink, ignore_event
-from acquire.load_cell import LoadCell, ZeroedLoadCell, open_load_cell
+from acquire.load_cell import LoadCell, SharedLoadCell, ZeroedLoadCell, open_load_cell
 from acquire.record_mode import Crop
+from live.config.sections import CameraConfig, LoadConfig
 
 if TYPE_CHECKING:
     from hw_mocks.specimen import VirtualSpecimen
@@ -58,14 +62,53 @@ def open_rig(
         Force from which forces count.
     """
     specimen = _specimen(camera_address, load_address)
-    camera = _open_camera(camera_address, on_event, specimen)
-    try:
-        camera = camera if crop is None else CroppedCamera(camera, crop)
+    with ExitStack() as opened:
+        camera = opened.enter_context(closing(_open_cropped(camera_address, on_event, specimen, crop)))
         load = _zeroed_load(load_address, on_event, specimen, zero_N)
-    except BaseException:
-        camera.close()
-        raise
+        opened.pop_all()
     return Rig(camera, load, specimen if _simulated(camera_address) else None)
+
+
+def open_two_rigs(
+    cameras: Sequence[CameraConfig], load: LoadConfig, sinks: Sequence[EventSink]
+) -> tuple[Rig, ...]:
+    """Open the cameras of both sides and one load cell, read once; raises as ``open_rig``.
+
+    Parameters
+    ----------
+    cameras : sequence of CameraConfig
+        Simulated ones look at the specimen of the first address.
+    load : LoadConfig
+    sinks : sequence of callables taking an Event
+        One of each camera; all take the events of the load cell.
+    """
+    _check_one_specimen([camera.address for camera in cameras])
+    simulated = [camera.address for camera in cameras if _simulated(camera.address)]
+    specimen = _specimen(simulated[0] if simulated else "none:", load.address)
+    with ExitStack() as opened:
+        found = [
+            opened.enter_context(closing(_open_cropped(camera.address, sink, specimen, camera.crop)))
+            for camera, sink in zip(cameras, sinks, strict=True)
+        ]
+        shared = SharedLoadCell(lambda sink: _zeroed_load(load.address, sink, specimen, load.zero_N), sinks)
+        opened.pop_all()
+    return tuple(
+        Rig(camera, reader, specimen if _simulated(one.address) else None)
+        for camera, reader, one in zip(found, shared.readers, cameras, strict=True)
+    )
+
+
+def _check_one_specimen(addresses: Sequence[str]) -> None:
+    """Raises ConfigError where two simulated cameras would have different specimens."""
+    from hw_mocks.specimen import SPECIMEN_KEYS
+
+    found = [parse_address(address) for address in addresses if _simulated(address)]
+    for other in found[1:]:
+        first, second = dict(found[0].settings), dict(other.settings)
+        differ = sorted(key for key in SPECIMEN_KEYS if first.get(key) != second.get(key))
+        if differ or found[0].target != other.target:
+            what = differ[0] if differ else "kind"
+            raise ConfigError(f"{other.text}: not the specimen of the front; give {what} as in its address")
 
 
 def check_load_port(address: str) -> None:
@@ -96,6 +139,17 @@ def _specimen(camera_address: str, load_address: str) -> VirtualSpecimen | None:
     from hw_mocks.specimen import specimen_from
 
     return specimen_from(parse_address(camera_address if _simulated(camera_address) else load_address))
+
+
+def _open_cropped(
+    address: str, on_event: EventSink, specimen: VirtualSpecimen | None, crop: Crop | None
+) -> Camera:
+    camera = _open_camera(address, on_event, specimen)
+    try:
+        return camera if crop is None else CroppedCamera(camera, crop)
+    except BaseException:
+        camera.close()
+        raise
 
 
 def _open_camera(address: str, on_event: EventSink, specimen: VirtualSpecimen | None) -> Camera:

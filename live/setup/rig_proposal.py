@@ -7,7 +7,7 @@ import json
 import math
 import shlex
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +15,8 @@ import numpy as np
 from acquire.errors import ConfigError
 from acquire.printable import printable
 from analysis.quality.pattern import zoi_pattern
+from analysis.quality.plates import FoundPlates, find_plates
+from analysis.quality.specimen import find_specimen
 from live.config.gauges import GaugeTable
 from live.config.loading import Config
 from live.config.values import AUTO
@@ -42,6 +44,8 @@ class Proposal:
         Descriptions of these devices.
     others : tuple of str
         Addresses of the other cameras found.
+    plates : FoundPlates
+        What looks like plates beside the specimen.
     """
 
     first_look: FirstLook
@@ -50,6 +54,7 @@ class Proposal:
     camera: str
     load: str
     others: tuple[str, ...] = ()
+    plates: FoundPlates = field(default_factory=FoundPlates)
 
     @property
     def contrast(self) -> float:
@@ -100,7 +105,13 @@ def propose(
     if "measure.gauges" not in keys:
         config = _with(config, gauges=AUTO)
     placed = with_auto_gauges(config, region.grid(config, *first.size))
-    return Proposal(first, region, placed, *descriptions, tuple(others))
+    return Proposal(first, region, placed, *descriptions, tuple(others), _plates(first, auto_region))
+
+
+def _plates(first: FirstLook, auto_region: bool) -> FoundPlates:
+    """What looks like plates beside a specimen that was found."""
+    specimen = find_specimen(first.picture, first.noise) if auto_region else None
+    return FoundPlates() if specimen is None else find_plates(first.picture, specimen, first.noise)
 
 
 def _with(config: Config, **values: int | str) -> Config:
@@ -151,9 +162,8 @@ def rig_text(p: Proposal, path: Path, mask: Path | None = None) -> str:
         The mask of the specimen in its present place: with it, region and gauges are fixed in px; without,
         they are found at the start of each test.
     """
-    return "\n".join(
-        [*_head(path), *_devices(p), *_specimen(p), *_measure(p, mask), *_gauges(p, mask is not None), ""]
-    )
+    placed = (*_gauges(p, mask is not None), *_plate_tables(p))
+    return "\n".join([*_head(path), *_devices(p), *_specimen(p), *_measure(p, mask), *placed, ""])
 
 
 def _head(path: Path) -> Iterator[str]:
@@ -209,6 +219,19 @@ def _gauges(p: Proposal, fixed: bool) -> Iterator[str]:
         )
     for name, gauge in p.config.gauges.items():
         yield from ("", *(lead + line for line in _gauge(name, gauge)))
+
+
+def _plate_tables(p: Proposal) -> Iterator[str]:
+    """With a # each: a still picture does not show what hangs from a grip and what belongs to the frame."""
+    if not p.plates.plates:
+        return
+    yield from (
+        "",
+        "# These look like plates. Without the # they remove motion off the plane: only where they hang from one",
+    )
+    yield "# grip, beside the specimen and not loaded (docs/optics.md)."
+    for number, box in enumerate(p.plates.plates, 1):
+        yield from (f"# [plate.plate{number}]", f"# box = {_numbers((box.x, box.y, box.width, box.height))}")
 
 
 def _gauge(name: str, g: GaugeTable) -> Iterator[str]:

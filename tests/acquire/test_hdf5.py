@@ -29,6 +29,21 @@ def test_free_bytes_of_what_does_not_exist_yet(tmp_path: Path) -> None:
     assert free_bytes(tmp_path / "a" / "b" / "session.h5") > 0
 
 
+def test_two_files_of_one_name_are_made_at_once(tmp_path: Path) -> None:
+    """As two cameras do: each has its strain.h5, in a folder of its own."""
+    for name in ("front", "back"):
+        (tmp_path / name).mkdir()
+
+    def declare(file: h5py.File) -> None:
+        file.attrs["side"] = "front"
+        create_file(tmp_path / "back" / "a.h5", lambda other: other.attrs.update(side="back")).close()
+
+    create_file(tmp_path / "front" / "a.h5", declare).close()
+    for name in ("front", "back"):
+        with h5py.File(tmp_path / name / "a.h5") as file:
+            assert file.attrs["side"] == name
+
+
 DECLARED = """
 import resource, sys
 from pathlib import Path

@@ -106,6 +106,15 @@ def test_the_back_sees_the_motion_from_behind() -> None:
     assert back[1] / 30 - 1 == pytest.approx(-213e-6, abs=8e-6)
 
 
+def test_the_sides_of_a_bent_specimen_differ_from_the_mean_by_as_much() -> None:
+    specimen = VirtualSpecimen(width=201, height=161)
+    sides = [Optics(bending=0.05, behind=behind).seen(specimen, END) for behind in (False, True)]
+    front, back = ([float(gradient) for gradient in side.gradient(30.0, 40.0)] for side in sides)
+    axial, across = float(specimen.axial_strain(END)), float(specimen.transverse_strain(END))
+    assert (front[3], back[3]) == pytest.approx((1.05 * axial, 0.95 * axial), rel=1e-12)
+    assert (front[0], back[0]) == pytest.approx((1.05 * across, 0.95 * across), rel=1e-12)
+
+
 def test_the_picture_is_that_of_the_exact_road() -> None:
     optics = Optics(500.0, 0.003, PlaneMotion(0, 0.01, 0.01), PlaneMotion(0.1, 0.002, 0.002), readout_s=0.03)
     scene = Scene(VirtualSpecimen(width=96, height=80), optics=optics)
@@ -121,7 +130,9 @@ def test_impossible_views_are_refused(setting: str) -> None:
 def test_all_keys_of_an_address() -> None:
     keys = "stand_off_mm=500&distortion=0.3&tilt_x_deg=1&tilt_y_deg=2&settle_mm=0.1&settle_x_deg=3&settle_y_deg=4"
     options = Options(
-        parse_address(f"sim:?{keys}&plates=1,2,3,4;5,6,7,8&plate_strain=0.5&readout_ms=33&side=back")
+        parse_address(
+            f"sim:?{keys}&plates=1,2,3,4;5,6,7,8&plate_strain=0.5&readout_ms=33&side=back&bending=3"
+        )
     )
     found = take_optics(options)
     options.done()
@@ -135,4 +146,5 @@ def test_all_keys_of_an_address() -> None:
         0.5,
         0.033,
         True,
+        0.03,
     )

@@ -51,6 +51,18 @@ def timed(time: FakeTime, buffers: int = 4) -> SimCamera:
     return SimCamera(specimen, settings, "sim:", ignore_event, clock=time.clock, sleep=time.sleep)
 
 
+def test_a_camera_that_joins_later_has_lost_nothing_before() -> None:
+    time = FakeTime()
+    specimen = specimen_from(parse_address(f"sim:?{SMALL.rpartition('&')[0]}"))
+    specimen.clock.begin(time.now - 0.5)  # by the other camera
+    settings = SimCameraSettings(Sensor(), fps=50, buffers=60)
+    with SimCamera(specimen, settings, "sim:", ignore_event, clock=time.clock, sleep=time.sleep) as camera:
+        frames = list(camera)
+    assert [frame.index for frame in frames] == list(range(25, 51))
+    assert not any(frame.lost_before for frame in frames)
+    assert frames[0].t == pytest.approx(time.now - 0.5, abs=0.6)
+
+
 def frame(index: int) -> Frame:
     return Frame(np.zeros((1, 1), np.uint8), index, 0.0, "device", 0, 8, 0.0)
 

@@ -11,11 +11,12 @@ import numpy as np
 from acquire.errors import DataError
 from analysis.evaluate import CONFIDENCE
 from live.pipeline.screen import Screen
-from live.results.figures import axis_text, budget_rows, figure_lines, headline, sharpness_line
-from live.results.noise_floor import StillPhase, still_phase_of
+from live.results.budget import CameraView
+from live.results.figures import axis_text, budget_of, figure_lines, headline, sharpness_line
 from live.results.report import curves
 from live.results.report.evaluation import EvaluatedCurve, nearest_rows, neck_line, time_steps
 from live.results.report.maps import MapPictures, map_pictures, maps, statuses
+from live.results.report.noise_floor import StillPhase, still_phase_of
 from live.results.report.page import (
     Html,
     captioned,
@@ -268,30 +269,25 @@ def _lens_section(run: RunFolder) -> list[Html]:
     return [section("Lens", paragraph(words))]
 
 
-def budget_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
-    """What the interval of E is made of, and what is not stated."""
-    rows = budget_rows(curve.figures, stresses=curve.is_stress)
+def budget_table(run: RunFolder, curve: EvaluatedCurve, *, both_sides: bool = False) -> list[Html]:
+    """What the interval of E is made of, and what is not stated; ``both_sides``: of the mean of front and back."""
+    view = CameraView(run.stand_off_mm, run.readout_ms, bool(run.section("plate")), both_sides)
+    rows = budget_of(curve.figures, view, stresses=curve.is_stress)
     if not rows:
         return [paragraph("E is not known, so it has no budget.", "open")]
     unit, one = ("GPa", 1e9) if curve.is_stress else ("kN", 1e3)
     cells = [
-        (row.cause, f"{row.strain * 1e6:.3g}", f"{row.modulus / one:.3g}")
-        if math.isfinite(row.modulus)
-        else (row.cause, f"not stated: {row.key}", "")
+        (row.cause, row.words, "")
+        if row.words
+        else (row.cause, f"{row.strain * 1e6:.3g}", f"{row.modulus / one:.3g}")
         for row in rows
     ]
     words = (
         "Standard uncertainties, of the strain at the end of the elastic interval and of E, combined as the GUM"
-        " (JCGM 100:2008) has it; stated limits of error are taken as even distributions."
+        " (JCGM 100:2008) has it; stated limits of error are taken as even distributions. Rows with words are not"
+        " in the sum."
     )
-    plates = (
-        "Motion off the plane is removed by plates; their noise is in the scatter."
-        if run.section("plate")
-        else (
-            "Motion off the plane and a rolling shutter are in no row but strain, as a lens that is not corrected."
-        )
-    )
-    return [paragraph(f"{words} {plates}"), table(("", "µm/m", unit), cells, (1, 2))]
+    return [paragraph(words), table(("", "µm/m", unit), cells, (1, 2))]
 
 
 def _noise_section(content: _Content) -> list[Html]:

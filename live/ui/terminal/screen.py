@@ -63,6 +63,11 @@ class TerminalScreen(Screen):
         """Whether the status line may be renewed by now."""
         return not self._quiet and self._prompt is None and self._now() - self._last >= self._every
 
+    @property
+    def width(self) -> int:
+        """Letters of the status line; many in a log."""
+        return self._columns() if self._terminal else _FILE_WIDTH
+
     def status(self, text: str) -> None:
         """Renew the status line, in place on a terminal."""
         if not self.is_due:
@@ -88,7 +93,7 @@ class TerminalScreen(Screen):
 
     def snapshot(self, snapshot: Snapshot, words: str = "") -> None:
         """Renew the status line of a live run; ``words`` name what it waits for."""
-        self.status(status_line(snapshot, self._columns() if self._terminal else _FILE_WIDTH, words))
+        self.status(status_line(snapshot, self.width, words))
 
     def prompt(self, text: str | None) -> None:
         """Show what the operator types in place of the status line; None ends that."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from acquire.printable import duration, share_text
@@ -18,11 +18,45 @@ MAX_GAUGES = 4
 LARGE_SIGMA = 10e-6  # from here on without a decimal
 Item = tuple[int, str]
 """Rank and text; a line that is too long loses the items with the highest rank first."""
+SideValues = tuple[float, float, float]
+"""Mean of front and back, front minus mean, and the standard uncertainty of either."""
 
 
 def status_line(s: Snapshot, width: int, words: str = "") -> str:
     """The line, at most ``width`` characters; ``words`` name what the run waits for."""
     return fitted([*_test(s), (3, words), *_strain(s.time_step), _assumed(s), *_machine(s)], width)
+
+
+def sides_line(
+    sides: Mapping[str, Snapshot], both: Mapping[str, SideValues], width: int, words: str = ""
+) -> str:
+    """The line of a test with two cameras: mean and bending of each strain, and what each side does.
+
+    Parameters
+    ----------
+    sides : mapping of side to Snapshot
+        The front first.
+    both : mapping of str to (mean, bending, sigma)
+    width : int
+    words : str
+    """
+    first = next(iter(sides.values()))
+    return fitted([*_test(first), (3, words), *_both(both), *_machines(sides)], width)
+
+
+def _both(both: Mapping[str, SideValues]) -> Iterator[Item]:
+    for number, (name, (mean, bending, sigma)) in enumerate(both.items()):
+        text = f"{name} {strain_text(mean, sigma)}, bending {strain_text(bending, sigma)} µm/m"
+        yield 5 if number == 0 else 10, text
+
+
+def _machines(sides: Mapping[str, Snapshot]) -> Iterator[Item]:
+    for name, s in sides.items():
+        frames = s.frames
+        done = f"{s.valid}/{s.zois} ZOIs" if s.time_step is not None else f"{frames['grabbed']} frames"
+        yield 8, f"{name} {done}"
+        yield 11, f"skipped {frames['skipped']}"
+        yield (6, f"LOST {s.lost}") if s.lost else (13, "lost 0")
 
 
 def fitted(items: Sequence[Item], width: int) -> str:

@@ -83,7 +83,8 @@ class MapView:
         self._painted = m, painted
         height, width = m.burst.mean.shape
         shown = {"of": self.choice.name, "range": self.choice.span, "width": width, "height": height}
-        return as_jpeg(picture), shown | _scale_of(painted) | {"gauges": gauge_shapes(self._config)}
+        shapes = gauge_shapes(self._config) | plate_shapes(self._config)
+        return as_jpeg(picture), shown | _scale_of(painted) | {"gauges": shapes}
 
     def value_at(self, x: float, y: float) -> dict[str, Any]:
         """Value, sigma and status of the ZOI that is shown at a place of the picture, px."""
@@ -117,6 +118,17 @@ def _scale_of(painted: Painted) -> dict[str, Any]:
     counts, _ = np.histogram(values[np.isfinite(values)], BARS, (low, high))
     unit = "" if strain else scale.unit
     return {"low": low, "high": high, "strain": strain, "unit": unit, "histogram": counts.tolist()}
+
+
+def plate_shapes(config: Config) -> dict[str, Any]:
+    """The plates of a configuration as the page draws them beside the gauges: boxes without handles to drag, px."""
+    found = {}
+    for name, plate in config.plate.items():
+        assert plate.box is not None
+        x, y, w, h = plate.box
+        corners = [(x, y), (x + w, y), (x + w, y + h), (x, y + h), (x, y)]
+        found[f"plate {name}"] = {"kind": "plate", "handles": [(x, y)], "outline": [corners]}
+    return found
 
 
 def gauge_shapes(config: Config) -> dict[str, Any]:

@@ -28,8 +28,9 @@ from live.pipeline.run_state import RunState
 from live.pipeline.snapshot import Snapshot, peak_force
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.curve_history import CurveHistory
-from live.ui.web.map_view import MapView, gauge_shapes
+from live.ui.web.map_view import MapView, gauge_shapes, plate_shapes
 from live.ui.web.painting import as_jpeg, shrunk
+from live.ui.web.sides import SidesPanel
 
 MAX_EVENTS = 30
 STATE_S, PICTURE_S = 0.1, 0.25
@@ -94,6 +95,7 @@ class PageConsumer(Consumer):
         self._shown = 0
         self._scale: dict[str, Any] = {}
         self._running: Running | None = None
+        self._sides: SidesPanel | None = None
         self._newest: Measurement | None = None
         self._matched: Measurement | None = None
         self._peak: Measurement | None = None
@@ -108,8 +110,10 @@ class PageConsumer(Consumer):
         self._elongation_gauge, self._length_mm = elongation_length(config)
         self._due = {"state": 0.0, "picture": 0.0}
 
-    def attach(self, running: Running) -> None:
-        """Use ``running``, which has begun."""
+    def attach(self, running: Running, sides: Mapping[str, RunState] | None = None) -> None:
+        """Use ``running``, which has begun; ``sides`` are those of a test with two cameras."""
+        if sides:
+            self._sides = SidesPanel(sides, self._config.specimen, self._now)
         self._running, self._start_t = running, running.run_state.health.began_t
         self._channels = ChannelValues(self._start_t, running.run_state.snapshot)
 
@@ -225,6 +229,7 @@ class PageConsumer(Consumer):
             "ledger": s.frames,
             "alarms": [printable(text) for text in s.alarms],
             "disk_min": s.disk_s / 60,
+            "sides": None if self._sides is None else self._sides.state(),
         }
         return values | _measured(s)
 
@@ -258,7 +263,8 @@ class PageConsumer(Consumer):
         elif frame is not None:
             height, width = frame.image.shape
             self.picture = as_jpeg(shrunk(frame.image, frame.bits)[0])
-            self._scale = {"width": width, "height": height, "gauges": gauge_shapes(self._config)}
+            shapes = gauge_shapes(self._config) | plate_shapes(self._config)
+            self._scale = {"width": width, "height": height, "gauges": shapes}
         self._shown += 1
 
 

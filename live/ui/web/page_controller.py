@@ -22,6 +22,7 @@ from acquire.errors import PhasedicError
 from acquire.printable import brief, printable
 from analysis.evaluate import GAUGE_KINDS
 from live.config.loading import Config
+from live.pipeline.run_state import RunState
 from live.results.maps.field_maps import FIELD_MAPS
 from live.run.control import ONCE, Controls, answer
 from live.ui.web.authorization import HttpError
@@ -152,11 +153,11 @@ class PageController:
         self._enter(RUN, "")
         return self._consumer
 
-    def attach(self, live: ControlledRun) -> None:
-        """Pass commands to ``live`` from now on."""
+    def attach(self, live: ControlledRun, sides: Mapping[str, RunState] | None = None) -> None:
+        """Pass commands to ``live`` from now on; ``sides`` are those of a test with two cameras."""
         self._live = live
         if self._consumer is not None:
-            self._consumer.attach(live)
+            self._consumer.attach(live, sides)
 
     def end(self, result: Mapping[str, Any]) -> None:
         """Begin the stage after the run and show its ``result``."""

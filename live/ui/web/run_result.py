@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +10,14 @@ import numpy as np
 
 from analysis.evaluate import TensileFigures
 from live.config.sections import SpecimenConfig
+from live.config.sides import FRONT
 from live.pipeline.event_log import sentence
 from live.pipeline.run_state import RunState
 from live.results.figures import TensileRow, evaluate, tensile_table
 from live.results.report.curves import load_unit, strain_unit, stress_strain
 from live.results.report.evaluation import EvaluatedCurve, intercept_of
 from live.results.summary import why_nothing
+from live.ui.web.sides import side_figures
 
 MAX_TROUBLES = 20
 
@@ -35,6 +37,23 @@ def run_result(run_state: RunState, specimen: SpecimenConfig, folder: Path, word
         "lines": [] if figures is None else list(_lines(run_state, specimen, figures)),
         "ledger": run_state.frame_counts.line(),
         "troubles": troubles if measured else [*troubles, why_nothing(run_state)],
+    }
+
+
+def sides_result(
+    states: Mapping[str, RunState], specimen: SpecimenConfig, folder: Path, words: str
+) -> dict[str, Any]:
+    """The result of a test with two cameras: figures of the mean and of each side, warnings of both, else the front."""
+    results = {side: run_result(state, specimen, folder / side, words) for side, state in states.items()}
+    figures = [
+        {"name": f"{one['name']}, {one['side']}", "text": one["text"], "interval": ""}
+        for one in side_figures(states, specimen)
+    ]
+    return {
+        **results[FRONT],
+        "folder": str(folder),
+        "figures": figures,
+        "troubles": [f"{side}: {text}" for side, one in results.items() for text in one["troubles"]],
     }
 
 

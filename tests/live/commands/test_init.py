@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 
 from acquire.camera import CameraListing
+from hw_mocks.scene import Scene
+from hw_mocks.specimen import VirtualSpecimen
 from live.cli import main
 from live.config.loading import load_config
 
@@ -167,3 +169,21 @@ def test_no_camera_is_told(
     assert main(["init", str(tmp_path / "rig.toml")]) == 3
     assert "/dev/video0: this user may not open it" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_looks_like_plates_is_proposed_behind_a_mark(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    picture = np.full((480, 640), 60.0)
+    pattern = np.asarray(Scene(VirtualSpecimen(width=640, height=480)).render(0.0), np.float64) * 250
+    for x, y, w, h in ((240, 20, 160, 440), (50, 110, 110, 260)):
+        picture[y : y + h, x : x + w] = pattern[y : y + h, x : x + w]
+    shot = tmp_path / "shot.png"
+    cv2.imwrite(str(shot), (picture + np.random.default_rng(1).normal(0, 1, picture.shape)).astype(np.uint8))
+    rig = made(tmp_path, "--camera", f"files:{shot}")
+    assert "looks like a plate: " in capsys.readouterr().out
+    assert not load_config(rig, {}).plate
+    before, _, plates = rig.read_text().partition("# [plate.")
+    rig.write_text(f"{before}[plate.{plates.replace('# box', 'box')}")
+    box = load_config(rig, {}).plate["plate1"].box
+    np.testing.assert_allclose(box, (50, 110, 110, 260), atol=14)

@@ -15,7 +15,8 @@ from live.config.sections import SpecimenConfig
 from live.pipeline.event_log import EventLog
 from live.pipeline.history import History
 from live.pipeline.run_state import FrameCounts, RunState
-from live.results.figures import alignment_line, budget_rows, elastic_lines, evaluate, figure_lines, lag_line
+from live.results.budget import CameraView, budget_rows
+from live.results.figures import alignment_line, budget_of, elastic_lines, evaluate, figure_lines, lag_line
 from live.results.summary import summary_lines
 from tests.analysis.curves import Truth, composite, noisy, ramberg_osgood
 from tests.live.made_up import START, make_measurement
@@ -72,20 +73,45 @@ def test_the_interval_of_e_names_the_limits_in_it() -> None:
     stated = replace(FLAT, force_error_percent=1.0, strain_error_um_m=200.0)
     figures = evaluate(history, loads, stated)
     assert "interval, of E with limits of load cell, strain)" in figure_lines(figures, stated)[0]
-    *rows, combined = budget_rows(figures, stresses=True)
-    assert [row.cause for row in rows] == ["scatter", "load cell", "section", "strain"]
+    *rows, combined = budget_of(figures, CameraView(), stresses=True)
+    optics = ["motion off the plane", "lens", "rolling shutter"]
+    assert [row.cause for row in rows] == ["scatter", "load cell", "section", "strain", *optics]
     assert figures.span is not None
     assert rows[1].modulus == pytest.approx(0.01 / 3**0.5 * figures.E.value)
     assert rows[1].strain == pytest.approx(0.01 / 3**0.5 * figures.span.strain[1])
     assert math.isnan(rows[2].modulus)
-    assert rows[2].key == "specimen.section_error_percent"
+    assert rows[2].words == "not stated: specimen.section_error_percent"
     assert combined.modulus == pytest.approx(
         math.hypot(*(row.modulus for row in (rows[0], rows[1], rows[3])))
     )
     assert figures.E.high - figures.E.value == pytest.approx(1.96 * combined.modulus, rel=1e-2)
     forces = replace(stated, width_mm=None, thickness_mm=None, section_error_percent=1.0)
-    found = budget_rows(evaluate(history, loads, forces), stresses=False)
-    assert [row.cause for row in found] == ["scatter", "load cell", "strain", "combined"]
+    found = budget_of(evaluate(history, loads, forces), CameraView(), stresses=False)
+    assert [row.cause for row in found] == ["scatter", "load cell", "strain", *optics, "combined"]
+
+
+@pytest.mark.parametrize(
+    ("view", "stated", "words"),
+    [
+        (CameraView(), False, "not stated: scale.stand_off_mm"),
+        (CameraView(500.0), False, "not counted: 0.1 mm at 500 mm is 200 µm/m"),
+        (CameraView(500.0), True, "in strain"),
+        (CameraView(500.0, plates=True), True, "removed by plates; their noise is in scatter"),
+        (CameraView(500.0, both_sides=True), False, "not in the mean of both sides"),
+    ],
+)
+def test_what_the_budget_says_of_motion_off_the_plane(view: CameraView, stated: bool, words: str) -> None:
+    shares = {"scatter": 0.003} | ({"strain": 0.004} if stated else {})
+    rows = {row.cause: row for row in budget_rows(shares, 1e-3, 70.0, view, stresses=True)}
+    assert rows["motion off the plane"].words == words
+    assert rows["combined"].modulus == pytest.approx(70 * (0.005 if stated else 0.003))
+    assert rows["combined"].strain == pytest.approx(5e-6 if stated else 3e-6)
+
+
+def test_the_budget_names_the_shutter() -> None:
+    for readout, words in ((None, "not stated: camera.readout_ms"), (0.0, "none"), (33.0, "removed")):
+        rows = budget_rows({"scatter": 0.1}, 1e-3, 1.0, CameraView(readout_ms=readout), stresses=False)
+        assert next(row.words for row in rows if row.cause == "rolling shutter") == words
 
 
 def test_a_laminate_has_no_proof_strength() -> None:

@@ -19,7 +19,7 @@ from live.config.sections import DEFAULT_BURST
 from live.results.maps.painting import overlay_cells
 from live.setup.scale import Board, Scale, from_board
 from live.ui.web.broadcaster import Broadcaster
-from live.ui.web.map_view import gauge_shapes
+from live.ui.web.map_view import gauge_shapes, plate_shapes
 from live.ui.web.painting import as_jpeg, mark_saturated, shrunk
 from live.ui.web.setup.camera_preview import CameraPreview
 from live.ui.web.setup.check_panel import camera_values, quality_colours
@@ -138,6 +138,7 @@ class SetupSession:
             "overlays": self.overlays,
             "region": region,
             "gauges": gauge_shapes(config),
+            "plates": plate_shapes(config),
             "measure": {"zoi": m.zoi, "step": m.step, "burst": m.burst or DEFAULT_BURST},
             "specimen": {key: getattr(specimen, key) for key in SPECIMEN_KEYS},
             "metadata": dict(config.metadata),

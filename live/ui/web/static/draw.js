@@ -43,7 +43,7 @@ export function drawGauges(svg, gauges, width, height, handles) {
     text.textContent = name;
     parts.push(...outline(gauge, colour));
     names.push(text);
-    if (handles) gauge.handles.forEach((p, i) => dots.push(make("circle", { class: "handle", cx: p[0], cy: p[1], r: size / 3, fill: colour, tabindex: 0, role: "button", "data-handle": `${name} ${i}`, "aria-label": `${name} ${i + 1}` })));
+    if (handles && gauge.kind !== "plate") gauge.handles.forEach((p, i) => dots.push(make("circle", { class: "handle", cx: p[0], cy: p[1], r: size / 3, fill: colour, tabindex: 0, role: "button", "data-handle": `${name} ${i}`, "aria-label": `${name} ${i + 1}` })));
   });
   svg.replaceChildren(...parts, ...names, ...dots);
   if (focused) svg.querySelector(`[data-handle="${CSS.escape(focused)}"]`)?.focus();

@@ -273,7 +273,7 @@ export function showDrawing(value) {
 function showGauges() {
   if (state.camera && !pending) {
     const before = svg.dataset.mark;
-    drawGauges(svg, state.gauges, state.camera.width, state.camera.height, true);
+    drawGauges(svg, { ...state.gauges, ...state.plates }, state.camera.width, state.camera.height, true);
     if (svg.dataset.mark !== before) sketch();
   }
 }

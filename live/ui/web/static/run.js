@@ -37,6 +37,7 @@ export function showRun(value) {
   put($("peak"), value.peak_N == null ? "–" : `${fixed(value.peak_N, 1)} N`);
   put($("elongation"), value.elongation_mm == null ? "–" : `${fixed(value.elongation_mm, 4)} mm`);
   put($("strainrate"), value.strain_rate == null ? "–" : `${rate(value.strain_rate)} 1/s`);
+  showSides(value.sides);
   showStrip(value);
   showEvents(value.events);
   showAlarm(value);
@@ -79,6 +80,21 @@ function showStrains(value) {
     put(number, one.reason || one.value == null ? t("lost") : withPart(strainText(one.value, one.sigma), one.part));
     number.title = one.reason ? t(one.reason) : "";
   });
+}
+
+// Two cameras: mean and bending, the figures so far, and each camera.
+function showSides(sides) {
+  const rows = [];
+  for (const one of sides?.strains ?? []) {
+    rows.push([`${t("mean")}: ${one.name}`, strainText(one.mean, one.sigma)]);
+    rows.push([t("front minus mean"), strainText(one.bending, one.sigma)]);
+  }
+  for (const one of sides?.cameras ?? []) {
+    rows.push([t(one.side), `${one.valid} / ${one.zois}, ${t("skipped")} ${one.skipped}, ${t("lost")} ${one.lost}`]);
+  }
+  for (const one of sides?.figures ?? []) rows.push([`${one.name}, ${t(one.side)}`, one.text]);
+  $("sides").hidden = !rows.length;
+  fill($("sides"), rows, ([name, text]) => el("li", {}, el("span", { text: name }), el("b", { text })));
 }
 
 const CELLS = ["ZOIs", "frames/s", "latency", "recorded", "skipped", "lost", "kernel", "disk"];

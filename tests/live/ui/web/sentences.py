@@ -17,6 +17,8 @@ LANGUAGES = ("de", "fr")
 MODULES = (
     "live/run/control.py",
     "live/run/live_run.py",
+    "live/run/two_cameras.py",
+    "live/config/sides.py",
     "live/run/alarms.py",
     "live/setup/check/verdict.py",
     "live/setup/region.py",

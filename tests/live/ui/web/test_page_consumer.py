@@ -25,6 +25,7 @@ from live.pipeline.run_state import RunState
 from live.results.maps.field_maps import FIELD_MAPS
 from live.ui.web.broadcaster import Broadcaster
 from live.ui.web.curve_history import MAX_POINTS, CurveHistory
+from live.ui.web.map_view import plate_shapes
 from live.ui.web.page_consumer import PageConsumer, elongation_length
 from tests.live.made_up import make_frame, make_measurement
 from tests.live.ui.waiting import until
@@ -313,3 +314,22 @@ def test_a_translation_keeps_what_is_filled_in(name: str) -> None:
 def test_the_library_has_its_licence_and_origin() -> None:
     text = (STATIC / "uplot-license.txt").read_text("utf-8")
     assert "The MIT License" in text and "https://github.com/leeoniya/uPlot" in text and "1.6.32" in text
+
+
+def test_plates_are_drawn_beside_the_gauges_and_cannot_be_dragged() -> None:
+    plates = {"plate.left": {"box": [10, 20, 30, 40]}}
+    config = load_config(None, {"gauges.axial": {"kind": "line", "start": [1, 2], "end": [3, 4]}, **plates})
+    shapes = plate_shapes(config)
+    assert shapes == {
+        "plate left": {
+            "kind": "plate",
+            "handles": [(10, 20)],
+            "outline": [[(10, 20), (40, 20), (40, 60), (10, 60), (10, 20)]],
+        }
+    }
+    broadcaster = Broadcaster()
+    broadcaster.open()
+    consumer = ready(PageConsumer(broadcaster, config))
+    consumer.measurement(measurement())
+    consumer.idle()
+    assert set(consumer.state()["picture"]["gauges"]) == {"axial", "plate left"}

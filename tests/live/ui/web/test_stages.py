@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.live.ui.web.browser import Page
-from tests.live.ui.web.conftest import Start, another, measuring, started
+from tests.live.ui.web.browser import Page, Program
+from tests.live.ui.web.conftest import CAMERA, OPTIONS, Start, another, measuring, started
 from tests.live.ui.web.legibility import COLOURS, contrast, fits, readable
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(600)]
@@ -329,3 +330,26 @@ def test_messages_of_devices_and_the_colours_of_gauges(start: Start) -> None:
         assert contrast(letters, [255, 255, 255]) >= 4.5, letters
         assert min(contrast(line, panel) for panel in panels.values()) >= 3, line
     assert page.page.evaluate("() => [...untranslated]") == []
+
+
+def test_front_and_back_of_a_test_with_two_cameras(browser: Any, tmp_path: Path) -> None:
+    camera = f"{CAMERA.format(seconds=60)}&bending=5&stand_off_mm=500&settle_mm=0.1"
+    cameras = ["--camera", camera, "--back", f"{camera}&side=back&seed=3"]
+    program = Program(tmp_path, "page", *cameras, "--load", "sim:", *OPTIONS)
+    try:
+        page = another(browser, program.address)
+        started(page)
+        page.until(lambda: "front minus mean" in page.text("sides"), "mean and bending of both")
+        rows = page.page.locator("#sides li").all_text_contents()
+        assert rows[0].startswith("mean: axial")
+        assert [row.endswith("lost 0") for row in rows if row.startswith(("front1", "back1"))] == [True, True]
+        page.press("q")
+        page.confirm()
+        page.until(lambda: page.stage() == "after", "the result")
+        page.until(lambda: "Rm, both" in page.page.inner_text("#after"), "the figures of both")
+        assert not page.errors
+        folders = {path.parent.name for path in tmp_path.glob("runs/*/*/strain.h5")}
+        assert folders == {"front", "back"}
+    finally:
+        program.kill()
+    assert "Traceback" not in (tmp_path / "err.txt").read_text()

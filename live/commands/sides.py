@@ -1,0 +1,74 @@
+"""``phasedic sides``: front and back of one test: mean strain, bending, and E of the mean."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from live.config.sides import BACK, FRONT
+from live.pipeline.screen import Screen
+from live.ui.terminal.screen import TerminalScreen
+
+if TYPE_CHECKING:
+    from live.results.sides.together import SidesOfTest
+
+TABLE = "strain.csv"
+"""Of both sides, in the folder of a test with two cameras."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic sides``."""
+    parser.add_argument(
+        "front", help="folder of a test with two cameras, or of the run of the front, with the force"
+    )
+    parser.add_argument(
+        "back", nargs="?", help="folder of the run of the back, of the same time on the same machine"
+    )
+    parser.add_argument("--out", metavar="FILE.csv", help="new file (default: sides.csv beside the front)")
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic sides``."""
+    front = Path(arguments.front)
+    one, other = (front, Path(arguments.back)) if arguments.back else (front / FRONT, front / BACK)
+    out = Path(arguments.out) if arguments.out else front / "sides.csv"
+    put_together(one, other, out, TerminalScreen())
+    return 0
+
+
+def put_together(front: Path, back: Path, out: Path, screen: Screen) -> None:
+    """Write the table of both sides to ``out``, a new file, and print their strains and figures.
+
+    Raises
+    ------
+    ConfigError, DataError
+        The file exists, a run cannot be read, or they are not of one test.
+    """
+    from live.results.export.atomic_file import new_file
+    from live.results.run_folder import open_run
+    from live.results.sides.together import SidesOfTest, write_sides
+
+    with open_run(front) as one, open_run(back) as other:
+        sides, stresses = SidesOfTest.of_folders(one, other), one.specimen.area_m2 is not None
+    with new_file(out) as part, part.open("x", encoding="utf-8", newline="") as file:
+        write_sides(sides, file)
+    for line in (*_strains(sides), *sides.figure_lines(stresses=stresses)):
+        screen.print(line)
+    screen.print(str(out))
+
+
+def _strains(sides: SidesOfTest) -> Iterator[str]:
+    """The last instant that both sides have, µm/m."""
+    from live.ui.terminal.status_line import strain_text
+
+    yield "at the end, µm/m:      mean of both        front minus mean"
+    for name, one in sides.courses.items():
+        known = np.flatnonzero(np.isfinite(one.mean))
+        if len(known):
+            k = known[-1]
+            mean, bending = (strain_text(values[k], one.sigma[k]) for values in (one.mean, one.bending))
+            yield f"  {name:<16} {mean:>18}  {bending:>18}"

@@ -1,0 +1,1 @@
+"""Front and back of one specimen: ``together`` puts two runs together, ``folder`` has where they are, and clocks."""

@@ -1,0 +1,113 @@
+"""Front and back of one test put together: what bends or moves towards the cameras leaves the mean, and E."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from acquire.errors import DataError
+from analysis.evaluate import Course, TwoSides, evaluate_test
+from live.cli import main
+from live.results.figures import tensile_options
+from live.results.run_folder import open_run
+from live.results.sides.folder import shift_s
+from live.results.sides.together import SidesOfTest
+from tests.live import made_run
+from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run, noisy
+
+BENT, TOWARDS = 0.05, -0.08  # bending and out-of-plane motion of the front, as shares of the strain
+LATER_S = 0.73  # the back was started so much later
+
+
+def runs(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, config: Mapping[str, Any] = CONFIG
+) -> tuple[Path, Path]:
+    """Two runs of one test; the times of the back count from its own start."""
+    wrong = BENT + TOWARDS
+    front = make_run(folder / "front", config=config, field_of=lambda k, e: noisy(k, e * (1 + wrong)))
+    monkeypatch.setattr(made_run, "START", made_run.START + LATER_S)
+    back = make_run(folder / "back", config=config, field_of=lambda k, e: noisy(k + 1000, e * (1 - wrong)))
+    return front, back
+
+
+def test_between_instants_by_lines_and_nothing_across_gaps() -> None:
+    course = Course(
+        np.array([0.0, 1.0, 2.0, 9.0]), np.array([0.0, 2.0, 4.0, 4.0]), np.array([3.0, 4.0, 0.0, 0.0])
+    )
+    found = course.at(np.array([-0.1, 0.0, 0.5, 2.0, 5.0, 9.1]), 2.0)
+    np.testing.assert_allclose(found.value, [np.nan, 0, 1, np.nan, np.nan, np.nan])
+    assert found.sigma[2] == pytest.approx(2.5)
+    assert np.isnan(Course(np.zeros(1), np.zeros(1), np.zeros(1)).at(np.zeros(3), 1.0).value).all()
+
+
+def test_mean_bending_and_their_sigma() -> None:
+    t = np.arange(3.0)
+    front, back = (
+        Course(t, np.full(3, value), np.full(3, sigma)) for value, sigma in ((110.0, 3), (90.0, 4))
+    )
+    both = TwoSides.of(front, back, 2.0)
+    assert both.mean.tolist() == [100, 100, 100]
+    assert both.bending.tolist() == [10, 10, 10]
+    assert both.sigma.tolist() == pytest.approx([2.5, 2.5, 2.5])
+    exact = Course(t, t, np.zeros(3))
+    # Both see cos(0.1 degree): short by 1.5 um/m at most.
+    assert TwoSides.of(exact, exact, 2.0).sigma == pytest.approx(1.523e-6 / math.sqrt(3), rel=1e-3)
+
+
+def test_the_mean_has_neither_bending_nor_motion(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    config = {**CONFIG, "gauges": GAUGES}
+    with open_run(
+        make_run(tmp_path / "truth", config=config, field_of=lambda k, e: noisy(k, e, 0.0, 1e-5))
+    ) as run:
+        truth, E = run.gauges["axial"].value, evaluate_test(run.curve, tensile_options(run.specimen)).E.value
+    front, back = runs(tmp_path, monkeypatch, config)
+    with open_run(front) as one, open_run(back) as other:
+        assert other.start_monotonic - one.start_monotonic == pytest.approx(LATER_S)
+        sides = SidesOfTest.of_folders(one, other)
+    axial = sides.courses["axial"]
+    for values, share in ((axial.mean, 1.0), (axial.bending, BENT + TOWARDS)):
+        rest = values - share * truth
+        assert np.mean(np.abs(rest) < 3 * axial.sigma) > 0.95
+        assert abs(np.mean(rest)) < 1e-6
+    assert abs(sides.front.E.value / E - 1) > 0.025
+    assert sides.both.E.value == pytest.approx(E, rel=1e-3)
+    assert sides.both.E.low < E < sides.both.E.high
+
+
+def test_the_command_writes_a_table(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    front, back = runs(tmp_path, monkeypatch, {**CONFIG, "gauges": GAUGES})
+    assert main(["sides", str(front), str(back)]) == 0
+    shown = capsys.readouterr().out
+    assert "both:  E = " in shown and "front: E = " in shown and "back:  E = " in shown
+    with (front / "sides.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == len(PULLED)
+    assert float(rows[-1]["mean_axial"]) == pytest.approx(PULLED[-1], rel=0.02)  # of a coarse grid
+    assert float(rows[-1]["bending_axial"]) == pytest.approx((BENT + TOWARDS) * PULLED[-1], rel=0.02)
+    assert abs(float(rows[-1]["mean_shear"])) < 1e-5
+    assert main(["sides", str(front), str(back)]) == 2  # it exists
+    assert "sides.csv" in capsys.readouterr().err
+
+
+def test_what_is_not_of_one_test_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    front = make_run(tmp_path / "front")
+    same = make_run(tmp_path / "same", session=False)  # by its time: of one run with two cameras
+    monkeypatch.setattr(made_run, "START", made_run.START + 501.0)
+    monkeypatch.setattr(made_run, "UTC_START", made_run.UTC_START + timedelta(seconds=1))
+    without = make_run(tmp_path / "without", session=False)
+    elsewhere = make_run(tmp_path / "elsewhere")
+    with open_run(front) as one, open_run(same) as other:
+        assert shift_s(one, other) == 0
+    with open_run(front) as one, open_run(without) as other, pytest.raises(DataError, match="no recording"):
+        SidesOfTest.of_folders(one, other)
+    with open_run(front) as one, open_run(elsewhere) as other, pytest.raises(DataError, match="500 s apart"):
+        SidesOfTest.of_folders(one, other)
