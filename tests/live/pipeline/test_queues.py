@@ -220,3 +220,14 @@ def test_only_the_calling_thread_becomes_nicer() -> None:
     thread.join()
     assert found == [min(before + 3, 19)]
     assert os.getpriority(os.PRIO_PROCESS, 0) == before
+
+
+def test_of_what_is_skipped_only_the_brief_is_kept() -> None:
+    box: LatestQueue[list[int]] = LatestQueue(at_first=2, brief=lambda item: item[:1])
+    for i in range(5):
+        box.put([i] * 1000)
+    box.begin()
+    assert len(box.get(0) or []) == len(box.get(0) or []) == 1000
+    box.close()
+    box.put([5] * 1000)
+    assert box.take_skipped() == [[0], [1], [2], [5]]
