@@ -45,7 +45,7 @@ def backend_is_here() -> bool:
         return False
 
 
-_USED = (".py", ".toml", ".h5", ".npz")
+_USED = (".py", ".toml", ".h5", ".npz", ".csv")
 """Kinds of files that the tests are made of."""
 FILES = (
     "pyproject.toml",
