@@ -65,24 +65,31 @@ def products(name: str) -> tuple[tuple[int, float], ...]:
     return tuple((PAIR_INDEX[i, j], a * b) for i, a in terms for j, b in terms)
 
 
-def stretched(covariance: NDArray[np.float32], parameters: Floats) -> NDArray[np.float32]:
-    """Covariances of the fit, (21, R, C), as those of u, v and their gradients.
+def stretched(
+    covariances: tuple[NDArray[np.float32], NDArray[np.float32]], parameters: Floats
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Two covariances of the fit, (21, R, C) each, as those of u, v and their gradients.
 
     The fit is made where the warped picture differs: its step of (u, v), and of their gradients, moves by
     F = I + grad u in the deformed picture. Below ``STRETCH`` nothing is done.
 
     Parameters
     ----------
-    covariance : (21, R, C)
+    covariances : (21, R, C) each
     parameters : (6, R, C)
         u, du_dx, du_dy, v, dv_dx, dv_dy.
     """
     gradients = parameters[[DU_DX, DU_DY, DV_DX, DV_DY]]
     if not np.nanmax(np.abs(gradients), initial=0) > STRETCH:
-        return covariance
+        return covariances
     f = np.asarray(gradients + np.array([1, 0, 0, 1])[:, None, None], np.float32).reshape(
         2, 2, *gradients.shape[1:]
     )
+    return _turned(covariances[0], f), _turned(covariances[1], f)
+
+
+def _turned(covariance: NDArray[np.float32], f: NDArray[np.float32]) -> NDArray[np.float32]:
+    """A covariance (21, R, C) of (u, v) and its gradients, each multiplied by ``f`` (2, 2, R, C)."""
     out = np.empty_like(covariance)
     for pair, (i, j) in enumerate(_PAIRS):
         (row, first), (column, second) = divmod(i, 3), divmod(j, 3)

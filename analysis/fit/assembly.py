@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,16 @@ def weigh(
         if measured[z]:
             from_reference[z] = reference[z]
             whole[z] = reference[z] + current[z] / max(gain[z], MIN_NOISE_GAIN) ** 2
+
+
+@helper
+def weigh_blur(unit: Any, whole: Any, out: Any) -> None:
+    """The uncertainty of the blur of each ZOI, (A,) float32, px^2, written to ``out``; NaN where nothing was measured.
+
+    ``unit`` (A,) is its variance for noise of 1 GL, ``whole`` as in ``weigh``.
+    """
+    for z in range(len(out)):
+        out[z] = math.sqrt(max(unit[z] * whole[z], 0.0)) if whole[z] == whole[z] else np.nan
 
 
 @parallel

@@ -232,21 +232,29 @@ class PooledError(NamedTuple):
         Variance that a ZOI of this contrast leaves, over that expected from the noise as stated.
     forgiven : (A,)
         The same where it is the common state of the picture; 1 where that is as stated.
+    usual : float
+        Median of ``ratio``.
     scatter : float
-        Standard deviation of what a single ZOI leaves over that.
+        Standard deviation of what a single ZOI leaves over that; 0 where that is as stated.
     colour : (2,)
         Variance of u and of v over that of white noise of the same variance a pixel.
     """
 
     ratio: Floats
     forgiven: Floats
+    usual: float
     scatter: float
     colour: Floats
 
     @classmethod
     def none(cls, count: int) -> PooledError:
         """Of ``count`` ZOIs that leave what is expected."""
-        return cls(np.ones(count), np.ones(count), 0.0, np.ones(2))
+        return cls(np.ones(count), np.ones(count), 1.0, 0.0, np.ones(2))
+
+    @property
+    def is_as_given(self) -> bool:
+        """Whether the noise as given explains what all ZOIs leave."""
+        return bool(np.all(self.ratio == 1))
 
     def at(self, places: NDArray[np.intp] | slice) -> PooledError:
         """That of some ZOIs."""

@@ -9,15 +9,19 @@ H^-1 (J' w C w J) H^-1 with the autocovariance C of what is left, without C.
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.compiled.loops import helper
 from analysis.fit.assembly import MIN_NOISE_GAIN
 from analysis.fit.kernel_args import CONVERGED, OutArgs, PooledError, ReferenceArgs
 from analysis.fit.validity import COLOURED, LOST_SHARE
 
 Floats = NDArray[np.float64]
-Places = NDArray[np.intp] | slice
+Places = NDArray[np.intp]
 
 MIN_POOLED = 25
 """ZOIs from which on their common error is taken in place of the noise as stated."""
@@ -31,6 +35,8 @@ GROUP, MAX_GROUPS = 50, 8
 """ZOIs of like contrast whose median counts, at least, and number of such groups at most."""
 COLOUR_SPREAD = 1.0
 """Standard deviation of the logarithm of the ratio that the shapes of one ZOI show."""
+SHOWN = 6
+"""Figures of a ZOI that are pooled (``explained``)."""
 SAME = 1e-3
 """What is left over what the noise as stated explains, below which the picture is its own reference: no noise shows."""
 LOWEST, LOWEST_DEVIATION = 5, 0.84
@@ -52,40 +58,78 @@ def pooled(
     Parameters
     ----------
     found : OutArgs
-        Of B ZOIs, some of the A.
+        Of B ZOIs, some of the A; of more than ``MAX_POOLED`` one in so many counts.
     left, expected : (B,), GL^2
         Variance a pixel that the fit leaves, and that the noise as stated explains.
     known : ReferenceArgs
         Of all A.
-    places : which of the A
+    places : (B,)
+        Which of the A.
     given : bool
         Whether the noise was given: it stands where what is left agrees with it.
     """
-    own, gain = known.at(places), found.nuisance[:, 0]
-    matched = _matched(found, left, expected, own)
-    count = int(np.count_nonzero(matched))
+    every = 1 + len(places) // MAX_POOLED
+    out = np.empty((SHOWN, 1 + len(places) // every))
+    count = explained(found, left, expected, known, places, every, out)
     if count < MIN_POOLED:
         return None
-    if np.median((found.left / (own.pixels * expected))[matched]) < SAME:
+    contrast, ratio, spread, bare, *cubic = out[:, np.argsort(out[0, :count], kind="stable")]
+    if np.count_nonzero(bare < SAME) > count / 2:
         return None
-    ratio, contrast = left[matched] / expected[matched], own.signal[matched]
-    groups = _alike(contrast)
-    middle, usual = np.median(contrast[groups], axis=1), np.median(ratio[groups], axis=1)
-    scatter = MAD * float(np.median(np.abs(ratio / _at(contrast, middle, usual) - 1)))
-    agrees = given and usual.min() > AGREES[0] and usual.max() < AGREES[1]
-    if agrees:
-        usual = np.ones(len(usual))
-    spread = np.sqrt(2 / np.maximum(own.pixels[matched], 1))
+    groups = _alike(count)
+    middle, usual = medians(contrast[groups]), medians(ratio[groups])
+    number, shares = count * min(1.0, every * known.independent), np.array(cubic) / known.white[:, None]
+    if given and usual.min() > AGREES[0] and usual.max() < AGREES[1]:
+        colour = _shrunk(medians(shares), number)
+        stated = PooledError.none(len(known.signal))
+        return stated if np.abs(np.log(colour)).max() < np.log(COLOURED) else stated._replace(colour=colour)
+    trend, of_each = _at(known.signal, middle, usual), _at(contrast, middle, usual)
+    scatter = MAD * float(np.median(np.abs(ratio / of_each - 1)))
     lowest = _lowest(ratio[groups], spread[groups])
     as_stated = (lowest < AS_STATED) | (np.median(lowest) < AS_STATED)
-    common = np.where(as_stated, np.minimum(usual, 1.0), usual)
-    trend = _at(known.signal, middle, usual)
-    error = expected * trend[places] / np.maximum(gain, MIN_NOISE_GAIN) ** 2
-    shares = found.cubic[matched] / (error[:, None] * own.unit)[matched]
-    colour = _shrunk(np.median(shares, axis=0) / known.white, count * known.independent)
-    if agrees and np.all(np.abs(np.log(colour)) < np.log(COLOURED)):
-        colour = np.ones(2)
-    return PooledError(trend, _at(known.signal, middle, common), scatter, colour)
+    forgiven = _at(known.signal, middle, np.where(as_stated, np.minimum(usual, 1.0), usual))
+    colour = _shrunk(medians(shares / of_each), number)
+    return PooledError(trend, forgiven, float(np.median(trend)), scatter, colour)
+
+
+@helper
+def medians(rows: Any) -> Any:
+    """The median of each row of (K, N), (K,)."""
+    out = np.empty(len(rows))
+    for i in range(len(rows)):
+        out[i] = np.median(rows[i])
+    return out
+
+
+@helper
+def explained(
+    found: OutArgs, left: Any, expected: Any, known: ReferenceArgs, places: Any, every: int, out: Any
+) -> int:
+    """How many of one in ``every`` ZOIs have a clear pattern and explain it; 0 where most with a clear one do not.
+
+    Written to ``out`` (SHOWN, ..) of each: contrast; variance left over that expected, and what this scatters by;
+    the same before rounding counts; variance of the shapes of u and of v over that expected of u and of v.
+    """
+    tried = count = 0
+    for i in range(0, len(places), every):
+        z = places[i]
+        gain = found.nuisance[i, 0]
+        of_u, of_v = known.unit[z, 0], known.unit[z, 1]
+        if not (math.isfinite(left[i]) and max(of_u, of_v) * min(left[i], expected[i]) < CLEAR_SIGMA**2):
+            continue
+        tried += 1
+        pattern = known.signal[z] * min(max(gain, 0.0), 1.0) ** 2
+        if found.state[i] != CONVERGED or not left[i] < max(LOST_SHARE * pattern, 1.5 * expected[i]):
+            continue
+        error = expected[i] / max(gain, MIN_NOISE_GAIN) ** 2
+        out[0, count] = known.signal[z]
+        out[1, count] = left[i] / expected[i]
+        out[2, count] = math.sqrt(2 / max(known.pixels[z], 1.0))
+        out[3, count] = found.left[i] / (known.pixels[z] * expected[i])
+        out[4, count] = found.cubic[i, 0] / (error * of_u)
+        out[5, count] = found.cubic[i, 1] / (error * of_v)
+        count += 1
+    return count if count >= MIN_MATCHED * tried else 0
 
 
 def _at(contrast: Floats, middle: Floats, values: Floats) -> Floats:
@@ -95,23 +139,11 @@ def _at(contrast: Floats, middle: Floats, values: Floats) -> Floats:
     return np.asarray(np.interp(contrast, middle, values))
 
 
-def _matched(found: OutArgs, left: Floats, expected: Floats, own: ReferenceArgs) -> NDArray[np.bool_]:
-    """ZOIs with a clear pattern that explain it, (B,); none where most of those with a clear pattern do not."""
-    with np.errstate(invalid="ignore"):
-        sharp = own.unit.max(axis=1) * np.minimum(left, expected) < CLEAR_SIGMA**2
-        tried = sharp & np.isfinite(left)
-        pattern = own.signal * np.clip(found.nuisance[:, 0], 0, 1) ** 2
-        explained = left < np.maximum(LOST_SHARE * pattern, 1.5 * expected)
-    matched = tried & explained & (found.state == CONVERGED)
-    enough = np.count_nonzero(matched) >= MIN_MATCHED * np.count_nonzero(tried)
-    return np.asarray(matched & enough)
-
-
-def _alike(contrast: Floats) -> NDArray[np.intp]:
-    """Groups of ZOIs of like contrast, (G, N); a few of the highest are left over."""
-    count = max(1, min(MAX_GROUPS, len(contrast) // GROUP))
-    size = len(contrast) // count
-    return np.argsort(contrast, kind="stable")[: count * size].reshape(count, size)
+def _alike(count: int) -> NDArray[np.intp]:
+    """Groups of ZOIs of like contrast, in whose order they are, (G, N); a few of the highest are left over."""
+    groups = max(1, min(MAX_GROUPS, count // GROUP))
+    size = count // groups
+    return np.arange(groups * size).reshape(groups, size)
 
 
 def _lowest(ratio: Floats, spread: Floats) -> Floats:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.field.picture_error import Cause, PictureError
+from analysis.field.picture_error import Cause
 from analysis.kernel.lines import inner, left_by_fit, lines_along, some
 from analysis.kernel.prepared import PreparedReference
 from analysis.kernel.solve import Solution
@@ -25,8 +25,8 @@ Floats = NDArray[np.float64]
 
 BLUR, NEIGHBOURS = 0.25, 0.12
 """Limits: growth of the variance of the blur, px^2; correlation of neighbouring pixels."""
-SAMPLE, SPECTRA = 30, 300
-"""ZOIs that are looked at, and whose spectra are averaged."""
+SAMPLE, SPECTRA = 30, 300 * 32**2
+"""ZOIs that are looked at, and pixels of those whose spectra are averaged."""
 BOTH_ALIKE = ("compression", "filter")
 """Causes that spoil the reference as much as the picture."""
 
@@ -41,13 +41,22 @@ def error_cause(solution: Solution, ok: NDArray[np.bool_]) -> Cause:
         return "bands"
     if abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR:
         return "blur"
+    return "noise" if _is_white(left) else "filter"
+
+
+def leaves_white(solution: Solution, ok: NDArray[np.bool_]) -> bool:
+    """Whether neighbouring pixels of what the fits of the ZOIs ``ok`` (A,) leave have nothing in common."""
+    return _is_white(left_by_fit(solution, some(ok, SAMPLE)))
+
+
+def _is_white(left: Floats) -> bool:
     within = inner(left)
     beside = (np.mean(within[:, 1:] * within[:, :-1]) + np.mean(within[:, :, 1:] * within[:, :, :-1])) / 2
-    return "noise" if abs(beside) < NEIGHBOURS * np.mean(within**2) else "filter"
+    return bool(abs(beside) < NEIGHBOURS * np.mean(within**2))
 
 
 def coloured_bias(
-    solution: Solution, ok: NDArray[np.bool_], error: PictureError | None, share: float
+    solution: Solution, ok: NDArray[np.bool_], cause: Cause, share: float
 ) -> tuple[Floats, Floats]:
     """What to add to the parameters (A, modes) and to the growth of the variance of the blur (A,), px^2.
 
@@ -55,8 +64,8 @@ def coloured_bias(
     ----------
     solution : Solution
     ok : (A,) bool
-    error : PictureError or None
-        Without a cause nothing is added.
+    cause : str
+        Of the error.
     share : float
         Of the error of both pictures that is the reference's, as stated.
     """
@@ -64,11 +73,9 @@ def coloured_bias(
 
     reference, ready, found = solution.reference, solution.reference.prepared, solution.found
     modes = reference.modes
-    if error is None or not error.cause or reference.sensors is not None:
-        return np.zeros((1, modes)), np.zeros(1)
-    which = some(ok, SPECTRA)
+    which = some(ok, SPECTRA // reference.grid.size**2)
     own = _own_error(ready, left_by_fit(solution, which), which)
-    own *= 0.5 if error.cause in BOTH_ALIKE else share
+    own *= 0.5 if cause in BOTH_ALIKE else share
     more = ready.weight * (own - solution.noise_taken[:, None] * ready.pattern.own_noise)
     inverse = ready.inverse[:-1, :, [modes, -3, -2]]  # with the columns f, f_xx and f_yy
     step = np.einsum("apk,ak->ap", inverse, more) / found.nuisance[:, :1]
@@ -87,10 +94,16 @@ def _own_error(ready: PreparedReference, left: Floats, which: NDArray[np.intp]) 
     level, raw = (_spectra(np.stack([ready.images[k][at] for at in places]), window) for k in (2, 3))
     response = np.mean((level * raw.conj()).real, axis=0) / np.mean(np.abs(raw) ** 2, axis=0)
     power = np.mean(np.abs(_spectra(left, window)) ** 2, axis=0) / np.sum(window**2)
+    columns = np.arange(size // 2 + 1)
+    share = np.where((columns == 0) | (2 * columns == size), 1, 2) / size**2  # the other half is the same
+    error = power * response * share
     bend = 2 * np.cos(2 * np.pi * np.fft.fftfreq(size)) - 2
-    return np.array([np.mean(power * response * b) for b in (np.ones(1), bend[None, :], bend[:, None])])
+    return np.array([np.sum(error), np.sum(error * bend[: len(columns)]), np.sum(error * bend[:, None])])
 
 
-def _spectra(zois: NDArray[np.floating], window: Floats) -> NDArray[np.complex128]:
-    """Of ZOIs (N, n, n) without their means, under a window."""
-    return np.asarray(np.fft.fft2((zois - zois.mean(axis=(1, 2), keepdims=True)) * window))
+def _spectra(zois: NDArray[np.floating], window: Floats) -> NDArray[np.complex64]:
+    """Of ZOIs (N, n, n) without their means, under a window: the half with columns from 0, (N, n, n // 2 + 1)."""
+    from scipy.fft import rfft2
+
+    level = zois.astype(np.float32)
+    return np.asarray(rfft2((level - level.mean(axis=(1, 2), keepdims=True)) * window.astype(np.float32)))

@@ -99,7 +99,8 @@ def rounding_variance(image: NDArray[Any]) -> float:
     sample = image.ravel()[:: max(1, image.size // ROUNDING_SAMPLE)].astype(np.float64)
     if not np.array_equal(sample, np.rint(sample)):
         return 0.0
-    step = np.gcd.reduce((sample - sample[0]).astype(np.int64))
+    away = (sample - sample[0]).astype(np.int64)
+    step = 1 if (away == 1).any() else np.gcd.reduce(away)
     return float(step) ** 2 / 12
 
 

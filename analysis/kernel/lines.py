@@ -38,8 +38,7 @@ def mend(solution: Solution) -> None:
         if mended is not None:
             solution.measure_in(mended)
     for _ in range(ROUNDS):
-        ok = solution.status == Status.OK
-        mended = without_lines(solution, ok) if solution.leaves_much else None
+        mended = without_lines(solution, solution.status == Status.OK) if solution.leaves_much else None
         if mended is None:
             return
         solution.had_lines = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 from analysis.field import Motion, Status, StrainField, stretched
 from analysis.field.picture_error import LIMIT, PictureError
 from analysis.follow.renewal import UNSHARED, Placement
-from analysis.kernel.coloured import BLUR, coloured_bias, error_cause
+from analysis.kernel.coloured import BLUR, coloured_bias, error_cause, leaves_white
 from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]
@@ -57,7 +58,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
     expected : PredictedMotion, optional
         None: the field has no motion.
     """
-    from analysis.fit.assembly import weigh
+    from analysis.fit.assembly import weigh, weigh_blur
 
     reference, found = solution.reference, solution.found
     ok = solution.status == Status.OK
@@ -77,16 +78,14 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
     )
     parts = _covariances(solution, ok, noise, first, whole)
     error = _picture_error(solution, ok, noise)
-    moved, sharper = coloured_bias(solution, ok, error, noise.share(gain, ok))
-    p = found.p + moved
-    variance = np.where(ok, reference.prepared.blur * whole, np.float32(np.nan))
-    sigma_blur = np.sqrt(np.maximum(variance, 0))  # rounding may leave a little less than nothing
-    blur = np.stack([np.where(ok, found.nuisance[:, 2] + sharper, np.nan), sigma_blur]).astype(np.float32)
-    values = reference.total(p)
+    local, growth = _unbiased(solution, ok, error, noise)
+    blur = np.stack([growth, growth]).astype(np.float32)
+    blur[0, ~ok] = np.nan
+    weigh_blur(reference.prepared.blur, whole, blur[1])
+    values = reference.total(local)
     if not ok.all():
         values = np.where(ok[:, None], values, np.nan)
-    gradients = reference.spread(values[:, reference.affine])
-    covariance_reference, covariance = (stretched(part, gradients) for part in parts)
+    covariance_reference, covariance = stretched(parts, reference.spread(values[:, reference.affine]))
     return StrainField(
         grid=reference.grid,
         parameters=reference.spread(values),
@@ -103,6 +102,18 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         picture=error,
         blur=reference.spread(blur.T),
     )
+
+
+def _unbiased(
+    solution: Solution, ok: NDArray[np.bool_], error: PictureError | None, noise: _Noise
+) -> tuple[Floats, Floats]:
+    """Parameters, and growth of the variance of the blur, without what an error that is not noise adds on average."""
+    found = solution.found
+    if error is None or not error.cause or solution.reference.sensors is not None:
+        return found.p, found.nuisance[:, 2]
+    share = noise.share(found.nuisance[:, 0], ok)
+    moved, sharper = coloured_bias(solution, ok, error.cause, share)
+    return found.p + moved, found.nuisance[:, 2] + sharper
 
 
 def _picture_error(solution: Solution, ok: NDArray[np.bool_], noise: _Noise) -> PictureError | None:
@@ -129,15 +140,15 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     if common is None or solution.retried or np.count_nonzero(ok) < FEW_REFUSED * len(ok):
         common = solution.pooled(np.flatnonzero(ok))
     if common is not None:
-        blurred = abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR
-        # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
-        colour = np.maximum(common.colour, 1) if blurred else common.colour
+        colour = common.colour
+        if colour.min() < 1 and abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR:
+            # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
+            colour = np.maximum(colour, 1)
+        if common.is_as_given and colour.max() > 1 and leaves_white(solution, ok):
+            colour = white  # a strain that bends within the ZOIs shows in the shapes, too
         whole = common.ratio * solution.expected(np.s_[:], gain)
-        return _Noise(
-            *_parted(whole, reference * gain**2, gain, solution),
-            colour,
-            float(np.sqrt(np.median(common.ratio[ok]))),
-        )
+        over = common.usual if ok.all() else float(np.median(common.ratio[ok]))
+        return _Noise(*_parted(whole, reference * gain**2, gain, solution), colour, math.sqrt(over))
     if solution.noise is not None or not ok.any():
         return _Noise(reference, current, white, float("nan"))
     left = solution.found.left / solution.reference.prepared.freedom

@@ -96,14 +96,14 @@ class Solution:
     @property
     def is_disturbed(self) -> bool:
         """Whether the image leaves much more than its noise, or many ZOIs are refused: it may have wild pixels."""
-        which = self._places[0]
-        refused = np.count_nonzero(self.status[which] != Status.OK)
-        return self.leaves_much or bool(refused > DISTURBED_SHARE * len(which))
+        tried = len(self._places[0])
+        refused = tried - np.count_nonzero(self.status == Status.OK)
+        return bool(self.leaves_much or refused > DISTURBED_SHARE * tried)
 
     @property
     def leaves_much(self) -> bool:
         """Whether the image leaves much more than its noise."""
-        return self.common is not None and float(np.median(self.common.ratio)) > DISTURBED_RATIO
+        return self.common is not None and self.common.usual > DISTURBED_RATIO
 
     def _solve(self, which: NDArray[np.intp], unknown: NDArray[np.bool_]) -> None:
         guess = self.guess
@@ -147,7 +147,7 @@ class Solution:
 
     def keep(self, which: NDArray[np.intp], found: OutArgs, status: NDArray[np.uint8]) -> None:
         """Take over what was found of the ZOIs ``which``."""
-        self.retried = True
+        self.retried = self.retried or len(which) > 0
         self.status[which] = status
         self.found.put(which, found)
 
@@ -206,31 +206,32 @@ class Solution:
         from analysis.fit.verdict import judge
 
         reference, ready, settings = self.reference, self.reference.prepared, self.reference.settings
-        known, expected = self._known(), self.expected(which, found.nuisance[:, 0])
+        known, expected = self._known, self.expected(which, found.nuisance[:, 0])
         far = CENTRE_VARIANCE[settings.order - 1]
         rule = VerdictArgs(
             self._is_given, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far
         )
         left = self._left(which, found)
-        if self.common is None and 2 * len(expected) > len(
-            self._places[0]
-        ):  # some that are retried forgive nothing
-            self.common = self.pooled(which, found)
+        most = 2 * len(expected) > len(self._places[0])  # some that are retried forgive nothing
+        if self.common is None and most:
+            self.common = self._pooled(which, found, left, expected)
         common = PooledError.none(len(known.signal)) if self.common is None else self.common
         status = np.empty(len(expected), np.uint8)
         judge(found, left, expected, common.at(which), known.at(which), rule, status)
         return status
 
-    def pooled(self, which: Places, found: OutArgs | None = None) -> PooledError | None:
-        """What the fits of the ZOIs ``which`` leave in common, from so many of them; None: as they are kept."""
-        from analysis.fit.pooling import MAX_POOLED, pooled
+    def pooled(self, which: NDArray[np.intp]) -> PooledError | None:
+        """What the fits of the ZOIs ``which``, as they are kept, leave in common."""
+        found = self.found.at(which)
+        return self._pooled(
+            which, found, self._left(which, found), self.expected(which, found.nuisance[:, 0])
+        )
+
+    def _pooled(self, which: Places, found: OutArgs, left: Floats, expected: Floats) -> PooledError | None:
+        from analysis.fit.pooling import pooled
 
         places = np.arange(len(self.guess))[which]
-        every = 1 + len(places) // MAX_POOLED
-        chosen = places[::every]
-        some = self.found.at(chosen) if found is None else found.at(np.arange(0, len(places), every))
-        left, expected = self._left(chosen, some), self.expected(chosen, some.nuisance[:, 0])
-        return pooled(some, left, expected, self._known(every), chosen, self._is_given)
+        return pooled(found, left, expected, self._known, places, self._is_given)
 
     @property
     def noise_taken(self) -> Floats:
@@ -242,8 +243,9 @@ class Solution:
         """Whether the noise of both images was given."""
         return self.noise is not None and self.reference.noise_model is not None
 
-    def _known(self, every: int = 1) -> ReferenceArgs:
-        """For the verdict; of each ZOI, or where one in ``every`` counts."""
+    @property
+    def _known(self) -> ReferenceArgs:
+        """What the verdict needs of each ZOI."""
         reference, ready = self.reference, self.reference.prepared
         pixels = ready.freedom * reference.sharpness
         return ReferenceArgs(
@@ -252,7 +254,7 @@ class Solution:
             reference.share_variance,
             reference.unit_sigma[2],
             reference.white,
-            min(1.0, every * (2 * reference.grid.step / reference.grid.size) ** 2),
+            min(1.0, (2 * reference.grid.step / reference.grid.size) ** 2),
         )
 
     def _left(self, which: Places, found: OutArgs) -> Floats:

@@ -43,12 +43,13 @@ def not_compiled(kinds: Sequence[str] = PICTURE_KINDS, *, phase: bool = True) ->
 
 
 def _loops(phase: bool) -> list[Any]:
-    from analysis.fit import assembly, iteration, sensitivity, sums, verdict
+    from analysis.fit import assembly, iteration, pooling, sensitivity, sums, verdict
     from analysis.follow import hill_climb, prediction
 
     loops = [
         sensitivity.prepare, iteration.track, hill_climb.climb, prediction.advance, verdict.judge,
-        assembly.weigh, assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
+        assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.medians, assembly.scale,
+        assembly.clipped_shares, sums.scatter, iteration.warp_zois,
     ]  # fmt: skip
     return loops + [iteration.compose_all, iteration.within_image] * phase
 
@@ -191,9 +192,10 @@ def _prefilter(kinds: Sequence[str]) -> None:
 
 def _rest() -> None:
     """All but the iteration, the prefilter and what only the estimator by phases needs."""
-    from analysis.fit.assembly import clipped_share, scale, weigh
+    from analysis.fit.assembly import clipped_share, scale, weigh, weigh_blur
     from analysis.fit.iteration import warp_zois
     from analysis.fit.kernel_args import OutArgs, PooledError, ReferenceArgs, VerdictArgs
+    from analysis.fit.pooling import explained, medians
     from analysis.fit.verdict import judge
     from analysis.follow.prediction import motion_after
     from analysis.kernel.reference import ReferencePicture
@@ -209,11 +211,12 @@ def _rest() -> None:
     line = profile("gaussian", 32)
     clipped_share(np.zeros((32, 32), np.bool_), np.zeros((1, 2), np.int64), line)
     none, pairs, single = np.empty(0), np.empty((0, 2)), np.empty(0, np.float32)
-    judge(
-        OutArgs.starting(np.empty((0, 6))), none, none, PooledError.none(0),
-        ReferenceArgs(none, none, pairs, none, np.ones(2), 1.0), VerdictArgs(True, np.empty(2), 1.0, 0.05, 4.0),
-        np.empty(0, np.uint8),
-    )  # fmt: skip
+    found, known = OutArgs.starting(np.empty((0, 6))), ReferenceArgs(none, none, pairs, none, np.ones(2), 1.0)
+    rule = VerdictArgs(True, np.empty(2), 1.0, 0.05, 4.0)
+    judge(found, none, none, PooledError.none(0), known, rule, np.empty(0, np.uint8))
+    explained(found, none, none, known, np.empty(0, np.intp), 1, pairs)
+    medians(np.ones((2, 2)))
+    weigh_blur(single, single, single)
     weigh(np.empty(0, np.bool_), none, none, np.empty((2, 2))[:, 0], none, none, single, single, single)
     origins, p = np.empty((0, 2), np.int64), np.empty((0, 6))
     warp_zois(_no_picture(), np.empty(18, np.float32), origins, 32, p, np.empty((0, 32, 32), np.float32))
