@@ -251,11 +251,6 @@ class PooledError(NamedTuple):
         """Of ``count`` ZOIs that leave what is expected."""
         return cls(np.ones(count), np.ones(count), 1.0, 0.0, np.ones(2))
 
-    @property
-    def is_as_given(self) -> bool:
-        """Whether the noise as given explains what all ZOIs leave."""
-        return bool(np.all(self.ratio == 1))
-
     def at(self, places: NDArray[np.intp] | slice) -> PooledError:
         """That of some ZOIs."""
         return self._replace(ratio=self.ratio[places], forgiven=self.forgiven[places])

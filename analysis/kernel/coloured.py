@@ -27,6 +27,11 @@ BLUR, NEIGHBOURS = 0.25, 0.12
 """Limits: growth of the variance of the blur, px^2; correlation of neighbouring pixels."""
 SAMPLE, SPECTRA = 30, 300 * 32**2
 """ZOIs that are looked at, and pixels of those whose spectra are averaged."""
+FEWEST, PART = 8, 8
+"""ZOIs at least, and px of a square in them, in which a strain that varies is looked for."""
+EXPLAINED, MIN_CORNER = 0.5, 0.01
+"""Share of the error that shifts must explain; determinant of the gradients over its largest, from which on they are
+known."""
 BOTH_ALIKE = ("compression", "filter")
 """Causes that spoil the reference as much as the picture."""
 
@@ -44,9 +49,67 @@ def error_cause(solution: Solution, ok: NDArray[np.bool_]) -> Cause:
     return "noise" if _is_white(left) else "filter"
 
 
-def leaves_white(solution: Solution, ok: NDArray[np.bool_]) -> bool:
-    """Whether neighbouring pixels of what the fits of the ZOIs ``ok`` (A,) leave have nothing in common."""
-    return _is_white(left_by_fit(solution, some(ok, SAMPLE)))
+def beside_strain(solution: Solution, ok: NDArray[np.bool_]) -> float | None:
+    """What the fits leave beside a strain that varies within the ZOIs, over what noise as stated leaves (variances).
+
+    Such a strain shifts the pattern a little otherwise in each part of a ZOI. Where shifts of its parts explain most
+    of what is left over the noise, and the rest is white, the picture has no other error. Of blocks, filters, blur
+    and noise they explain next to nothing.
+
+    Parameters
+    ----------
+    solution : Solution
+    ok : (A,) bool
+        ZOIs that have a value.
+
+    Returns
+    -------
+    float or None
+        None: it is an error of the picture.
+    """
+    size = solution.reference.grid.size
+    which = some(ok, max(FEWEST, SAMPLE * 32**2 // size**2))
+    left = _in_parts(left_by_fit(solution, which))
+    ready = solution.reference.prepared
+    places = [np.s_[top : top + size, column : column + size] for top, column in ready.origins[which]]
+    dx, dy = (_in_parts(np.stack([ready.images[k][at] for at in places])) for k in (0, 1))
+    rest = left - _shifts(left, dx, dy)
+    noise = float(np.median(solution.expected(which, solution.found.nuisance[which, 0])))
+    free = 2 * left[..., 0].size
+    explained = np.sum(left**2) - np.sum(rest**2) - free * noise
+    excess = np.sum(left**2) - left.size * noise
+    by_chance = 3 * noise * (2 * left.size) ** 0.5
+    if abs(excess) < by_chance:
+        return 1.0 if _is_white(_joined(left)) else None
+    if excess < 0 or explained < EXPLAINED * excess or not _is_white(_joined(rest)):
+        return None
+    return float(np.sum(rest**2) / (left.size - free) / noise)
+
+
+def _shifts(left: Floats, dx: Floats, dy: Floats) -> Floats:
+    """What of each part, (..., m), is a shift of the pattern with the gradients ``dx`` and ``dy``."""
+    xx, yy, xy = (np.sum(a * b, axis=-1) for a, b in ((dx, dx), (dy, dy), (dx, dy)))
+    x, y = (np.sum(d * left, axis=-1) for d in (dx, dy))
+    determinant = xx * yy - xy**2
+    clear = determinant > MIN_CORNER * xx * yy
+    scale = np.where(clear, 1 / np.where(clear, determinant, 1), 0)
+    u, v = scale * (yy * x - xy * y), scale * (xx * y - xy * x)
+    return np.asarray(u[..., None] * dx + v[..., None] * dy)
+
+
+def _in_parts(zois: NDArray[np.floating]) -> Floats:
+    """Squares of ``PART`` px of ZOIs (N, n, n), (N, k, k, PART**2), from the middle."""
+    count = zois.shape[1] // PART
+    rim = (zois.shape[1] - count * PART) // 2
+    inside = zois[:, rim : rim + count * PART, rim : rim + count * PART].astype(np.float64)
+    parts = inside.reshape(len(zois), count, PART, count, PART).swapaxes(2, 3)
+    return parts.reshape(len(zois), count, count, PART**2)
+
+
+def _joined(parts: Floats) -> Floats:
+    """The inverse of ``_in_parts``, (N, n, n)."""
+    squares = parts.reshape(*parts.shape[:3], PART, PART).swapaxes(2, 3)
+    return squares.reshape(len(parts), PART * parts.shape[1], -1)
 
 
 def _is_white(left: Floats) -> bool:
