@@ -177,6 +177,7 @@ class BudgetRow:
 _CAUSES = {
     "load cell": "specimen.force_error_percent",
     "section": "specimen.section_error_percent",
+    "lens": "--lens",
     "strain": "specimen.strain_error_um_m",
 }
 
@@ -189,7 +190,9 @@ def budget_rows(figures: TensileFigures, *, stresses: bool) -> list[BudgetRow]:
     if figures.span is None or not figures.budget:
         return []
     strain, E = figures.span.strain[1], figures.E.value
-    causes = [cause for cause in ("scatter", *_CAUSES) if stresses or cause != "section"]
+    left_out = {"section"} if not stresses else set()
+    left_out |= {"lens"} - figures.budget.keys()  # measured, not stated
+    causes = [cause for cause in ("scatter", *_CAUSES) if cause not in left_out]
     shares = {**dict.fromkeys(causes, math.nan), **figures.budget}
     rows = [
         BudgetRow(cause, share * strain, share * E, _CAUSES.get(cause, "")) for cause, share in shares.items()
