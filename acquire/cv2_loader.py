@@ -24,5 +24,13 @@ def load_cv2() -> Any:
         os.environ.setdefault(key, value)
     import cv2
 
-    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    log_settings(cv2).setLogLevel(LOG_SILENT)
     return cv2
+
+
+LOG_SILENT, LOG_WARNING = 0, 3
+
+
+def log_settings(cv2: Any) -> Any:
+    """What has ``getLogLevel`` and ``setLogLevel``: ``cv2.utils.logging`` since OpenCV 5, ``cv2`` itself before."""
+    return getattr(cv2.utils, "logging", cv2)

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from acquire.burst.memory import PictureMemory
 from acquire.errors import ConfigError, DataError
 from acquire.frame import Burst, Frame, frozen
 
@@ -117,6 +118,8 @@ class BurstAccumulator:
     not_before : float, s
         Frames whose time is earlier are left out: those that lay in the driver's buffers
         when the burst was asked for.
+    memory : PictureMemory, optional
+        That of its bursts; by default its own.
 
     Raises
     ------
@@ -124,10 +127,11 @@ class BurstAccumulator:
         An impossible n.
     """
 
-    def __init__(self, n: int, *, not_before: float = -math.inf) -> None:
+    def __init__(self, n: int, *, not_before: float = -math.inf, memory: PictureMemory | None = None) -> None:
         if not 1 <= n <= MAX_FRAMES:
             raise ConfigError(f"a burst of {n} frames is not possible; allowed: 1 to {MAX_FRAMES}")
         self._n, self._not_before = n, not_before
+        self._memory = memory or PictureMemory()
         self._times: list[float] = []
         self._sums: _Sums | None = None
         self._lost = 0
@@ -151,7 +155,7 @@ class BurstAccumulator:
         if self._n == 1:
             return self._single(frame)
         if self._sums is None:
-            self._sums, self._first = _Sums(frame), frame.index
+            self._sums, self._first = _Sums(frame, self._memory), frame.index
         self._last = frame.index
         self._times.append(frame.t)
         done = len(self._times) == self._n
@@ -166,8 +170,10 @@ class BurstAccumulator:
 
     def _single(self, frame: Frame) -> Burst:
         """A burst of one is the frame itself: nothing is averaged, nothing copied."""
+        clipped = self._memory.take(frame.image.shape, np.bool_)
+        np.greater_equal(frame.image, frame.saturation, out=clipped)
         burst = Burst(
-            mean=frame.image, n=1, noise=math.nan, clipped=frozen(frame.image >= frame.saturation),
+            mean=frame.image, n=1, noise=math.nan, clipped=frozen(clipped),
             bits=frame.bits, t=frame.t, duration=0.0, first_index=frame.index, last_index=frame.index,
             lost=self._lost, clock=frame.clock,
         )  # fmt: skip
@@ -198,11 +204,11 @@ class BurstAccumulator:
 class _Sums:
     """The running sums of one burst. Frames are kept, not copied, until a group can be folded."""
 
-    def __init__(self, like: Frame) -> None:
+    def __init__(self, like: Frame, memory: PictureMemory) -> None:
         compile_loops((like.image.dtype.name,))
-        self._like = like
-        self.mean = np.empty(like.image.shape, np.float32)
-        self.clipped = np.empty(like.image.shape, np.bool_)
+        self._like, self._memory = like, memory
+        self.mean = memory.take(like.image.shape, np.float32)
+        self.clipped = memory.take(like.image.shape, np.bool_)
         self._total = np.empty(0, np.uint32)
         self._waiting: list[NDArray[Any]] = []
         self._previous: NDArray[Any] | None = None
@@ -230,7 +236,7 @@ class _Sums:
 
         images, first = self._waiting, self._previous is None
         if not (first and n) and self._total.size == 0:
-            self._total = np.empty(self.mean.size, np.uint32)
+            self._total = self._memory.take(self.mean.shape, np.uint32).reshape(-1)
         self._squares += int(
             fold(
                 tuple(images + images[-1:] * (GROUP - len(images))),

@@ -25,7 +25,7 @@ from typing import IO, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.cv2_loader import load_cv2
+from acquire.cv2_loader import LOG_WARNING, load_cv2, log_settings
 from acquire.errors import DataError
 
 MAX_BYTES = 2**31 - 1
@@ -134,11 +134,11 @@ def _captured_reports(lines: list[str]) -> Iterator[None]:
     if not _owns_stderr():
         yield
         return
-    logging = load_cv2().utils.logging
+    logging = log_settings(load_cv2())
     level, capture, error = logging.getLogLevel(), _capture_file(), os.dup(2)
     try:
         os.dup2(capture.fileno(), 2)
-        logging.setLogLevel(logging.LOG_LEVEL_WARNING)
+        logging.setLogLevel(LOG_WARNING)
         yield
     finally:
         logging.setLogLevel(level)

@@ -104,6 +104,11 @@ def clipped_shares(marked: Any, first: Any, weight: Any, out: Any) -> None:
         total = 0.0
         for y in range(size):
             row = marked[top + y, left : left + size]
+            any_marked = np.uint8(0)
+            for x in range(size):  # in vectors, and as a rule there is none
+                any_marked |= row[x]
+            if any_marked == 0:
+                continue
             along = np.float32(0)
             for x in range(size):
                 along += weight[x] * np.float32(row[x])

@@ -29,6 +29,9 @@ POOLED_NOISE_FACTOR = 3.5
 """(or this, where the ZOIs together show that it does not) ..."""
 MODEL_SHARE = 0.002
 """... plus this share of the variance of the pattern, for what no noise explains."""
+AGREES = 0.8, 1.1
+"""What is left over what the given noise explains, between which the given noise stands. Where the warp reads between
+the pixels it smooths the noise, and white noise of the strength given leaves down to 0.84 (quintic splines)."""
 LOST_SHARE = 0.5
 """A fit that leaves more than this share of the pattern's variance has found something else."""
 BENDING_CHANCE = 5.0

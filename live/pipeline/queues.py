@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from typing import Generic, TypeVar
 
 CATCH_UP_S = 2.0
@@ -42,7 +43,7 @@ class LatestQueue(_Queue[Item]):
     """Holds one item, and a newer one replaces it: the measuring path never waits for old bursts.
 
     With ``waits=True`` ``put`` waits until the queue is empty, so that nothing is skipped: for
-    sources that wait for their reader. Replaced items are kept until ``take_skipped``.
+    sources that wait for their reader. Of replaced items ``brief`` is kept until ``take_skipped``.
 
     Parameters
     ----------
@@ -50,11 +51,15 @@ class LatestQueue(_Queue[Item]):
     at_first : int
         Size of the queue until the reader, which has to prepare first, has caught up; after as many
         items, or after ``CATCH_UP_S``, it continues with the newest in any case.
+    brief : callable
+        What is kept of an item that is skipped, without its pictures: many are while the reader prepares.
     """
 
-    def __init__(self, *, waits: bool = False, at_first: int = 1) -> None:
+    def __init__(
+        self, *, waits: bool = False, at_first: int = 1, brief: Callable[[Item], Item] = lambda item: item
+    ) -> None:
         super().__init__()
-        self._waits = waits
+        self._waits, self._brief = waits, brief
         self._size = self._catch_up_items = at_first
         self._reading, self._catch_up_t = False, 0.0
         self._skipped: list[Item] = []
@@ -69,10 +74,10 @@ class LatestQueue(_Queue[Item]):
             while self._waits and self._items and not self._closed:
                 self._change.wait()
             if self._closed:
-                self._skipped.append(item)
+                self._skipped.append(self._brief(item))
                 return
             while len(self._items) >= self._size:
-                self._skipped.append(self._items.popleft())
+                self._skipped.append(self._brief(self._items.popleft()))
             self._items.append(item)
             self._change.notify_all()
 
@@ -92,7 +97,7 @@ class LatestQueue(_Queue[Item]):
         if not self._items or self._catch_up_items < 0 or time.monotonic() > self._catch_up_t:
             self._size = 1
             while len(self._items) > 1:
-                self._skipped.append(self._items.popleft())
+                self._skipped.append(self._brief(self._items.popleft()))
 
     def take_skipped(self) -> list[Item]:
         """The items skipped since the last call."""

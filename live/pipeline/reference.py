@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.burst import BurstAccumulator
+from acquire.burst import BurstAccumulator, PictureMemory
 from acquire.errors import ConfigError, DataError, MachineUnfit, PhasedicError
 from acquire.frame import Burst, Frame
 from analysis.field import Status, StrainField
@@ -145,17 +145,17 @@ class ReferenceBurst:
 
 
 class ReferenceTaker:
-    """Averages n frames as a whole and as two halves."""
+    """Averages n frames as a whole and as two halves, in ``memory``."""
 
-    def __init__(self, n: int) -> None:
-        self._n = n
-        self._whole = BurstAccumulator(n)
+    def __init__(self, n: int, memory: PictureMemory | None = None) -> None:
+        self._n, self._memory = n, memory
+        self._whole = BurstAccumulator(n, memory=memory)
         self._half: BurstAccumulator | None = None
         self._halves: list[Burst] = []
         self._begin_half()
 
     def _begin_half(self) -> None:
-        self._half = BurstAccumulator(self._n // 2) if self._n >= 4 else None
+        self._half = BurstAccumulator(self._n // 2, memory=self._memory) if self._n >= 4 else None
 
     def add(self, frame: Frame) -> ReferenceBurst | None:
         """Take a frame; the reference when it is complete."""

@@ -12,9 +12,10 @@ from typing import Any
 
 from acquire.errors import ConfigError
 from acquire.printable import printable
+from live import VERSION
 
 FILES = ("session.h5", "mask.png", "strain.h5", "strain.csv", "view.rrd", "config.json")
-_PACKAGES = ("phasedic", "numpy", "scipy", "numba", "opencv-python-headless", "h5py", "rerun-sdk", "pyserial")
+_PACKAGES = ("numpy", "scipy", "numba", "opencv-python-headless", "h5py", "rerun-sdk", "pyserial")
 
 
 def versions() -> dict[str, str]:
@@ -27,6 +28,7 @@ def versions() -> dict[str, str]:
 def installed_versions() -> dict[str, str]:
     """Versions of phasedic, of Python and of the libraries; imports nothing heavy."""
     found = {
+        "phasedic": VERSION,
         "python": platform.python_version(),
         "machine": platform.machine(),
         "system": platform.platform(),

@@ -14,7 +14,9 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from acquire.burst import BurstAccumulator
+import numpy as np
+
+from acquire.burst import BurstAccumulator, PictureMemory
 from acquire.camera import Camera, missing_at_end
 from acquire.errors import PhasedicError
 from acquire.events import EventKind, RateLimiter
@@ -28,6 +30,8 @@ from live.pipeline.run_state import RunState
 log = logging.getLogger(__name__)
 HELD_BYTES, HELD_S = 256_000_000, 1.0
 """Limits of the bursts that wait for the first measurement: bytes of means, seconds of frames."""
+_AT_WORK, _OF_REFERENCE = 3, 3
+"""Bursts beside those that wait: averaged, measured, shown; and a reference with its two halves."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +63,16 @@ def _held_at_first(camera: CameraInfo) -> int:
     return int(
         min(max(HELD_BYTES // (4 * camera.width * camera.height), 1), max(HELD_S * (camera.fps or 0), 1))
     )
+
+
+def _memory_for(camera: CameraInfo, plan: GrabPlan) -> PictureMemory:
+    """Memory of the bursts of ``HELD_S``, so that the first ones take no longer to average than all others."""
+    memory, shape = PictureMemory(), (camera.height, camera.width)
+    bursts = _AT_WORK + min(_held_at_first(camera), math.ceil(HELD_S * (camera.fps or 0) / plan.burst))
+    memory.prepare(_OF_REFERENCE + bursts, shape, np.bool_)
+    memory.prepare(_OF_REFERENCE + bursts * (plan.burst > 1), shape, np.float32)
+    memory.prepare(_OF_REFERENCE, shape, np.uint32)
+    return memory
 
 
 class Grabber:
@@ -102,12 +116,15 @@ class Grabber:
         self._plan, self._on_frame, self._on_burst = plan, on_frame, on_burst
         self.references: queue.SimpleQueue[ReferenceBurst] = queue.SimpleQueue()
         self.bursts: LatestQueue[Burst] = LatestQueue(
-            waits=not camera.info.live, at_first=_held_at_first(camera.info)
+            waits=not camera.info.live,
+            at_first=_held_at_first(camera.info),
+            brief=Burst.without_pictures,
         )
+        self._memory = _memory_for(camera.info, plan) if camera.info.live else PictureMemory()
         self.error: Exception | None = None
         self.fps = 0.0
-        self._taker: ReferenceTaker | None = ReferenceTaker(plan.reference_burst)
-        self._accumulator = BurstAccumulator(plan.burst)
+        self._taker: ReferenceTaker | None = ReferenceTaker(plan.reference_burst, self._memory)
+        self._accumulator = BurstAccumulator(plan.burst, memory=self._memory)
         self._unassigned, self.time_is_over = 0, False
         self._limiter, self._unreported = RateLimiter(), 0
         self.begun_t = self.arrived_t = math.nan
@@ -181,7 +198,7 @@ class Grabber:
         self._unassigned += 1
         if self._retake.is_set():
             self._retake.clear()
-            self._taker = ReferenceTaker(self._plan.reference_burst)
+            self._taker = ReferenceTaker(self._plan.reference_burst, self._memory)
         if self._taker is not None:
             self._feed_reference(self._taker, frame)
         elif (burst := self._accumulator.add(frame)) is not None:
@@ -206,7 +223,7 @@ class Grabber:
         self._used(reference.burst.n)
         self._on_burst(reference.burst)
         self._frame_counts.add(reference=reference.burst.n)
-        self._taker, self._accumulator = None, BurstAccumulator(self._plan.burst)
+        self._taker, self._accumulator = None, BurstAccumulator(self._plan.burst, memory=self._memory)
         self.references.put(reference)
 
     def _used(self, n: int) -> None:

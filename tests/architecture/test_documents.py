@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from docs import make_formats, make_site
+from live import VERSION
 from live.commands.arguments import COMMANDS, full_parser
 from tests.architecture.layers import PACKAGES
 from tests.architecture.links import dead_links
@@ -150,11 +151,13 @@ def test_code_is_not_words(tmp_path: Path) -> None:
 
 
 def test_the_citation_and_the_changes_are_of_this_version() -> None:
-    version = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    assert project["project"]["dynamic"] == ["version"], "it stands in one place"
+    assert project["tool"]["setuptools"]["dynamic"]["version"] == {"attr": "live.VERSION"}
     citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8").splitlines()
-    assert f"version: {version}" in citation
+    assert f"version: {VERSION}" in citation
     (released,) = (line.split(": ")[1] for line in citation if line.startswith("date-released: "))
-    assert f"## {version}, {released}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").splitlines()
+    assert f"## {VERSION}, {released}" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").splitlines()
 
 
 def test_quoted_messages_exist() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import email
 import os
 import shutil
 import subprocess
@@ -15,6 +16,7 @@ from zipfile import ZipFile
 
 import pytest
 
+from live import VERSION
 from tests.architecture.layers import PACKAGES
 
 ROOT = Path(__file__).parents[2]
@@ -43,6 +45,8 @@ def backend_is_here() -> bool:
         return False
 
 
+_USED = (".py", ".toml", ".h5", ".npz", ".csv")
+"""Kinds of files that the tests are made of."""
 FILES = (
     "pyproject.toml",
     "README.md",
@@ -52,6 +56,7 @@ FILES = (
     "CITATION.cff",
     "CONTRIBUTING.md",
     "Makefile",
+    "constraints.txt",
 )
 SDIST = (
     "import os, sys; from setuptools import build_meta; os.makedirs('dist'); build_meta.build_sdist('dist')"
@@ -91,7 +96,7 @@ def test_the_source_distribution_has_what_a_reader_needs(sdist: Path) -> None:
         *FILES,
         "docs/method.md",
         "examples/second_consumer.py",
-        "tests/architecture/test_architecture.py",
+        *(path.relative_to(ROOT).as_posix() for path in (ROOT / "tests").rglob("*") if path.suffix in _USED),
     } <= held
     assert not [name for name in held if "__pycache__" in name]
     assert sdist.stat().st_size < 5_000_000
@@ -102,6 +107,20 @@ def installed(wheel: Path) -> Path:
     target = wheel.parent / "installed"
     pip("install", "--no-deps", "--target", str(target), str(wheel), cwd=wheel.parent)
     return target
+
+
+def test_the_wheel_is_of_this_version_and_says_what_it_is(wheel: Path) -> None:
+    assert wheel.name == f"phasedic-{VERSION}-py3-none-any.whl"
+    with ZipFile(wheel) as file:
+        about = email.message_from_bytes(file.read(f"phasedic-{VERSION}.dist-info/METADATA"))
+        names = {name.rpartition("/")[2] for name in file.namelist() if ".dist-info/" in name}
+    assert (about["Version"], about["License-Expression"], about["Requires-Python"]) == (
+        VERSION,
+        "MIT",
+        ">=3.11",
+    )
+    assert all(about[key] for key in ("Summary", "Author", "Keywords", "Description-Content-Type"))
+    assert {"LICENSE", "entry_points.txt"} <= names
 
 
 @pytest.mark.parametrize("package", PACKAGES)

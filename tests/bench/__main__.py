@@ -291,9 +291,9 @@ def start_up(report: Report) -> None:
 
 
 def running(report: Report) -> None:
-    """The program itself with a camera from memory (``--live``, three minutes)."""
+    """The program itself with a camera from memory (``--live``, four minutes)."""
     for name, words in live.CASES.items():
-        report.add("The running program, 1280x1024", {"case": name} | live.shown(live.case(words)))
+        report.add("The running program", {"case": name} | live.shown(live.case(words)))
 
 
 SECTIONS = (throughput, counts, first_frame, scaling, bursts, start_up, other_engines)
@@ -315,7 +315,7 @@ def write(report: Report, live: bool, folder: Path = DATA) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m tests.bench", description=__doc__)
     parser.add_argument("--json", action="store_true", help="one JSON object instead of tables")
-    parser.add_argument("--live", action="store_true", help="the running program alone, three minutes")
+    parser.add_argument("--live", action="store_true", help="the running program alone, four minutes")
     parser.add_argument("--only", nargs="+", default=[], choices=[s.__name__ for s in SECTIONS])
     options = parser.parse_args()
     warm_up()

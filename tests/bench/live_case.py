@@ -78,8 +78,8 @@ def disk_MB_s(folder: Path, megabytes: int = 512) -> float:
 def run(case: argparse.Namespace, folder: Path) -> tuple[Outcome, np.ndarray]:
     """The live run, and the rows of its measurements."""
     camera = (
-        f"bench:?width=1280&height=1024&fps={case.fps:g}&bits={case.bits}&seconds={case.seconds:g}"
-        f"&saturated={case.saturated:g}&buffers=8"
+        f"bench:?width={case.width}&height={case.height}&fps={case.fps:g}&bits={case.bits}"
+        f"&seconds={case.seconds:g}&saturated={case.saturated:g}&buffers=8"
     )
     settings = {
         "camera.address": camera,
@@ -162,6 +162,8 @@ def skipped_at_start(case: argparse.Namespace, rows: np.ndarray) -> int:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--width", type=int, default=1280)
+    parser.add_argument("--height", type=int, default=1024)
     parser.add_argument("--fps", type=float, default=30.0)
     parser.add_argument("--burst", type=int, default=1)
     parser.add_argument("--bits", type=int, default=8)

@@ -146,6 +146,8 @@ def run_tests(folder: Path, tests: Sequence[str]) -> tuple[int | None, str]:
         "no:cacheprovider",
         "--timeout",
         "200",
+        "-m",
+        "not timed",  # several run at once
         *tests,
     ]
     command += ["--basetemp", str(folder / "made")]

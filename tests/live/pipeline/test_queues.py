@@ -126,6 +126,14 @@ def test_the_buffer_is_bounded_in_bytes() -> None:
     assert buffer.finished
 
 
+def test_what_was_taken_makes_room() -> None:
+    buffer: BoundedQueue[int] = BoundedQueue(100)
+    assert [buffer.put(i, 40) for i in range(3)] == [True, True, False]
+    assert (buffer.get(0), buffer.waiting_bytes) == (0, 40)
+    assert [buffer.put(i, 40) for i in (3, 4)] == [True, False]
+    assert [buffer.get(0), buffer.get(0), buffer.waiting_bytes] == [1, 3, 0]
+
+
 def test_a_waiting_buffer_loses_nothing() -> None:
     buffer: BoundedQueue[int] = BoundedQueue(3, waits=True)
     thread = threading.Thread(target=lambda: [buffer.put(i, 1) for i in range(100)] and buffer.close())
@@ -220,3 +228,14 @@ def test_only_the_calling_thread_becomes_nicer() -> None:
     thread.join()
     assert found == [min(before + 3, 19)]
     assert os.getpriority(os.PRIO_PROCESS, 0) == before
+
+
+def test_of_what_is_skipped_only_the_brief_is_kept() -> None:
+    box: LatestQueue[list[int]] = LatestQueue(at_first=2, brief=lambda item: item[:1])
+    for i in range(5):
+        box.put([i] * 1000)
+    box.begin()
+    assert len(box.get(0) or []) == len(box.get(0) or []) == 1000
+    box.close()
+    box.put([5] * 1000)
+    assert box.take_skipped() == [[0], [1], [2], [5]]

@@ -57,6 +57,14 @@ def test_a_measurement_as_json_and_as_csv() -> None:
     assert row["axial"] == "0.0015" and row["frame"] == "16" and row["latency_s"] == "nan"
 
 
+def test_a_value_has_eight_digits() -> None:
+    m = make_measurement(2, 1.2345678912e-3)
+    exact = json.loads(LineFormat(readings(-1234.5678), ("axial", "force_N"), "json").of(m))
+    assert exact == {"axial": 0.0012345679, "force_N": -1234.5678}
+    line = LineFormat(readings(-1234.5678), ("axial", "force_N"), "csv").of(m)
+    assert line == "0.0012345679,-1234.5678"
+
+
 def test_the_channels_without_a_choice_are_those_of_the_guide() -> None:
     guide = (Path(__file__).parents[3] / "docs" / "guide.md").read_text(encoding="utf-8")
     listed = ", ".join(f"`{name}`" for name in DEFAULT_CHANNELS)
