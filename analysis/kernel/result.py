@@ -59,6 +59,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         None: the field has no motion.
     """
     from analysis.fit.assembly import weigh, weigh_blur
+    from analysis.fit.pooling import medians
 
     reference, found = solution.reference, solution.found
     ok = solution.status == Status.OK
@@ -95,7 +96,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         status=reference.spread(solution.status[:, None], Status.NOT_MEASURED)[0],
         iterations=reference.spread(found.iterations[:, None], 0)[0],
         gain=reference.spread(gain[:, None].astype(np.float32))[0],
-        noise=float(np.sqrt(np.median(noise.current[ok]))) if ok.any() else float("nan"),
+        noise=math.sqrt(medians(noise.current[ok][None])[0]) if ok.any() else float("nan"),
         window=reference.settings.window,
         motion=None if expected is None else _motion(solution, values, expected),
         sums=reference.sums,
