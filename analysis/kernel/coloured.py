@@ -23,8 +23,9 @@ from analysis.picture.blocks import BLOCKS, blockiness
 
 Floats = NDArray[np.float64]
 
-BLUR, NEIGHBOURS = 0.25, 0.12
-"""Limits: growth of the variance of the blur, px^2; correlation of neighbouring pixels."""
+BLUR, SOME_BLUR, NEIGHBOURS = 0.25, 0.1, 0.12
+"""Limits: growth of the variance of the blur that is the cause of an error, and that acts on u and v, px^2;
+correlation of neighbouring pixels."""
 SAMPLE, SPECTRA = 30, 300
 """ZOIs that are looked at, and whose spectra are averaged."""
 BOTH_ALIKE = ("compression", "filter")
@@ -46,7 +47,9 @@ def error_cause(solution: Solution, ok: NDArray[np.bool_]) -> Cause:
     return "noise" if abs(beside) < NEIGHBOURS * np.mean(within**2) else "filter"
 
 
-def coloured_bias(solution: Solution, ok: NDArray[np.bool_], cause: Cause, share: float) -> tuple[Floats, Floats]:
+def coloured_bias(
+    solution: Solution, ok: NDArray[np.bool_], cause: Cause, share: float
+) -> tuple[Floats, Floats]:
     """What to add to the parameters (A, modes) and to the growth of the variance of the blur (A,), px^2.
 
     Parameters

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from analysis.field import Motion, Status, StrainField, stretched
 from analysis.field.picture_error import LIMIT, PictureError
 from analysis.follow.renewal import UNSHARED, Placement
-from analysis.kernel.coloured import BLUR, coloured_bias, error_cause
+from analysis.kernel.coloured import SOME_BLUR, coloured_bias, error_cause
 from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]
@@ -142,7 +142,7 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
         common = solution.pooled(np.flatnonzero(ok))
     if common is not None:
         colour = common.colour
-        if colour.min() < 1 and abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR:
+        if colour.min() < 1 and abs(float(np.median(solution.found.nuisance[ok, 2]))) > SOME_BLUR:
             # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
             colour = np.maximum(colour, 1)
         whole = common.ratio * solution.expected(np.s_[:], gain)

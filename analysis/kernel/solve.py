@@ -223,7 +223,9 @@ class Solution:
     def pooled(self, which: NDArray[np.intp]) -> PooledError | None:
         """What the fits of the ZOIs ``which``, as they are kept, leave in common."""
         found = self.found.at(which)
-        return self._pooled(which, found, self._left(which, found), self.expected(which, found.nuisance[:, 0]))
+        return self._pooled(
+            which, found, self._left(which, found), self.expected(which, found.nuisance[:, 0])
+        )
 
     def _pooled(self, which: Places, found: OutArgs, left: Floats, expected: Floats) -> PooledError | None:
         from analysis.fit.pooling import pooled

@@ -25,7 +25,7 @@ log = logging.getLogger("analysis")
 
 COMPILE_SECONDS = 80
 """About how long one process takes for everything; for the announcement."""
-FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 51, 5, 7
+FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 55, 5, 7
 """That are compiled in all, more for each kind of pictures, and for the estimator by phases."""
 ITERATION, REST, PHASE, ALL = "iteration", "rest", "phase", "all"
 COMPILE_PARTS = (ITERATION, REST)
@@ -48,7 +48,8 @@ def _loops(phase: bool) -> list[Any]:
 
     loops = [
         sensitivity.prepare, iteration.track, hill_climb.climb, prediction.advance, verdict.judge,
-        assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.medians, assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
+        assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.medians,
+        assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
     ]  # fmt: skip
     return loops + [iteration.compose_all, iteration.within_image] * phase
 

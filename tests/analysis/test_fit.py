@@ -20,7 +20,7 @@ from analysis.fit.kernel_args import (
 )
 from analysis.fit.shapes import shapes_of
 from analysis.fit.validity import has_pattern
-from analysis.fit.verdict import judge, stretch_of
+from analysis.fit.verdict import judge, squared_stretch
 from analysis.kernel.images import as_model
 from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.solve import Solution
@@ -294,7 +294,7 @@ def test_a_centre_beyond_the_pattern_shows_in_its_uncertainty() -> None:
 def test_the_stretch_of_a_strain_is_free_of_rotation() -> None:
     c, s, stretched = np.cos(0.5), np.sin(0.5), 1.1
     turned = np.array([[3.0, stretched * c - 1, -s, -2.0, stretched * s, c - 1]])
-    assert stretch_of(turned, 0, 5.0) == pytest.approx(5.0 * (stretched**2 - 1) / 2)
+    assert squared_stretch(turned, 0, 5.0) == pytest.approx((5.0 * (stretched**2 - 1) / 2) ** 2)
 
 
 def test_a_zoi_of_noise_has_no_pattern() -> None:
