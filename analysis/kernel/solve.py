@@ -98,7 +98,7 @@ class Solution:
         """Whether the image leaves much more than its noise, or many ZOIs are refused: it may have wild pixels."""
         tried = len(self._places[0])
         refused = tried - np.count_nonzero(self.status == Status.OK)
-        return self.leaves_much or refused > DISTURBED_SHARE * tried
+        return self.leaves_much or bool(refused > DISTURBED_SHARE * tried)
 
     @property
     def leaves_much(self) -> bool:
