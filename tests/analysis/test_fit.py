@@ -8,7 +8,7 @@ import pytest
 from analysis import KernelSettings, PhaseKernel, Roi, Status, ZoiGrid
 from analysis.field import profile
 from analysis.field.grid import WINDOWS, Window
-from analysis.fit.assembly import RUN, clipped_share, scale, weigh
+from analysis.fit.assembly import RUN, clipped_share, expect, scale, weigh, weigh_blur
 from analysis.fit.kernel_args import (
     CONVERGED,
     LEFT_IMAGE,
@@ -289,6 +289,18 @@ def test_a_centre_beyond_the_pattern_shows_in_its_uncertainty() -> None:
     assert verdict(**doubtful, beyond=3.9) == Status.OK
     assert verdict(**doubtful, beyond=8.0) == Status.UNEVEN
     assert verdict(beyond=8.0) == Status.OK
+
+
+def test_noise_is_expected_with_the_gain_within_its_limits_and_not_below_rounding() -> None:
+    gain, out = np.array([[2.0, 0], [9.0, 0], [0.1, 0], [np.nan, 0]])[:, 0], np.empty(4)
+    expect(gain, np.full(4, 3.0), np.full(4, 0.01), 0.08, out)
+    assert out == pytest.approx([12.01, 75.01, 0.08, np.nan], nan_ok=True)
+
+
+def test_the_uncertainty_of_a_blur_is_unknown_where_nothing_was_measured() -> None:
+    out, whole = np.empty(3, np.float32), np.array([4.0, np.nan, -1e-9], np.float32)
+    weigh_blur(np.full(3, 0.25, np.float32), whole, out)
+    assert out == pytest.approx([1.0, np.nan, 0.0], nan_ok=True)
 
 
 def test_the_stretch_of_a_strain_is_free_of_rotation() -> None:

@@ -70,6 +70,16 @@ def test_what_a_part_of_the_picture_leaves_is_not_forgiven() -> None:
     assert not field.ok[:, GRID.x > 130].any()
 
 
+def test_what_a_blur_leaves_is_pattern_and_counts_no_less_than_white_noise() -> None:
+    rng, clean = np.random.default_rng(2), picture(0, 1).astype(np.float32)
+    soft = cv2.GaussianBlur(clean, (9, 9), 0.48)
+    first, second = (np.rint(image + rng.normal(0, 1, SHAPE)).clip(0, 255) for image in (clean, soft))
+    field = PhaseKernel(first.astype(np.uint8), GRID).measure(second.astype(np.uint8))
+    blur = mean_blur(field)
+    assert 0.3 < blur.px < 0.5 and field.picture is not None
+    assert min(field.picture.colour) >= 1
+
+
 def test_of_an_unrelated_picture_no_common_error_is_taken() -> None:
     other = 128 + 200 * (Speckle(2.0, 77, span=400).at(*affine(SHAPE)) - 0.5)
     field = PhaseKernel(picture(1, 1), GRID).measure(other.astype(np.uint8))
@@ -97,7 +107,7 @@ def test_the_common_error_follows_the_contrast_and_ignores_those_that_stand_out(
     left = 2 + 0.01 * signal
     left[::10] *= 9
     found, known = zois(800, left, signal)
-    common = pooled(found, left, np.ones(800), known, np.s_[:], given=True)
+    common = pooled(found, left, np.ones(800), known, np.arange(800), given=True)
     assert common is not None
     assert common.ratio == pytest.approx(2 + 0.01 * signal, rel=0.12)
     assert common.colour == pytest.approx([2.0, 4.0], rel=0.02)
@@ -107,14 +117,14 @@ def test_the_common_error_follows_the_contrast_and_ignores_those_that_stand_out(
 def test_given_noise_stands_where_what_is_left_agrees_and_few_zois_decide_nothing() -> None:
     signal = np.full(200, 900.0)
     found, known = zois(200, np.full(200, 0.9), signal)
-    agreed = pooled(found, found.left, np.ones(200), known, np.s_[:], given=True)
+    agreed = pooled(found, found.left, np.ones(200), known, np.arange(200), given=True)
     assert agreed is not None and (agreed.ratio == 1).all()
-    free = pooled(found, found.left, np.ones(200), known, np.s_[:], given=False)
+    free = pooled(found, found.left, np.ones(200), known, np.arange(200), given=False)
     assert free is not None and free.ratio == pytest.approx(np.full(200, 0.9))
     few, of_few = zois(20, np.full(20, 9.0), np.full(20, 900.0))
-    assert pooled(few, few.left, np.ones(20), of_few, np.s_[:], given=True) is None
+    assert pooled(few, few.left, np.ones(20), of_few, np.arange(20), given=True) is None
     unlike, of_unlike = zois(200, np.full(200, 800.0), signal)
-    assert pooled(unlike, unlike.left, np.ones(200), of_unlike, np.s_[:], given=True) is None
+    assert pooled(unlike, unlike.left, np.ones(200), of_unlike, np.arange(200), given=True) is None
 
 
 def test_the_answer_of_the_shapes_to_white_noise_is_that_of_many_pictures() -> None:
