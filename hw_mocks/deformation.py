@@ -106,7 +106,9 @@ class SpecimenDeformation:
     ----------
     modes : StrainModes
     axial, transverse : float
-        Mean strains.
+        Mean strains, of a specimen with a neck those elsewhere.
+    neck : (float, float)
+        What the middle of the neck has more, along and across the load.
     angle : float, rad
         Rigid rotation, clockwise on the screen.
     shift : (float, float), px
@@ -118,6 +120,7 @@ class SpecimenDeformation:
     transverse: float
     angle: float = 0.0
     shift: tuple[float, float] = (0.0, 0.0)
+    neck: tuple[float, float] = (0.0, 0.0)
 
     def displacement(self, x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
         """See ``Deformation``."""
@@ -129,8 +132,7 @@ class SpecimenDeformation:
 
     def displaced(self, modes: Modes) -> tuple[Array, Array]:
         """(u, v) in px where ``modes`` were taken."""
-        u = self.axial * modes.axial[0] + self.transverse * modes.transverse[0]
-        v = self.axial * modes.axial[1] + self.transverse * modes.transverse[1]
+        u, v, *_ = self._sums(modes)
         if self.angle:
             turn, fall = math.sin(self.angle), math.cos(self.angle) - 1
             px, py = modes.dx + u, modes.dy + v
@@ -139,10 +141,19 @@ class SpecimenDeformation:
 
     def strained(self, modes: Modes) -> Gradient:
         """(du_dx, du_dy, dv_dx, dv_dy) where ``modes`` were taken."""
-        pairs = zip(modes.axial[2:], modes.transverse[2:], strict=True)
-        a, b, c, d = (self.axial * one + self.transverse * two for one, two in pairs)
+        _, _, a, b, c, d = self._sums(modes)
         if not self.angle:
             return a, b, c, d
         sin, cos = math.sin(self.angle), math.cos(self.angle)
         a, d = a + 1, d + 1
         return cos * a - sin * c - 1, cos * b - sin * d, sin * a + cos * c, sin * b + cos * d - 1
+
+    def _sums(self, modes: Modes) -> list[Array]:
+        """u, v and the four gradients without rotation and shift."""
+        sums = [
+            self.axial * one + self.transverse * two
+            for one, two in zip(modes.axial, modes.transverse, strict=True)
+        ]
+        for strain, mode in zip(self.neck, modes.neck or (), strict=False):
+            sums = [whole + strain * part for whole, part in zip(sums, mode, strict=True)]
+        return sums

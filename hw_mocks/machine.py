@@ -298,6 +298,18 @@ class PowerLaw:
         """Axial strain where plastic flow begins."""
         return self.yield_stress / self.E
 
+    @property
+    def uniform_strain(self) -> float:
+        """Axial engineering strain at the highest force, where a neck begins.
+
+        A. Considere, Ann. Ponts Chauss. 9 (1885) 574-775: the true stress rises as fast as the section shrinks, at a
+        plastic strain of n (1 - stress / E).
+        """
+        plastic = self.n
+        for _ in range(NEWTON_STEPS):
+            plastic = self.n * (1 - float(self._flow_stress(np.asarray(plastic))) / self.E)
+        return math.expm1(plastic + float(self._flow_stress(np.asarray(plastic))) / self.E)
+
     def plastic_strain(self, strain: ArrayLike) -> Array:
         """True plastic strain at an axial engineering strain >= 0, by bisection."""
         total = np.log1p(np.asarray(strain, float))

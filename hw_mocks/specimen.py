@@ -18,7 +18,7 @@ from acquire.addresses import Address, Options
 from acquire.errors import ConfigError
 from hw_mocks.deformation import Gradient, SpecimenDeformation
 from hw_mocks.machine import FlowCurve, Machine, PowerLaw, Programme, TestClock
-from hw_mocks.strain_modes import Axis, Kind, StrainModes
+from hw_mocks.strain_modes import NECK_AT, Axis, Kind, StrainModes
 
 Array = NDArray[np.float64]
 KINDS: tuple[Kind, ...] = ("uniform", "hole", "woven")
@@ -41,6 +41,7 @@ SPECIMEN_KEYS = frozenset(
         "hole",
         "cell",
         "overstrain",
+        "neck",
         "drift_x",
         "drift_y",
         "rotation_deg",
@@ -72,6 +73,9 @@ class VirtualSpecimen:
         Of the hole, and period of the weave.
     overstrain : float
         Of the weave: highest local strain over the mean, less 1.
+    neck_px : float, px
+        Width of a neck (``StrainModes.neck``) that grows from the highest force on, while the rest rests; 0: none.
+        The strain of the programme, and the stress, are then those of its middle.
     drift_px : (float, float), px
         Rigid displacement along x and y reached at the end of the ramp.
     rotation_rad : float, rad
@@ -93,6 +97,7 @@ class VirtualSpecimen:
     hole_radius_px: float = 60.0
     cell_px: float = 96.0
     overstrain: float = 0.6
+    neck_px: float = 0.0
     drift_px: tuple[float, float] = (0.0, 0.0)
     rotation_rad: float = 0.0
     nominal: bool = False
@@ -126,23 +131,34 @@ class VirtualSpecimen:
     def modes(self) -> StrainModes:
         """The strain field per unit of mean strain."""
         middle = ((self.width - 1) / 2, (self.height - 1) / 2)
-        return StrainModes(self.kind, self.axis, *middle, self.hole_radius_px, self.cell_px, self.overstrain)
+        neck = NECK_AT * (self.width if self.axis == "x" else self.height), self.neck_px
+        return StrainModes(
+            self.kind, self.axis, *middle, self.hole_radius_px, self.cell_px, self.overstrain, neck
+        )
 
     def elapsed(self, now: float) -> float:
         """Seconds since the start at ``now`` on the clock of whoever began the test."""
         return self.clock.elapsed(now)
 
     def axial_strain(self, t: ArrayLike) -> Array:
-        """Mean strain along the load, ``t`` seconds since the start (for the hole: remote)."""
-        return self.programme.strain(t)
+        """Mean strain along the load, ``t`` seconds since the start (for the hole: remote; beside the neck)."""
+        strain = self.programme.strain(t)
+        if self.neck_px and isinstance(self.material, PowerLaw):
+            return np.minimum(strain, self.material.uniform_strain)
+        return strain
 
     def transverse_strain(self, t: ArrayLike) -> Array:
         """Mean strain across the load (for the hole: remote)."""
         return self.material.transverse(self.axial_strain(t))
 
+    def neck_strains(self, t: float) -> tuple[float, float]:
+        """Strains along and across the load in the middle of the neck."""
+        strain = self.programme.strain(t)
+        return float(strain), float(self.material.transverse(strain))
+
     def stress(self, t: ArrayLike) -> Array:
         """Mean stress, Pa (for the hole: gross and remote)."""
-        return self.material.stress(self.axial_strain(t))
+        return self.material.stress(self.programme.strain(t))
 
     def force(self, t: ArrayLike) -> Array:
         """Load on the specimen, N, tension positive."""
@@ -153,7 +169,9 @@ class VirtualSpecimen:
         progress = float(self.programme.progress(t))
         shift = (progress * self.drift_px[0], progress * self.drift_px[1])
         axial, transverse = float(self.axial_strain(t)), float(self.transverse_strain(t))
-        return SpecimenDeformation(self.modes, axial, transverse, progress * self.rotation_rad, shift)
+        neck = self.neck_strains(t) if self.neck_px else (axial, transverse)
+        beyond = neck[0] - axial, neck[1] - transverse
+        return SpecimenDeformation(self.modes, axial, transverse, progress * self.rotation_rad, shift, beyond)
 
     def displacement(self, x: ArrayLike, y: ArrayLike, t: float) -> tuple[Array, Array]:
         """Where reference pixels (x, y) have gone: (u, v) in px."""
@@ -213,6 +231,7 @@ def take_specimen(options: Options) -> VirtualSpecimen:
         hole_radius_px=options.number("hole", 60.0, minimum=4),
         cell_px=options.number("cell", 96.0, minimum=8),
         overstrain=options.number("overstrain", 0.6, minimum=0, maximum=0.95),
+        neck_px=_take_neck(options, kind, material),
         drift_px=(options.number("drift_x", 0.0), options.number("drift_y", 0.0)),
         rotation_rad=math.radians(options.number("rotation_deg", 0.0, minimum=-45, maximum=45)),
         nominal=options.flag("lockstep"),
@@ -226,6 +245,13 @@ def _kind(address: Address) -> Kind:
         if kind == wanted:
             return kind
     raise ConfigError(f"{address.text}: there is no simulated specimen {wanted!r}; known: {', '.join(KINDS)}")
+
+
+def _take_neck(options: Options, kind: Kind, material: FlowCurve | PowerLaw) -> float:
+    width = options.number("neck", 0.0, minimum=4, maximum=8192)
+    if width and (kind != "uniform" or not isinstance(material, PowerLaw)):
+        raise ConfigError(f"{options.address.text}: a neck needs sim:uniform of a sheet metal; give n or r")
+    return width
 
 
 def _take_material(options: Options) -> FlowCurve | PowerLaw:

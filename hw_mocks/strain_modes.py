@@ -9,6 +9,8 @@ gradients, so that they are computed once for the places that matter and combine
   transverse strain of the moment, plasticity does not spread from the hole.
 - woven: homogeneous plus a periodic part with over-strain where the yarns of a plain weave cross;
   its mean over a cell is the mean strain.
+
+Beside these a neck may grow: a band across the load whose strains, beyond those elsewhere, fall off as sech^2.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ Axis = Literal["x", "y"]
 Mode = tuple[Array, Array, Array, Array, Array, Array]  # u, v, du_dx, du_dy, dv_dx, dv_dy
 # The field is continued into the hole down to this part of its radius, where it stays finite.
 CONTINUED = 0.75
+NECK_AT = 0.2  # of the distance along the load, from the centre
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,12 +42,15 @@ class Modes:
         Places, from the centre.
     axial, transverse : tuple of six arrays
         u and v in px, then du_dx, du_dy, dv_dx, dv_dy.
+    neck : pair of the same, or None
+        Per unit of strain that the middle of the neck has more than the rest, along and across the load.
     """
 
     dx: Array
     dy: Array
     axial: Mode
     transverse: Mode
+    neck: tuple[Mode, Mode] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +69,9 @@ class StrainModes:
         Period of the weave along x and y.
     overstrain : float
         Highest local strain over the mean, less 1.
+    neck : (float, float), px
+        Its middle along the load, from (x0, y0), and its width: the argument of sech^2 is the distance over it.
+        Without a width there is no neck.
     """
 
     kind: Kind = "uniform"
@@ -72,6 +81,7 @@ class StrainModes:
     hole_radius: float = 60.0
     cell: float = 96.0
     overstrain: float = 0.6
+    neck: tuple[float, float] = (0.0, 0.0)
 
     def at(self, x: ArrayLike, y: ArrayLike) -> Modes:
         """The two fields at reference pixels (x, y), px."""
@@ -84,8 +94,11 @@ class StrainModes:
             pair = _woven(along, across, self.cell, self.overstrain)
         else:
             pair = _uniform(along, across)
-        axial, transverse = pair if self.axis == "x" else (_swapped(pair[0]), _swapped(pair[1]))
-        return Modes(dx, dy, axial, transverse)
+        neck = _necked(along, across, *self.neck) if self.neck[1] else None
+        if self.axis == "x":
+            return Modes(dx, dy, *pair, neck)
+        turned = None if neck is None else (_swapped(neck[0]), _swapped(neck[1]))
+        return Modes(dx, dy, _swapped(pair[0]), _swapped(pair[1]), turned)
 
 
 def _swapped(mode: Mode) -> Mode:
@@ -96,6 +109,14 @@ def _swapped(mode: Mode) -> Mode:
 def _uniform(along: Array, across: Array) -> tuple[Mode, Mode]:
     zero, one = np.zeros_like(along), np.ones_like(along)
     return (along, zero, one, zero, zero, zero), (zero, across, zero, zero, zero, one)
+
+
+def _necked(along: Array, across: Array, middle: float, width: float) -> tuple[Mode, Mode]:
+    far, zero = (along - middle) / width, np.zeros_like(along)
+    share = 1 / np.cosh(np.clip(far, -300, 300)) ** 2
+    moved = width * (np.tanh(far) + math.tanh(middle / width))
+    narrows = -2 / width * share * np.tanh(far) * across
+    return (moved, zero, share, zero, zero, zero), (zero, across * share, zero, zero, narrows, share)
 
 
 def _woven(along: Array, across: Array, cell: float, over: float) -> tuple[Mode, Mode]:

@@ -99,17 +99,23 @@ def list_cameras() -> list[CameraListing]:
     return found
 
 
+RECORDING = "session.h5"
 _VIDEOS = (".mp4", ".avi", ".mkv", ".mov", ".m4v", ".webm")
 
 
 def with_scheme(text: str) -> str:
-    """The address with its scheme, where it is but the name of a folder, a glob or a file: ``files:shots``."""
+    """The address with its scheme, where it is but the name of a folder, a glob or a file: ``files:shots``.
+
+    A folder that holds a ``session.h5`` is the folder of a run: its session is meant.
+    """
     address = parse_address(text)
     path, suffix = expanded(address.target), Path(address.target).suffix.lower()
     if address.scheme and address.scheme in (*CAMERAS.schemes(), "sim"):
         return text
     if suffix in (".h5", ".hdf5"):
         return f"session:{text}"
+    if (path / RECORDING).is_file():
+        return f"session:{Path(address.target) / RECORDING}{text[len(address.target) :]}"
     if path.is_dir() or "*" in address.target:
         return f"files:{text}"
     if not path.is_file():

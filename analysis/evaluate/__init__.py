@@ -1,21 +1,29 @@
 """Figures from fields: what a test engineer or a map needs.
 
-``gauge_kinds`` are virtual ``gauges`` and extensometers on a field, by the ``extension`` of two ends. ``tensile``
-evaluates a test: a ``curve`` by one of the ``standards``, its ``elastic`` line, its ``strengths``, its plastic
-``flow``, each a ``figure`` with an interval. ``lag`` is the delay of the load beside the frames. ``floor`` has the
-still phase of a test and the noise floor in it. ``deconvolution`` removes the blur of the ZOI from a map.
+``gauges`` are virtual gauges and extensometers on a field, by the extension of two ends. ``tensile`` evaluates a test:
+a ``curve`` by one of the ``standards``, its ``elastic`` line, its ``strengths``, its plastic ``flow``, each a
+``figure`` with an interval. ``lag`` is the delay of the load beside the frames. ``floor`` has the still phase of a test
+and the noise floor in it. ``deconvolution`` removes the blur of the ZOI from a map.
 """
 
 from analysis.evaluate.area.strain import AreaStrain, Unevenness
 from analysis.evaluate.curve import Curve, true_curve
 from analysis.evaluate.deconvolution import deconvolved, effect
 from analysis.evaluate.elastic import ErrorLimits, LoadAxis, load_axis, principal_direction
-from analysis.evaluate.extensometers import ExtensionGauge, LineGauge, TransverseGauge, extension_of
 from analysis.evaluate.figure import CONFIDENCE, Figure
 from analysis.evaluate.floor import MIN_STILL_INSTANTS, NoiseFloor, evenly, noise_floor, still_phase
-from analysis.evaluate.flow import Neck, neck
-from analysis.evaluate.gauge_kinds import GAUGE_KINDS, AreaGauge, CircleGauge, StripGauge, ZoiGauge
-from analysis.evaluate.gauges import Gauge, GaugeValue, Parameter, inside_polygon
+from analysis.evaluate.flow import Neck, neck, true_at_top
+from analysis.evaluate.gauges.extensometers import (
+    ExtensionGauge,
+    LineGauge,
+    TransverseGauge,
+    extension_of,
+    strips_of,
+)
+from analysis.evaluate.gauges.gauge import Gauge, GaugeValue, Parameter
+from analysis.evaluate.gauges.geometry import inside_polygon
+from analysis.evaluate.gauges.kinds import GAUGE_KINDS, AreaGauge, CircleGauge, StripGauge, ZoiGauge
+from analysis.evaluate.gauges.readings import distance
 from analysis.evaluate.lag import Track, find_lag
 from analysis.evaluate.standards import STANDARDS, Band, Interval, Standard, free
 from analysis.evaluate.tensile import Span, StrainZero, TensileFigures, TensileOptions, ZeroBy, evaluate_test
@@ -53,6 +61,7 @@ __all__ = [
     "ZeroBy",
     "ZoiGauge",
     "deconvolved",
+    "distance",
     "effect",
     "evaluate_test",
     "evenly",
@@ -65,5 +74,7 @@ __all__ = [
     "noise_floor",
     "principal_direction",
     "still_phase",
+    "strips_of",
+    "true_at_top",
     "true_curve",
 ]

@@ -18,6 +18,8 @@ _BROKEN = 0.02  # of the highest stress: below it there is no specimen any more
 _FALL = 5.0  # times what is usual from one sample to the next
 _PARTS, _WIDEST = 60, 4  # of a loading: half the width of its running means, and the most, samples
 _MEDIAN_OF_NORMAL = 0.6745
+ENOUGH = 6
+"""Samples that a parabola is laid through."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +41,8 @@ class Curve:
         How much ``elastic`` varies over its area, rms.
     misfit : (N,) float64 or None
         That over what noise makes of it.
+    narrowing : (N,) float64 or None
+        Elongation across the load over the length, where ``transverse`` may be another measure of strain.
     source, elastic_source : str
         What ``strain`` and ``elastic`` are, in words.
     """
@@ -50,12 +54,14 @@ class Curve:
     elastic: Floats | None = None
     uneven: Floats | None = None
     misfit: Floats | None = None
+    narrowing: Floats | None = None
     source: str = ""
     elastic_source: str = ""
 
     def __post_init__(self) -> None:
         n = len(self.t)
-        for values in (self.strain, self.stress, self.transverse, self.elastic, self.uneven, self.misfit):
+        optional = self.transverse, self.elastic, self.uneven, self.misfit, self.narrowing
+        for values in (self.strain, self.stress, *optional):
             if values is not None and values.shape != (n,):
                 raise ValueError(f"a curve needs arrays of one length, got {values.shape} beside {n} times")
 
@@ -66,7 +72,7 @@ class Loading:
 
     Attributes
     ----------
-    t, strain, stress, transverse, elastic, uneven, misfit : (M,) float64
+    t, strain, stress, transverse, elastic, uneven, misfit, narrowing : (M,) float64
         As of the ``Curve``; NaN where unknown.
     level, course : (M,) float64
         Running means of stress and strain, to find places by; never a figure.
@@ -87,6 +93,7 @@ class Loading:
     elastic: Floats
     uneven: Floats
     misfit: Floats
+    narrowing: Floats
     level: Floats
     course: Floats
     noise_strain: float
@@ -101,18 +108,21 @@ class Loading:
         end = broken_at(curve.stress)
         stop = len(curve.t) if end is None else end + 1
         elastic = curve.strain if curve.elastic is None else curve.elastic
+        narrowing = curve.transverse if curve.narrowing is None else curve.narrowing
         known = np.isfinite(curve.strain[:stop]) & np.isfinite(curve.stress[:stop])
         nothing = np.full(len(curve.t), math.nan)
-        t, strain, stress, across, elastic, uneven, misfit = (
+        t, strain, stress, across, elastic, uneven, misfit, narrowing = (
             (nothing if a is None else a)[:stop][known]
             for a in (
-                curve.t, curve.strain, curve.stress, curve.transverse, elastic, curve.uneven, curve.misfit
+                curve.t, curve.strain, curve.stress, curve.transverse, elastic, curve.uneven, curve.misfit,
+                narrowing,
             )
         )  # fmt: skip
         top = int(np.argmax(stress)) if len(stress) else 0
         half = min(top // _PARTS, _WIDEST)
         return cls(
-            t, strain, stress, across, elastic, uneven, misfit, smoothed(stress, half), smoothed(strain, half),
+            t, strain, stress, across, elastic, uneven, misfit, narrowing,
+            smoothed(stress, half), smoothed(strain, half),
             noise(strain), noise(stress), half, top, end is not None,
         )  # fmt: skip
 
@@ -185,12 +195,12 @@ def reading(values: Floats, at: float, first: int, last: int, min_sigma: float =
     values : (N,) float64
     at : float, samples
     first, last : int
-        A straight line between the two neighbours is taken where there are fewer than 6 samples.
+        A straight line between the two neighbours is taken where there are fewer samples than ``ENOUGH``.
     min_sigma : float
         Noise of one value, where that of the fit is smaller.
     """
     first, last = max(first, 0), min(last, len(values))
-    if last - first < 6:
+    if last - first < ENOUGH:
         return _between(values, at, min_sigma)
     k = np.arange(first, last) - at
     design = np.vander(k, 3, increasing=True)

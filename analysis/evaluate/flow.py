@@ -49,10 +49,10 @@ class PlasticPart:
     def of(cls, loading: Loading, line: FittedLine, nu: float) -> PlasticPart:
         """With the elastic part of both strains taken away by the elastic ``line`` and Poisson's ratio."""
         part = slice(line.last, loading.top + 1)
-        strain = loading.elastic[part] - line.strain0
+        strain = loading.strain[part] - line.strain0
         stress = loading.stress[part] * (1 + strain)
         elastic = stress / line.slope
-        across = np.log1p(loading.transverse[part]) + nu * elastic
+        across = np.log1p(loading.narrowing[part]) + nu * elastic
         return cls(np.log1p(strain) - elastic, across, stress, elastic)
 
     @property
@@ -108,6 +108,16 @@ def hardening(loading: Loading, line: FittedLine) -> Figure:
     return Figure.about(slope, sigma, n - 2, _over(low, min(high, reached)))
 
 
+def true_at_top(strength: Figure, strain: Figure) -> tuple[Figure, Figure]:
+    """True stress (Pa) and logarithmic strain of the highest stress and the extension there, where a neck begins.
+
+    Volume is kept, and the strain is uniform up to there. Both must be known.
+    """
+    stretch = strain.minus(-1.0)
+    stress = Figure(strength.value * stretch.value, strength.low * stretch.low, strength.high * stretch.high)
+    return stress, Figure(math.log(stretch.value), math.log(stretch.low), math.log(stretch.high))
+
+
 @dataclass(frozen=True, slots=True)
 class Neck:
     """Where strain grows after the highest stress while the rest of the specimen rests.
@@ -150,13 +160,10 @@ def neck(before: StrainField, after: StrainField, axis: Literal["x", "y"]) -> Ne
     k, elsewhere = int(np.argmax(mean)), float(np.median(mean))
     if mean[k] - elsewhere < max(_CLEAR_SIGMA * sigma[k], _CLEAR_SHARE * abs(elsewhere), _CLEAR_STRAIN):
         return None
-    rows, columns = np.nonzero(
-        both
-        & (np.arange(both.shape[1 - across]) == np.flatnonzero(known)[k]).reshape(
-            (1, -1) if across == 0 else (-1, 1)
-        )
-    )
-    grid = before.grid
+    grid, at = before.grid, np.flatnonzero(known)[k]
+    section = np.zeros(grid.shape, np.bool_)
+    section[(slice(None), at) if across == 0 else (at, slice(None))] = True
+    rows, columns = np.nonzero(section & grid.active)
     return Neck(float(grid.x[columns].mean()), float(grid.y[rows].mean()), float(mean[k]), elsewhere)
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.evaluate.curve import Curve, Floats, Loading, first_crossing, noise, reading, smoothed
+from analysis.evaluate.curve import ENOUGH, Curve, Floats, Loading, first_crossing, noise, reading, smoothed
 from analysis.evaluate.elastic import FittedLine
 from analysis.evaluate.figure import Figure, quantile
 
@@ -51,7 +51,10 @@ def proof_strength(loading: Loading, line: FittedLine, offset: float) -> Figure:
     hardening = abs(stress.slope / strain.slope) if strain.slope > 0 else 0.0
     value = stress.value + stress.slope * float(np.clip(place, -2, 2))
     doubt = math.hypot(strain.sigma, line.sigma_at(value))
-    return Figure.about(value, math.hypot(stress.sigma, hardening * doubt), max(last - first - 3, 4))
+    found = Figure.about(value, math.hypot(stress.sigma, hardening * doubt), max(last - first - 3, 4))
+    # Of few samples nothing shows how the curve bends between them.
+    between = abs(stress.slope) if last - first < ENOUGH else 0.0
+    return replace(found, low=found.low - between, high=found.high + between)
 
 
 def yield_point(loading: Loading, line: FittedLine) -> Yield:

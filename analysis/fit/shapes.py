@@ -61,18 +61,13 @@ def weighted_rows(a: Any, at: Any, weights: Any, width: int, out: Any) -> None:
 
     Reads and writes whole vectors: up to LANES samples more than there are, both in ``a`` and in ``out``.
     """
-    down = np.uintp(width)
     for n in range(0, width, LANES):
         i = at + np.uintp(n)
-        even = spread(np.float32(weights[0])) * load(a, i)
-        odd = spread(np.float32(weights[1])) * load(a, i + down)
-        for k in range(2, len(weights) - 1, 2):  # two sums: each waits for its last multiply-add
-            i += down + down
-            even += spread(np.float32(weights[k])) * load(a, i)
-            odd += spread(np.float32(weights[k + 1])) * load(a, i + down)
-        if len(weights) & 1:
-            even += spread(np.float32(weights[len(weights) - 1])) * load(a, i + down + down)
-        store(out, np.uintp(n), even + odd)
+        value = spread(np.float32(weights[0])) * load(a, i)
+        for k in range(1, len(weights)):
+            i += np.uintp(width)
+            value += spread(np.float32(weights[k])) * load(a, i)
+        store(out, np.uintp(n), value)
 
 
 @inlined
@@ -366,18 +361,16 @@ def shares(s: Any, component: int, out: Any) -> None:
 def bent(s: Any, cross: Any, z: int, step: Any, gain: Any, units: Any, fitted: Any, cubic: Any) -> Any:
     """Sum of the squared shares, px^2, of what is left of the difference after a linear fit of ZOI ``z``.
 
-    ``s`` (10,) are the sums with the whole difference, ``step`` (P,) is the fit and ``gain`` that of the difference;
-    ``units`` (A, 2) are the sums of w f_x^2 and w f_y^2. ``fitted`` float32, 10 in whole vectors, is for use here; the
-    part of third degree is written to ``cubic`` (A, 2).
+    ``s`` (10,) are the sums with the whole difference, ``step`` (P,) and ``gain`` are the fit, ``units`` (A, 2) the sums
+    of w f_x^2 and w f_y^2; ``fitted`` float32, 10 in whole vectors, is for use here, ``cubic`` (A, 2) for degree 3.
     """
     width = 2 * N_SHAPES
-    unit_x, unit_y = units[z, 0], units[z, 1]
     weighted_rows(cross, np.uintp(z * len(step) * width), step, width, fitted)
     of_u = of_v = 0.0
     for i in range(1, N_SHAPES):
         of_u += (s[i] - fitted[i]) ** 2
         of_v += (s[N_SHAPES + i] - fitted[N_SHAPES + i]) ** 2
-    by_u, by_v = 1 / (gain * unit_x) ** 2, 1 / (gain * unit_y) ** 2
+    by_u, by_v = 1 / (gain * units[z, 0]) ** 2, 1 / (gain * units[z, 1]) ** 2
     cubic[z, 0], cubic[z, 1] = of_u * by_u, of_v * by_v
-    second_u, second_v = s[0] - fitted[0], s[N_SHAPES] - fitted[N_SHAPES]
-    return cubic[z, 0] + cubic[z, 1] + second_u**2 * by_u + second_v**2 * by_v
+    of_u, of_v = of_u + (s[0] - fitted[0]) ** 2, of_v + (s[N_SHAPES] - fitted[N_SHAPES]) ** 2
+    return of_u * by_u + of_v * by_v

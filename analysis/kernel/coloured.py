@@ -26,8 +26,13 @@ Floats = NDArray[np.float64]
 BLUR, SOME_BLUR, NEIGHBOURS = 0.25, 0.1, 0.12
 """Limits: growth of the variance of the blur that is the cause of an error, and that acts on u and v, px^2;
 correlation of neighbouring pixels."""
-SAMPLE, SPECTRA = 30, 300
-"""ZOIs that are looked at, and whose spectra are averaged."""
+SAMPLE, SPECTRA = 30, 300 * 32**2
+"""ZOIs that are looked at, and pixels of those whose spectra are averaged."""
+FEWEST, PART = 8, 8
+"""ZOIs at least, and px of a square in them, in which a strain that varies is looked for."""
+EXPLAINED, MIN_CORNER = 0.5, 0.01
+"""Share of the error that shifts must explain; determinant of the gradients over its largest, from which on they are
+known."""
 BOTH_ALIKE = ("compression", "filter")
 """Causes that spoil the reference as much as the picture."""
 
@@ -42,9 +47,76 @@ def error_cause(solution: Solution, ok: NDArray[np.bool_]) -> Cause:
         return "bands"
     if abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR:
         return "blur"
+    return "noise" if _is_white(left) else "filter"
+
+
+def beside_strain(solution: Solution, ok: NDArray[np.bool_]) -> float | None:
+    """What the fits leave beside a strain that varies within the ZOIs, over what noise as stated leaves (variances).
+
+    Such a strain shifts the pattern a little otherwise in each part of a ZOI. Where shifts of its parts explain most
+    of what is left over the noise, and the rest is white, the picture has no other error. Of blocks, filters, blur
+    and noise they explain next to nothing.
+
+    Parameters
+    ----------
+    solution : Solution
+    ok : (A,) bool
+        ZOIs that have a value.
+
+    Returns
+    -------
+    float or None
+        None: it is an error of the picture.
+    """
+    size = solution.reference.grid.size
+    which = some(ok, max(FEWEST, SAMPLE * 32**2 // size**2))
+    left = _in_parts(left_by_fit(solution, which))
+    ready = solution.reference.prepared
+    places = [np.s_[top : top + size, column : column + size] for top, column in ready.origins[which]]
+    dx, dy = (_in_parts(np.stack([ready.images[k][at] for at in places])) for k in (0, 1))
+    rest = left - _shifts(left, dx, dy)
+    noise = float(np.median(solution.expected(which, solution.found.nuisance[which, 0])))
+    free = 2 * left[..., 0].size
+    explained = np.sum(left**2) - np.sum(rest**2) - free * noise
+    excess = np.sum(left**2) - left.size * noise
+    by_chance = 3 * noise * (2 * left.size) ** 0.5
+    if abs(excess) < by_chance:
+        return 1.0 if _is_white(_joined(left)) else None
+    if excess < 0 or explained < EXPLAINED * excess or not _is_white(_joined(rest)):
+        return None
+    return float(np.sum(rest**2) / (left.size - free) / noise)
+
+
+def _shifts(left: Floats, dx: Floats, dy: Floats) -> Floats:
+    """What of each part, (..., m), is a shift of the pattern with the gradients ``dx`` and ``dy``."""
+    xx, yy, xy = (np.sum(a * b, axis=-1) for a, b in ((dx, dx), (dy, dy), (dx, dy)))
+    x, y = (np.sum(d * left, axis=-1) for d in (dx, dy))
+    determinant = xx * yy - xy**2
+    clear = determinant > MIN_CORNER * xx * yy
+    scale = np.where(clear, 1 / np.where(clear, determinant, 1), 0)
+    u, v = scale * (yy * x - xy * y), scale * (xx * y - xy * x)
+    return np.asarray(u[..., None] * dx + v[..., None] * dy)
+
+
+def _in_parts(zois: NDArray[np.floating]) -> Floats:
+    """Squares of ``PART`` px of ZOIs (N, n, n), (N, k, k, PART**2), from the middle."""
+    count = zois.shape[1] // PART
+    rim = (zois.shape[1] - count * PART) // 2
+    inside = zois[:, rim : rim + count * PART, rim : rim + count * PART].astype(np.float64)
+    parts = inside.reshape(len(zois), count, PART, count, PART).swapaxes(2, 3)
+    return parts.reshape(len(zois), count, count, PART**2)
+
+
+def _joined(parts: Floats) -> Floats:
+    """The inverse of ``_in_parts``, (N, n, n)."""
+    squares = parts.reshape(*parts.shape[:3], PART, PART).swapaxes(2, 3)
+    return squares.reshape(len(parts), PART * parts.shape[1], -1)
+
+
+def _is_white(left: Floats) -> bool:
     within = inner(left)
     beside = (np.mean(within[:, 1:] * within[:, :-1]) + np.mean(within[:, :, 1:] * within[:, :, :-1])) / 2
-    return "noise" if abs(beside) < NEIGHBOURS * np.mean(within**2) else "filter"
+    return bool(abs(beside) < NEIGHBOURS * np.mean(within**2))
 
 
 def coloured_bias(
@@ -65,7 +137,7 @@ def coloured_bias(
 
     reference, ready, found = solution.reference, solution.reference.prepared, solution.found
     modes = reference.modes
-    which = some(ok, SPECTRA)
+    which = some(ok, SPECTRA // reference.grid.size**2)
     own = _own_error(ready, left_by_fit(solution, which), which)
     own *= 0.5 if cause in BOTH_ALIKE else share
     more = ready.weight * (own - solution.noise_taken[:, None] * ready.pattern.own_noise)
@@ -86,10 +158,16 @@ def _own_error(ready: PreparedReference, left: Floats, which: NDArray[np.intp]) 
     level, raw = (_spectra(np.stack([ready.images[k][at] for at in places]), window) for k in (2, 3))
     response = np.mean((level * raw.conj()).real, axis=0) / np.mean(np.abs(raw) ** 2, axis=0)
     power = np.mean(np.abs(_spectra(left, window)) ** 2, axis=0) / np.sum(window**2)
+    columns = np.arange(size // 2 + 1)
+    share = np.where((columns == 0) | (2 * columns == size), 1, 2) / size**2  # the other half is the same
+    error = power * response * share
     bend = 2 * np.cos(2 * np.pi * np.fft.fftfreq(size)) - 2
-    return np.array([np.mean(power * response * b) for b in (np.ones(1), bend[None, :], bend[:, None])])
+    return np.array([np.sum(error), np.sum(error * bend[: len(columns)]), np.sum(error * bend[:, None])])
 
 
-def _spectra(zois: NDArray[np.floating], window: Floats) -> NDArray[np.complex128]:
-    """Of ZOIs (N, n, n) without their means, under a window."""
-    return np.asarray(np.fft.fft2((zois - zois.mean(axis=(1, 2), keepdims=True)) * window))
+def _spectra(zois: NDArray[np.floating], window: Floats) -> NDArray[np.complex64]:
+    """Of ZOIs (N, n, n) without their means, under a window: the half with columns from 0, (N, n, n // 2 + 1)."""
+    from scipy.fft import rfft2
+
+    level = zois.astype(np.float32)
+    return np.asarray(rfft2((level - level.mean(axis=(1, 2), keepdims=True)) * window.astype(np.float32)))

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from analysis.field import Motion, Status, StrainField, stretched
 from analysis.field.picture_error import LIMIT, PictureError
+from analysis.fit.validity import AGREES
 from analysis.follow.renewal import UNSHARED, Placement
-from analysis.kernel.coloured import SOME_BLUR, coloured_bias, error_cause
+from analysis.kernel.coloured import SOME_BLUR, beside_strain, coloured_bias, error_cause
 from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]
@@ -20,6 +21,8 @@ Covariance = NDArray[np.float32]
 
 FEW_REFUSED = 0.98
 """Share of valid ZOIs from which on what all fits leave in common is that of the valid ones."""
+DOUBTFUL = 1.05
+"""What is left over what is expected, or its colour, from which on a strain that varies within the ZOIs may do it."""
 MIN_SHARE = 0.04
 """Share of the common error that the deformed image has at least, however noisy the reference was said to be."""
 
@@ -141,12 +144,17 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
     if common is None or solution.retried or np.count_nonzero(ok) < FEW_REFUSED * len(ok):
         common = solution.pooled(np.flatnonzero(ok))
     if common is not None:
-        colour = common.colour
-        if colour.min() < 1 and abs(float(np.median(solution.found.nuisance[ok, 2]))) > SOME_BLUR:
+        colour, ratio = common.colour, common.ratio
+        over = common.usual if ok.all() else float(np.median(ratio[ok]))
+        doubtful = max(colour.max(), over) > DOUBTFUL and not solution.had_lines
+        rest = beside_strain(solution, ok) if doubtful else None
+        if rest is not None:
+            over = 1.0 if solution.is_given and AGREES[0] < rest < AGREES[1] else rest
+            colour, ratio = white, np.full(len(ok), over)
+        elif colour.min() < 1 and abs(float(np.median(solution.found.nuisance[ok, 2]))) > SOME_BLUR:
             # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
             colour = np.maximum(colour, 1)
-        whole = common.ratio * solution.expected(np.s_[:], gain)
-        over = common.usual if ok.all() else float(np.median(common.ratio[ok]))
+        whole = ratio * solution.expected(np.s_[:], gain)
         return _Noise(*_parted(whole, reference * gain**2, gain, solution), colour, math.sqrt(over))
     if solution.noise is not None or not ok.any():
         return _Noise(reference, current, white, float("nan"))

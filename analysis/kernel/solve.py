@@ -98,7 +98,7 @@ class Solution:
         """Whether the image leaves much more than its noise, or many ZOIs are refused: it may have wild pixels."""
         tried = len(self._places[0])
         refused = tried - np.count_nonzero(self.status == Status.OK)
-        return self.leaves_much or bool(refused > DISTURBED_SHARE * tried)
+        return bool(self.leaves_much or refused > DISTURBED_SHARE * tried)
 
     @property
     def leaves_much(self) -> bool:
@@ -209,7 +209,7 @@ class Solution:
         known, expected = self._known, self.expected(which, found.nuisance[:, 0])
         far = CENTRE_VARIANCE[settings.order - 1]
         rule = VerdictArgs(
-            self._is_given, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far
+            self.is_given, ready.shapes.noise, reference.grid.size / 6, settings.bending_px, far
         )
         left = self._left(which, found)
         most = 2 * len(expected) > len(self._places[0])  # some that are retried forgive nothing
@@ -231,7 +231,7 @@ class Solution:
         from analysis.fit.pooling import pooled
 
         places = np.arange(len(self.guess))[which]
-        return pooled(found, left, expected, self._known, places, self._is_given)
+        return pooled(found, left, expected, self._known, places, self.is_given)
 
     @property
     def noise_taken(self) -> Floats:
@@ -239,7 +239,7 @@ class Solution:
         return np.asarray(self._noise * np.minimum(np.maximum(self.found.left, 0) / self._noise_left, 1))
 
     @property
-    def _is_given(self) -> bool:
+    def is_given(self) -> bool:
         """Whether the noise of both images was given."""
         return self.noise is not None and self.reference.noise_model is not None
 

@@ -7,11 +7,12 @@ import math
 from pathlib import Path
 
 from acquire.errors import ConfigError
+from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
 from live.results.export.formats import FORMATS, ExportRequest, export
 from live.results.export.job import ExportOptions
 from live.results.quantities import Display
-from live.results.run_folder import RunFolder, add_gauges, open_run
+from live.results.run_folder import RunFolder, open_run
 from live.ui.terminal.screen import TerminalScreen
 
 FPS = 10.0

@@ -16,7 +16,10 @@ from live.ui.terminal.summary import print_summary
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic replay``."""
-    parser.add_argument("source", help="session.h5, a folder, 'files:shots/*.tif' or 'video:file.mp4'")
+    parser.add_argument(
+        "source",
+        help="folder of a run, session.h5, pictures in a folder, 'files:shots/*.tif' or 'video:file.mp4'",
+    )
     add_as_measured(parser)
     add_time_span(parser)
     parser.add_argument("--reference", metavar="FILE", help="reference picture (default: the first)")

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 from contextlib import ExitStack
+from itertools import chain, count
 from pathlib import Path
 
 from acquire.errors import ConfigError, PhasedicError
+from live.commands.more_gauges import add_gauges
 from live.commands.options import add_gauge_option
 from live.pipeline.screen import Screen
 from live.results.export.atomic_file import check_free, new_file
@@ -14,14 +16,15 @@ from live.results.quantities import Display
 from live.results.report.comparison import compare, tests_of, write_table
 from live.results.report.report import Report, ReportRequest, make_report
 from live.results.report.saving import NO_BROWSER, find_browser, save_figures, save_page, save_pdf
-from live.results.run_folder import RunFolder, add_gauges, open_run
+from live.results.run_folder import RunFolder, open_run
 from live.ui.terminal.screen import TerminalScreen
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``phasedic report``."""
     parser.add_argument("run", nargs="?", help="folder of a run or replay, or a strain.h5")
-    parser.add_argument("--out", metavar="FILE.html", help="new page (default: report.html in the folder)")
+    words = "new page (default: report.html in the folder; report-2.html where that is there)"
+    parser.add_argument("--out", metavar="FILE.html", help=words)
     parser.add_argument("--pdf", action="store_true", help="also print the page to a PDF; needs a browser")
     parser.add_argument(
         "--figures", metavar="DIR", help="also write the figures as SVG, PNG and CSV to a new folder"
@@ -48,12 +51,12 @@ def command(arguments: argparse.Namespace) -> int:
     screen = TerminalScreen()
     if arguments.pdf and find_browser() is None:
         raise ConfigError(f"--pdf: {NO_BROWSER}")
-    default = Path("comparison.html") if arguments.compare else None
     with ExitStack() as opened:
         found = [opened.enter_context(open_run(run)) for run in runs]
         for run in found if arguments.more_gauges else ():
             add_gauges(run, Path(arguments.more_gauges))
-        out = Path(arguments.out) if arguments.out else default or found[0].path / "report.html"
+        default = Path("comparison.html") if arguments.compare else found[0].path / "report.html"
+        out = Path(arguments.out) if arguments.out else _first_free(default, arguments)
         check_free(*_targets(out, arguments))
         if arguments.compare:
             tests = tests_of(found)
@@ -93,6 +96,13 @@ def _targets(out: Path, arguments: argparse.Namespace) -> list[Path]:
     beside = [".csv"] * bool(arguments.compare) + [".pdf"] * arguments.pdf
     figures = [Path(arguments.figures)] if arguments.figures else []
     return [out, *(out.with_suffix(suffix) for suffix in beside), *figures]
+
+
+def _first_free(page: Path, arguments: argparse.Namespace) -> Path:
+    """The page, or the same with a number, so that neither it nor what is saved beside it is there."""
+    names = (page.with_stem(f"{page.stem}-{k}") for k in count(2))
+    beside = argparse.Namespace(**{**vars(arguments), "figures": None})
+    return next(out for out in chain([page], names) if not any(f.exists() for f in _targets(out, beside)))
 
 
 def _save(report: Report, out: Path, arguments: argparse.Namespace, screen: Screen) -> None:

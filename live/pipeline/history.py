@@ -210,9 +210,11 @@ def curve_of(
         # Files of before November 2026 have no extension, and means of the gradients.
         words = f"mean {axial}" if extension is None else f"{axial} of the region"
         return Curve(t, _known(elastic, t), stress, strain(transverse), source=words)
+    across = strain(TRANSVERSE if transverse == TRANSVERSE else f"extension_{'x' if axis == 'y' else 'y'}")
+    narrowing = None if across is None or not np.isfinite(across).any() else across
     return Curve(
         t, extension, stress, strain(transverse), elastic, strain(f"uneven_{axial}"), strain("misfit"),
-        f"extension between strips along {axis}", f"{axial} of the region",
+        narrowing, f"extension between strips along {axis}", f"{axial} of the region",
     )  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from analysis.evaluate import (
     evaluate_test,
     find_lag,
     free,
+    true_at_top,
 )
 from analysis.field import Blur
 from live.config.sections import SpecimenConfig
@@ -281,8 +282,13 @@ def _known_texts(rows: Mapping[str, TensileRow], keys: Sequence[str]) -> str:
     return "  ".join(_text(rows, key) for key in keys if rows[key].figure.known)
 
 
-def figure_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]:
-    """All figures as text: ``elastic_lines``, the elastic part, extensions, strain rate, and what is not known."""
+def figure_lines(
+    figures: TensileFigures, specimen: SpecimenConfig, length_mm: float | None = None
+) -> list[str]:
+    """All figures as text: ``elastic_lines``, the elastic part, extensions, strain rates, and what is not known.
+
+    ``length_mm`` is that between the ends of the extension, where it is known; else the one given is taken.
+    """
     rows, span = _rows(figures, specimen), figures.span
     lines = elastic_lines(figures, specimen) or [line for line in [_known_texts(rows, _STRENGTHS)] if line]
     if not lines:
@@ -293,14 +299,37 @@ def figure_lines(figures: TensileFigures, specimen: SpecimenConfig) -> list[str]
             f"  {figures.standard}: strains {100 * low:.3f} to {100 * high:.3f} %, R2 = {figures.r2:.5f}, by chord"
             f" {rows['E_chord'].text}; strain{_named(figures.strain)} counts {figures.zero.how}"
         )
-    if extensions := _known_texts(rows, _EXTENSIONS):
-        lines.append(extensions + _elongation(figures, specimen.gauge_length_mm))
-    if flow := _known_texts(rows, _FLOW):
-        lines.append(flow)
-    if figures.rate_elastic.known:
-        words = f" ({figures.rate_elastic.why})" if figures.rate_elastic.why else ""
-        lines.append(f"strain rate {figures.rate_elastic.value:.3g} 1/s in the elastic part{words}")
+    lines += plastic_lines(figures, specimen, length_mm)
+    rates = (("in the elastic part", figures.rate_elastic), ("after it", figures.rate_plastic))
+    known = [
+        f"{one.value:.3g} 1/s {when}" + f" ({one.why})" * bool(one.why) for when, one in rates if one.known
+    ]
+    if known:
+        lines.append("strain rate " + ", ".join(known))
     return lines + _unknown_lines(rows)
+
+
+def plastic_lines(
+    figures: TensileFigures, specimen: SpecimenConfig, length_mm: float | None = None
+) -> list[str]:
+    """Extensions with the elongation, true stress and strain at the highest force, r and n; those that are known."""
+    rows = _rows(figures, specimen)
+    extensions, flow = _known_texts(rows, _EXTENSIONS), _known_texts(rows, _FLOW)
+    if extensions:
+        extensions += _elongation(figures, length_mm or specimen.gauge_length_mm)
+    return [line for line in (extensions, _true_line(figures, specimen), flow) if line]
+
+
+def _true_line(figures: TensileFigures, specimen: SpecimenConfig) -> str:
+    """True stress and strain at the highest force, where a neck begins; empty where they are not known."""
+    strength, strain = figures.Rm, figures.Agt
+    if not (strain.known and figures.Ag.known and strength.known and specimen.area_m2):
+        return ""
+    stress, true_strain = true_at_top(strength, strain)
+    return (
+        f"true stress {figure_text(stress, 1e6, 'MPa')}, true strain {figure_text(true_strain, 0.01, '%')}"
+        " at the highest force"
+    )
 
 
 def _elongation(figures: TensileFigures, length_mm: float | None) -> str:
@@ -311,7 +340,7 @@ def _elongation(figures: TensileFigures, length_mm: float | None) -> str:
     known = [f"{figure_text(one.over(1 / length_mm), 1, 'mm')} {when}" for when, one in totals if one.known]
     return (
         "  ("
-        + ", ".join([f"gauge length {length_mm:g} mm", *(f"elongation {words}" for words in known)])
+        + ", ".join([f"gauge length {length_mm:.4g} mm", *(f"elongation {words}" for words in known)])
         + ")"
     )
 

@@ -24,6 +24,8 @@ REQUIRED = {*COLUMNS} - {
 }
 KNOWN = {*COLUMNS, "stress_Pa", "true_strain", "true_stress_Pa", "force_raw_N"}
 ERRORS = "_errors"  # NeXus: the uncertainty of NAME is also called NAME_errors
+# Of each reference, from the row of its first measurement on: upper triangles of the normal matrices of all ZOIs.
+REFERENCES, NORMAL, FIRST_ROW, N_PAIRS = "references", "normal", "first_row", 21
 MAX_SIDE_PX = 65_535
 
 ROOT = {"format": Declared("text"), "format_version": Declared("int", (), 1), "start_time": Declared("text")}
@@ -34,6 +36,11 @@ TEXTS = dict.fromkeys(("config", "metadata", "versions"), Declared("text"))
 def map_declared(name: str, shape: tuple[int, int]) -> Declared:
     """The maps of one name, (T, R, C)."""
     return Declared("u1" if name in BYTES else "f4", (None, *shape))
+
+
+def normal_declared(shape: tuple[int, int]) -> dict[str, Declared]:
+    """The normal matrices of the references, which files of earlier versions do not have."""
+    return {NORMAL: Declared("f4", (None, N_PAIRS, *shape)), FIRST_ROW: Declared("i8", (None,), 0)}
 
 
 def column_declared(name: str) -> Declared:

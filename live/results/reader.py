@@ -81,6 +81,7 @@ class Strain(Closing):
         )
         self.names = (*layout.MAPS, *(name for name in layout.ADDED_MAPS if name in strain))
         self._maps = open_datasets(strain, {n: layout.map_declared(n, self.grid.shape) for n in self.names})
+        self._references = _references(entry, self.grid.shape)
         columns = _columns(mean)
         self.n = _rows(path, [*self._maps.values(), *columns.values()], whole=not unfinished)
         self.values: dict[str, NDArray[Any]] = {name: item[: self.n] for name, item in columns.items()}
@@ -136,6 +137,33 @@ class Strain(Closing):
             return np.asarray(dataset[rows.start : rows.stop : rows.step])
         except (OSError, RuntimeError) as error:
             raise DataError(f"{self.path}: map {name!r} cannot be read ({error}); make it again") from error
+
+    def reference(self, row: int) -> int | None:
+        """The number of the reference at one row, for ``normal``.
+
+        None in files of earlier versions, and of the estimator by phases.
+        """
+        if not self._references:
+            return None
+        found = np.flatnonzero(
+            self._references[layout.FIRST_ROW][: len(self._references[layout.NORMAL])] <= row
+        )
+        return int(found[-1]) if found.size else None
+
+    def normal(self, reference: int) -> NDArray[np.float32]:
+        """Normal matrices of the ZOIs of a reference, by which areas weigh them: upper triangles (21, R, C).
+
+        Raises
+        ------
+        DataError
+            They cannot be read.
+        """
+        try:
+            return np.asarray(self._references[layout.NORMAL][reference])
+        except (OSError, RuntimeError, ValueError) as error:
+            raise DataError(
+                f"{self.path}: the normal matrices cannot be read ({error}); make it again"
+            ) from error
 
     @property
     def force_one_zero(self) -> NDArray[np.float64]:
@@ -248,6 +276,13 @@ def _grid(strain: Any, text: Any, path: Path) -> ZoiGrid:
         if not np.array_equal(open_dataset(strain, name, Declared("f8", places.shape))[()], places):
             raise DataError(f"{where} has other centres {name} than its description; make it again")
     return grid
+
+
+def _references(entry: Any, shape: tuple[int, int]) -> dict[str, Any]:
+    """What is stored of each reference; nothing in files of earlier versions."""
+    if layout.REFERENCES not in entry:
+        return {}
+    return open_datasets(open_group(entry, layout.REFERENCES), layout.normal_declared(shape))
 
 
 def _columns(mean: Any) -> dict[str, Any]:

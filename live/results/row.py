@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from numpy.typing import NDArray
 
 from analysis.evaluate import AreaStrain
-from analysis.field import blur_maps
+from analysis.field import Sums, blur_maps
 from analysis.optics import NAMES
 from live.pipeline.measurement import AXIAL, extension_along, strains_along
 
@@ -88,16 +88,19 @@ class StrainRow:
         iterations; blur and its sigma (px).
     values : mapping of name to number
         One a row, in the order of the columns of ``strain.csv``.
+    pattern : Sums or None
+        Of the reference, by which areas weigh their ZOIs.
     """
 
     maps: dict[str, NDArray[Any]]
     values: dict[str, float | int]
+    pattern: Sums | None = None
 
     @classmethod
     def of(cls, measurement: Measurement, info: ResultsInfo, axis: str = "y") -> StrainRow:
         """The row of ``measurement``, strains in the measure of ``info``; ``axis`` is that of the load."""
         maps = maps_of(measurement.field, info.strain_measure)
-        return cls(maps, _values(measurement, maps, info, axis))
+        return cls(maps, _values(measurement, maps, info, axis), measurement.field.sums)
 
 
 def gauge_columns(name: str) -> tuple[str, str, str]:

@@ -2,8 +2,6 @@
 
 with open_run("runs/20261122T081747Z") as run:
     run.strain.values["eyy"], run.stress
-
-``add_gauges`` adds virtual gauges afterwards; it reads them from the stored maps.
 """
 
 from __future__ import annotations
@@ -14,7 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any, TypeVar, cast
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,22 +24,20 @@ from acquire.events import Event, EventKind
 from acquire.load_sample import LoadSample
 from acquire.record_mode import Crop
 from acquire.session import Session
-from analysis.evaluate import Curve, Gauge, LoadAxis, load_axis
-from analysis.field import PAIR_INDEX, WINDOWS, Measure, StrainField, Window
-from live.config.gauges import gauges_for
-from live.config.loading import from_dict, load_config
+from analysis.evaluate import Curve, LoadAxis, load_axis
+from analysis.field import StrainField
+from live.config.loading import from_dict
 from live.config.sections import SpecimenConfig
 from live.pipeline.history import curve_of
 from live.pipeline.measurement import AXIAL, TRANSVERSE, strains_along
 from live.results.pictures import Image, Pictures, of_images, of_session
 from live.results.reader import Strain
 from live.results.row import gauge_columns
+from live.results.stored_fields import StoredPattern, length_between, read_field, stored_pattern
 
 Item = TypeVar("Item")
 SESSION, STRAIN = "session.h5", "strain.h5"
 _AS_FILES = ("files:", "video:")
-_GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
-_DU_DY, _DV_DX = 2, 4  # of u, du_dx, du_dy, v, dv_dx, dv_dy
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,6 +72,7 @@ class RunFolder(Closing):
         self.path, self.strain = path, strain
         self._sessions: list[Session] = []
         self._notes: dict[str, None] = {}  # in their order, each once
+        self._patterns: dict[int, StoredPattern] = {}  # the last
 
     @cached_property
     def session(self) -> Session | None:
@@ -248,7 +245,12 @@ class RunFolder(Closing):
         DataError
             There is no such instant, or it cannot be read.
         """
-        return read_field(self.strain, row)
+        field, number = read_field(self.strain, row), self.strain.reference(row)
+        if number is None:
+            return field
+        if number not in self._patterns:
+            self._patterns = {number: stored_pattern(self.strain, number)}
+        return replace(field, sums=self._patterns[number])
 
     @property
     def force(self) -> NDArray[np.float64]:
@@ -272,6 +274,13 @@ class RunFolder(Closing):
         load = self.force_one_zero if self.stress is None else self.stress
         times = np.asarray(self.strain.time_s, np.float64)
         return curve_of(self._strain, self.gauges, self.load_axis.axis, times, load)
+
+    @property
+    def gauge_length_mm(self) -> float | None:
+        """Between the ends of the extension of the test; None without a scale, or where it has no ends."""
+        described = self.gauges[AXIAL].described if AXIAL in self.gauges else None
+        scale, length = self.mm_per_px, length_between(self.strain, self.load_axis.axis, described)
+        return length * scale if scale and length > 0 else None
 
     @cached_property
     def events(self) -> list[Event]:
@@ -308,68 +317,3 @@ def open_run(path: str | os.PathLike[str]) -> RunFolder:
     if not file.exists():
         raise DataError(f"{path}: no {STRAIN} there; give the folder that phasedic run or replay wrote")
     return RunFolder(file.parent, Strain.open(file))
-
-
-def read_field(strain: Strain, row: int) -> StrainField:
-    """The field of ``row``; covariances that the stored sigmas do not give are 0.
-
-    Raises
-    ------
-    DataError
-        There is no such row, or it cannot be read.
-    """
-    maps = {name: np.asarray(strain.maps(name, row), np.float64) for name in ("u", "v", *_GRADIENTS)}
-    sigmas = {name: np.asarray(strain.maps(f"sigma_{name}", row), np.float64) for name in maps}
-    status, residual = strain.maps("status", row), strain.maps("residual", row)
-    field = StrainField.from_values(strain.grid, maps, sigmas, status=status, residual=residual)
-    covariance = np.array(field.covariance)
-    shear = np.asarray(strain.maps("sigma_exy", row), np.float64)
-    both = sigmas["du_dy"] ** 2 + sigmas["dv_dx"] ** 2
-    covariance[PAIR_INDEX[_DU_DY, _DV_DX]] = (4 * shear**2 - both) / 2
-    measure = cast(Measure, strain.strain_measure)
-    return replace(field, covariance=covariance, measure=measure, window=_window(strain))
-
-
-def _window(strain: Strain) -> Window:
-    """The window of the ZOIs, on which the correlation of neighbours depends; gaussian where it is not recorded."""
-    measure = strain.config.get("measure")
-    name = measure.get("window") if isinstance(measure, dict) else None
-    return cast(Window, name) if name in WINDOWS else "gaussian"
-
-
-def add_gauges(run: RunFolder, path: Path) -> tuple[str, ...]:
-    """Add the ``[gauges.NAME]`` of a TOML file to ``run`` while it is open; its files stay as they are.
-
-    Values are those that a replay with this file would give, and so are the uncertainties of extensometers and single
-    ZOIs. That of an area includes only the overlap of the windows (6 % low at a step of a quarter of a ZOI, a third at
-    most). A gauge replaces an existing one of the same name.
-
-    Raises
-    ------
-    ConfigError
-        The file cannot be read, holds no gauge, or no ZOI lies at a gauge.
-    DataError
-        The maps cannot be read.
-    """
-    config = load_config(path, {"specimen.axis": run.specimen.axis})
-    if not config.gauges:
-        raise ConfigError(f"{path}: holds no gauge; give a table [gauges.NAME] each")
-    gauges, strain = gauges_for(config.gauges, config.specimen.first_axis, run.strain.grid), run.strain
-    values, sigmas = _read(run, gauges)
-    stored = run.section("gauges")
-    strain.config["gauges"] = {**stored, **config.gauges}
-    for k, gauge in enumerate(gauges):
-        strain.values |= dict(zip(gauge_columns(gauge.name)[:2], (values[:, k], sigmas[:, k]), strict=True))
-    run.__dict__.pop("gauges", None)  # the cached value is out of date
-    return tuple(gauge.name for gauge in gauges)
-
-
-def _read(run: RunFolder, gauges: tuple[Gauge, ...]) -> tuple[np.ndarray, np.ndarray]:
-    """Values and sigmas, (T, number of gauges) each."""
-    values, sigmas = np.full((2, run.strain.n, len(gauges)), np.nan)
-    for row in range(run.strain.n):
-        field = run.field(row)
-        for k, gauge in enumerate(gauges):
-            read = gauge.measure(field)
-            values[row, k], sigmas[row, k] = read.value, read.sigma
-    return values, sigmas

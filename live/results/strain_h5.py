@@ -25,7 +25,7 @@ from live.results.quantities import quantity_of
 from live.results.row import STRAINS, StrainRow, gauge_columns
 
 if TYPE_CHECKING:
-    from analysis.field import ZoiGrid
+    from analysis.field import Sums, ZoiGrid
     from live.results.row import ResultsInfo
 
 VALUE_BITS, SIGMA_BITS = 9, 9
@@ -84,6 +84,10 @@ class StrainWriter:
         entry = self._file["entry"]
         self._maps = {n: PictureStack(entry["strain"][n]) for n in _MAPS}
         self._values = RowTable(entry["mean"], _value_names(info))
+        references = entry[layout.REFERENCES]
+        self._normal, self._first_row = PictureStack(references[layout.NORMAL]), references[layout.FIRST_ROW]
+        self._grid = grid
+        self._pattern: Sums | None = None
 
     def write(self, row: StrainRow) -> None:
         """Append one row."""
@@ -115,9 +119,17 @@ class StrainWriter:
 
     def _append(self, row: StrainRow) -> None:
         values = self._values.row(row.values)
+        if row.pattern is not None and row.pattern is not self._pattern:
+            self._pattern = row.pattern
+            self._append_normal(normal_matrices(row.pattern, self._grid))
         for name, stored in rounded(row.maps).items():
             self._maps[name].append(stored)
         self._values.hold(values)
+
+    def _append_normal(self, normal: NDArray[np.float32]) -> None:
+        self._normal.append(normal)
+        self._first_row.resize((self._normal.length,))
+        self._first_row[-1] = next(iter(self._maps.values())).length
 
     def _flush(self) -> None:
         self._timer.began()
@@ -153,6 +165,14 @@ class StrainWriter:
         return DataError(
             f"{self._path}: cannot be written ({reason(error)}){kept}; make room on the disk or choose another --out"
         )
+
+
+def normal_matrices(pattern: Sums, grid: ZoiGrid) -> NDArray[np.float32]:
+    """Upper triangles of the normal matrices of all ZOIs, (21, R, C), zero where one has no pattern."""
+    at = np.flatnonzero(grid.active)
+    out = np.zeros((layout.N_PAIRS, *grid.shape), np.float32)
+    out.reshape(layout.N_PAIRS, -1)[:, at] = pattern.information(at)[np.triu_indices(6)]
+    return out
 
 
 def rounded(maps: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
@@ -198,6 +218,7 @@ def _declare(file: Any, grid: ZoiGrid, info: ResultsInfo) -> None:
     entry["start_monotonic_s"].attrs["units"] = "s"
     entry["title"] = str(info.metadata.get("specimen", "") or "phasedic")
     _add_strain(entry, grid, info)
+    _add_references(entry, grid.shape)
     _add_mean(entry, info)
     _add_gauges(entry, info)
     _add_notes(entry, info)
@@ -289,6 +310,17 @@ def _add_map(strain: Any, name: str, shape: tuple[int, int]) -> None:
     dataset.attrs.update(units=unit, long_name=f"{words} ({unit})" if unit else words, interpretation="image")
     if name == "status":
         dataset.attrs["meaning"] = json.dumps(_status_words())
+
+
+def _add_references(entry: Any, shape: tuple[int, int]) -> None:
+    group = _group(entry, layout.REFERENCES, "NXcollection")
+    normal = group.create_dataset(
+        layout.NORMAL, (0, layout.N_PAIRS, *shape), "f4", maxshape=(None, layout.N_PAIRS, *shape),
+        chunks=(1, layout.N_PAIRS, *shape), fletcher32=True, **COMPRESSED,
+    )  # fmt: skip
+    normal.attrs["long_name"] = "normal matrices of u, du/dx, du/dy, v, dv/dx, dv/dy: upper triangles"
+    row = group.create_dataset(layout.FIRST_ROW, (0,), "i8", maxshape=(None,), chunks=(64,), fletcher32=True)
+    row.attrs["long_name"] = "row of the maps from which on it holds"
 
 
 def _fill(kind: str) -> float:

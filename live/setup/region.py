@@ -6,6 +6,7 @@ its folder and a replay use it from there.
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -17,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from acquire.cv2_loader import load_cv2
-from acquire.errors import ConfigError, DataError
+from acquire.errors import ConfigError, DataError, DeviceError
 from acquire.events import Event, EventSink
-from acquire.frame import CameraInfo
+from acquire.frame import CameraInfo, Frame
 from live.config.loading import Config
 from live.config.values import ALL, AUTO
 from live.setup.devices import at_rest, open_rig
@@ -28,6 +29,7 @@ from live.setup.pictures import read_mask, with_mask
 from live.setup.placement import with_auto_gauges
 
 if TYPE_CHECKING:
+    from acquire.camera.contract import Camera
     from analysis import ZoiGrid
 
 Box = tuple[int, int, int, int]
@@ -35,6 +37,8 @@ Bools = NDArray[np.bool_]
 
 FIRST_LOOK_FRAMES = 4
 """Frames of a live camera in which the specimen is searched; of recorded pictures, one."""
+SILENCE_S = 20.0
+"""Wait for the next picture of a first look; a run waits for ever, since a test may be under way."""
 FILLS_PICTURE = 0.98  # of the picture: above it the specimen fills the picture, unless it has a hole
 
 
@@ -167,6 +171,8 @@ def first_look(config: Config, print_line: Callable[[str], None]) -> FirstLook:
     ------
     DataError
         The camera ended without a whole frame.
+    DeviceError
+        No whole picture came for ``SILENCE_S``.
     """
     rig = open_rig(
         at_rest(config.camera.address), "none:", report_warnings(print_line), crop=config.camera.crop
@@ -175,8 +181,8 @@ def first_look(config: Config, print_line: Callable[[str], None]) -> FirstLook:
     images: list[NDArray[Any]] = []
     try:
         with rig.camera:
-            for frame in rig.camera:
-                images += [] if frame.damaged else [frame.image]
+            for frame in _whole_frames(rig.camera):
+                images.append(frame.image)
                 if len(images) == n:
                     break
     finally:
@@ -184,6 +190,33 @@ def first_look(config: Config, print_line: Callable[[str], None]) -> FirstLook:
     if not images:
         raise DataError(f"{config.camera.address}: gave no whole frame; look at the camera")
     return FirstLook(*_mean_and_noise(images), rig.camera.info)
+
+
+def _whole_frames(camera: Camera) -> Iterator[Frame]:
+    """The undamaged frames of a camera; raises DeviceError where none comes for ``SILENCE_S``."""
+    frames, silent = (frame for frame in camera if not frame.damaged), False
+
+    def stop() -> None:
+        nonlocal silent
+        silent = True
+        camera.stop()
+
+    while True:
+        watch = threading.Timer(SILENCE_S, stop)
+        watch.start()
+        try:
+            frame = next(frames, None)
+        finally:
+            watch.cancel()
+        if frame is not None:
+            yield frame
+        elif silent:
+            raise DeviceError(
+                f"{camera.info.name}: no whole picture came in {SILENCE_S:g} s; look at its cable, its trigger and the"
+                " light, and call again"
+            )
+        else:
+            return
 
 
 def report_warnings(print_line: Callable[[str], None]) -> EventSink:

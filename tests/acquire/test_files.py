@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
+from acquire.camera.opening import with_scheme
 from acquire.errors import DataError
 from acquire.files.picture import check_regular, decode, read_bytes, read_picture, write_picture
 from acquire.printable import printable
@@ -122,3 +123,15 @@ def test_a_limit_of_size(tmp_path: Path) -> None:
 def test_words_of_others_are_harmless(text: str, shown: str) -> None:
     assert printable(text) == shown
     printable(text).encode()
+
+
+def test_the_folder_of_a_run_is_its_session(tmp_path: Path) -> None:
+    """It also holds mask.png, which is no picture of a test."""
+    run, shots = tmp_path / "run", tmp_path / "shots"
+    for folder in (run, shots):
+        folder.mkdir()
+        (folder / "mask.png").touch()
+    (run / "session.h5").touch()
+    assert with_scheme(str(run)) == f"session:{run}/session.h5"
+    assert with_scheme(f"{run}?fps=5") == f"session:{run}/session.h5?fps=5"
+    assert with_scheme(str(shots)) == f"files:{shots}"

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from analysis.evaluate import STANDARDS, Curve, TensileOptions, evaluate_test, neck
+from analysis.evaluate import STANDARDS, Curve, TensileOptions, evaluate_test, neck, true_at_top
 from analysis.field import Roi, StrainField, ZoiGrid
 from hw_mocks.machine import FlowCurve, PowerLaw
 
@@ -33,6 +33,28 @@ def test_r_and_n_of_a_power_law(n: float, r: float) -> None:
     assert found.Ag.value == pytest.approx(np.expm1(n), abs=0.01), "the highest force of a power law"
     assert found.n.why.startswith("plastic strains 10 to ")
     assert found.r.why == f"plastic strains 2 to {100 * min(0.2, np.expm1(n)):.3g} %" or n < 0.19
+
+
+def test_r_and_n_are_of_elongations_whatever_the_measure_of_the_other_strains() -> None:
+    plain = pulled(PowerLaw(0.2, 1.5), 0.3)
+    assert plain.transverse is not None
+    hencky = replace(
+        plain,
+        elastic=np.log1p(plain.strain),
+        transverse=np.log1p(plain.transverse),
+        narrowing=plain.transverse,
+    )
+    found = evaluate_test(hencky)
+    assert found.r.value == pytest.approx(1.5, rel=2e-3) and found.n.value == pytest.approx(0.2, rel=5e-3)
+
+
+def test_true_stress_and_strain_at_the_highest_force() -> None:
+    metal = PowerLaw(0.2, 1.5)
+    found = evaluate_test(pulled(metal, 0.3))
+    stress, strain = true_at_top(found.Rm, found.Agt)
+    top = metal.uniform_strain
+    assert stress.low <= float(metal.stress(top)) * (1 + top) <= stress.high
+    assert strain.low <= np.log1p(top) <= strain.high and strain.high - strain.low < 0.02
 
 
 def test_intervals_hold_the_truth_as_often_as_they_promise() -> None:
@@ -86,7 +108,13 @@ def test_a_neck_is_found_where_strain_grows_while_the_rest_rests() -> None:
     before = strained({})
     found = neck(before, strained({7: 0.35, 8: 0.41, 9: 0.33}), "y")
     assert found is not None and found.growth == pytest.approx(0.21)
-    assert (found.x, found.y) == (10 + 15.5 + 4 * 7, 20 + 15.5 + 8 * 8) and abs(found.elsewhere) < 1e-12
+    place = (found.x, found.y)
+    lost = replace(before, status=np.where(np.arange(8) < 3, np.uint8(5), before.status))
+    seen = neck(lost, strained({7: 0.35, 8: 0.41, 9: 0.33}), "y")
+    assert seen is not None and (seen.x, seen.y) == place, (
+        "the middle of the section, whichever ZOIs are lost"
+    )
+    assert place == (10 + 15.5 + 4 * 7, 20 + 15.5 + 8 * 8) and abs(found.elsewhere) < 1e-12
     assert neck(before, strained(dict.fromkeys(range(12), 0.25)), "y") is None, "an even strain is no neck"
     assert neck(before, strained({8: 0.201}, sigma=1e-2), "y") is None, "nor is noise"
     assert neck(before, strained({8: 0.41}), "x") is None

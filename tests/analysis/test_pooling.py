@@ -15,6 +15,7 @@ from analysis.kernel.white_noise import white_cubic
 from analysis.picture.blocks import BLOCKS, blockiness
 from analysis.picture.impulses import without_impulses
 from tests.accuracy.truth import Speckle, affine
+from tests.accuracy.truth import field as displaced
 
 SHAPE = (320, 320)
 GRID = ZoiGrid.cover(Roi(16, 16, 288, 288), 32, 16)
@@ -50,6 +51,33 @@ def test_noise_other_than_stated_is_found_and_refuses_nothing(
     assert field.ok.mean() > 0.99
     for name in ("u", "v"):
         assert predicted_over_observed(field, name, MOTION[name]) == pytest.approx(1, abs=0.15)
+
+
+def bent(noise: float, seed: int, amplitude: float, correlated_px: float = 0.0) -> np.ndarray:
+    """The pattern under v = ``amplitude`` sin(2 pi y / 96), with noise of a strength and of a reach."""
+    wave = lambda x, y: (0 * x, amplitude * np.sin(2 * np.pi * y / 96))  # noqa: E731
+    added = np.random.default_rng(seed).normal(0, 1, SHAPE)
+    if correlated_px:
+        added = cv2.GaussianBlur(added, (0, 0), correlated_px)
+    level = 128 + 200 * (Speckle(2.0, 3, span=400).at(*displaced(SHAPE, wave)) - 0.5)
+    return (level + noise * added / added.std()).astype(np.float32)
+
+
+@pytest.mark.parametrize("amplitude", [0.018, 0.1])
+def test_a_strain_that_bends_within_the_zois_is_no_error_of_the_picture(amplitude: float) -> None:
+    """Neither colour where what is left agrees with the noise, nor noise where it is several times as much."""
+    zois = ZoiGrid.cover(Roi(16, 16, 288, 288), 64, 8)
+    kernel = PhaseKernel(bent(0.25, 1, 0.0), zois, noise=0.25)
+    still, strained = (kernel.measure(bent(0.25, 2, by), noise=0.25) for by in (0.0, amplitude))
+    assert strained.picture is not None and strained.picture.colour == (1.0, 1.0)
+    assert strained.sigma_v == pytest.approx(still.sigma_v, rel=1e-3)
+
+
+def test_coloured_noise_of_the_strength_given_keeps_its_colour() -> None:
+    kernel = PhaseKernel(bent(2.0, 1, 0.0, 1.0), GRID, noise=2.0)
+    field = kernel.measure(bent(2.0, 2, 0.0, 1.0), noise=2.0)
+    assert field.picture is not None and min(field.picture.colour) > 2
+    assert predicted_over_observed(field, "v", 0.0) == pytest.approx(1, abs=0.2)
 
 
 def test_a_compressed_picture_is_measured_with_the_uncertainty_that_it_has() -> None:

@@ -348,3 +348,12 @@ def test_samples_that_come_in_bunches() -> None:
     bunched = np.repeat(force.t[::4], 4)[: len(force.t)]
     figure = find_lag(strain, Track(bunched, force.values))
     assert figure.value == pytest.approx(0.15, abs=0.05)
+
+
+def test_a_proof_strength_between_two_distant_samples_has_an_interval_that_holds_it() -> None:
+    """Two samples of the flow, 0.15 % apart, about a sharp knee: the chord between them is below the curve."""
+    strain = np.concatenate([np.linspace(0, 1.99e-3, 200), 2e-3 + 1.5e-3 * np.arange(0.55, 20)])
+    curve = Curve(np.arange(len(strain)) / 10, strain, np.minimum(70e9 * strain, 140e6) + 1e8 * strain)
+    found = evaluate_test(curve).Rp01
+    truth = 140e6 + 1e8 * 3e-3
+    assert found.low <= truth <= found.high and found.high - found.low < 10e6

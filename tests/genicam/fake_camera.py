@@ -77,6 +77,14 @@ def description(lib: Any, white: int | None) -> str:
     return text.replace("</RegisterDescription>", f"{more}</RegisterDescription>")
 
 
+def fitted(shown: NDArray[Any], width: int, height: int) -> NDArray[Any]:
+    """The picture cut or filled up with black to the size of the frame, since its memory holds no more."""
+    frame = np.zeros((height, width), shown.dtype)
+    part = shown[:height, :width]
+    frame[: part.shape[0], : part.shape[1]] = part
+    return frame
+
+
 def serve(options: argparse.Namespace) -> None:
     """Be the camera, for ever."""
     lib = library()
@@ -88,9 +96,10 @@ def serve(options: argparse.Namespace) -> None:
         nonlocal sent
         name, handle = names[code], c.c_void_p(buffer)
         width, height = lib.arv_buffer_get_image_width(handle), lib.arv_buffer_get_image_height(handle)
-        shown = (
-            picture(sent, width, height, name) if pictures is None else pictures[min(sent, len(pictures) - 1)]
-        )
+        if pictures is None:
+            shown = picture(sent, width, height, name)
+        else:
+            shown = fitted(pictures[min(sent, len(pictures) - 1)], width, height)
         content = PACK[name](shown.reshape(-1))
         size = c.c_size_t()
         c.memmove(lib.arv_buffer_get_data(handle, c.byref(size)), content, len(content))

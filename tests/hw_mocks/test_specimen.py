@@ -22,6 +22,12 @@ DEFORMATIONS: dict[str, Deformation] = {
         for kind in ("uniform", "hole", "woven")
         for axis in ("x", "y")
     },
+    **{
+        f"neck along {axis}": VirtualSpecimen(
+            axis=axis, neck_px=40.0, material=PowerLaw(0.2, 1.5), programme=Programme(max_strain=0.45)
+        ).at(18.5)
+        for axis in ("x", "y")
+    },
 }
 
 
@@ -55,6 +61,21 @@ def test_uniform_field_has_the_mean_strains() -> None:
     np.testing.assert_allclose(dv_dy, specimen.axial_strain(15.0))
     np.testing.assert_allclose(du_dx, specimen.transverse_strain(15.0))
     assert not du_dy.any() and not dv_dx.any()
+
+
+def test_a_neck_grows_from_the_highest_force_on_while_the_rest_rests() -> None:
+    metal = PowerLaw(0.2, 1.5)
+    specimen = VirtualSpecimen(neck_px=40.0, material=metal, programme=Programme(max_strain=0.45))
+    strain = np.linspace(0.1, 0.4, 30001)
+    assert metal.uniform_strain == pytest.approx(strain[np.argmax(metal.stress(strain))], abs=2e-5)
+    middle = 0.2 * 512 + 511 / 2
+    at_end = specimen.gradient([320, 320], [middle, 0], 20.0)
+    assert at_end[3] == pytest.approx([0.45, metal.uniform_strain], abs=1e-5)
+    assert at_end[0][0] == pytest.approx(float(metal.transverse(0.45)))
+    assert specimen.force(20.0) == pytest.approx(40e-6 * float(metal.stress(0.45)))
+    assert specimen.force(20.0) < specimen.area_m2 * float(metal.stress(metal.uniform_strain))
+    with pytest.raises(ConfigError, match="a neck needs sim:uniform of a sheet metal; give n or r"):
+        specimen_from(parse_address("sim:uniform?neck=40"))
 
 
 def test_hole_has_kirschs_concentration() -> None:

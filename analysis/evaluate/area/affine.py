@@ -128,7 +128,7 @@ class AffineFit:
             if len(self._variances) >= _KEPT * len(VALUES):
                 self._variances.clear()
             places = Places.of(strain.grid, strain.window)
-            noise = _noise_of_windows(places, self.at, self._weights(q, valid))
+            noise = noise_of_windows(places, self.at, self._weights(q, valid))
             self._variances[key] = noise * self._beyond_windows(name, q, strain)
         return self._variances[key]
 
@@ -141,7 +141,7 @@ class AffineFit:
             weights = self._weights(q, self.measurable)
             places = Places.of(strain.grid, strain.window)
             made = pattern.variance(self.at, weights)
-            self._patterns[name] = made / _noise_of_windows(places, self.at, weights)
+            self._patterns[name] = made / noise_of_windows(places, self.at, weights)
         return self._patterns[name]
 
     def _weights(self, q: Floats, valid: Bools) -> Floats:
@@ -171,7 +171,7 @@ def _of_windows(places: Places, area: bytes, whole: bool) -> AffineFit:
     return _fit(places, at, information, np.ones((2, len(at))), whole)
 
 
-def _noise_of_windows(places: Places, at: NDArray[np.intp], weights: Floats) -> float:
+def noise_of_windows(places: Places, at: NDArray[np.intp], weights: Floats) -> float:
     """Variance of a sum of the values of ZOIs by ``weights`` (6, n), where a displacement has the variance 1."""
     model, flat = covariance_of(places), np.zeros((6, places.shape[0] * places.shape[1]))
     flat[:, at] = weights

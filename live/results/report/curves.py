@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from analysis.evaluate import true_curve
 from live.results.maps.colours import Unit, unit_for
 from live.results.report.evaluation import EvaluatedCurve
 from live.results.report.svg import COLOURS, Array, Mark, Plot, PlotLine
@@ -53,6 +54,19 @@ def stress_strain(curve: EvaluatedCurve) -> Plot:
     title = f"{what.capitalize()} against strain"
     return Plot(
         "stress-strain", title, f"axial strain, {e.name}", f"{what}, {load.name}", tuple(curves), tuple(marks)
+    )
+
+
+def true_stress_strain(curve: EvaluatedCurve) -> Plot | None:
+    """True stress over true strain up to the highest stress; None without a section, or before that was passed."""
+    if not (curve.is_stress and curve.figures.Ag.known):
+        return None
+    strain, stress = true_curve(curve.axial, curve.load)
+    e, unit = strain_unit(strain), load_unit(curve)
+    line = PlotLine("", strain * e.factor, stress * unit.factor)
+    heads = (f"true strain, {e.name}", f"true stress, {unit.name}")
+    return Plot(
+        "true-stress-strain", "True stress against true strain up to the highest force", *heads, (line,)
     )
 
 

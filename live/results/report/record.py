@@ -33,6 +33,8 @@ _FIGURES = (
     ("Rm", "Pa", "highest stress: force over the undeformed section"),
     ("Agt, Ag", "1", "extension at Rm, total and plastic"),
     ("At, A", "1", "extension at the break, total and plastic"),
+    ("r", "1", "true plastic strain of the width over that of the thickness, ISO 10113"),
+    ("n", "1", "slope of the logarithm of true stress over that of true plastic strain, ISO 10275"),
 )
 
 

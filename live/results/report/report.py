@@ -104,7 +104,7 @@ def _content(run: RunFolder, wanted: ReportRequest, screen: Screen) -> _Content:
 
 
 def _figures(run: RunFolder, curve: EvaluatedCurve) -> tuple[Plot, ...]:
-    first = [curves.stress_strain(curve)] if curve.has_load else []
+    first = [curves.stress_strain(curve), curves.true_stress_strain(curve)] if curve.has_load else []
     found = [
         *first,
         curves.force(run),
@@ -234,7 +234,9 @@ def _about_curves(curve: EvaluatedCurve) -> Html:
 
 def figure_table(run: RunFolder, curve: EvaluatedCurve) -> list[Html]:
     """The figures as text, how they were found, and why others are not known."""
-    lines = [*figure_lines(curve.figures, run.specimen), neck_line(run, curve)] if curve.has_load else []
+    if not curve.has_load:
+        return []
+    lines = [*figure_lines(curve.figures, run.specimen, run.gauge_length_mm), neck_line(run, curve)]
     return [paragraph(line.strip().replace("  ", ", ")) for line in lines if line]
 
 

@@ -268,7 +268,8 @@ def _events(run: RunFolder) -> Iterator[Message]:
 
 def _status(run: RunFolder) -> str:
     """The figures of the test and the final values of the gauges, as Markdown."""
-    lines = figure_lines(evaluate_test(run.curve, tensile_options(run.specimen)), run.specimen)
+    figures = evaluate_test(run.curve, tensile_options(run.specimen))
+    lines = figure_lines(figures, run.specimen, run.gauge_length_mm)
     lines += [
         f"gauge **{name}** {gauge.value[-1] * 1e6:+.0f} ± {gauge.sigma[-1] * 1e6:.0f} µm/m at the end"
         for name, gauge in run.gauges.items()

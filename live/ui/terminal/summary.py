@@ -15,7 +15,15 @@ from live.pipeline.consumer import ConsumerReport
 from live.pipeline.event_log import sentence
 from live.pipeline.run_state import RunState
 from live.pipeline.screen import Screen
-from live.results.figures import alignment_line, elastic_lines, evaluate, figure_lines, lag_line, tare_line
+from live.results.figures import (
+    alignment_line,
+    elastic_lines,
+    evaluate,
+    figure_lines,
+    lag_line,
+    plastic_lines,
+    tare_line,
+)
 from live.results.summary import file_lines, noise_line, summary_lines, why_nothing
 from live.ui.terminal.status_line import strain_text
 
@@ -67,7 +75,9 @@ def brief_lines(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
 def _figures(run_state: RunState, specimen: SpecimenConfig) -> list[str]:
     figures = evaluate(run_state.history, run_state.loads, specimen)
     if figures.E.known:
-        return [line for line in elastic_lines(figures, specimen) if line]
+        return [
+            line for line in [*elastic_lines(figures, specimen), *plastic_lines(figures, specimen)] if line
+        ]
     if not np.isfinite(run_state.history.forces(run_state.loads)).any():
         return ["E is not known: no force is known (--load)"]
     return [f"E is not known: {figures.E.why}", *figure_lines(figures, specimen)[:1]]

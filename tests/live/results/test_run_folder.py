@@ -14,7 +14,8 @@ import pytest
 from acquire.errors import DataError
 from acquire.record_mode import RecordMode
 from live.cli import main
-from live.results.run_folder import add_gauges, open_run
+from live.commands.more_gauges import add_gauges
+from live.results.run_folder import open_run
 from tests.live.made_run import CONFIG, E_PA, GAUGES, PULLED, make_run, session_writer
 from tests.live.made_up import START, make_measurement
 

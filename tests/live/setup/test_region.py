@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 import pytest
 
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DeviceError
 from analysis import Roi, ZoiGrid
 from analysis.evaluate import extension_of
 from live.cli import main
@@ -127,6 +127,14 @@ def test_warnings_of_the_camera_are_printed(monkeypatch: pytest.MonkeyPatch) -> 
     first = first_look(load_config(None, {"camera.address": SIM}), messages.append)
     assert messages == ["no picture for 2.0 s; still waiting"]
     assert first.size == (320, 320)
+
+
+def test_a_camera_that_stays_silent_is_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run waits for it; a first look, which nobody's test hangs on, ends and names what to look at."""
+    monkeypatch.setattr("live.setup.region.SILENCE_S", 0.2)
+    silent = "sim:hole?fps=20&width=320&height=320&hole=40&faults=disconnect@0*600"
+    with pytest.raises(DeviceError, match=r"no whole picture came in 0\.2 s; look at its cable"):
+        first_look(load_config(None, {"camera.address": silent}), [].append)
 
 
 @pytest.mark.parametrize(

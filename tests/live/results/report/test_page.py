@@ -214,6 +214,17 @@ def test_refusals(
     assert not (tmp_path / "r.html").exists()
 
 
+def test_a_second_report_gets_a_number(tmp_path: Path) -> None:
+    """Whoever has a page and asks for more of it needs no new name for it."""
+    make_run(tmp_path / "run")
+    (tmp_path / "run" / "report.html").write_text("precious")
+    for _ in range(2):
+        assert main(["report", str(tmp_path / "run")]) == 0
+    names = sorted(file.name for file in (tmp_path / "run").glob("report*"))
+    assert names == ["report-2.html", "report-3.html", "report.html"]
+    assert (tmp_path / "run" / "report.html").read_text() == "precious"
+
+
 def test_nothing_is_overwritten(run_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "r.html"
     out.with_suffix(".csv").write_text("precious")

@@ -9,14 +9,11 @@ from typing import Any, Literal
 
 import numpy as np
 
-from analysis.evaluate.area.affine import Places
-from analysis.evaluate.gauges import (
+from analysis.evaluate.gauges.gauge import Gauge, GaugeValue, Parameter
+from analysis.evaluate.gauges.geometry import (
     Box,
-    Gauge,
-    GaugeValue,
     Line,
     Mask,
-    Parameter,
     Point,
     box_between,
     circle,
@@ -24,11 +21,10 @@ from analysis.evaluate.gauges import (
     corners_of,
     ends_of,
     near_px,
-    read_ends,
-    read_strips,
     zois_inside,
     zois_near,
 )
+from analysis.evaluate.gauges.readings import read_ends, read_strips
 from analysis.field import Roi, StrainField, ZoiGrid
 
 BOX = Parameter("box", "x, y, width, height of an area, extension or transverse gauge")
@@ -159,17 +155,22 @@ class ExtensionGauge(TransverseGauge):
         return read_strips(self.zois(field.grid), field, self.along)
 
 
+def strips_of(grid: ZoiGrid, along: Literal["x", "y"]) -> tuple[Mask, ...]:
+    """The two strips of ``extension_of``, (R, C) bool each."""
+    return _strips(grid.roi, grid.size, grid.step, grid.shape, grid.active.tobytes(), along)
+
+
 def extension_of(field: StrainField, along: Literal["x", "y"]) -> GaugeValue:
     """(L - L0)/L0 between strips at the two ends of all active ZOIs of a field; ``ExtensionGauge``."""
-    grid = field.grid
-    strips = _strips(Places.of(grid, field.window), grid.roi, grid.active.tobytes(), along)
-    return read_strips(strips, field, along)
+    return read_strips(strips_of(field.grid, along), field, along)
 
 
 @lru_cache(maxsize=8)
-def _strips(places: Places, roi: Roi, active: bytes, along: Literal["x", "y"]) -> tuple[Mask, ...]:
-    inside = np.frombuffer(active, np.bool_).reshape(places.shape)
-    grid = ZoiGrid(roi, places.size, places.step, inside)
+def _strips(
+    roi: Roi, size: int, step: int, shape: tuple[int, int], active: bytes, along: Literal["x", "y"]
+) -> tuple[Mask, ...]:
+    inside = np.frombuffer(active, np.bool_).reshape(shape)
+    grid = ZoiGrid(roi, size, step, inside)
     rows, columns = (np.flatnonzero(inside.any(axis=axis)) for axis in (1, 0))
     if not rows.size:
         return inside, inside

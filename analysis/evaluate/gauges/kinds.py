@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from analysis.evaluate.extensometers import (
+from analysis.evaluate.gauges.extensometers import (
     BOX,
     END,
     RADIUS,
@@ -19,25 +19,21 @@ from analysis.evaluate.extensometers import (
     LineGauge,
     TransverseGauge,
 )
-from analysis.evaluate.gauges import (
+from analysis.evaluate.gauges.gauge import Gauge, GaugeValue, Parameter
+from analysis.evaluate.gauges.geometry import (
     Box,
-    Gauge,
-    GaugeValue,
     Line,
     Mask,
-    Parameter,
     Point,
-    Statistic,
     box_between,
-    check_value,
     circle,
     closed,
     corners_of,
     near_px,
-    read_area,
     zois_inside,
     zois_near,
 )
+from analysis.evaluate.gauges.readings import Statistic, check_value, read_area
 from analysis.field import StrainField, ZoiGrid
 
 _VALUE = Parameter(

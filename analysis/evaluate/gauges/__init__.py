@@ -1,0 +1,1 @@
+"""Virtual gauges and extensometers on a strain field."""

@@ -1,0 +1,110 @@
+"""Strain fields as ``strain.h5`` holds them, and the length between the ends of an extension."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import replace
+from typing import Any, Literal, TypeVar, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from acquire.errors import ConfigError
+from analysis.evaluate import distance, strips_of
+from analysis.evaluate.area.affine import Places, noise_of_windows
+from analysis.field import PAIR_INDEX, WINDOWS, Measure, StrainField, Window
+from live.config.gauges import gauges_for
+from live.config.loading import from_dict
+from live.results.reader import Strain
+
+Item = TypeVar("Item")
+_GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
+_DU_DY, _DV_DX = 2, 4  # of u, du_dx, du_dy, v, dv_dx, dv_dy
+
+
+class StoredPattern:
+    """The weights of ZOIs in areas, as they were during the test; of their noise only the overlap of the windows.
+
+    Fulfils ``Sums``.
+
+    Parameters
+    ----------
+    normal : (21, R, C) float32
+        Upper triangles of the normal matrices.
+    places : Places
+    """
+
+    def __init__(self, normal: NDArray[np.float32], places: Places) -> None:
+        self._normal, self._places = normal.reshape(len(normal), -1).astype(np.float64), places
+        self._made: dict[Hashable, Any] = {}
+
+    def factor(self, name: str, where: NDArray[np.bool_]) -> float:
+        """See ``Sums``: as windows overlap."""
+        return 1.0
+
+    def information(self, at: NDArray[np.intp]) -> NDArray[np.float64]:
+        """See ``Sums``."""
+        out = np.empty((6, 6, len(at)))
+        for one, (i, j) in zip(self._normal[:, at], zip(*np.triu_indices(6), strict=True), strict=True):
+            out[i, j] = out[j, i] = one
+        return out
+
+    def variance(self, at: NDArray[np.intp], weights: NDArray[np.float64]) -> float:
+        """See ``Sums``: as windows overlap."""
+        return noise_of_windows(self._places, at, weights)
+
+    def unit_variances(self, at: NDArray[np.intp]) -> NDArray[np.float64]:
+        """See ``Sums``: all alike."""
+        return np.ones((2, len(at)))
+
+    def kept(self, key: Hashable, make: Callable[[], Item]) -> Item:
+        """See ``Sums``."""
+        if key not in self._made:
+            self._made[key] = make()
+        found: Item = self._made[key]
+        return found
+
+
+def read_field(strain: Strain, row: int) -> StrainField:
+    """The field of ``row``; covariances that the stored sigmas do not give are 0.
+
+    Raises
+    ------
+    DataError
+        There is no such row, or it cannot be read.
+    """
+    maps = {name: np.asarray(strain.maps(name, row), np.float64) for name in ("u", "v", *_GRADIENTS)}
+    sigmas = {name: np.asarray(strain.maps(f"sigma_{name}", row), np.float64) for name in maps}
+    status, residual = strain.maps("status", row), strain.maps("residual", row)
+    field = StrainField.from_values(strain.grid, maps, sigmas, status=status, residual=residual)
+    covariance = np.array(field.covariance)
+    shear = np.asarray(strain.maps("sigma_exy", row), np.float64)
+    both = sigmas["du_dy"] ** 2 + sigmas["dv_dx"] ** 2
+    covariance[PAIR_INDEX[_DU_DY, _DV_DX]] = (4 * shear**2 - both) / 2
+    measure = cast(Measure, strain.strain_measure)
+    return replace(field, covariance=covariance, measure=measure, window=_window(strain))
+
+
+def stored_pattern(strain: Strain, reference: int) -> StoredPattern:
+    """The weights of the ZOIs against a reference (``Strain.reference``)."""
+    return StoredPattern(strain.normal(reference), Places.of(strain.grid, _window(strain)))
+
+
+def _window(strain: Strain) -> Window:
+    """The window of the ZOIs, on which the correlation of neighbours depends; gaussian where it is not recorded."""
+    measure = strain.config.get("measure")
+    name = measure.get("window") if isinstance(measure, dict) else None
+    return cast(Window, name) if name in WINDOWS else "gaussian"
+
+
+def length_between(strain: Strain, axis: Literal["x", "y"], described: Mapping[str, Any] | None) -> float:
+    """L0 along ``axis``, px: between strips, or between the ends of the gauge ``described``; NaN without ends."""
+    ends = strips_of(strain.grid, axis)
+    if described is not None:
+        try:
+            table = from_dict({"gauges": {"axial": dict(described)}}, {}, str(strain.path)).gauges
+            ends = gauges_for(table, axis, strain.grid)[0].zois(strain.grid)
+        except ConfigError:  # a file of another version
+            return math.nan
+    return distance(strain.grid, ends)
