@@ -361,11 +361,10 @@ def shares(s: Any, component: int, out: Any) -> None:
 def bent(s: Any, cross: Any, z: int, step: Any, gain: Any, units: Any, fitted: Any, cubic: Any) -> Any:
     """Sum of the squared shares, px^2, of what is left of the difference after a linear fit of ZOI ``z``.
 
-    ``s`` (10,) are the sums with the whole difference, ``step`` (P,) and ``gain`` are the fit, ``units`` (A, 2) the sums
-    of w f_x^2 and w f_y^2; ``fitted`` float32, 10 in whole vectors, is for use here, ``cubic`` (A, 2) for degree 3.
+    ``s`` (10,) are the sums with the whole difference, ``step`` (P,) and ``gain`` are the fit, ``units`` (A, 2) the
+    sums of w f_x^2 and w f_y^2; ``fitted`` float32, 10 in whole vectors, is for use here, ``cubic`` (A, 2) for degree 3.
     """
-    width = 2 * N_SHAPES
-    weighted_rows(cross, np.uintp(z * len(step) * width), step, width, fitted)
+    weighted_rows(cross, np.uintp(z * len(step) * 2 * N_SHAPES), step, 2 * N_SHAPES, fitted)
     of_u = of_v = 0.0
     for i in range(1, N_SHAPES):
         of_u += (s[i] - fitted[i]) ** 2
