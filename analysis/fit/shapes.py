@@ -362,7 +362,7 @@ def bent(s: Any, cross: Any, z: int, step: Any, gain: Any, units: Any, fitted: A
     """Sum of the squared shares, px^2, of what is left of the difference after a linear fit of ZOI ``z``.
 
     ``s`` (10,) are the sums with the whole difference, ``step`` (P,) and ``gain`` are the fit, ``units`` (A, 2) the
-    sums of w f_x^2 and w f_y^2; ``fitted`` float32, 10 in whole vectors, is for use here, ``cubic`` (A, 2) for degree 3.
+    sums of w f_x^2 and w f_y^2; ``fitted`` float32, 10 in whole vectors, is for use, ``cubic`` (A, 2) for degree 3.
     """
     weighted_rows(cross, np.uintp(z * len(step) * 2 * N_SHAPES), step, 2 * N_SHAPES, fitted)
     of_u = of_v = 0.0
