@@ -80,7 +80,7 @@ def stretched(
         u, du_dx, du_dy, v, dv_dx, dv_dy.
     """
     gradients = parameters[[DU_DX, DU_DY, DV_DX, DV_DY]]
-    if not np.nanmax(np.abs(gradients), initial=0) > STRETCH:
+    if not max(np.fmax.reduce(gradients, axis=None), -np.fmin.reduce(gradients, axis=None)) > STRETCH:
         return covariances
     f = np.asarray(gradients + np.array([1, 0, 0, 1])[:, None, None], np.float32).reshape(
         2, 2, *gradients.shape[1:]

@@ -13,8 +13,20 @@ from analysis.compiled.loops import helper, parallel
 
 RUN = 1024
 """ZOIs whose covariances are scaled at a time."""
-MIN_NOISE_GAIN = 0.1
-"""The gain by which the noise of the deformed image is divided at least."""
+MIN_NOISE_GAIN, MAX_NOISE_GAIN = 0.1, 5.0
+"""The gain by which the noise of the deformed image is divided, and that of the reference multiplied: limits."""
+
+
+@helper
+def expect(gain: Any, reference: Any, current: Any, least: Any, out: Any) -> None:
+    """Variance a pixel that noise leaves in the difference of the images, GL^2, written to ``out`` (A,).
+
+    ``reference`` and ``current`` (A,) are of the two images, ``least`` is what rounding leaves; NaN where the gain is.
+    """
+    for z in range(len(out)):
+        square = gain[z] ** 2
+        both = (MAX_NOISE_GAIN**2 if square > MAX_NOISE_GAIN**2 else square) * reference[z] + current[z]
+        out[z] = least if both < least else both
 
 
 @helper

@@ -296,10 +296,7 @@ def _track_some(picture: Any, table: Any, fit: Any, stop: Any, out: Any, start: 
             nuisance[z, 1] = step[modes + 3]
             nuisance[z, 2] = (step[modes + 6] + step[modes + 7]) / gain
             gain = min(max(gain, GAIN_RANGE[0]), GAIN_RANGE[1])
-            bends = bent(bent_by, fit.cross, z, step, fit.squares[z, 0], fit.squares[z, 1], solved, cubic[z])
-            bending[z] = bends / gain**2
-            cubic[z, 0] /= gain**2
-            cubic[z, 1] /= gain**2
+            bending[z] = bent(bent_by, fit.cross, z, step, gain, fit.squares, solved, cubic)
             longest = 0.0
             for i in range(modes):
                 longest = max(longest, abs(step[i]) / gain)

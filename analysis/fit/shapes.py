@@ -358,18 +358,18 @@ def shares(s: Any, component: int, out: Any) -> None:
 
 
 @inlined
-def bent(s: Any, cross: Any, z: int, step: Any, unit_x: Any, unit_y: Any, fitted: Any, cubic: Any) -> Any:
+def bent(s: Any, cross: Any, z: int, step: Any, gain: Any, units: Any, fitted: Any, cubic: Any) -> Any:
     """Sum of the squared shares, px^2, of what is left of the difference after a linear fit of ZOI ``z``.
 
-    ``s`` (10,) are the sums with the whole difference, ``step`` (P,) is the fit, ``unit_x`` and ``unit_y`` the
-    sums of w f_x^2 and w f_y^2; ``fitted`` float32, 10 in whole vectors, is for use here, ``cubic`` (2,) for degree 3.
+    ``s`` (10,) are the sums with the whole difference, ``step`` (P,) and ``gain`` are the fit, ``units`` (A, 2) the
+    sums of w f_x^2 and w f_y^2; ``fitted`` float32, 10 in whole vectors, is for use, ``cubic`` (A, 2) for degree 3.
     """
-    width = 2 * N_SHAPES
-    weighted_rows(cross, np.uintp(z * len(step) * width), step, width, fitted)
+    weighted_rows(cross, np.uintp(z * len(step) * 2 * N_SHAPES), step, 2 * N_SHAPES, fitted)
     of_u = of_v = 0.0
     for i in range(1, N_SHAPES):
         of_u += (s[i] - fitted[i]) ** 2
         of_v += (s[N_SHAPES + i] - fitted[N_SHAPES + i]) ** 2
-    cubic[0], cubic[1] = of_u / unit_x**2, of_v / unit_y**2
-    second_u, second_v = s[0] - fitted[0], s[N_SHAPES] - fitted[N_SHAPES]
-    return cubic[0] + cubic[1] + second_u**2 / unit_x**2 + second_v**2 / unit_y**2
+    by_u, by_v = 1 / (gain * units[z, 0]) ** 2, 1 / (gain * units[z, 1]) ** 2
+    cubic[z, 0], cubic[z, 1] = of_u * by_u, of_v * by_v
+    of_u, of_v = of_u + (s[0] - fitted[0]) ** 2, of_v + (s[N_SHAPES] - fitted[N_SHAPES]) ** 2
+    return of_u * by_u + of_v * by_v

@@ -94,7 +94,7 @@ def _sigma(known: Any, z: int, variance: Any) -> Any:
 
 @helper
 def _is_empty(left: Any, expected: Any) -> Any:
-    return EMPTY_SHARES[0] < left / expected < EMPTY_SHARES[1]
+    return EMPTY_SHARES[0] * expected < left < EMPTY_SHARES[1] * expected
 
 
 @helper
@@ -119,7 +119,7 @@ def _bent(found: Any, z: int, known: Any, variance: Any, rule: Any) -> Any:
     """
     of_u, of_v = variance * known.unit[z, 0], variance * known.unit[z, 1]
     spread = math.sqrt(2 * rule.noise[1] * (of_u**2 + of_v**2))
-    allowed = rule.limit**2 + (BENDING_SHARE * stretch_of(found.p, z, rule.lever)) ** 2
+    allowed = rule.limit**2 + BENDING_SHARE**2 * squared_stretch(found.p, z, rule.lever)
     return _used(found.bending[z], (of_u + of_v) * rule.noise[0], BENDING_CHANCE * spread + allowed)
 
 
@@ -130,12 +130,12 @@ def _beyond(known: Any, z: int, far: Any) -> Any:
 
 
 @helper
-def stretch_of(values: Any, z: int, lever: Any) -> Any:
-    """Magnitude of the Green-Lagrange strain of ZOI ``z`` times ``lever`` px."""
+def squared_stretch(values: Any, z: int, lever: Any) -> Any:
+    """Square of the magnitude of the Green-Lagrange strain of ZOI ``z`` times ``lever`` px."""
     half = values.shape[1] // 2
     du_dx, du_dy = values[z, 1], values[z, 2]
     dv_dx, dv_dy = values[z, half + 1], values[z, half + 2]
     xx = du_dx + (du_dx**2 + dv_dx**2) / 2
     yy = dv_dy + (du_dy**2 + dv_dy**2) / 2
     xy = (du_dy + dv_dx + du_dx * du_dy + dv_dx * dv_dy) / 2
-    return lever * math.sqrt(xx**2 + yy**2 + 2 * xy**2)
+    return lever**2 * (xx**2 + yy**2 + 2 * xy**2)

@@ -65,12 +65,12 @@ def advance(
     half = modes // 2
     for z in range(len(values)):
         reach, known = 0.0, True
-        for i in range(modes):
-            news = abs(values[z, i] - guess[z, i])
-            k = i % half
-            known = known and math.isfinite(news)
-            if k < 3:
-                reach = max(reach, news * (1.0 if k == 0 else lever))
+        for first in (0, half):
+            for k in range(half):
+                news = abs(values[z, first + k] - guess[z, first + k])
+                known = known and math.isfinite(news)
+                if k < 3:
+                    reach = max(reach, news * (1.0 if k == 0 else lever))
         if not known:
             for i in range(modes):
                 new_change[z, i] = 0.0

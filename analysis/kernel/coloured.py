@@ -24,8 +24,9 @@ from analysis.picture.blocks import BLOCKS, blockiness
 
 Floats = NDArray[np.float64]
 
-BLUR, NEIGHBOURS = 0.25, 0.12
-"""Limits: growth of the variance of the blur, px^2; correlation of neighbouring pixels."""
+BLUR, SOME_BLUR, NEIGHBOURS = 0.25, 0.1, 0.12
+"""Limits: growth of the variance of the blur that is the cause of an error, and that acts on u and v, px^2;
+correlation of neighbouring pixels."""
 SAMPLE, SPECTRA = 30, 300 * 32**2
 """ZOIs that are looked at, and pixels of those whose spectra are averaged."""
 FEWEST, PART = 8, 8

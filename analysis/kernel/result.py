@@ -13,7 +13,7 @@ from analysis.field import Motion, Status, StrainField, stretched
 from analysis.field.picture_error import LIMIT, PictureError
 from analysis.fit.validity import AGREES
 from analysis.follow.renewal import UNSHARED, Placement
-from analysis.kernel.coloured import BLUR, beside_strain, coloured_bias, error_cause
+from analysis.kernel.coloured import SOME_BLUR, beside_strain, coloured_bias, error_cause
 from analysis.kernel.solve import Solution
 
 Floats = NDArray[np.float64]
@@ -62,6 +62,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         None: the field has no motion.
     """
     from analysis.fit.assembly import weigh, weigh_blur
+    from analysis.fit.pooling import medians
 
     reference, found = solution.reference, solution.found
     ok = solution.status == Status.OK
@@ -98,7 +99,7 @@ def field_of(solution: Solution, expected: PredictedMotion | None = None) -> Str
         status=reference.spread(solution.status[:, None], Status.NOT_MEASURED)[0],
         iterations=reference.spread(found.iterations[:, None], 0)[0],
         gain=reference.spread(gain[:, None].astype(np.float32))[0],
-        noise=float(np.sqrt(np.median(noise.current[ok]))) if ok.any() else float("nan"),
+        noise=math.sqrt(medians(noise.current[ok][None])[0]) if ok.any() else float("nan"),
         window=reference.settings.window,
         motion=None if expected is None else _motion(solution, values, expected),
         sums=reference.sums,
@@ -150,7 +151,7 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
         if rest is not None:
             over = 1.0 if solution.is_given and AGREES[0] < rest < AGREES[1] else rest
             colour, ratio = white, np.full(len(ok), over)
-        elif colour.min() < 1 and abs(float(np.median(solution.found.nuisance[ok, 2]))) > BLUR:
+        elif colour.min() < 1 and abs(float(np.median(solution.found.nuisance[ok, 2]))) > SOME_BLUR:
             # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
             colour = np.maximum(colour, 1)
         whole = ratio * solution.expected(np.s_[:], gain)

@@ -263,8 +263,11 @@ class Solution:
 
     def expected(self, which: Places, gain: Floats) -> Floats:
         """Variance a pixel that noise alone leaves in the difference of the images, GL^2."""
-        reference, current = self.variances(which, gain)
-        return np.asarray(np.maximum(np.minimum(gain**2, 25.0) * reference + current, self.rounding))
+        from analysis.fit.assembly import expect
+
+        out = np.empty(len(gain))
+        expect(gain, *self.variances(which, gain), self.rounding, out)
+        return out
 
     def variances(self, which: Places, gain: Floats) -> tuple[Floats, Floats]:
         """Variance a pixel of the reference and of the image at some ZOIs, GL^2; the reference's where not known."""

@@ -25,7 +25,7 @@ log = logging.getLogger("analysis")
 
 COMPILE_SECONDS = 80
 """About how long one process takes for everything; for the announcement."""
-FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 51, 5, 7
+FUNCTIONS, FUNCTIONS_OF_KIND, FUNCTIONS_OF_PHASE = 55, 5, 7
 """That are compiled in all, more for each kind of pictures, and for the estimator by phases."""
 ITERATION, REST, PHASE, ALL = "iteration", "rest", "phase", "all"
 COMPILE_PARTS = (ITERATION, REST)
@@ -48,8 +48,8 @@ def _loops(phase: bool) -> list[Any]:
 
     loops = [
         sensitivity.prepare, iteration.track, hill_climb.climb, prediction.advance, verdict.judge,
-        assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.medians, assembly.scale,
-        assembly.clipped_shares, sums.scatter, iteration.warp_zois,
+        assembly.expect, assembly.weigh, assembly.weigh_blur, pooling.explained, pooling.medians,
+        assembly.scale, assembly.clipped_shares, sums.scatter, iteration.warp_zois,
     ]  # fmt: skip
     return loops + [iteration.compose_all, iteration.within_image] * phase
 
@@ -192,7 +192,7 @@ def _prefilter(kinds: Sequence[str]) -> None:
 
 def _rest() -> None:
     """All but the iteration, the prefilter and what only the estimator by phases needs."""
-    from analysis.fit.assembly import clipped_share, scale, weigh, weigh_blur
+    from analysis.fit.assembly import clipped_share, expect, scale, weigh, weigh_blur
     from analysis.fit.iteration import warp_zois
     from analysis.fit.kernel_args import OutArgs, PooledError, ReferenceArgs, VerdictArgs
     from analysis.fit.pooling import explained, medians
@@ -217,6 +217,7 @@ def _rest() -> None:
     explained(found, none, none, known, np.empty(0, np.intp), 1, pairs)
     medians(np.ones((2, 2)))
     weigh_blur(single, single, single)
+    expect(np.empty((2, 2))[:, 0], np.ones(2), np.ones(2), 0.0, np.empty(2))
     weigh(np.empty(0, np.bool_), none, none, np.empty((2, 2))[:, 0], none, none, single, single, single)
     origins, p = np.empty((0, 2), np.int64), np.empty((0, 6))
     warp_zois(_no_picture(), np.empty(18, np.float32), origins, 32, p, np.empty((0, 32, 32), np.float32))

@@ -17,7 +17,7 @@ import numpy as np
 from analysis.compiled.loops import helper, inlined
 from analysis.compiled.vectors import LANES
 
-ROWS = 16
+ROWS = 32
 """Rows that are warped and summed before the next: few enough for the first-level cache."""
 MAX_ROWS_PASSED = 2
 """Rows of the image that a vector of pixels may pass."""

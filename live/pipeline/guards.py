@@ -170,6 +170,8 @@ CAUSES = {
 class PictureGuard:
     """Checks what each picture leaves beyond its noise; an event when it exceeds the limit, and when that ends.
 
+    Blur is left to ``BlurGuard``, which names it once.
+
     Parameters
     ----------
     on_event : callable taking an Event
@@ -183,7 +185,7 @@ class PictureGuard:
         error = field.picture
         if error is None or not field.ok.any():
             return
-        if error.cause and not self._cause:
+        if error.cause not in ("", "blur") and not self._cause:
             self._emit(t, picture_words(field), "warning", error)
             self._cause = error.cause
         elif self._cause and not error.cause and error.factor < 0.85 * LIMIT:
@@ -200,9 +202,19 @@ def picture_words(field: StrainField) -> str:
     error = field.picture
     if error is None or not error.cause:
         return ""
-    sigma = float(np.nanmedian(np.hypot(field.sigma_exx, field.sigma_eyy))) / math.sqrt(2) * 1e6
-    text = f"the picture shows {CAUSES[error.cause]}: strain of a ZOI is uncertain by {sigma:.0f} µm/m"
-    return f"{text} in place of {sigma / error.factor:.0f}" if error.factor > 1 else text
+    sigma = _usual_sigma(field)
+    shown = CAUSES[error.cause]
+    if not error.factor > 1:
+        return f"the picture shows {shown}: strain of a ZOI is uncertain by {sigma:.0f} µm/m"
+    usual = sigma / error.factor
+    return (
+        f"the picture shows {shown}: strain of a ZOI is uncertain by {sigma:.0f} µm/m in place of {usual:.0f}"
+    )
+
+
+def _usual_sigma(field: StrainField) -> float:
+    """Uncertainty of the strain of a ZOI, um/m: median of both directions."""
+    return float(np.nanmedian(np.hypot(field.sigma_exx, field.sigma_eyy))) / math.sqrt(2) * 1e6
 
 
 class BlurGuard:
@@ -218,13 +230,12 @@ class BlurGuard:
         self._on_event, self._limit = on_event, limit_px
         self._changed = False
 
-    def check(self, step: TimeStep) -> None:
-        """Check one time step; one whose blur is not known changes nothing."""
+    def check(self, step: TimeStep, field: StrainField | None = None) -> None:
+        """Check one time step; one whose blur is not known changes nothing. ``field`` shows what the blur costs."""
         blur, size = Blur(step.blur, step.sigma_blur), abs(step.blur)
         if not self._changed and size - CERTAIN * blur.sigma > self._limit:
             self._changed = True
-            text = f"the picture is {blur.text} since the reference: look at focus, distance and exposure"
-            self._emit(step, text, "warning")
+            self._emit(step, _blur_words(blur, field), "warning")
         elif self._changed and size < CALM * self._limit:
             self._changed = False
             self._emit(step, "the picture is as sharp as the reference again", "info")
@@ -232,3 +243,14 @@ class BlurGuard:
     def _emit(self, step: TimeStep, text: str, level: Level) -> None:
         data = {"blur_px": step.blur, "sigma_blur_px": step.sigma_blur}
         self._on_event(Event(step.t, EventKind.MEASUREMENT, "sharpness", text, level, data))
+
+
+def _blur_words(blur: Blur, field: StrainField | None) -> str:
+    error = None if field is None else field.picture
+    if field is None or error is None or error.factor <= LIMIT:
+        return f"the picture is {blur.text} since the reference: look at focus, distance and exposure"
+    sigma = _usual_sigma(field)
+    return (
+        f"the picture is {blur.text} since the reference: look at focus, distance and exposure;"
+        f" strain of a ZOI is uncertain by {sigma:.0f} µm/m in place of {sigma / error.factor:.0f}"
+    )

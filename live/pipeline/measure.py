@@ -255,7 +255,7 @@ def measure(
             guard.check(field, item.t)
         measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, reading)
         measurement = replace(measurement.with_lens(of_lens), as_measured=whole)
-        sharpness.check(measurement.time_step)
+        sharpness.check(measurement.time_step, field)
         if dilatation is not None:
             dilatation.check(measurement.time_step)
         if tilt is not None:

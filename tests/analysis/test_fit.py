@@ -8,7 +8,7 @@ import pytest
 from analysis import KernelSettings, PhaseKernel, Roi, Status, ZoiGrid
 from analysis.field import profile
 from analysis.field.grid import WINDOWS, Window
-from analysis.fit.assembly import RUN, clipped_share, scale, weigh
+from analysis.fit.assembly import RUN, clipped_share, expect, scale, weigh, weigh_blur
 from analysis.fit.kernel_args import (
     CONVERGED,
     LEFT_IMAGE,
@@ -20,7 +20,7 @@ from analysis.fit.kernel_args import (
 )
 from analysis.fit.shapes import shapes_of
 from analysis.fit.validity import has_pattern
-from analysis.fit.verdict import judge, stretch_of
+from analysis.fit.verdict import judge, squared_stretch
 from analysis.kernel.images import as_model
 from analysis.kernel.reference import ReferencePicture
 from analysis.kernel.solve import Solution
@@ -291,10 +291,22 @@ def test_a_centre_beyond_the_pattern_shows_in_its_uncertainty() -> None:
     assert verdict(beyond=8.0) == Status.OK
 
 
+def test_noise_is_expected_with_the_gain_within_its_limits_and_not_below_rounding() -> None:
+    gain, out = np.array([[2.0, 0], [9.0, 0], [0.1, 0], [np.nan, 0]])[:, 0], np.empty(4)
+    expect(gain, np.full(4, 3.0), np.full(4, 0.01), 0.08, out)
+    assert out == pytest.approx([12.01, 75.01, 0.08, np.nan], nan_ok=True)
+
+
+def test_the_uncertainty_of_a_blur_is_unknown_where_nothing_was_measured() -> None:
+    out, whole = np.empty(3, np.float32), np.array([4.0, np.nan, -1e-9], np.float32)
+    weigh_blur(np.full(3, 0.25, np.float32), whole, out)
+    assert out == pytest.approx([1.0, np.nan, 0.0], nan_ok=True)
+
+
 def test_the_stretch_of_a_strain_is_free_of_rotation() -> None:
     c, s, stretched = np.cos(0.5), np.sin(0.5), 1.1
     turned = np.array([[3.0, stretched * c - 1, -s, -2.0, stretched * s, c - 1]])
-    assert stretch_of(turned, 0, 5.0) == pytest.approx(5.0 * (stretched**2 - 1) / 2)
+    assert squared_stretch(turned, 0, 5.0) == pytest.approx((5.0 * (stretched**2 - 1) / 2) ** 2)
 
 
 def test_a_zoi_of_noise_has_no_pattern() -> None:

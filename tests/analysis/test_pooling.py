@@ -98,6 +98,16 @@ def test_what_a_part_of_the_picture_leaves_is_not_forgiven() -> None:
     assert not field.ok[:, GRID.x > 130].any()
 
 
+def test_what_a_blur_leaves_is_pattern_and_counts_no_less_than_white_noise() -> None:
+    rng, clean = np.random.default_rng(2), picture(0, 1).astype(np.float32)
+    soft = cv2.GaussianBlur(clean, (9, 9), 0.48)
+    first, second = (np.rint(image + rng.normal(0, 1, SHAPE)).clip(0, 255) for image in (clean, soft))
+    field = PhaseKernel(first.astype(np.uint8), GRID).measure(second.astype(np.uint8))
+    blur = mean_blur(field)
+    assert 0.3 < blur.px < 0.5 and field.picture is not None
+    assert min(field.picture.colour) >= 1
+
+
 def test_of_an_unrelated_picture_no_common_error_is_taken() -> None:
     other = 128 + 200 * (Speckle(2.0, 77, span=400).at(*affine(SHAPE)) - 0.5)
     field = PhaseKernel(picture(1, 1), GRID).measure(other.astype(np.uint8))

@@ -16,11 +16,12 @@ from acquire.events import Event, EventKind
 from acquire.frame import Burst
 from acquire.load_cell.load_log import LoadLog
 from acquire.load_sample import LoadSample
-from analysis import KernelSettings, Roi, ZoiGrid
+from analysis import KernelSettings, Roi, StrainField, ZoiGrid
 from analysis.evaluate import GaugeValue
+from analysis.field.picture_error import PictureError
 from hw_mocks.deformation import Affine
 from hw_mocks.speckle import Speckle
-from live.pipeline.guards import BlurGuard
+from live.pipeline.guards import BlurGuard, PictureGuard
 from live.pipeline.history import SHORT, AxisFinder, History, curve_of
 from live.pipeline.measure import NewReference, measure
 from live.pipeline.measurement import HOLD_S, ForceMatching, TimeStep, ordered_mean
@@ -196,6 +197,18 @@ def test_a_blurred_picture_is_told_with_its_width_and_changes_no_strain(speckle:
     assert found[1].time_step.blur == pytest.approx(0.8, abs=0.1)
     assert abs(found[1].time_step.exx) < 30e-6
     assert [event.source for event in told] == ["sharpness"] and told[0].t == 2.0
+
+
+def test_a_blur_that_costs_is_told_once_and_with_its_cost() -> None:
+    told: list[Event] = []
+    field = StrainField.from_values(GRID, {"u": 0.0}, {"du_dx": 120e-6, "dv_dy": 120e-6})
+    field = replace(field, picture=PictureError(2.0, (1.0, 1.0), "blur"))
+    PictureGuard(told.append).check(field, 1.0)
+    assert not told
+    step = replace(make_measurement(0).time_step, blur=0.7, sigma_blur=0.02)
+    BlurGuard(told.append).check(step, field)
+    assert [event.source for event in told] == ["sharpness"]
+    assert "by 120 µm/m in place of 60" in told[0].text
 
 
 def test_what_the_picture_has_become_is_told_once_with_its_cost_and_when_it_ends(speckle: Speckle) -> None:

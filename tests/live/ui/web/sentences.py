@@ -42,7 +42,8 @@ WHOLE = (
     "analysis/evaluate/[!ls]*.py", "analysis/field/blur.py", "hw_mocks/faults.py", "hw_mocks/sim_*.py",
     "hw_mocks/specimen.py", "live/config/gauges.py", "live/config/loading.py", "live/config/rig_file.py",
     "live/config/values.py", "live/pipeline/consumer_thread.py", "live/pipeline/run_state.py",
-    "live/pipeline/measure.py", "live/run/grabber.py", "live/run/load_thread.py", "live/run/measuring.py",
+    "live/pipeline/guards.py", "live/pipeline/measure.py", "live/run/grabber.py", "live/run/load_thread.py",
+    "live/run/measuring.py",
     "live/run/pre_trigger.py", "live/run/recorder.py", "live/setup/devices.py", "live/setup/grid.py",
     "live/setup/lens.py", "live/setup/scale.py",
 )  # fmt: skip
