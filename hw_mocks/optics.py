@@ -76,6 +76,8 @@ class Optics:
         The camera looks at the back.
     bending : float
         Strain of the front over the mean of both sides, less 1; the back has as much less.
+    flicker, lamp_Hz : float, Hz
+        Amplitude of the light over its mean, as the exposure leaves it, and its frequency.
     """
 
     stand_off_mm: float = math.inf
@@ -87,6 +89,13 @@ class Optics:
     readout_s: float = 0.0
     behind: bool = False
     bending: float = 0.0
+    flicker: float = 0.0
+    lamp_Hz: float = 100.0
+
+    def light(self, t: float, height: int) -> Array:
+        """The light on each line of a picture stamped ``t`` (s), (H, 1), over its mean."""
+        when = t + self.readout_s * (np.arange(height)[:, None] / max(height - 1, 1) - 0.5)
+        return np.asarray(1 + self.flicker * np.cos(2 * math.pi * self.lamp_Hz * when))
 
     @property
     def plain(self) -> bool:
@@ -284,6 +293,8 @@ def take_optics(options: Options) -> Optics:
         plates=_plates(options),
         plate_strain=options.number("plate_strain", 0.0, minimum=-1, maximum=2),
         readout_s=options.number("readout_ms", 0.0, minimum=0, maximum=1000) * 1e-3,
+        flicker=options.number("flicker", 0.0, minimum=0, maximum=50) / 100,
+        lamp_Hz=options.number("lamp_hz", 100.0, minimum=1, maximum=1e5),
         behind=options.choice("side", ("front", "back"), "front") == "back",
         bending=options.number("bending", 0.0, minimum=-100, maximum=100) / 100,
     )

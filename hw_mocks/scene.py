@@ -56,7 +56,9 @@ class Scene:
     def render(self, t: float) -> NDArray[np.float32]:
         """The picture ``t`` seconds since the start, (H, W), part of full scale, without noise."""
         if not self.optics.plain:
-            return self.speckle.fast(self.optics.seen(self.specimen, t))
+            seen = self.speckle.fast(self.optics.seen(self.specimen, t))
+            light = self.optics.light(t, self.specimen.height) if self.optics.flicker else 1.0
+            return np.asarray(seen * light, np.float32)
         motion = self.specimen.at(t)
         u, v = motion.displaced(self._modes)
         blobs = self.speckle.blobs

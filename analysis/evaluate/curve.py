@@ -46,6 +46,8 @@ class Curve:
         That over what noise makes of it.
     narrowing : (N,) float64 or None
         Elongation across the load over the length, where ``transverse`` may be another measure of strain.
+    lens : (N,) float64 or None
+        Standard uncertainty of the strain by the correction of a lens.
     source, elastic_source : str
         What ``strain`` and ``elastic`` are, in words.
     """
@@ -58,12 +60,13 @@ class Curve:
     uneven: Floats | None = None
     misfit: Floats | None = None
     narrowing: Floats | None = None
+    lens: Floats | None = None
     source: str = ""
     elastic_source: str = ""
 
     def __post_init__(self) -> None:
         n = len(self.t)
-        optional = self.transverse, self.elastic, self.uneven, self.misfit, self.narrowing
+        optional = self.transverse, self.elastic, self.uneven, self.misfit, self.narrowing, self.lens
         for values in (self.strain, self.stress, *optional):
             if values is not None and values.shape != (n,):
                 raise ValueError(f"a curve needs arrays of one length, got {values.shape} beside {n} times")
@@ -75,7 +78,7 @@ class Loading:
 
     Attributes
     ----------
-    t, strain, stress, transverse, elastic, uneven, misfit, narrowing : (M,) float64
+    t, strain, stress, transverse, elastic, uneven, misfit, narrowing, lens : (M,) float64
         As of the ``Curve``; NaN where unknown.
     level, course : (M,) float64
         Running means of stress and strain, to find places by; never a figure.
@@ -97,6 +100,7 @@ class Loading:
     uneven: Floats
     misfit: Floats
     narrowing: Floats
+    lens: Floats
     level: Floats
     course: Floats
     noise_strain: float
@@ -114,17 +118,17 @@ class Loading:
         narrowing = curve.transverse if curve.narrowing is None else curve.narrowing
         known = np.isfinite(curve.strain[:stop]) & np.isfinite(curve.stress[:stop])
         nothing = np.full(len(curve.t), math.nan)
-        t, strain, stress, across, elastic, uneven, misfit, narrowing = (
+        t, strain, stress, across, elastic, uneven, misfit, narrowing, lens = (
             (nothing if a is None else a)[:stop][known]
             for a in (
                 curve.t, curve.strain, curve.stress, curve.transverse, elastic, curve.uneven, curve.misfit,
-                narrowing,
+                narrowing, curve.lens,
             )
         )  # fmt: skip
         top = int(np.argmax(stress)) if len(stress) else 0
         half = min(top // _PARTS, _WIDEST)
         return cls(
-            t, strain, stress, across, elastic, uneven, misfit, narrowing,
+            t, strain, stress, across, elastic, uneven, misfit, narrowing, lens,
             smoothed(stress, half), smoothed(strain, half),
             noise(strain), noise(stress), half, top, end is not None,
         )  # fmt: skip

@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
+import numpy as np
+
 from analysis.evaluate.curve import Curve, Loading, first_crossing, noise, reading
 from analysis.evaluate.elastic import (
     MIN_POINTS,
@@ -239,7 +241,7 @@ def _with_line(
     slope = line_through(region, line.first, line.last) or line
     remark = not_uniform(loading, slope)
     strained = float(loading.course[line.last - 1] - loading.course[line.first])
-    shares = options.limits.shares(strained)
+    shares = options.limits.shares(strained) | _lens_share(loading, line, strained)
     nu = _poisson(loading, slope, options.standard)
     figures = TensileFigures(
         E=slope.modulus(math.hypot(*shares.values())).remarked(remark),
@@ -269,6 +271,15 @@ def _with_line(
         standard=options.standard.name,
     )
     return figures if options.standard.flow else _without_flow(figures)
+
+
+def _lens_share(loading: Loading, line: FittedLine, strained: float) -> dict[str, float]:
+    """The largest uncertainty of the strain by a corrected lens in the elastic interval, over ``strained``.
+
+    All of it may come with the load: the error of a lens is the same in every picture of a motion.
+    """
+    sigma = loading.lens[line.first : line.last]
+    return {"lens": float(np.nanmax(sigma)) / strained} if np.isfinite(sigma).any() else {}
 
 
 def _poisson(loading: Loading, line: FittedLine, standard: Standard) -> Figure:

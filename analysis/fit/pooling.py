@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from analysis.compiled.loops import helper
 from analysis.fit.assembly import MIN_NOISE_GAIN
 from analysis.fit.kernel_args import CONVERGED, OutArgs, PooledError, ReferenceArgs
-from analysis.fit.validity import COLOURED, LOST_SHARE
+from analysis.fit.validity import AGREES, COLOURED, LOST_SHARE
 
 Floats = NDArray[np.float64]
 Places = NDArray[np.intp]
@@ -44,9 +44,6 @@ LOWEST, LOWEST_DEVIATION = 5, 0.84
 AS_STATED = 1.1
 """... leave no more than this of what the noise as stated explains, what the others leave more is their own: blur or
 glare on a part of the picture."""
-AGREES = 0.8, 1.1
-"""What is left over what the given noise explains, between which the given noise stands. Where the warp reads between
-the pixels it smooths the noise, and white noise of the strength given leaves down to 0.84 (quintic splines)."""
 MAD = 1.4826
 
 

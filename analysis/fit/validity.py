@@ -36,6 +36,9 @@ BENDING_CHANCE = 5.0
 BENDING_SHARE = 0.15
 """... beyond the squares of a limit in px and of this share of the displacement that the strain makes in
 the ZOI, which a crack exceeds."""
+AGREES = 0.8, 1.1
+"""What is left over what the given noise explains, between which the given noise stands. Where the warp reads between
+the pixels it smooths the noise, and white noise of the strength given leaves down to 0.84 (quintic splines)."""
 COLOURED = 1.5
 """Variance of u or v over that of white noise from which on bending is allowed as much more noise."""
 CENTRE_VARIANCE = (4.0, 16.0)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.field.picture_error import Cause
+from analysis.fit.validity import AGREES
 from analysis.kernel.lines import inner, left_by_fit, lines_along, some
 from analysis.kernel.prepared import PreparedReference
 from analysis.kernel.solve import Solution
@@ -79,9 +80,10 @@ def beside_strain(solution: Solution, ok: NDArray[np.bool_]) -> float | None:
     explained = np.sum(left**2) - np.sum(rest**2) - free * noise
     excess = np.sum(left**2) - left.size * noise
     by_chance = 3 * noise * (2 * left.size) ** 0.5
-    if abs(excess) < by_chance:
-        return 1.0 if _is_white(_joined(left)) else None
-    if excess < 0 or explained < EXPLAINED * excess or not _is_white(_joined(rest)):
+    agrees = solution.is_given and AGREES[0] < 1 + excess / (left.size * noise) < AGREES[1]
+    if (agrees or abs(excess) < by_chance) and _is_white(_joined(left)):
+        return 1.0
+    if excess < by_chance or explained < EXPLAINED * excess or not _is_white(_joined(rest)):
         return None
     return float(np.sum(rest**2) / (left.size - free) / noise)
 

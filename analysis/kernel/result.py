@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.field import Motion, Status, StrainField, stretched
 from analysis.field.picture_error import LIMIT, PictureError
-from analysis.fit.pooling import AGREES
+from analysis.fit.validity import AGREES
 from analysis.follow.renewal import UNSHARED, Placement
 from analysis.kernel.coloured import BLUR, beside_strain, coloured_bias, error_cause
 from analysis.kernel.solve import Solution

@@ -1,28 +1,46 @@
 """What the camera adds to the motion of a plane, and how it is removed.
 
 ``plane`` is the apparent motion of a rigid plane in pictures, ``layout`` places the ZOIs of plates beside those of the
-specimen, ``plates`` measures the apparent motion on them. ``shutter`` removes
-what reading line by line adds.
+specimen, ``plates`` measures the apparent motion on them. ``keystone`` names
+what motion off the plane shows without them. ``shutter`` removes
+what reading line by line adds, for the time that ``readout`` finds; ``lens`` the distortion, which ``shifts`` finds.
 """
 
+from analysis.optics.keystone import Keystone, alike, keystones
 from analysis.optics.layout import Box, PlateLayout, without_plates
+from analysis.optics.lens import LENS_NAMES, LensCorrection, LensModel, LensReading, strain_of_shift
 from analysis.optics.plane import MODELS, NAMES, SCALE, ApparentMotion, Model
 from analysis.optics.plates import ASSUMED_TILT, ChosenModel, PlateFit, choose_model, trouble
+from analysis.optics.readout import Readout, readout_of_bands, readout_of_motion
+from analysis.optics.shifts import LensFit, lens_of_shifts
 from analysis.optics.shutter import ShutterCorrection
 
 __all__ = [
     "ASSUMED_TILT",
+    "LENS_NAMES",
     "MODELS",
     "NAMES",
     "SCALE",
     "ApparentMotion",
     "Box",
     "ChosenModel",
+    "Keystone",
+    "LensCorrection",
+    "LensFit",
+    "LensModel",
+    "LensReading",
     "Model",
     "PlateFit",
     "PlateLayout",
+    "Readout",
     "ShutterCorrection",
+    "alike",
     "choose_model",
+    "keystones",
+    "lens_of_shifts",
+    "readout_of_bands",
+    "readout_of_motion",
+    "strain_of_shift",
     "trouble",
     "without_plates",
 ]

@@ -33,9 +33,12 @@ class ShutterCorrection:
         From the first line of the picture to the last.
     height : int
         Lines of the picture.
+    sigma_s : float, s
+        Standard uncertainty of ``readout_s``.
     """
 
-    def __init__(self, readout_s: float, height: int) -> None:
+    def __init__(self, readout_s: float, height: int, sigma_s: float = 0.0) -> None:
+        self._relative = sigma_s / readout_s if readout_s else 0.0
         self._a_line = readout_s / max(height - 1, 1)
         self._middle = (height - 1) / 2
         self._last: _Place | None = None
@@ -63,9 +66,10 @@ class ShutterCorrection:
         half, parameters = len(field.parameters) // 2, field.parameters.copy()
         parameters[:3] -= velocity[0] * moved
         parameters[half : half + 3] -= velocity[1] * moved
-        shapes = np.zeros((2, 6, *field.grid.shape))
+        shapes = np.zeros((3, 6, *field.grid.shape))
         shapes[0, :3] = shapes[1, 3:] = np.nan_to_num(moved)
-        error = CommonError(shapes, np.diag(np.square(sigma)))
+        shapes[2] = velocity[0] * shapes[0] + velocity[1] * shapes[1]  # of the readout time, relative
+        error = CommonError(shapes, np.diag(np.square([*sigma, self._relative])))
         return replace(field, parameters=parameters, common=error.beside(field.common))
 
 

@@ -22,6 +22,8 @@ EXAMPLES = {
     "demo": "phasedic demo --specimen hole --seconds 20",
     "init": "phasedic init --camera '/dev/video0?format=Y12&fps=30' --section 20,2",
     "scale": "phasedic scale --camera /dev/video0 --points 100,200,900,200 --length 25",
+    "lens": "phasedic lens 'board/*.png' --checkerboard 9x6 --square 10 --out lens.toml",
+    "readout": "phasedic readout '/dev/video0?exposure_us=2000' --lamp 100 --config rig.toml",
     "page": "phasedic page --camera '/dev/video0?format=Y12&fps=30'",
     "replay": "phasedic replay 'shots/*.tif' --zoi 32 --step 8 --load forces.csv --section 20,2 --out out",
     "batch": "phasedic batch 'runs/*/session.h5' --zoi 32 --step 8 --section 20,2 --workers 4 --out asked-again",
@@ -82,6 +84,12 @@ COMMANDS = {
     ),
     "scale": Entry(
         "live.commands.scale", "measure mm per px from two points, a board, or the width of the specimen"
+    ),
+    "lens": Entry(
+        "live.commands.lens", "calibrate the lens from a board, or from shifted pictures of the specimen"
+    ),
+    "readout": Entry(
+        "live.commands.readout", "measure the readout time of a rolling shutter: from a lamp, or by motion"
     ),
     "check": Entry("live.commands.check", "check picture and load cell before a test: GO or NO-GO"),
     "average": Entry("live.commands.average", "average frames to a dark or flat frame"),

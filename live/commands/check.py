@@ -19,6 +19,7 @@ from live.commands.options import (
     PICTURES,
     add_config_file,
     add_help_all,
+    add_lens,
     add_options,
     add_verbose,
     configured,
@@ -57,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_config_file(parser)
     add_options(parser, "measurement", *(name for name in MEASURE if name != "strain"), "axis")
+    add_lens(parser)
     add_options(parser, "view of --watch", "no-view")
     add_verbose(parser)
     add_help_all(parser)

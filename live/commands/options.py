@@ -12,7 +12,7 @@ from typing import Any
 
 from acquire.errors import ConfigError
 from live.commands.arguments import HELP_ALL, not_empty
-from live.config.loading import Config, load_config, options
+from live.config.loading import Config, lens_in, load_config, options
 
 MEASURE = (
     "roi", "mask", "zoi", "step", "gauges", "scale", "burst", "reference-burst", "window", "estimator", "strain",
@@ -58,9 +58,17 @@ def add_measure(parser: argparse.ArgumentParser, *output: str) -> None:
     add_options(parser, "measurement", *MEASURE)
     add_options(parser, "output", *(output or OUTPUT))
     add_section(parser)
+    add_lens(parser)
     add_metadata(parser)
     add_verbose(parser)
     add_help_all(parser)
+
+
+def add_lens(parser: argparse.ArgumentParser) -> None:
+    """Add --lens and --no-lens."""
+    group = parser.add_mutually_exclusive_group()
+    group.add_argument("--lens", metavar="FILE", help="correct the lens that phasedic lens calibrated")
+    group.add_argument("--no-lens", action="store_true", help="do not correct the lens of the configuration")
 
 
 def add_help_all(parser: argparse.ArgumentParser) -> None:
@@ -68,9 +76,10 @@ def add_help_all(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(HELP_ALL, action="help", help="this help, with the options for experts")
 
 
-def add_config_file(parser: argparse.ArgumentParser) -> None:
+def add_config_file(
+    parser: argparse.ArgumentParser, words: str = "TOML file of the configuration; options override it"
+) -> None:
     """Add --config."""
-    words = "TOML file of the configuration; options override it"
     parser.add_argument("--config", metavar="FILE", help=words)
 
 
@@ -123,6 +132,8 @@ def overrides(arguments: argparse.Namespace) -> dict[str, Any]:
     found = {key: value for key, value in given.items() if "." in key and value is not None}
     if given.get("section"):
         found |= _section(given["section"])
+    if given.get("lens") or given.get("no_lens"):
+        found["lens"] = lens_in(Path(given["lens"])) if given["lens"] else {}
     for pair in given.get("meta") or ():
         key, _, value = pair.partition("=")
         found[f"metadata.{key}"] = value

@@ -7,7 +7,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from acquire.errors import ConfigError
 from live.commands.options import add_options, add_verbose, configured
@@ -32,21 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     how = parser.add_argument_group("method, one of these")
     how.add_argument("--points", metavar="X1,Y1,X2,Y2", help="two points in px, with --length")
     how.add_argument("--length", type=float, metavar="MM", help="distance between the two points")
-    how.add_argument(
-        "--checkerboard",
-        metavar="CxR",
-        help="board with columns x rows of inner corners, with --square",
-    )
-    how.add_argument(
-        "--charuco",
-        metavar="CxR",
-        help="board with columns x rows of squares, with --square, --marker, --dictionary",
-    )
-    how.add_argument("--square", type=float, metavar="MM", help="side of a square of the board")
-    how.add_argument("--marker", type=float, metavar="MM", help="side of a marker of a ChArUco board")
-    how.add_argument(
-        "--dictionary", default="4X4_50", metavar="NAME", help="its dictionary of markers (default 4X4_50)"
-    )
+    add_board(how)
     how.add_argument(
         "--width", type=float, nargs="?", const=WIDTH_OF_RIG, metavar="MM",
         help="width of the specimen, which is found in the picture (default: width_mm of the rig file)",
@@ -65,6 +51,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="distance from the camera to the specimen",
     )
     add_verbose(parser)
+
+
+def add_board(group: Any) -> None:
+    """Add the options of a board."""
+    words = "board with columns x rows of inner corners, with --square"
+    group.add_argument("--checkerboard", metavar="CxR", help=words)
+    words = "board with columns x rows of squares, with --square, --marker, --dictionary"
+    group.add_argument("--charuco", metavar="CxR", help=words)
+    group.add_argument("--square", type=float, metavar="MM", help="side of a square of the board")
+    group.add_argument("--marker", type=float, metavar="MM", help="side of a marker of a ChArUco board")
+    words = "its dictionary of markers (default 4X4_50)"
+    group.add_argument("--dictionary", default="4X4_50", metavar="NAME", help=words)
 
 
 def command(arguments: argparse.Namespace) -> int:
@@ -110,8 +108,9 @@ def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | Non
     if not config.camera.address:
         raise ConfigError("no camera is given; use --camera ADDRESS or --config rig.toml")
     first = first_look(config, screen.print)
-    if arguments.width is None:
-        return from_board(first.picture, _board(arguments), arguments.sigma, stand_off)
+    board = board_of(arguments)
+    if board is not None:
+        return from_board(first.picture, board, arguments.sigma, stand_off)
     width = config.specimen.width_mm if arguments.width == WIDTH_OF_RIG else arguments.width
     if width is None or not 0 < width < math.inf:
         raise ConfigError(
@@ -122,7 +121,12 @@ def _scale(arguments: argparse.Namespace, config: Config, stand_off: float | Non
     return from_width(first.picture, region, config.specimen.first_axis, width, arguments.sigma)
 
 
-def _board(arguments: argparse.Namespace) -> Board:
+def board_of(arguments: argparse.Namespace) -> Board | None:
+    """The board of the arguments; None where they name none."""
+    if arguments.checkerboard is not None and arguments.charuco is not None:
+        raise ConfigError("give one of --checkerboard and --charuco, not both")
+    if arguments.checkerboard is None and arguments.charuco is None:
+        return None
     option = "--charuco" if arguments.charuco else "--checkerboard"
     columns, rows = _numbers(arguments.charuco or arguments.checkerboard, "x", 2, int, option, "9x6")
     marker = _needed(arguments, "marker") if arguments.charuco else 0.0

@@ -25,6 +25,7 @@ from live.config.gauges import DEFAULT_KIND, NAME_PATTERN, GaugeTable, gauge_che
 from live.config.sections import (
     AlarmConfig,
     CameraConfig,
+    LensConfig,
     LoadConfig,
     MeasureConfig,
     OperateConfig,
@@ -55,6 +56,7 @@ class Config:
     load: LoadConfig = field(default_factory=LoadConfig)
     measure: MeasureConfig = field(default_factory=MeasureConfig)
     scale: ScaleConfig = field(default_factory=ScaleConfig)
+    lens: LensConfig = field(default_factory=LensConfig)
     record: RecordConfig = field(default_factory=RecordConfig)
     operate: OperateConfig = field(default_factory=OperateConfig)
     strain_out: StrainOutConfig = field(default_factory=StrainOutConfig)
@@ -69,8 +71,9 @@ class Config:
     def as_dict(self) -> dict[str, Any]:
         """Nested plain values for JSON: the keys of each section, the alarms by number."""
         plain = dataclasses.asdict(self)
-        if not self.plate:  # a section that versions before do not have
-            del plain["plate"]
+        for name, used in (("plate", bool(self.plate)), ("lens", self.lens != LensConfig())):
+            if not used:  # a section that versions before do not have
+                del plain[name]
         return plain | {"alarm": {str(n): alarm for n, alarm in enumerate(plain["alarm"], 1)}}
 
 
@@ -122,12 +125,21 @@ def settings_in(path: Path) -> dict[str, Any]:
     """The values that ``path`` sets, "section.key" -> value, checked; raises ConfigError."""
     load_config(path, {})
     tree = _read_toml(path)
-    return {
+    lens = {"lens": tree.pop("lens")} if "lens" in tree else {}  # one calibration, not keys of two
+    return lens | {
         f"{name}.{key}": value
         for name, section in tree.items()
         if isinstance(section, Mapping)
         for key, value in section.items()
     }
+
+
+def lens_in(path: Path) -> dict[str, Any]:
+    """The section [lens] of a file; raises ConfigError."""
+    table = _plain_toml(path).get("lens")
+    if not isinstance(table, Mapping):
+        raise ConfigError(f"{path}: has no section [lens]; phasedic lens makes one")
+    return dict(table)
 
 
 def _without_none(stored: Mapping[str, Any]) -> dict[str, Any]:
@@ -154,6 +166,13 @@ def _overlaid(tree: Mapping[str, Any], overrides: Mapping[str, Any], where: str)
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
+    tree = _plain_toml(path)
+    if isinstance(tree.get("lens"), str):
+        tree["lens"] = lens_in(Path(tree["lens"]))
+    return tree
+
+
+def _plain_toml(path: Path) -> dict[str, Any]:
     if not path.exists():
         raise ConfigError(f"{path}: there is no such configuration file")
     try:

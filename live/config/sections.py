@@ -9,13 +9,16 @@ from typing import Literal
 from live.config.values import (
     AUTO,
     BOX,
+    COVARIANCE,
     FLAG,
     GIVEN,
     LISTEN_ADDRESS,
     NAMES,
+    POINT,
     RECORD_MODE,
     RECTANGLE,
     REGION,
+    SIZE,
     STRAINS,
     TEXT,
     Option,
@@ -49,6 +52,7 @@ class CameraConfig:
     readout_ms: float | None = key(number(0, 10_000), None,
         "time of a rolling shutter from the first line of the picture to the last, ms: the strain that motion shows"
         " by it is removed")
+    sigma_readout_ms: float | None = key(number(0, 10_000), None, "standard uncertainty of readout_ms")
     dark: str | None = key(TEXT, None,
         "dark frame (TIFF), subtracted from every burst", Option("dark", "FILE", expert=True))
     flat: str | None = key(TEXT, None,
@@ -136,6 +140,27 @@ class PlateConfig:
 
     box: tuple[float, float, float, float] | None = key(RECTANGLE, None,
         "x, y, width, height of the pattern on the plate, px")
+
+
+@dataclass(frozen=True, slots=True)
+class LensConfig:
+    """[lens], or lens = "lens.toml": what phasedic lens found (docs/optics.md)."""
+
+    focal_px: float | None = key(number(1, 1e9), None, "focal length, px; without it nothing is corrected")
+    centre: tuple[float, float] | None = key(POINT, None, "x, y of the optical axis, px")
+    k1: float = key(number(-1e6, 1e6), 0.0, "radial term of r^2, with r over the focal length; signs as in OpenCV")
+    k2: float = key(number(-1e6, 1e6), 0.0, "of r^4")
+    p1: float = key(number(-1e6, 1e6), 0.0, "tangential term along y")
+    p2: float = key(number(-1e6, 1e6), 0.0, "along x")
+    k3: float = key(number(-1e6, 1e6), 0.0, "radial term of r^6")
+    covariance: tuple[tuple[float, ...], ...] | None = key(COVARIANCE, None,
+        "8 rows: covariance of focal_px, centre (x, y), k1, k2, p1, p2, k3 (default: zero, which no lens has)")
+    picture: tuple[int, int] | None = key(SIZE, None, "width, height of the pictures it holds for, px")
+    box: tuple[float, float, float, float] | None = key(RECTANGLE, None,
+        "x, y, width, height of the part of the picture that was calibrated, px")
+    rms_px: float | None = key(number(0, 1e3), None, "what the fit leaves, rms, px")
+    date: str | None = key(TEXT, None, "time of the calibration")
+    method: str | None = key(TEXT, None, "method of the calibration")
 
 
 @dataclass(frozen=True, slots=True)

@@ -217,12 +217,42 @@ def _strains(value: Any) -> tuple[float, float]:
     return low, high
 
 
+def _size(value: Any) -> tuple[int, int]:
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise NotAllowed("two whole numbers: width, height in px")
+    return as_integer(value[0], 1, 10**6), as_integer(value[1], 1, 10**6)
+
+
+def _covariance(value: Any) -> tuple[tuple[float, ...], ...]:
+    rows = value if isinstance(value, list | tuple) else ()
+    if len(rows) != LENS_PARAMETERS or any(
+        not isinstance(row, list | tuple) or len(row) != LENS_PARAMETERS for row in rows
+    ):
+        raise NotAllowed(f"{LENS_PARAMETERS} rows of {LENS_PARAMETERS} numbers")
+    found = tuple(tuple(as_number(one, -1e18, 1e18) for one in row) for row in rows)
+    for i, row in enumerate(found):
+        for j, one in enumerate(row[:i]):
+            most = math.sqrt(abs(row[i] * found[j][j])) * (1 + 1e-6)
+            if abs(one - found[j][i]) > 1e-6 * most or abs(one) > most:
+                raise NotAllowed(
+                    "a covariance: the same on both sides of the diagonal, and no correlation beyond 1"
+                )
+        if row[i] < 0:
+            raise NotAllowed("a covariance: no variance below 0")
+    return found
+
+
 def _names(value: Any) -> tuple[str, ...]:
     if not isinstance(value, list | tuple) or not 1 <= len(value) <= 64:
         raise NotAllowed("1 to 64 names in brackets")
     return tuple(_text(name) for name in value)
 
 
+LENS_PARAMETERS = 8
+COVARIANCE = Check(_covariance)
+"""Of the parameters of a lens."""
+SIZE = Check(_size)
+"""width, height in px."""
 TEXT = Check(_text)
 NAMES = Check(_names, lambda word: word.split(","))
 """Names; on the command line separated by commas."""

@@ -10,6 +10,7 @@ import numpy as np
 from acquire.events import Event, EventKind, EventSink, Level
 from analysis.field import Blur
 from analysis.field.picture_error import LIMIT, PictureError
+from analysis.optics import alike, keystones
 from live.pipeline.measurement import TimeStep
 
 if TYPE_CHECKING:
@@ -97,6 +98,63 @@ class DilatationGuard:
             f"the strains along and across do not fit nu = {nu:g}: {false * 1e6:+.0f} µm/m in both is as from"
             f" motion{far} {way} the camera, and no strain; E is off by it too (docs/optics.md)"
         )
+
+
+class TiltGuard:
+    """Checks small strains for what motion off the plane shows without plates and without nu, and warns once of each.
+
+    Strains alike in x and y are those of motion along the axis, also where they rise evenly over the region: of a tilt
+    (``analysis.optics.keystones``). A load along one axis makes neither.
+
+    Parameters
+    ----------
+    focal_px : float or None, px
+        Distance of the camera over the size of a pixel, for the messages.
+    dilatation : bool
+        Whether to check for motion along the axis too; ``DilatationGuard`` does it better where nu is known.
+    on_event : callable taking an Event
+    """
+
+    def __init__(self, focal_px: float | None, on_event: EventSink, *, dilatation: bool = True) -> None:
+        self._focal_px, self._on_event = focal_px, on_event
+        self._seeks_dilatation, self._seeks_tilt = dilatation, True
+
+    def check(self, field: StrainField, step: TimeStep) -> None:
+        """Check one field with its time step."""
+        if not max(abs(step.exx), abs(step.eyy)) < MAX_ELASTIC:
+            return
+        if self._seeks_dilatation:
+            noise = FALSE_STRAIN + CERTAIN * max(step.sigma_exx, step.sigma_eyy)
+            false = alike(step.exx, step.eyy, noise)
+            if false:
+                self._seeks_dilatation = False
+                text = (
+                    f"exx and eyy are alike, {false * 1e6:+.0f} µm/m: as from motion by {abs(false):.1e} of the"
+                    " stand-off or from temperature, not from a load along one axis (docs/optics.md)"
+                )
+                self._emit(step, text, false)
+        if self._seeks_tilt:
+            self._check_tilt(field, step)
+
+    def _check_tilt(self, field: StrainField, step: TimeStep) -> None:
+        for way, found in zip(("from left to right", "from top to bottom"), keystones(field), strict=True):
+            # A load makes exx and eyy differ, and an uneven specimen may then show anything.
+            load = abs(step.exx - step.eyy)
+            if not abs(found.rise) > max(FALSE_STRAIN + CERTAIN * found.sigma, load):
+                continue
+            self._seeks_tilt = False
+            angle = ""
+            if self._focal_px is not None:
+                angle = f" by {abs(math.degrees(found.tilt(self._focal_px))):.2g} degrees"
+            text = (
+                f"strain rises by {found.rise * 1e6:+.0f} µm/m {way}, in x and y alike: as from a tilt{angle}, or from"
+                " a shift behind a lens that is not corrected (docs/optics.md)"
+            )
+            self._emit(step, text, found.rise)
+            return
+
+    def _emit(self, step: TimeStep, text: str, strain: float) -> None:
+        self._on_event(Event(step.t, EventKind.MEASUREMENT, "strain", text, "warning", {"strain": strain}))
 
 
 CAUSES = {

@@ -27,7 +27,7 @@ _GROWTH = 1.1  # of the time steps from one search for the axis to the next
 _COUNTS = ("n_valid", "n_zoi")
 SHORT = (
     "sigma_exx", "sigma_eyy", "sigma_exy", "sigma_extension_x", "sigma_extension_y", "zoi_sigma", "u", "v", "noise_GL",
-    "measure_s", "latency_s", "misfit", "blur", "sigma_blur",
+    "measure_s", "latency_s", "misfit", "blur", "sigma_blur", "sigma_lens_exx", "sigma_lens_eyy",
 )  # fmt: skip
 """Numbers of which nobody needs more than seven digits."""
 _TYPES = {
@@ -40,7 +40,7 @@ _TYPES = {
 class TimeSeries(Sequence[TimeStep]):
     """A list that one thread appends to and any thread reads: numbers as columns, each text once.
 
-    About 170 bytes for each time step and 25 more for each gauge; of ``sigma`` and the like seven digits.
+    About 180 bytes for each time step and 25 more for each gauge; of ``sigma`` and the like seven digits.
     """
 
     def __init__(self) -> None:
@@ -209,17 +209,18 @@ def curve_of(
     """
     axial, transverse = strains_along(gauges, axis)
     elastic, extension = strain(axial), strain(extension_along(gauges, axis))
+    lens = strain(f"sigma_lens_e{axis}{axis}")
     if axial == AXIAL:
-        return Curve(t, _known(elastic, t), stress, strain(transverse), source=f"gauge {AXIAL}")
+        return Curve(t, _known(elastic, t), stress, strain(transverse), lens=lens, source=f"gauge {AXIAL}")
     if extension is None or not np.isfinite(extension).any():
         # Files of before November 2026 have no extension, and means of the gradients.
         words = f"mean {axial}" if extension is None else f"{axial} of the region"
-        return Curve(t, _known(elastic, t), stress, strain(transverse), source=words)
+        return Curve(t, _known(elastic, t), stress, strain(transverse), lens=lens, source=words)
     across = strain(TRANSVERSE if transverse == TRANSVERSE else f"extension_{'x' if axis == 'y' else 'y'}")
     narrowing = None if across is None or not np.isfinite(across).any() else across
     return Curve(
         t, extension, stress, strain(transverse), elastic, strain(f"uneven_{axial}"), strain("misfit"),
-        narrowing, f"extension between strips along {axis}", f"{axial} of the region",
+        narrowing, lens, f"extension between strips along {axis}", f"{axial} of the region",
     )  # fmt: skip
 
 

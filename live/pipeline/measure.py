@@ -18,8 +18,16 @@ from acquire.events import Event, EventKind, EventSink, Level, ignore_event
 from acquire.frame import Burst
 from acquire.load_cell import LoadLog
 from analysis.field import part_of
-from analysis.optics import ASSUMED_TILT, SCALE, PlateFit, ShutterCorrection, choose_model, trouble
-from live.pipeline.guards import BlurGuard, DilatationGuard, PictureGuard, StrainGuard
+from analysis.optics import (
+    ASSUMED_TILT,
+    SCALE,
+    LensCorrection,
+    PlateFit,
+    ShutterCorrection,
+    choose_model,
+    trouble,
+)
+from live.pipeline.guards import BlurGuard, DilatationGuard, PictureGuard, StrainGuard, TiltGuard
 from live.pipeline.measurement import Measurement, PlateReading
 from live.pipeline.reference import Correction, averaged, repetition_text, unchanged
 
@@ -177,10 +185,12 @@ def measure(
     correct: Correction = unchanged,
     gauges: Sequence[Gauge] = (),
     shutter: ShutterCorrection | None = None,
+    lens: LensCorrection | None = None,
     plates: PlateCorrection | None = None,
     renew_at: float = 1.0,
     strain: Measure = "small",
     dilatation: DilatationGuard | None = None,
+    tilt: TiltGuard | None = None,
     on_event: EventSink = ignore_event,
     timer: Timer = lambda: 0.0,
 ) -> Iterator[Measurement]:
@@ -200,6 +210,8 @@ def measure(
     gauges : sequence of Gauge
         Read on every field.
     shutter : ShutterCorrection, optional
+        Corrects every field, before lens and plates.
+    lens : LensCorrection, optional
         Corrects every field, before the plates.
     plates : PlateCorrection, optional
         Corrects every field; ``kernel`` then measures the ZOIs of its plates too.
@@ -209,6 +221,7 @@ def measure(
     strain : "small", "engineering", "green" or "hencky"
         The measure of strain of the fields and means.
     dilatation : DilatationGuard, optional
+    tilt : TiltGuard, optional
     on_event : callable taking an Event
         Called when the reference is renewed, and where a guard warns.
     timer : callable
@@ -232,17 +245,20 @@ def measure(
         began = timer()
         whole, reading = tracker.measure(correct(item)), None
         upright = whole if shutter is None else shutter.apply(whole, item.t)
+        straight, of_lens = (upright, None) if lens is None else lens.apply(upright)
         if plates is None:
-            field = replace(upright, measure=strain)
+            field = replace(straight, measure=strain)
         else:
-            field, reading = plates.apply(upright, item, strain)
+            field, reading = plates.apply(straight, item, strain)
         took = timer() - began
         for guard in guards:
             guard.check(field, item.t)
         measurement = Measurement.of(number, item, field, loads.force_at(item.t), took, gauges, reading)
-        measurement = replace(measurement, as_measured=whole)
+        measurement = replace(measurement.with_lens(of_lens), as_measured=whole)
         sharpness.check(measurement.time_step)
         if dilatation is not None:
             dilatation.check(measurement.time_step)
+        if tilt is not None:
+            tilt.check(field, measurement.time_step)
         yield measurement
         number += 1

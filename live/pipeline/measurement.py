@@ -16,7 +16,7 @@ import numpy as np
 from acquire.frame import Burst
 from analysis.evaluate import AreaStrain, Gauge, GaugeValue, extension_of
 from analysis.field import StrainField, area_share, mean_blur
-from analysis.optics import ApparentMotion
+from analysis.optics import ApparentMotion, LensReading
 
 AXIAL, TRANSVERSE = "axial", "transverse"
 """Gauges of these names are the strain along and across the load."""
@@ -66,6 +66,8 @@ class TimeStep:
         That variation over what noise makes of it.
     blur, sigma_blur : float, px
         Of the picture since its reference (``analysis.field.Blur``); negative: sharper.
+    sigma_lens_exx, sigma_lens_eyy : float
+        What of ``sigma_exx`` and ``sigma_eyy`` the uncertainty of a corrected lens makes; NaN without.
     area_share : float
         Of the region that its strains stand for, where a block of ZOIs was lost (``analysis.field.area_share``).
     """
@@ -100,6 +102,8 @@ class TimeStep:
     misfit: float = math.nan
     blur: float = math.nan
     sigma_blur: float = math.nan
+    sigma_lens_exx: float = math.nan
+    sigma_lens_eyy: float = math.nan
     area_share: float = 1.0
 
     @property
@@ -217,6 +221,8 @@ class Measurement:
     time_step : TimeStep
     plates : PlateReading or None
         Where there are plates, and ``field`` is corrected by them.
+    lens : LensReading or None
+        Where a lens is corrected.
     as_measured : StrainField or None
         What the kernel gave, of specimen and plates, before any correction.
     """
@@ -226,6 +232,7 @@ class Measurement:
     field: StrainField
     time_step: TimeStep
     plates: PlateReading | None = None
+    lens: LensReading | None = None
     as_measured: StrainField | None = None
 
     @classmethod
@@ -240,6 +247,13 @@ class Measurement:
         values = {gauge.name: gauge.read(field) for gauge in gauges}
         step = replace(time_step_of(burst, field, force, measure_s), gauges=values)
         return cls(number, burst, field, step, plates)
+
+    def with_lens(self, lens: LensReading | None) -> Measurement:
+        """The same with what a corrected lens made."""
+        if lens is None:
+            return self
+        step = replace(self.time_step, sigma_lens_exx=lens.sigma_exx, sigma_lens_eyy=lens.sigma_eyy)
+        return replace(self, lens=lens, time_step=step)
 
     @property
     def t(self) -> float:

@@ -102,6 +102,8 @@ _INSTANTS = (
         Quantity(f"raw_{e}", UNITLESS, f"{e} of the region before the correction by plates")
         for e in ("exx", "eyy", "exy")
     ),
+    Quantity("lens_exx", UNITLESS, "exx of the region that the lens made, and that was removed"),
+    Quantity("lens_eyy", UNITLESS, "the same of eyy"),
     Quantity(
         "corrected", UNITLESS, "1 where the plates were measured, 0 where their last motion was removed"
     ),

@@ -27,6 +27,8 @@ UNEVEN = ("uneven_exx", "uneven_eyy", "misfit")
 RAW = ("raw_exx", "raw_eyy", "raw_exy")
 PLATES = (*RAW, "corrected", *(f"plate_{name}" for name in NAMES), "sigma_plate_scale")
 """Columns of a test with plates: strains as measured, whether the plates were good, and their motion."""
+LENS = ("lens_exx", "lens_eyy", "sigma_lens_exx", "sigma_lens_eyy")
+"""Columns of a test whose lens is corrected: the strain that was removed, and its standard uncertainty."""
 GRADIENTS = ("du_dx", "du_dy", "dv_dx", "dv_dy")
 
 
@@ -52,6 +54,8 @@ class ResultsInfo:
         Of the load; auto: found from the means, y until then.
     plates : bool
         Plates correct the strains; rows have the strains as measured and the motion of the plates too.
+    lens : bool
+        A lens is corrected; rows have the strain that it made too.
     lagged : bool
         The force is corrected for a lag of the load; rows have the force as stamped too.
     """
@@ -68,13 +72,14 @@ class ResultsInfo:
     axis: str = "y"
     lagged: bool = False
     plates: bool = False
+    lens: bool = False
 
     @property
     def extras(self) -> tuple[str, ...]:
         """The columns that only some tests have, without those of gauges."""
         stress = ("stress_Pa", "true_strain", "true_stress_Pa") if self.area_m2 is not None else ()
-        plates = PLATES if self.plates else ()
-        return (*stress, *(("force_raw_N",) if self.lagged else ()), *plates)
+        optics = (*(LENS if self.lens else ()), *(PLATES if self.plates else ()))
+        return (*stress, *(("force_raw_N",) if self.lagged else ()), *optics)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,6 +161,8 @@ def _values(
         values |= {"true_strain": math.log(stretch), "true_stress_Pa": stress * stretch}
     if info.lagged:
         values["force_raw_N"] = time_step.force_raw
+    if info.lens:
+        values |= dict(zip(LENS, measurement.lens or [math.nan] * len(LENS), strict=True))
     if info.plates:
         values |= _plates(measurement)
     return values

@@ -10,7 +10,7 @@ from typing import Any, Literal, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from acquire.errors import ConfigError
+from acquire.errors import ConfigError, DataError
 from analysis.evaluate import distance, strips_of
 from analysis.evaluate.area.affine import Places, noise_of_windows
 from analysis.field import PAIR_INDEX, WINDOWS, Measure, StrainField, Window
@@ -87,8 +87,20 @@ def read_field(strain: Strain, row: int) -> StrainField:
 
 
 def stored_pattern(strain: Strain, reference: int) -> StoredPattern:
-    """The weights of the ZOIs against a reference (``Strain.reference``)."""
-    return StoredPattern(strain.normal(reference), Places.of(strain.grid, _window(strain)))
+    """The weights of the ZOIs against a reference (``Strain.reference``).
+
+    Raises
+    ------
+    DataError
+        They cannot be read, or are none.
+    """
+    normal = strain.normal(reference)
+    i, j = np.triu_indices(6)
+    if not (
+        np.isfinite(normal).all() and (normal[i == j] >= 0).all() and (normal[i == j] > 0).all(axis=0).any()
+    ):
+        raise DataError(f"{strain.path}: its normal matrices are damaged; make it again with phasedic replay")
+    return StoredPattern(normal, Places.of(strain.grid, _window(strain)))
 
 
 def _window(strain: Strain) -> Window:

@@ -150,6 +150,7 @@ def write_results(about: RunInfo, run_state: RunState) -> Sequence[Consumer]:
         axis=config.specimen.axis,
         lagged=config.load.lag_s != 0,
         plates=bool(config.plate),
+        lens=config.lens.focal_px is not None,
     )
     return [
         ResultsConsumer(

@@ -13,16 +13,17 @@ from numpy.typing import NDArray
 from acquire.events import EventSink
 from acquire.frame import Burst, CameraInfo
 from acquire.load_cell import LoadLog
-from analysis.optics import PlateFit, ShutterCorrection
+from analysis.optics import LensCorrection, LensModel, PlateFit, ShutterCorrection
 from live.config.gauges import gauges_for
 from live.config.loading import Config
-from live.pipeline.guards import DilatationGuard
+from live.pipeline.guards import DilatationGuard, TiltGuard
 from live.pipeline.measure import NewReference, PlateCorrection, measure
 from live.pipeline.measurement import Measurement
 from live.pipeline.reference import Correction, prepare
 from live.pipeline.warm_up import picture_kinds
 from live.setup.compiling import compile_ahead
 from live.setup.grid import grid_for, kernel_settings, plates_for
+from live.setup.lens import lens_for
 from live.setup.pictures import correction
 
 if TYPE_CHECKING:
@@ -44,6 +45,7 @@ class MeasurePlan:
     grid : ZoiGrid
     gauges : tuple of Gauge
     plates : PlateFit or None
+    lens : LensModel or None
     settings : KernelSettings
     correct : callable
         Corrects the fixed pattern of the sensor in a burst.
@@ -56,6 +58,7 @@ class MeasurePlan:
     grid: ZoiGrid
     gauges: tuple[Gauge, ...]
     plates: PlateFit | None
+    lens: LensModel | None
     settings: KernelSettings
     correct: Correction
     width: int
@@ -75,22 +78,27 @@ class MeasurePlan:
         layout = plates_for(config, grid, camera.width, camera.height)
         middle = ((camera.width - 1) / 2, (camera.height - 1) / 2)
         plates = None if layout is None else PlateFit(layout, middle)
+        lens = lens_for(config, camera.width, camera.height, grid if layout is None else layout.whole)
         settings, correct = kernel_settings(config), correction(config, camera)
-        return cls(config, mask, grid, gauges, plates, settings, correct, camera.width, camera.height)
+        return cls(config, mask, grid, gauges, plates, lens, settings, correct, camera.width, camera.height)
 
     @property
     def shutter(self) -> ShutterCorrection | None:
         """A new correction of the rolling shutter; None without its readout time."""
-        readout_ms = self.config.camera.readout_ms
-        return None if not readout_ms else ShutterCorrection(1e-3 * readout_ms, self.height)
+        readout_ms, sigma_ms = self.config.camera.readout_ms, self.config.camera.sigma_readout_ms or 0.0
+        return None if not readout_ms else ShutterCorrection(1e-3 * readout_ms, self.height, 1e-3 * sigma_ms)
+
+    @property
+    def lens_correction(self) -> LensCorrection | None:
+        """The correction of the lens; None where there is none to correct."""
+        layout = None if self.plates is None else self.plates.layout
+        return None if self.lens is None else LensCorrection(self.lens, self.kernel_grid, layout)
 
     @property
     def focal_px(self) -> float:
         """Distance of the camera over the size of a pixel on the specimen; assumed where it is not known."""
-        scale = self.config.scale
-        if scale.mm_per_px is None or scale.stand_off_mm is None:
-            return ASSUMED_FOCAL * self.width
-        return scale.stand_off_mm / scale.mm_per_px
+        known = _focal_px(self.config)
+        return ASSUMED_FOCAL * self.width if known is None else known
 
     @property
     def kernel_grid(self) -> ZoiGrid:
@@ -143,10 +151,20 @@ class PreparedKernel:
             correct=self.plan.correct,
             gauges=self.plan.gauges,
             shutter=self.plan.shutter,
+            lens=self.plan.lens_correction,
             plates=None if plates is None else PlateCorrection(plates, self.plan.focal_px, on_event),
             renew_at=settings.renew_at,
             strain=cast(Any, settings.strain),
             dilatation=DilatationGuard(config.specimen.nu, stand_off, on_event),
+            tilt=TiltGuard(_focal_px(config), on_event, dilatation=config.specimen.nu is None),
             on_event=on_event,
             timer=self.timer,
         )
+
+
+def _focal_px(config: Config) -> float | None:
+    """Distance of the camera over the size of a pixel on the specimen, px; None where it is not known."""
+    scale = config.scale
+    if scale.mm_per_px is None or scale.stand_off_mm is None:
+        return None
+    return scale.stand_off_mm / scale.mm_per_px

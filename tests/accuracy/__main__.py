@@ -347,7 +347,7 @@ def star_image(quick: bool) -> Lines:
         ("spectral", "tukey", 37, 2, (0,)),
         ("spectral", "tukey", 41, 2, (0,)),
         ("spectral", "gaussian", 37, 1, (0, 3, 7)),
-        ("spectral", "gaussian", 31, 1, (0, 7)),
+        ("spectral", "gaussian", 31, 1, (0, 7, 15)),
     ):
         settings = KernelSettings(estimator=estimator, window=window, order=order)  # type: ignore[arg-type]
         coarse = quick or estimator == "phase"

@@ -46,6 +46,15 @@ def test_the_noise_of_the_velocity_is_in_the_strain() -> None:
     assert found.mean("eyy")[1] > second.mean("eyy")[1]
 
 
+def test_the_uncertainty_of_the_readout_time_is_in_the_strain() -> None:
+    correction = ShutterCorrection(READOUT, HEIGHT, 0.1 * READOUT)
+    first, second = seen(0.1, 1e-9), seen(0.2, 1e-9)
+    correction.apply(first, 0.1)
+    found = correction.apply(second, 0.2)
+    assert found.mean("eyy")[1] == pytest.approx(0.1 * 330e-6, rel=5e-3)
+    assert found.mean("gamma_xy")[1] == pytest.approx(0.1 * 4 * READOUT / 1000, rel=5e-3)
+
+
 def test_a_lost_picture_and_a_time_that_stands_change_nothing() -> None:
     correction = ShutterCorrection(READOUT, HEIGHT)
     correction.apply(seen(0.1), 0.1)

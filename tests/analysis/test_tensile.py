@@ -99,6 +99,19 @@ def test_stated_limits_of_error_are_in_the_interval_of_e() -> None:
     assert found.nu == plain.nu
 
 
+def test_the_uncertainty_of_a_corrected_lens_is_in_the_interval_of_e() -> None:
+    interval = TensileOptions(free(Interval("strain", 0.0005, 0.0025)))
+    curve = noisy(linear(), 3)
+    plain = evaluate_test(curve, interval)
+    found = evaluate_test(replace(curve, lens=4e-3 * np.abs(curve.strain)), interval)  # grows with the motion
+    assert plain.span is not None
+    low, high = plain.span.strain
+    assert list(found.budget) == ["scatter", "lens"]
+    assert found.budget["lens"] == pytest.approx(4e-3 * high / (high - low), rel=2e-2)
+    assert found.E.high - found.E.value > 1.5 * (plain.E.high - plain.E.value)
+    assert found.E.value == plain.E.value
+
+
 def test_few_points_keep_their_degrees_of_freedom() -> None:
     line = line_through(Loading.of(noisy(linear(fps=1.0), 3)), 4, 12)
     assert line is not None

@@ -46,6 +46,16 @@ def test_its_values_are_those_of_the_test_to_the_digits_of_the_maps(folder: Path
         assert normal.id.get_storage_size() < 21 * 4 * normal.shape[2] * normal.shape[3] + 200
 
 
+@pytest.mark.parametrize("value", [np.nan, 0.0, -1.0])
+def test_damaged_normal_matrices_are_refused(folder: Path, tmp_path: Path, value: float) -> None:
+    spoilt = tmp_path / "run"
+    spoilt.mkdir()
+    (spoilt / "strain.h5").write_bytes((folder / "strain.h5").read_bytes())
+    with h5py.File(spoilt / "strain.h5", "a") as file:
+        file["entry/references/normal"][...] = value
+    assert main(["export", str(spoilt), "--gauges", str(folder.parent / "later.toml"), "--to", "csv"]) == 4
+
+
 def test_a_file_without_normal_matrices_is_read_as_before(folder: Path, tmp_path: Path) -> None:
     old = tmp_path / "run"
     old.mkdir()

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.evaluate.area.affine import AffineFit, Places, affine_fit
 from analysis.evaluate.area.unevenness import strain_shapes, variation
-from analysis.field import PAIR_INDEX, StrainField, combination, fixed_sums, strain_tensor
+from analysis.field import PAIR_INDEX, CommonError, StrainField, combination, fixed_sums, strain_tensor
 
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -69,10 +69,17 @@ class AreaStrain:
         valid = self.valid.ravel()[self.fit.at]
         variance, common = self.fit.variance(name, self.field, valid), self.field.common
         if common is not None:
-            shares = np.zeros((6, self.valid.size))
-            shares[:, self.fit.at] = self.fit.weights(name, valid)
-            variance += common.variance_of_sum(shares.reshape(6, *self.valid.shape))
+            variance += self._variance_by(common, name)
         return math.sqrt(variance) if variance > 0 else 0.0
+
+    def sigma_by(self, common: CommonError, name: str) -> float:
+        """Standard uncertainty of ``value`` by an error that all ZOIs have in common."""
+        return math.sqrt(max(self._variance_by(common, name), 0.0))
+
+    def _variance_by(self, common: CommonError, name: str) -> float:
+        shares = np.zeros((6, self.valid.size))
+        shares[:, self.fit.at] = self.fit.weights(name, self.valid.ravel()[self.fit.at])
+        return common.variance_of_sum(shares.reshape(6, *self.valid.shape))
 
     def unevenness(self) -> Unevenness:
         """How much the strain varies over the area."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,6 +32,7 @@ from live.results.report.page import (
 from live.results.report.practice import PracticeValues, reporting_table
 from live.results.report.record import definitions, events, frame_counts, gauges, hashes, times, version_table
 from live.results.report.svg import Plot, draw
+from live.results.row import LENS
 from live.results.run_folder import RunFolder
 
 MAX_BYTES = 5_000_000
@@ -131,6 +133,7 @@ def _parts(content: _Content, wanted: ReportRequest, side: int) -> list[Html]:
         section("Maps", *(maps(run, name, chosen, pictures, side) for name in fields)),
         section("Noise floor", *_noise_section(content)),
         *_sharpness_section(run),
+        *_lens_section(run),
         section("Status of the ZOIs", statuses(run, max(chosen), pictures, min(side, 480))),
         section("Frame counts and events", frame_counts(run), events(run), *_unreadable(run)),
         section("Reporting table (iDICs Good Practices Guide)", reporting_table(known)),
@@ -247,6 +250,23 @@ def _sharpness_section(run: RunFolder) -> list[Html]:
         return []
     lines = sharpness_line(values["blur_px"].tolist(), values["sigma_blur_px"].tolist())
     return [section("Sharpness", *(paragraph(line.replace("+-", "±")) for line in lines))] * bool(lines)
+
+
+def _lens_section(run: RunFolder) -> list[Html]:
+    """What a corrected lens made; nothing where none is corrected."""
+    values, lens = run.strain.values, run.section("lens")
+    if "lens_exx" not in values:
+        return []
+    columns = [np.abs(np.asarray(values[name], np.float64)) for name in LENS]
+    exx, eyy, sigma_exx, sigma_eyy = (
+        1e6 * float(np.nanmax(one)) if np.isfinite(one).any() else math.nan for one in columns
+    )
+    words = (
+        f"Calibrated {lens.get('date') or 'at a time not stated'}: {lens.get('method') or 'by others'}. Up to"
+        f" {exx:.3g} µm/m of exx and {eyy:.3g} of eyy of the region were the lens, known to"
+        f" {sigma_exx:.2g} and {sigma_eyy:.2g}; they are removed from all values."
+    )
+    return [section("Lens", paragraph(words))]
 
 
 def budget_table(run: RunFolder, curve: EvaluatedCurve, *, both_sides: bool = False) -> list[Html]:

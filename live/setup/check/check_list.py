@@ -31,6 +31,7 @@ from live.setup.check.noise_floor import (
 )
 from live.setup.check.sample import CheckRegion, CheckSample, FrameStack
 from live.setup.check.stillness import PictureStillness, light, stillness
+from live.setup.lens import lens_for, lens_words
 from live.setup.pictures import correction
 from live.setup.region import Region, region_of
 
@@ -104,6 +105,8 @@ class CheckFigures:
         Whether the picture shows the blocks of a codec.
     picture : str
         What else it shows beyond its noise, in words; "": nothing.
+    lens : str
+        What a corrected lens does to the strain of the region, in words; "": none is corrected.
     """
 
     region: Region
@@ -126,6 +129,7 @@ class CheckFigures:
     px_per_mm: float | None = None
     blocks: bool = False
     picture: str = ""
+    lens: str = ""
 
     @property
     def automatic(self) -> tuple[str, ...]:
@@ -183,7 +187,9 @@ def examine(
     m = config.measure
     sizes, orders, bursts = (SIZES, ORDERS, BURSTS) if table else ((), (), ())
     wanted = (*sizes, m.zoi), (*orders, m.order), (*bursts, sample.burst)
-    return figures_of(sample, KernelFigures.of(sample), noise_floors(sample, *wanted), load)
+    figures = figures_of(sample, KernelFigures.of(sample), noise_floors(sample, *wanted), load)
+    lens = lens_for(config, stack.camera.width, stack.camera.height, sample.check_region.grid)
+    return figures if lens is None else replace(figures, lens=lens_words(lens, sample.check_region.grid))
 
 
 def find_region(stack: FrameStack, config: Config) -> Region:

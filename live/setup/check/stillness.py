@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from acquire.errors import DataError
 from analysis.field import Roi, StrainField
+from analysis.optics import alike, keystones
 from analysis.quality.steadiness import Steadiness, steadiness
 from live.pipeline.reference import averaged, prepare
 from live.setup.check.sample import CheckSample, around, moved
@@ -33,6 +34,8 @@ class PictureStillness:
     ----------
     u, v : Steadiness, px
     exx, eyy : Steadiness, dimensionless
+    rises : pair of (Steadiness, Steadiness)
+        Along x and along y, each as u and as v show it (``analysis.optics.Keystone``).
     light : Steadiness
         Of the mean grey level, relative.
     """
@@ -41,6 +44,7 @@ class PictureStillness:
     v: Steadiness
     exx: Steadiness
     eyy: Steadiness
+    rises: tuple[tuple[Steadiness, Steadiness], tuple[Steadiness, Steadiness]]
     light: Steadiness
 
     @property
@@ -51,9 +55,17 @@ class PictureStillness:
     @property
     def dilatation(self) -> float:
         """Drift that exx and eyy have in common, as from a changing distance; 0 where they differ or are noise."""
-        both, half = (self.exx.drift + self.eyy.drift) / 2, abs(self.exx.drift - self.eyy.drift) / 2
-        clear = abs(both) > max(2 * half, DRIFT_OVER_NOISE * max(self.exx.noise, self.eyy.noise))
-        return both if clear else 0.0
+        noise = DRIFT_OVER_NOISE * max(self.exx.noise, self.eyy.noise)
+        return alike(self.exx.drift, self.eyy.drift, noise)
+
+    @property
+    def keystone(self) -> tuple[float, float]:
+        """Drift of the rise of the mean strain over the ZOIs, along x and along y, as from a tilt; 0 where noise."""
+        along_x, along_y = (
+            alike(by_u.drift, by_v.drift, DRIFT_OVER_NOISE * max(by_u.rms, by_v.rms))
+            for by_u, by_v in self.rises
+        )
+        return along_x, along_y
 
     @property
     def worse(self) -> Steadiness:
@@ -88,7 +100,22 @@ def stillness(sample: CheckSample, measurable: NDArray[np.bool_]) -> PictureStil
         own = math.sqrt(1 / (1 + 1 / FIRST_FRAMES)) if known.size else math.nan
         return steadiness(times, values, own * float(np.sqrt(np.mean(known**2))) if known.size else 0.0)
 
-    return PictureStillness(series("u"), series("v"), series("exx"), series("eyy"), light(sample))
+    rises = _rises(times, fields)
+    return PictureStillness(series("u"), series("v"), series("exx"), series("eyy"), rises, light(sample))
+
+
+def _rises(
+    times: NDArray[np.float64], fields: list[StrainField]
+) -> tuple[tuple[Steadiness, Steadiness], tuple[Steadiness, Steadiness]]:
+    """The series of ``analysis.optics.keystones``; their scatter is their noise."""
+    values = np.array(
+        [[(one.by_u, one.by_v) for one in keystones(field)] for field in fields]
+        or np.full((len(times), 2, 2), math.nan)
+    )
+    along_x, along_y = (
+        (steadiness(times, values[:, k, 0]), steadiness(times, values[:, k, 1])) for k in (0, 1)
+    )
+    return along_x, along_y
 
 
 def light(sample: CheckSample) -> Steadiness:

@@ -221,6 +221,8 @@ def _sssig(f: CheckFigures) -> CheckLine:
 
 
 def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
+    if f.lens:
+        yield CheckLine("lens", f.lens)
     s = f.still
     if f.stack.few:
         yield from (_not_measured(f, what) for what in ("drift", "vibration"))
@@ -235,6 +237,15 @@ def _motion(f: CheckFigures, max_px: float) -> Iterator[CheckLine]:
         yield CheckLine("distance", f"exx and eyy drift alike, {s.dilatation * 1e6:+.0f} µm/m: it changes by"
                    f" {abs(s.dilatation):.1e} of the stand-off", abs(s.dilatation) < MAX_DILATATION,
                    "warm up the camera, clamp grips and tripod, or hang plates (docs/optics.md)")  # fmt: skip
+    across, down = s.keystone
+    if across:
+        yield CheckLine("tilt", f"strain drifts by {across * 1e6:+.0f} µm/m from left to right, in x and y alike",
+                   abs(across) < MAX_DILATATION,
+                   "clamp grips and tripod, warm up the camera, or hang plates (docs/optics.md)")  # fmt: skip
+    if down:
+        yield CheckLine("tilt", f"strain drifts by {down * 1e6:+.0f} µm/m from top to bottom, in x and y alike",
+                   abs(down) < MAX_DILATATION,
+                   "clamp grips and tripod, warm up the camera, or hang plates (docs/optics.md)")  # fmt: skip
     shake = s.worse
     yield CheckLine("vibration", f"{_vibration(shake, 1, 'px', 4)}, {_vibration(s.worse_strain, 1e6, 'µm/m', 0)}",
                shake.vibration <= max_px, "a stiffer tripod, a quiet floor, no fan on the bench")  # fmt: skip

@@ -157,7 +157,7 @@ def test_the_help_ends_with_an_example_that_works(name: str, capsys: pytest.Capt
 @pytest.mark.parametrize(
     ("typed", "found"),
     [
-        ("phasedic re", ["replay", "report", "recover"]),
+        ("phasedic re", ["readout", "replay", "report", "recover"]),
         ("phasedic report --pd", ["--pdf"]),
         ("phasedic export run --to v", ["vtk"]),
         ("phasedic replay a --axis ", ["auto", "x", "y"]),

@@ -65,7 +65,7 @@ def test_memory_of_hours(hours: float, fps: int) -> None:
         tracemalloc.stop()
     assert len(kept.run_state.history.time_steps) == frames, "nothing is thinned that figures are from"
     # 16 bytes a load sample; a list that grows has room for a sixteenth more.
-    assert grown / (frames / 2) < 1.07 * (160 + 16 / every) + 20
+    assert grown / (frames / 2) < 1.07 * (168 + 16 / every) + 20
     per_minute = grown / (hours * 60 / 2) / 2**20
     assert per_minute < 0.3 * fps / 20
     assert len(kept.curve.since(-1, 0)["rows"]) <= 4001

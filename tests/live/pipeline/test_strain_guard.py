@@ -13,9 +13,13 @@ import pytest
 from acquire.events import Event
 from analysis import Roi, StrainField, ZoiGrid
 from hw_mocks.deformation import Affine
+from hw_mocks.machine import Programme
+from hw_mocks.optics import Optics, PlaneMotion
+from hw_mocks.specimen import VirtualSpecimen
 from hw_mocks.speckle import Speckle
 from live.cli import main
-from live.pipeline.guards import DilatationGuard, StrainGuard
+from live.pipeline.guards import DilatationGuard, StrainGuard, TiltGuard
+from live.pipeline.measurement import region_strains
 from live.results import Strain
 from tests.live.made_up import make_measurement
 
@@ -128,3 +132,62 @@ def test_no_warning_where_strains_may_be_right(nu: float | None, exx: float, eyy
     events: list[Event] = []
     steps(events, nu, [(exx, eyy)])
     assert not events
+
+
+def seen_by(optics: Optics, u: float = 0.0, sigma: float = 1e-3) -> StrainField:
+    """What a perfect kernel measures of a plane that moves as ``optics`` say, in pictures of 640 x 480 px."""
+    plane = VirtualSpecimen(width=640, height=480, programme=Programme(max_strain=1e-12))
+    grid = ZoiGrid.cover(Roi(60, 60, 520, 360), 40, 20)
+    seen, (x, y) = optics.seen(plane, plane.duration_s), np.meshgrid(grid.x, grid.y)
+    (right, down), gradient = seen.displacement(x, y), seen.gradient(x, y)
+    values = dict(zip(("du_dx", "du_dy", "dv_dx", "dv_dy"), gradient, strict=True))
+    return StrainField.from_values(grid, {"u": right + u, "v": down, **values}, sigma)
+
+
+def warned(one: StrainField, *, focal_px: float | None = 10_000.0, dilatation: bool = True) -> list[Event]:
+    events: list[Event] = []
+    guard = TiltGuard(focal_px, events.append, dilatation=dilatation)
+    step = replace(make_measurement(number=1).time_step, **region_strains(one))
+    for _ in range(2):  # warned of once
+        guard.check(one, step)
+    return events
+
+
+def test_a_plane_that_comes_nearer_or_tilts_is_named_with_its_figures() -> None:
+    nearer = warned(seen_by(Optics(500.0, settling=PlaneMotion(0.05))))
+    assert len(nearer) == 1
+    assert nearer[0].data["strain"] == pytest.approx(100e-6, rel=1e-2)
+    assert "exx and eyy are alike, +100 µm/m: as from motion by 1.0e-04 of the stand-off" in nearer[0].text
+    assert not warned(seen_by(Optics(500.0, settling=PlaneMotion(0.05))), dilatation=False)
+    for axis, way, px in ((2, "from left to right", 480), (1, "from top to bottom", 320)):
+        tilt = PlaneMotion(0.0, *(math.radians(0.2) * np.eye(2)[axis - 1]))
+        (event,) = warned(seen_by(Optics(500.0, settling=tilt)))
+        assert event.data["strain"] == pytest.approx(1.5 * math.radians(0.2) * px / 10_000, rel=2e-2)
+        assert way in event.text
+        assert "as from a tilt by 0.2 degrees" in event.text
+    assert "by 0.2 degrees" not in warned(seen_by(Optics(500.0, settling=tilt)), focal_px=None)[0].text
+
+
+def bent(load: float, kappa: float, nu: float = 0.3) -> StrainField:
+    """Pulled along y by ``load`` and bent in its plane."""
+    grid = ZoiGrid.cover(Roi(60, 60, 520, 360), 40, 20)
+    x, y = np.meshgrid(grid.x - grid.x.mean(), grid.y - grid.y.mean())
+    eyy = load + kappa * x
+    v, u = eyy * y, -nu * (load * x + kappa * (x**2 - y**2) / 2) - kappa * y**2 / 2 * (1 - nu)
+    values = {"u": u, "v": v, "dv_dy": eyy, "du_dx": -nu * eyy, "dv_dx": kappa * y, "du_dy": -kappa * y}
+    return StrainField.from_values(grid, values, 1e-3)
+
+
+@pytest.mark.parametrize(
+    "one",
+    [
+        bent(5e-4, 0.0),
+        bent(0.0, 1e-6),
+        bent(5e-4, 1e-6),
+        seen_by(Optics(500.0), 3.0),
+        seen_by(Optics(5e4), sigma=0.5),
+    ],
+    ids=["pulled", "bent", "pulled and bent", "shifted", "noise"],
+)
+def test_load_bending_and_shift_are_no_motion_off_the_plane(one: StrainField) -> None:
+    assert not warned(one)

@@ -51,6 +51,7 @@ def test_a_good_picture_is_ready(capsys: pytest.CaptureFixture[str]) -> None:
         ("", ("--target", "5"), "more than the 5.0 µm/m asked for: "),
         ("&hold=0.01&end=0.1&drift_x=40", (), "LOOK  drift"),
         ("&hold=0.01&end=0.1&max_strain=1e-8&stand_off_mm=100&settle_mm=5", (), "LOOK  distance"),
+        ("&hold=0.01&end=0.1&max_strain=1e-8&stand_off_mm=100&settle_x_deg=4", (), "LOOK  tilt"),
     ],
 )
 def test_a_bad_picture_is_not(

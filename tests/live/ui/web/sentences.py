@@ -44,7 +44,7 @@ WHOLE = (
     "live/config/values.py", "live/pipeline/consumer_thread.py", "live/pipeline/run_state.py",
     "live/pipeline/measure.py", "live/run/grabber.py", "live/run/load_thread.py", "live/run/measuring.py",
     "live/run/pre_trigger.py", "live/run/recorder.py", "live/setup/devices.py", "live/setup/grid.py",
-    "live/setup/scale.py",
+    "live/setup/lens.py", "live/setup/scale.py",
 )  # fmt: skip
 # Calls whose texts are shown, and the places of these texts.
 SHOWN = {

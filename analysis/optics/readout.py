@@ -1,0 +1,180 @@
+"""The readout time of a rolling shutter: from the bands of a flickering lamp, or from a specimen that was moved.
+
+A lamp on mains of 50 or 60 Hz flickers at F = 100 or 120 Hz: a picture whose lines are read over T shows F T bands.
+A specimen that moves along the lines' normal at v shows the strain v T / (H - 1), and along the lines a shear.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+LAMP_SIGMA = 5e-4
+"""Relative standard uncertainty of the frequency of the mains."""
+MIN_PICTURES, MAX_ERROR = 16, 0.1
+"""Pictures that are needed, and the relative standard uncertainty beyond which nothing is measured."""
+_GROUPS, _LEAST, _MOST, _GRID = 8, 0.2, 40.0, 0.05  # bands in a picture
+_KEPT = 0.1
+_CLEAR = 5.0  # over what noise explains by chance
+_NO_BANDS = "no bands that move from picture to picture"
+_FINE = 60  # steps of the golden section
+_LITTLE = "too little motion; move the specimen to and fro, faster, at a steady distance"
+_JUMP = 0.02  # of the highest velocity: two ways to find it agree so far where it is steady
+_LEAST_POWER = 1e-12  # of a velocity, (px/s)^2
+_GOLDEN = (math.sqrt(5) - 1) / 2
+
+
+@dataclass(frozen=True, slots=True)
+class Readout:
+    """Time from the first line of a picture to the last, s, with its standard uncertainty."""
+
+    seconds: float
+    sigma: float
+
+
+def readout_of_bands(profiles: ArrayLike, lamp_Hz: float) -> Readout:
+    """From the mean grey level of each line, (N, H), of N pictures of anything that stands still.
+
+    The number of bands is the one whose cosine, with any amplitude and phase in each picture, leaves the least; the
+    uncertainty follows from groups of pictures.
+
+    Parameters
+    ----------
+    profiles : (N, H)
+    lamp_Hz : float, Hz
+        Of the light: twice the mains.
+
+    Raises
+    ------
+    ValueError
+        Too few pictures, or no bands that move.
+    """
+    seen = np.asarray(profiles, np.float64)
+    if len(seen) < MIN_PICTURES:
+        raise ValueError(f"{len(seen)} pictures; it takes {MIN_PICTURES}")
+    ratio = seen / np.maximum(seen.mean(axis=0), 1e-9)
+    ratio -= ratio.mean(axis=1, keepdims=True)
+    bands = _bands(ratio)
+    _check_bands(ratio, bands)
+    groups = [_bands(ratio[k::_GROUPS], bands) for k in range(_GROUPS)]
+    scatter = float(np.std(groups, ddof=1)) / math.sqrt(_GROUPS)
+    # The mean of the pictures, which is the scene, keeps some of the bands: it matters below one band.
+    scene = _KEPT / len(seen) if bands < 1 else 0.0
+    sigma = math.hypot(scatter, LAMP_SIGMA * bands, scene * bands)
+    if not sigma < MAX_ERROR * bands:
+        raise ValueError(_NO_BANDS)
+    return Readout(bands / lamp_Hz, sigma / lamp_Hz)
+
+
+def _check_bands(ratio: Floats, bands: float) -> None:
+    """Raises ValueError where ``bands`` are noise, or lie at the end of what is sought."""
+    energy = float(np.sum(ratio**2))
+    explained = float(np.sum((ratio @ _basis(bands, ratio.shape[1])) ** 2))
+    by_chance = 2 / (ratio.shape[1] - 1) * (energy - explained)
+    at_the_end = bands < _LEAST + _GRID or bands > _limit(ratio.shape[1]) - _GRID
+    if at_the_end or not explained > _CLEAR * by_chance:
+        raise ValueError(_NO_BANDS)
+
+
+def _limit(lines: int) -> float:
+    return min(_MOST, lines / 8)
+
+
+def _basis(bands: float, lines: int) -> Floats:
+    """Cosine and sine over the lines of a picture, without their means, (H, 2) orthonormal."""
+    angle = 2 * math.pi * bands * np.linspace(-0.5, 0.5, lines)
+    basis = np.stack([np.cos(angle) - np.cos(angle).mean(), np.sin(angle)], axis=1)
+    return np.asarray(basis / np.linalg.norm(basis, axis=0))
+
+
+def _bands(ratio: Floats, near: float | None = None) -> float:
+    """Bands in a picture, from the lines of pictures over their mean (N, H); the best, or the best ``near`` a value."""
+
+    def explained(bands: float) -> float:
+        return float(np.sum(np.square(ratio @ _basis(bands, ratio.shape[1]))))
+
+    if near is None:
+        tried = np.arange(_LEAST, _limit(ratio.shape[1]), _GRID)
+        near = float(tried[np.argmax([explained(one) for one in tried])])
+    low, high = max(near - 2 * _GRID, _LEAST / 2), near + 2 * _GRID
+    for _ in range(_FINE):
+        one, other = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        low, high = (low, other) if explained(one) > explained(other) else (one, high)
+    return (low + high) / 2
+
+
+def readout_of_motion(
+    t: ArrayLike, moved: tuple[ArrayLike, ArrayLike], along: tuple[ArrayLike, ArrayLike], height: int
+) -> Readout:
+    """From the motion of a rigid specimen, to and fro.
+
+    What goes with the velocity is the shutter; what goes with the displacement, to the second degree, is lens,
+    tilt and distance.
+
+    Parameters
+    ----------
+    t : (N,) s
+    moved : (u, v), each (N,) px
+        Mean displacement.
+    along : (du_dy, dv_dy), each (N,)
+        Mean gradients along y.
+    height : int
+        Lines of the picture.
+
+    Raises
+    ------
+    ValueError
+        Too few pictures, or too little motion.
+    """
+    times, u, v, du_dy, dv_dy = (np.asarray(one, np.float64) for one in (t, *moved, *along))
+    known = np.isfinite(u + v + du_dy + dv_dy)
+    if known.sum() < MIN_PICTURES or not np.all(np.diff(times[known]) > 0):
+        raise ValueError(
+            f"{int(known.sum())} pictures with a value, one after the other; it takes {MIN_PICTURES}"
+        )
+    times, u, v, du_dy, dv_dy = (one[known] for one in (times, u, v, du_dy, dv_dy))
+    still = np.stack([np.ones(len(u)), *(_unit(one) ** k for one in (u, v) for k in (1, 2))], axis=1)
+    found = [_slope(times, one, still, slope) for one, slope in ((u, du_dy), (v, dv_dy))]
+    weights = np.array([0.0 if math.isinf(sigma) else sigma**-2 for _, sigma in found])
+    if not weights.any():
+        raise ValueError(_LITTLE)
+    slope = float(np.sum(weights * [one for one, _ in found]) / weights.sum())
+    sigma = 1 / math.sqrt(float(weights.sum()))
+    if not sigma < MAX_ERROR * abs(slope):
+        raise ValueError(_LITTLE)
+    return Readout(slope * (height - 1), sigma * (height - 1))
+
+
+def _unit(moved: Floats) -> Floats:
+    """Displacement about its mean, over its range."""
+    return np.asarray((moved - moved.mean()) / max(float(np.ptp(moved)), 1e-9))
+
+
+def _velocity(t: Floats, moved: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    """Velocity, px/s, and where it is known: not at the ends, nor where it jumps from one picture to the next."""
+    from scipy.interpolate import CubicSpline
+
+    found, plain = np.asarray(CubicSpline(t, moved)(t, 1)), np.gradient(moved, t)
+    steady = np.abs(found - plain) < _JUMP * np.abs(plain).max()
+    steady[:2] = steady[-2:] = False
+    return found, steady
+
+
+def _slope(t: Floats, moved: Floats, still: Floats, gradient: Floats) -> tuple[float, float]:
+    """Change of the gradient by the velocity, 1/(px/s), beside what goes with ``still``, and its uncertainty."""
+    velocity, within = _velocity(t, moved)
+    if within.sum() < MIN_PICTURES:
+        return 0.0, math.inf
+    rest, *_ = np.linalg.lstsq(still[within], velocity[within], rcond=None)
+    own = velocity[within] - still[within] @ rest
+    power = float(own @ own)
+    if not power > _LEAST_POWER:
+        return 0.0, math.inf
+    design = np.column_stack([own, still[within]])
+    fitted, *_ = np.linalg.lstsq(design, gradient[within], rcond=None)
+    left = gradient[within] - design @ fitted
+    return float(fitted[0]), math.sqrt(float(left @ left) / max(len(left) - design.shape[1], 1) / power)

@@ -1,0 +1,134 @@
+"""``phasedic lens``: calibrate the lens from pictures of a board, or from shifted pictures of the specimen."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from acquire.camera import with_scheme
+from acquire.errors import ConfigError
+from live.commands.options import add_config_file, add_options, add_verbose, overrides, require_new
+from live.commands.scale import add_board, board_of
+from live.config.loading import load_config, settings_in
+from live.config.rig_file import write_rig
+from live.pipeline.screen import Screen
+from live.setup.lens import lens_words
+from live.setup.lens_calibration import LensCalibration, from_boards, from_shifts
+from live.ui.terminal.screen import TerminalScreen
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from analysis.field import StrainField
+
+MAX_SHIFTS = 60
+"""Shifted pictures that are fitted; of more, as many evenly chosen ones."""
+SHOWN_ZOI, SHOWN_STEP = 64, 16
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic lens``."""
+    words = "'board/*.png', a video, or pictures or session of the specimen, still and shifted in its plane"
+    parser.add_argument("source", help=words)
+    add_board(parser.add_argument_group("pictures of a board; without one they are of the specimen"))
+    parser.add_argument("--k3", action="store_true", help="with a board: also the term of r^6 (wide angles)")
+    words = "without a board: the camera is square to the specimen, so that tangential terms can be found"
+    parser.add_argument("--square-on", action="store_true", help=words)
+    parser.add_argument("--out", metavar="FILE", help="new file for --lens (default: lens.toml)")
+    add_config_file(parser)
+    add_options(parser, "pictures of the specimen", "roi", "mask", "zoi")
+    add_verbose(parser)
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic lens``."""
+    screen, out = TerminalScreen(), Path(arguments.out or "lens.toml")
+    require_new(out)
+    board = board_of(arguments)
+    if board is None:
+        found = _of_specimen(arguments, screen)
+    else:
+        found = from_boards(_pictures(arguments), board, k3=arguments.k3)
+    for line in _lines(found):
+        screen.print(line)
+    write_rig(out, found.changes)
+    screen.print(f'written to {out}; use it with --lens {out}, or lens = "{out}" at the head of the rig file')
+    return 0
+
+
+def _lines(found: LensCalibration) -> Iterator[str]:
+    from analysis import Roi, ZoiGrid
+
+    lens, (x, y, width, height) = found.fit.lens, found.box
+    yield f"lens: {found.method}, {found.fit.rms_px:.3g} px rms"
+    if found.fit.over_noise > 1.5:
+        yield (
+            f"LOOK  the fit leaves {found.fit.over_noise:.1f} times what noise explains: is the specimen flat, and"
+            " does it stand still in every picture?"
+        )
+    for name, value, variance in zip(
+        ("focal length, px", "axis x, px", "axis y, px", "k1", "k2", "p1", "p2", "k3"),
+        lens.parameters, lens.covariance.diagonal(), strict=True,
+    ):  # fmt: skip
+        if variance > 0:
+            yield f"  {name:<17} {value:.6g} ± {variance**0.5:.2g}"
+    size = int(min(SHOWN_ZOI, width, height))
+    grid = ZoiGrid.cover(Roi(int(x), int(y), int(width), int(height)), size, SHOWN_STEP)
+    yield f"over the calibrated part, {lens_words(lens, grid)}"
+
+
+def _pictures(arguments: argparse.Namespace) -> Iterator[np.ndarray]:
+    """Every picture of the source.
+
+    Raises
+    ------
+    ConfigError
+        It is a live camera, which does not end.
+    """
+    from live.setup.devices import open_rig
+
+    rig = open_rig(with_scheme(arguments.source), "none:")
+    try:
+        if rig.camera.info.live:
+            raise ConfigError(f"{arguments.source}: give recorded pictures of the board, as 'board/*.png'")
+        with rig.camera as camera:
+            yield from (frame.image for frame in camera if not frame.damaged)
+    finally:
+        rig.close()
+
+
+def _of_specimen(arguments: argparse.Namespace, screen: Screen) -> LensCalibration:
+    from acquire.events import ignore_event
+    from live.replay.opening import open_source, prepare_replay
+    from live.replay.source import ReplayRequest
+
+    request = ReplayRequest(
+        source=arguments.source,
+        as_measured=False,
+        start_s=None,
+        end_s=None,
+        reference=None,
+        config_file=Path(arguments.config) if arguments.config else None,
+        overrides=_alone(arguments),
+    )
+    with open_source(request) as (source, config):
+        ready = prepare_replay(source, config, arguments.source, screen)
+        fields: list[StrainField] = []
+        for m in ready.measurements(source.bursts, source.loads, ignore_event):
+            fields.append(m.field)
+            screen.progress(m.time_step, m.number + 1, source.expected, 0.0)
+    chosen = fields[:: -(-len(fields) // MAX_SHIFTS) or 1]
+    return from_shifts(chosen, source.camera.width, source.camera.height, square=arguments.square_on)
+
+
+def _alone(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The settings of the command line, for ZOIs side by side and displacements as the picture shows them."""
+    given = overrides(arguments)
+    file = settings_in(Path(arguments.config)) if arguments.config else {}
+    zoi = given.get("measure.zoi", file.get("measure.zoi", load_config(None, {}).measure.zoi))
+    return {
+        **given, "measure.zoi": zoi, "measure.step": zoi, "measure.strain": "small", "measure.renew_at": 1.0,
+        "measure.order": 1, "lens": {}, "plate": {}, "gauges": {}, "alarm": [],
+    }  # fmt: skip

@@ -1,0 +1,80 @@
+"""``phasedic readout``: measure the readout time of a rolling shutter."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from acquire.camera import with_scheme
+from acquire.errors import ConfigError
+from analysis.optics import Readout
+from live.commands.options import add_config_file, add_options, add_verbose, overrides
+from live.config.rig_file import write_rig
+from live.setup.readout import LAMPS_HZ, from_lamp, from_motion, rounded_ms
+from live.ui.terminal.screen import TerminalScreen
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Arguments of ``phasedic readout``."""
+    words = (
+        "camera, pictures or session: something still under the lamp, or a rigid specimen moved to and fro"
+    )
+    parser.add_argument("source", help=words)
+    words = "the light flickers at this frequency, twice the mains; without it the specimen is moved"
+    parser.add_argument("--lamp", type=float, choices=LAMPS_HZ, metavar="100|120", help=words)
+    words = "rig file to which the time is written (default: print only)"
+    add_config_file(parser, words)
+    add_options(parser, "with a moved specimen", "roi", "mask", "zoi", "step")
+    add_verbose(parser)
+
+
+def command(arguments: argparse.Namespace) -> int:
+    """``phasedic readout``."""
+    screen = TerminalScreen()
+    found = _of_motion(arguments, screen) if arguments.lamp is None else _of_lamp(arguments)
+    changes = rounded_ms(found)
+    screen.print(
+        f"readout: {found.seconds * 1e3:.4g} ± {found.sigma * 1e3:.2g} ms from the first line to the last"
+    )
+    if arguments.config:
+        write_rig(Path(arguments.config), changes)
+        screen.print(f"written to {arguments.config}; the former file is {arguments.config}.bak")
+    return 0
+
+
+def _of_lamp(arguments: argparse.Namespace) -> Readout:
+    from live.setup.devices import at_rest, open_rig
+
+    rig = open_rig(at_rest(with_scheme(arguments.source)), "none:")
+    try:
+        with rig.camera as camera:
+            return from_lamp(camera, arguments.lamp)
+    finally:
+        rig.close()
+
+
+def _of_motion(arguments: argparse.Namespace, screen: TerminalScreen) -> Readout:
+    from acquire.events import ignore_event
+    from live.replay.opening import open_source, prepare_replay
+    from live.replay.source import ReplayRequest
+
+    single = {"measure.burst": 1, "measure.strain": "small", "measure.renew_at": 1.0}
+    none = {"lens": {}, "plate": {}, "gauges": {}, "alarm": [], "camera.readout_ms": 0.0}
+    request = ReplayRequest(
+        source=arguments.source,
+        as_measured=False,
+        start_s=None,
+        end_s=None,
+        reference=None,
+        config_file=Path(arguments.config) if arguments.config and Path(arguments.config).exists() else None,
+        overrides={**overrides(arguments), **single, **none},
+    )
+    with open_source(request) as (source, config):
+        if source.camera.clock == "nominal" and not source.camera.fps:
+            raise ConfigError(f"{arguments.source}: the pictures have no times; record a session")
+        ready = prepare_replay(source, config, arguments.source, screen)
+        found = []
+        for m in ready.measurements(source.bursts, source.loads, ignore_event):
+            found.append((m.t, m.field))
+            screen.progress(m.time_step, m.number + 1, source.expected, 0.0)
+    return from_motion([t for t, _ in found], [field for _, field in found], source.camera.height)

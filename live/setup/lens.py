@@ -1,0 +1,71 @@
+"""The lens of a configuration, as ``phasedic lens`` calibrated it, checked against the pictures that it corrects."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from acquire.errors import ConfigError
+from analysis.optics import LensModel, strain_of_shift
+from live.config.loading import Config
+from live.config.sections import LensConfig
+
+if TYPE_CHECKING:
+    from analysis import ZoiGrid
+
+SHOWN_SHIFT_PX = 10.0
+"""Motion for which check and calibration give the strain that a lens makes."""
+
+
+def lens_for(config: Config, width: int, height: int, grid: ZoiGrid) -> LensModel | None:
+    """The lens for the ZOIs of ``grid`` on pictures of ``width`` x ``height`` px; None where none is given.
+
+    Raises
+    ------
+    ConfigError
+        It was calibrated for other pictures or another part of them, or is no lens.
+    """
+    given = config.lens
+    if given.focal_px is None:
+        return None
+    lens = _lens(given)
+    if given.picture is not None and given.picture != (width, height):
+        raise ConfigError(
+            f"lens: it was calibrated with pictures of {given.picture[0]} x {given.picture[1]} px, these have"
+            f" {width} x {height}; calibrate with the same format and --crop, or measure with --no-lens"
+        )
+    x, y = np.meshgrid(grid.x, grid.y)
+    x, y = x[grid.active], y[grid.active]
+    if given.box is not None and not _inside(given.box, x, y):
+        left, top, across, down = given.box
+        raise ConfigError(
+            f"lens: ZOIs from {x.min():.0f},{y.min():.0f} to {x.max():.0f},{y.max():.0f} px leave the part that was"
+            f" calibrated, {left:.0f},{top:.0f} to {left + across:.0f},{top + down:.0f}; calibrate over the whole"
+            " region, take a smaller --roi, or measure with --no-lens"
+        )
+    if not lens.is_single_valued(x, y):
+        raise ConfigError("lens: its terms fold the picture at the ZOIs; calibrate again")
+    return lens
+
+
+def _lens(given: LensConfig) -> LensModel:
+    if given.centre is None:
+        raise ConfigError("lens: give centre = [x, y] in px beside focal_px")
+    parameters = np.array([given.focal_px, *given.centre, given.k1, given.k2, given.p1, given.p2, given.k3])
+    n = len(parameters)
+    return LensModel(parameters, np.zeros((n, n)) if given.covariance is None else np.array(given.covariance))
+
+
+def _inside(box: tuple[float, float, float, float], x: np.ndarray, y: np.ndarray) -> bool:
+    left, top, width, height = box
+    return bool(x.min() >= left and x.max() <= left + width and y.min() >= top and y.max() <= top + height)
+
+
+def lens_words(lens: LensModel, grid: ZoiGrid) -> str:
+    """What the lens does to the strain of the region, and how well that is known."""
+    strain, sigma = strain_of_shift(lens, grid, SHOWN_SHIFT_PX)
+    return (
+        f"a shift of {SHOWN_SHIFT_PX:g} px shows {strain * 1e6:.1f} µm/m in the region; removed, known to"
+        f" {sigma * 1e6:.2g} µm/m"
+    )

@@ -1,0 +1,84 @@
+"""The readout time against closed forms: bands of a lamp, and a rigid specimen behind a rolling shutter."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.optics import readout_of_bands, readout_of_motion
+from hw_mocks.deformation import Affine
+from hw_mocks.optics import Optics, RolledShutter
+
+LINES = 240
+
+
+def profiles(
+    readout_s: float, seed: int, fps: float = 29.3, lamp: float = 100.0, flicker: float = 0.1
+) -> np.ndarray:
+    """Means of the lines of 96 pictures of an uneven scene."""
+    rng = np.random.default_rng(seed)
+    scene = 100 * (1 + 0.2 * np.clip(rng.standard_normal(LINES), -3, 3))
+    optics = Optics(readout_s=readout_s, flicker=flicker, lamp_Hz=lamp)
+    light = np.array([optics.light((k + 0.1) / fps, LINES)[:, 0] for k in range(96)])
+    return np.asarray(scene * light + rng.normal(0, 0.1, light.shape))
+
+
+@pytest.mark.parametrize(("readout_s", "lamp"), [(0.004, 100), (0.0166, 120), (0.033, 100), (0.12, 100)])
+def test_bands_of_a_lamp_give_the_time(readout_s: float, lamp: float) -> None:
+    found = [readout_of_bands(profiles(readout_s, seed, lamp=lamp), lamp) for seed in range(6)]
+    errors = [(one.seconds - readout_s) / one.sigma for one in found]
+    assert np.max(np.abs(errors)) < 3
+    assert max(one.sigma for one in found) < 3e-3 * readout_s
+
+
+@pytest.mark.parametrize(
+    "seen",
+    [profiles(0.0, 1), profiles(0.033, 1, fps=25.0), profiles(0.033, 1, flicker=0.0)],
+    ids=["global shutter", "bands stand still", "even light"],
+)
+def test_pictures_without_moving_bands_are_refused(seen: np.ndarray) -> None:
+    with pytest.raises(ValueError, match="no bands that move"):
+        readout_of_bands(seen, 100.0)
+    with pytest.raises(ValueError, match="15 pictures; it takes 16"):
+        readout_of_bands(seen[:15], 100.0)
+
+
+READOUT_S = 0.033
+
+
+def moved(seed: int, amplitude: tuple[float, float]) -> tuple[np.ndarray, ...]:
+    """t, u, v, du_dy, dv_dy of a specimen moved to and fro, nearer to the camera where it is lower, with noise."""
+    rng, t = np.random.default_rng(seed), np.arange(90) / 30.0
+
+    def at(when: float) -> Affine:
+        x, y = amplitude[0] * np.sin(2.5 * when), amplitude[1] * np.sin(2 * when)
+        scale = 2e-5 * y + 1e-6 * y**2
+        return Affine(x, y, du_dx=scale, dv_dy=scale, x0=200, y0=LINES / 2)
+
+    rows = []
+    for when in t:
+        seen = RolledShutter(at, when, READOUT_S, LINES)
+        (u, v), gradient = seen.displacement(200.0, LINES / 2), seen.gradient(200.0, LINES / 2)
+        rows.append((u, v, gradient[1], gradient[3]))
+    u, v, du_dy, dv_dy = np.array(rows, float).T
+    noise = rng.normal(0, 2e-5, (2, len(t)))
+    return t, u, v, du_dy + noise[0], dv_dy + noise[1]
+
+
+@pytest.mark.parametrize("amplitude", [(12.0, 0.0), (0.0, 12.0), (10.0, 8.0)])
+def test_motion_gives_the_time_whatever_the_distance_does(amplitude: tuple[float, float]) -> None:
+    errors = []
+    for seed in range(30):
+        t, u, v, du_dy, dv_dy = moved(seed, amplitude)
+        found = readout_of_motion(t, (u, v), (du_dy, dv_dy), LINES)
+        errors.append((found.seconds - READOUT_S) / found.sigma)
+        assert found.sigma < 0.02 * READOUT_S
+    assert 0.6 < np.sqrt(np.mean(np.square(errors))) < 1.6
+
+
+def test_too_little_motion_is_refused() -> None:
+    t, u, v, du_dy, dv_dy = moved(1, (0.01, 0.01))
+    with pytest.raises(ValueError, match="too little motion"):
+        readout_of_motion(t, (u, v), (du_dy, dv_dy), LINES)
+    with pytest.raises(ValueError, match="9 pictures with a value"):
+        readout_of_motion(t[:9], (u[:9], v[:9]), (du_dy[:9], dv_dy[:9]), LINES)
