@@ -74,10 +74,10 @@ class Optics:
         From the first line of the picture to the last; a frame is stamped at its middle line.
     behind : bool
         The camera looks at the back.
-    flicker, lamp_Hz : float, Hz
-        Amplitude of the light over its mean, as the exposure leaves it, and its frequency.
     bending : float
         Strain of the front over the mean of both sides, less 1; the back has as much less.
+    flicker, lamp_Hz : float, Hz
+        Amplitude of the light over its mean, as the exposure leaves it, and its frequency.
     """
 
     stand_off_mm: float = math.inf
@@ -88,10 +88,9 @@ class Optics:
     plate_strain: float = 0.0
     readout_s: float = 0.0
     behind: bool = False
+    bending: float = 0.0
     flicker: float = 0.0
     lamp_Hz: float = 100.0
-
-    bending: float = 0.0
 
     def light(self, t: float, height: int) -> Array:
         """The light on each line of a picture stamped ``t`` (s), (H, 1), over its mean."""

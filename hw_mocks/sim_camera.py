@@ -319,8 +319,7 @@ def open_sim_camera(address: Address, on_event: EventSink, specimen: VirtualSpec
     (% of full scale at mid-grey), fpn (%), brightness, exposure_us, radius (px), contrast (%), seed,
     buffers, offset (s), faults. Of the view (``hw_mocks.optics``): stand_off_mm (none: telecentric), distortion
     (% at the corner), tilt_x_deg, tilt_y_deg, settle_mm, settle_x_deg, settle_y_deg (reached at the largest load),
-    plates (x,y,width,height;...), plate_strain, readout_ms, flicker (%), lamp_hz, side (front or back),
-    bending (%: strain of the front over the mean, less 1).
+    plates (x,y,width,height;...), plate_strain, readout_ms, flicker (%), lamp_hz, side, bending (%, of the front).
 
     Raises
     ------

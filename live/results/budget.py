@@ -14,6 +14,7 @@ from live.config.sections import CameraConfig, ScaleConfig
 
 MOTION_MM = 0.1
 """Towards the camera, that the budget gives the strain of."""
+LENS = "lens"
 _KEYS = {
     "load cell": "specimen.force_error_percent",
     "section": "specimen.section_error_percent",
@@ -76,8 +77,8 @@ def budget_rows(
     Parameters
     ----------
     shares : mapping of str to float
-        Relative standard uncertainties: scatter, that of a lens that is corrected, and what is stated of load cell,
-        section and strain.
+        Relative standard uncertainties: scatter, what is stated of load cell, section and strain, and of a lens
+        that is corrected.
     strain : float
         End of the elastic interval.
     modulus : float
@@ -86,8 +87,8 @@ def budget_rows(
     stresses : bool
         The section is known.
     """
-    corrected = ("lens",) if "lens" in shares else ()
-    causes = [cause for cause in ("scatter", *corrected, *_KEYS) if stresses or cause != "section"]
+    left_out = ({"section"} if not stresses else set()) | ({LENS} - shares.keys())
+    causes = [cause for cause in ("scatter", *_KEYS, LENS) if cause not in left_out]
     rows = [
         BudgetRow(cause, shares[cause] * strain, shares[cause] * modulus)
         if cause in shares
@@ -95,18 +96,15 @@ def budget_rows(
         for cause in causes
     ]
     combined = math.hypot(*shares.values())
-    optics = (
-        BudgetRow(cause, words=words)
-        for cause, words in _optics(view, stated="strain" in shares)
-        if cause not in corrected
-    )
+    seen = _optics(view, stated="strain" in shares)
+    optics = (BudgetRow(cause, words=words) for cause, words in seen if cause not in shares)
     return [*rows, *optics, BudgetRow("combined", combined * strain, combined * modulus)]
 
 
 def _optics(view: CameraView, *, stated: bool) -> Iterator[tuple[str, str]]:
     """What the view adds to strains, in words: removed, in the row strain where that is ``stated``, or not counted."""
     yield "motion off the plane", _motion(view, stated=stated)
-    yield "lens", "in strain" if stated else "not stated: --lens, or specimen.strain_error_um_m"
+    yield LENS, "in strain" if stated else "not stated: --lens, specimen.strain_error_um_m"
     shutter = "not stated: camera.readout_ms" if view.readout_ms is None else "removed"
     yield "rolling shutter", shutter if view.readout_ms != 0 else "none"
 

@@ -182,7 +182,7 @@ def _at_the_front(front: Curve, back: Curve, gap: float) -> Curve:
     return replace(
         back, t=front.t, strain=strain, stress=front.stress, transverse=moved(back.transverse),
         elastic=moved(back.elastic), uneven=moved(back.uneven), misfit=moved(back.misfit),
-        narrowing=moved(back.narrowing),
+        narrowing=moved(back.narrowing), lens=moved(back.lens),
     )  # fmt: skip
 
 
@@ -197,8 +197,10 @@ def _mean_of(front: Curve, back: Curve) -> Curve:
     strain = (front.strain + back.strain) / 2
     transverse, elastic = mean(front.transverse, back.transverse), mean(front.elastic, back.elastic)
     narrowing = mean(front.narrowing, back.narrowing)
+    known = [lens for lens in (front.lens, back.lens) if lens is not None]
+    lens = np.hypot.reduce(known) / 2 if known else None
     return Curve(
-        front.t, strain, front.stress, transverse, elastic, narrowing=narrowing,
+        front.t, strain, front.stress, transverse, elastic, narrowing=narrowing, lens=lens,
         source=f"mean of both sides: {front.source}", elastic_source=front.elastic_source,
     )  # fmt: skip
 
