@@ -39,14 +39,8 @@ BENDING_CHANCE = 5.0
 BENDING_SHARE = 0.15
 """... beyond the squares of a limit in px and of this share of the displacement that the strain makes in
 the ZOI, which a crack exceeds."""
-AGREES = 0.8, 1.1
-"""What is left over what the given noise explains, between which the given noise stands. Where the warp reads between
-the pixels it smooths the noise, and white noise of the strength given leaves down to 0.84 (quintic splines)."""
 COLOURED = 1.5
 """Variance of u or v over that of white noise from which on bending is allowed as much more noise."""
-AGREES = 0.8, 1.1
-"""What is left over what the given noise explains, between which the given noise stands. Where the warp reads between
-the pixels it smooths the noise, and white noise of the strength given leaves down to 0.84 (quintic splines)."""
 CENTRE_VARIANCE = (4.0, 16.0)
 """The shares of the two limits above that a ZOI uses up are added and must not exceed 1: cracks, blur and glare often
 show a little in both (of 645,000 good simulated ZOIs 10 are lost so, of 295 wrong ones that pass both limits 157
