@@ -266,7 +266,7 @@ class Solution:
         from analysis.fit.assembly import expect
 
         out = np.empty(len(gain))
-        expect(gain, *self.variances(which, gain), self.rounding, out)
+        expect(np.ascontiguousarray(gain), *self.variances(which, gain), self.rounding, out)
         return out
 
     def variances(self, which: Places, gain: Floats) -> tuple[Floats, Floats]:

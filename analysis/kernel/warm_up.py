@@ -217,7 +217,7 @@ def _rest() -> None:
     explained(found, none, none, known, np.empty(0, np.intp), 1, pairs)
     medians(np.ones((2, 2)))
     weigh_blur(single, single, single)
-    expect(np.empty((2, 2))[:, 0], np.ones(2), np.ones(2), 0.0, np.empty(2))
+    expect(np.ones(2), np.ones(2), np.ones(2), 0.0, np.empty(2))
     weigh(np.empty(0, np.bool_), none, none, np.empty((2, 2))[:, 0], none, none, single, single, single)
     origins, p = np.empty((0, 2), np.int64), np.empty((0, 6))
     warp_zois(_no_picture(), np.empty(18, np.float32), origins, 32, p, np.empty((0, 32, 32), np.float32))

@@ -280,3 +280,25 @@ def test_moments_of_products(order: int) -> None:
                 for y in range(most + 1):
                     for x in range(most + 1 - y):
                         assert found[PRODUCT[a, b], y, x] == pytest.approx(expected[y, x], abs=1e-3)
+
+
+def test_a_measurement_compiles_nothing_that_was_not_compiled_ahead() -> None:
+    """What a process compiles for itself may have another last digit than what the next one loads."""
+    from analysis import PhaseKernel, Roi, ZoiGrid
+    from analysis.kernel.warm_up import _loops
+
+    def compiled() -> list[int]:
+        return [len(getattr(loop, "dispatcher", loop).signatures) for loop in _loops(True)]
+
+    from analysis import warm_up
+
+    warm_up()
+    before = compiled()
+    image = RNG.normal(128, 30, (256, 256)).astype(np.uint8)
+    for step in (4, 8):
+        kernel = PhaseKernel(image, ZoiGrid.cover(Roi(8, 8, 240, 240), 32, step), noise=1.0)
+        field = kernel.measure(image, noise=1.0)
+        noisy = np.clip(image + RNG.normal(0, 3, image.shape), 0, 255).astype(np.uint8)
+        kernel.measure(noisy, field, noise=1.0)
+        kernel.measure(np.roll(image, 40, 1), field)
+    assert compiled() == before
