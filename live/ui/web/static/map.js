@@ -21,11 +21,14 @@ export function beginMap(stage) {
   load(++shownPicture);
 }
 
+let choosing = false; // "fixed" is chosen and waits for its limit: the range of the program does not take its place
+
 for (const id of ["component", "range", "limit"]) {
   $(id).addEventListener("change", () => {
     $("limit").hidden = $("range").value !== "fixed";
     const limit = Number($("limit").value) / strainUnit().factor;
-    if ($("range").value === "fixed" && !(limit > 0)) { $("limit").focus(); return; }
+    choosing = $("range").value === "fixed" && !(limit > 0);
+    if (choosing) { $("limit").focus(); return; }
     post("/map", { of: $("component").value, range: $("range").value, limit });
   });
 }
@@ -52,7 +55,7 @@ export function showMap(value) {
 addEventListener("unit", () => { if (picture) showLegend(); });
 
 function showLegend() {
-  for (const [id, now] of [["component", picture.of], ["range", picture.range]]) if ($(id) !== document.activeElement) $(id).value = now;
+  for (const [id, now] of [["component", picture.of], ["range", choosing ? "fixed" : picture.range]]) if ($(id) !== document.activeElement) $(id).value = now;
   $("limit").hidden = $("range").value !== "fixed";
   const scaled = picture.high != null, unit = picture.strain ? strainUnit().name : (picture.unit ?? "");
   if ($("limit") !== document.activeElement && scaled && picture.range === "fixed" && picture.strain) $("limit").value = short(picture.high * factor()).replace("−", "-");

@@ -227,9 +227,8 @@ def test_other_versions_are_refused(package: str) -> None:
 
 
 ELSEWHERE = """
-from importlib import metadata
-here = metadata.version
-metadata.version = lambda name: "0.0.1" if name == "phasedic" else here(name)
+import live
+live.VERSION = "0.0.1"
 """
 """As ``sitecustomize``: a machine that has another version of phasedic installed."""
 
