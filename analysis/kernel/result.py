@@ -37,14 +37,15 @@ class PredictedMotion(NamedTuple):
 class _Noise(NamedTuple):
     """Variances a pixel of the reference and of the image at each ZOI, (A,), GL^2, and their share of u and of v.
 
-    ``colour`` (2,) is the variance of u and of v over that of white noise; ``over`` the standard deviation of both
-    images over that as given, NaN where it was not found.
+    ``colour`` (2,) is the variance of u and of v over that of white noise, and ``seen`` the same as the shapes show it;
+    ``over`` the standard deviation of both images over that as given, NaN where it was not found.
     """
 
     reference: Floats
     current: Floats
     colour: Floats
     over: float
+    seen: Floats
 
     def share(self, gain: Floats, ok: NDArray[np.bool_]) -> float:
         """What of the variance is the reference's, median of some ZOIs."""
@@ -123,7 +124,7 @@ def _unbiased(
 def _picture_error(solution: Solution, ok: NDArray[np.bool_], noise: _Noise) -> PictureError | None:
     if np.isnan(noise.over):
         return None
-    error = PictureError(noise.over, (float(noise.colour[0]), float(noise.colour[1])))
+    error = PictureError(noise.over, (float(noise.seen[0]), float(noise.seen[1])))
     if solution.had_lines:
         return replace(error, cause="bands")
     return replace(error, cause=error_cause(solution, ok)) if error.factor > LIMIT else error
@@ -145,23 +146,25 @@ def _noise_parts(solution: Solution, ok: NDArray[np.bool_]) -> _Noise:
         common = solution.pooled(np.flatnonzero(ok))
     if common is not None:
         colour, ratio = common.colour, common.ratio
+        seen = colour
         over = common.usual if ok.all() else float(np.median(ratio[ok]))
         doubtful = max(colour.max(), over) > DOUBTFUL and not solution.had_lines
         rest = beside_strain(solution, ok) if doubtful else None
         if rest is not None:
             over = 1.0 if solution.is_given and AGREES[0] < rest < AGREES[1] else rest
-            colour, ratio = white, np.full(len(ok), over)
+            seen = colour = white
+            ratio = np.full(len(ok), over)
         elif colour.min() < 1 and abs(float(np.median(solution.found.nuisance[ok, 2]))) > SOME_BLUR:
             # What a fit leaves of a blur is pattern, which moves u and v more than it shows in the shapes.
             colour = np.maximum(colour, 1)
         whole = ratio * solution.expected(np.s_[:], gain)
-        return _Noise(*_parted(whole, reference * gain**2, gain, solution), colour, math.sqrt(over))
+        return _Noise(*_parted(whole, reference * gain**2, gain, solution), colour, math.sqrt(over), seen)
     if solution.noise is not None or not ok.any():
-        return _Noise(reference, current, white, float("nan"))
+        return _Noise(reference, current, white, float("nan"), white)
     left = solution.found.left / solution.reference.prepared.freedom
     found = max(float(np.median(left[ok])), solution.rounding)
     whole = np.full(len(ok), found)
-    return _Noise(*_parted(whole, reference, np.ones(len(ok)), solution), white, float("nan"))
+    return _Noise(*_parted(whole, reference, np.ones(len(ok)), solution), white, float("nan"), white)
 
 
 def _parted(whole: Floats, reference: Floats, gain: Floats, solution: Solution) -> tuple[Floats, Floats]:
