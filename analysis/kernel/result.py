@@ -124,10 +124,11 @@ def _unbiased(
 def _picture_error(solution: Solution, ok: NDArray[np.bool_], noise: _Noise) -> PictureError | None:
     if np.isnan(noise.over):
         return None
-    error = PictureError(noise.over, (float(noise.seen[0]), float(noise.seen[1])))
+    error = PictureError(noise.over, (float(noise.colour[0]), float(noise.colour[1])))
     if solution.had_lines:
         return replace(error, cause="bands")
-    return replace(error, cause=error_cause(solution, ok)) if error.factor > LIMIT else error
+    found = noise.over * float(noise.seen.max()) ** 0.5
+    return replace(error, cause=error_cause(solution, ok)) if found > LIMIT else error
 
 
 def _motion(solution: Solution, values: Floats, expected: PredictedMotion) -> Motion:
