@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import fields, replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -304,6 +305,7 @@ def tracks(
     )
 
 
+@cache
 def found(lag: float, **test: float) -> list[Figure]:
     return [find_lag(*tracks(seed, lag, **test)) for seed in range(50)]
 

@@ -217,9 +217,9 @@ def disturbed(
     each: Callable[[Measurement], None] = lambda m: None,
     **more: Any,
 ) -> tuple[Outcome, np.ndarray]:
-    """A run of four seconds, and time and latency of each result."""
+    """A run of a good three seconds, and time and latency of each result."""
     settings = {
-        "camera.address": f"bench:?width=192&height=160&fps={FPS:g}&seconds=4&pictures=8&buffers=64",
+        "camera.address": f"bench:?width=192&height=160&fps={FPS:g}&seconds=3.3&pictures=8&buffers=64",
         "measure.zoi": 48,
         "measure.step": 32,
         "measure.burst": 1,

@@ -211,6 +211,7 @@ def test_the_table_can_be_followed_while_the_test_runs(tmp_path: Path) -> None:
 RATE, UNTIL = 5e-4, 4e-3
 
 
+@pytest.mark.slow
 @pytest.mark.timed
 def test_the_strain_rate_is_held_through_yield(tmp_path: Path) -> None:
     """Within the 20 % of ISO 6892-1 over a second, where the machine alone would be 40 % off."""

@@ -20,7 +20,7 @@ from tests.live.ui.web.browser import ROOT, Program
 from tests.live.ui.web.http_page import HttpPage
 from tests.live.ui.web.test_page_consumer import costs_of, measurement
 
-CAMERA = "sim:uniform?width=256&height=192&fps=20&seconds=12"
+CAMERA = "sim:uniform?width=256&height=192&fps=20&seconds=8"
 RUN = [
     "run",
     "--page",
