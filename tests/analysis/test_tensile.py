@@ -25,7 +25,7 @@ from analysis.evaluate import (
     principal_direction,
 )
 from analysis.evaluate.curve import Loading, broken_at
-from analysis.evaluate.elastic import line_through
+from analysis.evaluate.elastic import _slope, line_through
 from tests.analysis.curves import Truth, composite, linear, lueders, noisy, ramberg_osgood
 
 SEEDS = 60
@@ -303,6 +303,16 @@ def tracks(
         Track(frames, np.interp(frames, t, strain) + rng.normal(0, 10e-6, len(frames))),
         Track(samples, np.interp(samples - lag, t, force) + rng.normal(0, newtons, len(samples))),
     )
+
+
+def test_the_slope_of_two_noises_is_that_of_total_least_squares() -> None:
+    """In units of the two noises, along the largest eigenvector of the covariance."""
+    for ratio in (0.5, 3.0, 7.0):
+        moments = np.array([[4.0, 9.0], [9.0, 30.0]])
+        scaled = moments / np.outer([1.0, ratio], [1.0, ratio])
+        across, along = np.linalg.eigh(scaled)[1][:, -1]
+        expected = ratio * along / across
+        assert _slope(4.0, 9.0, 30.0, 0.2, 0.2 * ratio) == pytest.approx(expected, rel=1e-9), ratio
 
 
 @cache
