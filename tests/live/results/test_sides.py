@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping
 from datetime import timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,10 +15,12 @@ import pytest
 from acquire.errors import DataError
 from analysis.evaluate import Course, Curve, TensileOptions, TwoSides, evaluate_test
 from live.cli import main
+from live.pipeline.measurement import AXIAL
+from live.pipeline.run_state import RunState
 from live.results.figures import tensile_options
 from live.results.run_folder import open_run
 from live.results.sides.folder import shift_s
-from live.results.sides.together import SideOfTest, SidesOfTest, longest_gap
+from live.results.sides.together import SideOfTest, SidesOfTest, longest_gap, newest
 from tests.live import made_run
 from tests.live.made_run import CONFIG, GAUGES, PULLED, make_run, noisy
 
@@ -68,6 +70,17 @@ def test_the_curve_of_the_mean_has_means_and_the_stress_of_the_front() -> None:
     np.testing.assert_allclose(found.transverse, -5e-4 * t)
     np.testing.assert_allclose(found.narrowing, -2e-3 * t)
     np.testing.assert_allclose(found.lens, 2.5e-5)
+
+
+def test_the_newest_values_are_those_of_the_newest_instant_of_both(monkeypatch: pytest.MonkeyPatch) -> None:
+    def recent(last: int) -> dict[str, Course]:
+        t = np.arange(last + 1.0)
+        return {AXIAL: Course(t, 1e-3 * t * last, np.zeros(last + 1))}
+
+    monkeypatch.setattr("live.results.sides.together._recent", recent)
+    front, back = cast(RunState, 6), cast(RunState, 4)
+    mean, bending, _ = newest(front, back)[AXIAL]
+    assert mean == pytest.approx(4e-3 * (6 + 4) / 2) and bending == pytest.approx(4e-3 * (6 - 4) / 2)
 
 
 def test_mean_bending_and_their_sigma() -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from live.config.loading import load_config
+from live.results.budget import CameraView, budget_rows
 from live.setup.check.budget import budget_lines
 from live.setup.check.noise_floor import GaugeNoise
 
@@ -45,3 +46,22 @@ def test_the_mean_of_the_region_without_a_gauge_along_the_load() -> None:
 
 def test_nothing_without_noise() -> None:
     assert lines(()) == {}
+
+
+@pytest.mark.parametrize(
+    ("readout_ms", "words"),
+    [(None, "not stated: camera.readout_ms"), (0.0, "none"), (1.0, "removed"), (12.0, "removed")],
+)
+def test_the_rolling_shutter_is_removed_where_its_time_is_stated(
+    readout_ms: float | None, words: str
+) -> None:
+    rows = budget_rows({"scatter": 0.01}, 1e-3, 100.0, CameraView(readout_ms=readout_ms), stresses=True)
+    assert {row.cause: row.words for row in rows}["rolling shutter"] == words
+
+
+def test_shares_combine_as_independent_ones_in_strain_and_in_the_modulus() -> None:
+    shares = {"scatter": 0.03, "section": 0.04}
+    found = {row.cause: row for row in budget_rows(shares, 2e-3, 70.0, CameraView(500.0), stresses=True)}
+    assert (found["section"].strain, found["section"].modulus) == pytest.approx((8e-5, 2.8))
+    assert (found["combined"].strain, found["combined"].modulus) == pytest.approx((1e-4, 3.5))
+    assert found["motion off the plane"].words == "not counted: 0.1 mm at 500 mm is 200 µm/m"
